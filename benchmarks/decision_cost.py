@@ -74,7 +74,7 @@ class Telling:
         self.left: float | None = None
         self._writer = codec.FeedbackWriter()
 
-    def tell(self, feedback: Feedback) -> None:
+    def publish_feedback(self, feedback: Feedback) -> None:
         """Write one feedback."""
         self._writer.write(feedback)
         self.left = time.perf_counter()
@@ -206,7 +206,7 @@ def cost(robots: int, seconds: float) -> dict[str, list[float]]:
         now = Instant(one.at, WALL + one.at)
         begin = time.thread_time()
         for received in read(one.body, now):
-            evaluator.take(received)
+            evaluator.apply(received)
         evaluator.settle()
         took.setdefault(one.kind, []).append((time.thread_time() - begin) * 1e3)
         if one.at - ticked >= TICK_S:
@@ -237,7 +237,7 @@ async def latency(robots: int, seconds: float) -> list[float]:
         now = clock.now()
         fleet.taken()
         for received in read(one.body, now):
-            evaluator.take(received)
+            evaluator.apply(received)
         evaluator.settle()
         left = fleet.taken()
         if left is not None:

@@ -127,9 +127,9 @@ class Listening(Telling):
         super().__init__()
         self.told: dict[Spot, float] = {}
 
-    def tell(self, feedback: Feedback) -> None:
+    def publish_feedback(self, feedback: Feedback) -> None:
         """Write one feedback, and look whom it tells of."""
-        super().tell(feedback)
+        super().publish_feedback(feedback)
         for alert in feedback.alerts:
             if alert.position is not None:
                 x, y, _ = alert.position
@@ -181,7 +181,7 @@ async def _through_orion(parts: Pipeline, told: list[Message]) -> dict[Spot, flo
 def _notify(parts: Pipeline, body: bytes) -> None:
     _, reading = codec.read_notification(body, parts.ingest.is_past)
     for observation in reading.observations:
-        parts.ingest.offer(Received(observation, clock.now(), FIWARE.id))
+        parts.ingest.enqueue(Received(observation, clock.now(), FIWARE.id))
 
 
 async def _directly(parts: Pipeline, told: list[Message]) -> dict[Spot, float]:
@@ -191,7 +191,7 @@ async def _directly(parts: Pipeline, told: list[Message]) -> dict[Spot, float]:
         "bench",
         robots,
         clock.now,
-        parts.ingest.offer,
+        parts.ingest.enqueue,
         parts.ingest.reject,
         is_past=parts.ingest.is_past,
         passed_over=parts.latency.watch.passed_over,

@@ -86,7 +86,7 @@ def cost(count: int, batch: int, *, storm: bool) -> float:
         part = everything[start : start + batch]
         now = part[-1].at
         for received in part:
-            evaluator.take(received)
+            evaluator.apply(received)
         evaluator.settle()
         if now.mono - ticked >= TICK_S:
             ticked = now.mono

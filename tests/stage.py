@@ -60,7 +60,7 @@ class Stage:
 
     def _hear(self, topic: str, payload: bytes) -> None:
         for received in read_direct(topic, payload, self.now):
-            self._desk.ingest.offer(received)
+            self._desk.ingest.enqueue(received)
 
     # --- time -------------------------------------------------------------------------
 

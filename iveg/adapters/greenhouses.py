@@ -15,7 +15,7 @@ from typing import TypeVar
 from iveg.adapters.toml_positions import syntax_error
 from iveg.domain.errors import DataFileError
 from iveg.domain.geometry import Pose2D, Rectangle
-from iveg.domain.greenhouse import Greenhouse, Lane, Obstacle, Post
+from iveg.domain.greenhouse import DriveLane, Greenhouse, PlacedObstacle, StructuralPost
 
 BUILT_IN = ("mvsim-20x20", "agroconnect", "none")
 _LISTS = ("lanes", "rows", "posts", "obstacles", "starts")
@@ -158,16 +158,18 @@ class _Fields:
         return area
 
 
-def _lane(fields: _Fields) -> Lane:
-    return Lane(fields.text("label"), fields.rectangle())
+def _lane(fields: _Fields) -> DriveLane:
+    return DriveLane(fields.text("label"), fields.rectangle())
 
 
-def _post(fields: _Fields) -> Post:
-    return Post(fields.number("x"), fields.number("y"), fields.number("radius", 0.001))
+def _post(fields: _Fields) -> StructuralPost:
+    return StructuralPost(
+        fields.number("x"), fields.number("y"), fields.number("radius", 0.001)
+    )
 
 
-def _obstacle(fields: _Fields) -> Obstacle:
-    return Obstacle(fields.text("kind"), fields.rectangle())
+def _obstacle(fields: _Fields) -> PlacedObstacle:
+    return PlacedObstacle(fields.text("kind"), fields.rectangle())
 
 
 def _start(fields: _Fields) -> Pose2D:

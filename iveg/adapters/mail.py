@@ -13,16 +13,16 @@ from iveg.adapters.outbound import OutboundHttp
 from iveg.domain.errors import OutboundError
 from iveg.domain.messages import (
     Contacts,
-    Delivery,
     Email,
     Language,
-    Message,
-    Recipient,
-    Text,
+    MailRecipient,
+    MessageDelivery,
+    MessageText,
+    OutboundMessage,
 )
 from iveg.domain.observations import Instant
 
-Write = Callable[[Message, Language], Text]
+Write = Callable[[OutboundMessage, Language], MessageText]
 
 
 class MailSender:
@@ -38,8 +38,8 @@ class MailSender:
         self._write = write
 
     async def send(
-        self, contacts: Contacts, message: Message, now: Instant
-    ) -> Sequence[Delivery]:
+        self, contacts: Contacts, message: OutboundMessage, now: Instant
+    ) -> Sequence[MessageDelivery]:
         """A letter to each recipient, where a server is known."""
         email = contacts.email
         if not email.server or not email.recipients:
@@ -52,9 +52,11 @@ class MailSender:
             why = "no_answer"
         except (OutboundError, aiosmtplib.SMTPException, OSError) as error:
             why = _why(error)
-        return [Delivery("email", one.who, now, why) for one in email.recipients]
+        return [MessageDelivery("email", one.who, now, why) for one in email.recipients]
 
-    async def _send(self, email: Email, text: Text, now: Instant) -> list[Delivery]:
+    async def _send(
+        self, email: Email, text: MessageText, now: Instant
+    ) -> list[MessageDelivery]:
         connection = await self._outbound.connect(email.server, email.port)
         own = connection.getsockname()[0]
         client = aiosmtplib.SMTP(
@@ -76,8 +78,12 @@ class MailSender:
 
 
 async def _letter(
-    client: aiosmtplib.SMTP, email: Email, to: Recipient, text: Text, now: Instant
-) -> Delivery:
+    client: aiosmtplib.SMTP,
+    email: Email,
+    to: MailRecipient,
+    text: MessageText,
+    now: Instant,
+) -> MessageDelivery:
     letter = EmailMessage()
     letter["From"], letter["To"] = email.sender, to.address
     letter["Subject"] = text.title
@@ -89,10 +95,10 @@ async def _letter(
     try:
         await client.send_message(letter)
     except aiosmtplib.SMTPResponseException as error:
-        return Delivery("email", to.who, now, _why(error))
+        return MessageDelivery("email", to.who, now, _why(error))
     except aiosmtplib.SMTPRecipientsRefused:
-        return Delivery("email", to.who, now, "refused")
-    return Delivery("email", to.who, now)
+        return MessageDelivery("email", to.who, now, "refused")
+    return MessageDelivery("email", to.who, now)
 
 
 def _why(error: Exception) -> str:

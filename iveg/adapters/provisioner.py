@@ -323,7 +323,9 @@ class Provisioner:
         for entity in entities:
             for observation in codec.read_entity(entity).observations:
                 if getattr(observation, "robot_id", None) in self._robots:
-                    self._ingest.offer(Received(observation, at, FIWARE.id, asked=True))
+                    self._ingest.enqueue(
+                        Received(observation, at, FIWARE.id, asked=True)
+                    )
 
     # --- telling ------------------------------------------------------------------
 

@@ -20,7 +20,7 @@ class MqttTransport:
         self._apikey = apikey
         self._writer = codec.FeedbackWriter()
 
-    def tell(self, feedback: Feedback) -> None:
+    def publish_feedback(self, feedback: Feedback) -> None:
         """Offer feedback; a newer one overtakes what has not left yet."""
         topic = names.FEEDBACK_TOPIC.format(robot_id=feedback.robot_id)
         self._link.offer(topic, self._writer.write(feedback), qos=1)

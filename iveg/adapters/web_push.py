@@ -22,7 +22,13 @@ from cryptography.hazmat.primitives.serialization import Encoding, PublicFormat
 from iveg.adapters.mail import Write
 from iveg.adapters.outbound import OutboundHttp
 from iveg.domain.errors import OutboundError
-from iveg.domain.messages import Contacts, Delivery, Device, Message, Push
+from iveg.domain.messages import (
+    Contacts,
+    MessageDelivery,
+    OutboundMessage,
+    Push,
+    SubscribedBrowser,
+)
 from iveg.domain.observations import Instant
 
 _CURVE: Final = ec.SECP256R1()
@@ -41,8 +47,8 @@ class PushSender:
         self._write = write
 
     async def send(
-        self, contacts: Contacts, message: Message, now: Instant
-    ) -> Sequence[Delivery]:
+        self, contacts: Contacts, message: OutboundMessage, now: Instant
+    ) -> Sequence[MessageDelivery]:
         """One push a device, all at once."""
         push = contacts.push
         return await asyncio.gather(
@@ -50,8 +56,12 @@ class PushSender:
         )
 
     async def _one(
-        self, push: Push, device: Device, message: Message, now: Instant
-    ) -> Delivery:
+        self,
+        push: Push,
+        device: SubscribedBrowser,
+        message: OutboundMessage,
+        now: Instant,
+    ) -> MessageDelivery:
         text = self._write(message, device.language)
         content = orjson.dumps({"title": text.title, "body": text.body})
         try:
@@ -71,7 +81,7 @@ class PushSender:
             failed = error.why
         except ValueError:
             failed = "gone"  # what the browser told is no key: it cannot be reached
-        return Delivery("push", device.who, now, failed, device.device_id)
+        return MessageDelivery("push", device.who, now, failed, device.device_id)
 
 
 def _failed(status: int) -> str | None:

@@ -6,7 +6,7 @@ import orjson
 
 from iveg.adapters.outbound import OutboundHttp
 from iveg.domain.errors import OutboundError
-from iveg.domain.messages import Contacts, Delivery, Message
+from iveg.domain.messages import Contacts, MessageDelivery, OutboundMessage
 from iveg.domain.observations import Instant
 from iveg.domain.stamps import format_stamp
 
@@ -20,8 +20,8 @@ class WebhookSender:
         self._outbound = outside
 
     async def send(
-        self, contacts: Contacts, message: Message, now: Instant
-    ) -> Sequence[Delivery]:
+        self, contacts: Contacts, message: OutboundMessage, now: Instant
+    ) -> Sequence[MessageDelivery]:
         """Post to the address, where there is one."""
         hook = contacts.webhook
         if not hook.url:
@@ -30,12 +30,12 @@ class WebhookSender:
         try:
             status = await self._outbound.post(hook.url, body, _HEADERS)
         except OutboundError as error:
-            return [Delivery("webhook", hook.who, now, error.why)]
+            return [MessageDelivery("webhook", hook.who, now, error.why)]
         failed = None if 200 <= status < 300 else "refused"
-        return [Delivery("webhook", hook.who, now, failed)]
+        return [MessageDelivery("webhook", hook.who, now, failed)]
 
 
-def body_of(message: Message, now: Instant) -> dict[str, object]:
+def body_of(message: OutboundMessage, now: Instant) -> dict[str, object]:
     """Body for a program: priority, kind, time; no more."""
     return {
         "iveg": "test" if message.is_test else "alert",

@@ -137,7 +137,7 @@ class Dss:
             self.settings.apikey,
             self.fleet.ids,
             clock.now,
-            ingest.offer,
+            ingest.enqueue,
             ingest.reject,
             self.settings.direct_read,
             ingest.is_past,

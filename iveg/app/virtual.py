@@ -53,11 +53,11 @@ class VirtualPipeline:
     def hear(self, topic: str, payload: bytes) -> None:
         """Take a robot's own message as if read from the broker."""
         for received in read_direct(topic, payload, self.now):
-            self.parts.ingest.offer(received)
+            self.parts.ingest.enqueue(received)
 
     # --- its ports ----------------------------------------------------------------
 
-    def tell(self, feedback: Feedback) -> None:
+    def publish_feedback(self, feedback: Feedback) -> None:
         """Keep the feedback."""
         self.told.append(feedback)
 

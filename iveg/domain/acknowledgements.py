@@ -15,7 +15,7 @@ was slow for another reason is not asked.
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from iveg.domain.decisions import Decision
+from iveg.domain.decisions import SlowdownDecision
 from iveg.domain.observations import Instant
 from iveg.domain.ranks import nearest_rank
 
@@ -48,7 +48,7 @@ class Acknowledgements:
 
 
 def acknowledgements_of(
-    decisions: Iterable[Decision], now: Instant
+    decisions: Iterable[SlowdownDecision], now: Instant
 ) -> Acknowledgements:
     """Acknowledgement latencies of the decisions in memory, last five minutes."""
     recent = [one for one in decisions if _counts(one, now)]
@@ -67,20 +67,20 @@ def acknowledgements_of(
     )
 
 
-def _counts(decision: Decision, now: Instant) -> bool:
+def _counts(decision: SlowdownDecision, now: Instant) -> bool:
     crossing = decision.crossing
     # Who was ahead and has braked by now was not slow for something else.
     asked = decision.answered is not None or not crossing.already_slow
     return asked and now.mono - crossing.entered.mono <= WINDOW_S
 
 
-def _is_due(decision: Decision, now: Instant) -> bool:
+def _is_due(decision: SlowdownDecision, now: Instant) -> bool:
     """Whether the time to acknowledge is over."""
     waited = now.mono - decision.crossing.entered.mono
     return waited > ECHO_S or _is_acknowledged(decision)
 
 
-def _is_acknowledged(decision: Decision) -> bool:
+def _is_acknowledged(decision: SlowdownDecision) -> bool:
     applied, crossing = decision.applied, decision.crossing
     return crossing.ahead or (
         applied is not None and applied.mono - crossing.entered.mono <= ECHO_S

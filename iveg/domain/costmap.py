@@ -103,7 +103,7 @@ class Sweep:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Costmap:
+class InflatedGrid:
     """Costs at one moment: ``nav_msgs/OccupancyGrid`` with its rings inflated.
 
     Attributes:
@@ -161,13 +161,13 @@ class Occupancy:
         other._log[row : row + there.shape[0], column : column + there.shape[1]] = there
         return other
 
-    def costs(self, rings: Iterable[Ring] = ()) -> Costmap:
+    def costs(self, rings: Iterable[Ring] = ()) -> InflatedGrid:
         """What each cell costs, rings laid over it."""
         cost = np.clip(self._log * (100.0 / _MOST), 0.0, 100.0).astype(np.int8)
         cost[np.abs(self._log) < _KNOWN] = UNKNOWN
         for ring in rings:
             _inflate(cost, self.grid, ring)
-        return Costmap(self.grid, cost)
+        return InflatedGrid(self.grid, cost)
 
 
 def window_round(poses: Iterable[Pose2D], before: Grid | None) -> Grid | None:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from iveg.domain.greenhouse import Greenhouse, Lane
+from iveg.domain.greenhouse import DriveLane, Greenhouse
 from iveg.domain.observations import Instant
 from iveg.domain.robot_state import RobotState
 from iveg.domain.tracking.sight import visible_from
@@ -35,7 +35,7 @@ class LaneCells:
         columns: Cells from west to east; ``rows`` from south to north.
     """
 
-    lane: Lane
+    lane: DriveLane
     columns: int
     rows: int
 
@@ -52,7 +52,7 @@ class LaneCells:
         return np.column_stack((np.tile(x, self.rows), np.repeat(y, self.columns)))
 
 
-class Coverage:
+class AisleCoverage:
     """Remembers when each cell of a greenhouse was last in view."""
 
     def __init__(self, greenhouse: Greenhouse) -> None:
@@ -87,7 +87,7 @@ class Coverage:
         return float(np.mean(now.mono - self._looked_at <= RECENT_S))
 
 
-def _laid_out(lanes: tuple[Lane, ...]) -> tuple[LaneCells, ...]:
+def _laid_out(lanes: tuple[DriveLane, ...]) -> tuple[LaneCells, ...]:
     area = sum(_size(lane)[0] * _size(lane)[1] for lane in lanes)
     side = max(CELL_M, math.sqrt(area / MOST_CELLS))
     return tuple(
@@ -96,7 +96,7 @@ def _laid_out(lanes: tuple[Lane, ...]) -> tuple[LaneCells, ...]:
     )
 
 
-def _size(lane: Lane) -> tuple[float, float]:
+def _size(lane: DriveLane) -> tuple[float, float]:
     area = lane.area
     return area.xmax - area.xmin, area.ymax - area.ymin
 

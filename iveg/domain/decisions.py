@@ -1,7 +1,7 @@
 """The decision record: from the detection to the observed slow-down, link by link.
 
-One ``Decision`` opens when a robot enters a ring and closes when it is let go.  Every
-link has a time and a verdict; a link that does not come in time raises an alert
+A ``SlowdownDecision`` opens when a robot enters a ring and closes when it is let go.
+Every link has a time and a verdict; a link that does not come in time raises an alert
 (docs/dashboard.md, "Decisions")::
 
     detection ─> filter ─> geometry ─> rule ─> feedback ─> applied ─> observed
@@ -60,7 +60,7 @@ class Place:
 
 
 @dataclass(frozen=True, slots=True)
-class Decision:
+class SlowdownDecision:
     """Why one robot was slowed once.
 
     Attributes:
@@ -117,35 +117,35 @@ class Decision:
         hidden = crossing.already_slow or crossing.speeding_up
         return crossing.speed_before > JUDGED_ABOVE and not hidden
 
-    def published(self, at: Instant) -> "Decision":
+    def published(self, at: Instant) -> "SlowdownDecision":
         """The speed limit was published."""
         return self if self.feedback is not None else replace(self, feedback=at)
 
-    def reported(self, report: SafetyReport, at: Instant) -> "Decision":
+    def reported(self, report: SafetyReport, at: Instant) -> "SlowdownDecision":
         """The robot said what it applies."""
         obeys = report.speed_factor <= HALF_SPEED
         if self.applied is not None or not obeys or self.ended is not None:
             return self
         return replace(self, applied=at)
 
-    def moved(self, speed: float, at: Instant) -> "Decision":
+    def moved(self, speed: float, at: Instant) -> "SlowdownDecision":
         """Odometry came in with this speed (m/s)."""
         limit = OBSERVED_SHARE * self.crossing.speed_before
         if self.observed is not None or not self.judged or abs(speed) > limit:
             return self
         return replace(self, observed=at, speed_after=abs(speed))
 
-    def closed(self, at: Instant) -> "Decision":
+    def closed(self, at: Instant) -> "SlowdownDecision":
         """The robot was let go."""
         return replace(self, ended=at)
 
-    def aged(self, now: Instant) -> "Decision":
+    def aged(self, now: Instant) -> "SlowdownDecision":
         """Let time pass; a link that did not come is missing from now on."""
         if self.waited_out or now.mono - self.crossing.entered.mono < MISSING_S:
             return self
         return replace(self, waited_out=True)
 
-    def broken_off(self, at: Instant) -> "Decision":
+    def broken_off(self, at: Instant) -> "SlowdownDecision":
         """Close the decision unfinished: iVeg stops, and its end stays unknown."""
         return replace(self, ended=at, interrupted=True)
 
@@ -210,30 +210,30 @@ class Decisions:
 
     def __init__(self, keep: int = 200) -> None:
         self._keep = keep
-        self._all: dict[str, Decision] = {}
+        self._all: dict[str, SlowdownDecision] = {}
         self._first_reports = FirstReports()
 
-    def get(self, decision_id: str) -> Decision | None:
+    def get(self, decision_id: str) -> SlowdownDecision | None:
         """One decision that is still in memory."""
         return self._all.get(decision_id)
 
     @property
-    def known(self) -> Iterable[Decision]:
+    def known(self) -> Iterable[SlowdownDecision]:
         """All that are in memory: the open ones and the newest that ended."""
         return self._all.values()
 
     @property
-    def open(self) -> list[Decision]:
+    def open(self) -> list[SlowdownDecision]:
         """All open decisions."""
         return [one for one in self._all.values() if one.ended is None]
 
     def begin(
         self, crossing: Crossing, rule: DetectionRule, places: Iterable[Place] = ()
-    ) -> Decision:
+    ) -> SlowdownDecision:
         """Open the decision of a crossing; the oldest ended ones make room."""
         notice = self._first_reports.of(crossing)
         noticed, answered = (None, None) if notice is None else notice
-        decision = Decision(
+        decision = SlowdownDecision(
             crossing,
             rule,
             noticed=noticed,
@@ -246,7 +246,7 @@ class Decisions:
             self._all.pop(next(ended, ""), None)
         return decision
 
-    def end(self, decision_id: str, at: Instant) -> list[Decision]:
+    def end(self, decision_id: str, at: Instant) -> list[SlowdownDecision]:
         """A robot was let go."""
         one = self._all.get(decision_id)
         return [] if one is None else self._change([one], lambda one: one.closed(at))
@@ -256,7 +256,7 @@ class Decisions:
         for person_id in people:
             self._first_reports.seen(person_id, at)
 
-    def moved(self, odometry: Odometry, at: Instant) -> list[Decision]:
+    def moved(self, odometry: Odometry, at: Instant) -> list[SlowdownDecision]:
         """A robot drives."""
         speed = odometry.twist.linear_x
         return self._change(
@@ -265,32 +265,34 @@ class Decisions:
 
     def reported(
         self, report: SafetyReport, published_at: float, at: Instant
-    ) -> list[Decision]:
+    ) -> list[SlowdownDecision]:
         """A robot says what it applies; feedback last went out at ``published_at``."""
         self._first_reports.reported(report, published_at, at)
         return self._change(
             self._open_of(report.robot_id), lambda one: one.reported(report, at)
         )
 
-    def published(self, at: Instant) -> list[Decision]:
+    def published(self, at: Instant) -> list[SlowdownDecision]:
         """Feedback was published."""
         return self._change(self.open, lambda one: one.published(at))
 
-    def age(self, now: Instant, known: Container[str]) -> list[Decision]:
+    def age(self, now: Instant, known: Container[str]) -> list[SlowdownDecision]:
         """Time passes; notices of persons who are no longer known are forgotten."""
         self._first_reports.forget(known)
         return self._change(self.open, lambda one: one.aged(now))
 
-    def break_off(self, at: Instant) -> list[Decision]:
+    def break_off(self, at: Instant) -> list[SlowdownDecision]:
         """End every open one: iVeg stops."""
         return self._change(self.open, lambda one: one.broken_off(at))
 
-    def _open_of(self, robot_id: str) -> list[Decision]:
+    def _open_of(self, robot_id: str) -> list[SlowdownDecision]:
         return [one for one in self.open if one.crossing.robot_id == robot_id]
 
     def _change(
-        self, some: Iterable[Decision], step: Callable[[Decision], Decision]
-    ) -> list[Decision]:
+        self,
+        some: Iterable[SlowdownDecision],
+        step: Callable[[SlowdownDecision], SlowdownDecision],
+    ) -> list[SlowdownDecision]:
         changed = [after for one in some if (after := step(one)) is not one]
         self._all.update({one.decision_id: one for one in changed})
         return changed

@@ -62,7 +62,7 @@ class OutOfService:
 
 
 @dataclass(slots=True)
-class Detector:
+class DetectorEvidence:
     """The evidence of one detector; moments are monotonic seconds.
 
     Attributes:

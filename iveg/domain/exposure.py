@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from iveg.domain.limits import LIMITS
-from iveg.domain.margins import Margin
+from iveg.domain.margins import SafetyMargin
 from iveg.domain.observations import Instant
 
 PERIOD_S = 0.5
@@ -25,7 +25,7 @@ _DAY_S = 86_400.0
 class Worst:
     """The least margin of a day, and when it was."""
 
-    margin: Margin
+    margin: SafetyMargin
     at: Instant
 
 
@@ -74,7 +74,7 @@ class Exposures:
         )
 
     def update(
-        self, margins: Sequence[Margin], now: Instant, *, seen: bool
+        self, margins: Sequence[SafetyMargin], now: Instant, *, seen: bool
     ) -> Exposure:
         """Take one evaluation of the margins.
 
@@ -101,7 +101,7 @@ class Exposures:
 
 
 def _spend(
-    day: Exposure, past: float, least: Margin | None, *, whole: bool
+    day: Exposure, past: float, least: SafetyMargin | None, *, whole: bool
 ) -> Exposure:
     """Book the time; a margin that is known to be negative needs no other."""
     if least is not None and least.margin_m < 0.0:
@@ -113,7 +113,9 @@ def _spend(
     return replace(day, known_s=day.known_s + past)
 
 
-def _worse(worst: Worst | None, least: Margin | None, now: Instant) -> Worst | None:
+def _worse(
+    worst: Worst | None, least: SafetyMargin | None, now: Instant
+) -> Worst | None:
     if least is None or (worst is not None and worst.margin.margin_m <= least.margin_m):
         return worst
     return Worst(least, now)

@@ -6,7 +6,7 @@ from iveg.domain.geometry import Pose2D, Rectangle
 
 
 @dataclass(frozen=True, slots=True)
-class Lane:
+class DriveLane:
     """A corridor to drive in, with the label that people know it by."""
 
     label: str
@@ -14,7 +14,7 @@ class Lane:
 
 
 @dataclass(frozen=True, slots=True)
-class Post:
+class StructuralPost:
     """A round structural post (m)."""
 
     x: float
@@ -23,7 +23,7 @@ class Post:
 
 
 @dataclass(frozen=True, slots=True)
-class Obstacle:
+class PlacedObstacle:
     """A crate stack or a trolley."""
 
     kind: str
@@ -43,10 +43,10 @@ class Greenhouse:
 
     name: str
     bounds: Rectangle
-    lanes: tuple[Lane, ...] = ()
+    lanes: tuple[DriveLane, ...] = ()
     rows: tuple[Rectangle, ...] = ()
-    posts: tuple[Post, ...] = ()
-    obstacles: tuple[Obstacle, ...] = ()
+    posts: tuple[StructuralPost, ...] = ()
+    obstacles: tuple[PlacedObstacle, ...] = ()
     starts: tuple[Pose2D, ...] = ()
 
     def in_sight(self, ax: float, ay: float, bx: float, by: float) -> bool:

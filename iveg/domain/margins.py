@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant, Odometry
 from iveg.domain.robot_state import RobotState
-from iveg.domain.tracking.person import Person, Sighting
+from iveg.domain.tracking.person import Sighting, TrackedPerson
 
 Band = Literal["clear", "tight", "inside", "unknown"]
 
@@ -35,7 +35,7 @@ _INSIDE_M = 1e6
 
 
 @dataclass(frozen=True, slots=True)
-class Margin:
+class SafetyMargin:
     """Remaining distance between one robot and one person, surface to surface (m).
 
     Attributes:
@@ -91,7 +91,10 @@ class LeastMargins:
     """
 
     def __init__(
-        self, robots: Iterable[RobotState], people: Iterable[Person], now: Instant
+        self,
+        robots: Iterable[RobotState],
+        people: Iterable[TrackedPerson],
+        now: Instant,
     ) -> None:
         self._robots: list[_Placed] = []
         for robot in robots:
@@ -111,14 +114,14 @@ class LeastMargins:
             self._columns.setdefault(person_id, []).append(column)
         self._pairs = _Pairs.of(self._robots, [look for _, look in seen], now)
 
-    def of_robot(self, robot_id: str) -> Margin | None:
+    def of_robot(self, robot_id: str) -> SafetyMargin | None:
         """The least margin of this robot to anybody."""
         row = self._row.get(robot_id)
         if row is None or not self._persons:
             return None
         return self._pair(row, int(np.argmin(self._pairs.rank[row])))
 
-    def of_person(self, person_id: str) -> Margin | None:
+    def of_person(self, person_id: str) -> SafetyMargin | None:
         """The least margin of any robot to this person."""
         columns = self._columns.get(person_id)
         if columns is None or not self._robots:
@@ -127,7 +130,7 @@ class LeastMargins:
         row, column = np.unravel_index(int(np.argmin(found)), found.shape)
         return self._pair(int(row), columns[int(column)])
 
-    def telling(self) -> list[Margin]:
+    def telling(self) -> list[SafetyMargin]:
         """The least of all pairs that are known now, and one that is not, if any.
 
         They say of this moment what all pairs do (``domain/exposure``).
@@ -150,11 +153,11 @@ class LeastMargins:
             for place in map(int, places)
         ]
 
-    def _pair(self, row: int, column: int) -> Margin:
+    def _pair(self, row: int, column: int) -> SafetyMargin:
         pairs, robot = self._pairs, self._robots[row][0]
         parts = pairs.gap, pairs.walks, pairs.reaction, pairs.braking, pairs.age
         gap, walks, reaction, braking, age = (float(one[row, column]) for one in parts)
-        return Margin(
+        return SafetyMargin(
             robot.robot_id,
             self._persons[column],
             gap,

@@ -21,7 +21,7 @@ MOST_RECIPIENTS = 10
 
 
 @dataclass(frozen=True, slots=True)
-class Recipient:
+class MailRecipient:
     """Somebody with an address; ``who`` is what other people are shown."""
 
     who: str
@@ -44,7 +44,7 @@ class Email:
     user: str = ""
     password: str = field(default="", repr=False)
     sender: str = ""
-    recipients: tuple[Recipient, ...] = ()
+    recipients: tuple[MailRecipient, ...] = ()
     least: Level = "P1"
     language: Language = "es"
 
@@ -60,7 +60,7 @@ class Webhook:
 
 
 @dataclass(frozen=True, slots=True)
-class Device:
+class SubscribedBrowser:
     """One browser that asked to be told (Push API, ``PushSubscription``).
 
     Attributes:
@@ -88,7 +88,7 @@ class Push:
 
     on: bool = False
     contact: str = ""
-    devices: tuple[Device, ...] = ()
+    devices: tuple[SubscribedBrowser, ...] = ()
     key: str = field(default="", repr=False)
 
 
@@ -131,7 +131,7 @@ class AlertItem:
 
 
 @dataclass(frozen=True, slots=True)
-class Message:
+class OutboundMessage:
     """A message to people; without items a test."""
 
     items: Sequence[AlertItem] = ()
@@ -148,7 +148,7 @@ class Message:
 
 
 @dataclass(frozen=True, slots=True)
-class Text:
+class MessageText:
     """A message in one language."""
 
     title: str
@@ -156,7 +156,7 @@ class Text:
 
 
 @dataclass(frozen=True, slots=True)
-class Delivery:
+class MessageDelivery:
     """Result of a message to one person or device.
 
     Attributes:
@@ -171,6 +171,6 @@ class Delivery:
     device_id: str | None = None
 
 
-def newest(deliveries: Sequence[Delivery]) -> tuple[Delivery, ...]:
+def newest(deliveries: Sequence[MessageDelivery]) -> tuple[MessageDelivery, ...]:
     """The last word on each person and channel, in the order of the first ones."""
     return tuple({(one.channel, one.to): one for one in deliveries}.values())

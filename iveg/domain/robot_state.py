@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from iveg.domain.clocks import RobotClock
-from iveg.domain.detector import Detector
+from iveg.domain.detector import DetectorEvidence
 from iveg.domain.doubt import Doubts
 from iveg.domain.fleet import RobotDescription, RobotProfile
 from iveg.domain.geometry import Pose2D
@@ -92,7 +92,7 @@ class RobotState:
     frame_transport: TransportId = FIWARE.id
     detections_at: float | None = None
     sighted_at: Instant | None = None
-    detector: Detector = field(default_factory=Detector)
+    detector: DetectorEvidence = field(default_factory=DetectorEvidence)
     unlabelled: bool = False
     safety: SafetyReport | None = None
     safety_received: Instant | None = None

@@ -31,7 +31,7 @@ def learn_kind(robot: RobotState, received: Received, origin: Origin) -> None:
         robot.live_at = received.at.mono
 
 
-def take_in(robot: RobotState, received: Received, moment: float | None) -> None:
+def apply_newest(robot: RobotState, received: Received, moment: float | None) -> None:
     """Take the newest of its kind in; ``moment`` is when it was measured, or None."""
     observation, at = received.observation, received.at
     match observation:

@@ -33,7 +33,7 @@ from iveg.domain.observations import (
 from iveg.domain.plausibility import Plausibility
 from iveg.domain.probe import ProbeLag
 from iveg.domain.robot_state import RobotState
-from iveg.domain.robot_updates import dated, learn_kind, take_in
+from iveg.domain.robot_updates import apply_newest, dated, learn_kind
 from iveg.domain.stream_order import OrderVerdict
 from iveg.domain.transports import FIWARE
 
@@ -134,7 +134,7 @@ class World:
             robot.sighted_at = dated(at, seen_at)
         if verdict == "new":
             self._doubt(robot, received)
-            take_in(robot, received, self._measured_at(origin, received, likely))
+            apply_newest(robot, received, self._measured_at(origin, received, likely))
         return verdict
 
     def _doubt(self, robot: RobotState, received: Received) -> None:

@@ -5,7 +5,7 @@ from typing import cast
 from pydantic import Field
 
 from iveg.domain.alerts import alert_book, flood
-from iveg.domain.messages import Channel, Delivery, Priority
+from iveg.domain.messages import Channel, MessageDelivery, Priority
 from iveg.domain.records import AlertRecord, Json, LogRecord
 from iveg.domain.stamps import format_stamp
 from iveg.models.base import Listing, Model, Slots, moment, stamp
@@ -20,7 +20,7 @@ class Told(Model):
     failed: str | None
 
     @classmethod
-    def of(cls, one: Delivery) -> "Told":
+    def of(cls, one: MessageDelivery) -> "Told":
         """One that is in memory."""
         at = format_stamp(one.at.wall)
         return cls(channel=one.channel, to=one.to, at=at, failed=one.failed)
@@ -49,7 +49,7 @@ class Occurrence(Model):
     """Recipients outside iVeg."""
 
     @classmethod
-    def of(cls, one: alert_book.Occurrence) -> "Occurrence":
+    def of(cls, one: alert_book.AlertOccurrence) -> "Occurrence":
         """One that is in memory."""
         return cls(
             priority=one.priority,
@@ -58,7 +58,7 @@ class Occurrence(Model):
             acknowledged_at=moment(one.acknowledged),
             acknowledged_by=one.acknowledged_by,
             note=one.note or None,
-            told=[Told.of(told) for told in one.told],
+            told=[Told.of(told) for told in one.deliveries],
         )
 
     @classmethod
@@ -97,7 +97,7 @@ class Alert(Model):
     """The newest occurrences, oldest first."""
 
     @classmethod
-    def of(cls, alert: alert_book.Alert) -> "Alert":
+    def of(cls, alert: alert_book.BookedAlert) -> "Alert":
         """One alert with its newest occurrences."""
         condition, last = alert.condition, alert.last
         return cls(
@@ -113,7 +113,7 @@ class Alert(Model):
             acknowledged_by=last.acknowledged_by,
             note=last.note or None,
             count=alert.count,
-            told=[Told.of(one) for one in last.told],
+            told=[Told.of(one) for one in last.deliveries],
             members=[Occurrence.of(one) for one in alert.members],
         )
 
@@ -148,7 +148,7 @@ class Flood(Model):
     since: str | None
 
     @classmethod
-    def of(cls, of: flood.Flood) -> "Flood":
+    def of(cls, of: flood.FloodState) -> "Flood":
         """The present rate of alerts."""
         return cls(
             count=of.count,

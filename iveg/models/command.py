@@ -118,7 +118,9 @@ class Command(Model):
     """Steps of the audit trail; empty on ``/live``, which reports each step itself."""
 
     @classmethod
-    def of(cls, of: stop.Command, machine: StopMachine, now: Instant) -> "Command":
+    def of(
+        cls, of: stop.FollowedCommand, machine: StopMachine, now: Instant
+    ) -> "Command":
         """One command with the robot's last word."""
         return cls(
             command_id=of.command_id,
@@ -197,7 +199,7 @@ def _robot(machine: StopMachine, now: Instant) -> CommandRobot:
     )
 
 
-def _note(of: stop.Command) -> Sentence | None:
+def _note(of: stop.FollowedCommand) -> Sentence | None:
     """Note about a late agent for an order that went through it."""
     lag = of.agent_lag_s
     if lag is None or lag <= AGENT_LATE_S:
@@ -215,7 +217,7 @@ class Pressed(Model):
     state: str
 
     @classmethod
-    def of(cls, command: stop.Command) -> "Pressed":
+    def of(cls, command: stop.FollowedCommand) -> "Pressed":
         """As it stands just after the press."""
         return cls(
             robot_id=command.robot_id,

@@ -33,7 +33,7 @@ class Margin(Model):
     """Counted on (m/s)."""
 
     @classmethod
-    def of(cls, margin: margins.Margin | None) -> "Margin | None":
+    def of(cls, margin: margins.SafetyMargin | None) -> "Margin | None":
         """Margin between a robot and a person; None where there is no pair."""
         if margin is None:
             return None

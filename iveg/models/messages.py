@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from urllib.parse import urlsplit
 
 from iveg.domain import messages
-from iveg.domain.messages import Channel, Contacts, Delivery
+from iveg.domain.messages import Channel, Contacts, MessageDelivery
 from iveg.domain.stamps import format_stamp
 from iveg.models.alert import Told
 from iveg.models.base import Model
@@ -77,7 +77,7 @@ class Messages(Model):
         cls,
         contacts: Contacts,
         public_key: str | None,
-        last: Mapping[Channel, Sequence[Delivery]],
+        last: Mapping[Channel, Sequence[MessageDelivery]],
         counts: Mapping[str, int],
     ) -> "Messages":
         """As it stands."""

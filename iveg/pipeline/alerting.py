@@ -2,10 +2,10 @@
 
 from collections.abc import Callable, Iterable, Sequence
 
-from iveg.domain.alerts.alert_book import Alert, AlertBook, Condition
-from iveg.domain.alerts.flood import Flood, FloodGauge
+from iveg.domain.alerts.alert_book import AlertBook, BookedAlert, Condition
+from iveg.domain.alerts.flood import FloodGauge, FloodState
 from iveg.domain.events import LogEvent, Slot
-from iveg.domain.messages import Delivery
+from iveg.domain.messages import MessageDelivery
 from iveg.domain.observations import Instant
 from iveg.pipeline import topics
 from iveg.pipeline.event_log import EventLog
@@ -21,19 +21,19 @@ class Alerting:
     """
 
     def __init__(self, event_log: EventLog, new_id: Ids) -> None:
-        self.on_raised: Callable[[Sequence[Alert]], None] = lambda _: None
+        self.on_raised: Callable[[Sequence[BookedAlert]], None] = lambda _: None
         self._event_log = event_log
         self._new_id = new_id
         self._book = AlertBook()
         self._gauge = FloodGauge()
 
     @property
-    def waiting(self) -> list[Alert]:
+    def waiting(self) -> list[BookedAlert]:
         """Active alerts, and each P1 that cleared before anybody saw it."""
         return self._book.waiting
 
     @property
-    def flood(self) -> Flood:
+    def flood(self) -> FloodState:
         """Rate of alerts at present."""
         return self._gauge.flood
 
@@ -41,7 +41,7 @@ class Alerting:
         """Whether an alert is of this run, active or recently cleared."""
         return self._book.find(alert_id) is not None
 
-    def remember(self, earlier: Iterable[Alert]) -> None:
+    def remember(self, earlier: Iterable[BookedAlert]) -> None:
         """Take up unacknowledged alerts of an earlier run."""
         self._book.remember(one for one in earlier if not self.knows(one.alert_id))
         self._event_log.changed(topics.ALERTS.name)
@@ -57,17 +57,17 @@ class Alerting:
             self.on_raised(raised)
         self._watch_flood(len(raised), now)
 
-    def told(
-        self, alert_id: str, raised: Instant, deliveries: Iterable[Delivery]
+    def record_deliveries(
+        self, alert_id: str, raised: Instant, deliveries: Iterable[MessageDelivery]
     ) -> None:
         """Record the recipients of an alert outside iVeg."""
-        alert = self._book.told(alert_id, raised, deliveries)
+        alert = self._book.record_deliveries(alert_id, raised, deliveries)
         if alert is not None:
             self._event_log.alert(alert)
 
     def acknowledge(
         self, alert_id: str, by: str, note: str, now: Instant
-    ) -> Alert | None:
+    ) -> BookedAlert | None:
         """A person acknowledges an alert; None when there is no such alert."""
         alert = self._book.acknowledge(alert_id, by, note, now)
         if alert is not None:
@@ -83,7 +83,7 @@ class Alerting:
 
     def _watch_flood(self, raised: int, now: Instant) -> None:
         before = self.flood
-        after = self._gauge.take(raised, now)
+        after = self._gauge.count(raised, now)
         if after == before:
             return
         self._event_log.changed(topics.FLOOD.name)

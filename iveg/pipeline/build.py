@@ -224,7 +224,7 @@ def build_services(
     messenger = Messenger(
         kept.contacts, kept.contact_store, senders, alerts, event_log, clock
     )
-    alerts.on_raised = parts.supervision.guard("messages", messenger.offer)
+    alerts.on_raised = parts.supervision.guard("messages", messenger.enqueue_raised)
     return Services(
         Rules(evaluator, kept.rule_store, event_log, kept.rules),
         Detectors(parts.world, kept.detector_store, event_log, kept.out_of_service),

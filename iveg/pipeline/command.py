@@ -25,9 +25,9 @@ from iveg.domain.records import CommandRecord
 from iveg.domain.stop import (
     Changed,
     Closed,
-    Command,
     DesiredRecord,
     Effect,
+    FollowedCommand,
     OffTable,
     Press,
     SendOnce,
@@ -91,7 +91,7 @@ class Commander:
         self.machines: Mapping[str, StopMachine] = {
             robot_id: StopMachine(robot_id, ports) for robot_id in robots
         }
-        self.commands: dict[str, Command] = {}
+        self.commands: dict[str, FollowedCommand] = {}
         self.drills = drills
         self.counters: Counter[str] = Counter()
         self._mistakes: dict[str, OffTable] = {}
@@ -121,7 +121,7 @@ class Commander:
 
     async def stop(
         self, robots: Iterable[str], by: str, at: Instant, press: Press = _PLAIN
-    ) -> list[Command]:
+    ) -> list[FollowedCommand]:
         """STOP these robots, in parallel; returns when it is sent and on disk."""
         machines = [self.machine(robot_id) for robot_id in robots]
         pressed = [self._press(machine, by, at, press) for machine in machines]
@@ -129,7 +129,7 @@ class Commander:
 
     def _press(
         self, machine: StopMachine, by: str, at: Instant, press: Press
-    ) -> Command:
+    ) -> FollowedCommand:
         """Begin or join an episode; a repeated press is the same press."""
         known = self._presses.find(by, press, machine.robot_id, at)
         earlier = None if known is None else self.commands.get(known)
@@ -143,8 +143,8 @@ class Commander:
         return machine.stop
 
     async def _write_down(
-        self, pressed: Sequence[Command], by: str, at: Instant
-    ) -> list[Command]:
+        self, pressed: Sequence[FollowedCommand], by: str, at: Instant
+    ) -> list[FollowedCommand]:
         """Write the desired state and its author to disk before the press is accepted.
 
         Returns:
@@ -164,7 +164,7 @@ class Commander:
 
     async def drill(
         self, robot_id: str, by: str, at: Instant, press: Press = _PLAIN
-    ) -> Command:
+    ) -> FollowedCommand:
         """Prove that STOP works: a real STOP, of a robot that hardly moves.
 
         Raises:
@@ -179,7 +179,7 @@ class Commander:
 
     async def release(
         self, robot_id: str, seen: Iterable[str], by: str, at: Instant
-    ) -> Command:
+    ) -> FollowedCommand:
         """Lift the holds that a person saw.
 
         Raises:
@@ -189,7 +189,7 @@ class Commander:
         effects = machine.release(by, seen, at, self._new_id())
         return self._once(machine, effects, at)
 
-    async def resume(self, robot_id: str, by: str, at: Instant) -> Command:
+    async def resume(self, robot_id: str, by: str, at: Instant) -> FollowedCommand:
         """Let a released robot drive.
 
         Raises:
@@ -200,15 +200,15 @@ class Commander:
 
     def _once(
         self, machine: StopMachine, effects: list[Effect], at: Instant
-    ) -> Command:
+    ) -> FollowedCommand:
         self._perform(machine, effects, at)
         assert machine.once is not None  # noqa: S101 - just begun
         return machine.once
 
     # --- what comes back ----------------------------------------------------------
 
-    def take(self, received: Received, age_s: float = 0.0) -> None:
-        """Show a robot's machine a new observation.
+    def apply(self, received: Received, age_s: float = 0.0) -> None:
+        """Apply a new observation to the machine of its robot.
 
         The observation was at most ``age_s`` old when it came; infinite where that is
         unknown.
@@ -357,7 +357,7 @@ class Commander:
         self._log_line(machine, command, changed, at)
         self._show(machine)
 
-    def _note_end(self, command: Command, at: Instant) -> None:
+    def _note_end(self, command: FollowedCommand, at: Instant) -> None:
         """A release or resume that was confirmed also moves the STOP on."""
         for earlier in reversed(self.commands.values()):
             if earlier.robot_id == command.robot_id and earlier.kind == "stop":
@@ -368,7 +368,7 @@ class Commander:
     def _log_line(
         self,
         machine: StopMachine,
-        command: Command | None,
+        command: FollowedCommand | None,
         changed: Changed,
         at: Instant,
     ) -> None:

@@ -5,7 +5,7 @@ No robot stops for it, and aisles do not change: twice a second is often enough.
 
 import asyncio
 
-from iveg.domain.coverage import Coverage
+from iveg.domain.coverage import AisleCoverage
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import Instant
 from iveg.domain.tracking.sight import is_detecting
@@ -24,7 +24,7 @@ class CoverageMonitor:
 
     def __init__(self, world: World, greenhouse: Greenhouse) -> None:
         self._world = world
-        self.coverage = Coverage(greenhouse)
+        self.coverage = AisleCoverage(greenhouse)
 
     async def run(self, clock: Clock) -> None:
         """Until cancelled."""

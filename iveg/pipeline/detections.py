@@ -56,14 +56,14 @@ class DetectionTracking:
         """Number of persons whose last log line is remembered."""
         return len(self._told)
 
-    def take(
+    def track_frame(
         self,
         frame: DetectionFrame,
         received: Received,
         verdict: OrderVerdict,
         rule: DetectionRule,
     ) -> None:
-        """Take one frame; a late one may still protect somebody, Orion's answer not.
+        """Track who is in a frame; a late one may still protect, Orion's answer not.
 
         A frame that is later than a ring lives protects nobody, and would only show
         ghosts.

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from iveg.domain.alerts import conditions
 from iveg.domain.alerts.alert_book import Condition
-from iveg.domain.decisions import Decision, Decisions
+from iveg.domain.decisions import Decisions, SlowdownDecision
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.events import LogEvent, Slot
 from iveg.domain.feedback import UNSUPERVISED, SpeedLimit
@@ -105,7 +105,7 @@ class Evaluator:
         decision = self.decisions.get(decision_id)
         return None if decision is None else record_of(decision, now)
 
-    def live_decisions(self) -> Iterable[Decision]:
+    def live_decisions(self) -> Iterable[SlowdownDecision]:
         """Decisions in memory about live robots, without recordings."""
         robots = self.world.robots
         return (
@@ -116,7 +116,7 @@ class Evaluator:
 
     # --- what arrives -------------------------------------------------------------
 
-    def take(self, received: Received) -> bool:
+    def apply(self, received: Received) -> bool:
         """Apply one observation; :meth:`settle` judges what follows from it.
 
         Returns:
@@ -127,7 +127,7 @@ class Evaluator:
             return False
         observation = received.observation
         if isinstance(observation, DetectionFrame):
-            self.tracking.take(observation, received, verdict, self.rule)
+            self.tracking.track_frame(observation, received, verdict, self.rule)
             self.decisions.seen(self._people_of(observation.robot_id), received.at)
         if verdict != "new":
             return False
@@ -222,7 +222,7 @@ class Evaluator:
         self._untold = self._untold or bool(changed or changes)
         # A slow-down never waits; other news waits until robots can use more.
         if slower or (self._untold and self._feedback_publisher.may_publish(now)):
-            self.tell(now)
+            self.publish(now)
 
     def _crossed(self, change: LimitChange, now: Instant) -> None:
         crossing = change.crossing
@@ -235,10 +235,10 @@ class Evaluator:
         begun = self.decisions.begin(crossing, self.rule, places)
         self._event_log.decisions([begun], now)
 
-    def tell(self, now: Instant) -> None:
+    def publish(self, now: Instant) -> None:
         """Publish feedback to the fleet (Algorithm 2, line 13)."""
         self._untold = False
-        self._feedback_publisher.tell(self.speed_limits, self.rule, now)
+        self._feedback_publisher.publish(self.speed_limits, self.rule, now)
         self._event_log.decisions(self.decisions.published(now), now)
 
     # --- time ---------------------------------------------------------------------
@@ -252,7 +252,7 @@ class Evaluator:
         self.settle()
         self._judge(now)
         if now.mono - self._feedback_publisher.published_at >= HEARTBEAT_S - 1e-3:
-            self.tell(now)
+            self.publish(now)
         aged = self.decisions.age(now, self.people.known)
         self._event_log.decisions(aged, now)
         self.alerts.sync([*self._conditions(now), *more], now)
@@ -300,7 +300,7 @@ class Evaluator:
     def leave_unsupervised(self, now: Instant) -> None:
         """Tell every robot to slow, once: a part without which nobody watches ended."""
         limits = dict.fromkeys(self.world.robots, UNSUPERVISED)
-        self._feedback_publisher.tell(limits, self.rule, now)
+        self._feedback_publisher.publish(limits, self.rule, now)
 
     # --- words --------------------------------------------------------------------
 

@@ -10,8 +10,8 @@ from dataclasses import asdict, fields, replace
 from functools import wraps
 from typing import Any, Concatenate, ParamSpec
 
-from iveg.domain.alerts.alert_book import Alert, Occurrence
-from iveg.domain.decisions import Decision
+from iveg.domain.alerts.alert_book import AlertOccurrence, BookedAlert
+from iveg.domain.decisions import SlowdownDecision
 from iveg.domain.events import LogEvent
 from iveg.domain.observations import Climate, Instant, Observation, Odometry
 from iveg.domain.records import (
@@ -26,7 +26,7 @@ from iveg.domain.records import (
     ReadingRecord,
 )
 from iveg.domain.robot_state import RobotState
-from iveg.domain.stop import Changed, Closed, Command
+from iveg.domain.stop import Changed, Closed, FollowedCommand
 from iveg.domain.tracking.people import Placed
 from iveg.pipeline import topics
 from iveg.pipeline.evidence import cleared_behind, left_behind, record_of, wall_of
@@ -115,7 +115,7 @@ class EventLog:
             self._hub.append(topics.EARLIER_LOG.name, before)
 
     @_guarded
-    def decisions(self, changed: Iterable[Decision], now: Instant) -> None:
+    def decisions(self, changed: Iterable[SlowdownDecision], now: Instant) -> None:
         """Record decisions that are new or have a new link."""
         for decision in changed:
             self._sink.offer(record_of(decision, now))
@@ -186,7 +186,9 @@ class EventLog:
             self._sink.offer(record)
 
     @_guarded
-    def command(self, command: Command, changed: Changed | None, at: Instant) -> None:
+    def command(
+        self, command: FollowedCommand, changed: Changed | None, at: Instant
+    ) -> None:
         """Record a command that is new or has taken a step."""
         times = command.times
         self._sink.offer(
@@ -250,7 +252,11 @@ class EventLog:
             self.changed(topic.name)
 
     def _audit(
-        self, command: Command | CommandRecord, state: str, why: str, at: Instant
+        self,
+        command: FollowedCommand | CommandRecord,
+        state: str,
+        why: str,
+        at: Instant,
     ) -> None:
         self._sink.offer(
             CommandEventRecord(
@@ -301,7 +307,7 @@ class EventLog:
         return is_due
 
     @_guarded
-    def alert(self, alert: Alert) -> None:
+    def alert(self, alert: BookedAlert) -> None:
         """Record an alert that was raised, acknowledged or cleared."""
         condition, last = alert.condition, alert.last
         self._sink.offer(
@@ -324,7 +330,7 @@ class EventLog:
         self.changed(topics.ALERTS.name)
 
 
-def _member(one: Occurrence) -> dict[str, Any]:
+def _member(one: AlertOccurrence) -> dict[str, Any]:
     return {
         "priority": one.priority,
         "raised_at": one.raised.wall,
@@ -339,6 +345,6 @@ def _member(one: Occurrence) -> dict[str, Any]:
                 "at": told.at.wall,
                 "failed": told.failed,
             }
-            for told in one.told
+            for told in one.deliveries
         ],
     }

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import asdict, replace
 
-from iveg.domain.decisions import Decision, Link, Place
+from iveg.domain.decisions import Link, Place, SlowdownDecision
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import HALF_SPEED
 from iveg.domain.observations import Instant
@@ -13,7 +13,7 @@ from iveg.domain.rule.zones import Zone
 from iveg.domain.world import World
 
 
-def record_of(decision: Decision, now: Instant) -> DecisionRecord:
+def record_of(decision: SlowdownDecision, now: Instant) -> DecisionRecord:
     """The whole chain as it stands at ``now``; open links may yet come."""
     crossing = decision.crossing
     zone, sighting = crossing.zone, crossing.zone.sighting

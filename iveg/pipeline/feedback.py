@@ -56,7 +56,7 @@ class FeedbackPublisher:
         since = max(0.0, now.mono - self.published_at)
         return min(BURST, self._left + USED_HZ * since)
 
-    def tell(
+    def publish(
         self, speed_limits: Mapping[str, SpeedLimit], rule: DetectionRule, now: Instant
     ) -> None:
         """Send every robot what the fleet must know."""
@@ -74,7 +74,9 @@ class FeedbackPublisher:
         self._world.ledger.composed(self._boot, first, last, now.mono)
         for robot in robots.values():
             self._seq += 1
-            self._fleet.tell(self._feedback(robot, alerts, speed_limits, seen, now))
+            self._fleet.publish_feedback(
+                self._feedback(robot, alerts, speed_limits, seen, now)
+            )
 
     def _feedback(
         self,

@@ -67,8 +67,8 @@ class Ingest:
         self._logged: Counter[str | None] = Counter()
         self.counters: Counter[str] = Counter()
 
-    def offer(self, received: Received) -> None:
-        """Take one observation; never blocks."""
+    def enqueue(self, received: Received) -> None:
+        """Queue one observation; never blocks."""
         robot_id = getattr(received.observation, "robot_id", None)
         if robot_id is not None and not self._known(robot_id):
             self.reject(robot_id, "unknown_robot", str(UnknownRobotError(robot_id)))

@@ -3,8 +3,8 @@
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from iveg.domain.alerts.alert_book import Alert
-from iveg.domain.alerts.flood import FLOOD_LIMIT, FLOOD_WINDOW_S, Flood
+from iveg.domain.alerts.alert_book import BookedAlert
+from iveg.domain.alerts.flood import FLOOD_LIMIT, FLOOD_WINDOW_S, FloodState
 from iveg.domain.decisions import Decisions
 from iveg.domain.events import LogEvent, Slot
 from iveg.domain.feedback import FULL_SPEED
@@ -15,7 +15,7 @@ from iveg.domain.robot_state import RobotState
 from iveg.domain.rule.premises import Missing
 from iveg.domain.rule.speed_limits import Crossing
 from iveg.domain.tracking.people import People
-from iveg.domain.tracking.person import Person
+from iveg.domain.tracking.person import TrackedPerson
 from iveg.domain.world import World
 
 
@@ -103,7 +103,7 @@ def _of_crossing(crossing: Crossing) -> SlowdownCauses:
 
 
 def _of_person(
-    person: Person, robot: RobotState, greenhouse: Greenhouse
+    person: TrackedPerson, robot: RobotState, greenhouse: Greenhouse
 ) -> SlowdownCauses | None:
     if robot.odometry is None:
         return None
@@ -185,7 +185,7 @@ def speed_line(
     )
 
 
-def flood_line(before: Flood, after: Flood) -> LogEvent | None:
+def flood_line(before: FloodState, after: FloodState) -> LogEvent | None:
     """A flood of alerts began or ended; None for neither."""
     if (before.since is None) == (after.since is None):
         return None
@@ -198,7 +198,7 @@ def flood_line(before: Flood, after: Flood) -> LogEvent | None:
     return LogEvent("alert", key, slots)
 
 
-def alert_line(alert: Alert) -> LogEvent:
+def alert_line(alert: BookedAlert) -> LogEvent:
     """An alert was raised or cleared."""
     condition = alert.condition
     key = "log.alert.raised" if alert.cleared is None else "log.alert.cleared"

@@ -118,7 +118,9 @@ class RuleLoop:
             if not fresh and not isinstance(received.observation, CommandAnswer):
                 continue
             if self._evaluator.world.may_act(received):
-                self._commander.take(received, self._evaluator.world.age_then(received))
+                self._commander.apply(
+                    received, self._evaluator.world.age_then(received)
+                )
         if judges:
             self._evaluator.settle()
         if self._taken and not self._evaluator.is_unjudged:
@@ -141,7 +143,7 @@ class RuleLoop:
         """
         observation = received.observation
         try:
-            return self._evaluator.take(received)
+            return self._evaluator.apply(received)
         except Exception as error:
             if kind(observation).vital:
                 raise

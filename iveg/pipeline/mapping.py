@@ -9,8 +9,8 @@ import asyncio
 from collections.abc import Iterable
 
 from iveg.domain.costmap import (
-    Costmap,
     Grid,
+    InflatedGrid,
     Occupancy,
     Ring,
     Sweep,
@@ -67,7 +67,7 @@ class Mapper:
         if due:
             self._draw(min(due, key=self._last_drawn), now)
 
-    def shared(self, zones: Iterable[Zone], now: Instant) -> Costmap | None:
+    def shared(self, zones: Iterable[Zone], now: Instant) -> InflatedGrid | None:
         """The fleet's costmap; None before the first scan."""
         return _costs(self._drawn.get(None), zones, now)
 
@@ -78,7 +78,9 @@ class Mapper:
         drawn = [at for at in found if at is not None]
         return now.mono - max(drawn) if drawn else None
 
-    def of(self, robot_id: str, zones: Iterable[Zone], now: Instant) -> Costmap | None:
+    def of(
+        self, robot_id: str, zones: Iterable[Zone], now: Instant
+    ) -> InflatedGrid | None:
         """Costmap of one robot: its own scans, people and peers of its feedback."""
         others = [zone for zone in zones if zone.cause != robot_id]
         return _costs(self._drawn.get(robot_id), others, now)
@@ -133,7 +135,7 @@ def _added(
 
 def _costs(
     occupancy: Occupancy | None, zones: Iterable[Zone], now: Instant
-) -> Costmap | None:
+) -> InflatedGrid | None:
     if occupancy is None:
         return None
     occupancy.fade(now.mono)

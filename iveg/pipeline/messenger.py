@@ -1,7 +1,7 @@
 """Tells people outside iVeg of alerts: beside everything, in the way of nothing.
 
-``offer`` is called where alerts are raised and only fills a bounded queue; each channel
-has a task of its own that waits, sends, and rests::
+``enqueue_raised`` is called where alerts are raised and only fills a bounded queue;
+each channel has a task of its own that waits, sends, and rests::
 
     raised ──> queue of the channel ──> everything that waits, as one message ──> rest
                     ^                                  │ nobody was reached, twice more
@@ -17,7 +17,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
-from iveg.domain.alerts.alert_book import Alert
+from iveg.domain.alerts.alert_book import BookedAlert
 from iveg.domain.errors import HopError
 from iveg.domain.events import LogEvent
 from iveg.domain.messages import (
@@ -25,8 +25,8 @@ from iveg.domain.messages import (
     AlertItem,
     Channel,
     Contacts,
-    Delivery,
-    Message,
+    MessageDelivery,
+    OutboundMessage,
 )
 from iveg.pipeline.alerting import Alerting
 from iveg.pipeline.event_log import EventLog
@@ -64,7 +64,7 @@ class Messenger:
         limit_s: float = LIMIT_S,
     ) -> None:
         self.contacts = contacts
-        self.last: dict[Channel, Sequence[Delivery]] = {}
+        self.last: dict[Channel, Sequence[MessageDelivery]] = {}
         self.counters: Counter[str] = Counter()
         self._store = store
         self._senders = senders
@@ -79,7 +79,7 @@ class Messenger:
         }
         self._arrived = {name: asyncio.Event() for name in CHANNELS}
 
-    def offer(self, raised: Iterable[Alert]) -> None:
+    def enqueue_raised(self, raised: Iterable[BookedAlert]) -> None:
         """Have people told of alerts that were raised; returns at once."""
         for alert in raised:
             last, key = alert.last, alert.condition.key
@@ -94,9 +94,9 @@ class Messenger:
             for channel in CHANNELS:
                 tasks.create_task(self._serve(channel), name=f"message-{channel}")
 
-    async def test(self, channel: Channel) -> Sequence[Delivery]:
+    async def test(self, channel: Channel) -> Sequence[MessageDelivery]:
         """Try a channel now, whether or not it is on."""
-        return await self._send(channel, Message())
+        return await self._send(channel, OutboundMessage())
 
     async def change(
         self, update: Callable[[Contacts], Contacts], channel: Channel, by: str
@@ -138,24 +138,26 @@ class Messenger:
             await asyncio.sleep(self._rest_s)
 
     async def _deliver(self, channel: Channel, items: Sequence[AlertItem]) -> None:
-        deliveries = await self._send(channel, Message(items))
+        deliveries = await self._send(channel, OutboundMessage(items))
         for item in items:
-            self._alerts.told(item.alert_id, item.raised, deliveries)
+            self._alerts.record_deliveries(item.alert_id, item.raised, deliveries)
         if deliveries and all(one.failed for one in deliveries):
             for item in items:
                 if item.tries + 1 < TRIES:
                     self._wait(channel, replace(item, tries=item.tries + 1))
 
-    async def _send(self, channel: Channel, message: Message) -> Sequence[Delivery]:
+    async def _send(
+        self, channel: Channel, message: OutboundMessage
+    ) -> Sequence[MessageDelivery]:
         now, sender = self._clock(), self._senders[channel]
         try:
             async with asyncio.timeout(self._limit_s):
                 deliveries = await sender.send(self.contacts, message, now)
         except TimeoutError:
-            deliveries = [Delivery(channel, "", now, "no_answer")]
+            deliveries = [MessageDelivery(channel, "", now, "no_answer")]
         except Exception:
             _log.exception("a message by %s failed", channel)
-            deliveries = [Delivery(channel, "", now, "internal")]
+            deliveries = [MessageDelivery(channel, "", now, "internal")]
         self.last[channel] = deliveries
         for one in deliveries:
             outcome = "failed" if one.failed else "sent"
@@ -163,7 +165,7 @@ class Messenger:
         await self._forget_gone(deliveries)
         return deliveries
 
-    async def _forget_gone(self, deliveries: Sequence[Delivery]) -> None:
+    async def _forget_gone(self, deliveries: Sequence[MessageDelivery]) -> None:
         """A browser that its push service no longer knows has left."""
         gone = {one.device_id or "" for one in deliveries if one.failed == "gone"}
         if gone:

@@ -6,7 +6,7 @@ from typing import Literal, Protocol
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.detector import OutOfService
 from iveg.domain.feedback import Feedback
-from iveg.domain.messages import Contacts, Delivery, Message
+from iveg.domain.messages import Contacts, MessageDelivery, OutboundMessage
 from iveg.domain.observations import Instant
 
 
@@ -43,8 +43,8 @@ class CommandPort(Protocol):
 class FleetPort(Protocol):
     """The fleet's topics on MQTT: feedback and desired states."""
 
-    def tell(self, feedback: Feedback) -> None:
-        """Offer feedback to the fleet; the newest of each topic counts."""
+    def publish_feedback(self, feedback: Feedback) -> None:
+        """Publish feedback to the fleet; the newest of each topic counts."""
 
     async def set_desired_state(
         self, robot_id: str, desired: Literal["stopped", "run"], ids: Iterable[str]
@@ -109,8 +109,8 @@ class MessageSender(Protocol):
     """One channel to people who are not before a page."""
 
     async def send(
-        self, contacts: Contacts, message: Message, now: Instant
-    ) -> Sequence[Delivery]:
+        self, contacts: Contacts, message: OutboundMessage, now: Instant
+    ) -> Sequence[MessageDelivery]:
         """Send to each that the channel reaches; says of each what came of it."""
 
 

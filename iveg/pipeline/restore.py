@@ -11,12 +11,12 @@ from typing import Any, Protocol, cast
 
 from iveg.domain.alerts.alert_book import (
     MOST_KEPT,
-    Alert,
+    AlertOccurrence,
+    BookedAlert,
     Condition,
-    Occurrence,
 )
 from iveg.domain.errors import HopError
-from iveg.domain.messages import Delivery, Priority
+from iveg.domain.messages import MessageDelivery, Priority
 from iveg.domain.observations import Instant
 from iveg.domain.records import (
     AlertRecord,
@@ -88,18 +88,18 @@ async def remember(
         return
 
 
-def alert_of(record: AlertRecord, now: Instant) -> Alert:
+def alert_of(record: AlertRecord, now: Instant) -> BookedAlert:
     """An alert of the history as one that is over, with its life as it was."""
     if record.cleared_at is None:
         record = cleared_behind(record, now.wall)
     priority = cast("Priority", record.priority)
     members = tuple(_occurrence(one, now) for one in record.members)
-    last = Occurrence(
+    last = AlertOccurrence(
         priority,
         _moment(record.last_raised_at, now),
         _moment(record.cleared_at or now.wall, now),
     )
-    return Alert(
+    return BookedAlert(
         record.alert_id,
         Condition(
             priority,
@@ -122,9 +122,9 @@ def _subject(record: AlertRecord) -> str:
     return record.robot_id
 
 
-def _occurrence(told: Mapping[str, Any], now: Instant) -> Occurrence:
+def _occurrence(told: Mapping[str, Any], now: Instant) -> AlertOccurrence:
     cleared, seen = told["cleared_at"], told["acknowledged_at"]
-    return Occurrence(
+    return AlertOccurrence(
         told["priority"],
         _moment(told["raised_at"], now),
         None if cleared is None else _moment(cleared, now),
@@ -135,9 +135,9 @@ def _occurrence(told: Mapping[str, Any], now: Instant) -> Occurrence:
     )
 
 
-def _delivery(one: Mapping[str, Any], now: Instant) -> Delivery:
+def _delivery(one: Mapping[str, Any], now: Instant) -> MessageDelivery:
     at = _moment(one["at"], now)
-    return Delivery(one["channel"], one["to"], at, one["failed"])
+    return MessageDelivery(one["channel"], one["to"], at, one["failed"])
 
 
 def _moment(wall: float, now: Instant) -> Instant:

@@ -5,7 +5,7 @@ from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import Instant
 from iveg.domain.robot_state import Link, RobotState
 from iveg.domain.tracking.people import People
-from iveg.domain.tracking.person import Person
+from iveg.domain.tracking.person import TrackedPerson
 from iveg.domain.tracking.sight import AllClear
 from iveg.domain.world import World
 from iveg.pipeline import topics
@@ -66,7 +66,7 @@ class Staleness:
             slots["age"] = round(age, 1)
         self._event_log.log(LogEvent("link", key, slots, robot.robot_id), now)
 
-    def _log_stage(self, person: Person, now: Instant) -> None:
+    def _log_stage(self, person: TrackedPerson, now: Instant) -> None:
         stage = person.stage(now)
         before = self._stages.get(person.person_id)
         if stage == before:
@@ -88,7 +88,7 @@ class Staleness:
             LogEvent("detection", key, slots, newest.observer, person.class_), now
         )
 
-    def _log_clear(self, person: Person, now: Instant) -> None:
+    def _log_clear(self, person: TrackedPerson, now: Instant) -> None:
         self._event_log.changed(topics.PEOPLE.name)
         newest = person.newest
         if person.sightings or person.stage(now) != "remembered":

@@ -12,7 +12,7 @@ from typing import Any, Literal, Protocol
 
 from iveg.domain.observations import Instant
 from iveg.domain.records import LogRecord
-from iveg.domain.stop import Command as StopCommand
+from iveg.domain.stop import FollowedCommand as StopCommand
 from iveg.models.alert import Alert, Flood, LogEntry
 from iveg.models.climate import Climate
 from iveg.models.command import Command

@@ -16,7 +16,7 @@ class Echo:
         self.heard: FeedbackRef | None = None
         """None before the first feedback."""
 
-    def take(self, feedback: Origin) -> None:
+    def note(self, feedback: Origin) -> None:
         """Store the reference of a feedback that could be read."""
         if feedback.boot is None or feedback.seq is None:
             return

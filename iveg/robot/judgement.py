@@ -95,8 +95,8 @@ class Judgement:
             and abs(motion.twist.angular_z) < LIMITS.standing_speed
         )
 
-    def take_odometry(self, pose: Pose2D | None, twist: Twist2D, now: float) -> None:
-        """Take odometry; one with a number that is not finite is ignored.
+    def note_odometry(self, pose: Pose2D | None, twist: Twist2D, now: float) -> None:
+        """Note odometry; one with a number that is not finite is ignored.
 
         Odometry without a pose gives the speed, which confirms a standstill, but no
         position: proximity cannot be judged, and the cap is 0.
@@ -105,9 +105,9 @@ class Judgement:
         if all(map(math.isfinite, (*place, twist.linear_x, twist.angular_z))):
             self._motion = Motion(pose, twist, now)
 
-    def take_feedback(self, topic: str, feedback: Feedback, now: float) -> None:
-        """Take a message of ``/{topic}/mqtt_feedback``."""
-        if self._peer_feedback.take(topic, feedback, self._own(now), now):
+    def note_feedback(self, topic: str, feedback: Feedback, now: float) -> None:
+        """Note a message of ``/{topic}/mqtt_feedback``."""
+        if self._peer_feedback.apply(topic, feedback, self._own(now), now):
             self.watchdog.heard(feedback.seen.get(self._id), now)
 
     def settle(self, now: float) -> None:

@@ -285,7 +285,7 @@ class RobotNode:
             feedback = read_feedback(payload)
         except UnreadableError:
             return  # Counts as no feedback: the watchdog does the rest.
-        self._echo.take(feedback.origin)
+        self._echo.note(feedback.origin)
         self._uplink.rates.take_backlog(feedback.backlog_s, now)
         peer = topic.removeprefix("/").partition("/")[0]
         self._perform(self._machine.feedback(peer, feedback, now), now)

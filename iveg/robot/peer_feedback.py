@@ -92,10 +92,10 @@ class PeerFeedback:
         self._me = robot_id
         self._topics: dict[str, _Topic] = {}
 
-    def take(
+    def apply(
         self, topic: str, feedback: Feedback, own: Pose2D | None, now: float
     ) -> bool:
-        """Take a message of ``topic``; messages older than the newest are dropped.
+        """Apply a message of ``topic``; messages older than the newest are dropped.
 
         Returns:
             Whether it was accepted.

@@ -136,7 +136,7 @@ class SafetyMachine:
         self, pose: Pose2D | None, twist: Twist2D, now: float
     ) -> tuple[Effect, ...]:
         """Take measured pose (None: not in ``map``) and speed."""
-        self._judgement.take_odometry(pose, twist, now)
+        self._judgement.note_odometry(pose, twist, now)
         return self.tick(now)
 
     def limit(self, cap: Cap) -> None:
@@ -147,7 +147,7 @@ class SafetyMachine:
         self, topic: str, feedback: Feedback, now: float
     ) -> tuple[Effect, ...]:
         """Take a message of ``/{topic}/mqtt_feedback``."""
-        self._judgement.take_feedback(topic, feedback, now)
+        self._judgement.note_feedback(topic, feedback, now)
         return self.tick(now)
 
     def reported(self, seq: int, now: float) -> None:

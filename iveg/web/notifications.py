@@ -141,7 +141,7 @@ class NotificationEndpoint:
             self._ingest.reject(problem.source, problem.reason, problem.detail)
         thinned = self._is_thinned(subscription_id)
         for observation in reading.observations:
-            self._ingest.offer(Received(observation, at, FIWARE.id, thinned=thinned))
+            self._ingest.enqueue(Received(observation, at, FIWARE.id, thinned=thinned))
         return None
 
 

@@ -12,8 +12,8 @@ from iveg.domain.records import LogRecord
 from iveg.domain.robot_state import RobotState
 from iveg.domain.rule.speed_limits import Crossing
 from iveg.domain.stamps import format_stamp
-from iveg.domain.stop import Command, StopMachine
-from iveg.domain.tracking.person import Person
+from iveg.domain.stop import FollowedCommand, StopMachine
+from iveg.domain.tracking.person import TrackedPerson
 from iveg.domain.transports import alias_of
 from iveg.models.alert import Alert, Flood, LogEntry
 from iveg.models.base import moment, rounded
@@ -120,7 +120,7 @@ class Views:
 
     def _margin(
         self, robot: RobotState, margins: LeastMargins | None, now: Instant
-    ) -> margins_.Margin | None:
+    ) -> margins_.SafetyMargin | None:
         if margins is None or robot.is_replay:
             margins = LeastMargins([robot], self._people.known.values(), now)
         return margins.of_robot(robot.robot_id)
@@ -169,7 +169,7 @@ class Views:
         return [self._person(one, margins, now) for one in self._people.known.values()]
 
     def _person(
-        self, person: Person, margins: LeastMargins, now: Instant
+        self, person: TrackedPerson, margins: LeastMargins, now: Instant
     ) -> PersonModel:
         newest, rule = person.newest, self._evaluator.rule
         crossings = [
@@ -223,7 +223,7 @@ class Views:
 
     # --- commands, alerts, log ----------------------------------------------------
 
-    def command(self, command: Command, now: Instant) -> CommandModel:
+    def command(self, command: FollowedCommand, now: Instant) -> CommandModel:
         """One command with the robot's newest report."""
         return CommandModel.of(command, self._commander.machine(command.robot_id), now)
 

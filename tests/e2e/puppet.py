@@ -79,7 +79,7 @@ class Puppet:
     def _hear(self, topic: str, payload: bytes) -> None:
         if topic != self._orders:
             with contextlib.suppress(UnreadableError):
-                self._echo.take(read_feedback(payload).origin)
+                self._echo.note(read_feedback(payload).origin)
         elif self.answers:
             self._obey(payload)
 

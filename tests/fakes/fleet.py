@@ -31,7 +31,7 @@ class FakeFleet:
         self.opened = asyncio.Event()
         self.opened.set()
 
-    def tell(self, feedback: Feedback) -> None:
+    def publish_feedback(self, feedback: Feedback) -> None:
         self.told.append(feedback)
 
     async def stop(self, robot_id: str, hold_id: str, by: str) -> None:  # noqa: ARG002 - the port

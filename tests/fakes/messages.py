@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from iveg.domain.errors import HopError
-from iveg.domain.messages import Channel, Contacts, Delivery, Message
+from iveg.domain.messages import Channel, Contacts, MessageDelivery, OutboundMessage
 from iveg.domain.observations import Instant
 
 
@@ -31,15 +31,15 @@ class FakeSender:
     broken: bool = False
     hangs: bool = False
     device_id: str | None = None
-    sent: list[Message] = field(default_factory=list)
+    sent: list[OutboundMessage] = field(default_factory=list)
 
     async def send(
-        self, contacts: Contacts, message: Message, now: Instant
-    ) -> Sequence[Delivery]:
+        self, contacts: Contacts, message: OutboundMessage, now: Instant
+    ) -> Sequence[MessageDelivery]:
         assert isinstance(contacts, Contacts)
         self.sent.append(message)
         if self.hangs:
             await asyncio.Event().wait()
         if self.broken:
             raise RuntimeError("a fault of ours")
-        return [Delivery(self.channel, "Ana", now, self.failing, self.device_id)]
+        return [MessageDelivery(self.channel, "Ana", now, self.failing, self.device_id)]

@@ -80,7 +80,7 @@ async def test_f20_with_a_locked_database_iveg_starts_stops_signs_in_and_judges(
                 await so(lambda: machine.wants_stop)
                 read = await browser.get("/api/v1/robots")
                 pressed = await press(browser)
-                dss.pipeline.ingest.offer(Received(odometry("AGI", 3.0), clock.now()))
+                dss.pipeline.ingest.enqueue(Received(odometry("AGI", 3.0), clock.now()))
                 robot = dss.pipeline.world.robot("AGI")
                 await so(lambda: robot.odometry is not None)
                 judged = dss.pipeline.evaluator.speed_limits["AGI"]

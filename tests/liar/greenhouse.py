@@ -79,7 +79,7 @@ class Field:
             "iveg",
             FLEET,
             desk.clock,
-            desk.ingest.offer,
+            desk.ingest.enqueue,
             desk.ingest.reject,
             is_past=desk.ingest.is_past,
         )

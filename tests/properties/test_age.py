@@ -176,7 +176,7 @@ class Rig:
             elif parcel.is_probe:
                 self.probe.returned(parcel.content, self.at())
             else:
-                self.echo.take(parcel.content)
+                self.echo.note(parcel.content)
 
     def drive(self, phase: Phase, rnd: Random) -> Iterator[float]:
         """Each moment of a phase at which somebody may look (s)."""

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from iveg.domain.alerts.alert_book import (
     MEMBERS_KEPT,
-    Alert,
     AlertBook,
+    BookedAlert,
     Condition,
 )
 from iveg.domain.messages import Priority
@@ -29,7 +29,7 @@ class Person:
     unseen: set[Priority] = field(default_factory=set)
     now: float = 0.0
 
-    def live(self, wrong: Priority | None) -> list[Alert]:
+    def live(self, wrong: Priority | None) -> list[BookedAlert]:
         """One second passes; returns what was raised or cleared."""
         self.now += 1.0
         conditions = [] if wrong is None else [Condition(wrong, "alert.x", "AGI")]

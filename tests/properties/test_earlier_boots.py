@@ -85,7 +85,7 @@ class Life:
         self.heard += [(now + self.down_s, one.origin) for one in fresh]
         for due, said in self.heard:
             if due <= now:
-                self.echo.take(said)
+                self.echo.note(said)
         self.heard = [one for one in self.heard if one[0] > now]
         hold_id = self.desk.commander.machine("AGI").hold_id
         if hold_id is not None and hold_id != FORGOTTEN.id:

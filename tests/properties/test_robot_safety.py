@@ -471,7 +471,7 @@ def test_feedback_counts_forward_only_within_a_boot_and_boots_never_return(
     last: dict[str, int] = {}
     for boot, seq in order:
         feedback = rig.feedback(origin=Origin(boot, seq))
-        counts = peer_feedback.take("T", feedback, None, rig.now)
+        counts = peer_feedback.apply("T", feedback, None, rig.now)
         newest = bool(met) and met[-1] == boot
         assert counts == (boot not in met or (newest and seq > last[boot]))
         if counts:

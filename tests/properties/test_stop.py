@@ -30,9 +30,9 @@ from iveg.domain.observations import (
 from iveg.domain.stop import (
     Changed,
     Closed,
-    Command,
     DesiredRecord,
     Effect,
+    FollowedCommand,
     OffTable,
     SendOnce,
     SendStop,
@@ -125,7 +125,7 @@ class StopOverBadTransports(RuleBasedStateMachine):
         self.ended: set[str] = set()
         self.reported_released: set[str] = set()
         self.episode: str | None = None
-        self.history: dict[str, Command] = {}
+        self.history: dict[str, FollowedCommand] = {}
         self.measured: dict[tuple[str | None, int | None], float] = {}
         self.restart()
 
@@ -173,7 +173,7 @@ class StopOverBadTransports(RuleBasedStateMachine):
                 self._changed(effect)
         self._keep(self.iveg.stop, self.iveg.once)
 
-    def _keep(self, *commands: Command | None) -> None:
+    def _keep(self, *commands: FollowedCommand | None) -> None:
         """The last that was told of each command."""
         self.history |= {one.command_id: one for one in commands if one is not None}
 

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
 from iveg.domain.events import Slot
-from iveg.domain.messages import Delivery, Priority, newest
+from iveg.domain.messages import MessageDelivery, Priority, newest
 from iveg.domain.observations import Instant
 
 GROUPING_S = 600.0
@@ -37,7 +37,7 @@ class Condition:
 
 
 @dataclass(frozen=True, slots=True)
-class Occurrence:
+class AlertOccurrence:
     """One period in which a condition held, with recipients and acknowledgement."""
 
     priority: Priority
@@ -46,11 +46,11 @@ class Occurrence:
     acknowledged: Instant | None = None
     acknowledged_by: str | None = None
     note: str = ""
-    told: tuple[Delivery, ...] = ()
+    deliveries: tuple[MessageDelivery, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
-class Alert:
+class BookedAlert:
     """One alert with its life: every occurrence of one condition.
 
     Attributes:
@@ -64,12 +64,12 @@ class Alert:
     alert_id: str
     condition: Condition
     raised: Instant
-    members: tuple[Occurrence, ...]
+    members: tuple[AlertOccurrence, ...]
     unseen: Priority | None
     count: int = 1
 
     @property
-    def last(self) -> Occurrence:
+    def last(self) -> AlertOccurrence:
         """The newest occurrence."""
         return self.members[-1]
 
@@ -98,16 +98,16 @@ class AlertBook:
     """All active alerts and the recently cleared ones."""
 
     def __init__(self) -> None:
-        self._alerts: dict[tuple[str, str], Alert] = {}
+        self._alerts: dict[tuple[str, str], BookedAlert] = {}
 
     @property
-    def waiting(self) -> list[Alert]:
+    def waiting(self) -> list[BookedAlert]:
         """Active alerts, and each P1 that cleared before it was acknowledged."""
         return [one for one in self._alerts.values() if one.waits]
 
     def sync(
         self, conditions: Iterable[Condition], now: Instant, new_id: str
-    ) -> list[Alert]:
+    ) -> list[BookedAlert]:
         """Take the conditions that hold now; returns the alerts that they changed."""
         wrong = _gravest(conditions)
         changed = []
@@ -128,27 +128,27 @@ class AlertBook:
 
     def acknowledge(
         self, alert_id: str, by: str, note: str, now: Instant
-    ) -> Alert | None:
+    ) -> BookedAlert | None:
         """Acknowledge all occurrences; None when there is no such alert."""
         alert = self.find(alert_id)
         return None if alert is None else self._keep(_see(alert, by, note, now))
 
-    def told(
-        self, alert_id: str, raised: Instant, deliveries: Iterable[Delivery]
-    ) -> Alert | None:
+    def record_deliveries(
+        self, alert_id: str, raised: Instant, deliveries: Iterable[MessageDelivery]
+    ) -> BookedAlert | None:
         """Record the recipients of one occurrence; None when it is forgotten."""
         alert = self.find(alert_id)
         if alert is None or all(one.raised != raised for one in alert.members):
             return None
         members = tuple(
-            replace(one, told=newest((*one.told, *deliveries)))
+            replace(one, deliveries=newest((*one.deliveries, *deliveries)))
             if one.raised == raised
             else one
             for one in alert.members
         )
         return self._keep(replace(alert, members=members))
 
-    def remember(self, alerts: Iterable[Alert]) -> None:
+    def remember(self, alerts: Iterable[BookedAlert]) -> None:
         """Take up cleared, unacknowledged alerts of an earlier run; known ones stay.
 
         If the condition holds again, a new alert of this run already stands beside it.
@@ -161,12 +161,12 @@ class AlertBook:
                 key = named.key, named.subject
             self._alerts[key] = alert
 
-    def find(self, alert_id: str) -> Alert | None:
+    def find(self, alert_id: str) -> BookedAlert | None:
         """An alert that is active or recently cleared."""
         found = (one for one in self._alerts.values() if one.alert_id == alert_id)
         return next(found, None)
 
-    def _keep(self, alert: Alert) -> Alert:
+    def _keep(self, alert: BookedAlert) -> BookedAlert:
         """Store the new value of an alert."""
         self._alerts[alert.condition.key, alert.condition.subject] = alert
         return alert
@@ -189,22 +189,22 @@ def _gravest(conditions: Iterable[Condition]) -> dict[tuple[str, str], Condition
     return wrong
 
 
-def _goes_on(before: Alert, condition: Condition) -> bool:
+def _goes_on(before: BookedAlert, condition: Condition) -> bool:
     """Whether the occurrence continues: a graver one is a new occurrence."""
     return before.cleared is None and condition.priority >= before.condition.priority
 
 
-def _clear(alert: Alert, now: Instant) -> Alert:
+def _clear(alert: BookedAlert, now: Instant) -> BookedAlert:
     last = replace(alert.last, cleared=now)
     return replace(alert, members=(*alert.members[:-1], last))
 
 
 def _raise(
-    before: Alert | None, condition: Condition, now: Instant, alert_id: str
-) -> Alert:
-    new = Occurrence(condition.priority, now)
+    before: BookedAlert | None, condition: Condition, now: Instant, alert_id: str
+) -> BookedAlert:
+    new = AlertOccurrence(condition.priority, now)
     if before is None:
-        return Alert(alert_id, condition, now, (new,), unseen=new.priority)
+        return BookedAlert(alert_id, condition, now, (new,), unseen=new.priority)
     past = before if before.cleared is not None else _clear(before, now)
     # The same alert, but a new occurrence needs a new acknowledgement.
     return replace(
@@ -216,7 +216,7 @@ def _raise(
     )
 
 
-def _see(alert: Alert, by: str, note: str, now: Instant) -> Alert:
+def _see(alert: BookedAlert, by: str, note: str, now: Instant) -> BookedAlert:
     members = tuple(
         one
         if one.acknowledged is not None

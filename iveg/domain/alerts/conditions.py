@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from math import inf
 
 from iveg.domain.alerts.alert_book import Condition
-from iveg.domain.decisions import Decision
+from iveg.domain.decisions import SlowdownDecision
 from iveg.domain.detection_rule import RECOVERED, DetectionRule
 from iveg.domain.events import Slot
 from iveg.domain.limits import LIMITS
@@ -20,7 +20,7 @@ SHOWN_S = 10.0
 alert and not one a second."""
 
 
-def of_decision(decision: Decision, now: Instant) -> Iterable[Condition]:
+def of_decision(decision: SlowdownDecision, now: Instant) -> Iterable[Condition]:
     """A decision that is not obeyed is a P1; a slow-down as such is no alert.
 
     The slow-down is on the robot's card, on the map and in the log.

@@ -19,7 +19,7 @@ _MOST_COUNTED = 1000
 
 
 @dataclass(frozen=True, slots=True)
-class Flood:
+class FloodState:
     """Number of alerts within the window, at most a thousand.
 
     Attributes:
@@ -39,9 +39,9 @@ class FloodGauge:
 
     def __init__(self) -> None:
         self._raised: deque[float] = deque(maxlen=_MOST_COUNTED)
-        self.flood = Flood()
+        self.flood = FloodState()
 
-    def take(self, raised: int, now: Instant) -> Flood:
+    def count(self, raised: int, now: Instant) -> FloodState:
         """Count the alerts raised now and forget those out of the window."""
         self._raised.extend([now.mono] * raised)
         while self._raised and now.mono - self._raised[0] >= FLOOD_WINDOW_S:
@@ -51,5 +51,5 @@ class FloodGauge:
             since = now
         elif count < FLOOD_OVER:
             since = None
-        self.flood = Flood(count, since)
+        self.flood = FloodState(count, since)
         return self.flood

@@ -18,7 +18,7 @@ from iveg.domain.limits import LIMITS, ring_radius
 from iveg.domain.observations import Instant
 from iveg.domain.robot_state import RobotState
 from iveg.domain.tracking.people import People
-from iveg.domain.tracking.person import Person, Sighting
+from iveg.domain.tracking.person import Sighting, TrackedPerson
 from iveg.domain.world import World
 
 _Floats = NDArray[np.float64]
@@ -66,7 +66,7 @@ def zones_of(
 
 
 def _zones_of(
-    person: Person, world: World, rule: DetectionRule, now: Instant
+    person: TrackedPerson, world: World, rule: DetectionRule, now: Instant
 ) -> Iterator[Zone]:
     for sighting, radius in person.rings(rule, now):
         yield Zone(
@@ -185,10 +185,10 @@ class _Neighbours:
     at: float
     radius_m: float
     places: Mapping[str, _Place]
-    persons: Mapping[str, Person]
+    persons: Mapping[str, TrackedPerson]
     people: Mapping[str, set[str]]
     peers: Mapping[str, set[str]]
-    checked: dict[str, Person]
+    checked: dict[str, TrackedPerson]
 
     @classmethod
     def of(
@@ -244,7 +244,7 @@ class _Neighbours:
             return False
         return _is_as_near(now, place)
 
-    def _is_still_seen_there(self, person: Person) -> bool:
+    def _is_still_seen_there(self, person: TrackedPerson) -> bool:
         if self.checked.get(person.person_id) is person:
             return True
         before = self.persons.get(person.person_id)

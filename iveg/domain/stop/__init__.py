@@ -1,8 +1,8 @@
 """STOP, from a person's hand to a measured standstill (docs/safety.md, "STOP")."""
 
 from iveg.domain.stop.commands import (
-    Command,
     CommandState,
+    FollowedCommand,
     Press,
     State,
     Times,
@@ -29,11 +29,11 @@ __all__ = [
     "STEPS",
     "Changed",
     "Closed",
-    "Command",
     "CommandState",
     "DesiredRecord",
     "Effect",
     "Event",
+    "FollowedCommand",
     "Key",
     "OffTable",
     "Press",

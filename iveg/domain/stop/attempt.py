@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from iveg.domain.observations import CommandAnswer, Instant, SafetyReport
-from iveg.domain.stop.commands import Command, State
+from iveg.domain.stop.commands import FollowedCommand, State
 from iveg.domain.transports import TransportId
 
 
@@ -28,7 +28,7 @@ class Attempt:
         refused: Why one of its copies was refused.
     """
 
-    command: Command
+    command: FollowedCommand
     challenge: str
     ids: tuple[str, ...] = ()
     before: State = "STANDING"

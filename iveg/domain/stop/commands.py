@@ -92,7 +92,7 @@ class Times:
 
 
 @dataclass(frozen=True, slots=True)
-class Command:
+class FollowedCommand:
     """One STOP, RELEASE or RESUME as the operator follows it.
 
     Attributes:
@@ -129,7 +129,7 @@ class Command:
 
     def sent(
         self, transport: Transport, left: Instant, *, ok: bool, doubtful: bool
-    ) -> "Command":
+    ) -> "FollowedCommand":
         """Note that a transport accepted the message, or failed.
 
         Accepted is not arrived.  The time is when it ``left``: the robot's answer is
@@ -149,19 +149,19 @@ class Command:
         now = ("unknown" if doubtful else taken) if ok else "failed"
         return replace(self, times=times, transports=self._with(transport.id, now))
 
-    def heard_of(self, transport: TransportId, at: Instant) -> "Command":
+    def heard_of(self, transport: TransportId, at: Instant) -> "FollowedCommand":
         """Note the robot's confirmation on this transport; the first one counts."""
         if transport in self.times.answered:
             return self
         answered = {**self.times.answered, transport: at}
         return replace(self, times=replace(self.times, answered=answered))
 
-    def answered(self, transport: TransportId, at: Instant) -> "Command":
+    def answered(self, transport: TransportId, at: Instant) -> "FollowedCommand":
         """Note the robot's own answer."""
         heard = self.heard_of(transport, at)
         return replace(heard, transports=self._with(transport, "ok"))
 
-    def stood(self, first: Instant) -> "Command":
+    def stood(self, first: Instant) -> "FollowedCommand":
         """Note the measured standstill since ``first``; the first one counts."""
         if self.times.standing is not None:
             return self
@@ -171,7 +171,7 @@ class Command:
             standstill_ms=self.times.ms_from_press(first),
         )
 
-    def ended(self, why: str) -> "Command":
+    def ended(self, why: str) -> "FollowedCommand":
         """The closed command; a release that the robot never confirmed is marked."""
         if self.kind == "stop":
             return replace(self, state="REPLACED")

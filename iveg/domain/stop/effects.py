@@ -6,7 +6,7 @@ from typing import Literal
 
 from iveg.domain.observations import Instant
 from iveg.domain.stop.attempt import Attempt
-from iveg.domain.stop.commands import PLAIN, Command, Kind, Press, State, Times
+from iveg.domain.stop.commands import PLAIN, FollowedCommand, Kind, Press, State, Times
 from iveg.domain.stop.wanted import NEW_HOLD, Kept
 from iveg.domain.transports import Transport, TransportId
 
@@ -52,7 +52,7 @@ class Event:
     kept: Kept = NEW_HOLD
     attempt: Attempt | None = None
 
-    def begins(self, robot_id: str, transports: Iterable[Transport]) -> Command:
+    def begins(self, robot_id: str, transports: Iterable[Transport]) -> FollowedCommand:
         """The command that begins with it; ``off`` on transports that cannot carry it.
 
         A release or resume is sent once, at once; a STOP as often as it takes.
@@ -61,7 +61,7 @@ class Event:
         is_stop = kind == "stop"
         plain = not is_stop or self.key in ("requested", "adopted")
         ways = {one.id: "pending" if one.carries(kind) else "off" for one in transports}
-        return Command(
+        return FollowedCommand(
             self.new_id,
             robot_id,
             kind,
@@ -121,7 +121,7 @@ class Changed:
     state: State
     key: Key
     why: str | None = None
-    commands: tuple[Command, ...] = ()
+    commands: tuple[FollowedCommand, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,7 +132,7 @@ class Closed:
         key: What closed it; the sentence of that is told by the command that came.
     """
 
-    command: Command
+    command: FollowedCommand
     key: Key
 
 

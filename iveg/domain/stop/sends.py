@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping
 from typing import Literal
 
 from iveg.domain.observations import Instant
-from iveg.domain.stop.commands import Command
+from iveg.domain.stop.commands import FollowedCommand
 from iveg.domain.stop.effects import SendStop
 from iveg.domain.transports import Transport, TransportId
 
@@ -62,7 +62,7 @@ class Sends:
         self._busy.discard(transport)
         self._next[transport] = at.mono + FIWARE_PAUSE_S
 
-    def due(self, stop: Command, at: Instant) -> list[SendStop]:
+    def due(self, stop: FollowedCommand, at: Instant) -> list[SendStop]:
         """Sends that are due now; they count as sent."""
         age_s = at.mono - stop.times.requested.mono
         progress = _PROGRESS.get(stop.state, "asked")

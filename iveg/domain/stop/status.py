@@ -7,7 +7,7 @@ from math import inf
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
 from iveg.domain.stop.attempt import Attempt
-from iveg.domain.stop.commands import Command, State
+from iveg.domain.stop.commands import FollowedCommand, State
 from iveg.domain.stop.effects import Changed, Closed, Key
 from iveg.domain.stop.evidence import Evidence
 from iveg.domain.stop.sends import Sends
@@ -28,7 +28,7 @@ class StopStatus:
     def __init__(self, robot_id: str, transports: Iterable[Transport]) -> None:
         self.robot_id = robot_id
         self.state: State = "RUNNING"
-        self.stop: Command | None = None
+        self.stop: FollowedCommand | None = None
         self.attempt: Attempt | None = None
         self.evidence = Evidence(robot_id)
         self._transports = {one.id: one for one in transports}
@@ -45,27 +45,27 @@ class StopStatus:
         """Whether a STOP stands that no reported release has ended."""
         return self.stop is not None and self.state not in ("RUNNING", "READY")
 
-    def follows(self, command: Command) -> bool:
+    def follows(self, command: FollowedCommand) -> bool:
         """Whether this is the STOP that stands now."""
         stop = self.stop if self.wants_stop else None
         return stop is not None and stop.command_id == command.command_id
 
     @property
-    def once(self) -> Command | None:
+    def once(self) -> FollowedCommand | None:
         """The release or resume under way."""
         return None if self.attempt is None else self.attempt.command
 
     @property
-    def commands(self) -> tuple[Command, ...]:
+    def commands(self) -> tuple[FollowedCommand, ...]:
         """The STOP, and the release or resume under way, as they are now."""
         return tuple(one for one in (self.stop, self.once) if one is not None)
 
-    def _find(self, command_id: str) -> Command | None:
+    def _find(self, command_id: str) -> FollowedCommand | None:
         return next(
             (one for one in self.commands if one.command_id == command_id), None
         )
 
-    def _keep(self, command: Command) -> None:
+    def _keep(self, command: FollowedCommand) -> None:
         """Store the new value of one of the two commands."""
         if command.kind == "stop":
             self.stop = command
@@ -104,7 +104,9 @@ class StopStatus:
 
     # --- what is told of it -------------------------------------------------------
 
-    def _changed(self, key: Key, about: Command | None, why: str | None) -> Changed:
+    def _changed(
+        self, key: Key, about: FollowedCommand | None, why: str | None
+    ) -> Changed:
         command_id = "" if about is None else about.command_id
         return Changed(command_id, self.state, key, why, self.commands)
 

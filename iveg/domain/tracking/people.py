@@ -15,7 +15,7 @@ from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Detection, DetectionFrame, Instant
 from iveg.domain.robot_state import RobotState
-from iveg.domain.tracking.person import Person, Sighting
+from iveg.domain.tracking.person import Sighting, TrackedPerson
 from iveg.domain.tracking.picture import PlacedDetection
 from iveg.domain.tracking.possible_people import POSSIBLE_FROM, PossiblePeople
 from iveg.domain.tracking.tracker import Tracker
@@ -48,7 +48,7 @@ class Placed:
     position: tuple[float, float, float]
     kind: Literal["alert", "faint", "other"]
     class_: Class | None
-    person: Person | None = None
+    person: TrackedPerson | None = None
     peer: str | None = None
     possible: bool = False
     doubtful: tuple[Pose2D, float] | None = None
@@ -74,7 +74,7 @@ class People:
         """Frames that the last frame named and nobody described."""
 
     @property
-    def known(self) -> dict[str, Person]:
+    def known(self) -> dict[str, TrackedPerson]:
         """Everyone, by id."""
         return self._tracker.known
 
@@ -164,7 +164,7 @@ class People:
             if one.kind == "alert" and one.peer is None
         ]
         first: dict[int, int] = {}
-        tracks = self._tracker.take(
+        tracks = self._tracker.track_picture(
             [
                 PlacedDetection(
                     out[index].class_ or "person",
@@ -194,11 +194,13 @@ class People:
                 )
         return out
 
-    def drop_sighting(self, person_id: str, sighting: Sighting) -> Person:
+    def drop_sighting(self, person_id: str, sighting: Sighting) -> TrackedPerson:
         """Drop a sighting whose place was seen to be empty."""
         return self._tracker.drop(person_id, sighting)
 
-    def is_suspected(self, person: Person, sighting: Sighting, observer: str) -> bool:
+    def is_suspected(
+        self, person: TrackedPerson, sighting: Sighting, observer: str
+    ) -> bool:
         """Whether a robot's newest frame has such a faint detection near a sighting."""
         spot = sighting.x, sighting.y
         return any(
@@ -207,7 +209,7 @@ class People:
             for one in self._faint.get(observer, ())
         )
 
-    def forget(self, now: Instant) -> list[Person]:
+    def forget(self, now: Instant) -> list[TrackedPerson]:
         """Drop persons who have not been seen for ten minutes; returns them."""
         return self._tracker.forget(now)
 

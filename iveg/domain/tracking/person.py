@@ -66,7 +66,7 @@ class Sighting:
 
 
 @dataclass(frozen=True, slots=True)
-class Person:
+class TrackedPerson:
     """A person, or a robot that does not belong to the fleet, with all sightings.
 
     Attributes:
@@ -87,9 +87,11 @@ class Person:
         """Seconds since the newest sighting by any robot."""
         return self.newest.age_s(now)
 
-    def seen_as(self, newest: Sighting, sightings: tuple[Sighting, ...]) -> "Person":
+    def seen_as(
+        self, newest: Sighting, sightings: tuple[Sighting, ...]
+    ) -> "TrackedPerson":
         """The same person, seen otherwise."""
-        return Person(
+        return TrackedPerson(
             self.person_id,
             self.class_,
             self.decision_id,

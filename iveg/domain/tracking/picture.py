@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from iveg.domain.detection_rule import Class
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
-from iveg.domain.tracking.person import Person, Sighting
+from iveg.domain.tracking.person import Sighting, TrackedPerson
 
 GATE_M, GATE_CAP_M = 1.0, 2.0
 LOST_SPEED, LOST_CAP_M = 1.0, 6.0
@@ -42,14 +42,14 @@ def first_places(picture: Sequence[PlacedDetection]) -> list[int]:
     ]
 
 
-def is_alike(person: Person, one: PlacedDetection) -> bool:
+def is_alike(person: TrackedPerson, one: PlacedDetection) -> bool:
     """Whether they can be one: of a class, and of the same map."""
     frame = person.newest.recording
     return person.class_ == one.class_ and frame == one.sighting.recording
 
 
 def chain_cost(
-    one: PlacedDetection, person: Person, earlier: Sighting, at: Instant
+    one: PlacedDetection, person: TrackedPerson, earlier: Sighting, at: Instant
 ) -> float:
     """Distance to the observer's own earlier sighting (m); inf for another person's."""
     if not is_alike(person, one) or bool(earlier.reach_m) != bool(one.sighting.reach_m):
@@ -60,7 +60,7 @@ def chain_cost(
     return distance if distance <= _gate(earlier, at) else math.inf
 
 
-def live_cost(one: PlacedDetection, person: Person, at: Instant) -> float:
+def live_cost(one: PlacedDetection, person: TrackedPerson, at: Instant) -> float:
     """Distance to the nearest fresh sighting by anybody (m); inf beyond its gate.
 
     Where two robots see one person with noise, a detection that lies far from the one
@@ -81,7 +81,7 @@ def live_cost(one: PlacedDetection, person: Person, at: Instant) -> float:
     )
 
 
-def lost_cost(one: PlacedDetection, person: Person, at: Instant) -> float:
+def lost_cost(one: PlacedDetection, person: TrackedPerson, at: Instant) -> float:
     """Distance to the last sighting (m); inf beyond what is likely."""
     last = person.newest
     if not is_alike(person, one) or one.sighting.reach_m or last.reach_m:

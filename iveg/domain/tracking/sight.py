@@ -15,7 +15,7 @@ from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
 from iveg.domain.robot_state import RobotState
 from iveg.domain.tracking.people import People
-from iveg.domain.tracking.person import Person, Sighting
+from iveg.domain.tracking.person import Sighting, TrackedPerson
 from iveg.domain.world import World
 
 CLEAR_S = 1.0
@@ -37,7 +37,7 @@ class AllClear:
 
     def sweep(
         self, people: People, world: World, greenhouse: Greenhouse, now: Instant
-    ) -> list[Person]:
+    ) -> list[TrackedPerson]:
         """Remove rings whose centre is seen to be empty; returns their persons."""
         watched: dict[_Look, float] = {}
         empty: set[int] = set()

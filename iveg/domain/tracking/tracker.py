@@ -20,7 +20,7 @@ from dataclasses import dataclass, field
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
 from iveg.domain.tracking.assignment import assign
-from iveg.domain.tracking.person import Person, Sighting
+from iveg.domain.tracking.person import Sighting, TrackedPerson
 from iveg.domain.tracking.picture import (
     PlacedDetection,
     chain_cost,
@@ -46,13 +46,15 @@ class Tracker:
     """
 
     merge_m: float = MERGE_M
-    known: dict[str, Person] = field(default_factory=dict)
+    known: dict[str, TrackedPerson] = field(default_factory=dict)
     _chains: int = 0
     _tracks: int = 0
     _together: dict[str, set[str]] = field(default_factory=dict)
 
-    def take(self, picture: Sequence[PlacedDetection], at: Instant) -> list[str | None]:
-        """Take one detection frame of one robot in.
+    def track_picture(
+        self, picture: Sequence[PlacedDetection], at: Instant
+    ) -> list[str | None]:
+        """Assign each detection of a frame of one robot to a track.
 
         Returns:
             The track of each detection; None where no more can be kept.
@@ -68,14 +70,14 @@ class Tracker:
         merged = dict(self._merge(dict.fromkeys(named), at))
         return [_name_now(track, merged) for track in tracks]
 
-    def drop(self, person_id: str, sighting: Sighting) -> Person:
+    def drop(self, person_id: str, sighting: Sighting) -> TrackedPerson:
         """Drop a sighting whose place was seen to be empty."""
         person = self.known[person_id]
         left = tuple(earlier for earlier in person.sightings if earlier != sighting)
         self.known[person_id] = person.seen_as(person.newest, left)
         return self.known[person_id]
 
-    def forget(self, now: Instant) -> list[Person]:
+    def forget(self, now: Instant) -> list[TrackedPerson]:
         """Drop persons who have not been seen for ten minutes; returns them."""
         gone = [one for one in self.known.values() if one.stage(now) == "gone"]
         for person in gone:
@@ -243,7 +245,7 @@ class Tracker:
         self._tracks += 1
         track = f"{'P' if one.class_ == 'person' else 'R'}{self._tracks}"
         sighting = one.sighting
-        self.known[track] = Person(
+        self.known[track] = TrackedPerson(
             track, one.class_, one.decision_id, at, sighting, (sighting,), self._tracks
         )
         return track

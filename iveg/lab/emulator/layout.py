@@ -13,7 +13,7 @@ from iveg.adapters.fleet_files import built_in
 from iveg.domain.errors import DataFileError
 from iveg.domain.fleet import FleetDescription, RobotProfile
 from iveg.domain.geometry import Pose2D, Rectangle
-from iveg.domain.greenhouse import Greenhouse, Lane
+from iveg.domain.greenhouse import DriveLane, Greenhouse
 from iveg.lab.emulator.people import WalkStop
 from iveg.lab.emulator.routes import route_of
 from iveg.lab.emulator.scripts import TESTBED, Incident, RobotScript, Scenario
@@ -126,7 +126,7 @@ def _around_the_field(robots: Sequence[str]) -> tuple[tuple[WalkStop, ...], ...]
 
 def _lanes_for(
     robots: Mapping[str, RobotProfile], greenhouse: Greenhouse
-) -> list[Lane]:
+) -> list[DriveLane]:
     """One lane for each robot: the one of its start, else the longest free one.
 
     Robots with the largest turning radius choose first.
@@ -135,7 +135,7 @@ def _lanes_for(
     if len(robots) > len(lanes):
         reason = f"has {len(lanes)} lanes, too few for {len(robots)} robots."
         raise DataFileError(f"greenhouse {greenhouse.name!r}", "", reason)
-    chosen: dict[str, Lane] = {}
+    chosen: dict[str, DriveLane] = {}
     for robot_id, start in zip(robots, greenhouse.starts, strict=False):
         here = [lane for lane in lanes if lane.area.contains(start.x, start.y)]
         if here:

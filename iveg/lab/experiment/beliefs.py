@@ -6,7 +6,7 @@ from typing import Any, Final, Literal
 
 import numpy as np
 
-from iveg.domain.costmap import Costmap, Grid
+from iveg.domain.costmap import Grid, InflatedGrid
 from iveg.lab.experiment.scoring import Picture, SeenObject
 
 Held = Literal["nobody", "told", "own"]
@@ -17,7 +17,7 @@ _TAKEN: Final = 50
 _SAME_MOMENT_S: Final = 0.1
 
 
-def belief_of(own: Costmap, told: Costmap) -> Belief:
+def belief_of(own: InflatedGrid, told: InflatedGrid) -> Belief:
     """Belief of the robot's own scan and of the costmap with peer reports."""
 
     def held(x: float, y: float) -> Held:
@@ -33,7 +33,7 @@ def belief_in(answer: Mapping[str, Any]) -> Belief:
     width, height, origin = answer["width"], answer["height"], answer["origin"]
     grid = Grid(answer["resolution"], origin["x"], origin["y"], width, height)
     cells = np.asarray(answer["data"], np.int8).reshape(height, width)
-    told = Costmap(grid, cells)
+    told = InflatedGrid(grid, cells)
     return lambda x, y: "told" if _is_taken(told, x, y) else "nobody"
 
 
@@ -86,7 +86,7 @@ def _first_sights(truth: Sequence[Picture], robot_id: str) -> dict[str, float]:
     return first
 
 
-def _is_taken(costmap: Costmap, x: float, y: float) -> bool:
+def _is_taken(costmap: InflatedGrid, x: float, y: float) -> bool:
     grid = costmap.grid
     column = math.floor((x - grid.xmin) / grid.resolution)
     row = math.floor((y - grid.ymin) / grid.resolution)

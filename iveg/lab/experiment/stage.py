@@ -104,7 +104,7 @@ class StagedRobot:
     def listen(self, topic: str, payload: bytes, now: Instant) -> None:
         """Take iVeg's feedback to a robot of the fleet."""
         feedback = codec.read_feedback(payload)
-        self._echo.take(feedback.origin)
+        self._echo.note(feedback.origin)
         self._perform(self._machine.feedback(topic, feedback, now.mono), now)
 
     def order(self, payload: bytes, now: Instant) -> None:

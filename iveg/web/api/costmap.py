@@ -14,7 +14,7 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 from numpy.typing import NDArray
 from PIL import Image
 
-from iveg.domain.costmap import UNKNOWN, Costmap
+from iveg.domain.costmap import UNKNOWN, InflatedGrid
 from iveg.domain.rule.zones import zones_of
 from iveg.models.base import write_json
 from iveg.models.places import Costmap as CostmapModel
@@ -67,7 +67,7 @@ def router(mapper: Mapper, evaluator: Evaluator, clock: Clock) -> APIRouter:
     return routes
 
 
-def _json(costmap: Costmap | None, age_s: float | None) -> bytes:
+def _json(costmap: InflatedGrid | None, age_s: float | None) -> bytes:
     if costmap is None:
         return write_json(_NOTHING)
     grid = costmap.grid
@@ -83,7 +83,7 @@ def _json(costmap: Costmap | None, age_s: float | None) -> bytes:
     return orjson.dumps(told, option=orjson.OPT_SERIALIZE_NUMPY)
 
 
-def _shades(costmap: Costmap | None) -> NDArray[np.uint8]:
+def _shades(costmap: InflatedGrid | None) -> NDArray[np.uint8]:
     if costmap is None:
         return np.full((1, 1), _UNKNOWN_GREY, np.uint8)
     data = costmap.data

@@ -23,7 +23,7 @@ from iveg.adapters.history.series import (
     ConfidenceCount,
     SpeedSeries,
 )
-from iveg.domain.alerts.flood import Flood as NoFlood
+from iveg.domain.alerts.flood import FloodState as NoFlood
 from iveg.domain.fleet import NOBODY, FleetDescription
 from iveg.domain.records import CommandRecord, DecisionRecord, Record
 from iveg.domain.stamps import format_stamp

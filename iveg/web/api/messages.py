@@ -16,7 +16,14 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from iveg.adapters import web_push
 from iveg.adapters.outbound import is_public_target
 from iveg.domain import messages
-from iveg.domain.messages import Channel, Contacts, Language, Level, Message, Text
+from iveg.domain.messages import (
+    Channel,
+    Contacts,
+    Language,
+    Level,
+    MessageText,
+    OutboundMessage,
+)
 from iveg.models.alert import Told
 from iveg.models.messages import Messages, MessageTest
 from iveg.ngsi.payloads import clean_text
@@ -93,7 +100,7 @@ class EmailBody(_Body):
             password=password,
             sender=self.sender,
             recipients=tuple(
-                messages.Recipient(one.who, one.address) for one in self.recipients
+                messages.MailRecipient(one.who, one.address) for one in self.recipients
             ),
             least=self.least,
             language=self.language,
@@ -140,9 +147,9 @@ class DeviceBody(_Body):
     keys: KeysBody
     language: Language
 
-    def device(self, device_id: str, since: float) -> messages.Device:
+    def device(self, device_id: str, since: float) -> messages.SubscribedBrowser:
         """The browser under a name of its own."""
-        return messages.Device(
+        return messages.SubscribedBrowser(
             device_id,
             self.who,
             self.endpoint,
@@ -291,23 +298,23 @@ def _switched(all_: Contacts, body: PushBody) -> Contacts:
     return replace(all_, push=push)
 
 
-def _joined(all_: Contacts, device: messages.Device) -> Contacts:
+def _joined(all_: Contacts, device: messages.SubscribedBrowser) -> Contacts:
     devices = (*_others(all_.push, device.endpoint), device)
     return replace(all_, push=replace(all_.push, devices=devices))
 
 
-def _others(push: messages.Push, endpoint: str) -> list[messages.Device]:
+def _others(push: messages.Push, endpoint: str) -> list[messages.SubscribedBrowser]:
     return [one for one in push.devices if one.endpoint != endpoint]
 
 
-def writer() -> Callable[[Message, Language], Text]:
+def writer() -> Callable[[OutboundMessage, Language], MessageText]:
     """Writes messages in words: priority and time, but no place and no person."""
     sentences = {one: Sentences(read_translations(one)) for one in LANGUAGES}
 
-    def write(message: Message, language: Language) -> Text:
+    def write(message: OutboundMessage, language: Language) -> MessageText:
         said = sentences[language]
         if message.is_test:
-            return Text(
+            return MessageText(
                 said.say("messages.test_title", {}), said.say("messages.test_body", {})
             )
         slots = {
@@ -316,7 +323,7 @@ def writer() -> Callable[[Message, Language], Text]:
             "at": min(one.raised.wall for one in message.items),
         }
         key = "one" if len(message.items) == 1 else "more"
-        return Text(
+        return MessageText(
             said.say("messages.title", slots), said.say(f"messages.body_{key}", slots)
         )
 

@@ -8,13 +8,24 @@ import pytest
 from iveg.adapters.contacts import FileContacts
 from iveg.adapters.web_push import new_key
 from iveg.domain.errors import HopError
-from iveg.domain.messages import Contacts, Device, Email, Push, Recipient, Webhook
+from iveg.domain.messages import (
+    Contacts,
+    Email,
+    MailRecipient,
+    Push,
+    SubscribedBrowser,
+    Webhook,
+)
 
 ALL = Contacts(
     Push(
         True,
         "ana@coop.es",
-        (Device("D1", "Ana", "https://push.example/1", "k", "s", "es", 12.5),),
+        (
+            SubscribedBrowser(
+                "D1", "Ana", "https://push.example/1", "k", "s", "es", 12.5
+            ),
+        ),
         new_key(),
     ),
     Email(
@@ -23,7 +34,7 @@ ALL = Contacts(
         user="iveg",
         password="tomato",
         sender="iveg@coop.es",
-        recipients=(Recipient("Ana", "ana@coop.es"),),
+        recipients=(MailRecipient("Ana", "ana@coop.es"),),
         least="P2",
     ),
     Webhook(True, "Guardia", "https://hooks.coop.es/secret"),

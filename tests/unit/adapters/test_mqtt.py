@@ -232,7 +232,7 @@ async def test_the_direct_transport_speaks_as_the_contract_says() -> None:
             await until(lambda: heard.link.connected)
             await transport.stop("AGI", "01A", "x")
             await transport.set_desired_state("AGI", "stopped", ["01A"])
-            transport.tell(Feedback("AGI", Origin("b", 1, "t")))
+            transport.publish_feedback(Feedback("AGI", Origin("b", 1, "t")))
             await until(lambda: len(heard.messages) == 3)
 
     said = {topic: orjson.loads(payload) for topic, payload in heard.messages}

@@ -19,23 +19,23 @@ from iveg.domain.errors import OutboundError
 from iveg.domain.messages import (
     AlertItem,
     Contacts,
-    Device,
     Email,
     Language,
-    Message,
+    MailRecipient,
+    MessageText,
+    OutboundMessage,
     Push,
-    Recipient,
-    Text,
+    SubscribedBrowser,
     Webhook,
 )
 from tests.builders import START
 from tests.fakes.outbound import HttpsStand, MailStand, loopback, standing
 
-ALERT = Message([AlertItem("01J", "P1", "stop_unconfirmed", START)])
+ALERT = OutboundMessage([AlertItem("01J", "P1", "stop_unconfirmed", START)])
 
 
-def write(message: Message, language: Language) -> Text:
-    return Text(f"iVeg: {message.priority}", f"({language})")
+def write(message: OutboundMessage, language: Language) -> MessageText:
+    return MessageText(f"iVeg: {message.priority}", f"({language})")
 
 
 def hooked(url: str) -> Contacts:
@@ -43,7 +43,7 @@ def hooked(url: str) -> Contacts:
 
 
 def mailed(stand: MailStand, *people: str, wrong: str = "") -> Contacts:
-    recipients = tuple(Recipient(who, f"{who}@coop.es") for who in people)
+    recipients = tuple(MailRecipient(who, f"{who}@coop.es") for who in people)
     return Contacts(
         email=Email(
             on=True,
@@ -259,7 +259,7 @@ def test_a_push_is_encrypted_as_the_example_of_rfc_8291() -> None:
 
 def subscribed(stand: HttpsStand) -> Contacts:
     browser = web_push.public_key(new_key())
-    device = Device(
+    device = SubscribedBrowser(
         "D1", "ana", stand.url("/push/1"), browser, encode(b"s" * 16), "es", 0.0
     )
     return Contacts(push=Push(True, "ana@coop.es", (device,), new_key()))

@@ -16,7 +16,7 @@ from iveg.domain.observations import (
 )
 from iveg.domain.rule.speed_limits import LimitChange, SpeedLimits
 from iveg.domain.tracking.people import People, Placed
-from iveg.domain.tracking.person import Person
+from iveg.domain.tracking.person import TrackedPerson
 from iveg.domain.tracking.sight import AllClear
 from iveg.domain.world import World
 from tests.builders import (
@@ -130,13 +130,13 @@ class Scene:
         self.changes += changes
         return speed_limits
 
-    def sweep(self) -> list[Person]:
+    def sweep(self) -> list[TrackedPerson]:
         return self.all_clear.sweep(
             self.people, self.world, self.greenhouse, at(self.now)
         )
 
     @property
-    def everyone(self) -> list[Person]:
+    def everyone(self) -> list[TrackedPerson]:
         return list(self.people.known.values())
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from iveg.domain.acknowledgements import ECHO_S, WINDOW_S, acknowledgements_of
-from iveg.domain.decisions import Decision
+from iveg.domain.decisions import SlowdownDecision
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.rule.speed_limits import Crossing
 from iveg.domain.rule.zones import Zone
@@ -19,7 +19,7 @@ def asked(
     already_slow: bool = False,
     ahead: float | None = None,
     looked: float | None = 0.0,
-) -> Decision:
+) -> SlowdownDecision:
     """AGII was told at ``entered`` and answered ``after`` that long; None: never.
 
     The look that it rests on came ``looked`` before; None: the ring was known.  A robot
@@ -37,7 +37,7 @@ def asked(
         already_slow=already_slow,
         ahead=ahead is not None,
     )
-    one = Decision(
+    one = SlowdownDecision(
         crossing,
         DetectionRule(),
         noticed=None if looked is None else at(entered - looked).mono,

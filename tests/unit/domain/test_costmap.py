@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from iveg.domain.costmap import (
     MAX_CELLS,
     UNKNOWN,
-    Costmap,
     Grid,
+    InflatedGrid,
     Occupancy,
     Ring,
     sweep_of,
@@ -33,13 +33,13 @@ def around(distance: float, beams: int = 720, range_max: float = 12.0) -> LaserS
     )
 
 
-def seen(one: LaserScan, pose: Pose2D, grid: Grid = ROOM) -> Costmap:
+def seen(one: LaserScan, pose: Pose2D, grid: Grid = ROOM) -> InflatedGrid:
     occupancy = Occupancy(grid)
     occupancy.add(sweep_of(one, pose, grid))
     return occupancy.costs()
 
 
-def cost(costmap: Costmap, x: float, y: float) -> int:
+def cost(costmap: InflatedGrid, x: float, y: float) -> int:
     return int(costmap.data[costmap.grid.index(x, y)])
 
 

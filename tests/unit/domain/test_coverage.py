@@ -1,14 +1,14 @@
 """Issue 13.21: what nobody sees, and when somebody last looked there."""
 
-from iveg.domain.coverage import MOST_CELLS, Coverage
+from iveg.domain.coverage import MOST_CELLS, AisleCoverage
 from iveg.domain.geometry import Rectangle
-from iveg.domain.greenhouse import Greenhouse, Lane
+from iveg.domain.greenhouse import DriveLane, Greenhouse
 from tests.builders import at
 from tests.unit.domain.scene import Scene
 
 AISLES = (
-    Lane("1", Rectangle(0.0, -0.5, 12.0, 0.5)),
-    Lane("2", Rectangle(0.0, 1.5, 12.0, 2.5)),
+    DriveLane("1", Rectangle(0.0, -0.5, 12.0, 0.5)),
+    DriveLane("2", Rectangle(0.0, 1.5, 12.0, 2.5)),
 )
 GREENHOUSE = Greenhouse(
     "two aisles",
@@ -18,9 +18,9 @@ GREENHOUSE = Greenhouse(
 )
 
 
-def looking(seconds: float = 0.0) -> tuple[Scene, Coverage]:
+def looking(seconds: float = 0.0) -> tuple[Scene, AisleCoverage]:
     """AGI stands in the middle of aisle 1 and looks east."""
-    scene, coverage = Scene(greenhouse=GREENHOUSE), Coverage(GREENHOUSE)
+    scene, coverage = Scene(greenhouse=GREENHOUSE), AisleCoverage(GREENHOUSE)
     scene.drive("AGI", 4.0, linear=0.0)
     scene.look("AGI")
     coverage.update(scene.world.live_robots(), at(seconds))
@@ -28,7 +28,7 @@ def looking(seconds: float = 0.0) -> tuple[Scene, Coverage]:
 
 
 def test_what_no_camera_ever_looked_at_is_never() -> None:
-    coverage = Coverage(GREENHOUSE)
+    coverage = AisleCoverage(GREENHOUSE)
 
     assert coverage.ages(at(5)) == [[None] * 12, [None] * 12]
     assert coverage.share(at(5)) == 0.0
@@ -61,13 +61,13 @@ def test_a_robot_that_is_silent_looks_at_nothing() -> None:
 def test_an_open_field_has_no_aisles_to_look_at() -> None:
     field = Greenhouse("field", Rectangle(-100, -100, 100, 100))
 
-    assert Coverage(field).share(at(0)) is None
+    assert AisleCoverage(field).share(at(0)) is None
 
 
 def test_no_greenhouse_costs_more_than_a_bound() -> None:
-    vast = Lane("1", Rectangle(0, 0, 500, 500))
+    vast = DriveLane("1", Rectangle(0, 0, 500, 500))
     greenhouse = Greenhouse("vast", vast.area, lanes=(vast,))
 
-    (cells,) = Coverage(greenhouse).lanes
+    (cells,) = AisleCoverage(greenhouse).lanes
 
     assert cells.count <= 1.1 * MOST_CELLS

@@ -10,14 +10,17 @@ from iveg.domain.day import (
     worked_minutes,
 )
 from iveg.domain.geometry import Rectangle
-from iveg.domain.greenhouse import Greenhouse, Lane
+from iveg.domain.greenhouse import DriveLane, Greenhouse
 from iveg.domain.stop.drills import due_drills
 from tests.fakes.records import NOON, decision_record
 
 GREENHOUSE = Greenhouse(
     "two aisles",
     Rectangle(0, 0, 20, 10),
-    lanes=(Lane("1", Rectangle(0, 0, 20, 4)), Lane("2", Rectangle(0, 6, 20, 10))),
+    lanes=(
+        DriveLane("1", Rectangle(0, 0, 20, 4)),
+        DriveLane("2", Rectangle(0, 6, 20, 10)),
+    ),
 )
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from iveg.domain.alerts.conditions import of_decision, of_robot
-from iveg.domain.decisions import Decision, Decisions
+from iveg.domain.decisions import Decisions, SlowdownDecision
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.observations import FeedbackRef, SafetyReport
 from iveg.domain.robot_state import RobotState
@@ -50,19 +50,19 @@ def crossing(
     )
 
 
-def decision(**parts: object) -> Decision:
-    return Decision(crossing(**parts), DetectionRule())  # type: ignore[arg-type]
+def decision(**parts: object) -> SlowdownDecision:
+    return SlowdownDecision(crossing(**parts), DetectionRule())  # type: ignore[arg-type]
 
 
 def slow() -> SafetyReport:
     return safety_report("AGII", speed_factor=0.5, reason="person")
 
 
-def verdicts(one: Decision, after: float) -> dict[str, str]:
+def verdicts(one: SlowdownDecision, after: float) -> dict[str, str]:
     return {link.name: link.verdict for link in one.links(at(after))}
 
 
-def obeyed(one: Decision, after: float = 0.2) -> Decision:
+def obeyed(one: SlowdownDecision, after: float = 0.2) -> SlowdownDecision:
     done = one.published(at(0.01)).reported(slow(), at(after))
     return done.moved(0.4, at(after))
 
@@ -161,7 +161,7 @@ def test_what_is_reported_after_the_end_is_not_for_this_decision() -> None:
 # --- overdue ----------------------------------------------------------------------
 
 
-def keys(one: Decision, after: float) -> list[tuple[str, str]]:
+def keys(one: SlowdownDecision, after: float) -> list[tuple[str, str]]:
     return [(wrong.priority, wrong.key) for wrong in of_decision(one, at(after))]
 
 

@@ -6,7 +6,7 @@ from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.detector import (
     CLASS_NAMES,
     FRAMES_HZ,
-    Detector,
+    DetectorEvidence,
     OutOfService,
     flaw_of,
 )
@@ -16,8 +16,8 @@ from tests.builders import at, detection, detection_frame
 OUT = OutOfService("maria", 1.0, "boot-a")
 
 
-def looked(moment: float = 0.0) -> Detector:
-    detector = Detector()
+def looked(moment: float = 0.0) -> DetectorEvidence:
+    detector = DetectorEvidence()
     detector.note_whole(at(moment).mono)
     return detector
 
@@ -27,7 +27,7 @@ def frame(*unread: str | None) -> DetectionFrame:
 
 
 def test_a_detector_that_was_never_heard_is_missing() -> None:
-    assert Detector().is_missing(at(0.0))
+    assert DetectorEvidence().is_missing(at(0.0))
 
 
 @pytest.mark.parametrize(("age", "missing"), [(1.0, False), (1.01, True)])
@@ -36,7 +36,7 @@ def test_a_whole_frame_proves_it_for_a_second(age: float, *, missing: bool) -> N
 
 
 def test_a_frame_whose_age_nobody_knows_proves_nothing() -> None:
-    detector = Detector()
+    detector = DetectorEvidence()
     detector.note_whole(None)
     assert detector.is_missing(at(0.0))
 
@@ -51,11 +51,11 @@ def test_a_flaw_outweighs_whole_frames_for_a_second(
 
 
 def test_one_out_of_service_is_not_waited_for() -> None:
-    assert not Detector(out_of_service=OUT).is_missing(at(0.0))
+    assert not DetectorEvidence(out_of_service=OUT).is_missing(at(0.0))
 
 
 def test_a_refused_frame_counts_even_out_of_service() -> None:
-    detector = Detector(out_of_service=OUT)
+    detector = DetectorEvidence(out_of_service=OUT)
     detector.note_flaw("unreadable", at(0.0))
     assert detector.is_missing(at(0.5))
 
@@ -66,19 +66,19 @@ def test_a_refused_frame_counts_even_out_of_service() -> None:
 def test_the_next_boot_puts_it_back_in_service(
     boot: str | None, *, ended: bool
 ) -> None:
-    detector = Detector(out_of_service=OUT)
+    detector = DetectorEvidence(out_of_service=OUT)
     assert detector.meet_boot(boot) is ended
     assert (detector.out_of_service is None) is ended
 
 
 def test_forty_five_frames_a_second_are_judged_and_no_more() -> None:
-    detector = Detector()
+    detector = DetectorEvidence()
     admitted = sum(detector.admits_frame(at(n / 200)) for n in range(2000))
     assert admitted == pytest.approx(FRAMES_HZ * 11, abs=1)
 
 
 def test_thirty_frames_a_second_are_judged_for_ever() -> None:
-    detector = Detector()
+    detector = DetectorEvidence()
     assert all(detector.admits_frame(at(n / 30)) for n in range(3000))
 
 
@@ -106,7 +106,7 @@ def names(frame: DetectionFrame) -> list[str]:
 
 
 def test_two_hundred_classes_of_a_robot_have_a_name_and_no_more() -> None:
-    detector, rule = Detector(), DetectionRule()
+    detector, rule = DetectorEvidence(), DetectionRule()
     for number in range(CLASS_NAMES):
         detector.bounded(seen(f"thing-{number}"), rule)
 
@@ -117,5 +117,5 @@ def test_two_hundred_classes_of_a_robot_have_a_name_and_no_more() -> None:
 
 
 def test_a_frame_of_known_classes_stays_as_it_is() -> None:
-    detector, frame = Detector(), seen("tomato", "farmer")
+    detector, frame = DetectorEvidence(), seen("tomato", "farmer")
     assert detector.bounded(frame, DetectionRule()) is frame

@@ -5,18 +5,18 @@ from dataclasses import replace
 import pytest
 
 from iveg.domain.exposure import PERIOD_S, Exposures
-from iveg.domain.margins import Margin
+from iveg.domain.margins import SafetyMargin
 from iveg.domain.observations import Instant
 from tests.builders import at
 
 # Needs 1.0 + 0.5 + 0.1 + 0.4 = 2.0 m.
-WIDE = Margin("AGI", "P1", 5.0, 1.0, 0.5, 0.1, age_s=0.1, braking=1.0)
+WIDE = SafetyMargin("AGI", "P1", 5.0, 1.0, 0.5, 0.1, age_s=0.1, braking=1.0)
 NEAR = replace(WIDE, gap_m=1.5)
 LOST = replace(NEAR, known=False)
 LONG_AGO = replace(NEAR, age_s=1.1)
 
 
-def watch(days: Exposures, *looks: list[Margin], seen: bool = True) -> None:
+def watch(days: Exposures, *looks: list[SafetyMargin], seen: bool = True) -> None:
     """One look each half a second."""
     begin = 0 if days.today is None else days.today.evaluations
     for number, margins in enumerate(looks):

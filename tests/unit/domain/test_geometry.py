@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from iveg.domain.geometry import Box3D, Pose2D, Rectangle, wrap_angle
-from iveg.domain.greenhouse import Greenhouse, Lane
+from iveg.domain.greenhouse import DriveLane, Greenhouse
 from tests.builders import scan
 
 QUARTER = math.pi / 2
@@ -76,7 +76,9 @@ def test_a_rectangle_holds_its_edges_and_a_margin(
 
 
 def test_a_lane_is_known_by_its_label() -> None:
-    greenhouse = Greenhouse("h", Rectangle(0, 0, 9, 9), lanes=(Lane("Pasillo 7", BOX),))
+    greenhouse = Greenhouse(
+        "h", Rectangle(0, 0, 9, 9), lanes=(DriveLane("Pasillo 7", BOX),)
+    )
 
     assert greenhouse.lane_at(1.5, 2.0) == "Pasillo 7"
     assert greenhouse.lane_at(5.0, 5.0) is None

@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 
 from iveg.domain.exposure import Exposure, Exposures
-from iveg.domain.margins import LeastMargins, Margin
-from iveg.domain.tracking.person import Person
+from iveg.domain.margins import LeastMargins, SafetyMargin
+from iveg.domain.tracking.person import TrackedPerson
 from tests.builders import at
 from tests.unit.domain.scene import Scene, person
 
@@ -25,13 +25,13 @@ def margins(scene: Scene) -> LeastMargins:
     return LeastMargins(scene.world.robots.values(), scene.everyone, at(scene.now))
 
 
-def margin(scene: Scene) -> Margin:
+def margin(scene: Scene) -> SafetyMargin:
     found = margins(scene).of_robot("AGI")
     assert found is not None
     return found
 
 
-def pairs(scene: Scene, people: list[Person]) -> list[Margin]:
+def pairs(scene: Scene, people: list[TrackedPerson]) -> list[SafetyMargin]:
     """The margin of each robot with each of these, each computed alone."""
     found = [
         LeastMargins([robot], [one], at(scene.now)).of_robot(robot.robot_id)
@@ -55,7 +55,7 @@ def test_the_need_is_that_of_the_table_of_separation_distances(
     speed: float, braking: float, age: float, needs: float
 ) -> None:
     reaction = 0.79
-    one = Margin(
+    one = SafetyMargin(
         "AGI",
         "P1",
         gap_m=2.0,

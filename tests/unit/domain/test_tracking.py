@@ -194,7 +194,7 @@ def test_the_union_of_rings_is_the_same_with_and_without_merging(
         after += pause
         now = at(after)
         for tracker in (merging, never):
-            tracker.take(
+            tracker.track_picture(
                 [
                     PlacedDetection(
                         "person",

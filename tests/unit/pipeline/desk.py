@@ -15,7 +15,7 @@ from iveg.domain.observations import (
     Origin,
     Received,
 )
-from iveg.domain.stop import Command
+from iveg.domain.stop import FollowedCommand
 from iveg.domain.transports import DIRECT, FIWARE, Transport, TransportId
 from iveg.pipeline.build import Choices, Ports, build
 from iveg.pipeline.ports import CommandPort
@@ -161,7 +161,7 @@ class Desk:
         assert machine.state == "STANDING"
         self.report(robot_id, Hold(machine.hold_id or "", "iveg", "remote"))
 
-    def now(self, command: Command) -> Command:
+    def now(self, command: FollowedCommand) -> FollowedCommand:
         """A command as it is by now."""
         return self.commander.commands[command.command_id]
 

@@ -7,14 +7,14 @@ import pytest
 from iveg.domain.errors import CommandRefusedError, UnknownRobotError
 from iveg.domain.observations import Hold
 from iveg.domain.records import CommandEventRecord, CommandRecord
-from iveg.domain.stop import STEPS, Command, DesiredRecord, StopMachine
+from iveg.domain.stop import STEPS, DesiredRecord, FollowedCommand, StopMachine
 from iveg.domain.transports import DIRECT, FIWARE
 from tests.builders import safety_report
 from tests.fakes.records import command_record
 from tests.unit.pipeline.desk import Desk, conditions_of, settle
 
 
-async def press(desk: Desk, by: str = "ana") -> Command:
+async def press(desk: Desk, by: str = "ana") -> FollowedCommand:
     (command,) = await desk.commander.stop(["AGI"], by, desk.clock())
     await settle()
     return command

@@ -104,7 +104,7 @@ def test_every_robot_is_told_how_far_orion_is_behind() -> None:
     desk.health_monitor.sent(Origin("iveg-boot", 1), desk.clock())
     desk.clock.now += 7.0
 
-    desk.evaluator.tell(desk.clock())
+    desk.evaluator.publish(desk.clock())
 
     assert [one.backlog_s for one in desk.fleet.told[-2:]] == [7.0, 7.0]
 
@@ -112,7 +112,7 @@ def test_every_robot_is_told_how_far_orion_is_behind() -> None:
 def test_another_confident_object_is_told_as_a_stamp_alone() -> None:
     desk = watched(Desk())
     desk.look("AGII", detection("crate", 9.0))
-    desk.evaluator.tell(desk.clock())
+    desk.evaluator.publish(desk.clock())
 
     alert = next(one for one in desk.fleet.told[::-1] if one.robot_id == "AGII").alert
     assert alert is not None

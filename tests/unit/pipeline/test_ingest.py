@@ -36,7 +36,7 @@ def ingest() -> Ingest:
 def test_what_arrives_leaves_in_the_same_order() -> None:
     queue = ingest()
     for seq in range(5):
-        queue.offer(received(odometry(origin=origin(seq))))
+        queue.enqueue(received(odometry(origin=origin(seq))))
 
     left = [one.observation for one in queue.drain()]
 
@@ -47,7 +47,7 @@ def test_what_arrives_leaves_in_the_same_order() -> None:
 def test_the_queue_is_bounded_and_the_oldest_telemetry_gives_way() -> None:
     queue = ingest()
     for seq in range(MAX_QUEUED + 10):
-        queue.offer(received(odometry(x=float(seq))))
+        queue.enqueue(received(odometry(x=float(seq))))
 
     left = [one.observation for one in queue.drain()]
 
@@ -61,9 +61,9 @@ def test_safety_reports_answers_and_looks_never_give_way() -> None:
     answer = CommandAnswer("AGI", Origin(), "id", "LATCHED")
     precious: list[Observation] = [safety_report(), answer, detection_frame()]
     for one in precious:
-        queue.offer(received(one))
+        queue.enqueue(received(one))
     for _ in range(MAX_QUEUED + 100):
-        queue.offer(received(scan()))
+        queue.enqueue(received(scan()))
 
     left = [one.observation for one in queue.drain()]
 
@@ -73,9 +73,9 @@ def test_safety_reports_answers_and_looks_never_give_way() -> None:
 def test_f24_a_flood_of_telemetry_holds_back_no_safety_report() -> None:
     queue = ingest()
     for number in range(5000):
-        queue.offer(received(odometry()))
+        queue.enqueue(received(odometry()))
         for _ in range(number % 100 == 0):
-            queue.offer(received(safety_report()))
+            queue.enqueue(received(safety_report()))
 
     kept = [isinstance(one.observation, SafetyReport) for one in queue.drain()]
     assert kept.count(True) == 50
@@ -83,9 +83,9 @@ def test_f24_a_flood_of_telemetry_holds_back_no_safety_report() -> None:
 
 def test_a_queue_of_nothing_but_safety_keeps_the_newest_of_each_robot() -> None:
     queue = ingest()
-    queue.offer(received(safety_report("AGII")))
+    queue.enqueue(received(safety_report("AGII")))
     for seq in range(MAX_QUEUED + 5):
-        queue.offer(received(safety_report(origin=origin(seq))))
+        queue.enqueue(received(safety_report(origin=origin(seq))))
 
     left = [one.observation for one in queue.drain()]
 
@@ -99,7 +99,7 @@ def test_a_flood_of_frames_keeps_the_newest_and_says_that_others_were_not_read()
 ):
     queue = ingest()
     for seq in range(50_000):
-        queue.offer(received(detection_frame(origin=origin(seq))))
+        queue.enqueue(received(detection_frame(origin=origin(seq))))
 
     assert queue.waiting == MAX_QUEUED
     left = [one.observation for one in queue.drain()]
@@ -111,9 +111,9 @@ def test_a_flood_of_one_robots_frames_costs_no_other_robot_anything() -> None:
     queue = ingest()
     others = detection_frame("AGII"), odometry("AGII")
     for one in others:
-        queue.offer(received(one))
+        queue.enqueue(received(one))
     for seq in range(MAX_QUEUED + 5):
-        queue.offer(received(detection_frame(origin=origin(seq))))
+        queue.enqueue(received(detection_frame(origin=origin(seq))))
 
     left = [one.observation for one in queue.drain()]
     assert left[:2] == [*others]
@@ -122,8 +122,8 @@ def test_a_flood_of_one_robots_frames_costs_no_other_robot_anything() -> None:
 
 def test_what_comes_is_counted_by_transport_and_kind() -> None:
     queue = ingest()
-    queue.offer(received(odometry()))
-    queue.offer(received(safety_report(), transport=DIRECT.id))
+    queue.enqueue(received(odometry()))
+    queue.enqueue(received(safety_report(), transport=DIRECT.id))
 
     assert queue.counters["orion.Odometry"] == 1
     assert queue.counters["mqtt.SafetyReport"] == 1
@@ -135,7 +135,7 @@ def test_an_unknown_robot_is_counted_each_time_and_logged_once(
     told: list[tuple[str, str]] = []
     queue = Ingest({"AGI"}.__contains__, lambda *one: told.append(one))
     for _ in range(10):
-        queue.offer(received(odometry("AGX")))
+        queue.enqueue(received(odometry("AGX")))
 
     assert list(queue.drain()) == []
     assert queue.counters["rejected.unknown_robot"] == 10
@@ -158,14 +158,14 @@ def test_no_flood_of_strange_names_fills_the_memory(
 
 def test_what_belongs_to_no_robot_comes_in() -> None:
     queue = ingest()
-    queue.offer(received(Climate(20.0)))
+    queue.enqueue(received(Climate(20.0)))
 
     assert len(list(queue.drain())) == 1
 
 
 async def test_who_waits_is_woken_by_what_arrives() -> None:
     queue = ingest()
-    queue.offer(received(odometry()))
+    queue.enqueue(received(odometry()))
 
     await queue.wait(timeout_s=60.0)
 
@@ -179,8 +179,8 @@ async def test_who_waits_in_vain_goes_on_after_a_while() -> None:
 def test_what_was_asked_for_is_counted_apart_from_what_was_sent() -> None:
     queue = ingest()
 
-    queue.offer(replace(received(odometry()), asked=True))
-    queue.offer(received(odometry()))
+    queue.enqueue(replace(received(odometry()), asked=True))
+    queue.enqueue(received(odometry()))
 
     assert queue.counters == {"asked.Odometry": 1, "orion.Odometry": 1}
 
@@ -189,10 +189,10 @@ def test_a_robot_that_floods_drops_its_own_telemetry_and_no_other_robots() -> No
     queue = ingest()
     quiet = [odometry("AGII", float(x)) for x in range(3)]
     for one in quiet:
-        queue.offer(received(one))
+        queue.enqueue(received(one))
     for _ in range(MAX_QUEUED + 50):
-        queue.offer(received(odometry("AGI")))
-    queue.offer(received(safety_report("AGI")))
+        queue.enqueue(received(odometry("AGI")))
+    queue.enqueue(received(safety_report("AGI")))
 
     left = [one.observation for one in queue.drain()]
 
@@ -204,9 +204,9 @@ def test_a_robot_that_floods_drops_its_own_telemetry_and_no_other_robots() -> No
 def test_telemetry_drops_nothing_of_a_queue_that_holds_safety_alone() -> None:
     queue = ingest()
     for _ in range(MAX_QUEUED):
-        queue.offer(received(safety_report()))
+        queue.enqueue(received(safety_report()))
 
-    queue.offer(received(odometry()))
+    queue.enqueue(received(odometry()))
 
     assert len(list(queue.drain())) == MAX_QUEUED
     assert queue.counters["dropped.Odometry"] == 1
@@ -214,7 +214,7 @@ def test_telemetry_drops_nothing_of_a_queue_that_holds_safety_alone() -> None:
 
 def test_a_message_that_waits_is_known_and_one_that_has_left_is_the_worlds() -> None:
     queue = ingest()
-    queue.offer(received(detection_frame(origin=origin(7))))
+    queue.enqueue(received(detection_frame(origin=origin(7))))
     waiting = queue.is_past("AGI", DetectionFrame, "boot-a", 7)
     others = [
         queue.is_past("AGI", DetectionFrame, "boot-a", 6),
@@ -229,7 +229,7 @@ def test_a_message_that_waits_is_known_and_one_that_has_left_is_the_worlds() -> 
 
 def test_what_orion_was_asked_for_hides_no_message() -> None:
     queue = ingest()
-    queue.offer(replace(received(odometry(origin=origin(7))), asked=True))
+    queue.enqueue(replace(received(odometry(origin=origin(7))), asked=True))
 
     assert not queue.is_past("AGI", Odometry, "boot-a", 7)
 
@@ -239,7 +239,7 @@ def test_the_twin_of_a_picture_is_timed_and_counted_and_waits_for_nobody() -> No
     queue = Ingest({"AGI"}.__contains__, passed=timed.append)
     twin = received(Overtaken("AGI", origin(7), DetectionFrame))
 
-    queue.offer(twin)
+    queue.enqueue(twin)
 
     assert (timed, queue.waiting) == ([twin], 0)
     assert queue.counters["DetectionFrame.duplicate"] == 1
@@ -255,7 +255,7 @@ def test_the_twin_of_a_picture_is_timed_and_counted_and_waits_for_nobody() -> No
 def test_a_copy_that_the_world_must_know_of_waits_for_it(copy: Overtaken) -> None:
     queue = ingest()
 
-    queue.offer(received(copy))
+    queue.enqueue(received(copy))
 
     assert queue.waiting == 1
 

@@ -20,7 +20,7 @@ def say(desk: Desk, *transports: TransportId, after_s: float = 0.0) -> None:
     told = odometry("AGI", origin=desk.next_origin())
     for number, transport in enumerate(transports):
         desk.clock.now += after_s if number else 0.0
-        desk.ingest.offer(Received(told, desk.clock(), transport))
+        desk.ingest.enqueue(Received(told, desk.clock(), transport))
         desk.loop.step(desk.ingest.drain(), desk.clock())
 
 
@@ -43,7 +43,7 @@ def test_what_waits_for_the_loop_is_part_of_the_third_hop() -> None:
     desk = Desk()
     told = odometry("AGI", origin=desk.next_origin())
 
-    desk.ingest.offer(Received(told, desk.clock(), DIRECT.id))
+    desk.ingest.enqueue(Received(told, desk.clock(), DIRECT.id))
     desk.clock.now += 0.3
     desk.loop.step(desk.ingest.drain(), desk.clock())
 
@@ -54,7 +54,7 @@ def test_an_answer_to_a_question_is_no_message() -> None:
     desk = Desk()
 
     told = odometry("AGI", origin=desk.next_origin())
-    desk.ingest.offer(Received(told, desk.clock(), FIWARE.id, asked=True))
+    desk.ingest.enqueue(Received(told, desk.clock(), FIWARE.id, asked=True))
 
     assert took(desk, "robot_orion").count == 0
 

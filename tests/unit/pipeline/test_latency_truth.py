@@ -49,7 +49,7 @@ class Air(Stage):
             due, _, transport, device, payload = heapq.heappop(self._on_way)
             at = Instant(due, START.wall + due - START.mono)
             for observation in codec.read_measure(device, payload).observations:
-                self._desk.ingest.offer(Received(observation, at, transport))
+                self._desk.ingest.enqueue(Received(observation, at, transport))
         await super().step()
 
     def _hear(self, topic: str, payload: bytes) -> None:

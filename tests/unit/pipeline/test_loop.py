@@ -12,7 +12,7 @@ from tests.unit.pipeline.desk import Desk, settle
 async def test_the_loop_takes_what_waits_without_being_called() -> None:
     desk = Desk()
     running = asyncio.create_task(desk.loop.run())
-    desk.ingest.offer(Received(odometry(), desk.clock()))
+    desk.ingest.enqueue(Received(odometry(), desk.clock()))
 
     browser = desk.hub.join()
     async with asyncio.timeout(30):

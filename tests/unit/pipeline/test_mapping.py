@@ -2,7 +2,7 @@
 
 import math
 
-from iveg.domain.costmap import Costmap
+from iveg.domain.costmap import InflatedGrid
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.rule.zones import Zone
 from iveg.pipeline.mapping import Mapper
@@ -37,18 +37,18 @@ class Field(Scene):
     def tick(self) -> None:
         self.mapper.tick(at(self.now))
 
-    def shared(self, *zones: Zone) -> Costmap:
+    def shared(self, *zones: Zone) -> InflatedGrid:
         found = self.mapper.shared(zones, at(self.now))
         assert found is not None
         return found
 
-    def of(self, robot_id: str, *zones: Zone) -> Costmap:
+    def of(self, robot_id: str, *zones: Zone) -> InflatedGrid:
         found = self.mapper.of(robot_id, zones, at(self.now))
         assert found is not None
         return found
 
 
-def knows(costmap: Costmap, x: float, y: float = 5.0) -> bool:
+def knows(costmap: InflatedGrid, x: float, y: float = 5.0) -> bool:
     return bool(costmap.data[costmap.grid.index(x, y)] >= 0)
 
 

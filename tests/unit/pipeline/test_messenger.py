@@ -14,9 +14,9 @@ from iveg.domain.messages import (
     AlertItem,
     Channel,
     Contacts,
-    Device,
     Email,
     Push,
+    SubscribedBrowser,
     Webhook,
 )
 from iveg.domain.records import AlertRecord
@@ -53,7 +53,7 @@ class Outpost:
             rest_s,
             limit_s,
         )
-        self.desk.evaluator.alerts.on_raised = self.messenger.offer
+        self.desk.evaluator.alerts.on_raised = self.messenger.enqueue_raised
 
     def wrong(self, *conditions: Condition) -> None:
         self.desk.evaluator.alerts.sync(conditions, self.desk.clock())
@@ -207,7 +207,9 @@ async def test_a_test_reaches_a_channel_that_is_off() -> None:
 
 
 async def test_a_browser_that_has_gone_is_forgotten() -> None:
-    device = Device("D1", "Ana", "https://push.example/1", "", "", "es", START.wall)
+    device = SubscribedBrowser(
+        "D1", "Ana", "https://push.example/1", "", "", "es", START.wall
+    )
     post = Outpost(Contacts(Push(on=True, devices=(device,))))
     post.senders["push"].failing, post.senders["push"].device_id = "gone", "D1"
     async with post.serving():

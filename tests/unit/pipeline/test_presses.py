@@ -5,14 +5,14 @@ import pytest
 from iveg.domain.errors import CommandRefusedError
 from iveg.domain.observations import Hold
 from iveg.domain.records import CommandRecord
-from iveg.domain.stop import Command, Press
+from iveg.domain.stop import FollowedCommand, Press
 from iveg.domain.stop.drills import Drills
 from iveg.pipeline.presses import REMEMBERED_S
 from tests.builders import START
 from tests.unit.pipeline.desk import Desk, settle
 
 
-async def press(desk: Desk, by: str = "ana", **words: object) -> Command:
+async def press(desk: Desk, by: str = "ana", **words: object) -> FollowedCommand:
     said = Press(**({"press_id": "p1"} | words))  # type: ignore[arg-type]
     (command,) = await desk.commander.stop(["AGI"], by, desk.clock(), said)
     await settle()
@@ -119,7 +119,7 @@ async def test_standstill_counts_from_the_finger_and_the_history_knows_it() -> N
 # --- drills -----------------------------------------------------------------------
 
 
-async def drill(desk: Desk, linear: float) -> Command:
+async def drill(desk: Desk, linear: float) -> FollowedCommand:
     desk.report(factor=1.0, reason="clear", linear=linear)
     return await desk.commander.drill("AGI", "ana", desk.clock())
 

@@ -10,7 +10,7 @@ from tests.builders import origin
 def after(*feedback: Origin) -> FeedbackRef | None:
     echo = Echo()
     for one in feedback:
-        echo.take(one)
+        echo.note(one)
     return echo.heard
 
 

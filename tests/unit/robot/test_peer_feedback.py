@@ -49,7 +49,7 @@ class Bench:
             pose_stamp,
             {} if speed_limit is None else {"AGI": speed_limit},
         )
-        return self.peer_feedback.take(robot_id, feedback, own, at)
+        return self.peer_feedback.apply(robot_id, feedback, own, at)
 
     def cap(self, at: float, own: Pose2D | None = HERE, slowed: bool = False) -> Cap:
         return lowest(self.peer_feedback.caps(own, slowed, at))

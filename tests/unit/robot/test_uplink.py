@@ -132,7 +132,7 @@ def test_every_message_tells_what_had_been_heard_when_it_was_measured(
     echo = Echo()
     wire = Wire(form, echo)
     wire.uplink.send(odometry(origin=BLANK), AT)
-    echo.take(Origin("iveg", 41))
+    echo.note(Origin("iveg", 41))
     for one in (scan(origin=BLANK), detection_frame("AGI", detection(), origin=BLANK)):
         wire.uplink.send(one, AT)
     wire.uplink.send(odometry(origin=BLANK), AT)
@@ -148,7 +148,7 @@ def test_every_message_tells_what_had_been_heard_when_it_was_measured(
 
 def test_a_report_tells_what_had_been_heard() -> None:
     echo = Echo()
-    echo.take(Origin("iveg", 41))
+    echo.note(Origin("iveg", 41))
     _, (_, message) = Wire(echo=echo).uplink.report(
         SafetyReport("AGI", BLANK, 1.0, "clear"), AT
     )

@@ -6,7 +6,7 @@ import pytest
 
 from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import Pose2D, Rectangle
-from iveg.domain.greenhouse import Greenhouse, Post
+from iveg.domain.greenhouse import Greenhouse, StructuralPost
 from iveg.lab.emulator.depth import (
     DepthCamera,
     DepthView,
@@ -206,7 +206,7 @@ def test_who_is_behind_crop_or_behind_the_camera_has_no_segment() -> None:
 
 
 def test_a_post_and_a_row_stand_in_the_picture() -> None:
-    post = Post(3.0, 0.0, 0.1)
+    post = StructuralPost(3.0, 0.0, 0.1)
     greenhouse = Greenhouse("h", BOUNDS, (), (Rectangle(5.0, -3.0, 6.0, 3.0),), (post,))
 
     depth = view(scenery=Scenery.of(greenhouse)).depth.depth

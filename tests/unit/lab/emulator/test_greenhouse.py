@@ -3,7 +3,7 @@ import math
 import pytest
 
 from iveg.domain.geometry import Pose2D, Rectangle
-from iveg.domain.greenhouse import Greenhouse, Obstacle, Post
+from iveg.domain.greenhouse import Greenhouse, PlacedObstacle, StructuralPost
 from iveg.lab.emulator.greenhouse import Body, Scenery
 from tests.touching import bodies_touch, touches
 
@@ -11,8 +11,8 @@ GREENHOUSE = Greenhouse(
     "shed",
     Rectangle(0.0, 0.0, 10.0, 10.0),
     rows=(Rectangle(4.0, 0.0, 5.0, 8.0),),
-    posts=(Post(7.0, 7.0, 0.1),),
-    obstacles=(Obstacle("crates", Rectangle(8.0, 1.0, 9.0, 2.0)),),
+    posts=(StructuralPost(7.0, 7.0, 0.1),),
+    obstacles=(PlacedObstacle("crates", Rectangle(8.0, 1.0, 9.0, 2.0)),),
 )
 SCENERY = Scenery.of(GREENHOUSE)
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.domain.geometry import Pose2D, Rectangle
-from iveg.domain.greenhouse import Greenhouse, Post
+from iveg.domain.greenhouse import Greenhouse, StructuralPost
 from iveg.lab.emulator.greenhouse import Body, Disc, Scenery
 from iveg.lab.emulator.lidar import LaserModel, sweep
 
@@ -66,7 +66,9 @@ def test_a_row_of_crop_is_nearer_than_the_wall_behind_it() -> None:
 
 
 def test_a_person_and_a_post_are_round() -> None:
-    greenhouse = Greenhouse("room", ROOM.bounds, posts=(Post(-3.0, 0.0, 0.1),))
+    greenhouse = Greenhouse(
+        "room", ROOM.bounds, posts=(StructuralPost(-3.0, 0.0, 0.1),)
+    )
 
     ranges = swept(Pose2D(0.0, 0.0, 0.0), greenhouse, people=[Disc(3.0, 0.0, 0.25)])
 

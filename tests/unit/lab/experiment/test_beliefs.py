@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from iveg.domain.costmap import Costmap, Grid
+from iveg.domain.costmap import Grid, InflatedGrid
 from iveg.lab.experiment.beliefs import Belief, belief_in, belief_of, injections
 from iveg.lab.experiment.observer import picture_of, slowdowns_of
 from iveg.lab.experiment.scoring import Picture, SeenObject
@@ -24,10 +24,10 @@ def answer(*, taken: bool) -> dict[str, Any]:
     return {**grid, "origin": {"x": 0.0, "y": 0.0}, "data": cells}
 
 
-def costmap(*, taken: bool) -> Costmap:
+def costmap(*, taken: bool) -> InflatedGrid:
     data = np.zeros((20, 20), np.int8)
     data[10, 10] = 100 if taken else 0
-    return Costmap(Grid(0.1, 0.0, 0.0, 20, 20), data)
+    return InflatedGrid(Grid(0.1, 0.0, 0.0, 20, 20), data)
 
 
 @pytest.mark.parametrize("taken", [True, False])

@@ -10,7 +10,7 @@ from fastapi import FastAPI
 
 from iveg.adapters.history.store import Store
 from iveg.domain.geometry import Rectangle
-from iveg.domain.greenhouse import Greenhouse, Lane
+from iveg.domain.greenhouse import DriveLane, Greenhouse
 from iveg.domain.observations import Instant
 from iveg.domain.records import Record
 from iveg.pipeline.record import Waiting
@@ -29,7 +29,7 @@ from tests.fakes.records import (
 from tests.fakes.worker import FakeWorker
 
 GREENHOUSE = Greenhouse(
-    "house", Rectangle(0, 0, 20, 20), lanes=(Lane("1", Rectangle(0, 0, 20, 4)),)
+    "house", Rectangle(0, 0, 20, 20), lanes=(DriveLane("1", Rectangle(0, 0, 20, 4)),)
 )
 MORNING = start_of(date(2026, 11, 20)) + 9 * 3600.0
 RECORDS: tuple[Record, ...] = (

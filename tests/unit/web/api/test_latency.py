@@ -22,8 +22,8 @@ def drive(desk: WebDesk, seconds: float, *, thinned: bool = False) -> None:
         desk.world.ledger.composed("iveg", desk.seq, desk.seq, desk.clock().mono - 0.01)
         origin = Origin("b", desk.seq, "2023", stamp, None, True, heard)
         told = odometry("AGI", origin=origin)
-        desk.ingest.offer(Received(told, desk.clock(), DIRECT.id))
-        desk.ingest.offer(
+        desk.ingest.enqueue(Received(told, desk.clock(), DIRECT.id))
+        desk.ingest.enqueue(
             Received(told, desk.clock().later(0.020), FIWARE.id, thinned=thinned)
         )
         desk.loop.step(desk.ingest.drain(), desk.clock())
@@ -157,7 +157,7 @@ async def test_what_is_wrong_with_a_hop_is_told_in_a_sentence() -> None:
         desk.seq += 1
         desk.clock.now += 0.05
         told = odometry("AGI", origin=Origin("b", desk.seq))
-        desk.ingest.offer(Received(told, desk.clock(), DIRECT.id))
+        desk.ingest.enqueue(Received(told, desk.clock(), DIRECT.id))
         desk.loop.step(desk.ingest.drain(), desk.clock())
 
     remarks = (await ask(desk))["remarks"]
@@ -169,7 +169,7 @@ async def test_what_is_wrong_with_a_hop_is_told_in_a_sentence() -> None:
 async def test_messages_that_do_not_count_are_told_with_their_reason() -> None:
     desk = WebDesk()
     told = odometry("AGI", origin=Origin("b", 1))
-    desk.ingest.offer(Received(told, desk.clock(), DIRECT.id))
+    desk.ingest.enqueue(Received(told, desk.clock(), DIRECT.id))
 
     streams = (await ask(desk))["streams"]
 

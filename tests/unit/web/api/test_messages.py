@@ -6,7 +6,7 @@ import httpx
 import pytest
 
 from iveg.adapters.web_push import encode, new_key, public_key
-from iveg.domain.messages import AlertItem, Message, Text
+from iveg.domain.messages import AlertItem, MessageText, OutboundMessage
 from iveg.web.api.messages import writer
 from iveg.web.security.authentication import Role
 from tests.builders import START
@@ -221,10 +221,10 @@ def test_a_letter_says_how_grave_and_when_in_the_readers_language() -> None:
     one = AlertItem("01J", "P1", "stop_unconfirmed", START)
     write = writer()
 
-    assert write(Message([one]), "es") == Text(
+    assert write(OutboundMessage([one]), "es") == MessageText(
         "iVeg: alarma P1", "Una alarma P1 desde las 23:13:20. Abra iVeg para verla."
     )
-    assert write(Message([one, one]), "en").body == (
+    assert write(OutboundMessage([one, one]), "en").body == (
         "2 alarms since 23:13:20; the gravest is P1. Open iVeg to see them."
     )
-    assert write(Message(), "en").title == "iVeg: test"
+    assert write(OutboundMessage(), "en").title == "iVeg: test"

@@ -22,7 +22,7 @@ async def busy_desk() -> WebDesk:
     desk = WebDesk()
     drive(desk, 10.0)
     told = odometry("AGI", origin=Origin("b", desk.seq + 1))
-    desk.ingest.offer(Received(told, desk.clock(), DIRECT.id))
+    desk.ingest.enqueue(Received(told, desk.clock(), DIRECT.id))
     for robot_id, x in (("AGI", 0.0), ("AGII", 50.0)):
         desk.drive(robot_id, x)
         desk.report(robot_id, factor=1.0, reason="clear", linear=0.5)
