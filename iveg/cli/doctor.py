@@ -17,6 +17,7 @@ import secrets
 from collections.abc import Awaitable, Callable
 from contextlib import AsyncExitStack
 from functools import partial
+from http import HTTPStatus
 from ipaddress import ip_address
 from pathlib import Path
 from typing import Any
@@ -35,6 +36,7 @@ from iveg.adapters.fiware_http import FiwareHttp
 from iveg.adapters.history.engine import describe, history_url
 from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.orion import OrionClient
+from iveg.adapters.post_listener import post_listener
 from iveg.cli.addresses import broker_of
 from iveg.cli.diagnosis import (
     LATE_S,
@@ -46,7 +48,6 @@ from iveg.cli.diagnosis import (
     missing,
     table,
 )
-from iveg.cli.post_listener import post_listener
 from iveg.cli.probe import Probe
 from iveg.cli.running import run_until_stopped
 from iveg.domain.errors import HopError, IvegError
@@ -278,7 +279,12 @@ class Examination:
         # As an iVeg with these settings names itself to Orion.
         settings = self._settings
         host = urlsplit(settings.notify_address).hostname or settings.host
-        async with post_listener(ear.hear, _bind_to(host)) as port:
+
+        def hear(body: bytes) -> tuple[HTTPStatus, str]:
+            ear.hear(body)
+            return HTTPStatus.NO_CONTENT, ""
+
+        async with post_listener(hear, _bind_to(host)) as port:
             self._listening_at = f"http://{_in_url(host)}:{port}/"
             subscription = await self._probe.subscribe(self._listening_at)
             mark = ear.mark()

@@ -19,9 +19,8 @@ from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.stamps import format_stamp
 from iveg.lab.emulator.camera import DETECTORS
 from iveg.lab.emulator.emulated_robot import EmulatedRobot, FleetSettings
-from iveg.lab.emulator.faults import open_fault_port
 from iveg.lab.emulator.layout import lay_out
-from iveg.lab.emulator.orders import FaultOrder, Order
+from iveg.lab.emulator.orders import FaultOrder, Order, open_fault_port
 from iveg.lab.emulator.radio import Radio
 from iveg.lab.emulator.relay import Relay
 from iveg.lab.emulator.ros2_base import Ros2Base
@@ -97,8 +96,7 @@ async def run_emulator(
     if fault_port is None:
         await fleet.run(incidents)
         return
-    server, port = await open_fault_port(fault_port, fleet.obey)
-    async with server:
+    async with open_fault_port(fault_port, fleet.obey) as port:
         on_fault_port(port)
         await fleet.run(incidents)
 

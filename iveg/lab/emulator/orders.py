@@ -1,12 +1,20 @@
-"""Fault orders: the vocabulary of the fault port and the command line."""
+"""Fault orders, on the command line and at an HTTP endpoint on loopback.
+
+``POST /`` with a ``FaultOrder`` or a ``PersonOrder``; 204 when done, 400 when it cannot
+be read, with a sentence that names the field, 409 when it cannot be done.  Not for
+production: the endpoint is on 127.0.0.1 alone, and only on request.
+"""
 
 import json
-from collections.abc import Sequence
+from collections.abc import AsyncIterator, Callable, Sequence
+from contextlib import AsyncExitStack, asynccontextmanager
+from http import HTTPStatus
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from iveg.domain.errors import DataFileError, UnreadableError
+from iveg.adapters.post_listener import post_listener
+from iveg.domain.errors import DataFileError, SettingsError, UnreadableError
 
 Percent = Annotated[float, Field(ge=0, le=100)]
 Milliseconds = Annotated[float, Field(ge=0, le=10_000)]
@@ -79,6 +87,40 @@ class PersonOrder(_Order):
 
 
 Order = FaultOrder | PersonOrder
+Obey = Callable[[Order], str | None]
+"""Executes an order; returns the reason if it cannot."""
+
+
+@asynccontextmanager
+async def open_fault_port(port: int, obey: Obey) -> AsyncIterator[int]:
+    """Accept orders while the block lasts.
+
+    Args:
+        port: 0 takes a free one.
+        obey: Executes an order.
+
+    Yields:
+        The port.
+
+    Raises:
+        SettingsError: the port is in use.
+    """
+
+    def answer(body: bytes) -> tuple[HTTPStatus, str]:
+        try:
+            why = obey(read_order(body))
+        except UnreadableError as error:
+            return HTTPStatus.BAD_REQUEST, str(error)
+        return (HTTPStatus.CONFLICT if why else HTTPStatus.NO_CONTENT), why or ""
+
+    async with AsyncExitStack() as stack:
+        listener = post_listener(answer, "127.0.0.1", port)
+        try:
+            bound = await stack.enter_async_context(listener)
+        except OSError as error:
+            allowed = "a port of 127.0.0.1 that nobody listens on"
+            raise SettingsError("fault_port", str(port), allowed) from error
+        yield bound
 
 
 def read_order(body: bytes) -> Order:
