@@ -19,7 +19,16 @@ from numpy.typing import NDArray
 from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import Pose2D
 from iveg.lab.emulator.camera import ROBOT_HEIGHT_M
-from iveg.lab.emulator.greenhouse import Body, Disc, Floats, Scenery
+from iveg.lab.emulator.greenhouse import (
+    Body,
+    Disc,
+    Floats,
+    Scenery,
+    Span,
+    box_span,
+    sides_of,
+    slab_span,
+)
 from iveg.lab.emulator.people import HEIGHT_M
 from iveg.robot.grounding.cloud import DepthPicture, Pinhole
 from iveg.robot.grounding.locate import Segment
@@ -28,8 +37,6 @@ from iveg.robot.grounding.mask import Mask, write_mask
 _CROP_HEIGHT_M = 2.0
 _SHOULDERS_M = 1.5
 _HEAD_RADIUS_M = 0.1
-_LEAST_SLOPE = 1e-9
-"""Stands for zero in a direction, so that no division is by zero."""
 _NOISE_PATCH = 8
 """Pixels across: stereo matches windows, so neighbours err together."""
 
@@ -196,19 +203,10 @@ class _Rays:
         return cls(across, up, camera.height)
 
 
-Span = tuple[Floats, Floats]
-"""Where rays enter and leave (m); a ray that leaves before it enters misses."""
-
-
 def _background(rays: _Rays, sensor: Pose2D, scenery: Scenery) -> Floats:
     """Depth of floor, wall and crop."""
-    bounds = scenery.bounds
-    greenhouse = _box_span(
-        rays.across, sensor, (bounds.xmin, bounds.ymin, bounds.xmax, bounds.ymax)
-    )
-    depth = np.minimum(
-        greenhouse[1][None, :], _height_span(rays, 0.0, math.inf)[1][:, None]
-    )
+    wall = box_span(rays.across, sensor, sides_of(scenery.bounds))[1]
+    depth = np.minimum(wall[None, :], _height_span(rays, 0.0, math.inf)[1][:, None])
     for xmin, ymin, xmax, ymax in scenery.rectangles:
         centre = Pose2D((xmin + xmax) / 2, (ymin + ymax) / 2, 0.0)
         crop = Body("crop", centre, xmax - xmin, ymax - ymin)
@@ -237,9 +235,7 @@ def _paint(rays: _Rays, sensor: Pose2D, thing: Upright, depth: Floats) -> Mask:
 def _footprint_span(across: Floats, sensor: Pose2D, footprint: Disc | Body) -> Span:
     if isinstance(footprint, Disc):
         return _disc_span(across, sensor, footprint)
-    inner, turned = footprint.rays_into(sensor, across)
-    x, y = footprint.length / 2, footprint.width / 2
-    return _box_span(turned, inner, (-x, -y, x, y))
+    return footprint.span(across, sensor)
 
 
 def _disc_span(across: Floats, sensor: Pose2D, disc: Disc) -> Span:
@@ -255,24 +251,8 @@ def _disc_span(across: Floats, sensor: Pose2D, disc: Disc) -> Span:
     )
 
 
-def _box_span(
-    across: Floats, sensor: Pose2D, box: tuple[float, float, float, float]
-) -> Span:
-    """The slab method on the floor; ``box`` is xmin, ymin, xmax, ymax."""
-    x = _slab(across[0], box[0] - sensor.x, box[2] - sensor.x)
-    y = _slab(across[1], box[1] - sensor.y, box[3] - sensor.y)
-    return np.maximum(x[0], y[0]), np.minimum(x[1], y[1])
-
-
 def _height_span(rays: _Rays, bottom: float, top: float) -> Span:
-    return _slab(rays.up, bottom - rays.height, top - rays.height)
-
-
-def _slab(slope: Floats, low: float, high: float) -> Span:
-    """Between two parallel planes."""
-    steep = np.where(np.abs(slope) < _LEAST_SLOPE, _LEAST_SLOPE, slope)
-    one, other = low / steep, high / steep
-    return np.minimum(one, other), np.maximum(one, other)
+    return slab_span(rays.up, bottom - rays.height, top - rays.height)
 
 
 # --- leaves -----------------------------------------------------------------------

@@ -14,6 +14,10 @@ from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.greenhouse import Greenhouse
 
 Floats = NDArray[np.float64]
+Span = tuple[Floats, Floats]
+"""Where rays enter and leave (m); a ray that leaves before it enters misses."""
+_LEAST_SLOPE = 1e-9
+"""Stands for zero in a direction, so that no division is by zero."""
 
 
 def into(frame: Pose2D, x: float, y: float) -> tuple[float, float]:
@@ -53,11 +57,14 @@ class Body:
         places = (self.pose.transform(along, 0.0) for along in (-reach, 0.0, reach))
         return tuple(Disc(x, y, self.width / 2) for x, y in places)
 
-    def rays_into(self, sensor: Pose2D, rays: Floats) -> tuple[Pose2D, Floats]:
-        """Origin and directions of a sensor's rays, shape (2, n), in its frame."""
+    def span(self, rays: Floats, sensor: Pose2D) -> Span:
+        """Rays of a sensor through the body; directions of shape (2, n)."""
         c, s = math.cos(self.pose.yaw), math.sin(self.pose.yaw)
         x, y = into(self.pose, sensor.x, sensor.y)
-        return Pose2D(x, y, 0.0), np.array(((c, s), (-s, c))) @ rays
+        half = self.length / 2, self.width / 2
+        turned = np.array(((c, s), (-s, c))) @ rays
+        box = np.array((-half[0], -half[1], *half))
+        return box_span(turned, Pose2D(x, y, 0.0), box)
 
     def gap_to(self, x: float, y: float) -> tuple[float, float, float]:
         """Distance from a point to the rectangle, and the direction away from it.
@@ -97,7 +104,7 @@ class Scenery:
     def of(cls, greenhouse: Greenhouse) -> "Scenery":
         """Arrays of a greenhouse."""
         screens = greenhouse.rows + tuple(thing.area for thing in greenhouse.obstacles)
-        sides = [(area.xmin, area.ymin, area.xmax, area.ymax) for area in screens]
+        sides = [sides_of(area) for area in screens]
         posts = [(post.x, post.y, post.radius) for post in greenhouse.posts]
         return cls(
             greenhouse.bounds,
@@ -114,3 +121,32 @@ class Scenery:
         """Whether a disc fits at a position."""
         inside = self.bounds.contains(x, y, -radius)
         return inside and not any(s.contains(x, y, radius) for s in self.screens)
+
+
+def slab_span(slope: Floats, low: Floats | float, high: Floats | float) -> Span:
+    """Rays of a slope between two parallel planes."""
+    steep = np.where(np.abs(slope) < _LEAST_SLOPE, _LEAST_SLOPE, slope)
+    one, other = low / steep, high / steep
+    return np.minimum(one, other), np.maximum(one, other)
+
+
+def box_span(rays: Floats, origin: Pose2D, boxes: Floats) -> Span:
+    """Rays through boxes by the slab method, in the boxes' frame.
+
+    Args:
+        rays: Directions, shape (2, n).
+        origin: Of the rays.
+        boxes: xmin, ymin, xmax, ymax; shape (…, 4).
+
+    Returns:
+        Two of shape (…, n).
+    """
+    sides = boxes[..., None]
+    x = slab_span(rays[0], sides[..., 0, :] - origin.x, sides[..., 2, :] - origin.x)
+    y = slab_span(rays[1], sides[..., 1, :] - origin.y, sides[..., 3, :] - origin.y)
+    return np.maximum(x[0], y[0]), np.minimum(x[1], y[1])
+
+
+def sides_of(area: Rectangle) -> Floats:
+    """A rectangle as ``box_span`` reads it."""
+    return np.array((area.xmin, area.ymin, area.xmax, area.ymax), float)

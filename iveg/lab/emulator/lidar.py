@@ -13,10 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iveg.domain.geometry import Pose2D
-from iveg.lab.emulator.greenhouse import Body, Disc, Floats, Scenery
-
-_LEAST_SLOPE = 1e-9
-"""Stands for zero in a direction, so that no division is by zero."""
+from iveg.lab.emulator.greenhouse import Body, Disc, Floats, Scenery, box_span, sides_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,55 +60,17 @@ def sweep(
     """
     angles = sensor.yaw - math.pi + model.angle_increment * np.arange(model.beams)
     directions = np.stack((np.cos(angles), np.sin(angles)))
-    slopes = _slopes(directions)
-    ranges = np.minimum(
-        _wall(sensor, slopes, scenery), _boxes(sensor, slopes, scenery.rectangles)
-    )
-    for body in others:
-        np.minimum(ranges, _body(sensor, directions, body), out=ranges)
+    ranges = box_span(directions, sensor, sides_of(scenery.bounds))[1]
+    crop = box_span(directions, sensor, scenery.rectangles)
+    for enter, leave in (crop, *(body.span(directions, sensor) for body in others)):
+        hit = np.where((enter <= leave) & (enter >= 0.0), enter, np.inf)
+        ranges = np.minimum(ranges, hit.reshape(-1, model.beams).min(0, initial=np.inf))
     discs = [(disc.x, disc.y, disc.radius) for disc in people]
     round_things = np.concatenate((scenery.posts, np.reshape(discs, (-1, 3))))
     _discs(sensor, model, round_things, ranges)
     ranges += rng.normal(0.0, model.noise, model.beams)
     ranges[(ranges > model.range_max) | (ranges < model.range_min)] = np.inf
     return ranges.astype(np.float32)
-
-
-def _slopes(directions: Floats) -> Floats:
-    """One over each direction; both of shape (2, beams)."""
-    flat = np.abs(directions) < _LEAST_SLOPE
-    return 1.0 / np.where(flat, _LEAST_SLOPE, directions)
-
-
-def _wall(sensor: Pose2D, slopes: Floats, scenery: Scenery) -> Floats:
-    """Distance of the outer wall on each ray."""
-    bounds = scenery.bounds
-    x = np.where(slopes[0] > 0, bounds.xmax - sensor.x, bounds.xmin - sensor.x)
-    y = np.where(slopes[1] > 0, bounds.ymax - sensor.y, bounds.ymin - sensor.y)
-    exits: Floats = np.minimum(x * slopes[0], y * slopes[1])
-    return exits
-
-
-def _boxes(sensor: Pose2D, slopes: Floats, boxes: Floats) -> Floats:
-    """Nearest entry of each ray into axis-aligned boxes, shape (n, 4); inf if none."""
-    if not len(boxes):
-        return np.full(slopes.shape[1], np.inf)
-    x1 = (boxes[:, 0:1] - sensor.x) * slopes[0]
-    x2 = (boxes[:, 2:3] - sensor.x) * slopes[0]
-    y1 = (boxes[:, 1:2] - sensor.y) * slopes[1]
-    y2 = (boxes[:, 3:4] - sensor.y) * slopes[1]
-    near = np.maximum(np.minimum(x1, x2), np.minimum(y1, y2))
-    far = np.minimum(np.maximum(x1, x2), np.maximum(y1, y2))
-    near[(near > far) | (near < 0.0)] = np.inf
-    nearest: Floats = near.min(axis=0)
-    return nearest
-
-
-def _body(sensor: Pose2D, directions: Floats, body: Body) -> Floats:
-    """The same for a rotated box: rays are transformed into its frame."""
-    inner, turned = body.rays_into(sensor, directions)
-    half = body.length / 2, body.width / 2
-    return _boxes(inner, _slopes(turned), np.array([(-half[0], -half[1], *half)]))
 
 
 def _discs(sensor: Pose2D, model: LaserModel, discs: Floats, ranges: Floats) -> None:
