@@ -10,7 +10,7 @@ from hypothesis import settings
 from playwright.sync_api import expect
 from xdist.scheduler import LoadScopeScheduling
 
-from iveg.cli.garbage_collection import tune_garbage_collection
+from iveg.cli.running import tune_garbage_collection
 
 # A helper's failed assertion shows its values as a test's own does.
 pytest.register_assert_rewrite("tests.processes")

@@ -37,7 +37,6 @@ from iveg.adapters.history.engine import describe, history_url
 from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.orion import OrionClient
 from iveg.adapters.post_listener import post_listener
-from iveg.cli.addresses import broker_of
 from iveg.cli.diagnosis import (
     LATE_S,
     Finding,
@@ -48,6 +47,7 @@ from iveg.cli.diagnosis import (
     missing,
     table,
 )
+from iveg.cli.nodes import broker_of
 from iveg.cli.probe import Probe
 from iveg.cli.running import run_until_stopped
 from iveg.domain.errors import HopError, IvegError

@@ -1,8 +1,8 @@
-"""Settings of the safety nodes that a part runs."""
+"""Settings of the safety nodes that a part runs, and the address of their broker."""
 
 from pathlib import Path
 
-from iveg.cli.addresses import broker_of
+from iveg.adapters.mqtt import BrokerAddress
 from iveg.robot.node import NodeSettings
 from iveg.settings import Settings
 
@@ -17,4 +17,11 @@ def node_settings(settings: Settings, directory: Path) -> NodeSettings:
         stand_s=settings.feedback_stand_s,
         on_link_loss=settings.on_link_loss,
         uplink=settings.uplink,
+    )
+
+
+def broker_of(settings: Settings) -> BrokerAddress:
+    """Address of the MQTT broker with user and password."""
+    return BrokerAddress.from_url(
+        settings.mqtt_url, settings.mqtt_user, settings.mqtt_password
     )

@@ -5,9 +5,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from iveg.adapters.fleet_files import load_fleet
-from iveg.cli.addresses import broker_of
 from iveg.cli.live_robots import live_robot
-from iveg.cli.nodes import node_settings
+from iveg.cli.nodes import broker_of, node_settings
 from iveg.cli.running import LOOPBACK
 from iveg.domain.errors import DataFileError
 from iveg.domain.fleet import FleetDescription

@@ -12,10 +12,13 @@ from iveg.adapters import clock
 from iveg.adapters.extras import require_extra
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.mqtt import MqttLink
-from iveg.cli.addresses import broker_of
-from iveg.cli.garbage_collection import tune_garbage_collection
-from iveg.cli.nodes import node_settings
-from iveg.cli.running import LOOPBACK, report_ready, run_until_stopped
+from iveg.cli.nodes import broker_of, node_settings
+from iveg.cli.running import (
+    LOOPBACK,
+    report_ready,
+    run_until_stopped,
+    tune_garbage_collection,
+)
 from iveg.domain.errors import (
     DataFileError,
     HopError,

@@ -20,8 +20,7 @@ from iveg.adapters.history.engine import history_url
 from iveg.adapters.history.migrate import upgrade
 from iveg.app.dss import Dss, open_dss
 from iveg.asgi import create_app
-from iveg.cli.garbage_collection import tune_garbage_collection
-from iveg.cli.running import print_sign_in_link, report_ready
+from iveg.cli.running import print_sign_in_link, report_ready, tune_garbage_collection
 from iveg.domain.errors import HopError
 from iveg.settings import Settings
 from iveg.web.bounded_http import bounded_http

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
-from iveg.cli.garbage_collection import tune_garbage_collection
 from iveg.cli.nodes import node_settings
-from iveg.cli.running import report_ready
+from iveg.cli.running import report_ready, tune_garbage_collection
 from iveg.lab.emulator.emulated_robot import FleetSettings
 from iveg.lab.emulator.fleet import run_emulator
 from iveg.lab.emulator.orders import read_fault_arguments

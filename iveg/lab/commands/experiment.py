@@ -27,7 +27,6 @@ from iveg.domain.errors import DataFileError, HopError, SettingsError
 from iveg.domain.stamps import format_stamp
 from iveg.lab.commands.demo import on_free_ports, start_part, stop_parts, wait_ready
 from iveg.lab.experiment import compare
-from iveg.lab.experiment.files import directory_of, read_json
 from iveg.lab.experiment.observer import watch
 from iveg.lab.experiment.outcome import (
     Outcome,
@@ -36,9 +35,16 @@ from iveg.lab.experiment.outcome import (
     read_truth,
     stack_of,
 )
-from iveg.lab.experiment.plan import GREENHOUSE, PLANS, ROBOTS, WATCHED, PlannedRun
-from iveg.lab.experiment.progress import Progress
-from iveg.lab.experiment.run_store import RunStore
+from iveg.lab.experiment.plan import (
+    GREENHOUSE,
+    PLANS,
+    ROBOTS,
+    WATCHED,
+    PlannedRun,
+    directory_of,
+    read_json,
+)
+from iveg.lab.experiment.run_store import Progress, RunStore
 from iveg.lab.experiment.virtual_run import VirtualRun
 from iveg.settings import Settings
 

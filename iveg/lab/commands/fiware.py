@@ -4,8 +4,7 @@ from urllib.parse import urlsplit
 
 from iveg.adapters.connections import raise_descriptor_limit
 from iveg.adapters.extras import require_extra
-from iveg.cli.garbage_collection import tune_garbage_collection
-from iveg.cli.running import report_ready
+from iveg.cli.running import report_ready, tune_garbage_collection
 from iveg.settings import Settings
 
 

@@ -13,7 +13,7 @@ from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import Pose2D, Twist2D, wrap_angle
 from iveg.lab.emulator.greenhouse import Disc, Floats
 from iveg.lab.emulator.kinematics import clip
-from iveg.lab.emulator.routes import SPACING_M, Route, Station
+from iveg.lab.emulator.scripts import SPACING_M, Route, Station
 
 _LOOK_AHEAD_M = 0.7
 _WINDOW = 12

@@ -15,8 +15,7 @@ from iveg.domain.fleet import FleetDescription, RobotProfile
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.greenhouse import DriveLane, Greenhouse
 from iveg.lab.emulator.people import WalkStop
-from iveg.lab.emulator.routes import route_of
-from iveg.lab.emulator.scripts import TESTBED, Incident, RobotScript, Scenario
+from iveg.lab.emulator.scripts import TESTBED, Incident, RobotScript, Scenario, route_of
 
 _RING_CORNERS = ((18.0, 2.0), (18.0, 18.0), (2.0, 18.0), (2.0, 2.0))
 _END_M, _KEEP_OFF_M = 0.5, 0.9

@@ -12,8 +12,7 @@ from iveg.domain.errors import DataFileError
 from iveg.domain.geometry import Pose2D
 from iveg.lab.emulator.orders import FaultOrder
 from iveg.lab.emulator.people import WalkStop
-from iveg.lab.emulator.routes import Station
-from iveg.lab.emulator.scripts import Incident, RobotScript, Scenario
+from iveg.lab.emulator.scripts import Incident, RobotScript, Scenario, Station
 
 _FOREVER_S = 1e9
 _NORTH, _SOUTH, _WEST = math.pi / 2, -math.pi / 2, math.pi

@@ -4,6 +4,7 @@
 (``stage``, ``virtual_run``), which gives the counts, and with the real programs, which
 ``cli/experiment`` starts, ``observer`` records and ``slices`` times.  ``scoring`` and
 ``beliefs`` compare both with the emulator's ground truth, ``statistics`` gives the
-intervals, ``outcome`` and ``run_store`` store the results, ``tables``, ``report`` and
-``compare`` present them beside the paper, ``progress`` shows the progress.
+intervals, ``outcome`` and ``run_store`` store results and progress, ``tables``,
+``report`` and ``compare`` present them beside the paper; ``runner`` starts one from the
+page, ``api`` has its routes.
 """

@@ -1,8 +1,14 @@
-"""Scenarios of an experiment, with their repetitions and durations."""
+"""Scenarios of an experiment with their durations, and the files of its directory."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Final, Literal
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Final, Literal
+
+import orjson
+
+from iveg import __version__
+from iveg.domain.errors import DataFileError
 
 Size = Literal["minimal", "quick", "full"]
 FAMILIES: Final = ("viewpoints", "peers", "together", "occluded", "nlos")
@@ -13,6 +19,10 @@ WATCHED: Final = "AGII"
 """Robot whose costmap is examined: the one without sight in the paper's test."""
 GREENHOUSE: Final = "mvsim-20x20"
 SEED: Final = 2026
+_STARTS_S: Final = 8.0
+"""Time to start and end the programs of one run (s)."""
+_COUNTED_SHARE: Final = 0.15
+"""Approximate real time of a virtual second (s)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +45,11 @@ class PlannedRun:
     def name(self) -> str:
         """Name of its file."""
         return f"{self.family}-{self.number}"
+
+
+def expected_s(step: PlannedRun) -> float:
+    """Estimated duration of a run (s)."""
+    return step.seconds + _STARTS_S + _COUNTED_SHARE * step.counted_s
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,3 +85,66 @@ PLANS: Final[dict[Size, Plan]] = {
 }
 """Two robots send about 180 messages a second: quick has 16,000, full 126,000.  Five
 runs of each are the paper's own number in simulation."""
+
+
+PROGRESS: Final = "progress.json"
+_PLAN: Final = "plan.json"
+
+
+def read_json(file: Path) -> Any:
+    """Read one of our JSON files.
+
+    Raises:
+        DataFileError: the file is missing or is not JSON.
+    """
+    try:
+        return orjson.loads(file.read_bytes())
+    except (OSError, orjson.JSONDecodeError) as error:
+        raise DataFileError(str(file), "", str(error)) from error
+
+
+def write_json(file: Path, value: object) -> None:
+    """Write atomically: after a crash the file is the old one or the new one."""
+    fresh = file.with_suffix(".part")
+    fresh.write_bytes(orjson.dumps(value))
+    fresh.replace(file)
+
+
+def directory_of(place: Path, plan: Plan) -> Path:
+    """Directory of an experiment: the newest one of this plan if incomplete, or a new.
+
+    Results of another version or another plan are not mixed with this one.
+    """
+    known = sorted(place.glob(f"{plan.size}-*")) if place.is_dir() else []
+    if (
+        known
+        and not (known[-1] / "result.json").exists()
+        and belongs_to(known[-1], plan)
+    ):
+        return known[-1]
+    return place / f"{plan.size}-{len(known) + 1:03d}"
+
+
+def belongs_to(directory: Path, plan: Plan) -> bool:
+    """Whether a directory is empty, or contains runs of this very plan and version."""
+    try:
+        return bool(read_json(directory / _PLAN) == _written(plan))
+    except DataFileError:
+        return not list(directory.glob("*-*.json"))
+
+
+def claim(directory: Path, plan: Plan) -> None:
+    """Assign a directory to this plan.
+
+    Raises:
+        DataFileError: it contains runs of another plan, or of another version.
+    """
+    directory.mkdir(parents=True, exist_ok=True)
+    if not belongs_to(directory, plan):
+        reason = "holds runs of another plan or version; name another directory"
+        raise DataFileError(str(directory), "", reason)
+    write_json(directory / _PLAN, _written(plan))
+
+
+def _written(plan: Plan) -> Any:
+    return orjson.loads(orjson.dumps({"version": __version__, "plan": asdict(plan)}))

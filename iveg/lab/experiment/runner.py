@@ -20,9 +20,15 @@ from typing import Any, Final
 
 from iveg.domain.errors import DataFileError, ExperimentRefusedError
 from iveg.domain.stamps import format_stamp
-from iveg.lab.experiment.files import PROGRESS, directory_of, read_json, write_json
-from iveg.lab.experiment.plan import PLANS, Size
-from iveg.lab.experiment.progress import expected_s
+from iveg.lab.experiment.plan import (
+    PLANS,
+    PROGRESS,
+    Size,
+    directory_of,
+    expected_s,
+    read_json,
+    write_json,
+)
 from iveg.models.experiment import Experiment, Experiments
 
 _KEPT: Final = ("IVEG_CONFIDENCE_THRESHOLD", "IVEG_SAFETY_RADIUS_M")

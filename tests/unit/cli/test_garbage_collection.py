@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from iveg.cli.garbage_collection import tune_garbage_collection
+from iveg.cli.running import tune_garbage_collection
 
 _PYTHONS = 700, 10, 10
 """Its own thresholds; the suite has settled, too (tests/conftest.py)."""

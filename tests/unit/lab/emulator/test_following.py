@@ -8,7 +8,7 @@ from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.lab.emulator.following import CLEARANCE_M, Follower
 from iveg.lab.emulator.greenhouse import Disc
 from iveg.lab.emulator.kinematics import Vehicle
-from iveg.lab.emulator.routes import SPACING_M, Route, Station, route_of
+from iveg.lab.emulator.scripts import SPACING_M, Route, Station, route_of
 from tests.builders import AGI, AGII
 
 DT = 0.05

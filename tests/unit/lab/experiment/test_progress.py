@@ -6,9 +6,8 @@ from typing import Any
 
 import pytest
 
-from iveg.lab.experiment.files import read_json
-from iveg.lab.experiment.plan import PlannedRun
-from iveg.lab.experiment.progress import Progress, expected_s
+from iveg.lab.experiment.plan import PlannedRun, expected_s, read_json
+from iveg.lab.experiment.run_store import Progress
 
 STEPS = [PlannedRun("peers", n, 20.0, n) for n in (1, 2)]
 

@@ -9,10 +9,16 @@ import pytest
 
 from iveg.domain.errors import DataFileError
 from iveg.lab.experiment.compare import write_comparison
-from iveg.lab.experiment.files import directory_of, read_json, write_json
 from iveg.lab.experiment.outcome import outcome_of, read_truth, result_of
-from iveg.lab.experiment.plan import FAMILIES, PLANS, PlannedRun
-from iveg.lab.experiment.progress import expected_s
+from iveg.lab.experiment.plan import (
+    FAMILIES,
+    PLANS,
+    PlannedRun,
+    directory_of,
+    expected_s,
+    read_json,
+    write_json,
+)
 from iveg.lab.experiment.report import write_report
 from iveg.lab.experiment.run_store import RunStore
 from iveg.lab.experiment.scoring import Tally

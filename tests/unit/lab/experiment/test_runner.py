@@ -11,9 +11,7 @@ from pathlib import Path
 import pytest
 
 from iveg.domain.errors import ExperimentRefusedError
-from iveg.lab.experiment.files import read_json, write_json
-from iveg.lab.experiment.plan import PLANS
-from iveg.lab.experiment.progress import expected_s
+from iveg.lab.experiment.plan import PLANS, expected_s, read_json, write_json
 from iveg.lab.experiment.runner import ExperimentRunner
 from iveg.models.experiment import Experiment
 from tests.processes import is_alive
