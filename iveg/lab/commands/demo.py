@@ -5,9 +5,7 @@ itself.  They watch their standard input, and end when this process has ended.
 """
 
 import asyncio
-import logging
 import secrets
-import signal
 import socket
 import sys
 from collections.abc import Mapping, Sequence
@@ -21,12 +19,10 @@ from iveg.adapters.free_ports import bind_once
 from iveg.cli.arguments import Call
 from iveg.cli.running import LOOPBACK, print_sign_in_link, run_until_stopped
 from iveg.domain.errors import SettingsError
+from iveg.lab.commands.processes import Parts
 from iveg.ros2.names import namespace_of
 from iveg.settings import Settings
 
-_log = logging.getLogger(__name__)
-_PATIENCE_S = 30.0
-_GRACE_S = 5.0
 _FIWARE = (
     ("mqtt_url", "IVEG_MQTT_URL", 1883),
     ("orion_url", "IVEG_ORION_URL", 80),
@@ -127,69 +123,14 @@ def _moved(
 async def _supervise(
     parts: Sequence[Sequence[str]], settings: Settings, environment: Mapping[str, str]
 ) -> None:
-    running: list[tuple[str, asyncio.subprocess.Process]] = []
-    try:
-        for arguments in parts:
-            process = await start_part(arguments, environment)
-            running.append((arguments[0], process))
-            await wait_ready(arguments[0], process)
+    async with Parts(environment) as running:
+        for words in parts:
+            await running.start(*words)
         print_sign_in_link(settings, settings.sign_in_token)
-        await asyncio.gather(*(_watch(name, process) for name, process in running))
-    finally:
-        await stop_parts([process for _, process in reversed(running)])
-
-
-async def start_part(
-    arguments: Sequence[str], environment: Mapping[str, str]
-) -> asyncio.subprocess.Process:
-    """Start one part of iVeg as a separate process."""
-    # A session of its own: Ctrl-C reaches this process alone, which stops the parts
-    # in order, so that none logs the loss of another.
-    return await asyncio.create_subprocess_exec(
-        sys.executable,
-        "-m",
-        "iveg",
-        *arguments,
-        "--until-eof",
-        stdin=asyncio.subprocess.PIPE,
-        stdout=asyncio.subprocess.PIPE,
-        env=dict(environment),
-        start_new_session=True,
-    )
-
-
-async def wait_ready(name: str, process: asyncio.subprocess.Process) -> None:
-    """Wait until a part reports that it is ready.
-
-    Raises:
-        SystemExit: the part ended first.
-    """
-    assert process.stdout is not None  # noqa: S101 - it was asked for
-    try:
-        async with asyncio.timeout(_PATIENCE_S):
-            line = await process.stdout.readline()
-    except TimeoutError:
-        line = b""
-    if line.strip() != b"ready":
-        raise SystemExit(f"iveg: {name} did not start.")
+        await asyncio.gather(*(_watch(*part) for part in running.running))
 
 
 async def _watch(name: str, process: asyncio.subprocess.Process) -> None:
     """Wait until a part ends; the others continue, as on a real site."""
     code = await process.wait()
     print(f"iveg: {name} has ended (exit code {code}).", file=sys.stderr, flush=True)
-
-
-async def stop_parts(processes: list[asyncio.subprocess.Process]) -> None:
-    """End parts, one after the other; a part that hangs is killed."""
-    for process in processes:
-        if process.returncode is not None:
-            continue
-        process.send_signal(signal.SIGTERM)
-        try:
-            async with asyncio.timeout(_GRACE_S):
-                await process.wait()
-        except TimeoutError:
-            _log.warning("process %d did not end and is killed", process.pid)
-            process.kill()
-            await process.wait()

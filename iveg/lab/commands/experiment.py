@@ -6,11 +6,10 @@ on free ports, with a data directory of its own.
 """
 
 import asyncio
-import contextlib
 import secrets
 import sys
-from collections.abc import AsyncIterator, Coroutine, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 from urllib.parse import urlsplit
@@ -25,7 +24,8 @@ from iveg.cli.running import run_until_stopped
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import DataFileError, HopError, SettingsError
 from iveg.domain.stamps import format_stamp
-from iveg.lab.commands.demo import on_free_ports, start_part, stop_parts, wait_ready
+from iveg.lab.commands.demo import on_free_ports
+from iveg.lab.commands.processes import Parts
 from iveg.lab.experiment import compare
 from iveg.lab.experiment.observer import watch
 from iveg.lab.experiment.outcome import (
@@ -124,7 +124,6 @@ class Lab:
     settings: Settings
     embedded: bool = True
     exit_code: int = 1
-    _running: dict[str, asyncio.subprocess.Process] = field(default_factory=dict)
 
     async def run(self, environment: Mapping[str, str]) -> None:
         """Run every step that is not done yet, then write the report."""
@@ -138,9 +137,13 @@ class Lab:
         try:
             if not self.embedded:
                 await refuse_live_robots(self.settings)
-            async with self._stack(surroundings):
+            async with Parts(surroundings) as parts:
+                if self.embedded:
+                    await parts.start("fiware")
+                # As in a demo no link is printed: no person signs in here.
+                await parts.start("serve", "--demo")
                 for step in steps:
-                    await self._step(step, surroundings, progress)
+                    await self._step(step, parts, progress)
             why = ""
         except (HopError, DataFileError, SystemExit) as error:
             why = str(error)
@@ -148,39 +151,19 @@ class Lab:
             ticking.cancel()
             self._finish(why, progress)
 
-    @contextlib.asynccontextmanager
-    async def _stack(self, environment: Mapping[str, str]) -> AsyncIterator[None]:
-        # As in a demo no link is printed: no person signs in here.
-        serve = ["serve", "--demo"]
-        parts = [["fiware"], serve] if self.embedded else [serve]
-        try:
-            for words in parts:
-                await self._start(words, environment)
-            yield
-        finally:
-            await stop_parts([*reversed(self._running.values())])
-
-    async def _start(
-        self, words: list[str], environment: Mapping[str, str]
-    ) -> asyncio.subprocess.Process:
-        part = self._running[words[0]] = await start_part(words, environment)
-        await wait_ready(words[0], part)
-        return part
-
-    async def _step(
-        self, step: PlannedRun, environment: Mapping[str, str], progress: Progress
-    ) -> None:
+    async def _step(self, step: PlannedRun, parts: Parts, progress: Progress) -> None:
         progress.begin(step, "counting", clock.mono())
         rehearsal = VirtualRun(step, self.profile, self._rule, WATCHED)
-        played = await self._while_all_run(rehearsal.play(step.counted_s))
+        played = await parts.outlast(rehearsal.play(step.counted_s))
         counted = counted_of(played, WATCHED)
         progress.begin(step, "running", clock.mono())
         truth = self.notebook.directory / f"{step.name}.truth.jsonl"
+        started = len(parts.running)
         try:
-            stack = await self._real(step, environment, truth)
+            stack = await self._real(step, parts, truth)
         finally:
-            robots = self._running.pop("emulator", None)
-            await stop_parts([] if robots is None else [robots])
+            if len(parts.running) > started:
+                await parts.stop_newest()
             truth.unlink(missing_ok=True)
         self.notebook.keep(step, outcome_of(step, counted, stack))
         progress.end(step, clock.mono())
@@ -193,41 +176,21 @@ class Lab:
             threshold=told.confidence_threshold, radius_m=told.safety_radius_m
         )
 
-    async def _real(
-        self, step: PlannedRun, environment: Mapping[str, str], truth: Path
-    ) -> Outcome:
+    async def _real(self, step: PlannedRun, parts: Parts, truth: Path) -> Outcome:
         """The same run by all programs, any of which may end early."""
-        words = ["emulator", "--scenario", step.family, "--seed", str(step.seed)]
+        words = ["--scenario", step.family, "--seed", str(step.seed)]
         words += ["--profile", self.profile, "--truth", str(truth)]
         since = format_stamp(clock.wall())
-        await self._start(words, environment)
-        completed = await self._while_all_run(self._until_live())
+        await parts.start("emulator", *words)
+        completed = await parts.outlast(self._until_live())
         url, token = self._url, self.settings.api_token
-        watched = await self._while_all_run(watch(url, token, step.seconds, WATCHED))
+        watched = await parts.outlast(watch(url, token, step.seconds, WATCHED))
         completed = completed and await self._are_live()
         # Stopped robots are not released here, so STOP comes last.
         stops = await self._stop() if self.notebook.is_last(step) else []
         decisions = (await self._ask(f"decisions?since={since}&limit=500"))["items"]
         stack = stack_of(watched, read_truth(truth), decisions, WATCHED)
         return {**stack, "completed": completed and stack["completed"], "stops": stops}
-
-    async def _while_all_run(self, work: Coroutine[Any, Any, T]) -> T:
-        """Run ``work``; raises HopError as soon as a program has ended."""
-        ends = {
-            asyncio.create_task(part.wait()): name
-            for name, part in self._running.items()
-        }
-        main = asyncio.create_task(work)
-        try:
-            await asyncio.wait([main, *ends], return_when=asyncio.FIRST_COMPLETED)
-            for end, name in ends.items():
-                if end.done():
-                    raise HopError(name, f"has ended (exit code {end.result()})")
-            return await main
-        finally:
-            for task in (main, *ends):
-                task.cancel()
-            await asyncio.gather(main, *ends, return_exceptions=True)
 
     async def _until_live(self) -> bool:
         deadline = clock.mono() + _LIVE_WITHIN_S
