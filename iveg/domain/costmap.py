@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.observations import LaserScan
+from iveg.domain.rule.zones import Zone
 
 RESOLUTION_M = 0.1
 MAX_CELLS = 400_000
@@ -114,15 +115,6 @@ class InflatedGrid:
     data: NDArray[np.int8]
 
 
-@dataclass(frozen=True, slots=True)
-class Ring:
-    """A person or peer to keep away from: centre in ``map`` and radius (m)."""
-
-    x: float
-    y: float
-    radius_m: float
-
-
 class Occupancy:
     """Log-odds of one grid: 0 unknown, below free, above taken."""
 
@@ -161,12 +153,12 @@ class Occupancy:
         other._log[row : row + there.shape[0], column : column + there.shape[1]] = there
         return other
 
-    def costs(self, rings: Iterable[Ring] = ()) -> InflatedGrid:
-        """What each cell costs, rings laid over it."""
+    def costs(self, zones: Iterable[Zone] = ()) -> InflatedGrid:
+        """What each cell costs, rings of people and peers laid over it."""
         cost = np.clip(self._log * (100.0 / _MOST), 0.0, 100.0).astype(np.int8)
         cost[np.abs(self._log) < _KNOWN] = UNKNOWN
-        for ring in rings:
-            _inflate(cost, self.grid, ring)
+        for zone in zones:
+            _inflate(cost, self.grid, zone)
         return InflatedGrid(self.grid, cost)
 
 
@@ -300,7 +292,7 @@ def _hits(
     return row, column
 
 
-def _inflate(cost: NDArray[np.int8], grid: Grid, ring: Ring) -> None:
+def _inflate(cost: NDArray[np.int8], grid: Grid, ring: Zone) -> None:
     """Lay one ring over the costs: dear at its edge, dearest at its centre."""
     cells = grid.window(ring.x, ring.y, ring.radius_m)
     dx, dy = grid.offsets(cells, ring.x, ring.y)

@@ -12,7 +12,6 @@ from iveg.domain.costmap import (
     Grid,
     InflatedGrid,
     Occupancy,
-    Ring,
     Sweep,
     sweep_of,
     window_round,
@@ -139,6 +138,4 @@ def _costs(
     if occupancy is None:
         return None
     occupancy.fade(now.mono)
-    return occupancy.costs(
-        Ring(zone.x, zone.y, zone.radius_m) for zone in zones if zone.recording is None
-    )
+    return occupancy.costs(zone for zone in zones if zone.recording is None)

@@ -12,15 +12,19 @@ from iveg.domain.costmap import (
     Grid,
     InflatedGrid,
     Occupancy,
-    Ring,
     sweep_of,
     window_round,
 )
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.observations import LaserScan
+from iveg.domain.rule.zones import Zone
 from tests.builders import scan
 
 ROOM = Grid.over(Rectangle(0, 0, 20, 10))
+
+
+def ring(x: float, y: float, radius_m: float) -> Zone:
+    return Zone("person", "P1", "AGI", x, y, radius_m)
 
 
 def around(distance: float, beams: int = 720, range_max: float = 12.0) -> LaserScan:
@@ -129,7 +133,7 @@ def test_what_nobody_looks_at_any_more_fades_to_unknown() -> None:
 
 
 def test_a_ring_is_laid_over_free_taken_and_unknown_cells() -> None:
-    costmap = Occupancy(ROOM).costs([Ring(5.05, 5.05, 2.0)])
+    costmap = Occupancy(ROOM).costs([ring(5.05, 5.05, 2.0)])
 
     assert cost(costmap, 5.05, 5.05) == 99
     assert 50 <= cost(costmap, 6.95, 5.05) < 55
@@ -141,7 +145,7 @@ def test_a_ring_makes_no_cell_cheaper() -> None:
     for _ in range(10):
         occupancy.add(sweep_of(around(3.0), Pose2D(5.05, 5.05, 0.0), ROOM))
 
-    costmap = occupancy.costs([Ring(9.0, 5.05, 2.0)])
+    costmap = occupancy.costs([ring(9.0, 5.05, 2.0)])
 
     assert cost(costmap, 8.05, 5.05) == 100
 
@@ -163,7 +167,7 @@ def test_any_scan_from_anywhere_leaves_costs_in_their_range(
     costmap = Occupancy(ROOM)
     costmap.add(sweep_of(one, Pose2D(x, y, yaw), ROOM))
 
-    data = costmap.costs([Ring(x, y, 2.0)]).data
+    data = costmap.costs([ring(x, y, 2.0)]).data
     assert data.shape == (100, 200)
     assert data.min() >= UNKNOWN
     assert data.max() <= 100
