@@ -7,7 +7,7 @@ camera that can clear no spot.
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Literal
 
 from iveg.domain.geometry import Pose2D
@@ -84,10 +84,6 @@ class RobotDescription:
     profile: RobotProfile = CAUTIOUS
     is_described: bool = False
     has_detector: bool = True
-
-    def without_detector(self) -> "RobotDescription":
-        """The same robot, whose detector nobody waits for."""
-        return replace(self, has_detector=False)
 
 
 @dataclass(frozen=True, slots=True)

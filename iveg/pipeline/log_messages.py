@@ -15,7 +15,6 @@ from iveg.domain.robot_state import RobotState
 from iveg.domain.rule.premises import Missing
 from iveg.domain.rule.speed_limits import Crossing
 from iveg.domain.tracking.people import People
-from iveg.domain.tracking.person import TrackedPerson
 from iveg.domain.world import World
 
 
@@ -79,9 +78,15 @@ def _without_decision(
 ) -> SlowdownCauses | None:
     for person in people.known.values():
         if report.decision_id == person.decision_id:
-            return _of_person(person, robot, greenhouse)
+            sighting = person.newest
+            place = sighting.x, sighting.y, sighting.observer
+            found = _seen_by(robot, greenhouse, person.person_id, person.class_, *place)
+            return found and replace(found, confidence=sighting.confidence)
     peer = world.robots.get(report.cause or "")
-    return None if peer is None else _of_peer(peer, robot, greenhouse)
+    if peer is None or peer.odometry is None:
+        return None
+    pose, name = peer.odometry.pose, peer.robot_id
+    return _seen_by(robot, greenhouse, name, "robot", pose.x, pose.y, name)
 
 
 def _of_crossing(crossing: Crossing) -> SlowdownCauses:
@@ -102,42 +107,28 @@ def _of_crossing(crossing: Crossing) -> SlowdownCauses:
     )
 
 
-def _of_person(
-    person: TrackedPerson, robot: RobotState, greenhouse: Greenhouse
+def _seen_by(
+    robot: RobotState,
+    greenhouse: Greenhouse,
+    cause: str,
+    class_: str,
+    x: float,
+    y: float,
+    observer: str,
 ) -> SlowdownCauses | None:
+    """How far a cause at x, y (m) is from a robot, and whether it may see it."""
     if robot.odometry is None:
         return None
-    pose, sighting = robot.odometry.pose, person.newest
-    return SlowdownCauses(
-        person.person_id,
-        person.class_,
-        sighting.observer,
-        pose.distance_to(sighting.x, sighting.y),
-        sighting.observer == robot.robot_id
-        or greenhouse.in_sight(pose.x, pose.y, sighting.x, sighting.y),
-        sighting.confidence,
-    )
+    pose = robot.odometry.pose
+    sees = greenhouse.in_sight(pose.x, pose.y, x, y)
+    in_sight = observer == robot.robot_id or sees
+    return SlowdownCauses(cause, class_, observer, pose.distance_to(x, y), in_sight)
 
 
 def _first_of(missing: Iterable[Missing], report: SafetyReport) -> Missing | None:
     """The premise whose lack a robot reports as its reason."""
     told = report.reason, report.cause
     return next((one for one in missing if (one.reason, one.robot_id) == told), None)
-
-
-def _of_peer(
-    peer: RobotState, robot: RobotState, greenhouse: Greenhouse
-) -> SlowdownCauses | None:
-    if robot.odometry is None or peer.odometry is None:
-        return None
-    pose, other = robot.odometry.pose, peer.odometry.pose
-    return SlowdownCauses(
-        peer.robot_id,
-        "robot",
-        peer.robot_id,
-        pose.distance_to(other.x, other.y),
-        greenhouse.in_sight(pose.x, pose.y, other.x, other.y),
-    )
 
 
 def speed_line(

@@ -104,19 +104,13 @@ class Tracker:
         ]
         for is_live in (True, False):
             wanting = [index for index in first_places(picture) if out[index] is None]
-            if not wanting:
-                break
             offered = [
                 (person, earlier)
                 for person, earlier in own
                 if (earlier.age_s(at) <= LIMITS.seen_s) is is_live
             ]
             costs = [
-                [
-                    chain_cost(picture[i], person, earlier, at)
-                    for person, earlier in offered
-                ]
-                for i in wanting
+                [chain_cost(picture[i], *pair, at) for pair in offered] for i in wanting
             ]
             for row, column in assign(costs):
                 person, earlier = offered[column]
@@ -198,8 +192,6 @@ class Tracker:
     ) -> None:
         """Assign free tracks to detections without one."""
         wanting = [index for index in first_places(picture) if tracks[index] is None]
-        if not wanting:
-            return
         taken = set(tracks)
         offered = [
             person

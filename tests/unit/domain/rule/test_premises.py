@@ -1,5 +1,7 @@
 """Premises of "clear": what is missing, for whom, and what of it is told."""
 
+from dataclasses import replace
+
 import pytest
 
 from iveg.domain.detector import OutOfService
@@ -96,7 +98,8 @@ def test_whose_pose_is_doubted_may_be_where_it_was_before() -> None:
 def test_a_detector_that_the_fleet_file_denies_is_not_waited_for() -> None:
     scene = Scene(("AGI", "R0"))
     world = scene.world
-    world.robot("AGI").description = world.robot("AGI").description.without_detector()
+    agi = world.robot("AGI")
+    agi.description = replace(agi.description, has_detector=False)
     for name in ("AGI", "R0"):
         scene.drive(name, 0.0 if name == "AGI" else 5.0)
     scene.look("R0")
