@@ -93,8 +93,8 @@ MUTANTS = (
     ),
     Mutant(
         "STOP: the second copy of a refused release is judged anew",
-        "return None if attempt is None else self._verdicts.get(attempt)",
-        "return None",
+        'verdict = self._verdicts.get(order.attempt or "")',
+        "verdict = None",
         ("unit/robot/test_safety.py",),
     ),
     Mutant(
