@@ -1,8 +1,10 @@
-"""Log lines as values: a template's name and what fills its holes."""
+"""Log lines and conditions of alerts: a template's name and what fills its holes."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
+
+from iveg.domain.messages import Priority
 
 Slot = str | float | bool | None
 EventKind = Literal["detection", "speed", "command", "link", "alert", "system"]
@@ -23,3 +25,25 @@ class LogEvent:
     robot_id: str | None = None
     class_: str | None = None
     decision_id: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """A condition that holds now and asks for an alert.
+
+    Attributes:
+        key: Names the sentence; ``subject`` tells two of a kind apart.
+    """
+
+    priority: Priority
+    key: str
+    subject: str
+    robot_id: str | None = None
+    slots: Mapping[str, Slot] = field(default_factory=dict)
+
+    @classmethod
+    def of_robot(
+        cls, priority: Priority, key: str, robot_id: str, **slots: Slot
+    ) -> "Condition":
+        """A condition of one robot, whom its sentence names."""
+        return cls(priority, key, robot_id, robot_id, {"robot": robot_id, **slots})

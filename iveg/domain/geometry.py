@@ -53,6 +53,9 @@ class Twist2D:
     angular_z: float
 
 
+REST = Twist2D(0.0, 0.0)
+
+
 @dataclass(frozen=True, slots=True)
 class Box3D:
     """An axis-aligned box (m) in the frame that its owner names."""

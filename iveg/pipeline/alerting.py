@@ -2,9 +2,9 @@
 
 from collections.abc import Callable, Iterable, Sequence
 
-from iveg.domain.alerts.alert_book import AlertBook, BookedAlert, Condition
+from iveg.domain.alerts.alert_book import AlertBook, BookedAlert
 from iveg.domain.alerts.flood import FloodGauge, FloodState
-from iveg.domain.events import LogEvent, Slot
+from iveg.domain.events import Condition, LogEvent, Slot
 from iveg.domain.messages import MessageDelivery
 from iveg.domain.observations import Instant
 from iveg.pipeline import topics

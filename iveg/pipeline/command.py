@@ -11,9 +11,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Literal
 
-from iveg.domain.alerts.alert_book import Condition
 from iveg.domain.errors import UnknownRobotError
-from iveg.domain.events import LogEvent, Slot
+from iveg.domain.events import Condition, LogEvent, Slot
 from iveg.domain.observations import (
     CommandAnswer,
     Instant,

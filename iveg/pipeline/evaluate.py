@@ -9,10 +9,9 @@ falls silent and slows the robots.
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from iveg.domain.alerts import conditions
-from iveg.domain.alerts.alert_book import Condition
 from iveg.domain.decisions import Decisions, SlowdownDecision
 from iveg.domain.detection_rule import DetectionRule
-from iveg.domain.events import LogEvent, Slot
+from iveg.domain.events import Condition, LogEvent, Slot
 from iveg.domain.feedback import UNSUPERVISED, SpeedLimit
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import (

@@ -9,8 +9,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from iveg.domain.alerts.alert_book import Condition
-from iveg.domain.events import Slot
+from iveg.domain.events import Condition, Slot
 from iveg.domain.observations import (
     Battery,
     Climate,

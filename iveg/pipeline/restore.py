@@ -13,9 +13,9 @@ from iveg.domain.alerts.alert_book import (
     MOST_KEPT,
     AlertOccurrence,
     BookedAlert,
-    Condition,
 )
 from iveg.domain.errors import HopError
+from iveg.domain.events import Condition
 from iveg.domain.messages import MessageDelivery, Priority
 from iveg.domain.observations import Instant
 from iveg.domain.records import (

@@ -15,9 +15,8 @@ from collections.abc import Awaitable, Callable, Iterable
 from functools import wraps
 from typing import ParamSpec
 
-from iveg.domain.alerts.alert_book import Condition
 from iveg.domain.alerts.conditions import SHOWN_S
-from iveg.domain.events import Slot
+from iveg.domain.events import Condition, Slot
 from iveg.domain.observations import Instant
 from iveg.pipeline.ports import Clock
 
@@ -118,11 +117,10 @@ class Supervision:
         """A P3 for each part that is down, a P2 for each that held up the loop."""
         for part in self._failed_at:
             if self._is_down(part, now):
-                slots: dict[str, Slot] = {"part": part}
-                yield Condition("P3", "alert.part_down", part, None, slots)
+                yield Condition("P3", "alert.part_down", part, None, {"part": part})
         for part, (at, cpu_s) in self._long_turns.items():
             if now.mono - at < SHOWN_S:
-                slots = {"part": part, "ms": round(1000.0 * cpu_s)}
+                slots: dict[str, Slot] = {"part": part, "ms": round(1000.0 * cpu_s)}
                 yield Condition("P2", "alert.loop_held_up", part, None, slots)
 
     def _is_down(self, part: str, now: Instant) -> bool:

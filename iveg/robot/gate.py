@@ -6,9 +6,8 @@ during the hold cannot jerk the robot (neutral interlock, docs/safety.md).
 
 import math
 
-from iveg.domain.geometry import Twist2D
+from iveg.domain.geometry import REST, Twist2D
 
-REST = Twist2D(0.0, 0.0)
 NEUTRAL_S = 0.5
 TWIST_VALID_S = 0.5
 RAMP_M_S2, RAMP_RAD_S2 = 0.5, 2.0

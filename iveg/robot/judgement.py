@@ -9,10 +9,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 from iveg.domain.feedback import HALF_SPEED, Feedback
-from iveg.domain.geometry import Pose2D, Twist2D
+from iveg.domain.geometry import REST, Pose2D, Twist2D
 from iveg.domain.limits import LIMITS
 from iveg.robot.caps import FREE, AppliedCap, Cap, lowest
-from iveg.robot.gate import REST
 from iveg.robot.peer_feedback import PeerFeedback
 from iveg.robot.watchdog import Watchdog
 

@@ -18,7 +18,7 @@ from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.domain.errors import UnreadableError
 from iveg.domain.feedback import Feedback
 from iveg.domain.fleet import RobotProfile
-from iveg.domain.geometry import Twist2D
+from iveg.domain.geometry import REST, Twist2D
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import (
     CommandAnswer,
@@ -34,7 +34,6 @@ from iveg.ngsi.codec import read_feedback
 from iveg.robot.caps import FREE, Cap
 from iveg.robot.echo import Echo
 from iveg.robot.effects import Answer, Drive, Effect, Persist, Report
-from iveg.robot.gate import REST
 from iveg.robot.hold_file import read_holds, write_holds
 from iveg.robot.judgement import Limits, OnLinkLoss
 from iveg.robot.lane import SafetyLane

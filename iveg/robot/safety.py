@@ -23,7 +23,6 @@ from typing import Literal
 from iveg.domain.feedback import Feedback
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import CommandAnswer, Hold, Origin, SafetyReport
-from iveg.robot.attempts import Attempts, AttemptVerdict
 from iveg.robot.caps import Cap
 from iveg.robot.effects import Answer, AnswerCode, Drive, Effect, Persist, Report
 from iveg.robot.gate import Gate
@@ -44,6 +43,9 @@ REPORT_EVERY_S, REPORT_HELD_EVERY_S = 0.4, 0.075
 """Below the contract's 0.5 s and 0.1 s, so that a late timer still keeps them.  The
 second is for iVeg alone: ten a second would be most of what one agent can carry."""
 
+ATTEMPTS_KEPT = 64
+_Verdict = tuple[str | None, AnswerCode, str | None]
+"""On a release or resume: the hold that the answer names, and why it was refused."""
 _Applied = tuple[float, str, str | None, str | None, tuple[Hold, ...], str]
 """Fields whose change triggers a report; speeds and ages alone do not."""
 
@@ -81,7 +83,8 @@ class SafetyMachine:
         self._resumed = False
         self._resumed_by: str | None = None
         self._challenge, self._challenge_at = fresh(), now
-        self._attempts = Attempts()
+        self._verdicts: dict[str, _Verdict] = {}
+        """By attempt, oldest first; the challenge of one that is forgotten is spent."""
         self._holds = (stored or HoldSet()).after_reboot()
         self._persisted: HoldSet | None = None
         self._said: _Applied | None = None
@@ -222,29 +225,38 @@ class SafetyMachine:
         return Hold(f"local-{self._fresh()}", "iveg", "remote")
 
     def _attempt(self, order: ReleaseOrder | ResumeOrder, now: float) -> CommandAnswer:
-        """Judge the first copy of an order; give every other the same answer."""
-        verdict = self._attempts.recall(order.attempt)
+        """Judge the first copy of an order; give every other the same answer.
+
+        That holds even when the robot's state has changed: a refused order stays
+        refused.
+        """
+        verdict = self._verdicts.get(order.attempt or "")
         if verdict is None:
             if isinstance(order, ReleaseOrder):
                 verdict = self._release(order, now)
             else:
                 verdict = self._resume(order, now)
-            self._attempts.note(order.attempt, verdict)
-        return self._answer(
-            verdict.answered, verdict.code, verdict.why, attempt=order.attempt
-        )
+            self._remember(order.attempt, verdict)
+        return self._answer(*verdict, attempt=order.attempt)
 
-    def _release(self, order: ReleaseOrder, now: float) -> AttemptVerdict:
+    def _remember(self, attempt: str | None, verdict: _Verdict) -> None:
+        if attempt is None:
+            return  # Its copies cannot be told from a new order.
+        self._verdicts[attempt] = verdict
+        if len(self._verdicts) > ATTEMPTS_KEPT:
+            del self._verdicts[next(iter(self._verdicts))]
+
+    def _release(self, order: ReleaseOrder, now: float) -> _Verdict:
         first = order.ids[0]
         if set(order.ids) <= set(self._holds.released):
             # The same release again: no hold is left to lift; the answer is the same.
-            return AttemptVerdict(first, "RELEASED")
+            return first, "RELEASED", None
         why = self._why_not_release(order, now)
         if why is not None:
             return self._refuse(first, order.challenge, why, now)
         self._holds = self._holds.lift(self._holds.remote & frozenset(order.ids))
         self._renew_challenge(now)
-        return AttemptVerdict(first, "RELEASED")
+        return first, "RELEASED", None
 
     def _why_not_release(self, order: ReleaseOrder, now: float) -> str | None:
         """Code of the refusal of a release; None when it is valid."""
@@ -257,16 +269,16 @@ class SafetyMachine:
             return "challenge"
         return None if self._judgement.stands(now) else "not_standing"
 
-    def _resume(self, order: ResumeOrder, now: float) -> AttemptVerdict:
+    def _resume(self, order: ResumeOrder, now: float) -> _Verdict:
         if self._resumed and order.challenge == self._resumed_by:
-            return AttemptVerdict(None, "RESUMED")
+            return None, "RESUMED", None
         why = self._why_not_resume(order)
         if why is not None:
             return self._refuse(None, order.challenge, why, now)
         self._let_go()
         self._resumed_by = order.challenge
         self._renew_challenge(now)
-        return AttemptVerdict(None, "RESUMED")
+        return None, "RESUMED", None
 
     def _why_not_resume(self, order: ResumeOrder) -> str | None:
         if self._holds.holds:
@@ -277,11 +289,11 @@ class SafetyMachine:
 
     def _refuse(
         self, answered: str | None, challenge: str, why: str, now: float
-    ) -> AttemptVerdict:
+    ) -> _Verdict:
         """Refuse an order; its challenge is spent, so a later copy cannot succeed."""
         if challenge == self._challenge:
             self._renew_challenge(now)
-        return AttemptVerdict(answered, "REFUSED", why)
+        return answered, "REFUSED", why
 
     def _answer(
         self,

@@ -19,7 +19,7 @@ import orjson
 
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.store import Store
-from iveg.domain.alerts.alert_book import Condition
+from iveg.domain.events import Condition
 from iveg.domain.observations import Climate, Instant, Navigation, RobotFault
 from iveg.domain.records import Record
 from iveg.models.base import write_json

@@ -9,8 +9,8 @@ from iveg.domain.alerts.alert_book import (
     MEMBERS_KEPT,
     AlertBook,
     BookedAlert,
-    Condition,
 )
+from iveg.domain.events import Condition
 from iveg.domain.messages import Priority
 from tests.builders import at
 

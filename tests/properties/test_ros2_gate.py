@@ -13,11 +13,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iveg.domain.feedback import SpeedLimit
-from iveg.domain.geometry import Twist2D
+from iveg.domain.geometry import REST, Twist2D
 from iveg.lab.emulator.ros2_base import TIMEOUT_S, DriveWatchdog
 from iveg.robot.caps import Cap
 from iveg.robot.effects import Drive as Told
-from iveg.robot.gate import RAMP_M_S2, RAMP_RAD_S2, REST
+from iveg.robot.gate import RAMP_M_S2, RAMP_RAD_S2
 from iveg.robot.ros2.config import DriveConfig
 from iveg.robot.ros2.drive import DriveTopics
 from iveg.robot.ros2.input_faults import InputFaults

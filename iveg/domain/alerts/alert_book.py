@@ -6,10 +6,10 @@ same alert, one occurrence more.  One row stands for all of them, but never for 
 than the gravest unacknowledged occurrence: grouping cannot hide an escalation.
 """
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 
-from iveg.domain.events import Slot
+from iveg.domain.events import Condition
 from iveg.domain.messages import MessageDelivery, Priority, newest
 from iveg.domain.observations import Instant
 
@@ -19,21 +19,6 @@ MOST_KEPT = 200
 """Beyond this number even an unacknowledged P1 is left to the history."""
 MEMBERS_KEPT = 100
 """Occurrences that an alert lists one by one; older ones are counted."""
-
-
-@dataclass(frozen=True, slots=True)
-class Condition:
-    """A condition that holds now and asks for an alert.
-
-    Attributes:
-        key: Names the sentence; ``subject`` tells two of a kind apart.
-    """
-
-    priority: Priority
-    key: str
-    subject: str
-    robot_id: str | None = None
-    slots: Mapping[str, Slot] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,11 +3,11 @@
 from collections.abc import Iterable
 from math import inf
 
-from iveg.domain.alerts.alert_book import Condition
 from iveg.domain.decisions import SlowdownDecision
 from iveg.domain.detection_rule import RECOVERED, DetectionRule
-from iveg.domain.events import Slot
+from iveg.domain.events import Condition, Slot
 from iveg.domain.limits import LIMITS
+from iveg.domain.messages import Priority
 from iveg.domain.observations import Instant
 from iveg.domain.robot_state import RobotState
 
@@ -26,35 +26,34 @@ def of_decision(decision: SlowdownDecision, now: Instant) -> Iterable[Condition]
     The slow-down is on the robot's card, on the map and in the log.
     """
     crossing = decision.crossing
+    zone, robot_id = crossing.zone, crossing.robot_id
+    if not decision.overdue(now):
+        return
+    is_person = zone.reason == "person"
+    key = "alert.person_not_slowing" if is_person else "alert.no_slow_down"
     slots: dict[str, Slot] = {
-        "robot": crossing.robot_id,
-        "person": crossing.zone.cause,
+        "robot": robot_id,
+        "person": zone.cause,
         "distance": round(crossing.distance_m, 2),
         "decision": decision.decision_id,
     }
-    subject = f"{crossing.robot_id}/{crossing.zone.cause}"
-    person = crossing.zone.reason == "person"
-    if decision.overdue(now):
-        key = "alert.person_not_slowing" if person else "alert.no_slow_down"
-        yield Condition("P1", key, subject, crossing.robot_id, slots)
+    yield Condition("P1", key, f"{robot_id}/{zone.cause}", robot_id, slots)
 
 
 def of_robot(robot: RobotState, now: Instant) -> Iterable[Condition]:
     """A robot that is lost, doubted, or whose clock or detector is off."""
-    slots: dict[str, Slot] = {"robot": robot.robot_id}
     name = robot.robot_id
     if robot.link(now) == "LOST":
-        moving = _was_moving(robot)
-        key = "alert.moving_robot_lost" if moving else "alert.robot_lost"
-        yield Condition("P1" if moving else "P2", key, name, name, slots)
+        if _was_moving(robot):
+            yield Condition.of_robot("P1", "alert.moving_robot_lost", name)
+        else:
+            yield Condition.of_robot("P2", "alert.robot_lost", name)
     offset = robot.clock.warning(now, _may_be_late_s(robot, now))
     if offset is not None:
-        slots = {**slots, "offset": round(offset, 2)}
-        yield Condition("P3", "alert.clock_offset", name, name, slots)
-    doubts = robot.doubts.active(now)
-    if doubts:
-        slots = {"robot": name, "code": doubts[0]}
-        yield Condition("P2", "alert.doubt", name, name, slots)
+        shown = round(offset, 2)
+        yield Condition.of_robot("P3", "alert.clock_offset", name, offset=shown)
+    for code in robot.doubts.active(now)[:1]:
+        yield Condition.of_robot("P2", "alert.doubt", name, code=code)
 
 
 def of_detector(
@@ -62,18 +61,17 @@ def of_detector(
 ) -> Iterable[Condition]:
     """A detector whose pictures are not read whole; ``started``: when iVeg did."""
     name, detector = robot.robot_id, robot.detector
-    slots: dict[str, Slot] = {"robot": name}
     if not robot.description.has_detector:
         return
     if _is_recent(detector.flawed_at.get("unreadable"), now):
-        yield Condition("P2", "alert.unreadable_detection", name, name, slots)
+        yield Condition.of_robot("P2", "alert.unreadable_detection", name)
     if _is_recent(robot.clock.detector_apart_at, now):
-        yield Condition("P2", "alert.detector_clock", name, name, slots)
+        yield Condition.of_robot("P2", "alert.detector_clock", name)
     if _is_silent(robot, now, started):
-        yield Condition("P2", "alert.detector_silent", name, name, slots)
+        yield Condition.of_robot("P2", "alert.detector_silent", name)
     if detector.out_of_service is not None:
-        slots = {**slots, "by": detector.out_of_service.by}
-        yield Condition("P3", "alert.detector_out_of_service", name, name, slots)
+        by = detector.out_of_service.by
+        yield Condition.of_robot("P3", "alert.detector_out_of_service", name, by=by)
 
 
 def _is_silent(robot: RobotState, now: Instant, started: Instant) -> bool:
@@ -94,12 +92,11 @@ def _is_silent(robot: RobotState, now: Instant, started: Instant) -> bool:
 
 def of_kind(robot: RobotState, now: Instant) -> Iterable[Condition]:
     """A robot whose messages contradict its kind in the fleet: live or recording."""
-    slots: dict[str, Slot] = {"robot": robot.robot_id}
     name = robot.robot_id
     if _is_recent(robot.live_at, now):
-        yield Condition("P1", "alert.recording_is_live", name, name, slots)
+        yield Condition.of_robot("P1", "alert.recording_is_live", name)
     if _is_recent(robot.refused_at, now):
-        yield Condition("P2", "alert.replay_refused", name, name, slots)
+        yield Condition.of_robot("P2", "alert.replay_refused", name)
 
 
 def _is_recent(moment: float | None, now: Instant, within_s: float = SHOWN_S) -> bool:
@@ -130,14 +127,13 @@ def of_overload(robots: Iterable[RobotState], now: Instant) -> Iterable[Conditio
         if _is_recent(robot.detector.flawed_at.get("overload"), now)
     ]
     if names:
-        slots: dict[str, Slot] = {"robots": ", ".join(sorted(names))}
-        yield Condition("P2", "alert.pictures_not_judged", "fleet", None, slots)
+        yield _of_all("P2", "alert.pictures_not_judged", sorted(names))
 
 
 def of_rule(rule: DetectionRule) -> Iterable[Condition]:
     """The rule in force was made from a damaged file, and nobody has looked at it."""
     if rule.author == RECOVERED:
-        slots: dict[str, Slot] = {"version": rule.version}
+        slots = {"version": rule.version}
         yield Condition("P2", "alert.rule_recovered", "fleet", None, slots)
 
 
@@ -162,5 +158,9 @@ def of_fleet(robots: Iterable[RobotState], now: Instant) -> Iterable[Condition]:
         ("alert.frame_not_named", unlabelled),
     ):
         if names:
-            slots: dict[str, Slot] = {"robots": ", ".join(names)}
-            yield Condition("P3", key, "fleet", None, slots)
+            yield _of_all("P3", key, names)
+
+
+def _of_all(priority: Priority, key: str, names: Iterable[str]) -> Condition:
+    """One condition that names every robot concerned."""
+    return Condition(priority, key, "fleet", None, {"robots": ", ".join(names)})

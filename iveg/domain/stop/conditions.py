@@ -2,8 +2,7 @@
 
 from collections.abc import Iterable
 
-from iveg.domain.alerts.alert_book import Condition
-from iveg.domain.events import Slot
+from iveg.domain.events import Condition
 from iveg.domain.observations import Instant
 from iveg.domain.stop.effects import OffTable
 from iveg.domain.stop.machine import StopMachine
@@ -23,20 +22,16 @@ def of_machines(machines: Iterable[StopMachine], now: Instant) -> Iterable[Condi
         if stop is None:
             continue
         age = round(now.mono - stop.times.requested.mono, 1)
-        slots: dict[str, Slot] = {"robot": robot_id, "age": age}
         key = _ALERTS.get(machine.state)
         if key is not None:
-            yield Condition("P1", key, robot_id, robot_id, slots)
+            yield Condition.of_robot("P1", key, robot_id, age=age)
         if stop.reason == "moved" and machine.state in _NOT_AT_REST:
-            yield Condition("P1", "alert.stop_moved", robot_id, robot_id, slots)
+            yield Condition.of_robot("P1", "alert.stop_moved", robot_id, age=age)
 
 
 def of_mistakes(mistakes: Iterable[OffTable]) -> Iterable[Condition]:
     """Conditions of internal errors of the machine."""
     for one in mistakes:
-        slots: dict[str, Slot] = {
-            "robot": one.robot_id,
-            "state": one.state,
-            "event": one.key,
-        }
-        yield Condition("P2", "alert.stop_off_table", one.robot_id, one.robot_id, slots)
+        yield Condition.of_robot(
+            "P2", "alert.stop_off_table", one.robot_id, state=one.state, event=one.key
+        )

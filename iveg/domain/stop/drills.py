@@ -6,8 +6,7 @@ first drill, and from then on a missing drill is a fact.
 
 from collections.abc import Iterable, Mapping
 
-from iveg.domain.alerts.alert_book import Condition
-from iveg.domain.events import Slot
+from iveg.domain.events import Condition
 from iveg.domain.observations import Instant
 
 _DAY_S = 86_400.0
@@ -37,8 +36,7 @@ class Drills:
         """Conditions of robots whose last drill is older than the configured days."""
         for robot_id in due_drills(self.last, self._days, now.wall):
             days = int((now.wall - self.last[robot_id]) / _DAY_S)
-            slots: dict[str, Slot] = {"robot": robot_id, "days": days}
-            yield Condition("P3", "alert.drill_due", robot_id, robot_id, slots)
+            yield Condition.of_robot("P3", "alert.drill_due", robot_id, days=days)
 
 
 def due_drills(last: Mapping[str, float], days: float, by: float) -> list[str]:

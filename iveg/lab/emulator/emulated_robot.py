@@ -8,13 +8,12 @@ from contextlib import AsyncExitStack
 from dataclasses import dataclass, replace
 
 from iveg.adapters import clock
-from iveg.domain.geometry import Twist2D
+from iveg.domain.geometry import REST, Twist2D
 from iveg.domain.observations import Battery, Instant, Origin
 from iveg.lab.emulator.orders import FaultOrder
 from iveg.lab.emulator.relay import Relay
 from iveg.lab.emulator.truth import TruthLog
 from iveg.lab.emulator.world import RobotHardware, SimulatedWorld
-from iveg.robot.gate import REST
 from iveg.robot.node import NodeSettings, RobotNode
 from iveg.robot.pacing import LONGEST_STEP_S, SLOTS, in_slots
 

@@ -11,12 +11,11 @@ import math
 
 from iveg.adapters import clock
 from iveg.domain.errors import UnreadableError
-from iveg.domain.geometry import Pose2D, Twist2D
+from iveg.domain.geometry import REST, Pose2D, Twist2D
 from iveg.domain.observations import Detection
 from iveg.lab.emulator.greenhouse import into
 from iveg.lab.emulator.orders import FaultOrder
 from iveg.lab.emulator.world import RobotHardware, SimulatedWorld
-from iveg.robot.gate import REST
 from iveg.robot.pacing import LONGEST_STEP_S, SLOTS, every, in_slots
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.reading import read_twist, write_twist

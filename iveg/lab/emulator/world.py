@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from iveg.domain.fleet import RobotProfile
-from iveg.domain.geometry import Twist2D
+from iveg.domain.geometry import REST, Twist2D
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import (
     Climate,
@@ -39,7 +39,6 @@ from iveg.lab.emulator.lidar import LaserModel, sweep
 from iveg.lab.emulator.orders import FaultOrder
 from iveg.lab.emulator.people import SimulatedPerson
 from iveg.lab.emulator.scripts import RobotScript
-from iveg.robot.gate import REST
 
 Camera = Literal["boxes", "grounding"]
 _LASER = LaserModel()

@@ -10,6 +10,7 @@ from itertools import count
 from typing import Final
 
 from iveg.domain.feedback import Feedback
+from iveg.domain.geometry import REST
 from iveg.domain.observations import Instant
 from iveg.lab.emulator.orders import FaultOrder
 from iveg.lab.emulator.scripts import Incident
@@ -19,7 +20,6 @@ from iveg.pipeline.ingest import Ingest
 from iveg.pipeline.loop import RuleLoop
 from iveg.robot.echo import Echo
 from iveg.robot.effects import Answer, Drive, Effect, Report
-from iveg.robot.gate import REST
 from iveg.robot.holds import HoldSet
 from iveg.robot.judgement import Limits
 from iveg.robot.safety import SafetyMachine

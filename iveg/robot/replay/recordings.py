@@ -5,9 +5,8 @@ from functools import partial
 from pathlib import Path
 
 from iveg.domain.errors import DataFileError
-from iveg.domain.geometry import Pose2D
+from iveg.domain.geometry import REST, Pose2D
 from iveg.domain.observations import Odometry, Origin
-from iveg.robot.gate import REST
 from iveg.robot.replay.bags import Bag, BagTopics
 from iveg.robot.replay.logs import LogReader, RecordingEntry
 

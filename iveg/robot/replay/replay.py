@@ -15,7 +15,7 @@ from pathlib import Path
 from iveg.adapters import clock
 from iveg.domain.errors import DataFileError
 from iveg.domain.fleet import NOBODY, FleetDescription, RobotProfile
-from iveg.domain.geometry import Pose2D, Twist2D
+from iveg.domain.geometry import REST, Pose2D, Twist2D
 from iveg.domain.observations import (
     DetectionFrame,
     LaserScan,
@@ -23,7 +23,6 @@ from iveg.domain.observations import (
     Odometry,
     Origin,
 )
-from iveg.robot.gate import REST
 from iveg.robot.node import NodeSettings, RobotNode
 from iveg.robot.pacing import every
 from iveg.robot.replay.bags import BagTopics

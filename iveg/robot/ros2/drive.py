@@ -5,8 +5,7 @@ the safety node; this module only converts messages.
 """
 
 from iveg.domain.errors import UnreadableError
-from iveg.domain.geometry import Twist2D
-from iveg.robot.gate import REST
+from iveg.domain.geometry import REST, Twist2D
 from iveg.robot.ros2.config import DriveConfig
 from iveg.robot.ros2.input_faults import InputFaults
 from iveg.robot.ros2.reading import read_twist, write_twist

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import pytest
 
-from iveg.domain.alerts.alert_book import Condition
+from iveg.domain.events import Condition
 from iveg.domain.messages import (
     CHANNELS,
     AlertItem,

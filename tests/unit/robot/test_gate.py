@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from iveg.domain.geometry import Twist2D
-from iveg.robot.gate import REST, Gate
+from iveg.domain.geometry import REST, Twist2D
+from iveg.robot.gate import Gate
 
 FORWARD = Twist2D(1.0, 0.5)
 

@@ -7,10 +7,10 @@ import pytest
 from iveg.domain.feedback import CLEAR, SpeedLimit
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import Hold
-from iveg.robot.attempts import ATTEMPTS_KEPT
 from iveg.robot.effects import Answer, Drive, Persist, Report
 from iveg.robot.holds import HoldSet
 from iveg.robot.judgement import Limits
+from iveg.robot.safety import ATTEMPTS_KEPT
 from tests.unit.robot.rig import (
     AHEAD,
     REST,

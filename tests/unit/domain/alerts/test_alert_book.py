@@ -7,8 +7,8 @@ from iveg.domain.alerts.alert_book import (
     MEMBERS_KEPT,
     MOST_KEPT,
     AlertBook,
-    Condition,
 )
+from iveg.domain.events import Condition
 from tests.builders import at
 
 LOST = Condition("P1", "alert.moving_robot_lost", "AGI", "AGI")

@@ -7,7 +7,7 @@ import pytest
 
 from iveg.adapters import clock
 from iveg.adapters.greenhouses import load_greenhouse
-from iveg.domain.geometry import Twist2D
+from iveg.domain.geometry import REST, Twist2D
 from iveg.domain.observations import DetectionFrame, LaserScan, Navigation, Odometry
 from iveg.lab.emulator.camera import DETECTORS
 from iveg.lab.emulator.layout import lay_out
@@ -16,7 +16,6 @@ from iveg.lab.emulator.ros2_base import TIMEOUT_S, DriveWatchdog, Ros2Base
 from iveg.lab.emulator.ros2_base import SimulatedNavigation as Nav
 from iveg.lab.emulator.scenarios import scenario_named
 from iveg.lab.emulator.world import SimulatedWorld
-from iveg.robot.gate import REST
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.inputs import TOPICS, SensorInputs
 from iveg.robot.uplink import Sensed

@@ -4,8 +4,7 @@ import math
 
 import pytest
 
-from iveg.domain.geometry import Twist2D
-from iveg.robot.gate import REST
+from iveg.domain.geometry import REST, Twist2D
 from iveg.robot.ros2.config import DriveConfig
 from iveg.robot.ros2.drive import DriveTopics
 from iveg.robot.ros2.input_faults import InputFaults, speed_of
