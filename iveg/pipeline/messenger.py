@@ -13,7 +13,7 @@ What fails is counted and shown, beside the alert and on the Settings page.
 import asyncio
 import contextlib
 import logging
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
@@ -74,10 +74,9 @@ class Messenger:
         self._rest_s = rest_s
         self._limit_s = limit_s
         self._changing = asyncio.Lock()
-        self._waiting: dict[Channel, deque[AlertItem]] = {
-            name: deque() for name in CHANNELS
+        self._waiting: dict[Channel, asyncio.Queue[AlertItem]] = {
+            name: asyncio.Queue(MOST_WAITING) for name in CHANNELS
         }
-        self._arrived = {name: asyncio.Event() for name in CHANNELS}
 
     def enqueue_raised(self, raised: Iterable[BookedAlert]) -> None:
         """Have people told of alerts that were raised; returns at once."""
@@ -118,18 +117,17 @@ class Messenger:
 
     def _wait(self, channel: Channel, item: AlertItem) -> None:
         waiting = self._waiting[channel]
-        if len(waiting) == MOST_WAITING:
-            waiting.popleft()
+        if waiting.full():
+            waiting.get_nowait()
             self.counters["messages.dropped"] += 1
-        waiting.append(item)
-        self._arrived[channel].set()
+        waiting.put_nowait(item)
 
     async def _serve(self, channel: Channel) -> None:
         while True:
-            await self._arrived[channel].wait()
-            items = tuple(self._waiting[channel])
-            self._waiting[channel].clear()
-            self._arrived[channel].clear()
+            waiting = self._waiting[channel]
+            items = [await waiting.get()]
+            while not waiting.empty():
+                items.append(waiting.get_nowait())
             try:
                 await self._deliver(channel, items)
             except Exception:
@@ -138,7 +136,7 @@ class Messenger:
             await asyncio.sleep(self._rest_s)
 
     async def _deliver(self, channel: Channel, items: Sequence[AlertItem]) -> None:
-        deliveries = await self._send(channel, OutboundMessage(items))
+        deliveries = await self._send(channel, OutboundMessage(tuple(items)))
         for item in items:
             self._alerts.record_deliveries(item.alert_id, item.raised, deliveries)
         if deliveries and all(one.failed for one in deliveries):
