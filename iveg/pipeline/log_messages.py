@@ -78,10 +78,10 @@ def _without_decision(
 ) -> SlowdownCauses | None:
     for person in people.known.values():
         if report.decision_id == person.decision_id:
-            sighting = person.newest
-            place = sighting.x, sighting.y, sighting.observer
-            found = _seen_by(robot, greenhouse, person.person_id, person.class_, *place)
-            return found and replace(found, confidence=sighting.confidence)
+            look = person.newest
+            facts = look.x, look.y, look.observer, look.confidence
+            name, class_ = person.person_id, person.class_
+            return _seen_by(robot, greenhouse, name, class_, *facts)
     peer = world.robots.get(report.cause or "")
     if peer is None or peer.odometry is None:
         return None
@@ -115,14 +115,15 @@ def _seen_by(
     x: float,
     y: float,
     observer: str,
+    confidence: float | None = None,
 ) -> SlowdownCauses | None:
     """How far a cause at x, y (m) is from a robot, and whether it may see it."""
     if robot.odometry is None:
         return None
     pose = robot.odometry.pose
-    sees = greenhouse.in_sight(pose.x, pose.y, x, y)
-    in_sight = observer == robot.robot_id or sees
-    return SlowdownCauses(cause, class_, observer, pose.distance_to(x, y), in_sight)
+    sees = observer == robot.robot_id or greenhouse.in_sight(pose.x, pose.y, x, y)
+    distance_m = pose.distance_to(x, y)
+    return SlowdownCauses(cause, class_, observer, distance_m, sees, confidence)
 
 
 def _first_of(missing: Iterable[Missing], report: SafetyReport) -> Missing | None:
