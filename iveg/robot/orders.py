@@ -12,6 +12,8 @@ from iveg.ngsi.codec import load_json
 
 _STOP = "stop"
 _MAX_NAMED = 128
+_ATTEMPTS = {"release": {"ids", "ch"}, "resume": {"ch"}}
+"""Orders that must be perfect, and their keys; ``attempt`` may come beside them."""
 _FORBIDDEN = frozenset("<>\"'=;()")  # Orion refuses values with any of these
 
 
@@ -114,33 +116,26 @@ def _release_or_resume(message: object) -> Order:
     command = _member(message, names.COMMAND)
     if not isinstance(command, dict) or len(command) != 1:
         return Unusable("malformed")
-    release, resume = command.get("release"), command.get("resume")
-    if isinstance(release, dict) and release.keys() - {"attempt"} == {"ids", "ch"}:
-        return _release(release)
-    if isinstance(resume, dict) and resume.keys() - {"attempt"} == {"ch"}:
-        return _resume(resume)
+    for name, keys in _ATTEMPTS.items():
+        asked = command.get(name)
+        if isinstance(asked, dict) and asked.keys() - {"attempt"} == keys:
+            return _attempt(asked)
     return Unusable("malformed")
 
 
-def _release(asked: dict[str, object]) -> Order:
-    ids, challenge = asked["ids"], asked["ch"]
-    if not isinstance(challenge, str) or not challenge or not _has_good_name(asked):
+def _attempt(asked: dict[str, object]) -> Order:
+    """A release, or a resume, which names no holds."""
+    challenge, attempt = asked["ch"], _usable_id(asked.get("attempt"))
+    if not isinstance(challenge, str) or not challenge:
         return Unusable("malformed")
+    if "attempt" in asked and attempt is None:
+        return Unusable("malformed")  # It could not be answered.
+    if "ids" not in asked:
+        return ResumeOrder(challenge, attempt)
+    ids = asked["ids"]
     if not isinstance(ids, list) or not 0 < len(ids) <= _MAX_NAMED:
         return Unusable("malformed")
     named = tuple(one for one in ids if isinstance(one, str) and one)
     if len(named) != len(ids):
         return Unusable("malformed")
-    return ReleaseOrder(named, challenge, _usable_id(asked.get("attempt")))
-
-
-def _resume(asked: dict[str, object]) -> Order:
-    challenge = asked["ch"]
-    if not isinstance(challenge, str) or not challenge or not _has_good_name(asked):
-        return Unusable("malformed")
-    return ResumeOrder(challenge, _usable_id(asked.get("attempt")))
-
-
-def _has_good_name(asked: dict[str, object]) -> bool:
-    """Whether an order has no attempt id at all or one that can be answered."""
-    return "attempt" not in asked or _usable_id(asked["attempt"]) is not None
+    return ReleaseOrder(named, challenge, attempt)

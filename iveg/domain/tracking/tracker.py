@@ -60,11 +60,14 @@ class Tracker:
             The track of each detection; None where no more can be kept.
         """
         chains = self._continue_chains(picture, at)
-        picture = self._chained(picture, chains)
         tracks = self._choose_tracks(picture, chains, at)
+        numbers: list[int] = []
         for index, (one, old) in enumerate(zip(picture, chains, strict=True)):
-            track = tracks[one.first_place(index)]
-            tracks[index] = self._put(one, old, track, at)
+            first = one.first_place(index)
+            # The chain of a further place has its first one's number, negative.
+            number = self._number_of(old) if first == index else -numbers[first]
+            numbers.append(number)
+            tracks[index] = self._put(one, number, old, tracks[first], at)
         named = [track for track in tracks if track is not None]
         self._remember_together(named)
         merged = dict(self._merge(dict.fromkeys(named), at))
@@ -133,30 +136,12 @@ class Tracker:
                 return track, earlier
         return None
 
-    def _chained(
-        self,
-        picture: Sequence[PlacedDetection],
-        chains: Sequence[tuple[str, Sighting] | None],
-    ) -> list[PlacedDetection]:
-        """The picture with the number of each one's chain.
-
-        The chain of a further place has its first one's number, negative.
-        """
-        out: list[PlacedDetection] = []
-        for index, (one, old) in enumerate(zip(picture, chains, strict=True)):
-            first = one.first_place(index)
-            if first != index:
-                chain = -out[first].sighting.chain
-            elif old is not None:
-                chain = old[1].chain
-            else:
-                self._chains += 1
-                chain = self._chains
-            sighting = one.sighting.in_chain(chain)
-            out.append(
-                PlacedDetection(one.class_, sighting, one.decision_id, one.same_as)
-            )
-        return out
+    def _number_of(self, old: tuple[str, Sighting] | None) -> int:
+        """Number of the chain that goes on, or of a new one."""
+        if old is not None:
+            return old[1].chain
+        self._chains += 1
+        return self._chains
 
     # --- tracks -------------------------------------------------------------------
 
@@ -208,18 +193,20 @@ class Tracker:
     def _put(
         self,
         one: PlacedDetection,
+        chain: int,
         old: tuple[str, Sighting] | None,
         track: str | None,
         at: Instant,
     ) -> str | None:
         """Keep a sighting in its track; its chain's earlier one is removed."""
+        sighting = one.sighting.in_chain(chain)
         if old is not None:
-            if old[1].at.mono > one.sighting.at.mono:
+            if old[1].at.mono > sighting.at.mono:
                 return old[0]
             self.drop(*old)
         if track is None:
-            return self._begin(one, at)
-        person, sighting = self.known[track], one.sighting
+            return self._begin(one, sighting, at)
+        person = self.known[track]
         kept = tuple(
             earlier
             for earlier in person.sightings
@@ -230,13 +217,14 @@ class Tracker:
         self.known[track] = person.seen_as(newest, (*kept, sighting))
         return track
 
-    def _begin(self, one: PlacedDetection, at: Instant) -> str | None:
+    def _begin(
+        self, one: PlacedDetection, sighting: Sighting, at: Instant
+    ) -> str | None:
         if not self._has_room(at):
             return None
         self._drop_mark(one, at)
         self._tracks += 1
         track = f"{'P' if one.class_ == 'person' else 'R'}{self._tracks}"
-        sighting = one.sighting
         self.known[track] = TrackedPerson(
             track, one.class_, one.decision_id, at, sighting, (sighting,), self._tracks
         )
