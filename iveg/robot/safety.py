@@ -18,6 +18,7 @@ added, which the paper treats as permission and iVeg does not.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Literal
 
 from iveg.domain.feedback import Feedback
@@ -46,8 +47,6 @@ second is for iVeg alone: ten a second would be most of what one agent can carry
 ATTEMPTS_KEPT = 64
 _Verdict = tuple[str | None, AnswerCode, str | None]
 """On a release or resume: the hold that the answer names, and why it was refused."""
-_Applied = tuple[float, str, str | None, str | None, tuple[Hold, ...], str]
-"""Fields whose change triggers a report; speeds and ages alone do not."""
 
 
 class SafetyMachine:
@@ -87,7 +86,8 @@ class SafetyMachine:
         """By attempt, oldest first; the challenge of one that is forgotten is spent."""
         self._holds = (stored or HoldSet()).after_reboot()
         self._persisted: HoldSet | None = None
-        self._said: _Applied | None = None
+        self._said: SafetyReport | None = None
+        """The newest report without speeds and ages: a change of it is news."""
         self._reported_at = self._measured_at = now
         if stored is None:
             self._latch(self._nameless_stop(), now)
@@ -363,37 +363,33 @@ class SafetyMachine:
             self._persisted = self._holds
             effects.append(Persist(self._holds))
         effects += [Answer(answer) for answer in answers]
-        applied = self._applied()
-        is_news = applied != self._said
+        report = self._report(now)
+        said = replace(report, linear=0.0, angular=0.0, feedback_age_s=None)
+        is_news = said != self._said
         every = REPORT_HELD_EVERY_S if self._holds.holds else REPORT_EVERY_S
         if is_news or now - self._reported_at >= every:
-            self._said, self._reported_at = applied, now
+            self._said, self._reported_at = said, now
             is_measure = is_news or now - self._measured_at >= REPORT_EVERY_S
             if is_measure:  # changes, and two reports a second, also go to the agent
                 self._measured_at = now
-            effects.append(Report(self._report(applied, now), is_measure))
+            effects.append(Report(report, is_measure))
         return tuple(effects)
 
-    def _applied(self) -> _Applied:
-        """Applied limit; a robot that waits for resume reports 0, ``hold``."""
-        cap, holds, challenge = self.cap, self._holds.holds, self._challenge
-        if self._free:
-            return cap.factor, cap.reason, cap.cause, cap.decision_id, holds, challenge
-        return 0.0, "hold", holds[0].id if holds else None, None, holds, challenge
-
-    def _report(self, applied: _Applied, now: float) -> SafetyReport:
-        factor, reason, cause, decision_id, holds, challenge = applied
-        twist = self._judgement.twist
+    def _report(self, now: float) -> SafetyReport:
+        """The limit that is applied; a robot that waits for resume says 0, ``hold``."""
+        limit, holds, twist = self.cap, self._holds.holds, self._judgement.twist
+        if not self._free:
+            limit = Cap(0.0, "hold", holds[0].id if holds else None)
         return SafetyReport(
             self._id,
             Origin(),
-            factor,
-            reason,
-            cause,
-            decision_id,
+            limit.factor,
+            limit.reason,
+            limit.cause,
+            limit.decision_id,
             holds,
             self._holds.released,
-            challenge,
+            self._challenge,
             twist.linear_x,
             twist.angular_z,
             self._judgement.watchdog.age(now),
