@@ -11,6 +11,7 @@ from iveg.adapters import clock
 from iveg.domain.geometry import REST, Twist2D
 from iveg.domain.observations import Battery, Instant, Origin
 from iveg.lab.emulator.orders import FaultOrder
+from iveg.lab.emulator.radio import LinkFaults
 from iveg.lab.emulator.relay import Relay
 from iveg.lab.emulator.truth import TruthLog
 from iveg.lab.emulator.world import RobotHardware, SimulatedWorld
@@ -77,10 +78,8 @@ class EmulatedRobot:
         self._run_began = 0.0
         self._told: tuple[str, float] = ("", -_NAVIGATION_EVERY_S)
         self._battery_told = -_BATTERY_EVERY_S
-        self._is_odometry_frozen = False
-        self._is_deaf = False
+        self._faults = FaultOrder(robot=self.robot_id)
         self._requested = REST
-        self._clock_offset_s = 0.0
 
     def _new_node(self, *, held: bool) -> RobotNode:
         settings = self._settings.node
@@ -128,7 +127,7 @@ class EmulatedRobot:
         self._rig.move(min(dt * SLOTS, LONGEST_STEP_S))
         if self._node_task is None:
             return
-        if not self._is_odometry_frozen:
+        if self._faults.freeze_odometry not in (True, "silent"):
             node.sense(self._rig.odometry())
         navigation = self._rig.navigation()
         task, published_at = self._told
@@ -153,26 +152,24 @@ class EmulatedRobot:
 
     def _obey_gate(self, command: Twist2D) -> None:
         """Apply the gate's command; with the fault ``deaf`` only a halt."""
-        ignores = self._is_deaf and command != REST
+        ignores = self._faults.deaf and command != REST
         self._rig.drive(self._requested if ignores else command)
 
     def _read_clock(self) -> Instant:
         """The robot's own clocks; the wall clock may be wrong."""
         now = clock.now()
-        return Instant(now.mono, now.wall + self._clock_offset_s)
+        return Instant(now.mono, now.wall + (self._faults.clock_offset_s or 0.0))
 
     # --- faults -------------------------------------------------------------------
 
     def obey(self, order: FaultOrder) -> None:
         """Execute a fault order in the order of its fields."""
         node = self._node
-        if order.deaf is not None:
-            self._is_deaf = order.deaf
-        if order.clock_offset_s is not None:
-            self._clock_offset_s = order.clock_offset_s
-        if order.freeze_odometry is not None:
-            self._is_odometry_frozen = order.freeze_odometry in (True, "silent")
-        self._disturb(order)
+        self._faults = self._faults.changed_by(order)
+        if self._relay is not None:
+            told = self._faults.model_dump(include=LINK_FIELDS, exclude_none=True)
+            repeats = self._faults.freeze_odometry == "repeat"
+            self._relay.radio.faults = LinkFaults(**told, repeats_odometry=repeats)
         self._rig.blind(order)
         if order.local_hold is not None:
             node.add_local_hold(order.local_hold)
@@ -184,16 +181,6 @@ class EmulatedRobot:
         if order.revive and self._node_task is None:
             self._node = self._new_node(held=True)
             self._start_node()
-
-    def _disturb(self, order: FaultOrder) -> None:
-        """Set the radio's faults; without a relay no order names it."""
-        if self._relay is None:
-            return
-        radio = self._relay.radio
-        told = order.model_dump(include=LINK_FIELDS, exclude_none=True)
-        if order.freeze_odometry is not None:
-            told["repeats_odometry"] = order.freeze_odometry == "repeat"
-        radio.faults = replace(radio.faults, **told)
 
     def _start_node(self) -> None:
         self._node_task = self._tasks.create_task(

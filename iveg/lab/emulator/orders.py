@@ -71,6 +71,10 @@ class FaultOrder(_Order):
     false_person: OrderPlace | None = None
     hide_people: bool | None = None
 
+    def changed_by(self, order: "FaultOrder") -> "FaultOrder":
+        """The faults in force after another order."""
+        return self.model_copy(update=order.model_dump(exclude_none=True))
+
 
 class PersonOrder(_Order):
     """Moves one person to a position; with ``hold`` the person stays there.

@@ -98,8 +98,7 @@ class StagedRobot:
         A mute robot's messages do not arrive; a deaf one ignores iVeg's speed limits,
         but not holds.
         """
-        named = order.model_dump(exclude_none=True)
-        self._faults = self._faults.model_copy(update=named)
+        self._faults = self._faults.changed_by(order)
 
     def listen(self, topic: str, payload: bytes, now: Instant) -> None:
         """Take iVeg's feedback to a robot of the fleet."""
