@@ -34,7 +34,7 @@ from iveg.models.experiment import Experiment, Experiments
 _KEPT: Final = ("IVEG_CONFIDENCE_THRESHOLD", "IVEG_SAFETY_RADIUS_M")
 """Settings of iVeg that an experiment inherits: it follows the same rule."""
 _NICENESS: Final = 10
-_LOOK_EVERY_S: Final = 1.0
+_LOOK_EVERY_S: Final = 0.2
 _GRACE_S: Final = 20.0
 _TOLD: Final = 300
 """Characters of a failed program's output that are kept."""
@@ -70,7 +70,6 @@ class ExperimentRunner:
         self._running: Path | None = None
         self._task: asyncio.Task[None] | None = None
         self._why: str | None = None
-        self._ended = asyncio.Event()
 
     @property
     def refused(self) -> str | None:
@@ -94,7 +93,6 @@ class ExperimentRunner:
         begun = {"state": "running", "of": len(steps), "left_s": left_s}
         write_json(directory / PROGRESS, {**_UNKNOWN, **begun})
         self._running, self._why = directory, None
-        self._ended.clear()
         self._task = asyncio.create_task(self._run(size, directory), name="experiment")
         return self._told(directory)
 
@@ -149,16 +147,10 @@ class ExperimentRunner:
     async def _watch(self, process: asyncio.subprocess.Process) -> None:
         """Wait until it ends or must end."""
         gone = asyncio.create_task(process.wait())
-        while not gone.done() and not self._ended.is_set():
+        while not gone.done() and self._why is None:
             if self._is_robot_there():
                 self._end("live_robot")
-            told = asyncio.create_task(self._ended.wait())
-            await asyncio.wait(
-                (gone, told),
-                timeout=_LOOK_EVERY_S,
-                return_when=asyncio.FIRST_COMPLETED,
-            )
-            told.cancel()
+            await asyncio.wait((gone,), timeout=_LOOK_EVERY_S)
         # It may end by itself at the same moment.
         with contextlib.suppress(ProcessLookupError):
             if not gone.done():
@@ -170,7 +162,6 @@ class ExperimentRunner:
     def _end(self, why: str) -> None:
         if self._running is not None and self._why is None:
             self._why = why
-            self._ended.set()
 
     # --- stored ones ----------------------------------------------------------------
 
