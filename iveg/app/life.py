@@ -61,4 +61,4 @@ async def _say(last_word: Work) -> None:
             await last_word()
     except Exception:
         # The part that would say it may be the one that has failed.
-        _log.exception("the fleet was not told; robots slow by themselves")
+        _log.exception("the last feedback failed; robots slow by themselves")

@@ -28,7 +28,7 @@ class VirtualPipeline:
 
     Attributes:
         now: Its time.
-        told: Feedback to robots, oldest first.
+        feedback: Feedback to robots, oldest first.
         decisions: All decisions as they stand, by id.
         parts: The pipeline.
     """
@@ -38,7 +38,7 @@ class VirtualPipeline:
     ) -> None:
         ids = count(1)
         self.now = START
-        self.told: list[Feedback] = []
+        self.feedback: list[Feedback] = []
         self.decisions: dict[str, DecisionRecord] = {}
         ports = Ports(
             self, {}, self, self, lambda: self.now, lambda: f"{next(ids):026d}"
@@ -59,7 +59,7 @@ class VirtualPipeline:
 
     def publish_feedback(self, feedback: Feedback) -> None:
         """Keep the feedback."""
-        self.told.append(feedback)
+        self.feedback.append(feedback)
 
     def offer(self, record: Record) -> None:
         """Keep a decision; ignore other records."""

@@ -47,6 +47,18 @@ def test_only_the_clock_reads_the_clock() -> None:
     assert readers <= {"iveg/adapters/clock.py"}
 
 
+def test_one_door_of_the_product_names_the_laboratory() -> None:
+    doors = {
+        str(path.relative_to(ROOT))
+        for path in MODULES
+        if "lab" not in path.relative_to(ROOT / "iveg").parts
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.Constant) and str(node.value).startswith("iveg.lab")
+    }
+
+    assert doors == {"iveg/app/laboratory.py"}
+
+
 def test_nothing_is_left_half_done() -> None:
     found = [
         f"{path.relative_to(ROOT)}: {word}"

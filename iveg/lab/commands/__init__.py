@@ -94,13 +94,13 @@ def _add_experiment(experiment: argparse.ArgumentParser) -> None:
     words = experiment.add_subparsers(dest="word", required=True)
     run = words.add_parser("run", help="run it; what broke off is taken up again")
     size = run.add_mutually_exclusive_group()
-    for name, told in (
+    for name, extent in (
         ("minimal", "one scenario, seconds: whether it works at all"),
         ("quick", "every scenario once, three minutes (the usual)"),
         ("full", "every scenario five times, over 100,000 messages"),
     ):
         size.add_argument(
-            f"--{name}", dest="size", action="store_const", const=name, help=told
+            f"--{name}", dest="size", action="store_const", const=name, help=extent
         )
     run.set_defaults(size="quick")
     run.add_argument(

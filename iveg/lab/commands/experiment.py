@@ -171,9 +171,9 @@ class Lab:
     @property
     def _rule(self) -> DetectionRule:
         """The rule of the iVeg that is started."""
-        told = self.settings
+        settings = self.settings
         return DetectionRule(
-            threshold=told.confidence_threshold, radius_m=told.safety_radius_m
+            threshold=settings.confidence_threshold, radius_m=settings.safety_radius_m
         )
 
     async def _real(self, step: PlannedRun, parts: Parts, truth: Path) -> Outcome:
@@ -240,20 +240,20 @@ class Lab:
         progress.finish(why)
         self.exit_code = int(bool(why))
         if why:
-            told = f"broken off ({why}); the same command goes on with it"
-            print(f"iveg: {told}: {self.notebook.directory}", file=sys.stderr)
+            reason = f"broken off ({why}); the same command goes on with it"
+            print(f"iveg: {reason}: {self.notebook.directory}", file=sys.stderr)
         print(f"report: {report}", flush=True)
 
     def _chosen(self) -> dict[str, Any]:
         """Settings that influence the numbers."""
-        told = self.settings
+        settings = self.settings
         return {
             "fiware": "embedded" if self.embedded else "named",
-            "confidence_threshold": told.confidence_threshold,
-            "safety_radius_m": told.safety_radius_m,
-            "direct_read": told.direct_read,
-            "uplink": told.uplink,
-            "orion_throttle": told.orion_throttle,
+            "confidence_threshold": settings.confidence_threshold,
+            "safety_radius_m": settings.safety_radius_m,
+            "direct_read": settings.direct_read,
+            "uplink": settings.uplink,
+            "orion_throttle": settings.orion_throttle,
         }
 
 

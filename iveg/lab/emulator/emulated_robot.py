@@ -76,8 +76,8 @@ class EmulatedRobot:
         self._node_task: asyncio.Task[None] | None = None
         self._tasks: asyncio.TaskGroup
         self._run_began = 0.0
-        self._told: tuple[str, float] = ("", -_NAVIGATION_EVERY_S)
-        self._battery_told = -_BATTERY_EVERY_S
+        self._navigation_sent: tuple[str, float] = ("", -_NAVIGATION_EVERY_S)
+        self._battery_sent = -_BATTERY_EVERY_S
         self._faults = FaultOrder(robot=self.robot_id)
         self._requested = REST
 
@@ -130,12 +130,12 @@ class EmulatedRobot:
         if self._faults.freeze_odometry not in (True, "silent"):
             node.sense(self._rig.odometry())
         navigation = self._rig.navigation()
-        task, published_at = self._told
+        task, published_at = self._navigation_sent
         if navigation.task != task or now - published_at >= _NAVIGATION_EVERY_S:
-            self._told = (navigation.task, now)
+            self._navigation_sent = (navigation.task, now)
             node.sense(navigation)
-        if now - self._battery_told >= _BATTERY_EVERY_S:
-            self._battery_told = now
+        if now - self._battery_sent >= _BATTERY_EVERY_S:
+            self._battery_sent = now
             node.sense(battery_after(now))
 
     def _scan(self, _: float) -> None:
@@ -167,9 +167,9 @@ class EmulatedRobot:
         node = self._node
         self._faults = self._faults.changed_by(order)
         if self._relay is not None:
-            told = self._faults.model_dump(include=LINK_FIELDS, exclude_none=True)
+            link = self._faults.model_dump(include=LINK_FIELDS, exclude_none=True)
             repeats = self._faults.freeze_odometry == "repeat"
-            self._relay.radio.faults = LinkFaults(**told, repeats_odometry=repeats)
+            self._relay.radio.faults = LinkFaults(**link, repeats_odometry=repeats)
         self._rig.blind(order)
         if order.local_hold is not None:
             node.add_local_hold(order.local_hold)

@@ -45,8 +45,8 @@ class TruthLog:
                     "part": round(part, 2),
                 }
             )
-        told = {"robot": rig.robot_id, "at": at, "visible": visible}
-        self._file.write(orjson.dumps(told).decode() + "\n")
+        picture = {"robot": rig.robot_id, "at": at, "visible": visible}
+        self._file.write(orjson.dumps(picture).decode() + "\n")
 
     def close(self) -> None:
         """Close the file."""

@@ -161,7 +161,7 @@ class Progress:
 
     def _keep(self, state: State, why: str, left_s: float) -> None:
         name, phase, _ = self._now or (None, None, 0.0)
-        told: dict[str, Any] = {
+        progress: dict[str, Any] = {
             "state": state,
             "run": name,
             "phase": phase,
@@ -170,7 +170,7 @@ class Progress:
             "left_s": round(left_s),
             "why": why,
         }
-        write_json(self._directory / PROGRESS, told)
+        write_json(self._directory / PROGRESS, progress)
 
     def _line(self, now: float) -> str:
         name, phase, _ = self._now or ("", "", 0.0)

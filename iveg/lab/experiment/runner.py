@@ -36,7 +36,7 @@ _KEPT: Final = ("IVEG_CONFIDENCE_THRESHOLD", "IVEG_SAFETY_RADIUS_M")
 _NICENESS: Final = 10
 _LOOK_EVERY_S: Final = 0.2
 _GRACE_S: Final = 20.0
-_TOLD: Final = 300
+_OUTPUT_KEPT: Final = 300
 """Characters of a failed program's output that are kept."""
 _UNKNOWN: Final[Mapping[str, Any]] = {
     "state": "broken",
@@ -94,7 +94,7 @@ class ExperimentRunner:
         write_json(directory / PROGRESS, {**_UNKNOWN, **begun})
         self._running, self._why = directory, None
         self._task = asyncio.create_task(self._run(size, directory), name="experiment")
-        return self._told(directory)
+        return self._experiment(directory)
 
     def stop(self) -> None:
         """End the running one; it keeps its results so far."""
@@ -110,7 +110,7 @@ class ExperimentRunner:
         """All experiments, newest first."""
         found = sorted(self._found(), key=lambda one: -one.stat().st_mtime)
         return Experiments(
-            items=[self._told(one) for one in found], refused=self.refused
+            items=[self._experiment(one) for one in found], refused=self.refused
         )
 
     def file(self, name: str, kind: str) -> Path | None:
@@ -170,7 +170,7 @@ class ExperimentRunner:
             for size in PLANS:
                 yield from self._place.glob(f"{size}-[0-9][0-9][0-9]")
 
-    def _told(self, directory: Path) -> Experiment:
+    def _experiment(self, directory: Path) -> Experiment:
         known = {**_UNKNOWN, **_progress(directory)}
         if known["state"] == "running" and directory != self._running:
             # Started by another iVeg, or by one that was killed together with it.
@@ -192,10 +192,10 @@ def _began(directory: Path) -> float:
 
 def _progress(directory: Path) -> dict[str, Any]:
     try:
-        told = read_json(directory / PROGRESS)
+        progress = read_json(directory / PROGRESS)
     except DataFileError:
         return {}
-    return {key: told[key] for key in _UNKNOWN if key in told}
+    return {key: progress[key] for key in _UNKNOWN if key in progress}
 
 
 async def _last_words(process: asyncio.subprocess.Process) -> str:
@@ -204,7 +204,7 @@ async def _last_words(process: asyncio.subprocess.Process) -> str:
     last = b""
     async for line in process.stderr:
         last = line.strip() or last
-    return last.decode(errors="replace")[:_TOLD]
+    return last.decode(errors="replace")[:_OUTPUT_KEPT]
 
 
 def _environment() -> dict[str, str]:
@@ -218,13 +218,13 @@ def _environment() -> dict[str, str]:
 
 def _close(directory: Path, code: int, why: str | None, said: str) -> None:
     """Record how it ended if the program could not."""
-    told = _progress(directory)
-    if told.get("state") == "running":
+    progress = _progress(directory)
+    if progress.get("state") == "running":
         reason = why or f"{said} (exit code {code})".strip()
         _write_partial(directory, reason)
-        write_json(directory / PROGRESS, {**told, "state": "broken", "why": reason})
-    elif why is not None and told.get("state") == "broken":
-        write_json(directory / PROGRESS, {**told, "why": why})
+        write_json(directory / PROGRESS, {**progress, "state": "broken", "why": reason})
+    elif why is not None and progress.get("state") == "broken":
+        write_json(directory / PROGRESS, {**progress, "why": why})
 
 
 def _write_partial(directory: Path, why: str) -> None:

@@ -138,7 +138,7 @@ class Stage:
 
     Args:
         incidents: Its faults.
-        told: Feedback that iVeg has published; it grows.
+        feedback: Feedback that iVeg has published; it grows.
         move_clock: Advances the clock by seconds; returns the time.
         hear: Called with each message of a robot, from its creation on.
         looked, scan_every: As for ``StagedRobot``.
@@ -153,7 +153,7 @@ class Stage:
         incidents: Iterable[Incident],
         ingest: Ingest,
         loop: RuleLoop,
-        told: Sequence[Feedback],
+        feedback: Sequence[Feedback],
         move_clock: Callable[[float], Instant],
         hear: Callable[[str, bytes], None],
         *,
@@ -162,7 +162,7 @@ class Stage:
     ) -> None:
         self._world = world
         self._incidents = [(one.at_s, one.order) for one in incidents]
-        self._ingest, self._loop, self._told = ingest, loop, told
+        self._ingest, self._loop, self._feedback = ingest, loop, feedback
         self._move_clock = move_clock
         self.now = move_clock(0.0)
         self.robots = {
@@ -192,9 +192,9 @@ class Stage:
 
     def _deliver(self) -> None:
         """Deliver new feedback to every robot."""
-        told = self._told[self._delivered :]
-        self._delivered += len(told)
-        for feedback in told:
+        new = self._feedback[self._delivered :]
+        self._delivered += len(new)
+        for feedback in new:
             payload = codec.write_feedback(feedback)
             for robot in self.robots.values():
                 robot.listen(feedback.robot_id, payload, self.now)

@@ -80,7 +80,7 @@ class VirtualRun:
             layout.incidents,
             iveg.parts.ingest,
             iveg.parts.loop,
-            iveg.told,
+            iveg.feedback,
             iveg.move,
             iveg.hear,
             looked=self._looked,
@@ -92,7 +92,7 @@ class VirtualRun:
         for number in range(round(seconds / STEP_S)):
             self._stage.step()
             self._mapper.tick(self._iveg.now)
-            self._result.pairs += self._told()
+            self._result.pairs += self._reported()
             if number % _BELIEVE_EVERY == 1:
                 self._believe()
             self._result.touched += self._touches()
@@ -111,7 +111,7 @@ class VirtualRun:
         )
         self._detections.append(Picture(rig.robot_id, self._iveg.now.mono, tuple(seen)))
 
-    def _told(self) -> Iterator[Pair]:
+    def _reported(self) -> Iterator[Pair]:
         """Detections that iVeg reports for the frames of this step."""
         looks, self._detections = self._detections, []
         for real in looks:
@@ -133,9 +133,9 @@ class VirtualRun:
         evaluator, now = self._iveg.parts.evaluator, self._iveg.now
         zones = zones_of(evaluator.world, evaluator.people, evaluator.rule, now)
         own = self._mapper.of(self._watched, (), now)
-        told = self._mapper.of(self._watched, zones, now)
-        if own is not None and told is not None:
-            self._result.beliefs.append((now.mono, belief_of(own, told)))
+        shared = self._mapper.of(self._watched, zones, now)
+        if own is not None and shared is not None:
+            self._result.beliefs.append((now.mono, belief_of(own, shared)))
 
     def _touches(self) -> int:
         people = self._world.discs()

@@ -155,8 +155,8 @@ class ReplayedRobot:
         self._playback = playback
         self._speed = settings.speed
         self._profile = profile
-        self._told = dict.fromkeys((LaserScan, DetectionFrame, Navigation), -1e9)
-        self._told_scan: LaserScan | None = None
+        self._sent_at = dict.fromkeys((LaserScan, DetectionFrame, Navigation), -1e9)
+        self._sent_scan: LaserScan | None = None
         self._command = REST
         self._pace = 0.0
         self._stood_s = 0.0
@@ -208,9 +208,9 @@ class ReplayedRobot:
         if self._is_due(Navigation, _NAVIGATION_EVERY_S, now):
             self._node.sense(Navigation(self.robot_id, Origin(), TASK))
         scan = self._playback.scan
-        is_new = scan is not self._told_scan
+        is_new = scan is not self._sent_scan
         if scan and (is_new or self._is_due(LaserScan, _SCAN_AGAIN_S, now)):
-            self._told_scan, self._told[LaserScan] = scan, now
+            self._sent_scan, self._sent_at[LaserScan] = scan, now
             self._node.sense(scan)
         looks = self._playback.has_detector
         if looks and self._is_due(DetectionFrame, _LOOK_EVERY_S, now):
@@ -218,7 +218,7 @@ class ReplayedRobot:
             self._node.sense(DetectionFrame(self.robot_id, Origin(), seen))
 
     def _is_due(self, kind: type, period: float, now: float) -> bool:
-        if now - self._told[kind] < period:
+        if now - self._sent_at[kind] < period:
             return False
-        self._told[kind] = now
+        self._sent_at[kind] = now
         return True
