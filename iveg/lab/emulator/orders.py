@@ -9,12 +9,13 @@ import json
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
 from http import HTTPStatus
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from iveg.adapters.post_listener import post_listener
 from iveg.domain.errors import DataFileError, SettingsError, UnreadableError
+from iveg.ngsi.codec.untrusted import first_complaint
 
 Percent = Annotated[float, Field(ge=0, le=100)]
 Milliseconds = Annotated[float, Field(ge=0, le=10_000)]
@@ -57,7 +58,7 @@ class FaultOrder(_Order):
     robot: str
     mute: bool | None = None
     deaf: bool | None = None
-    freeze_odometry: Literal["silent", "repeat"] | bool | None = None
+    freeze_odometry: Literal["silent", "repeat", True, False] | None = None
     clock_offset_s: Annotated[float, Field(ge=-1e9, le=1e9)] | None = None
     drop_percent: Percent | None = None
     duplicate_percent: Percent | None = None
@@ -91,6 +92,7 @@ class PersonOrder(_Order):
 
 
 Order = FaultOrder | PersonOrder
+T = TypeVar("T", FaultOrder, PersonOrder)
 Obey = Callable[[Order], str | None]
 """Executes an order; returns the reason if it cannot."""
 
@@ -139,7 +141,9 @@ def read_order(body: bytes) -> Order:
         raise UnreadableError("not_json") from error
     if not isinstance(value, dict):
         raise UnreadableError("no_object", "an order has a robot or a person")
-    return _validated(PersonOrder if "person" in value else FaultOrder, value)
+    if "person" in value:
+        return _validated(PersonOrder, value)
+    return _validated(FaultOrder, value)
 
 
 def read_fault_arguments(
@@ -169,7 +173,6 @@ def read_fault_arguments(
                 order = _validated(FaultOrder, {"robot": one, field: _value(text)})
             except UnreadableError as error:
                 raise DataFileError("--fault", word, f"{error.detail}.") from error
-            assert isinstance(order, FaultOrder)  # noqa: S101 - tells mypy which
             orders.append(order)
     return orders
 
@@ -182,20 +185,8 @@ def _value(text: str) -> object:
         return text
 
 
-def _validated(kind: type[Order], value: dict[str, object]) -> Order:
+def _validated(kind: type[T], value: dict[str, object]) -> T:
     try:
         return kind.model_validate(value)
     except ValidationError as error:
-        complaints = error.errors(include_input=False, include_url=False)
-        detail = _sentence([(one["loc"], one["msg"]) for one in complaints])
-        raise UnreadableError("bad_order", detail) from error
-
-
-def _sentence(complaints: Sequence[tuple[tuple[int | str, ...], str]]) -> str:
-    """The first invalid field with its reason."""
-    place, said = complaints[0]
-    # A field that allows several types has one error for each of them.
-    same = [why for where, why in complaints if where[0] == place[0]]
-    if len(same) > 1:
-        return f"{place[0]}: {'; or '.join(same)}"
-    return f"{'.'.join(str(part) for part in place)}: {said}"
+        raise UnreadableError("bad_order", first_complaint(error)) from error
