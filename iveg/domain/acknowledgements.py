@@ -7,7 +7,7 @@ robot's clock could tell it.
 
 A robot judges the feedback by its own pose, and may report a slow-down before iVeg
 finds the robot inside the ring.  It is then timed from the newest frame that the fleet
-had been told of by then.  A robot that drives into a ring of which no frame is recent
+had received by then.  A robot that drives into a ring of which no frame is recent
 counts as asked and acknowledged, but its time says nothing of the way.  A robot that
 was slow for another reason is not asked.
 """

@@ -70,13 +70,13 @@ class AisleCoverage:
 
     def ages(self, now: Instant) -> list[list[int | None]]:
         """Whole seconds since each cell was looked at, per lane; None: never."""
-        told = [
+        ages = [
             None if math.isinf(age) else max(0, int(age))
             for age in now.mono - self._looked_at
         ]
         lanes, start = [], 0
         for one in self.lanes:
-            lanes.append(told[start : start + one.count])
+            lanes.append(ages[start : start + one.count])
             start += one.count
         return lanes
 

@@ -32,7 +32,7 @@ class Condition:
     """A condition that holds now and asks for an alert.
 
     Attributes:
-        key: Names the sentence; ``subject`` tells two of a kind apart.
+        key: Names the sentence; ``subject`` distinguishes two of a kind.
     """
 
     priority: Priority

@@ -2,7 +2,7 @@
 
 A robot judges the feedback by its own pose and is often ahead of iVeg: its report that
 it slows for an alert comes before iVeg finds it inside the ring.  It is timed all the
-same, from the newest frame that robots had been told of by then::
+same, from the newest frame that robots had received by then::
 
     frame notified ──> feedback ──> robot slows, reports ──> (iVeg finds it inside)
          └────────────── timed ──────────────┘
@@ -57,7 +57,7 @@ class FirstReports:
         elif robot_id not in self._ahead:
             self._ahead[robot_id] = alert, at.mono, published_at
         elif self._ahead[robot_id][0] != alert:
-            # Slow for something else already: that it names this too tells no time.
+            # Slow for something else already: that it names this too times nothing.
             self._ahead[robot_id] = _UNTIMED
 
     def of(self, crossing: Crossing) -> FirstReport | None:

@@ -9,7 +9,7 @@ and a constant deceleration (docs/safety.md, "Margins")::
 It is shown beside the paper's ring and decides nothing.  T grows with the age of the
 data: a distance is as old as the older of both positions.  Somebody out of sight may
 have come nearer: of whom that could matter the margin is unknown, and of everybody else
-it is at least what is told.  Left out: the intrusion distance C, since nobody reaches
+it is at least what is shown.  Left out: the intrusion distance C, since nobody reaches
 through a light curtain here.
 """
 

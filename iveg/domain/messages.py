@@ -34,7 +34,7 @@ class Email:
 
     Attributes:
         security: ``tls`` from the first byte, or ``starttls`` after a greeting.
-        least: The least priority that is told.
+        least: The least priority that is sent.
     """
 
     on: bool = False
@@ -61,7 +61,7 @@ class Webhook:
 
 @dataclass(frozen=True, slots=True)
 class SubscribedBrowser:
-    """One browser that asked to be told (Push API, ``PushSubscription``).
+    """One browser that asked for messages (Push API, ``PushSubscription``).
 
     Attributes:
         p256dh: Its public key, ``auth`` its secret, both base64url.

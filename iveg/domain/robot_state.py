@@ -159,7 +159,7 @@ class RobotState:
 
     @property
     def recording(self) -> str | None:
-        """The map frame of a recording: its own unless told; None for a live robot."""
+        """The map frame of a recording: its own where it names none; None: live."""
         return (self.map_frame or self.robot_id) if self.is_replay else None
 
     @property

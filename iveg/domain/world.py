@@ -90,7 +90,7 @@ class World:
     def is_past(
         self, robot_id: str, kind: type[Observation], boot: str, seq: int
     ) -> bool:
-        """Whether a message can be told by its identity to be old or a twin."""
+        """Whether the identity of a message shows that it is old or a twin."""
         robot = self.robots.get(robot_id)
         return robot is not None and robot.is_past(kind, boot, seq)
 
@@ -269,5 +269,5 @@ class World:
 
 def _age_when_asked(origin: Origin, at: Instant) -> float:
     """How old Orion's answer is at least (s): nothing that was asked for looks live."""
-    told = 0.0 if origin.stamp_s is None else at.wall - origin.stamp_s
-    return max(told, _ASKED_AGE_S)
+    stamped = 0.0 if origin.stamp_s is None else at.wall - origin.stamp_s
+    return max(stamped, _ASKED_AGE_S)

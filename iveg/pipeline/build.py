@@ -114,7 +114,7 @@ class KeptChoices:
 
     Attributes:
         rules: Every version of the rule, oldest first.
-        contacts: Whom iVeg tells outside.
+        contacts: People outside whom iVeg sends messages.
         out_of_service: Detectors that nobody waits for, by robot.
     """
 

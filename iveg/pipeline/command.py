@@ -275,7 +275,7 @@ class Commander:
 
     def broker_back(self) -> None:
         """Publish every desired state again: the broker is connected."""
-        self._sender.levels_again()
+        self._sender.publish_desired_states()
 
     def conditions(self, now: Instant) -> Iterable[Condition]:
         """Alert conditions of STOP."""
@@ -301,7 +301,7 @@ class Commander:
                 case SetDesiredState():
                     self._sender.set_desired_state(effect)
                 case Changed():
-                    self._tell(machine, effect, at)
+                    self._record(machine, effect, at)
                     self._sender.start(
                         self._event_log.flushed(), f"audit-{machine.robot_id}"
                     )
@@ -331,7 +331,7 @@ class Commander:
     def _show(self, machine: StopMachine) -> None:
         self._event_log.changed(topics.ROBOT.of(machine.robot_id))
 
-    def _tell(self, machine: StopMachine, changed: Changed, at: Instant) -> None:
+    def _record(self, machine: StopMachine, changed: Changed, at: Instant) -> None:
         # What is open may know more than this step did: how late the agent is.
         known = (*changed.commands, *machine.commands)
         self.commands |= {one.command_id: one for one in known}

@@ -48,13 +48,13 @@ class DetectionTracking:
         self._people = people
         self._event_log = event_log
         self._new_id = new_id
-        self._told: dict[tuple[str, str], float] = {}
+        self._logged_at: dict[tuple[str, str], float] = {}
         self._unknown_frames: dict[str, set[str]] = {}
 
     @property
     def subjects(self) -> int:
         """Number of persons whose last log line is remembered."""
-        return len(self._told)
+        return len(self._logged_at)
 
     def track_frame(
         self,
@@ -125,13 +125,13 @@ class DetectionTracking:
         at, robot_id = received.at, frame.robot_id
         subject = one.peer or (one.person.person_id if one.person else "")
         subject = subject or f"{one.kind}:{one.detection.class_id}"
-        last = self._told.get((robot_id, subject))
+        last = self._logged_at.get((robot_id, subject))
         if one.kind == "other":
             self.other[robot_id] = at
         if last is not None and at.mono - last < _LOGGED_S:
             # The first moment stays, so that a long sighting gets a row every so often.
             return
-        self._told[robot_id, subject] = at.mono
+        self._logged_at[robot_id, subject] = at.mono
         self._event_log.detection(
             one, robot_id, frame.origin.stamp, at, received.transport
         )
@@ -140,10 +140,10 @@ class DetectionTracking:
 
     def forget(self, now: Instant) -> None:
         """Forget log lines about persons who are gone."""
-        if len(self._told) > _MAX_SUBJECTS:
-            self._told = {
+        if len(self._logged_at) > _MAX_SUBJECTS:
+            self._logged_at = {
                 key: at
-                for key, at in self._told.items()
+                for key, at in self._logged_at.items()
                 if now.mono - at < LIMITS.ring_lasts_s
             }
 

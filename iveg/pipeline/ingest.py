@@ -63,7 +63,7 @@ class Ingest:
         self._waiting: Counter[_Stream] = Counter()
         """How much waits, by robot and kind."""
         self._wake = asyncio.Event()
-        self._told: set[tuple[str, str]] = set()
+        self._named: set[tuple[str, str]] = set()
         self._logged: Counter[str | None] = Counter()
         self.counters: Counter[str] = Counter()
 
@@ -102,9 +102,9 @@ class Ingest:
         """Count something that cannot be used; say so once for each source."""
         self.counters[f"rejected.{reason}"] += 1
         key = (source, reason)
-        if key in self._told or not self._may_log(source):
+        if key in self._named or not self._may_log(source):
             return
-        self._told.add(key)
+        self._named.add(key)
         _log.warning("rejected from %s: %s %s", source, reason, detail)
         self._rejected(source, reason)
 
@@ -193,7 +193,7 @@ def _is_twin_of_a_picture(observation: Observation) -> bool:
     """Whether nothing follows from it but a count.
 
     A copy of odometry or of a scan says which transport feeds the robot; one that calls
-    itself a replay is refused, and people are told.
+    itself a replay is refused, and an alert says so.
     """
     if not isinstance(observation, Overtaken) or observation.origin.replay is not None:
         return False

@@ -128,8 +128,10 @@ def _seen_by(
 
 def _first_of(missing: Iterable[Missing], report: SafetyReport) -> Missing | None:
     """The premise whose lack a robot reports as its reason."""
-    told = report.reason, report.cause
-    return next((one for one in missing if (one.reason, one.robot_id) == told), None)
+    reported = report.reason, report.cause
+    return next(
+        (one for one in missing if (one.reason, one.robot_id) == reported), None
+    )
 
 
 def speed_line(
@@ -139,7 +141,7 @@ def speed_line(
 ) -> LogEvent:
     """A robot applies another factor than before, and why.
 
-    ``missing``: what it lacks to be clear; an old pose is told as any old data.
+    ``missing``: what it lacks to be clear; an old pose reads like any old data.
     """
     slots: dict[str, Slot] = {
         "robot": report.robot_id,

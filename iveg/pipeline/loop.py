@@ -154,14 +154,14 @@ class RuleLoop:
     def _watch_chain(self, now: Instant) -> None:
         hops = self._health_monitor.hops(now)
         for hop in hops:
-            self._tell(hop, now)
+            self._log_change(hop, now)
         before, self._states = self._states, {hop.name: hop.state for hop in hops}
         overdue = now.mono - self._health_at >= _HEALTH_PERIOD_S
         if overdue or self._states != before:
             self._health_at = now.mono
             self._event_log.changed(topics.HEALTH.name)
 
-    def _tell(self, hop: HopHealth, now: Instant) -> None:
+    def _log_change(self, hop: HopHealth, now: Instant) -> None:
         """A loss once, and its end once; what is merely late or unknown is neither."""
         if hop.state == "down" and hop.name not in self._broken:
             self._broken.add(hop.name)

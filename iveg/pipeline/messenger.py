@@ -79,7 +79,7 @@ class Messenger:
         }
 
     def enqueue_raised(self, raised: Iterable[BookedAlert]) -> None:
-        """Have people told of alerts that were raised; returns at once."""
+        """Queue alerts that were raised for every channel that wants them."""
         for alert in raised:
             last, key = alert.last, alert.condition.key
             item = AlertItem(alert.alert_id, last.priority, key, last.raised)

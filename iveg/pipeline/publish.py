@@ -2,7 +2,7 @@
 
 A state topic only remembers that it changed, so a slow browser gets the newest value
 and never a queue.  Log lines and command steps are events: each is kept until it is
-sent; a browser that lets them pile up is told to come back for a snapshot.
+sent; a browser that lets them pile up is sent back for a snapshot.
 """
 
 import asyncio
@@ -20,7 +20,7 @@ class Subscriber:
     """Changes that one browser has not been sent yet.
 
     Attributes:
-        dirty: State topics that changed and are told at once, longest waiting first.
+        dirty: State topics that changed and are sent at once, longest waiting first.
         telemetry: The same of those whose sending is paced.
         wants_telemetry: False while no telemetry could be sent: a change is noted and
             wakes nobody.
@@ -65,7 +65,7 @@ class Subscriber:
         return _taken(self.pending)
 
     def take_topics(self) -> list[str]:
-        """The topics that changed and are told at once."""
+        """The topics that changed and are sent at once."""
         return _taken(self.dirty)
 
     def take_telemetry(self) -> list[str]:

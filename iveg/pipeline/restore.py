@@ -122,16 +122,16 @@ def _subject(record: AlertRecord) -> str:
     return record.robot_id
 
 
-def _occurrence(told: Mapping[str, Any], now: Instant) -> AlertOccurrence:
-    cleared, seen = told["cleared_at"], told["acknowledged_at"]
+def _occurrence(stored: Mapping[str, Any], now: Instant) -> AlertOccurrence:
+    cleared, seen = stored["cleared_at"], stored["acknowledged_at"]
     return AlertOccurrence(
-        told["priority"],
-        _moment(told["raised_at"], now),
+        stored["priority"],
+        _moment(stored["raised_at"], now),
         None if cleared is None else _moment(cleared, now),
         None if seen is None else _moment(seen, now),
-        told["acknowledged_by"],
-        told["note"] or "",
-        tuple(_delivery(one, now) for one in told.get("told", ())),
+        stored["acknowledged_by"],
+        stored["note"] or "",
+        tuple(_delivery(one, now) for one in stored.get("told", ())),
     )
 
 

@@ -77,10 +77,10 @@ class OrderSender:
         self._desired_states[effect.robot_id] = effect
         self._start_desired_state(effect)
 
-    def levels_again(self) -> None:
+    def publish_desired_states(self) -> None:
         """Publish every desired state again: the broker is connected."""
-        for level in self._desired_states.values():
-            self._start_desired_state(level)
+        for wanted in self._desired_states.values():
+            self._start_desired_state(wanted)
 
     def start(self, work: Coroutine[None, None, None], name: str) -> None:
         """Run this as a task; a failure is logged."""
@@ -173,14 +173,14 @@ class OrderSender:
             )
             self._came_back(machine, effects, at)
 
-    def _start_desired_state(self, level: SetDesiredState) -> None:
-        self.start(self._set_desired_state(level), f"level-{level.robot_id}")
+    def _start_desired_state(self, wanted: SetDesiredState) -> None:
+        self.start(self._set_desired_state(wanted), f"desired-{wanted.robot_id}")
 
-    async def _set_desired_state(self, level: SetDesiredState) -> None:
+    async def _set_desired_state(self, wanted: SetDesiredState) -> None:
         try:
             await self._fleet.set_desired_state(
-                level.robot_id, level.desired, level.ids
+                wanted.robot_id, wanted.desired, wanted.ids
             )
         except HopError as error:
-            # Published again when the broker is back (``levels_again``).
-            _log.info("level of %s not set: %s", level.robot_id, error)
+            # Published again when the broker is back (``publish_desired_states``).
+            _log.info("desired state of %s not set: %s", wanted.robot_id, error)

@@ -108,7 +108,7 @@ class RobotNode:
         self._faults: tuple[RobotFault, ...] = ()
         self._nobody_there = held
         self._loop: asyncio.AbstractEventLoop | None = None
-        self._told: tuple[Twist2D, float] = REST, 0.0
+        self._commanded: tuple[Twist2D, float] = REST, 0.0
         self._broken: asyncio.Future[None] | None = None
         self._next_tick: asyncio.TimerHandle | None = None
         self._command_topic = names.command_topic(settings.apikey, robot_id)
@@ -297,7 +297,7 @@ class RobotNode:
         for effect in effects:
             match effect:
                 case Drive(twist):
-                    self._tell_drive(twist, now)
+                    self._command_drive(twist, now)
                 case Persist(holds):
                     self._lane.persist(holds)
                 case Answer(answer):
@@ -305,12 +305,12 @@ class RobotNode:
                 case Report(report, is_measure):
                     self._report(report, is_measure=is_measure)
 
-    def _tell_drive(self, twist: Twist2D, now: float) -> None:
+    def _command_drive(self, twist: Twist2D, now: float) -> None:
         """Send zero and changes at once; do not repeat a command just sent."""
-        told, at = self._told
-        if twist == told and twist != REST and now - at < _SAID_WITHIN_S:
+        commanded, at = self._commanded
+        if twist == commanded and twist != REST and now - at < _SAID_WITHIN_S:
             return
-        self._told = twist, now
+        self._commanded = twist, now
         self._put_off_tick()
         self._drive(twist)
 
@@ -321,8 +321,10 @@ class RobotNode:
         self._lane.answer(self._uplink.answer(answer, self._own(self._read_clock())))
 
     def _report(self, report: SafetyReport, *, is_measure: bool) -> None:
-        told, now = replace(report, faults=self._faults), self._read_clock()
-        seq, messages = self._uplink.report(told, self._own(now), is_measure=is_measure)
+        report, now = replace(report, faults=self._faults), self._read_clock()
+        seq, messages = self._uplink.report(
+            report, self._own(now), is_measure=is_measure
+        )
         self._machine.reported(seq, now.mono)
         for message in messages:
             self._lane.report(message)

@@ -50,8 +50,8 @@ class _Peer:
     """The observer of a topic at the pose that iVeg reports.
 
     Attributes:
-        stamp: As told; while it stays the same, the pose grows old.
-        at: When this stamp was first told (monotonic, s).
+        stamp: As received; while it stays the same, the pose grows old.
+        at: When this stamp was first received (monotonic, s).
     """
 
     pose: Pose2D
@@ -157,14 +157,14 @@ class PeerFeedback:
     def _remember(
         self, topic: _Topic, feedback: Feedback, own: Pose2D | None, now: float
     ) -> None:
-        told = _told(feedback)
+        received = _alerts_of(feedback)
         kept = {
             key: one for key, one in topic.alerts.items() if _alive(one, topic, now)
         }
         for key, one in kept.items():
-            if key not in told and one.missing_since is None:
+            if key not in received and one.missing_since is None:
                 kept[key] = replace(one, missing_since=now)
-        for key, alert in told.items():
+        for key, alert in received.items():
             myself = self._is_me(alert, topic, own, kept.get(key))
             kept[key] = _Kept(alert, now, None, myself)
         topic.alerts = dict(list(kept.items())[-_MAX_ALERTS:])
@@ -208,20 +208,20 @@ def _newer(origin: Origin, topic: _Topic) -> bool:
     return origin.seq > topic.origin.seq
 
 
-def _told(feedback: Feedback) -> dict[_Key, FeedbackAlert]:
+def _alerts_of(feedback: Feedback) -> dict[_Key, FeedbackAlert]:
     """People and robots of one message; the newest is usually in the list too."""
     alerts = list(feedback.alerts)
     if feedback.alert is not None and feedback.alert not in alerts:
         alerts.append(feedback.alert)
-    told: dict[_Key, FeedbackAlert] = {}
+    found: dict[_Key, FeedbackAlert] = {}
     for alert in alerts:
         if alert.class_ is None:
             continue
         number = 0
-        while (key := (*_whose(alert), number)) in told:
+        while (key := (*_whose(alert), number)) in found:
             number += 1
-        told[key] = alert
-    return told
+        found[key] = alert
+    return found
 
 
 def _whose(alert: FeedbackAlert) -> tuple[str, str | None, str | None]:
@@ -245,8 +245,8 @@ def _limited_free(speed_limit: SpeedLimit, alert: FeedbackAlert) -> bool:
 
 
 def _ring(alert: FeedbackAlert, silence: float) -> float:
-    told = LIMITS.ring_default_m if alert.radius_m is None else alert.radius_m
-    return ring_radius(told, silence)
+    radius_m = LIMITS.ring_default_m if alert.radius_m is None else alert.radius_m
+    return ring_radius(radius_m, silence)
 
 
 def _inside(

@@ -53,7 +53,7 @@ class SafetyMachine:
     """Decides whether and how fast one robot may drive.
 
     Every method takes ``now`` (monotonic, s) and returns effects in the order in which
-    they must be performed; the first is always what the drive is told.
+    they must be performed; the first is always the command for the drive.
 
     Args:
         robot_id: This robot.
@@ -241,7 +241,7 @@ class SafetyMachine:
 
     def _remember(self, attempt: str | None, verdict: _Verdict) -> None:
         if attempt is None:
-            return  # Its copies cannot be told from a new order.
+            return  # Its copies look like new orders.
         self._verdicts[attempt] = verdict
         if len(self._verdicts) > ATTEMPTS_KEPT:
             del self._verdicts[next(iter(self._verdicts))]

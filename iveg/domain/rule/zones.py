@@ -122,7 +122,7 @@ class ZoneFinder:
             people: Everybody.
             rule: How wide a ring is.
             now: The rings' age is counted from.
-            inside: By robot the causes that it is told to be slow for: never left out.
+            inside: By robot the causes that it must be slow for: never left out.
         """
         if len(world.robots) * (len(people.known) + len(world.robots)) <= _FEW_PAIRS:
             everything = list(zones_of(world, people, rule, now))

@@ -65,8 +65,8 @@ class Times:
     """Time of each step of a command; all but ``pressed`` on the server's clocks.
 
     Attributes:
-        pressed: Unix time (s); None where it was not told, or is impossible.
-        pressed_doubted: The page told an impossible time.
+        pressed: Unix time (s); None where the page sent none, or an impossible one.
+        pressed_doubted: The page sent an impossible time.
         sent: By transport, when it first took it.
         answered: By transport, when the robot first said that it has it.
     """
@@ -80,7 +80,7 @@ class Times:
 
     @classmethod
     def of(cls, at: Instant, press: Press) -> "Times":
-        """A command accepted now; its press as told by the page, if plausible."""
+        """A command accepted now; its press as the page sent it, if plausible."""
         pressed = believe(press.pressed_at, at)
         doubted = pressed is None and press.pressed_at is not None
         return cls(at, pressed, doubted)

@@ -129,7 +129,7 @@ class Closed:
     """A command that is no longer followed: its last audit row, and no log line.
 
     Attributes:
-        key: What closed it; the sentence of that is told by the command that came.
+        key: What closed it; its sentence stands at the command that came.
     """
 
     command: FollowedCommand

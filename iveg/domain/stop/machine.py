@@ -16,7 +16,7 @@ unconfirmed it becomes a STOP.
 What happens comes in by a method, from people, transports, the robot or time.  The
 method finds out which event that is (after the guard that may refuse an order) and the
 table at the end, ``STEPS``, says what follows.  An event without a row is a mistake in
-this module: nothing changes, ``OffTable`` tells of it, and STOP is sent on.
+this module: nothing changes, ``OffTable`` reports it, and STOP is sent on.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -130,7 +130,7 @@ class StopMachine(StopStatus):
         """A transport took our message (PUBACK, 2xx) or failed; neither is evidence.
 
         ``doubtful``: what lies behind is known to pass nothing on.  ``left``: when it
-        was handed to the transport; this moment unless told.
+        was handed to the transport; this moment if None.
         """
         command = self._find(command_id)
         if command is None:
@@ -363,7 +363,7 @@ class Step:
     Attributes:
         to: The new state; None is the one that the attempt began in.
         do: What changes, and what the world is asked to do besides telling of it.
-        ends: What is over once that was told: nothing, the release or resume, or all.
+        ends: What is over after that: nothing, the release or resume, or all.
     """
 
     to: State | None

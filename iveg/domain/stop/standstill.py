@@ -2,7 +2,7 @@
 
 Five samples at rest over at least a second, none more than half a second after the one
 before (0.75 s on a topic that has two a second).  Both are measured on the robot's own
-monotonic clock where it tells it, so that neither a burst nor a gap on the way makes or
+monotonic clock where it sends it, so that neither a burst nor a gap on the way makes or
 breaks a rest::
 
     odometry that moves      before the rest began     changes nothing, however late

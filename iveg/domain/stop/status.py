@@ -102,7 +102,7 @@ class StopStatus:
         since_report = self.evidence.report_age(now)
         return min(since_report, now.mono - self._begun_at) > LIMITS.report_fresh_s
 
-    # --- what is told of it -------------------------------------------------------
+    # --- what is recorded of it ---------------------------------------------------
 
     def _changed(
         self, key: Key, about: FollowedCommand | None, why: str | None
