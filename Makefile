@@ -11,7 +11,7 @@ WORKERS ?= 3
 SIDE_BY_SIDE = -n $(WORKERS) --dist loadscope --no-loadscope-reorder --max-worker-restart 0
 # What a site installs (run.lock), the demo and all that a test can ask for.
 LOCK = $(BIN)/uv pip compile --quiet --universal --generate-hashes --no-emit-index-url --no-header pyproject.toml
-ALL := demo bags postgresql ros2
+ALL := bags postgresql ros2
 # No end for a test that takes hours.
 FOR_HOURS := -o faulthandler_timeout=0
 export PYTHONPATH := $(CURDIR)
@@ -35,7 +35,7 @@ mutants: $(DEV) ; $(BIN)/python -m tests.mutants
 experiment: $(RUN) ; @exec $(BIN)/python -m iveg experiment run --$(or $(SIZE),quick)
 soak: $(DEV) ; $(BIN)/python -m benchmarks.soak
 migration: $(DEV) ; $(BIN)/alembic revision --autogenerate -m "$(m)"
-lock: $(DEV) ; $(BIN)/python -m pip install --quiet uv && $(LOCK) -o requirements/run.lock && $(LOCK) --extra demo --extra bags -o requirements/demo.lock && $(LOCK) $(ALL:%=--extra %) --extra dev -o requirements/dev.lock && $(LOCK) --extra bench -c requirements/dev.lock -o requirements/bench.lock
+lock: $(DEV) ; $(BIN)/python -m pip install --quiet uv && $(LOCK) -o requirements/run.lock && $(LOCK) --extra bags -o requirements/demo.lock && $(LOCK) $(ALL:%=--extra %) --extra dev -o requirements/dev.lock && $(LOCK) --extra bench -c requirements/dev.lock -o requirements/bench.lock
 clean: ; rm -rf $(VENV) node_modules .mypy_cache .ruff_cache .pytest_cache .hypothesis test-output
 
 # The system's part: installed on Debian, named elsewhere.

@@ -1,8 +1,8 @@
 """Floods of log messages by libraries, logged once at their beginning and their end.
 
-Under load amqtt and aiomqtt complain of every message that waits.  That is one fact
-with a beginning and an end: the first complaint passes, the others are counted, and
-when none has come for a while one line says that it is over and how many there were.
+Under load aiomqtt complains of every message that waits.  That is one fact with a
+beginning and an end: the first complaint passes, the others are counted, and when none
+has come for a while one line says that it is over and how many there were.
 """
 
 import asyncio

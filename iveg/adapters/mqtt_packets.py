@@ -31,7 +31,7 @@ def publish_packet(
     told = b"" if packet_id is None else packet_id.to_bytes(2)
     kind = PUBLISH | (QOS_1 if told else 0) | (RETAINED if retain else 0)
     size = 2 + len(name) + len(told) + len(payload)
-    head = bytes((kind,)), _length(size), len(name).to_bytes(2)
+    head = bytes((kind,)), remaining_length(size), len(name).to_bytes(2)
     return b"".join((*head, name, told, payload))
 
 
@@ -40,7 +40,7 @@ def puback_packet(packet_id: bytes) -> bytes:
     return b"\x40\x02" + packet_id
 
 
-def _length(size: int) -> bytes:
+def remaining_length(size: int) -> bytes:
     """A remaining length: seven bits a byte, the lowest first (section 2.2.3)."""
     parts = bytearray()
     while size > 127:

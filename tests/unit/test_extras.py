@@ -53,9 +53,6 @@ def test_the_dss_robots_and_the_emulator_start_without_any_extra() -> None:
 @pytest.mark.parametrize(
     ("extra", "command"),
     [
-        ("demo", ["demo"]),
-        ("demo", ["fiware"]),
-        ("demo", ["experiment", "run"]),
         ("ros2", ["robot", "--id", "AGI"]),
         ("ros2", ["emulator", "--dds"]),
     ],

@@ -13,7 +13,6 @@ from dataclasses import replace
 from typing import Any
 from urllib.parse import urlsplit
 
-from iveg.adapters.extras import require_extra
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.free_ports import bind_once
 from iveg.cli.arguments import Call
@@ -33,7 +32,6 @@ _FIWARE = (
 
 def demo(call: Call) -> int:
     """Run the demo; returns the exit code."""
-    require_extra("demo", "iveg demo")
     settings, environment = call.settings, call.environment
     directory = call.data / "demo"
     placed = replace(

@@ -17,7 +17,6 @@ from urllib.parse import urlsplit
 import httpx
 
 from iveg.adapters import clock
-from iveg.adapters.extras import require_extra
 from iveg.cli.arguments import Call
 from iveg.cli.live_robots import live_robot
 from iveg.cli.running import run_until_stopped
@@ -65,8 +64,6 @@ def experiment(call: Call) -> int:
         plan = replace(plan, seed=options.seed)
     directory = options.out or directory_of(call.data / "experiments", plan)
     embedded = options.fiware == ["embedded"]
-    if embedded:
-        require_extra("demo", "iveg experiment")
     named = with_fiware(settings, options.fiware)
     placed = experiment_settings(
         directory, on_free_ports(named, environment, fiware=embedded)

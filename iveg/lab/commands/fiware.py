@@ -3,16 +3,13 @@
 from urllib.parse import urlsplit
 
 from iveg.adapters.connections import raise_descriptor_limit
-from iveg.adapters.extras import require_extra
 from iveg.cli.running import report_ready, tune_garbage_collection
+from iveg.lab.embedded.server import serve_fiware
 from iveg.settings import Settings
 
 
 async def fiware(settings: Settings) -> None:
     """The embedded MQTT broker, Orion and IoT Agent."""
-    require_extra("demo", "iveg fiware")
-    from iveg.lab.embedded.server import serve_fiware
-
     raise_descriptor_limit()
     tune_garbage_collection()
     await serve_fiware(

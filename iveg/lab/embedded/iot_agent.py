@@ -207,7 +207,7 @@ class IotAgent:
 
     async def _publish(self, device: Device, command: str, value: Any) -> None:
         options = device.commands[command].get("mqtt") or {}
-        await self._mqtt.publish(
+        self._mqtt.publish(
             f"/{device.apikey}/{device.device_id}/cmd",
             orjson.dumps({command: value}),
             int(options.get("qos", 0)),

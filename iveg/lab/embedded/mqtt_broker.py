@@ -1,289 +1,190 @@
-"""An MQTT broker in the process, for greenhouses without one.
+"""An MQTT 3.1.1 broker in the process, for greenhouses without one.
 
-It is based on amqtt; this module adds a loopback port, anonymous clients, reduced
-logging, a cache of subscribers per topic, and a complete shutdown.  Code in the same
-process may listen and publish by a call, which halves the latency of a measure and
-saves a third of its CPU time.
+It handles each packet in the call that brings it, without a task, queue or lock.  Code
+in the same process may listen and publish by a call, which halves the latency of a
+measure and saves a third of its CPU time.  Its limits are in ``docs/fiware.md``.
 """
 
 import asyncio
 import logging
-from collections import deque
-from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager
-from functools import partial
-from typing import Any
+from collections.abc import Callable
+from typing import NamedTuple
 
-from amqtt.broker import Broker
+from paho.mqtt.client import topic_matches_sub
 
 from iveg.adapters import clock
 from iveg.adapters.connections import ConnectionCaps, ConnectionTable
-from iveg.adapters.free_ports import bind_once
-from iveg.adapters.log_filter import quiet
 from iveg.adapters.mqtt_packets import publish_packet
-from iveg.lab.embedded.loopback import require_loopback
-from iveg.lab.embedded.mqtt_telemetry import BoundedWriter, PacketProtocol
-
-for _name in ("amqtt", "transitions"):
-    # Both log every packet at INFO and DEBUG, which costs more than the packet.
-    logging.getLogger(_name).setLevel(logging.WARNING)
 
 _log = logging.getLogger(__name__)
-
-
-# amqtt logs a client that does not confirm once for each pending message.
-quiet("amqtt.broker", "amqtt.mqtt.protocol.handler")
-_PATIENCE_S = 1.0
 _MOST_TOPICS = 10_000
+_MOST_NUMBERS = 65_535
+LARGEST_PACKET = 8 << 20
+"""Of an admitted one (bytes); ``deploy/mosquitto.conf`` allows 128 KiB."""
+MOST_UNSENT = 512 << 10
+"""Telemetry pending for one slow client (bytes): a fifth of a second of ten robots'
+scans.  Messages to be confirmed queue behind it, up to ``LARGEST_PACKET``."""
 Listener = Callable[[str, bytes], None]
-_PLUGINS = {
-    "amqtt.plugins.authentication.AnonymousAuthPlugin": {"allow_anonymous": True}
-}
 
 
-@asynccontextmanager
-async def mqtt_broker(host: str, port: int) -> AsyncIterator["MqttBroker"]:
-    """Run a broker while the block lasts.
+class Publication(NamedTuple):
+    """A message that a client or code in the process publishes."""
 
-    Args:
-        host: A loopback address.
-        port: TCP port; 0 for a free one.
-
-    Yields:
-        The broker, ready.
-
-    Raises:
-        SettingsError: the address is not loopback.
-        OSError: the port is taken.
-    """
-    host = require_loopback("IVEG_MQTT_URL", host)
-    # amqtt would log a traceback and raise an error without the port.
-    bind_once(host, port)
-    shown = f"[{host}]" if ":" in host else host
-    broker = MqttBroker(
-        {
-            "listeners": {"default": {"type": "tcp", "bind": f"{shown}:{port}"}},
-            "plugins": _PLUGINS,
-        }
-    )
-    await broker.start()
-    ending = asyncio.create_task(broker.table.run(), name="mqtt-late-clients")
-    try:
-        yield broker
-    finally:
-        ending.cancel()
-        # A cancelled caller must not leave the broker partly closed.
-        await asyncio.shield(broker.close())
+    topic: str
+    payload: bytes
+    qos: int
+    retain: bool
 
 
-class MqttBroker(Broker):  # type: ignore[misc]
-    """amqtt's broker with six corrections.
-
-    It caches the subscribers of a topic; it lets code in the process listen; it
-    receives publications and sends telemetry (QoS 0) without a task for each message;
-    it delivers with the lesser quality of service of publication and subscription,
-    where amqtt uses the subscription's (MQTT 3.1.1 §3.8.4); it closes connections
-    whose client vanished, which amqtt leaves to the garbage collector; and it bounds
-    the number of connections and their time before CONNECT.
+class Client:
+    """One client: its subscriptions, and what is sent to it.
 
     Attributes:
-        table: Its connections.
+        client_id: Client identifier; empty until the client is admitted.
+        filters: Subscribed topic filters with their quality of service.
     """
 
-    def __init__(self, config: dict[str, object]) -> None:
-        super().__init__(config)
-        self.table = ConnectionTable(clock.mono, ConnectionCaps.on_loopback())
-        self._open: dict[asyncio.Task[None], asyncio.StreamWriter] = {}
-        self._listeners: list[Listener] = []
-        self._known_audience: dict[str, tuple[tuple[Any, int], ...]] = {}
-        self._arriving: dict[str, int] = {}
-        """Client → quality of service of the publication being received."""
+    line: asyncio.Transport
+
+    def __init__(self) -> None:
+        self.client_id = ""
+        self.filters: dict[str, int] = {}
+        self._number = 0
+
+    def hang_up(self) -> None:
+        """Close the connection at once."""
+        self.line.abort()
 
     @property
-    def port(self) -> int:
-        """Port in use."""
-        instance = self._servers["default"].instance
-        return int(instance.sockets[0].getsockname()[1])
+    def unsent(self) -> int:
+        """Data that the client has not read yet (bytes)."""
+        return self.line.get_write_buffer_size()
 
-    # --- in-process clients -----------------------------------------------------
+    def wanted_qos(self, topic: str) -> int | None:
+        """Quality of service of the subscriptions to a topic; None without one."""
+        fitting = [
+            qos
+            for topic_filter, qos in self.filters.items()
+            if topic_matches_sub(topic_filter, topic)
+        ]
+        return max(fitting, default=None)
+
+    def write_telemetry(self, packet: bytes) -> None:
+        """Send a whole packet, or nothing to a client that does not read."""
+        if self.unsent <= MOST_UNSENT:
+            self.line.write(packet)
+
+    def write_confirmed(self, topic: str, payload: bytes) -> None:
+        """Send a message at QoS 1; a client that never reads is disconnected."""
+        self.line.write(publish_packet(topic, payload, self.next_number()))
+        if self.unsent > LARGEST_PACKET + MOST_UNSENT:
+            self.hang_up()
+
+    def next_number(self) -> int:
+        """A packet identifier for a message at QoS 1."""
+        self._number = self._number % _MOST_NUMBERS + 1
+        return self._number
+
+
+class MqttBroker:
+    """Clients, their subscriptions and retained messages.
+
+    Attributes:
+        port: TCP port in use.
+        table: The connections.
+        clients: Admitted clients by client identifier.
+        lines: All open connections.
+    """
+
+    def __init__(self) -> None:
+        self.port = 0
+        self.table = ConnectionTable(clock.mono, ConnectionCaps.on_loopback())
+        self.clients: dict[str, Client] = {}
+        self.lines: set[Client] = set()
+        self._listeners: list[Listener] = []
+        self._retained: dict[str, Publication] = {}
+        self._known_audience: dict[str, tuple[tuple[Client, int], ...]] = {}
+
+    async def close(self) -> None:
+        """Disconnect every client."""
+        for line in self.lines:
+            line.hang_up()
+        # The loop closes their sockets before it comes back here.
+        await asyncio.sleep(0)
+
+    # --- code in the process ----------------------------------------------------
 
     def listen(self, listener: Listener) -> None:
         """Call ``listener`` with every message of clients; it must not block."""
         self._listeners.append(listener)
 
-    async def publish(
-        self, topic: str, payload: bytes, qos: int, *, retain: bool
-    ) -> None:
-        """Publish a message."""
-        self._spread(topic, payload, qos)
-        if retain:
-            await self.retain_message(None, topic, payload, qos)
+    def publish(self, topic: str, payload: bytes, qos: int, *, retain: bool) -> None:
+        """Publish a message, which listeners do not get."""
+        self._spread(Publication(topic, payload, qos, retain))
 
-    # --- corrected methods ------------------------------------------------------
+    # --- clients ----------------------------------------------------------------
 
-    async def _handle_message_delivery(
-        self, client_session: Any, handler: Any, wait_deliver: asyncio.Future[Any]
-    ) -> bool:
-        """A client published; keeps the quality of service, which amqtt drops."""
-        message = wait_deliver.result()
-        client = str(client_session.client_id)
-        self._arriving[client] = (message and message.qos) or 0
-        try:
-            return bool(
-                await super()._handle_message_delivery(
-                    client_session, handler, wait_deliver
-                )
-            )
-        finally:
-            self._arriving.pop(client, None)
+    def receive(self, publication: Publication, packet: bytes = b"") -> None:
+        """Deliver a client's message.
 
-    async def _broadcast_message(
-        self,
-        session: Any,
-        topic: str,
-        data: bytes | bytearray | None,
-        force_qos: int | None = None,
-    ) -> None:
-        if force_qos is None and session is not None:
-            force_qos = self._arriving.get(str(session.client_id))
-        self._take(topic, bytes(data or b""), force_qos)
-
-    def _take(
-        self, topic: str, payload: bytes, most: int | None, packet: bytes = b""
-    ) -> None:
-        """Deliver a client's publication."""
+        Args:
+            publication: The message.
+            packet: Its PUBLISH, where that is what subscribers at QoS 0 get.
+        """
         for listener in self._listeners:
             try:
-                listener(topic, payload)
+                listener(publication.topic, publication.payload)
             except Exception:
-                _log.exception("a message on %s could not be taken", topic)
-        self._spread(topic, payload, most, packet)
+                _log.exception("a message on %s could not be taken", publication.topic)
+        self._spread(publication, packet)
 
-    def _spread(
-        self, topic: str, payload: bytes, most: int | None, packet: bytes = b""
-    ) -> None:
-        """Write telemetry at once; messages to be confirmed use amqtt's queue."""
-        confirmed = False
-        for session, wanted in self._known_audience.get(topic) or self._audience(topic):
-            if wanted and most != 0:
-                confirmed = True
-                continue
-            handler = self._get_handler(session)
-            if handler is None or session.transitions.state != "connected":
-                continue
-            packet = packet or publish_packet(topic, payload)
-            handler.writer.write_telemetry(packet)
-        if confirmed:
-            most = 2 if most is None else most
-            self._broadcast_queue.put_nowait(
-                {"session": None, "topic": topic, "data": payload, "qos": most}
-            )
+    def admit(self, line: Client) -> None:
+        """Add a client; an older connection of the same identifier is closed."""
+        older = self.clients.get(line.client_id)
+        self.clients[line.client_id] = line
+        if older is not None:
+            older.hang_up()
 
-    async def _run_broadcast(self, running_tasks: deque[asyncio.Task[Any]]) -> None:
-        broadcast = await self._broadcast_queue.get()
-        topic, most = broadcast["topic"], broadcast["qos"]
-        for session, wanted in self._audience(topic):
-            handler = self._get_handler(session)
-            # All clients are anonymous, so nothing is stored for absent ones.
-            if handler is None or session.transitions.state != "connected":
-                continue
-            if not min(wanted, most):
-                continue  # has been written already
-            sending = handler.mqtt_publish(
-                topic, broadcast["data"], min(wanted, most), retain=False
-            )
-            running_tasks.append(asyncio.ensure_future(sending))
+    def leave(self, line: Client) -> None:
+        """Remove a connection that is closed."""
+        self.lines.discard(line)
+        if self.clients.get(line.client_id) is line:
+            del self.clients[line.client_id]
+        self.forget_audience()
 
-    async def _publish_retained_messages_for_subscription(
-        self, subscription: tuple[str, int], session: Any
-    ) -> None:
-        topic_filter, wanted = subscription
-        handler = self._get_handler(session)
-        kept = [
-            handler.mqtt_publish(
-                topic, one.data, min(wanted, one.qos or 0), retain=True
-            )
-            for topic, one in self._retained_messages.items()
-            if handler is not None and self._matches(topic, topic_filter)
+    def forget_audience(self) -> None:
+        """Clear the cache after a change of subscriptions."""
+        self._known_audience.clear()
+
+    def retained(self, topic_filter: str) -> list[Publication]:
+        """Retained messages that fit a filter."""
+        return [
+            one
+            for topic, one in self._retained.items()
+            if topic_matches_sub(topic_filter, topic)
         ]
-        await asyncio.gather(*kept, return_exceptions=True)
 
-    def _audience(self, topic: str) -> tuple[tuple[Any, int], ...]:
+    def _spread(self, publication: Publication, packet: bytes = b"") -> None:
+        topic, payload, qos, retain = publication
+        for line, wanted in self._audience(topic):
+            if wanted and qos:
+                line.write_confirmed(topic, payload)
+            else:
+                packet = packet or publish_packet(topic, payload)
+                line.write_telemetry(packet)
+        if retain and payload:
+            self._retained[topic] = publication
+        elif retain:
+            self._retained.pop(topic, None)
+
+    def _audience(self, topic: str) -> tuple[tuple[Client, int], ...]:
         """Subscribers of a topic with their quality of service."""
         known = self._known_audience.get(topic)
         if known is None:
             if len(self._known_audience) >= _MOST_TOPICS:
                 self._known_audience.clear()
+            wanted = {line: line.wanted_qos(topic) for line in self.clients.values()}
             known = self._known_audience[topic] = tuple(
-                one
-                for topic_filter, subscribed in self._subscriptions.items()
-                if subscribed and self._matches(topic, topic_filter)
-                for one in subscribed
+                (line, qos) for line, qos in wanted.items() if qos is not None
             )
         return known
-
-    async def add_subscription(
-        self, subscription: tuple[str, int], session: Any
-    ) -> int:
-        """Add a subscription of a client."""
-        self._known_audience.clear()
-        return int(await super().add_subscription(subscription, session))
-
-    def _del_subscription(self, a_filter: str, session: Any) -> int:
-        self._known_audience.clear()
-        return int(super()._del_subscription(a_filter, session))
-
-    async def _create_server_instance(
-        self,
-        listener_name: str,
-        listener_type: object,  # noqa: ARG002 - TCP, as no other is configured
-        address: str | None,
-        port: int,
-        ssl_context: object,  # noqa: ARG002 - there is none
-    ) -> asyncio.Server:
-        connected = partial(self.stream_connected, listener_name=listener_name)
-        return await asyncio.get_running_loop().create_server(
-            lambda: PacketProtocol(connected, self._take, self.table),
-            address,
-            port,
-            reuse_address=True,
-        )
-
-    async def _client_message_loop(self, client_session: Any, handler: Any) -> None:
-        """Admit a client that has got its CONNACK, and serve its packets."""
-        handler.writer.protocol.admit(handler.writer)
-        await super()._client_message_loop(client_session, handler)
-
-    async def stream_connected(
-        self,
-        reader: asyncio.StreamReader,  # noqa: ARG002 - it gets nothing to read
-        writer: asyncio.StreamWriter,
-        listener_name: str,
-    ) -> None:
-        """Serve one client to its end."""
-        task = asyncio.current_task()
-        assert task is not None  # noqa: S101 - asyncio starts servers' callbacks so
-        self._open[task] = writer
-        protocol = writer.transport.get_protocol()
-        assert isinstance(protocol, PacketProtocol)  # noqa: S101 - made above
-        try:
-            await self._client_connected(
-                listener_name, protocol.packets, BoundedWriter(writer, protocol)
-            )
-        finally:
-            writer.close()
-            del self._open[task]
-
-    async def close(self) -> None:
-        """Stop serving; no task is left running."""
-        # A client without CONNECT would keep a newer asyncio waiting.
-        patience = asyncio.get_running_loop().call_later(_PATIENCE_S, self._hang_up)
-        await self.shutdown()
-        patience.cancel()
-        self._hang_up()
-        await asyncio.gather(*self._open, return_exceptions=True)
-
-    def _hang_up(self) -> None:
-        for task, writer in self._open.items():
-            writer.transport.abort()
-            task.cancel()

@@ -11,7 +11,8 @@ from iveg.lab.embedded.http_server import http_server
 from iveg.lab.embedded.iot_agent import IotAgent
 from iveg.lab.embedded.iota_api import IotaApi
 from iveg.lab.embedded.loopback import require_loopback
-from iveg.lab.embedded.mqtt_broker import MqttBroker, mqtt_broker
+from iveg.lab.embedded.mqtt_broker import MqttBroker
+from iveg.lab.embedded.mqtt_server import mqtt_broker
 from iveg.lab.embedded.ngsi_api import NgsiApi
 
 Address = tuple[str, int]

@@ -13,7 +13,7 @@ from iveg.adapters.transports import MqttTransport
 from iveg.domain.errors import HopError
 from iveg.domain.feedback import Feedback
 from iveg.domain.observations import Origin
-from iveg.lab.embedded.mqtt_broker import mqtt_broker
+from iveg.lab.embedded.mqtt_server import mqtt_broker
 from tests.ports import free_ports
 
 

@@ -5,7 +5,8 @@ from collections.abc import AsyncIterator
 import aiomqtt
 import pytest
 
-from iveg.lab.embedded.mqtt_broker import MqttBroker, mqtt_broker
+from iveg.lab.embedded.mqtt_broker import MqttBroker
+from iveg.lab.embedded.mqtt_server import mqtt_broker
 
 
 @pytest.fixture
@@ -103,7 +104,7 @@ async def test_a_neighbour_hears_and_publishes_without_a_connection(
     broker.listen(lambda topic, payload: taken.append((topic, payload)))
     await robot.subscribe("/iveg/AGI/cmd", qos=1)
     await robot.publish("/iveg/AGI/attrs", b"measure", qos=1)
-    await broker.publish("/iveg/AGI/cmd", b"order", 0, retain=False)
+    broker.publish("/iveg/AGI/cmd", b"order", 0, retain=False)
     message = await heard(robot)
     assert taken == [("/iveg/AGI/attrs", b"measure")]
     assert (message.payload, message.qos) == (b"order", 0)

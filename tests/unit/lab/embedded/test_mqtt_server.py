@@ -1,6 +1,7 @@
 """The short way of telemetry, on real sockets, byte by byte."""
 
 import asyncio
+import contextlib
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
@@ -8,9 +9,9 @@ import aiomqtt
 import pytest
 
 from iveg.adapters.mqtt_packets import publish_packet
-from iveg.lab.embedded import mqtt_telemetry
-from iveg.lab.embedded.mqtt_broker import MqttBroker, mqtt_broker
-from iveg.lab.embedded.mqtt_telemetry import PacketReader
+from iveg.lab.embedded import mqtt_broker as broker_module
+from iveg.lab.embedded.mqtt_broker import MqttBroker
+from iveg.lab.embedded.mqtt_server import mqtt_broker
 
 CONNACK = b"\x20\x02\x00\x00"
 PINGREQ, PINGRESP = b"\xc0\x00", b"\xd0\x00"
@@ -133,7 +134,7 @@ async def test_a_topic_that_nobody_may_publish_on_is_the_end_of_the_line(
 async def test_a_slow_listener_misses_telemetry_and_costs_no_memory(
     broker: MqttBroker, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(mqtt_telemetry, "MOST_UNSENT", 100_000)
+    monkeypatch.setattr(broker_module, "MOST_UNSENT", 100_000)
     subscribe = b"\x82\x06\x00\x01\x00\x01n\x00"
     async with (
         line(broker) as (deaf, writer),
@@ -149,29 +150,77 @@ async def test_a_slow_listener_misses_telemetry_and_costs_no_memory(
             async with asyncio.timeout(30):
                 message = await anext(messages)
             assert bytes(message.payload).startswith(b"%d " % number)
-        waiting = [
-            handler.writer._line.get_write_buffer_size()
-            for _, handler in broker._sessions.values()
-        ]
+        waiting = [client.unsent for client in broker.clients.values()]
     assert max(waiting) <= 300_000
 
 
-async def test_a_packet_that_says_more_than_it_holds_borrows_nothing() -> None:
-    reader = PacketReader()
-    reader.feed(b"\x82\x01\x00")
-    reader.feed(PINGREQ)
-    assert await reader.read(2) == b"\x82\x01"
-    with pytest.raises(asyncio.IncompleteReadError):
-        await reader.read(2)
-    assert await reader.read(1) == PINGREQ[:1]
+@pytest.mark.parametrize(
+    "packet",
+    [
+        b"\x82\x01\x00",
+        b"\x82\x05\x00\x01\x00\x09a",
+        b"\x82\x04\x00\x01\x00\x01",
+        b"\x30\x02\x00\x05",
+        b"\x10\x02\x00\x04",
+        b"\x30\xff\xff\xff\xff",
+        b"\xf0\x00",
+    ],
+)
+async def test_a_packet_that_cannot_be_read_is_the_end_of_the_line(
+    broker: MqttBroker, packet: bytes
+) -> None:
+    async with line(broker) as (reader, writer):
+        writer.write(packet + PINGREQ)
+        assert await answered(reader, 2) == b""
 
 
-async def test_who_reads_on_after_the_end_is_told_of_it_every_time() -> None:
-    reader = PacketReader()
-    reader.feed_eof()
-    for _ in range(2):
-        with pytest.raises(asyncio.IncompleteReadError):
-            await reader.read(1)
+async def test_a_client_that_is_silent_for_too_long_is_disconnected_and_its_will_comes(
+    broker: MqttBroker,
+) -> None:
+    heard = Heard(broker)
+    reader, writer = await asyncio.open_connection("127.0.0.1", broker.port)
+    head = b"\x00\x04MQTT\x04\x06\x00\x01\x00\x02me"
+    writer.write(b"\x10\x18" + head + b"\x00\x04gone\x00\x02me")
+    assert await answered(reader, 4) == CONNACK
+    assert await heard.wait_for(1) == [("gone", b"me")]
+    assert await answered(reader, 1) == b""
+    writer.close()
+    with contextlib.suppress(ConnectionError):
+        await writer.wait_closed()
+
+
+async def test_a_client_that_says_goodbye_leaves_no_will(broker: MqttBroker) -> None:
+    heard = Heard(broker)
+    will = aiomqtt.Will("gone", b"me")
+    async with aiomqtt.Client("127.0.0.1", broker.port, will=will):
+        """It disconnects at once."""
+    async with line(broker) as (_, writer):
+        writer.write(publish_packet("after", b""))
+        assert await heard.wait_for(1) == [("after", b"")]
+
+
+async def test_the_newest_client_of_an_identifier_stays(broker: MqttBroker) -> None:
+    async with line(broker) as (first, _), line(broker) as (second, writer):
+        assert await answered(first, 1) == b""
+        writer.write(PINGREQ)
+        assert await answered(second, 2) == PINGRESP
+
+
+async def test_another_version_of_mqtt_is_refused_in_words(broker: MqttBroker) -> None:
+    reader, writer = await asyncio.open_connection("127.0.0.1", broker.port)
+    writer.write(b"\x10\x0d\x00\x04MQTT\x05\x02\x00\x00\x00\x00\x00")
+    assert await answered(reader, 4) == b"\x20\x02\x00\x01"
+    writer.close()
+    await writer.wait_closed()
+
+
+async def test_a_message_at_qos_2_is_heard_once_and_released(
+    broker: MqttBroker,
+) -> None:
+    heard = Heard(broker)
+    async with aiomqtt.Client("127.0.0.1", broker.port) as client:
+        await client.publish("a", b"x", qos=2)
+    assert heard.messages == [("a", b"x")]
 
 
 async def test_a_measure_that_is_to_be_confirmed_is_heard_and_confirmed(
