@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import orjson
 
 from iveg.lab.embedded.orion_dates import date_json, date_text
-from iveg.lab.embedded.orion_errors import bad_request, too_many
+from iveg.lab.embedded.orion_errors import NgsiError, bad_request, too_many
 from iveg.lab.embedded.orion_numbers import print_value
 from iveg.lab.embedded.orion_text import (
     UNRESTRICTED,
@@ -21,6 +21,7 @@ from iveg.lab.embedded.orion_text import (
 )
 
 _BUILTIN = ("dateCreated", "dateModified")
+_OPERATORS_NOT_DONE = ("$min", "$max", "$mul", "$push", "$addToSet", "$pull")
 
 
 class Value:
@@ -264,15 +265,12 @@ def _operated(attribute: Attribute | None, value: Mapping[str, Any]) -> Any:
     number = old if isinstance(old, int | float) else 0
     if name == "$inc" and isinstance(argument, int | float):
         return number + argument
-    if name in ("$min", "$max") and isinstance(argument, int | float):
-        return (min if name == "$min" else max)(number, argument)
-    items = old if isinstance(old, list) else []
-    if name == "$push":
-        return [*items, argument]
-    if name == "$addToSet":
-        return items if argument in items else [*items, argument]
-    if name == "$pull":
-        return [item for item in items if item != argument]
+    if name in _OPERATORS_NOT_DONE:
+        raise NgsiError(
+            501,
+            "NotImplemented",
+            f"operator {name} is not supported by the embedded broker",
+        )
     return argument
 
 

@@ -185,7 +185,7 @@ class _ClientLine(Client, asyncio.Protocol):
             self._check_alive()
 
     def _check_alive(self) -> None:
-        """Close the connection of a client that is silent for too long (section 3.1.2.10)."""
+        """Disconnect a client that is silent for too long (section 3.1.2.10)."""
         loop = asyncio.get_running_loop()
         left_s = self._heard_at + self._keep_alive_s - loop.time()
         if left_s <= 0:

@@ -1,83 +1,62 @@
-"""Selection and order of entities: the simple query language and ``orderBy``."""
+"""Selection and order of entities: simple queries and ``orderBy``."""
 
+import operator
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import orjson
 
 from iveg.lab.embedded.entities import Entity
-from iveg.lab.embedded.orion_errors import bad_request
+from iveg.lab.embedded.orion_errors import NgsiError, bad_request
 
-_STATEMENT = re.compile(r"(!?)([^=!<>~:]+?)(?:(==|!=|>=|<=|~=|>|<|:)(.*))?")
+_STATEMENT = re.compile(r"([^=!<>~:.]+)(?:(==|!=|>=|<=|>|<)([^,]+))?")
+_COMPARISONS: Mapping[str, Callable[[Any, Any], bool]] = {
+    "==": operator.eq,
+    "!=": operator.ne,
+    ">=": operator.ge,
+    "<=": operator.le,
+    ">": operator.gt,
+    "<": operator.lt,
+}
 
 
 def matches_query(entity: Entity, query: str) -> bool:
     """Whether an entity fulfils every statement of ``?q=``.
 
-    Not supported: metadata queries and geographical ones.
+    A statement is the name of an attribute, or compares one with a number or a text.
 
     Raises:
-        NgsiError: 400, not a query.
+        NgsiError: 501, any other statement.
     """
     return all(_fulfils(entity, one) for one in query.split(";") if one)
 
 
 def _fulfils(entity: Entity, statement: str) -> bool:
     found = _STATEMENT.fullmatch(statement)
-    if found is None:
-        raise bad_request("invalid query expression")
-    absent, path, operator, operand = found.groups()
-    there, value = _value(entity, path.strip())
-    if operator is None:
-        return there != bool(absent)
-    if operator == "!=":
-        return there and not _equals(value, operand)
-    return there and _compares(value, operator, operand)
+    if found is None or ".." in statement:
+        raise NgsiError(
+            501,
+            "NotImplemented",
+            f"the query {statement} is not supported by the embedded broker",
+        )
+    name, comparison, operand = found.groups()
+    attribute = entity.attributes.get(name)
+    if attribute is None or comparison is None:
+        return attribute is not None
+    value, wanted = orjson.loads(attribute.json), _read(operand)
+    comparable = str if isinstance(wanted, str) else int | float
+    if not isinstance(value, comparable):
+        return comparison == "!="
+    return _COMPARISONS[comparison](value, wanted)
 
 
-def _value(entity: Entity, path: str) -> tuple[bool, Any]:
-    name, *rest = path.split(".")
-    if name not in entity.attributes:
-        return False, None
-    value = orjson.loads(entity.attributes[name].json)
-    for part in rest:
-        if not isinstance(value, dict) or part not in value:
-            return False, None
-        value = value[part]
-    return True, value
-
-
-def _compares(value: Any, operator: str, operand: str) -> bool:
-    if operator in ("==", ":"):
-        return _equals(value, operand)
-    if operator == "~=":
-        return isinstance(value, str) and re.search(operand, value) is not None
-    wanted = _read(operand)
-    if isinstance(wanted, str) != isinstance(value, str):
-        return False
-    if not isinstance(value, str | int | float):
-        return False
-    below, same = bool(value < wanted), bool(value == wanted)
-    return {"<": below, "<=": below or same, ">": not (below or same)}.get(
-        operator, not below
-    )
-
-
-def _equals(value: Any, operand: str) -> bool:
-    if ".." in operand:
-        low, _, high = operand.partition("..")
-        return _compares(value, ">=", low) and _compares(value, "<=", high)
-    return any(value == _read(one) for one in operand.split(","))
-
-
-def _read(text: str) -> Any:
-    if text.startswith("'") and text.endswith("'"):
-        return text[1:-1]
+def _read(text: str) -> float | str:
+    """The operand: a number where it is one, else a text, with or without quotes."""
     try:
-        return orjson.loads(text)
-    except orjson.JSONDecodeError:
-        return text
+        return float(text)
+    except ValueError:
+        return text.strip("'")
 
 
 def ordered(entities: Iterable[Entity], order: str) -> list[Entity]:
@@ -100,14 +79,10 @@ def _rank(entity: Entity, name: str) -> tuple[int, float, str]:
     """MongoDB's order: absent and null values come before all others."""
     if name in ("id", "type"):
         return 2, 0.0, str(getattr(entity, name))
-    if name in ("dateCreated", "dateModified"):
-        return 1, entity.created if name == "dateCreated" else entity.modified, ""
-    _, value = _value(entity, name)
+    attribute = entity.attributes.get(name)
+    value = None if attribute is None else orjson.loads(attribute.json)
     if value is None:
         return 0, 0.0, ""
-    if isinstance(value, bool):
-        return 5, float(value), ""
     if isinstance(value, int | float):
         return 1, float(value), ""
-    kind = (str, dict, list).index(type(value)) + 2
-    return kind, 0.0, value if isinstance(value, str) else orjson.dumps(value).decode()
+    return 2, 0.0, value if isinstance(value, str) else orjson.dumps(value).decode()
