@@ -8,7 +8,7 @@ from iveg.lab.embedded.context_broker import ContextBroker
 from iveg.lab.embedded.entities import EntityChange
 from iveg.lab.embedded.http_server import Response
 from iveg.lab.embedded.ngsi_request import Call, read_id
-from iveg.lab.embedded.orion_errors import bad_request
+from iveg.lab.embedded.orion_text import bad_request
 from iveg.lab.embedded.outcomes import EXISTING, MISSING, Outcome, raise_for_batch
 
 _OLD_WORDS = {"UPDATE": "update", "APPEND": "append", "DELETE": "delete",

@@ -17,7 +17,7 @@ from iveg.lab.embedded.entities import (
     apply,
     under,
 )
-from iveg.lab.embedded.orion_errors import NgsiError, not_found
+from iveg.lab.embedded.orion_text import NgsiError, not_found
 from iveg.lab.embedded.outbox import Outbox
 from iveg.lab.embedded.outcomes import Outcome
 from iveg.lab.embedded.registrations import Registration, forward_update, providers

@@ -10,14 +10,17 @@ from typing import Any, NamedTuple
 
 import orjson
 
-from iveg.lab.embedded.orion_dates import date_json, date_text
-from iveg.lab.embedded.orion_errors import NgsiError, bad_request, too_many
 from iveg.lab.embedded.orion_numbers import print_value
 from iveg.lab.embedded.orion_text import (
     UNRESTRICTED,
+    NgsiError,
+    bad_request,
     check_name,
+    date_json,
+    date_text,
     holds_forbidden,
     quoted,
+    too_many,
 )
 
 _BUILTIN = ("dateCreated", "dateModified")

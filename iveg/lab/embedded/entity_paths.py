@@ -14,13 +14,14 @@ from iveg.lab.embedded.ngsi_request import (
     read_id,
     read_value,
 )
-from iveg.lab.embedded.orion_errors import (
+from iveg.lab.embedded.orion_text import (
     ATTRIBUTE_NOT_FOUND,
     bad_request,
+    looks_clean,
     not_found,
+    read_pattern,
     too_many,
 )
-from iveg.lab.embedded.orion_text import looks_clean, read_pattern
 from iveg.lab.embedded.outcomes import EXISTING
 from iveg.lab.embedded.query import matches_query, ordered
 from iveg.lab.embedded.registrations import bare_entities, foreign

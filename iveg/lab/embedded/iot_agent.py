@@ -26,8 +26,10 @@ from iveg.lab.embedded.devices import (
 from iveg.lab.embedded.entities import EntityChange
 from iveg.lab.embedded.measures import read_measures, read_single, status_changes
 from iveg.lab.embedded.mqtt_broker import MqttBroker
-from iveg.lab.embedded.orion_errors import NgsiError
-from iveg.lab.embedded.orion_text import load_json
+from iveg.lab.embedded.orion_text import (
+    NgsiError,
+    load_json,
+)
 from iveg.lab.embedded.registrations import Registration, read_registration
 from iveg.lab.embedded.scope import Scope
 

@@ -15,11 +15,13 @@ from iveg.lab.embedded.entities import (
     Value,
     default_type,
 )
-from iveg.lab.embedded.orion_dates import date_json, date_text
-from iveg.lab.embedded.orion_errors import NgsiError, bad_request
 from iveg.lab.embedded.orion_text import (
     UNRESTRICTED,
+    NgsiError,
+    bad_request,
     check_name,
+    date_json,
+    date_text,
     holds_forbidden,
     load_json,
     looks_clean,

@@ -18,7 +18,7 @@ from iveg.lab.embedded.ngsi_request import (
     read_options,
     scope,
 )
-from iveg.lab.embedded.orion_errors import (
+from iveg.lab.embedded.orion_text import (
     NgsiError,
     bad_request,
 )

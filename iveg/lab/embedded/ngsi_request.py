@@ -7,8 +7,14 @@ from typing import Any
 
 from iveg.lab.embedded.entities import EntityChange, read_changes
 from iveg.lab.embedded.http_server import Request
-from iveg.lab.embedded.orion_errors import NgsiError, bad_request, parse_error
-from iveg.lab.embedded.orion_text import check_name, load_json, looks_clean
+from iveg.lab.embedded.orion_text import (
+    NgsiError,
+    bad_request,
+    check_name,
+    load_json,
+    looks_clean,
+    parse_error,
+)
 from iveg.lab.embedded.scope import Scope
 from iveg.lab.embedded.views import EntityView
 

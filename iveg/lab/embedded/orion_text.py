@@ -1,16 +1,111 @@
-"""Text that Orion accepts: JSON of limited depth without forbidden characters.
+"""Orion's errors, dates and text: JSON of limited depth without forbidden characters.
 
 Values are stored as the JSON text that Orion would print, made once when a measure
 arrives, so that a LiDAR scan is not traversed or encoded again for each subscriber.
 """
 
 import re
+from datetime import UTC, datetime
 from functools import lru_cache
 from typing import Any
 
 import orjson
 
-from iveg.lab.embedded.orion_errors import bad_request, parse_error
+from iveg.domain.errors import IvegError
+
+ENTITY_NOT_FOUND = "The requested entity has not been found. Check type and id"
+ATTRIBUTE_NOT_FOUND = "The entity does not have such an attribute"
+
+
+class NgsiError(IvegError):
+    """A request that Orion would refuse.
+
+    Attributes:
+        status: HTTP status.
+        error: Orion's error name, such as ``BadRequest``.
+        description: Orion's sentence.
+    """
+
+    def __init__(
+        self, status: int, error: str, description: str, allow: str = ""
+    ) -> None:
+        super().__init__(f"{status} {error}: {description}")
+        self.status = status
+        self.error = error
+        self.description = description
+        self.allow = allow
+
+    @property
+    def body(self) -> bytes:
+        """The JSON body of the response."""
+        return orjson.dumps({"error": self.error, "description": self.description})
+
+
+def bad_request(description: str) -> NgsiError:
+    """400, with Orion's sentence."""
+    return NgsiError(400, "BadRequest", description)
+
+
+def parse_error() -> NgsiError:
+    """400 for a body that is not JSON, or not an object."""
+    return NgsiError(400, "ParseError", "Errors found in incoming JSON buffer")
+
+
+def not_found(description: str = ENTITY_NOT_FOUND) -> NgsiError:
+    """404, by default for an entity."""
+    return NgsiError(404, "NotFound", description)
+
+
+def too_many() -> NgsiError:
+    """409 for an id that matches several entities."""
+    return NgsiError(
+        409,
+        "TooManyResults",
+        "More than one matching entity. Please refine your query",
+    )
+
+
+# --- dates ----------------------------------------------------------------------
+
+_DATE = re.compile(r"\d{4}-\d{2}-\d{2}(T\d{2}:\d{2}(:\d{2}([.,]\d+)?)?)?(Z|[+-].*)?")
+
+
+def date_text(value: Any) -> bytes:
+    """A ``DateTime`` as Orion prints it: UTC with milliseconds.
+
+    Raises:
+        NgsiError: 400, not a date.
+    """
+    if value is None:
+        return b"null"
+    if isinstance(value, str) and _DATE.fullmatch(value):
+        try:
+            moment = datetime.fromisoformat(value.replace(",", "."))
+        except ValueError:
+            moment = None
+        if moment is not None:
+            moment = moment if moment.tzinfo else moment.replace(tzinfo=UTC)
+            return date_json(moment.timestamp())
+    raise bad_request("date has invalid format in attribute value")
+
+
+def date_json(at: float) -> bytes:
+    """Unix seconds as JSON text with milliseconds."""
+    return b'"%b"' % date_iso(at).encode()
+
+
+def date_iso(at: float) -> str:
+    """Unix seconds as ISO-8601 with milliseconds and Z."""
+    second, milliseconds = divmod(round(at * 1000), 1000)
+    return f"{_whole_second(second)}.{milliseconds:03d}Z"
+
+
+@lru_cache(maxsize=64)
+def _whole_second(at: int) -> str:
+    return datetime.fromtimestamp(at, UTC).isoformat()[:19]
+
+
+# --- text -----------------------------------------------------------------------
 
 FORBIDDEN = frozenset("<>\"'=;()")
 _NAME_FORBIDDEN = re.compile(r"[<>\"'=;()\s?/#&]")

@@ -12,7 +12,7 @@ error depends on whether any part was done::
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from iveg.lab.embedded.orion_errors import NgsiError, not_found
+from iveg.lab.embedded.orion_text import NgsiError, not_found
 
 MISSING = "do not exist: "
 EXISTING = "one or more of the attributes in the request already exist: "

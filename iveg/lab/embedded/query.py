@@ -8,7 +8,7 @@ from typing import Any
 import orjson
 
 from iveg.lab.embedded.entities import Entity
-from iveg.lab.embedded.orion_errors import NgsiError, bad_request
+from iveg.lab.embedded.orion_text import NgsiError, bad_request
 
 _STATEMENT = re.compile(r"([^=!<>~:.]+)(?:(==|!=|>=|<=|>|<)([^,]+))?")
 _COMPARISONS: Mapping[str, Callable[[Any, Any], bool]] = {

@@ -23,7 +23,7 @@ from iveg.lab.embedded.entities import (
     under,
 )
 from iveg.lab.embedded.notifier import NotificationTarget, exchange
-from iveg.lab.embedded.orion_errors import bad_request
+from iveg.lab.embedded.orion_text import bad_request
 from iveg.lab.embedded.outbox import AGENT
 from iveg.lab.embedded.scope import Scope
 from iveg.lab.embedded.subscriptions import new_id

@@ -5,7 +5,7 @@ from typing import Any
 from iveg.lab.embedded.context_broker import ContextBroker
 from iveg.lab.embedded.http_server import Response, json_response
 from iveg.lab.embedded.ngsi_request import Call, paging
-from iveg.lab.embedded.orion_errors import NgsiError, bad_request, not_found
+from iveg.lab.embedded.orion_text import NgsiError, bad_request, not_found
 from iveg.lab.embedded.registrations import Registration, read_registration
 from iveg.lab.embedded.subscriptions import (
     Subscription,

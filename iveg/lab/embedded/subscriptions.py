@@ -9,9 +9,15 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from iveg.lab.embedded.entities import Touched
-from iveg.lab.embedded.orion_dates import date_iso, date_text
-from iveg.lab.embedded.orion_errors import NgsiError, bad_request, parse_error
-from iveg.lab.embedded.orion_text import FORBIDDEN, read_pattern
+from iveg.lab.embedded.orion_text import (
+    FORBIDDEN,
+    NgsiError,
+    bad_request,
+    date_iso,
+    date_text,
+    parse_error,
+    read_pattern,
+)
 from iveg.lab.embedded.views import EntityView
 
 FORMATS = (

@@ -10,8 +10,10 @@ from iveg.lab.embedded.entities import (
     Value,
     metadata_json,
 )
-from iveg.lab.embedded.orion_dates import date_json
-from iveg.lab.embedded.orion_text import quoted
+from iveg.lab.embedded.orion_text import (
+    date_json,
+    quoted,
+)
 
 _BUILTIN = ("dateCreated", "dateModified", "alterationType")
 _NOTIFIED = frozenset(("actionType", "previousValue"))

@@ -5,8 +5,10 @@ from typing import Any
 import pytest
 
 from iveg.lab.embedded.entities import Entity, EntityChange, Touched, apply
-from iveg.lab.embedded.orion_dates import date_text
-from iveg.lab.embedded.orion_errors import NgsiError
+from iveg.lab.embedded.orion_text import (
+    NgsiError,
+    date_text,
+)
 from iveg.lab.embedded.query import matches_query
 from iveg.lab.embedded.subscriptions import Subscription, read_subscription
 

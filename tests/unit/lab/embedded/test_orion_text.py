@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from iveg.lab.embedded.orion_errors import NgsiError
 from iveg.lab.embedded.orion_text import (
+    NgsiError,
     check_name,
     holds_forbidden,
     looks_clean,
