@@ -57,7 +57,7 @@ class Outbox:
 
         def done(status: int, answer: bytes | str) -> None:
             if status:
-                subscription.told(self._now(), status)
+                subscription.succeeded(self._now(), status)
             else:
                 subscription.failed(self._now(), str(answer))
 

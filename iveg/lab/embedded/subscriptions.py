@@ -164,7 +164,7 @@ class Subscription:
         if self.status == "oneshot":
             self.status = "inactive"
 
-    def told(self, now: float, status: int) -> None:
+    def succeeded(self, now: float, status: int) -> None:
         """Record a response of the receiver; any status counts as success."""
         self.last_success, self.last_success_code, self.fails = now, status, 0
 
