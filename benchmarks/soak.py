@@ -25,10 +25,10 @@ from iveg.adapters.mqtt import BrokerAddress
 from tests.processes import Site, site
 
 KINDS = {
-    "_odom": ("base_pose_ground_truth", "orion.Odometry"),
-    "_lidar2D": ("lidar_header", "orion.LaserScan"),
-    "_yolox_bounding_boxes": ("detection_header", "orion.DetectionFrame"),
-    "_safety": ("safety_state", "orion.SafetyReport"),
+    "_odom": ("base_pose_ground_truth", "fiware.Odometry"),
+    "_lidar2D": ("lidar_header", "fiware.LaserScan"),
+    "_yolox_bounding_boxes": ("detection_header", "fiware.DetectionFrame"),
+    "_safety": ("safety_state", "fiware.SafetyReport"),
 }
 """Device suffix → attribute with the robot's own count, counter at the dashboard."""
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iveg.domain.geometry import Box3D, Pose2D, Twist2D
-from iveg.domain.transports import FIWARE, TransportId, alias_of
+from iveg.domain.transports import FIWARE, TransportId
 
 
 @dataclass(frozen=True, slots=True)
@@ -382,8 +382,3 @@ class Received:
     asked: bool = False
     thinned: bool = False
     sparse: bool = True
-
-    @property
-    def alias(self) -> str:
-        """The transport's name in counters, such as ``orion.odometry``."""
-        return alias_of(self.transport)

@@ -4,7 +4,6 @@ Orders, their times, JSON and pages are keyed by a transport's id.  Transports s
 nothing, so that a fault of one leaves the others alone.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Literal, NewType
 
@@ -23,7 +22,6 @@ class Transport:
             without, only the robot's answer says anything.
         one_at_a_time: A STOP waits until the one before came back, and is sent to a
             robot that has it only where there is no other way.
-        alias: The word for it in the JSON key ``road``, for one version.
     """
 
     id: TransportId
@@ -31,7 +29,6 @@ class Transport:
     can_release: bool = True
     confirms: bool = False
     one_at_a_time: bool = False
-    alias: str = ""
 
     def carries(self, order: Literal["stop", "release", "resume"]) -> bool:
         """Whether it takes such an order."""
@@ -42,15 +39,9 @@ class Transport:
         return self if on else replace(self, can_stop=False, can_release=False)
 
 
-DIRECT = Transport(TransportId("direct"), confirms=True, alias="mqtt")
+DIRECT = Transport(TransportId("direct"), confirms=True)
 """Straight over MQTT; its word is the broker's PUBACK."""
-FIWARE = Transport(TransportId("fiware"), one_at_a_time=True, alias="orion")
+FIWARE = Transport(TransportId("fiware"), one_at_a_time=True)
 """Through Orion and the IoT Agent; a 204 says nothing."""
 
 TRANSPORTS = (DIRECT, FIWARE)
-_ALIASES: Mapping[TransportId, str] = {one.id: one.alias for one in TRANSPORTS}
-
-
-def alias_of(transport: TransportId) -> str:
-    """Its word in the JSON key ``road``, for one version."""
-    return _ALIASES.get(transport) or transport

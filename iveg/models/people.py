@@ -8,7 +8,7 @@ from iveg.domain.records import DetectionRecord, Json
 from iveg.domain.stamps import format_stamp
 from iveg.domain.tracking.people import Placed
 from iveg.domain.tracking.person import Stage
-from iveg.domain.transports import TransportId, alias_of
+from iveg.domain.transports import TransportId
 from iveg.models.base import Model
 from iveg.models.margin import Margin
 from iveg.models.places import Position
@@ -92,8 +92,6 @@ class Detection(Model):
     """The robot of the fleet that was seen."""
     transport: TransportId
     """Transport of the copy that was first."""
-    road: str
-    """The same in the words of an earlier version."""
 
     @classmethod
     def of(
@@ -113,7 +111,6 @@ class Detection(Model):
             person_id=None if one.person is None else one.person.person_id,
             peer=one.peer,
             transport=transport,
-            road=alias_of(transport),
         )
 
     @classmethod
@@ -131,7 +128,6 @@ class Detection(Model):
             confident=record.confident,
             person_id=record.person_id,
             transport=TransportId(record.transport),
-            road=alias_of(TransportId(record.transport)),
         )
 
 
@@ -149,7 +145,5 @@ class DetectionFrame(Model):
     robot_id: str
     stamp: str | None
     transport: TransportId
-    road: str
-    """The same in the words of an earlier version."""
     age_s: float
     items: list[Detection]

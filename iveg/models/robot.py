@@ -237,8 +237,6 @@ class Robot(Model):
     navigation: Navigation | None
     replay: bool
     clock_offset_s: float | None
-    road: str
-    """Transport of the newest detections, in the words of an earlier version."""
     transport: TransportId
     """Transport that feeds the pose."""
     profile: Profile

@@ -75,7 +75,7 @@ class Ingest:
             return
         name = kind_of(received.observation).__name__
         # What we asked for is no message: it would hide that one was lost.
-        way = "asked" if received.asked else received.alias
+        way = "asked" if received.asked else received.transport
         self.counters[f"{way}.{name}"] += 1
         if not isinstance(received.observation, RefusedFrame):
             self._passed(received)

@@ -14,7 +14,6 @@ from iveg.domain.rule.speed_limits import Crossing
 from iveg.domain.stamps import format_stamp
 from iveg.domain.stop import FollowedCommand, StopMachine
 from iveg.domain.tracking.person import TrackedPerson
-from iveg.domain.transports import alias_of
 from iveg.models.alert import Alert, Flood, LogEntry
 from iveg.models.base import moment, rounded
 from iveg.models.climate import Climate
@@ -110,7 +109,6 @@ class Views:
             navigation=Navigation.of(robot),
             replay=robot.is_replay,
             clock_offset_s=rounded(robot.clock.offset_s(now)),
-            road=alias_of(robot.frame_transport),
             transport=self._world.feeds.of(robot_id).transport(now.mono),
             profile=Profile.of(robot.profile),
             margin=Margin.of(self._margin(robot, margins, now)),
@@ -208,7 +206,6 @@ class Views:
             robot_id=robot_id,
             stamp=stamp,
             transport=transport,
-            road=alias_of(transport),
             age_s=round(now.mono - robot.detections_at, 3),
             items=[
                 Detection.of(one, robot_id, stamp, transport)

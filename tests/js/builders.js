@@ -44,7 +44,6 @@ export function robot(changes = {}) {
     navigation: null,
     replay: false,
     clock_offset_s: 0,
-    road: "orion",
     transport: "direct",
     margin: null,
     battery: null,
@@ -107,7 +106,6 @@ export function detection(changes = {}) {
     received_at: null,
     peer: null,
     transport: "direct",
-    road: "mqtt",
     ...changes,
   };
 }

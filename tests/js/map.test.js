@@ -58,7 +58,7 @@ test("a message is painted in the next frame and told with its own stamp", async
   const sweep = { robot_id: "AGI", stamp: "s2", age_s: 0, points };
   store.apply("robots/AGI/scan", sweep);
   const items = [detection()];
-  const look = { robot_id: "AGI", stamp: "s3", road: "mqtt", items };
+  const look = { robot_id: "AGI", stamp: "s3", items };
   store.apply("detections/AGI", look);
   equal(painted, []);
   await frame();
@@ -207,7 +207,7 @@ test("every layer shows, and its switch takes it off the picture", async () => {
   store.apply("snapshot", snapshot({ robots: [robot({ navigation })], people }));
   store.setConnection("open");
   const faint = detection({ person_id: null, position: { x: 13, y: 2, z: 1 } });
-  const look = { robot_id: "AGI", stamp: "s", road: "mqtt", items: [faint] };
+  const look = { robot_id: "AGI", stamp: "s", items: [faint] };
   const points = new Float32Array([17, 9, 17.5, 9]);
   const origin = { x: 12, y: 8 };
   const grid = { resolution: 0.5, width: 2, height: 1, origin, data: [100, 40] };

@@ -132,7 +132,7 @@ test("a gauge says no limit and no speed of a robot without a message", () => {
 
 test("the most certain detection of a fresh frame is told, an old frame says nothing", () => {
   const items = [0.3, 0.9, 0.6].map((probability) => detection({ probability }));
-  const way = { transport: "direct", road: "mqtt" };
+  const way = { transport: "direct" };
   const frame = { robot_id: "AGI", stamp: "s", age_s: 0, ...way, items };
   const fresh = { ...frame, receivedAtMs: performance.now() };
   const old = { ...frame, receivedAtMs: performance.now() - 3500 };

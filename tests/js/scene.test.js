@@ -114,7 +114,7 @@ test("a box in the robot's frame turns with the robot, one in the map does not",
   const items = [detection({ box }), detection()];
   store.apply(
     "detections/AGI",
-    { robot_id: "AGI", stamp: "s", road: "mqtt", items },
+    { robot_id: "AGI", stamp: "s", items },
     0,
   );
   const [turned, straight] = readScene(store, 100).detections;
@@ -124,7 +124,7 @@ test("a box in the robot's frame turns with the robot, one in the map does not",
 
 test("a detection frame older than a second shows nothing", () => {
   const store = storeOf();
-  const frame = { robot_id: "AGI", stamp: "s", road: "mqtt", items: [detection()] };
+  const frame = { robot_id: "AGI", stamp: "s", items: [detection()] };
   store.apply("detections/AGI", frame, 0);
   equal(readScene(store, 1100).detections, []);
 });

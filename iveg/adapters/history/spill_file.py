@@ -18,7 +18,7 @@ import orjson
 from iveg.adapters.files import make_private
 from iveg.domain.errors import HopError
 from iveg.domain.records import RECORD_TYPES, Record
-from iveg.domain.transports import TRANSPORTS
+from iveg.domain.transports import DIRECT, FIWARE
 from iveg.pipeline.record import Waiting
 
 _log = logging.getLogger(__name__)
@@ -27,7 +27,8 @@ _ONCE_TEXT = frozenset({"rule_parameters", "links", "slots", "members", "box"})
 """Fields that the version before wrote as JSON in a text."""
 _ONCE_NAMED = {"road": "transport", "mandated_factor": "limit_factor"}
 """Fields that the version before called by another name."""
-_ONCE_VALUED = {one.alias: one.id for one in TRANSPORTS}
+_ONCE_VALUED = {"mqtt": DIRECT.id, "orion": FIWARE.id}
+"""Transports in the words of the version before."""
 _RESERVE_BYTES = 10 * 2**20
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT)
 

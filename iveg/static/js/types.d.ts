@@ -254,8 +254,6 @@ export type Detection = {
   peer: string | null;
   /** Transport of the copy that was first. */
   transport: string;
-  /** The same in the words of an earlier version. */
-  road: string;
 };
 
 /** A 3D box (m) in ``frame_id``. */
@@ -274,8 +272,6 @@ export type DetectionFrame = {
   robot_id: string;
   stamp: string | null;
   transport: string;
-  /** The same in the words of an earlier version. */
-  road: string;
   age_s: number;
   items: Detection[];
 };
@@ -746,8 +742,6 @@ export type Robot = {
   navigation: Navigation | null;
   replay: boolean;
   clock_offset_s: number | null;
-  /** Transport of the newest detections, in the words of an earlier version. */
-  road: string;
   /** Transport that feeds the pose. */
   transport: string;
   profile: Profile;

@@ -22,12 +22,11 @@ from iveg.domain.records import (
     AlertRecord,
     ByTransport,
     DecisionRecord,
-    DetectionRecord,
     LogRecord,
     Record,
 )
 from iveg.domain.stamps import format_stamp
-from iveg.domain.transports import TRANSPORTS, TransportId, alias_of
+from iveg.domain.transports import TRANSPORTS, TransportId
 from iveg.models.base import Model, write_json
 from iveg.models.decision import sentence_of
 from iveg.web.pages.sentences import Sentences
@@ -86,23 +85,13 @@ def csv_rows(
 def _columns(kind: type[R]) -> Iterator[tuple[str, Callable[[R], object]]]:
     """A column a field; of what is kept by transport one for each of the table."""
     for one in fields(kind):
-        if one.name == "transport":
-            yield "road", _road
-            continue
         if one.type != ByTransport:
             yield one.name, attrgetter(one.name)
             continue
-        # The version before had them in this order.
+        # Programs that read by position know this order.
         for transport in reversed(TRANSPORTS):
             name = one.name.replace("_at", f"_{transport.id}_at")
             yield name, partial(_of_transport, one.name, transport.id)
-    if kind is DetectionRecord:
-        yield "transport", attrgetter("transport")
-
-
-def _road(record: R) -> str:
-    """The transport under the name and in the place of the version before."""
-    return alias_of(attrgetter("transport")(record))
 
 
 def _of_transport(name: str, transport: TransportId, record: R) -> object:

@@ -125,8 +125,8 @@ def test_what_comes_is_counted_by_transport_and_kind() -> None:
     queue.enqueue(received(odometry()))
     queue.enqueue(received(safety_report(), transport=DIRECT.id))
 
-    assert queue.counters["orion.Odometry"] == 1
-    assert queue.counters["mqtt.SafetyReport"] == 1
+    assert queue.counters["fiware.Odometry"] == 1
+    assert queue.counters["direct.SafetyReport"] == 1
 
 
 def test_an_unknown_robot_is_counted_each_time_and_logged_once(
@@ -182,7 +182,7 @@ def test_what_was_asked_for_is_counted_apart_from_what_was_sent() -> None:
     queue.enqueue(replace(received(odometry()), asked=True))
     queue.enqueue(received(odometry()))
 
-    assert queue.counters == {"asked.Odometry": 1, "orion.Odometry": 1}
+    assert queue.counters == {"asked.Odometry": 1, "fiware.Odometry": 1}
 
 
 def test_a_robot_that_floods_drops_its_own_telemetry_and_no_other_robots() -> None:

@@ -135,7 +135,6 @@ async def test_a_detection_reads_as_the_contract_says(
         "person_id": "P1",
         "peer": None,
         "transport": "direct",
-        "road": "mqtt",
     }
 
 
@@ -654,7 +653,7 @@ async def test_the_lists_are_described_for_integrators(past: Past) -> None:
         "application/x-ndjson",
     }
     fields = described["components"]["schemas"]["Detection"]["properties"]
-    assert {"class", "position", "road"} <= set(fields)
+    assert {"class", "position", "transport"} <= set(fields)
 
 
 async def test_a_reading_reads_as_it_was_said(
