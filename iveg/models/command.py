@@ -13,7 +13,7 @@ from iveg.domain.stamps import format_stamp
 from iveg.domain.stop import StopMachine
 from iveg.domain.stop.commands import Times
 from iveg.domain.stop.outcome import Outcome, outcome_of, was_loud
-from iveg.domain.transports import DIRECT, FIWARE, TransportId
+from iveg.domain.transports import DIRECT, TransportId
 from iveg.models.base import Model, Slots, rounded, stamp
 
 AGENT_LATE_S = 1.0
@@ -30,11 +30,6 @@ class CommandTimes(Model):
     """By transport, when it took it; one that has not is not there."""
     answer: dict[TransportId, str]
     """By transport, when the robot said by it that it has it."""
-    sent_fiware: str | None
-    """As ``sent["fiware"]``, for one version; so are the next three."""
-    sent_direct: str | None
-    answer_fiware: str | None
-    answer_direct: str | None
     standing: str | None
     """The first standing sample."""
 
@@ -53,10 +48,6 @@ class CommandTimes(Model):
             requested=format_stamp(requested),
             sent={one: format_stamp(at) for one, at in sent.items()},
             answer={one: format_stamp(at) for one, at in answer.items()},
-            sent_fiware=stamp(sent.get(FIWARE.id)),
-            sent_direct=stamp(sent.get(DIRECT.id)),
-            answer_fiware=stamp(answer.get(FIWARE.id)),
-            answer_direct=stamp(answer.get(DIRECT.id)),
             standing=stamp(standing),
         )
 
@@ -105,8 +96,6 @@ class Command(Model):
     pressed_doubted: bool = False
     age_s: float | None = None
     transports: dict[str, str]
-    roads: dict[str, str]
-    """``transports`` for one version more."""
     agent_lag_s: float | None = None
     note: Sentence | None = None
     robot: CommandRobot | None = None
@@ -138,7 +127,6 @@ class Command(Model):
             pressed_doubted=of.times.pressed_doubted,
             age_s=round(now.mono - of.times.requested.mono, 3),
             transports=dict(of.transports.items()),
-            roads=dict(of.transports.items()),
             agent_lag_s=rounded(of.agent_lag_s, 1),
             note=_note(of),
             robot=_robot(machine, now),
@@ -170,7 +158,6 @@ class Command(Model):
             reason=record.reason,
             requesters=[record.requested_by],
             transports={},
-            roads={},
             outcome=outcome_of(record),
             was_loud=was_loud((record.state, *(one.state for one in steps))),
             steps=[
@@ -261,11 +248,6 @@ class RobotLatency(Model):
     sent: dict[TransportId, LatencySpread]
     """By transport, until it left; ``answer`` until the robot said that it has it."""
     answer: dict[TransportId, LatencySpread]
-    sent_direct: LatencySpread
-    """As ``sent["direct"]``, for one version; so are the next three."""
-    sent_fiware: LatencySpread
-    answer_direct: LatencySpread
-    answer_fiware: LatencySpread
     standing: LatencySpread
 
 

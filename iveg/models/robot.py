@@ -227,7 +227,6 @@ class Robot(Model):
     """Speed factor that the robot reports to apply."""
     applied: Applied | None
     speed_limit: SpeedLimit
-    mandate: SpeedLimit
     missing: list[MissingPremise]
     """What "clear" lacks, its reason first."""
     detector: Detector

@@ -83,7 +83,6 @@ class Views:
         robot = self._world.robot(robot_id)
         machine = self._commander.machine(robot_id)
         odometry, safety, age = robot.odometry, robot.safety, robot.age_s(now)
-        limit = SpeedLimit.of(self._evaluator.speed_limits[robot_id])
         return Robot(
             robot_id=robot_id,
             link=robot.link(now),
@@ -96,8 +95,7 @@ class Views:
             age_estimated=robot.estimated_since is not None,
             speed_factor=None if safety is None else safety.speed_factor,
             applied=Applied.of(robot, now),
-            speed_limit=limit,
-            mandate=limit,
+            speed_limit=SpeedLimit.of(self._evaluator.speed_limits[robot_id]),
             missing=[
                 MissingPremise(premise=one.premise, robot_id=one.robot_id)
                 for one in self._evaluator.missing(robot_id)

@@ -112,11 +112,7 @@ test("a box in the robot's frame turns with the robot, one in the map does not",
   const sides = { xmin: 3, xmax: 3.4, ymin: -0.3, ymax: 0.3, zmin: 0, zmax: 1.8 };
   const box = { ...sides, frame_id: "base_link" };
   const items = [detection({ box }), detection()];
-  store.apply(
-    "detections/AGI",
-    { robot_id: "AGI", stamp: "s", items },
-    0,
-  );
+  store.apply("detections/AGI", { robot_id: "AGI", stamp: "s", items }, 0);
   const [turned, straight] = readScene(store, 100).detections;
   equal([turned.yaw, straight.yaw], [1.5, 0]);
   near(turned.length, 0.4);

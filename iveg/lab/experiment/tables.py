@@ -151,7 +151,7 @@ STOPS: Final = ("robot", "robot's answer", "standing")
 def stops(result: Result) -> Rows:
     """STOP of the fleet (ms since the request)."""
     for one in result["stack"]["stops"]:
-        answered = ms(one["answer_direct"]["p50_ms"])
+        answered = ms(one["answer"]["direct"]["p50_ms"])
         yield one["robot_id"], answered, ms(one["standing"]["p50_ms"])
 
 

@@ -115,8 +115,6 @@ export type Command = {
   pressed_doubted: boolean;
   age_s: number | null;
   transports: Record<string, string>;
-  /** ``transports`` for one version more. */
-  roads: Record<string, string>;
   agent_lag_s: number | null;
   note: Sentence | null;
   robot: CommandRobot | null;
@@ -151,11 +149,6 @@ export type CommandTimes = {
   sent: Record<string, string>;
   /** By transport, when the robot said by it that it has it. */
   answer: Record<string, string>;
-  /** As ``sent["fiware"]``, for one version; so are the next three. */
-  sent_fiware: string | null;
-  sent_direct: string | null;
-  answer_fiware: string | null;
-  answer_direct: string | null;
   /** The first standing sample. */
   standing: string | null;
 };
@@ -732,7 +725,6 @@ export type Robot = {
   speed_factor: number | null;
   applied: Applied | null;
   speed_limit: SpeedLimit;
-  mandate: SpeedLimit;
   /** What "clear" lacks, its reason first. */
   missing: MissingPremise[];
   detector: Detector;
@@ -759,11 +751,6 @@ export type RobotLatency = {
   /** By transport, until it left; ``answer`` until the robot said that it has it. */
   sent: Record<string, LatencySpread>;
   answer: Record<string, LatencySpread>;
-  /** As ``sent["direct"]``, for one version; so are the next three. */
-  sent_direct: LatencySpread;
-  sent_fiware: LatencySpread;
-  answer_direct: LatencySpread;
-  answer_fiware: LatencySpread;
   standing: LatencySpread;
 };
 

@@ -14,7 +14,7 @@ from iveg.adapters.history.series import CommandLatency
 from iveg.domain.observations import Instant
 from iveg.domain.records import ByTransport, CommandRecord
 from iveg.domain.stamps import format_stamp
-from iveg.domain.transports import DIRECT, FIWARE, TRANSPORTS, TransportId
+from iveg.domain.transports import TRANSPORTS, TransportId
 from iveg.models.base import Listing, rounded
 from iveg.models.command import (
     Command,
@@ -87,18 +87,12 @@ def _by_robot(found: Iterable[CommandLatency]) -> list[RobotLatency]:
 
 
 def _robot(robot_id: str, stops: list[CommandLatency]) -> RobotLatency:
-    sent = _by_transport([one.sent_ms for one in stops])
-    answer = _by_transport([one.answer_ms for one in stops])
     return RobotLatency(
         robot_id=robot_id,
         stops=len(stops),
         accepted=LatencySpread.of(one.accepted_ms for one in stops),
-        sent=sent,
-        answer=answer,
-        sent_direct=sent[DIRECT.id],
-        sent_fiware=sent[FIWARE.id],
-        answer_direct=answer[DIRECT.id],
-        answer_fiware=answer[FIWARE.id],
+        sent=_by_transport([one.sent_ms for one in stops]),
+        answer=_by_transport([one.answer_ms for one in stops]),
         standing=LatencySpread.of(one.standstill_ms for one in stops),
     )
 

@@ -31,7 +31,6 @@ async def test_a_robot_that_was_never_heard_is_all_unknown() -> None:
     assert told["link"] == "UNKNOWN"
     assert (told["pose"], told["age_s"], told["speed_factor"]) == (None, None, None)
     assert told["speed_limit"]["speed_factor"] == 0.5
-    assert told["mandate"] == told["speed_limit"]
 
 
 async def test_a_robot_is_told_with_pose_age_speed_limit_and_profile() -> None:
@@ -120,7 +119,6 @@ async def test_a_robot_that_is_to_stop_is_told_with_its_command() -> None:
     assert (told["mode"], told["stop_state"]) == ("SLOW", "SENT")
     assert told["stop"]["requested_by"] == "ana"
     assert told["stop"]["transports"] == {"direct": "ok", "fiware": "pending"}
-    assert told["stop"]["roads"] == told["stop"]["transports"]
     assert told["stop"]["hold_id"] == told["stop"]["command_id"]
     assert told["stop"]["note"] is None
     assert not told["stop"]["challenge_fresh"]
