@@ -2,7 +2,7 @@
 
 This table is the only place that spells a topic.  The pipeline names changed topics by
 it (``ROBOT.of("AGI")``), ``/live`` reads and paces by it, and the snapshot is the table
-read once.  A topic without ``read`` is an event: each event is sent, none is a state.
+read once.  Events are each sent; of states the newest is.
 """
 
 from collections.abc import Callable, Iterable
@@ -29,17 +29,11 @@ Pace = Literal["at once", "frame", "read-out", "picture"]
 class StateReader(Protocol):
     """Source of the newest value of every topic (``web.views``)."""
 
-    def robot(self, robot_id: str, now: Instant) -> Robot:
-        """One robot."""
-
     def robots(self, now: Instant) -> list[Robot]:
         """The fleet."""
 
     def people(self, now: Instant) -> list[Person]:
         """Every known person."""
-
-    def frame(self, robot_id: str, now: Instant) -> DetectionFrame | None:
-        """A robot's newest detection frame."""
 
     def frames(self, now: Instant) -> dict[str, DetectionFrame]:
         """The newest detection frames of all robots that have one."""
@@ -82,18 +76,17 @@ class Topic:
     Attributes:
         name: As docs/interfaces/live.md writes it; ``{id}`` is the key.
         model: What its data are; None for what concerns one connection alone.
-        read: The newest value of one key; None for an event.
         tell: The data of an event.
-        member: Its place in the snapshot; ``every`` reads what stands there.
-        pace: How often a browser that speaks ``iveg.2`` is told of it.
+        member: Its place in the snapshot.
+        read: What stands there, which a topic told at once tells again as it changes.
+        pace: How often a browser is told of it.
     """
 
     name: str
     model: Any = None
-    read: Callable[[StateReader, str, Instant], Any] | None = None
     tell: Callable[[StateReader, Any, Instant], Any] = lambda _, item, __: item
     member: str = ""
-    every: Callable[[StateReader, Instant], Any] | None = None
+    read: Callable[[StateReader, Instant], Any] | None = None
     pace: Pace = "at once"
 
     def of(self, key: str) -> str:
@@ -104,9 +97,8 @@ class Topic:
 ROBOT = Topic(
     "robots/{id}",
     Robot,
-    lambda reader, robot_id, now: reader.robot(robot_id, now),
     member="robots",
-    every=lambda reader, now: reader.robots(now),
+    read=lambda reader, now: reader.robots(now),
     pace="frame",
 )
 ROBOT_STATE = Topic("robots/{id}/state", Robot, pace="read-out")
@@ -116,17 +108,15 @@ SCAN = Topic("robots/{id}/scan", Scan, pace="picture")
 PEOPLE = Topic(
     "people",
     list[Person],
-    lambda reader, _, now: reader.people(now),
     member="people",
-    every=lambda reader, now: reader.people(now),
+    read=lambda reader, now: reader.people(now),
     pace="read-out",
 )
 DETECTIONS = Topic(
     "detections/{id}",
     DetectionFrame,
-    lambda reader, robot_id, now: reader.frame(robot_id, now),
     member="detections",
-    every=lambda reader, now: reader.frames(now),
+    read=lambda reader, now: reader.frames(now),
     pace="picture",
 )
 COMMAND = Topic(
@@ -134,37 +124,34 @@ COMMAND = Topic(
     Command,
     tell=lambda reader, command, now: reader.command(command, now),
     member="commands",
-    every=lambda reader, now: reader.open_commands(now),
+    read=lambda reader, now: reader.open_commands(now),
 )
 ALERTS = Topic(
     "alerts",
     list[Alert],
-    lambda reader, _, __: reader.alerts(),
     member="alerts",
-    every=lambda reader, _: reader.alerts(),
+    read=lambda reader, _: reader.alerts(),
 )
 FLOOD = Topic(
     "flood",
     Flood,
-    lambda reader, _, __: reader.flood(),
     member="flood",
-    every=lambda reader, _: reader.flood(),
+    read=lambda reader, _: reader.flood(),
 )
 RULE = Topic(
     "rule",
     Rule,
-    lambda reader, _, __: reader.rule(),
     member="rule",
-    every=lambda reader, _: reader.rule(),
+    read=lambda reader, _: reader.rule(),
 )
-MAP = Topic("map", GreenhouseMap, member="map", every=lambda reader, _: reader.map())
+MAP = Topic("map", GreenhouseMap, member="map", read=lambda reader, _: reader.map())
 """In the snapshot alone: it stays as it is while iVeg runs."""
 LOG = Topic(
     "log",
     LogEntry,
     tell=lambda reader, line, _: reader.log([line])[0],
     member="log",
-    every=lambda reader, _: reader.newest_log(),
+    read=lambda reader, _: reader.newest_log(),
 )
 EARLIER_LOG = Topic(
     "log/earlier", list[LogEntry], tell=lambda reader, lines, _: reader.log(lines)
@@ -172,16 +159,14 @@ EARLIER_LOG = Topic(
 HEALTH = Topic(
     "health",
     Health,
-    lambda reader, _, now: reader.health(now),
     member="health",
-    every=lambda reader, now: reader.health(now),
+    read=lambda reader, now: reader.health(now),
 )
 CLIMATE = Topic(
     "climate",
     Climate | None,
-    lambda reader, _, now: reader.climate(now),
     member="climate",
-    every=lambda reader, now: reader.climate(now),
+    read=lambda reader, now: reader.climate(now),
 )
 SNAPSHOT = Topic("snapshot")
 PONG = Topic("pong")
@@ -233,4 +218,4 @@ def is_telemetry(topic: str) -> bool:
 
 def read_all(reader: StateReader, now: Instant) -> dict[str, Any]:
     """The members of the snapshot that topics have, by name."""
-    return {row.member: row.every(reader, now) for row in TOPICS if row.every}
+    return {row.member: row.read(reader, now) for row in TOPICS if row.read}

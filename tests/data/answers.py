@@ -44,11 +44,6 @@ from tests.unit.web.desk import WebDesk
 _ID = re.compile(rb"\bID\d{4}(-\d+)?")
 RECORDED = Path(__file__).with_name("answers.json")
 _TOPICS = (
-    "robots/AGI",
-    "robots/AGII",
-    "robots/AGI/scan",
-    "people",
-    "detections/AGI",
     "alerts",
     "flood",
     "rule",
@@ -181,7 +176,7 @@ async def _acknowledge(desk: WebDesk) -> Any:
 
 
 def _live(desk: WebDesk) -> dict[str, Any]:
-    """The frames of a browser without a subprotocol."""
+    """The messages beside telemetry."""
     told = {f"live {topic}": _read(desk.encoder.frame(topic)) for topic in _TOPICS}
     told["live log"] = _read(desk.encoder.event("log", log_record()))
     ana, now = Principal("ana", "operator"), desk.clock()
@@ -193,7 +188,7 @@ def _live(desk: WebDesk) -> dict[str, Any]:
 
 
 def _paced(desk: WebDesk) -> Any:
-    """The first frame of a browser that speaks ``iveg.2``."""
+    """The first frame of telemetry."""
     subscriber = Subscriber()
     for topic in _PACED:
         subscriber.changed(topic)

@@ -11,6 +11,7 @@ import httpx
 import orjson
 from websockets.asyncio.client import connect
 from websockets.exceptions import WebSocketException
+from websockets.typing import Subprotocol
 
 from iveg.domain.stamps import parse_stamp
 from iveg.lab.experiment.beliefs import Belief, belief_in
@@ -109,16 +110,28 @@ async def _listen(url: str, bearer: dict[str, str], watched: ObservedRun) -> Non
     address = url.replace("http", "ws", 1) + "/live"
     # A closed connection ends the recording, which keeps its frames.
     with contextlib.suppress(WebSocketException, OSError):
-        async with connect(address, additional_headers=bearer, proxy=None) as line:
+        async with connect(
+            address,
+            additional_headers=bearer,
+            subprotocols=[Subprotocol("iveg.2")],
+            proxy=None,
+        ) as line:
             async for message in line:
-                _hear(message, watched)
+                if isinstance(message, bytes):
+                    number = _hear(message, watched)
+                    await line.send(f'{{"type":"painted","frame":{number}}}')
 
 
-def _hear(message: str | bytes, watched: ObservedRun) -> None:
-    if isinstance(message, str) and message.startswith('{"topic":"detections/'):
-        picture = picture_of(orjson.loads(message)["data"])
-        if picture is not None:
-            watched.pictures.append(picture)
+def _hear(frame: bytes, watched: ObservedRun) -> int:
+    """Keep the pictures of one frame of telemetry; its number."""
+    end = 4 + int.from_bytes(frame[:4], "little")
+    head = orjson.loads(frame[4:end])
+    for part in head["parts"]:
+        if part["topic"].startswith("detections/"):
+            picture = picture_of(part["data"])
+            if picture is not None:
+                watched.pictures.append(picture)
+    return int(head["frame"])
 
 
 async def _believe(api: httpx.AsyncClient, robot_id: str, watched: ObservedRun) -> None:

@@ -1,8 +1,8 @@
 """A WebSocket with small buffers on this side.
 
 Data that the kernel and the server hold for a slow browser form a queue in front of the
-slots where the newest wins.  Credit bounds it for ``iveg.2``; here it is bounded for
-everybody.
+slots where the newest wins.  Credit bounds it for telemetry; here it is bounded for all
+else, too.
 """
 
 import asyncio

@@ -2,9 +2,8 @@
 
 A message is encoded once for all browsers.  Each browser has one task that sends the
 newest values; a browser that reads nothing keeps no queue and is closed after a while
-(fault F23).  A browser with ``iveg.2`` is sent telemetry in frames, as fast as it
-paints them; everything else passes beside them at once.  A browser without it gets a
-message for each topic, for one version more.
+(fault F23).  Telemetry goes in frames, as fast as a browser paints them; everything
+else passes beside them at once.
 """
 
 import asyncio
@@ -12,7 +11,6 @@ import logging
 from collections.abc import Awaitable, Callable, Coroutine, Iterable
 from typing import Annotated, Any
 
-import orjson
 from fastapi import APIRouter, Depends, WebSocket, WebSocketDisconnect
 from starlette.websockets import WebSocketState
 
@@ -29,7 +27,7 @@ from iveg.pipeline.publish import Hub, Subscriber
 from iveg.web.live.feed import TelemetryFeed
 from iveg.web.live.pacing import SUBPROTOCOL
 from iveg.web.live.painting import Painting
-from iveg.web.live.telemetry import TelemetryEncoder, write_frame
+from iveg.web.live.telemetry import TelemetryEncoder
 from iveg.web.presses import read_press
 from iveg.web.security.authentication import (
     NO_SESSION,
@@ -42,10 +40,11 @@ from iveg.web.views import Views
 
 _log = logging.getLogger(__name__)
 TOO_SLOW = 4008
+NO_PROTOCOL = 4406
+"""Close code of a program that does not ask for ``iveg.2``."""
 _SEND_LIMIT_S = 10.0
 _CHECK_S = 0.5
 _MAX_MESSAGE = 65536
-_CACHE = 512
 
 Stop = Callable[[str | None, str, Press], Awaitable[object]]
 
@@ -66,43 +65,20 @@ class Encoder:
         self._frames: dict[str, tuple[int, bytes]] = {}
 
     def frame(self, topic: str) -> bytes | None:
-        """The newest frame of a state topic; None when there is nothing to say."""
+        """The newest frame of a topic told at once; None with nothing to say."""
         version = self._hub.versions[topic]
         kept = self._frames.get(topic)
         if kept is not None and kept[0] == version:
             return kept[1]
         frame = self._encode(topic)
         if frame is not None:
-            if len(self._frames) >= _CACHE:
-                self._frames.clear()
             self._frames[topic] = version, frame
         return frame
 
     def _encode(self, topic: str) -> bytes | None:
-        now, (row, key) = self._clock(), topics.find(topic)
-        if row is topics.SCAN:
-            try:
-                return self._scan(topic, key, now)
-            except Exception as error:
-                self._views.scans.undrawable(key, error)
-                return None
-        data = None if row.read is None else row.read(self._views, key, now)
+        now, row = self._clock(), topics.find(topic)[0]
+        data = None if row.read is None else row.read(self._views, now)
         return None if data is None else text(topic, data, now)
-
-    def _scan(self, topic: str, robot_id: str, now: Instant) -> bytes | None:
-        robot = self._views.robot_state(robot_id)
-        scan = self._views.scans.newest(robot)
-        if scan is None or robot.scan_pose is None:
-            return None
-        head = orjson.dumps(
-            {
-                "topic": topic,
-                "robot_id": robot_id,
-                "stamp": scan.origin.stamp,
-                "age_s": self._views.scan_age_s(robot_id, now),
-            }
-        )
-        return write_frame(head, [scan.points(robot.scan_pose).tobytes()])
 
     def event(self, topic: str, item: object) -> bytes:
         """The frame of an event, which is never dropped."""
@@ -137,15 +113,15 @@ def router(
         principal: Annotated[Principal, Depends(require("read"))],
     ) -> None:
         """Serve one browser."""
-        is_paced = SUBPROTOCOL in websocket.scope.get("subprotocols", ())
-        await websocket.accept(SUBPROTOCOL if is_paced else None)
+        if SUBPROTOCOL not in websocket.scope.get("subprotocols", ()):
+            # Close codes are seen only after the handshake.
+            await websocket.accept()
+            await websocket.close(NO_PROTOCOL)
+            return
+        await websocket.accept(SUBPROTOCOL)
         subscriber = hub.join()
         line = Line(websocket, subscriber, encoder, clock)
-        feed = (
-            TelemetryFeed(encoder.telemetry, subscriber, Painting(latency))
-            if is_paced
-            else None
-        )
+        feed = TelemetryFeed(encoder.telemetry, subscriber, Painting(latency))
         try:
             now = clock()
             await line.say(text(topics.SNAPSHOT.name, snapshot(principal, now), now))
@@ -195,22 +171,15 @@ class Line:
         """Send JSON."""
         await _sent(self._websocket.send_text(frame.decode()))
 
-    async def send(self, feed: TelemetryFeed | None) -> None:
-        """Everything, as fast as the browser reads, and telemetry as fast as it paints.
-
-        Without a ``feed`` telemetry is sent like all else.
-        """
+    async def send(self, feed: TelemetryFeed) -> None:
+        """Everything, as fast as the browser reads; telemetry as fast as it paints."""
         loop = asyncio.get_running_loop()
         while not self._subscriber.overflowed:
             self._sending_since = None
-            within_s = None if feed is None else feed.wait_s(self._clock().mono)
-            await self._subscriber.news(within_s)
+            await self._subscriber.news(feed.wait_s(self._clock().mono))
             self._sending_since = loop.time()
             await self._send_news()
-            if feed is None:
-                await self._send_topics(self._subscriber.take_telemetry())
-            else:
-                await self._send_frame(feed)
+            await self._send_frame(feed)
         await self.close_slow()
 
     @property
@@ -232,16 +201,9 @@ class Line:
     async def _send_news(self) -> None:
         for topic, item in self._subscriber.take_events():
             await self.say(self._encoder.event(topic, item))
-        await self._send_topics(self._subscriber.take_topics())
-
-    async def _send_topics(self, changed: Iterable[str]) -> None:
-        for topic in changed:
+        for topic in self._subscriber.take_topics():
             frame = self._encoder.frame(topic)
-            if frame is None:
-                continue
-            if topics.find(topic)[0] is topics.SCAN:
-                await _sent(self._websocket.send_bytes(frame))
-            else:
+            if frame is not None:
                 await self.say(frame)
 
 
@@ -292,7 +254,7 @@ class ClientMessages:
         clock: Clock,
         stop: Stop,
         principal: Principal,
-        feed: TelemetryFeed | None,
+        feed: TelemetryFeed,
     ) -> None:
         self._websocket = websocket
         self._subscriber = subscriber
@@ -323,9 +285,8 @@ class ClientMessages:
             return
         match message.get("type"):
             case "painted":
-                if self._feed is not None:
-                    now = self._clock().mono
-                    self._feed.painted(message.get("frame"), now, message)
+                now = self._clock().mono
+                self._feed.painted(message.get("frame"), now, message)
             case "ping":
                 t, server = message.get("t"), self._clock().wall
                 self._subscriber.append(topics.PONG.name, {"t": t, "server": server})

@@ -2,10 +2,12 @@
 
 import json
 import re
+from typing import Any
 
 import httpx
 import pytest
 from websockets.sync.client import ClientConnection, connect
+from websockets.typing import Subprotocol
 
 from iveg.models.robot import Robot
 from iveg.models.snapshot import Snapshot
@@ -75,7 +77,12 @@ def _mention(path: str) -> str:
 def _dial(stack: Site) -> ClientConnection:
     bearer = {"Authorization": f"Bearer {stack.settings['IVEG_API_TOKEN']}"}
     address = httpx.URL(stack.url).copy_with(scheme="ws", path="/live")
-    return connect(str(address), additional_headers=bearer, proxy=None)
+    return connect(
+        str(address),
+        additional_headers=bearer,
+        subprotocols=[Subprotocol("iveg.2")],
+        proxy=None,
+    )
 
 
 def _listen(stack: Site, wanted: set[str]) -> set[str]:
@@ -83,15 +90,30 @@ def _listen(stack: Site, wanted: set[str]) -> set[str]:
     heard: set[str] = set()
     with _dial(stack) as live:
         for _ in range(600):
-            heard.add(_topic(live.recv(timeout=30)))
+            message = live.recv(timeout=30)
+            heard |= {_unnamed(topic) for topic in _topics(message)}
+            if isinstance(message, bytes):
+                live.send(
+                    json.dumps({"type": "painted", "frame": _head(message)["frame"]})
+                )
             if heard >= wanted - _NOT_BY_ITSELF:
                 break
     return heard
 
 
-def _topic(frame: str | bytes) -> str:
-    if isinstance(frame, bytes):
-        length = int.from_bytes(frame[:4], "little")
-        frame = frame[4 : 4 + length].decode()
-    topic = str(json.loads(frame)["topic"])
+def _topics(message: str | bytes) -> list[str]:
+    if isinstance(message, str):
+        return [str(json.loads(message)["topic"])]
+    head = _head(message)
+    moved = [f"robots/{move[0]}" for move in head["moves"]]
+    return moved + [str(part["topic"]) for part in head["parts"] + head["scans"]]
+
+
+def _head(frame: bytes) -> dict[str, Any]:
+    length = int.from_bytes(frame[:4], "little")
+    head: dict[str, Any] = json.loads(frame[4 : 4 + length])
+    return head
+
+
+def _unnamed(topic: str) -> str:
     return re.sub(r"^(robots|detections|commands)/[^/]+", r"\1/{id}", topic)

@@ -9,6 +9,7 @@ import pytest
 from playwright.sync_api import Browser, expect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
+from websockets.typing import Subprotocol
 
 from iveg.web.security.headers import CONTENT_SECURITY_POLICY, MAX_BODY
 from tests.processes import Site
@@ -183,7 +184,12 @@ def _ask(client: httpx.Client, method: str, path: str) -> httpx.Response:
 def _dial(stack: Site, session: str, origin: str) -> ClientConnection:
     address = httpx.URL(stack.url).copy_with(scheme="ws", path="/live")
     headers = {"Cookie": f"iveg={session}", "Origin": origin}
-    return connect(str(address), additional_headers=headers, proxy=None)
+    return connect(
+        str(address),
+        additional_headers=headers,
+        subprotocols=[Subprotocol("iveg.2")],
+        proxy=None,
+    )
 
 
 def test_the_link_signs_in_and_its_token_is_sent_in_no_address(

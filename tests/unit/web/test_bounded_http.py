@@ -149,6 +149,7 @@ async def test_an_open_socket_keeps_its_place_in_a_flood() -> None:
         "GET /live HTTP/1.1\r\nHost: iveg\r\nConnection: Upgrade\r\n"
         "Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
         "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
+        "Sec-WebSocket-Protocol: iveg.2\r\n"
         f"Authorization: Bearer {API_TOKEN}\r\n\r\n"
     )
     async with called(desk) as caller:
