@@ -243,8 +243,7 @@ class FeedbackValue(OriginFields):
     alerts: Annotated[list[AlertValue], Field(max_length=MAX_BOXES)] = []
     robot_pose: FeedbackPose | None = None
     speed_limits: SpeedLimitsValue = {}
-    clear: Annotated[list[Text], Field(max_length=MAX_ROBOTS)] | None = None
-    mandates: SpeedLimitsValue = {}
+    clear: Annotated[list[Text], Field(max_length=MAX_ROBOTS)] = []
     seen: Annotated[dict[str, int], Field(max_length=MAX_ROBOTS)] = {}
     backlog: Any = None
 

@@ -47,16 +47,12 @@ def read_feedback(payload: bytes) -> Feedback:
 
 
 def _speed_limits(value: payloads.FeedbackValue) -> dict[str, SpeedLimit]:
-    """Of every robot that is named; the version before named clear ones as mandates."""
-    named = value.speed_limits
-    if value.clear is None:
-        named = {**value.mandates, **named}
-    clear = dict.fromkeys(value.clear or (), CLEAR)
-    return clear | {
+    """Of every robot that is named."""
+    return dict.fromkeys(value.clear, CLEAR) | {
         robot_id: SpeedLimit(
             one.speed_factor, one.reason, one.cause, one.distance_m, one.decision_id
         )
-        for robot_id, one in named.items()
+        for robot_id, one in value.speed_limits.items()
     }
 
 
@@ -130,17 +126,12 @@ def _write_shared(feedback: Feedback) -> dict[str, Any]:
     """Part of the feedback that is the same for all robots.
 
     Of a robot that is clear the id alone is written, or the fleet's limits would be
-    most of the message; a robot that is named nowhere is unsupervised.  ``mandates``
-    holds them all under the name that robots of the version before read.
+    most of the message; a robot that is named nowhere is unsupervised.
     """
-    limits = {
-        robot_id: orjson.Fragment(orjson.dumps(_write_speed_limit(speed_limit)))
-        for robot_id, speed_limit in feedback.speed_limits.items()
-    }
     return {
         "alerts": [_write_alert(alert) for alert in feedback.alerts],
         "speed_limits": {
-            robot_id: limits[robot_id]
+            robot_id: _write_speed_limit(speed_limit)
             for robot_id, speed_limit in feedback.speed_limits.items()
             if speed_limit != CLEAR
         },
@@ -149,7 +140,6 @@ def _write_shared(feedback: Feedback) -> dict[str, Any]:
             for robot_id, speed_limit in feedback.speed_limits.items()
             if speed_limit == CLEAR
         ],
-        "mandates": limits,
         "seen": dict(feedback.seen),
     }
 

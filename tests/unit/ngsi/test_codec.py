@@ -313,10 +313,6 @@ def test_feedback_is_written_as_the_contract_says() -> None:
         },
         "speed_limits": {"AGII": limited},
         "clear": ["AGI"],
-        "mandates": {
-            "AGI": {"speed_factor": 1.0, "reason": "clear"},
-            "AGII": limited,
-        },
         "seen": {"AGII": 8731},
     }
 
@@ -325,19 +321,13 @@ def test_feedback_is_written_as_the_contract_says() -> None:
     "limits",
     [
         {"speed_limits": {"AGI": {"speed_factor": 0.5, "reason": "person"}}},
-        {"mandates": {"AGI": {"speed_factor": 0.5, "reason": "person"}}},
-        {
-            "speed_limits": {"AGI": {"speed_factor": 0.5, "reason": "person"}},
-            "clear": [],
-            "mandates": {"AGI": {"speed_factor": 1.0}, "AGII": {"speed_factor": 1.0}},
-        },
         {
             "speed_limits": {"AGI": {"speed_factor": 0.5, "reason": "person"}},
             "clear": ["AGI"],
         },
     ],
 )
-def test_speed_limits_are_read_by_their_name_or_by_the_one_before(
+def test_a_speed_limit_is_read_and_goes_before_a_clear_of_the_same_robot(
     limits: dict[str, object],
 ) -> None:
     feedback = codec.read_feedback(orjson.dumps({"robot_id": "AGI", **limits}))
@@ -351,13 +341,6 @@ def test_who_is_named_clear_is_clear_and_who_is_not_named_is_not_there() -> None
     )
 
     assert feedback.speed_limits == {"AGI": CLEAR}
-
-
-def test_the_version_before_named_clear_robots_as_mandates_alone() -> None:
-    told = {"speed_limits": {}, "mandates": {"AGI": {"speed_factor": 1.0}}}
-    feedback = codec.read_feedback(orjson.dumps({"robot_id": "AGI", **told}))
-
-    assert feedback.speed_limits["AGI"].speed_factor == 1.0
 
 
 def test_feedback_with_nothing_to_tell_says_null() -> None:
