@@ -93,14 +93,14 @@ MUTANTS = (
     ),
     Mutant(
         "STOP: the second copy of a refused release is judged anew",
-        'verdict = self._verdicts.get(order.attempt or "")',
+        "verdict = self._verdicts.get(order.attempt)",
         "verdict = None",
         ("unit/robot/test_safety.py",),
     ),
     Mutant(
         "STOP: an old refusal ends the release that is under way",
-        "return answer.attempt == self.command.command_id",
-        "return True",
+        "if answer.attempt != self.attempt.command.command_id:",
+        "if False:",
         ("unit/domain/test_stop_release.py",),
     ),
     Mutant(

@@ -12,7 +12,7 @@ from iveg.ngsi.codec import load_json
 
 _STOP = "stop"
 _MAX_NAMED = 128
-_ATTEMPTS = {"release": {"ids", "ch"}, "resume": {"ch"}}
+_ATTEMPTS = {"release": {"ids", "ch", "attempt"}, "resume": {"ch", "attempt"}}
 """Orders that must be perfect, and their keys; ``attempt`` may come beside them."""
 _FORBIDDEN = frozenset("<>\"'=;()")  # Orion refuses values with any of these
 
@@ -29,13 +29,12 @@ class ReleaseOrder:
     """Lift exactly these holds.
 
     Attributes:
-        attempt: Id of the order, shared by its copies.  None from the earlier
-            version.
+        attempt: Id of the order, shared by its copies.
     """
 
     ids: tuple[str, ...]
     challenge: str
-    attempt: str | None = None
+    attempt: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +42,7 @@ class ResumeOrder:
     """Drive again after a release; ``attempt`` as in ``ReleaseOrder``."""
 
     challenge: str
-    attempt: str | None = None
+    attempt: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,17 +117,17 @@ def _release_or_resume(message: object) -> Order:
         return Unusable("malformed")
     for name, keys in _ATTEMPTS.items():
         asked = command.get(name)
-        if isinstance(asked, dict) and asked.keys() - {"attempt"} == keys:
+        if isinstance(asked, dict) and asked.keys() == keys:
             return _attempt(asked)
     return Unusable("malformed")
 
 
 def _attempt(asked: dict[str, object]) -> Order:
     """A release, or a resume, which names no holds."""
-    challenge, attempt = asked["ch"], _usable_id(asked.get("attempt"))
+    challenge, attempt = asked["ch"], _usable_id(asked["attempt"])
     if not isinstance(challenge, str) or not challenge:
         return Unusable("malformed")
-    if "attempt" in asked and attempt is None:
+    if attempt is None:
         return Unusable("malformed")  # It could not be answered.
     if "ids" not in asked:
         return ResumeOrder(challenge, attempt)

@@ -230,7 +230,7 @@ class SafetyMachine:
         That holds even when the robot's state has changed: a refused order stays
         refused.
         """
-        verdict = self._verdicts.get(order.attempt or "")
+        verdict = self._verdicts.get(order.attempt)
         if verdict is None:
             if isinstance(order, ReleaseOrder):
                 verdict = self._release(order, now)

@@ -31,6 +31,7 @@ from iveg.lab.emulator.orders import FaultOrder
 from iveg.lab.emulator.scenarios import scenario_named
 from iveg.lab.emulator.scripts import Incident
 from iveg.lab.emulator.world import SimulatedWorld
+from iveg.ngsi import codec
 from iveg.robot.node import NodeSettings
 from tests.integration.emulator_cloud import Cloud, broker, running, until
 
@@ -156,12 +157,14 @@ async def test_a_stopped_robot_stands_and_drives_again_after_release_and_resume(
         assert [hold.id for hold in cloud.report("AGII").holds] == ["01STOP"]
 
         challenge = cloud.report("AGII").challenge
-        await cloud.command("AGII", {"release": {"ids": ["01STOP"], "ch": challenge}})
+        await cloud.command(
+            "AGII", codec.write_release(["01STOP"], challenge or "", "01T")
+        )
         await until(lambda: not cloud.report("AGII").holds)
         assert cloud.speed("AGII") < 0.001
 
         challenge = cloud.report("AGII").challenge
-        await cloud.command("AGII", {"resume": {"ch": challenge}})
+        await cloud.command("AGII", codec.write_resume(challenge or "", "01U"))
         await until(lambda: cloud.speed("AGII") > 0.5)
 
 

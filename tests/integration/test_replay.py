@@ -19,6 +19,7 @@ from iveg.domain.observations import (
     Odometry,
     SafetyReport,
 )
+from iveg.ngsi import codec
 from iveg.robot.node import NodeSettings
 from iveg.robot.replay.replay import ReplaySettings, run_replay
 from tests import data
@@ -117,10 +118,12 @@ async def test_a_stop_pauses_the_log_and_the_robot_reports_standing(
         assert [hold.id for hold in cloud.report("AGI").holds] == ["01STOP"]
 
         challenge = cloud.report("AGI").challenge
-        await cloud.command("AGI", {"release": {"ids": ["01STOP"], "ch": challenge}})
+        await cloud.command(
+            "AGI", codec.write_release(["01STOP"], challenge or "", "01T")
+        )
         await until(lambda: not cloud.report("AGI").holds)
         challenge = cloud.report("AGI").challenge
-        await cloud.command("AGI", {"resume": {"ch": challenge}})
+        await cloud.command("AGI", codec.write_resume(challenge or "", "01U"))
         await until(lambda: cloud.of("AGI", Odometry)[-1].pose.x > stood.x + 0.3)
 
 

@@ -158,11 +158,11 @@ async def release(cloud: Cloud, robot: Robot) -> None:
     said = cloud.reports[-1]
     ids = [hold.id for hold in said.holds]
     await cloud.command(
-        codec.write_command(codec.write_release(ids, said.challenge or ""))
+        codec.write_command(codec.write_release(ids, said.challenge or "", "01T"))
     )
     await until(lambda: len(cloud.answers) > before)
     challenge = cloud.answers[-1].challenge or ""
-    await cloud.command(codec.write_command(codec.write_resume(challenge)))
+    await cloud.command(codec.write_command(codec.write_resume(challenge, "01U")))
     await until(lambda: len(cloud.answers) > before + 1)
 
 

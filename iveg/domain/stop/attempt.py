@@ -43,19 +43,6 @@ class Attempt:
         """
         return report is not None and report.challenge != self.challenge
 
-    def is_meant_by(self, answer: CommandAnswer, *, is_news: bool) -> bool:
-        """Whether this answers it; a robot of the earlier version names no attempt.
-
-        Without its name, the copy of a refusal that came before is none of this.
-        """
-        if answer.attempt is not None:
-            return answer.attempt == self.command.command_id
-        if answer.result == "REFUSED":
-            return is_news and (answer.id is None or answer.id in self.ids)
-        if self.command.kind == "resume":
-            return answer.result == "RESUMED"
-        return answer.result == "RELEASED" and answer.id in self.ids
-
     def answered(
         self, answer: CommandAnswer, transport: TransportId, at: Instant
     ) -> "Attempt":

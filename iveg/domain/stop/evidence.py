@@ -4,7 +4,6 @@ A release, resume or drill that must not happen is refused here, before the mach
 table, and changes nothing.
 """
 
-from collections import deque
 from collections.abc import Iterable
 from math import inf, isfinite, isinf
 from typing import Literal
@@ -14,8 +13,6 @@ from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Hold, Instant, Origin, SafetyReport
 from iveg.domain.stop.commands import State
 from iveg.domain.stop.standstill import Standstill
-
-_REMEMBERED_ANSWERS = 64
 
 
 class Evidence:
@@ -35,7 +32,6 @@ class Evidence:
         self.report_age_then = 0.0
         self.speed = 0.0
         self.standstill = Standstill()
-        self._answers: deque[tuple[str, int]] = deque(maxlen=_REMEMBERED_ANSWERS)
 
     def note_report(
         self, report: SafetyReport, at: Instant, age_s: float, hold_id: str | None
@@ -76,17 +72,6 @@ class Evidence:
         if contradicted is not None:
             self.speed = abs(linear)
         return contradicted is True
-
-    def is_news(self, answer: Origin) -> bool:
-        """Whether this answer is new; an answer without origin always is."""
-        if answer.boot is None or answer.seq is None:
-            return True
-        # The agent's copy has lost its stamp.
-        identity = answer.boot, answer.seq
-        if identity in self._answers:
-            return False
-        self._answers.append(identity)
-        return True
 
     @property
     def holds(self) -> tuple[Hold, ...]:

@@ -155,9 +155,8 @@ class StopMachine(StopStatus):
         self, answer: CommandAnswer, at: Instant, transport: TransportId, new_id: str
     ) -> list[Effect]:
         """Take the robot's own answer on ``cmdexe`` or ``cmd_info``."""
-        is_news = self.evidence.is_news(answer.origin)
         if self.attempt is not None:
-            if not self.attempt.is_meant_by(answer, is_news=is_news):
+            if answer.attempt != self.attempt.command.command_id:
                 return []
             self.attempt = self.attempt.answered(answer, transport, at)
             # Its report may have come before the answer.

@@ -14,26 +14,21 @@ def write_stop(hold_id: str, by: str) -> dict[str, Any]:
 
 
 def write_release(
-    hold_ids: Iterable[str], challenge: str, attempt: str | None = None
+    hold_ids: Iterable[str], challenge: str, attempt: str
 ) -> dict[str, Any]:
     """The value of ``cmd`` that lifts exactly these holds.
 
     Args:
         hold_ids: Every remote hold of the robot.
         challenge: The robot's newest.
-        attempt: Names this order, so that its copies are known for what they are;
-            without one it is an order of the earlier version.
+        attempt: Names this order, so that its copies are known for what they are.
     """
-    return {"release": {"ids": list(hold_ids), "ch": challenge, **_named(attempt)}}
+    return {"release": {"ids": list(hold_ids), "ch": challenge, "attempt": attempt}}
 
 
-def write_resume(challenge: str, attempt: str | None = None) -> dict[str, Any]:
+def write_resume(challenge: str, attempt: str) -> dict[str, Any]:
     """The value of ``cmd`` that lets a released robot drive; as ``write_release``."""
-    return {"resume": {"ch": challenge, **_named(attempt)}}
-
-
-def _named(attempt: str | None) -> dict[str, str]:
-    return {} if attempt is None else {"attempt": attempt}
+    return {"resume": {"ch": challenge, "attempt": attempt}}
 
 
 def write_command(value: Mapping[str, Any]) -> bytes:

@@ -93,6 +93,8 @@ class Bench:
     ) -> list[Effect]:
         number = next(self._answers) if seq is None else seq
         named = self.machine.hold_id if id is None else id
+        if attempt is None and result != "LATCHED" and self.machine.once is not None:
+            attempt = self.attempt
         origin = Origin("b1", number)
         answer = CommandAnswer("AGI", origin, named, result, why=why, attempt=attempt)
         return self.keep(

@@ -215,28 +215,14 @@ def test_the_late_refusal_of_one_attempt_changes_nothing_of_the_next() -> None:
     assert bench.machine.once.times.answered.get(DIRECT.id) is None
 
 
-def test_the_copy_of_a_refusal_without_an_attempt_does_not_refuse_the_next() -> None:
-    bench = released()
-    bench.answer("REFUSED", why="challenge", seq=9)
-    bench.report(bench.ours, challenge=NEXT_CHALLENGE)
-    bench.release(bench.ours.id)
-
-    bench.answer("REFUSED", why="challenge", seq=9, transport=FIWARE.id)
-    bench.report(bench.ours, challenge="another")
-
-    assert bench.state == "RELEASING"
-
-
-@pytest.mark.parametrize(
-    ("result", "named"),
-    [("RELEASED", "01OTHER"), ("RESUMED", "id-1"), ("REFUSED", "01OTHER")],
-)
-def test_an_answer_without_an_attempt_is_matched_by_what_it_names(
-    result: str, named: str
+@pytest.mark.parametrize("result", ["RELEASED", "RESUMED", "REFUSED"])
+@pytest.mark.parametrize("attempt", ["", "01OTHER"])
+def test_an_answer_that_does_not_name_the_attempt_is_none_of_it(
+    result: str, attempt: str
 ) -> None:
     bench = released()
 
-    bench.answer(result, id=named)
+    bench.answer(result, attempt=attempt)
     bench.report(bench.ours, challenge=NEXT_CHALLENGE)
 
     assert bench.state == "RELEASING"

@@ -252,10 +252,10 @@ def test_commands_are_written_as_the_contract_says() -> None:
     stop = codec.write_command(codec.write_stop("01A", "opaque"))
 
     assert stop == b'{"cmd":{"stop":{"id":"01A","by":"opaque"}}}'
-    assert codec.write_release(["01A", "boot-1"], "c") == {
-        "release": {"ids": ["01A", "boot-1"], "ch": "c"}
+    assert codec.write_release(["01A", "boot-1"], "c", "01T") == {
+        "release": {"ids": ["01A", "boot-1"], "ch": "c", "attempt": "01T"}
     }
-    assert codec.write_resume("c") == {"resume": {"ch": "c"}}
+    assert codec.write_resume("c", "01T") == {"resume": {"ch": "c", "attempt": "01T"}}
     assert codec.write_desired("stopped", ["01A"]) == (
         b'{"desired":"stopped","ids":["01A"]}'
     )

@@ -135,9 +135,14 @@ class Desk:
 
     def answer(self, result: str, *, why: str | None = None) -> None:
         """AGI answers for the hold that it was last stopped with."""
-        hold_id = self.commander.machine("AGI").hold_id
+        machine = self.commander.machine("AGI")
+        attempt = None if machine.once is None else machine.once.command_id
         said = replace(self.next_origin(), stamp=None, stamp_s=None)
-        self.hear(CommandAnswer("AGI", said, hold_id, result, why=why))
+        self.hear(
+            CommandAnswer(
+                "AGI", said, machine.hold_id, result, why=why, attempt=attempt
+            )
+        )
 
     def next_origin(self) -> Origin:
         self.seq += 1

@@ -16,6 +16,7 @@ from iveg.robot.judgement import Limits
 from iveg.robot.safety import SafetyMachine
 
 STEP_S = 0.05
+_ATTEMPTS = itertools.count(1)
 REST = Twist2D(0.0, 0.0)
 AHEAD = Twist2D(1.0, 0.4)
 
@@ -35,12 +36,17 @@ def person(
     )
 
 
-def release(ids: list[str], challenge: str, attempt: str | None = None) -> bytes:
-    return codec.write_command(codec.write_release(ids, challenge, attempt))
+def release(ids: list[str], challenge: str, attempt: str = "") -> bytes:
+    named = attempt or _new_attempt()
+    return codec.write_command(codec.write_release(ids, challenge, named))
 
 
-def resume(challenge: str, attempt: str | None = None) -> bytes:
-    return codec.write_command(codec.write_resume(challenge, attempt))
+def resume(challenge: str, attempt: str = "") -> bytes:
+    return codec.write_command(codec.write_resume(challenge, attempt or _new_attempt()))
+
+
+def _new_attempt() -> str:
+    return f"try-{next(_ATTEMPTS)}"
 
 
 def stop(hold_id: str) -> bytes:

@@ -278,22 +278,22 @@ def test_the_same_resume_again_is_answered_alike() -> None:
 def test_a_resume_after_a_new_stop_is_refused() -> None:
     rig = Rig().run(0.5)
     rig.release()
-    message = resume(rig.machine.challenge)
-    rig.command(message)
+    challenge = rig.machine.challenge
+    rig.command(resume(challenge))
     rig.stop("01NEW")
-    answer = rig.command(message)
+    answer = rig.command(resume(challenge))
     assert (answer.result, answer.why) == ("REFUSED", "held")
 
 
 def test_an_old_resume_does_not_resume_the_next_release() -> None:
     rig = Rig().run(0.5)
     rig.release()
-    message = resume(rig.machine.challenge)
-    rig.command(message)
+    challenge = rig.machine.challenge
+    rig.command(resume(challenge))
     rig.stop("01NEW")
     rig.run(0.5)
     rig.release()
-    assert rig.command(message).why == "challenge"
+    assert rig.command(resume(challenge)).why == "challenge"
     assert rig.state == "READY"
 
 
@@ -386,22 +386,22 @@ def test_an_order_whose_attempt_cannot_be_answered_is_malformed(attempt: bytes) 
     assert rig.holds
 
 
-def test_a_copy_of_a_resume_that_came_too_early_does_not_count() -> None:
+def test_a_resume_that_came_too_early_has_spent_its_challenge() -> None:
     rig = Rig().run(0.5)
-    early = resume(rig.machine.challenge)
-    assert rig.command(early).why == "held"
+    challenge = rig.machine.challenge
+    assert rig.command(resume(challenge)).why == "held"
     rig.release()
-    assert rig.command(early).why == "challenge"
+    assert rig.command(resume(challenge)).why == "challenge"
     assert rig.resume().result == "RESUMED"
 
 
-def test_a_copy_of_a_release_that_came_too_early_does_not_count() -> None:
+def test_a_release_that_came_too_early_has_spent_its_challenge() -> None:
     rig = Rig(speed=Twist2D(0.3, 0.0), obeys=False).run(0.5)
-    early = release(["boot-b1"], rig.machine.challenge)
-    assert rig.command(early).why == "not_standing"
+    challenge = rig.machine.challenge
+    assert rig.command(release(["boot-b1"], challenge)).why == "not_standing"
     rig.speed = REST
     rig.run(0.5)
-    assert rig.command(early).why == "challenge"
+    assert rig.command(release(["boot-b1"], challenge)).why == "challenge"
     assert rig.release().result == "RELEASED"
 
 
@@ -413,16 +413,18 @@ def test_a_second_resume_with_another_challenge_is_refused() -> None:
 @pytest.mark.parametrize(
     "payload",
     [
-        b'{"cmd": {"release": {"ids": ["boot-b1"]}}}',
-        b'{"cmd": {"release": {"ids": "boot-b1", "ch": "b1n1"}}}',
-        b'{"cmd": {"release": {"ids": [], "ch": "b1n1"}}}',
-        b'{"cmd": {"release": {"ids": ["boot-b1", 1], "ch": "b1n1"}}}',
-        b'{"cmd": {"release": {"ids": ["boot-b1"], "ch": "b1n1", "by": "x"}}}',
-        b'{"cmd": {"release": {"ids": ["boot-b1"], "ch": ""}}}',
-        b'{"cmd": {"resume": {"ch": 7}}}',
-        b'{"cmd": {"resume": {"ch": ""}}}',
+        b'{"cmd": {"release": {"ids": ["boot-b1"], "attempt": "t"}}}',
+        b'{"cmd": {"release": {"ids": "boot-b1", "ch": "b1n1", "attempt": "t"}}}',
+        b'{"cmd": {"release": {"ids": [], "ch": "b1n1", "attempt": "t"}}}',
+        b'{"cmd": {"release": {"ids": ["boot-b1", 1], "ch": "b1n1", "attempt": "t"}}}',
+        b'{"cmd": {"release": {"ids": ["boot-b1"], "ch": "b1n1"}}}',
+        b'{"cmd": {"release":'
+        b' {"ids": ["boot-b1"], "ch": "b1n1", "attempt": "t", "by": "x"}}}',
+        b'{"cmd": {"release": {"ids": ["boot-b1"], "ch": "", "attempt": "t"}}}',
+        b'{"cmd": {"resume": {"ch": 7, "attempt": "t"}}}',
+        b'{"cmd": {"resume": {"ch": "", "attempt": "t"}}}',
         b'{"cmd": {"resume": {}, "release": {}}}',
-        b'{"release": {"ids": ["boot-b1"], "ch": "b1n1"}}',
+        b'{"release": {"ids": ["boot-b1"], "ch": "b1n1", "attempt": "t"}}',
         b'{"cmd": null}',
         b"[]",
     ],
