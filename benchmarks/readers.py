@@ -5,7 +5,7 @@ cost a server, and the page that is looked at, is measured with these beside it:
 
     python -m benchmarks.readers --link http://127.0.0.1:8000/?token=… --pages 4
 
-A reader speaks ``iveg.2`` where the server does, and reads whatever comes elsewhere.
+A reader asks for ``iveg.2``; a server without it, such as the relay, tells all it has.
 """
 
 import argparse

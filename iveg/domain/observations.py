@@ -272,8 +272,7 @@ class CommandAnswer:
     """The robot's own answer on ``cmdexe`` (or ``cmd_info``).
 
     Attributes:
-        attempt: Of the release or resume that is answered; None for a STOP, and from
-            robots of the earlier version.
+        attempt: Of the release or resume that is answered; None for a STOP.
     """
 
     robot_id: str
