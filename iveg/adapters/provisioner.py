@@ -322,7 +322,7 @@ class Provisioner:
         at = self._clock()
         for entity in entities:
             for observation in codec.read_entity(entity).observations:
-                if getattr(observation, "robot_id", None) in self._robots:
+                if observation.robot_id in self._robots:
                     self._ingest.enqueue(
                         Received(observation, at, FIWARE.id, asked=True)
                     )

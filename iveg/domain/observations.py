@@ -5,7 +5,7 @@ are Unix seconds unless said otherwise.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -77,17 +77,28 @@ UNKNOWN_ORIGIN = Origin()
 
 
 @dataclass(frozen=True, slots=True)
-class Odometry:
-    """Pose of ``base_link`` in ``map`` and the twist in ``base_link``."""
+class Observation:
+    """What somebody observed.
+
+    Attributes:
+        robot_id: Who says so; empty: no robot.
+        origin: Which of its messages it was.
+    """
 
     robot_id: str
     origin: Origin
+
+
+@dataclass(frozen=True, slots=True)
+class Odometry(Observation):
+    """Pose of ``base_link`` in ``map`` and the twist in ``base_link``."""
+
     pose: Pose2D
     twist: Twist2D
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class LaserScan:
+class LaserScan(Observation):
     """One sweep, field for field ``sensor_msgs/LaserScan``.
 
     Attributes:
@@ -99,8 +110,6 @@ class LaserScan:
         ranges: Shape (n,), float32 (m); ``inf`` where nothing came back.
     """
 
-    robot_id: str
-    origin: Origin
     angle_min: float
     angle_increment: float
     range_min: float
@@ -150,7 +159,7 @@ class Detection:
 
 
 @dataclass(frozen=True, slots=True)
-class DetectionFrame:
+class DetectionFrame(Observation):
     """All detections of one picture; an empty frame means that nothing was seen.
 
     Attributes:
@@ -158,8 +167,6 @@ class DetectionFrame:
             None where that is not known either.
     """
 
-    robot_id: str
-    origin: Origin
     detections: tuple[Detection, ...]
     unread: tuple[str | None, ...] = ()
 
@@ -189,7 +196,7 @@ class RobotFault:
 
 
 @dataclass(frozen=True, slots=True)
-class Unplaced:
+class Unplaced(Observation):
     """A measurement whose place in ``map`` is not known.
 
     Attributes:
@@ -197,14 +204,12 @@ class Unplaced:
         twist: Of odometry; a speed needs no place.
     """
 
-    robot_id: str
-    origin: Origin
     kind: Literal["odometry", "scan"]
     twist: Twist2D | None = None
 
 
 @dataclass(frozen=True, slots=True)
-class SafetyReport:
+class SafetyReport(Observation):
     """The speed factor that the robot applies and its reasons, as it reports them.
 
     Attributes:
@@ -216,8 +221,6 @@ class SafetyReport:
         faults: What it finds wrong with its own data.
     """
 
-    robot_id: str
-    origin: Origin
     speed_factor: float
     reason: str
     cause: str | None = None
@@ -232,18 +235,16 @@ class SafetyReport:
 
 
 @dataclass(frozen=True, slots=True)
-class Navigation:
+class Navigation(Observation):
     """A robot's intent: task, goal and path in ``map`` (m)."""
 
-    robot_id: str
-    origin: Origin
     task: str
     goal: tuple[float, float] | None = None
     path: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
-class Battery:
+class Battery(Observation):
     """Content of ``sensor_msgs/BatteryState`` that iVeg uses.
 
     Attributes:
@@ -252,31 +253,27 @@ class Battery:
         voltage: (V); None when unknown.
     """
 
-    robot_id: str
-    origin: Origin
     percentage: float | None = None
     charging: bool | None = None
     voltage: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
-class CommandStatus:
+class CommandStatus(Observation):
     """The IoT Agent's opinion of a command; displayed, never believed."""
 
-    robot_id: str
+    origin: Origin = field(default=UNKNOWN_ORIGIN, init=False)
     status: str
 
 
 @dataclass(frozen=True, slots=True)
-class CommandAnswer:
+class CommandAnswer(Observation):
     """The robot's own answer on ``cmdexe`` (or ``cmd_info``).
 
     Attributes:
         attempt: Of the release or resume that is answered; None for a STOP.
     """
 
-    robot_id: str
-    origin: Origin
     id: str | None
     result: str
     holds: tuple[Hold, ...] = ()
@@ -287,36 +284,36 @@ class CommandAnswer:
 
 
 @dataclass(frozen=True, slots=True)
-class Climate:
+class Climate(Observation):
     """Air in the greenhouse: °C, 0–1, ppm; None where a sensor is silent."""
 
+    robot_id: str = field(default="", init=False)
+    origin: Origin = field(default=UNKNOWN_ORIGIN, init=False)
     temperature: float | None = None
     relative_humidity: float | None = None
     co2: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
-class HeartbeatProbe:
+class HeartbeatProbe(Observation):
     """iVeg's own heartbeat probe after its way through the whole data path."""
 
-    origin: Origin
+    robot_id: str = field(default="", init=False)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class UnreadScan:
+class UnreadScan(Observation):
     """A scan of which only the identity is read: nothing else of it slows a robot.
 
     Attributes:
         read: The scan.  Raises UnreadableError.
     """
 
-    robot_id: str
-    origin: Origin
     read: Callable[[], LaserScan]
 
 
 @dataclass(frozen=True, slots=True)
-class Overtaken:
+class Overtaken(Observation):
     """A message older than its stream, reduced to its identity.
 
     A twin or straggler changes no pose and no scan, so its numbers are not read.  This
@@ -324,33 +321,14 @@ class Overtaken:
     protect somebody.
     """
 
-    robot_id: str
-    origin: Origin
     kind: "type[Odometry | LaserScan | DetectionFrame]"
 
 
 @dataclass(frozen=True, slots=True)
-class RefusedFrame:
+class RefusedFrame(Observation):
     """A detection frame that came and could not be read: somebody may be in it."""
 
-    robot_id: str
-
-
-Observation = (
-    Odometry
-    | LaserScan
-    | DetectionFrame
-    | SafetyReport
-    | Navigation
-    | CommandStatus
-    | CommandAnswer
-    | Climate
-    | HeartbeatProbe
-    | Battery
-    | UnreadScan
-    | Overtaken
-    | RefusedFrame
-)
+    origin: Origin = field(default=UNKNOWN_ORIGIN, init=False)
 
 
 def kind_of(observation: Observation) -> type[Observation]:

@@ -15,7 +15,6 @@ from iveg.domain.fleet import RobotDescription
 from iveg.domain.geometry import Rectangle, Twist2D
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import (
-    UNKNOWN_ORIGIN,
     Observation,
     Odometry,
     Origin,
@@ -108,7 +107,7 @@ class Plausibility:
         """Codes of what news contradicts in the robot's state before this message."""
         said, at = received.observation, received.at.mono
         memory = self._memory[robot.robot_id]
-        origin = getattr(said, "origin", UNKNOWN_ORIGIN)
+        origin = said.origin
         if self._ledger.is_unsent(origin.heard):
             yield "heard_unsent"
         if _boots_often(memory, said, origin, at):

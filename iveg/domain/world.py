@@ -15,7 +15,6 @@ from iveg.domain.fleet import FleetDescription
 from iveg.domain.geometry import Rectangle
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import (
-    UNKNOWN_ORIGIN,
     Climate,
     DetectionFrame,
     HeartbeatProbe,
@@ -107,7 +106,7 @@ class World:
         if isinstance(observation, _NO_MESSAGE):
             return self._note(observation, at)
         robot = self.robot(observation.robot_id)
-        origin = getattr(observation, "origin", UNKNOWN_ORIGIN)
+        origin = observation.origin
         if self.refuses(received):
             # What Orion kept may be of a time when the robot was a recording.
             robot.refused_at = robot.refused_at if received.asked else at.mono
@@ -171,9 +170,9 @@ class World:
         Nothing of it counts: whoever plays it is not that robot.
         """
         observation = received.observation
-        if getattr(observation, "origin", UNKNOWN_ORIGIN).replay is None:
+        if observation.origin.replay is None:
             return False
-        robot = self.robots.get(getattr(observation, "robot_id", ""))
+        robot = self.robots.get(observation.robot_id)
         return robot is not None and not robot.is_replay
 
     def _likely_age(

@@ -213,7 +213,7 @@ class Commander:
         unknown.
         """
         observation, at = received.observation, received.at
-        machine = self.machines.get(getattr(observation, "robot_id", ""))
+        machine = self.machines.get(observation.robot_id)
         if machine is None:
             return
         effects: list[Effect] = []

@@ -130,7 +130,7 @@ class Evaluator:
             self.decisions.seen(self._people_of(observation.robot_id), received.at)
         if verdict != "new":
             return False
-        row, robot_id = kind(observation), getattr(observation, "robot_id", "")
+        row, robot_id = kind(observation), observation.robot_id
         for topic in row.touches:
             self._event_log.changed(topic.of(robot_id))
         if row.kept:

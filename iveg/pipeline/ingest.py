@@ -15,10 +15,8 @@ from dataclasses import replace
 
 from iveg.domain.errors import UnknownRobotError
 from iveg.domain.observations import (
-    UNKNOWN_ORIGIN,
     DetectionFrame,
     Observation,
-    Origin,
     Overtaken,
     Received,
     RefusedFrame,
@@ -56,7 +54,7 @@ class Ingest:
         self._is_past = is_past
         self._rejected = rejected
         self._queue: deque[tuple[Received, _Stream]] = deque()
-        self._refused: dict[str | None, Received] = {}
+        self._refused: dict[str, Received] = {}
         """By robot, that one of its detection frames was dropped."""
         self._identities: set[_Identity] = set()
         """Of what waits and was counted by its sender."""
@@ -69,8 +67,8 @@ class Ingest:
 
     def enqueue(self, received: Received) -> None:
         """Queue one observation; never blocks."""
-        robot_id = getattr(received.observation, "robot_id", None)
-        if robot_id is not None and not self._known(robot_id):
+        robot_id = received.observation.robot_id
+        if robot_id and not self._known(robot_id):
             self.reject(robot_id, "unknown_robot", str(UnknownRobotError(robot_id)))
             return
         name = kind_of(received.observation).__name__
@@ -166,7 +164,7 @@ class Ingest:
     def _note_dropped(self, received: Received, stream: "_Stream") -> None:
         robot_id, kind = stream
         self.counters[f"dropped.{kind.__name__}"] += 1
-        if kind is DetectionFrame and robot_id is not None:
+        if kind is DetectionFrame:
             self._refused[robot_id] = replace(
                 received, observation=RefusedFrame(robot_id)
             )
@@ -178,15 +176,14 @@ class Ingest:
             del self._waiting[stream]
 
 
-_Stream = tuple[str | None, type[Observation]]
-_Identity = tuple[str | None, type[Observation], str | None, int | None]
+_Stream = tuple[str, type[Observation]]
+_Identity = tuple[str, type[Observation], str | None, int | None]
 
 
 def _identity(observation: Observation) -> _Identity:
     """Identity of a message, where its sender counts."""
-    origin: Origin = getattr(observation, "origin", UNKNOWN_ORIGIN)
-    robot_id = getattr(observation, "robot_id", None)
-    return robot_id, kind_of(observation), origin.boot, origin.seq
+    origin = observation.origin
+    return observation.robot_id, kind_of(observation), origin.boot, origin.seq
 
 
 def _is_twin_of_a_picture(observation: Observation) -> bool:
@@ -203,7 +200,7 @@ def _is_twin_of_a_picture(observation: Observation) -> bool:
 def _stream(received: Received) -> _Stream:
     """Robot and kind of a message."""
     observation = received.observation
-    return getattr(observation, "robot_id", None), type(observation)
+    return observation.robot_id, type(observation)
 
 
 def _may_drop(stream: _Stream) -> bool:

@@ -147,7 +147,7 @@ class RuleLoop:
         except Exception as error:
             if kind(observation).vital:
                 raise
-            source, of = getattr(observation, "robot_id", "?"), kind_of(observation)
+            source, of = observation.robot_id or "?", kind_of(observation)
             self._ingest.reject(source, f"unusable_{of.__name__}", repr(error))
             return False
 

@@ -81,7 +81,7 @@ class LatencyWatch:
         stream = self._stream(received)
         if stream is None:
             return
-        origin = received.observation.origin  # type: ignore[union-attr]
+        origin = received.observation.origin
         composed_at = self._composed_at(origin.heard)
         if received.transport != FIWARE.id:
             stream.heard(origin, received.at, composed_at, agent=received.sparse)
@@ -100,7 +100,7 @@ class LatencyWatch:
         for received in taken:
             stream = self._stream(received)
             if stream is not None:
-                origin = received.observation.origin  # type: ignore[union-attr]
+                origin = received.observation.origin
                 stream.decided(origin, received.at, now.mono)
 
     def decided_at(self, robot_id: str, data: Data) -> float | None:
@@ -178,7 +178,7 @@ class LatencyWatch:
         data = data_of(kind_of(received.observation))
         if data is None or received.asked:
             return None
-        robot_id: str = received.observation.robot_id  # type: ignore[union-attr]
+        robot_id: str = received.observation.robot_id
         stream = self._streams.get((robot_id, data))
         if stream is None and len(self.clocks) < _MOST_ROBOTS:
             self._add(robot_id)

@@ -47,7 +47,7 @@ async def test_robots_are_read_as_the_codec_takes_them(orion: OrionClient) -> No
     (entity,) = await orion.read_robots()
     assert "cmd" not in entity
     (odometry,) = codec.read_entity(entity).observations
-    assert odometry.robot_id == "AGI"  # type: ignore[union-attr]
+    assert odometry.robot_id == "AGI"
 
 
 async def test_all_robots_are_read_however_many_pages(orion: OrionClient) -> None:

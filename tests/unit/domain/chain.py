@@ -137,7 +137,7 @@ class Chain:
 
     def _decide(self, received: Received, when: float, data: Data) -> None:
         self.watch.decided([received], at(when))
-        robot_id = received.observation.robot_id  # type: ignore[union-attr]
+        robot_id = received.observation.robot_id
         painted = when + self.page()
         self._later(
             painted,

@@ -336,6 +336,20 @@ async def test_an_old_report_without_the_hold_moves_no_robot_that_stands() -> No
     assert "alert.stop_moved" not in conditions_of(desk)
 
 
+async def test_a_report_of_no_known_age_confirms_no_release() -> None:
+    robot = await standing()
+    machine = robot.desk.commander.machine("AGI")
+    held = machine.hold_id or ""
+    await robot.desk.commander.release("AGI", [held], "ana", robot.desk.clock())
+    asked = robot.state
+    moment = origin(1, boot="earlier", after=-200.0)
+    said = safety_report("AGI", released=(held,), origin=moment)
+
+    robot.desk.hear(said, FIWARE.id)
+
+    assert (asked, robot.state) == ("RELEASING", "RELEASING")
+
+
 async def test_a_report_of_no_known_age_that_holds_our_hold_has_received_it() -> None:
     desk = Desk()
     await desk.commander.stop(["AGI"], "ana", desk.clock())
