@@ -10,29 +10,14 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from iveg.domain.observations import (
-    DetectionFrame,
     Instant,
-    LaserScan,
-    Navigation,
     Observation,
-    Odometry,
     Received,
-    SafetyReport,
     kind_of,
 )
 from iveg.domain.transports import DIRECT
 from iveg.ngsi import codec, names
-from iveg.ngsi.sensors import SENSORS
 from iveg.pipeline.kinds import Kind, Scope, read_directly
-
-_SUFFIXES: dict[type[Observation], str] = {
-    Odometry: "_odom",
-    LaserScan: "_lidar2D",
-    DetectionFrame: "_yolox_bounding_boxes",
-    SafetyReport: "_safety",
-    Navigation: "_nav",
-    **{sensor.of: sensor.suffix for sensor in SENSORS},
-}
 
 PassedOver = Callable[[str, type[Observation], int], None]
 
@@ -98,18 +83,16 @@ class DirectReader:
         """Topics of one robot."""
         past = self._is_past
         for kind, row in rows.items():
-            if kind not in _SUFFIXES:
+            device = names.DEVICE_OF.get(kind)
+            if device is None:
                 continue
-            suffix = _SUFFIXES[kind]
-            device = robot_id + suffix
-            read = partial(codec.read_measure, device, is_past=past, later=True)
+            name = robot_id + device.suffix
+            read = partial(codec.read_measure, name, is_past=past, later=True)
             source = _Source(robot_id, row.qos, read, kind, row.apart_s)
-            yield names.measure_topic(apikey, device), source
-            if suffix in names.DIRECT_SUFFIXES:
-                yield (
-                    names.direct_topic(robot_id, suffix),
-                    replace(source, sparse=False),
-                )
+            yield names.measure_topic(apikey, name), source
+            if device.speaks_alone:
+                alone = names.direct_topic(robot_id, device.suffix)
+                yield alone, replace(source, sparse=False)
         if rows:
             whole = partial(codec.read_measure, robot_id, is_past=past, later=True)
             yield names.measure_topic(apikey, robot_id), _Source(robot_id, 1, whole)

@@ -204,6 +204,18 @@ class RobotState:
         while at - self._speeds[0][0] > GAIN_OVER_S:
             self._speeds.popleft()
 
+    def received_at(self, kind: type[Observation]) -> Instant | None:
+        """When the newest of a kind came in; None: never."""
+        members = {
+            Odometry: self.odometry_received,
+            LaserScan: self.scan_received,
+            DetectionFrame: self.sighted_at,
+            SafetyReport: self.safety_received,
+            Navigation: self.navigation_received,
+        }
+        sensed = self.sensed.get(kind)
+        return members.get(kind) if sensed is None else sensed.at
+
     def judge(
         self, received: Received, origin: Origin, proven_at: float | None
     ) -> OrderVerdict:

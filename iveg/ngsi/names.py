@@ -7,6 +7,14 @@ from functools import lru_cache
 from typing import Any
 
 from iveg.domain.errors import UnreadableError
+from iveg.domain.observations import (
+    DetectionFrame,
+    LaserScan,
+    Navigation,
+    Observation,
+    Odometry,
+    SafetyReport,
+)
 from iveg.ngsi.sensors import SENSORS
 
 ROBOT_TYPE = "Robot"
@@ -44,10 +52,14 @@ class Device:
     Attributes:
         suffix: After the robot id in the device id and topic; empty for the robot.
         attributes: NGSI attribute name and type.
+        of: What its measures observe; None for the device of everything.
+        speaks_alone: Whether it may also speak to iVeg alone, past the IoT Agent.
     """
 
     suffix: str
     attributes: tuple[tuple[str, str], ...]
+    of: type[Observation] | None = None
+    speaks_alone: bool = False
     has_command: bool = False
 
 
@@ -72,19 +84,33 @@ ROBOT_DEVICES = (
         ),
         has_command=True,
     ),
-    Device("_odom", ((ODOMETRY, "object"),)),
-    Device("_lidar2D", ((LIDAR, "array"), (LIDAR_HEADER, "object"))),
-    Device(FRAME_SUFFIX, ((BOXES, "object"), (BOXES_HEADER, "object"))),
-    Device("_safety", ((SAFETY, "object"),)),
-    Device("_nav", ((NAVIGATION, "object"),)),
-    *(Device(sensor.suffix, ((sensor.attribute, "object"),)) for sensor in SENSORS),
+    Device("_odom", ((ODOMETRY, "object"),), Odometry, speaks_alone=True),
+    Device(
+        "_lidar2D",
+        ((LIDAR, "array"), (LIDAR_HEADER, "object")),
+        LaserScan,
+        speaks_alone=True,
+    ),
+    Device(
+        FRAME_SUFFIX,
+        ((BOXES, "object"), (BOXES_HEADER, "object")),
+        DetectionFrame,
+        speaks_alone=True,
+    ),
+    Device("_safety", ((SAFETY, "object"),), SafetyReport, speaks_alone=True),
+    Device("_nav", ((NAVIGATION, "object"),), Navigation),
+    *(
+        Device(sensor.suffix, ((sensor.attribute, "object"),), sensor.of)
+        for sensor in SENSORS
+    ),
 )
 """The command device sorts before its sensors, and is provisioned last where the agent
 keeps its registry in memory, so that either registry picks it (docs/fiware.md)."""
 
-
-DIRECT_SUFFIXES = ("_odom", "_lidar2D", FRAME_SUFFIX, "_safety")
-"""Devices that may also speak to iVeg alone, past the IoT Agent."""
+DEVICE_OF: Mapping[type[Observation], Device] = {
+    device.of: device for device in ROBOT_DEVICES if device.of is not None
+}
+"""The device that measures a kind of observation."""
 
 
 @lru_cache(maxsize=1024)

@@ -133,8 +133,8 @@ class Evaluator:
         row, robot_id = kind(observation), observation.robot_id
         for topic in row.touches:
             self._event_log.changed(topic.of(robot_id))
-        if row.kept:
-            self._event_log.reading(observation, robot_id, received.at)
+        if row.kept is not None:
+            self._event_log.reading(row.kept, observation, received.at)
         match observation:
             case Odometry():
                 self._drove(observation, received.at)

@@ -282,17 +282,16 @@ class EventLog:
             )
 
     @_guarded
-    def reading(self, read: Observation, robot_id: str, at: Instant) -> None:
-        """Record a reading of a small sensor, once a minute for each."""
-        kind = type(read)
-        if not self._is_due(robot_id, kind, at):
+    def reading(self, name: str, read: Observation, at: Instant) -> None:
+        """Record a reading of a small sensor by its name, once a minute for each."""
+        if not self._is_due(read.robot_id, type(read), at):
             return
         own = (one.name for one in fields(read) if one.name not in _NOT_VALUES)
         self._sink.offer(
             ReadingRecord(
                 at=at.wall,
-                robot_id=robot_id,
-                kind=kind.__name__.lower(),
+                robot_id=read.robot_id,
+                kind=name,
                 value={name: getattr(read, name) for name in own},
             )
         )

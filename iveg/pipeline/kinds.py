@@ -66,7 +66,7 @@ class Kind:
         qos: There.  At 0 the inbox keeps the newest of a topic alone.
         apart_s: There, least time between two of a robot that are read (s).
         low: When it is worth a P3 alert.
-        kept: Whether the history keeps it as a reading, once a minute.
+        kept: Its name in the history, which keeps one a minute; None: keeps none.
         vital: Whether a STOP or a speed limit may rest on it.
     """
 
@@ -79,7 +79,7 @@ class Kind:
     qos: int = 0
     apart_s: float = 0.0
     low: Low | None = None
-    kept: bool = False
+    kept: str | None = None
     vital: bool = False
 
 
@@ -137,7 +137,7 @@ KINDS = (
         touches=(topics.ROBOT,),
         direct="all",
         low=Low("alert.battery_low", _low_battery, 0.20, 0.25, "level"),
-        kept=True,
+        kept="battery",
     ),
 )
 _BY_TYPE = {kind.of: kind for kind in KINDS}

@@ -24,6 +24,7 @@ from iveg.domain.observations import (
     CommandAnswer,
     Hold,
     Instant,
+    Observation,
     Odometry,
     RobotFault,
     SafetyReport,
@@ -38,7 +39,7 @@ from iveg.robot.hold_file import read_holds, write_holds
 from iveg.robot.judgement import Limits, OnLinkLoss
 from iveg.robot.lane import SafetyLane
 from iveg.robot.safety import SafetyMachine, State
-from iveg.robot.uplink import Form, Sensed, Uplink
+from iveg.robot.uplink import Form, Uplink
 
 _log = logging.getLogger(__name__)
 _GATE_EVERY_S = 0.04
@@ -206,7 +207,7 @@ class RobotNode:
                 self._next_tick.cancel()
             self._drive(REST)
 
-    def sense(self, *observations: Sensed) -> None:
+    def sense(self, *observations: Observation) -> None:
         """Take observations of the robot's own sensors; origins are filled in."""
         now = self._read_clock()
         mono = now.mono

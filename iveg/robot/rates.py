@@ -17,11 +17,14 @@ Messages held back still go to iVeg directly.
 
 from dataclasses import dataclass, field
 
+from iveg.domain.observations import DetectionFrame, LaserScan, Odometry
+from iveg.ngsi.names import DEVICE_OF
+
 TOP_HZ = 30.0
-FLOOR_HZ: dict[str, float] = {
-    "_lidar2D": 1.05,
-    "_yolox_bounding_boxes": 3.2,
-    "_odom": 5.3,
+FLOOR_HZ = {
+    DEVICE_OF[LaserScan].suffix: 1.05,
+    DEVICE_OF[DetectionFrame].suffix: 3.2,
+    DEVICE_OF[Odometry].suffix: 5.3,
 }
 """A little above the contract's 1, 3 and 5, so that a late timer still keeps them."""
 LEVELS = float(len(FLOOR_HZ))

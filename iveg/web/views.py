@@ -150,7 +150,7 @@ class Views:
     def devices(self, now: Instant) -> list[Device]:
         """Each robot's devices at the IoT Agent, and when each last sent something."""
         return [
-            Device.of(robot, device.suffix, now)
+            Device.of(robot, device.suffix, device.of, now)
             for robot in self._world.robots.values()
             for device in ROBOT_DEVICES
         ]

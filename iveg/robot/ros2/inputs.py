@@ -16,6 +16,7 @@ from iveg.domain.observations import (
     Detection,
     DetectionFrame,
     Instant,
+    Observation,
     Odometry,
     Unplaced,
 )
@@ -25,7 +26,6 @@ from iveg.robot.ros2.config import RobotConfig, Topics
 from iveg.robot.ros2.input_faults import InputFaults
 from iveg.robot.ros2.rigid import RigidTransform
 from iveg.robot.ros2.transforms import NoTransformError, TransformBuffer
-from iveg.robot.uplink import Sensed
 from iveg.ros2 import cdr
 from iveg.ros2 import messages as m
 from iveg.ros2.decoder import Fields
@@ -180,14 +180,14 @@ class SensorInputs:
         if message is not None:
             self._transforms.add(message, static=topic == "tf_static")
 
-    def tick(self, now: Instant) -> list[Sensed]:
+    def tick(self, now: Instant) -> list[Observation]:
         """New observations, odometry first."""
         if self._began is None:
             self._began = now.mono
         self._note_silence(now.mono)
         if self._awaits_transforms(now.mono):
             return []
-        found: list[Sensed] = []
+        found: list[Observation] = []
         for topic, work in (
             ("odometry", self._odometry),
             ("scan", self._scan),
@@ -217,10 +217,10 @@ class SensorInputs:
     def _attempt(
         self,
         topic: str,
-        work: Callable[[Any, Instant], list[Sensed]],
+        work: Callable[[Any, Instant], list[Observation]],
         payload: bytes,
         now: Instant,
-    ) -> list[Sensed]:
+    ) -> list[Observation]:
         """What follows from a message of a topic, unless it is unusable or old."""
         message = self._read(topic, payload, now.mono)
         if message is None:
@@ -282,7 +282,7 @@ class SensorInputs:
 
     # --- topics -------------------------------------------------------------------
 
-    def _odometry(self, message: m.Odometry, now: Instant) -> list[Sensed]:
+    def _odometry(self, message: m.Odometry, now: Instant) -> list[Observation]:
         stamp = message.header.stamp.seconds
         twist = reading.read_twist(message.twist.twist)
         odom = message.header.frame_id.lstrip("/") or self._frames.odom
@@ -305,7 +305,7 @@ class SensorInputs:
         base = self._lookup(child, self._frames.base_link, stamp, now)
         return None if base is None else pose.compose(base)
 
-    def _scan(self, message: m.LaserScan, now: Instant) -> list[Sensed]:
+    def _scan(self, message: m.LaserScan, now: Instant) -> list[Observation]:
         stamp = message.header.stamp.seconds
         here = self._here
         late = here is None or abs(stamp - here.stamp) > self._tf_max_age_s
@@ -325,7 +325,9 @@ class SensorInputs:
                 pass  # odometry may be missing in the tree; the mount must be there
         return self._lookup(self._frames.base_link, frame, stamp, now)
 
-    def _detections(self, message: m.Detection3DArray, now: Instant) -> list[Sensed]:
+    def _detections(
+        self, message: m.Detection3DArray, now: Instant
+    ) -> list[Observation]:
         stamp = message.header.stamp.seconds
         found: list[Detection] = []
         places: dict[str, RigidTransform | None] = {}
@@ -347,14 +349,14 @@ class SensorInputs:
                 lost.append(reading.class_id_of(one.results, self._classes))
         return [DetectionFrame("", UNKNOWN_ORIGIN, tuple(found), tuple(lost))]
 
-    def _path(self, message: m.Path, now: Instant) -> list[Sensed]:
+    def _path(self, message: m.Path, now: Instant) -> list[Observation]:
         frame = message.header.frame_id or self._frames.map
         # A path is old by nature: it is placed by the present transform.
         stamp = self._here.stamp if self._here else message.header.stamp.seconds
         place = self._in_map(frame, stamp, now.mono)
         return [] if place is None else [reading.read_path(message, place)]
 
-    def _battery(self, message: m.BatteryState, now: Instant) -> list[Sensed]:
+    def _battery(self, message: m.BatteryState, now: Instant) -> list[Observation]:
         if now.mono - self._battery_told < BATTERY_EVERY_S:
             return []
         self._battery_told = now.mono
@@ -362,23 +364,23 @@ class SensorInputs:
 
     # --- pictures -----------------------------------------------------------------
 
-    def _depth(self, message: m.Image, _: Instant) -> list[Sensed]:
+    def _depth(self, message: m.Image, _: Instant) -> list[Observation]:
         self._depths.append(message)
         return []
 
-    def _mask(self, message: m.Image, _: Instant) -> list[Sensed]:
+    def _mask(self, message: m.Image, _: Instant) -> list[Observation]:
         self._masks.append(message)
         return []
 
-    def _camera_info(self, message: m.CameraInfo, _: Instant) -> list[Sensed]:
+    def _camera_info(self, message: m.CameraInfo, _: Instant) -> list[Observation]:
         self._camera = message
         return []
 
-    def _picture(self, message: m.Detection2DArray, now: Instant) -> list[Sensed]:
+    def _picture(self, message: m.Detection2DArray, now: Instant) -> list[Observation]:
         self._look = message, now.mono
         return []
 
-    def _grounded(self, now: Instant) -> list[Sensed]:
+    def _grounded(self, now: Instant) -> list[Observation]:
         """The newest detection frame once its depth picture arrived, or is overdue."""
         if self._look is None:
             return []

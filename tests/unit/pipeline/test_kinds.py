@@ -1,5 +1,7 @@
 """The table of kinds is whole, and is what the pipeline does."""
 
+from dataclasses import dataclass
+
 import pytest
 
 from iveg.domain import observations
@@ -19,6 +21,7 @@ from iveg.domain.observations import (
 )
 from iveg.domain.records import ReadingRecord
 from iveg.domain.world import World
+from iveg.models.device import Device
 from iveg.ngsi import codec, names
 from iveg.ngsi.sensors import SENSORS, Sensor
 from iveg.pipeline.kinds import KINDS, Kind, read_directly
@@ -27,6 +30,7 @@ from tests.builders import (
     detection_frame,
     odometry,
     origin,
+    received,
     safety_report,
     scan,
 )
@@ -161,3 +165,19 @@ async def test_a_battery_is_kept_once_a_minute() -> None:
     assert [one.at - kept[0].at for one in kept] == [0.0, 55.0, 110.0]
     assert kept[0].kind == "battery"
     assert kept[0].value == {"percentage": 0.5, "charging": False, "voltage": 25.1}
+
+
+@dataclass(frozen=True, slots=True)
+class SoilMoisture(Observation):
+    """A sensor with a name of two words."""
+
+    percentage: float
+
+
+def test_a_sensor_with_a_name_of_two_words_has_an_age() -> None:
+    world = World(["AGI"])
+    world.apply(received(SoilMoisture("AGI", origin(1), 40.0), after=1.0))
+
+    device = Device.of(world.robot("AGI"), "_soil_moisture", SoilMoisture, at(3.0))
+
+    assert (device.kind, device.age_s) == ("soil_moisture", 2.0)

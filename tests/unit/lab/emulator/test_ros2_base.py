@@ -8,7 +8,13 @@ import pytest
 from iveg.adapters import clock
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.domain.geometry import REST, Twist2D
-from iveg.domain.observations import DetectionFrame, LaserScan, Navigation, Odometry
+from iveg.domain.observations import (
+    DetectionFrame,
+    LaserScan,
+    Navigation,
+    Observation,
+    Odometry,
+)
 from iveg.lab.emulator.camera import DETECTORS
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.orders import FaultOrder
@@ -18,7 +24,6 @@ from iveg.lab.emulator.scenarios import scenario_named
 from iveg.lab.emulator.world import SimulatedWorld
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.inputs import TOPICS, SensorInputs
-from iveg.robot.uplink import Sensed
 from iveg.ros2 import messages as m
 from tests.fakes.ros2_network import FakeNetwork
 
@@ -72,7 +77,7 @@ class Emulated:
         self.config = RobotConfig(namespace="/agii")
         self.base = Ros2Base(self.rig, self.world, self.network, self.config, 30.0)
 
-    def sensed(self) -> list[Sensed]:
+    def sensed(self) -> list[Observation]:
         """What Algorithm 1 makes of everything that was published."""
         senses = SensorInputs(self.config)
         now = clock.now()

@@ -5,10 +5,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from iveg.domain.observations import Instant
+from iveg.domain.observations import Instant, Observation
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.inputs import SensorInputs
-from iveg.robot.uplink import Sensed
 from iveg.ros2 import cdr
 from iveg.ros2 import messages as m
 from iveg.ros2.schema import Message
@@ -118,7 +117,7 @@ class Bench:
         self.inputs.hear(topic, [cdr.write(message)], MONO + after)
         return self
 
-    def tick(self, after: float = 0.0) -> list[Sensed]:
+    def tick(self, after: float = 0.0) -> list[Observation]:
         return self.inputs.tick(at(after))
 
     def faults(self, after: float = 0.0) -> dict[str, str]:
