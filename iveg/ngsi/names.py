@@ -111,6 +111,9 @@ DEVICE_OF: Mapping[type[Observation], Device] = {
     device.of: device for device in ROBOT_DEVICES if device.of is not None
 }
 """The device that measures a kind of observation."""
+DIRECT_SUFFIXES = tuple(
+    device.suffix for device in ROBOT_DEVICES if device.speaks_alone
+)
 
 
 @lru_cache(maxsize=1024)

@@ -45,11 +45,7 @@ def test_every_measure_topic_has_its_heading(device: names.Device) -> None:
         names.answer_topic("{apikey}", "{robot}"),
         names.FEEDBACK_TOPIC.format(robot_id="{robot}"),
         names.DESIRED_TOPIC.format(robot_id="{robot}"),
-        *(
-            names.direct_topic("{robot}", device.suffix)
-            for device in names.ROBOT_DEVICES
-            if device.speaks_alone
-        ),
+        *(names.direct_topic("{robot}", suffix) for suffix in names.DIRECT_SUFFIXES),
     ],
 )
 def test_every_other_topic_has_its_heading(topic: str) -> None:
