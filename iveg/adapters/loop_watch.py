@@ -75,16 +75,16 @@ class LoopWatch:
     ) -> None:
         while not ended.wait(_LOOK_S):
             if self._mono() - self._beat_at > BEAT_S + _OVERDUE_S:
-                self._part = _running(loop, thread)
+                # A loop that only waits for its next beat has no name to give.
+                self._part = _running(loop, thread) or self._part
 
 
-def _running(loop: asyncio.AbstractEventLoop, thread: int) -> str:
+def _running(loop: asyncio.AbstractEventLoop, thread: int) -> str | None:
     """Name of the task that the loop runs, or of the module where it has none."""
     task = asyncio.current_task(loop)
-    name = _UNKNOWN if task is None else task.get_name()
-    if task is not None and not name.startswith("Task-"):
-        return name
-    return _module_of(sys._current_frames().get(thread)) or _UNKNOWN
+    if task is not None and not task.get_name().startswith("Task-"):
+        return task.get_name()
+    return _module_of(sys._current_frames().get(thread))
 
 
 def _module_of(frame: FrameType | None) -> str | None:
