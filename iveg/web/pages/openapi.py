@@ -163,8 +163,8 @@ def _call(
 
 
 def _anchor(method: str, path: str) -> str:
-    translations = "".join(c if c.isalnum() else " " for c in path).split()
-    return "-".join([method, *translations])
+    words = "".join(c if c.isalnum() else " " for c in path).split()
+    return "-".join([method, *words])
 
 
 def _parameter(parameter: Parameter) -> FieldDoc:
@@ -237,15 +237,15 @@ def shape_of(schema: object) -> str:
     return _word(schema)
 
 
-def _either(translations: Iterable[str]) -> str:
-    return " or ".join(dict.fromkeys(translations))
+def _either(types: Iterable[str]) -> str:
+    return " or ".join(dict.fromkeys(types))
 
 
 def _word(schema: Schema) -> str:
     if schema.format == "date-time":
         return "time (ISO-8601 UTC)"
-    translations = {"string": "text", "boolean": "true or false"}
-    return translations.get(str(schema.type), str(schema.type or "anything"))
+    words = {"string": "text", "boolean": "true or false"}
+    return words.get(str(schema.type), str(schema.type or "anything"))
 
 
 def _limits(schema: object) -> str:
