@@ -6,9 +6,8 @@ one that the description names, and in either ``base_link`` or ``camera_link`` w
 names none.  A frame that nobody described has no place: that is doubt, not a guess.
 """
 
-from dataclasses import dataclass
 from functools import lru_cache
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from iveg.domain.fleet import Frame, RobotDescription, RobotProfile
 from iveg.domain.geometry import Box3D
@@ -23,8 +22,7 @@ _OPTICAL = ("_optical", "_optical_frame")
 _EITHER: tuple[Frame, ...] = ("base_link", "camera_link")
 
 
-@dataclass(frozen=True, slots=True)
-class FramedBox:
+class FramedBox(NamedTuple):
     """A box in a frame whose pose in ``map`` is the world's or the robot's own."""
 
     box: Box3D

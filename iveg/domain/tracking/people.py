@@ -117,17 +117,16 @@ class People:
         placed: list[Placed] = []
         unknown, self.unplaced = set[str](), 0
         for index, detection in enumerate(frame.detections):
-            boxes = resolve_box(detection, observer.description)
-            found = [
-                _placed(detection, box, index, pose, rule)
-                for box in boxes
-                if box is not None and (pose is not None or box.frame_id == "map")
-            ]
-            placed += found
-            if len(found) < len(boxes):
+            is_placed = True
+            for box in resolve_box(detection, observer.description):
+                if box is not None and (pose is not None or box.frame_id == "map"):
+                    placed.append(_placed(detection, box, index, pose, rule))
+                    continue
+                is_placed = False
+                if box is None and detection.frame_id is not None:
+                    unknown.add(detection.frame_id)
+            if not is_placed:
                 self.unplaced += _may_be_somebody(detection, rule)
-            if None in boxes and detection.frame_id is not None:
-                unknown.add(detection.frame_id)
         self.unknown_frames = frozenset(unknown)
         return placed
 
