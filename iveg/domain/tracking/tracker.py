@@ -177,6 +177,8 @@ class Tracker:
     ) -> None:
         """Assign free tracks to detections without one."""
         wanting = [index for index in first_places(picture) if tracks[index] is None]
+        if not wanting:
+            return
         taken = set(tracks)
         offered = [
             person
