@@ -7,6 +7,7 @@ import orjson
 import pytest
 
 from iveg.domain.observations import (
+    Battery,
     CommandAnswer,
     Detection,
     DetectionFrame,
@@ -313,3 +314,13 @@ def test_intent_keeps_its_own_topic_in_the_single_form() -> None:
     wire = Wire("single")
     wire.uplink.send(Navigation("", BLANK, "drive"), AT)
     assert wire.sent[0][0] == "/iveg/AGI_nav/attrs"
+
+
+def test_a_small_sensor_speaks_for_itself_beside_the_single_payload() -> None:
+    wire = Wire("single")
+
+    wire.uplink.send(Battery("AGI", BLANK, 0.5), AT)
+
+    (said,) = wire.read()
+    assert isinstance(said, Battery)
+    assert said.percentage == 0.5
