@@ -12,8 +12,8 @@ from iveg.ngsi.codec import load_json
 
 _STOP = "stop"
 _MAX_NAMED = 128
-_ATTEMPTS = {"release": {"ids", "ch", "attempt"}, "resume": {"ch", "attempt"}}
-"""Orders that must be perfect, and their keys; ``attempt`` may come beside them."""
+_KEYS = {"release": {"ids", "ch", "attempt"}, "resume": {"ch", "attempt"}}
+"""Orders that must be perfect, and exactly the keys that each has."""
 _FORBIDDEN = frozenset("<>\"'=;()")  # Orion refuses values with any of these
 
 
@@ -115,7 +115,7 @@ def _release_or_resume(message: object) -> Order:
     command = _member(message, names.COMMAND)
     if not isinstance(command, dict) or len(command) != 1:
         return Unusable("malformed")
-    for name, keys in _ATTEMPTS.items():
+    for name, keys in _KEYS.items():
         asked = command.get(name)
         if isinstance(asked, dict) and asked.keys() == keys:
             return _attempt(asked)

@@ -18,7 +18,6 @@ added, which the paper treats as permission and iVeg does not.
 """
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Literal
 
 from iveg.domain.feedback import Feedback
@@ -86,8 +85,8 @@ class SafetyMachine:
         """By attempt, oldest first; the challenge of one that is forgotten is spent."""
         self._holds = (stored or HoldSet()).after_reboot()
         self._persisted: HoldSet | None = None
-        self._said: SafetyReport | None = None
-        """The newest report without speeds and ages: a change of it is news."""
+        self._said: tuple[Cap, HoldSet, str] | None = None
+        """What the newest report rests on, but speeds and ages: a change is news."""
         self._reported_at = self._measured_at = now
         if stored is None:
             self._latch(self._nameless_stop(), now)
@@ -239,9 +238,7 @@ class SafetyMachine:
             self._remember(order.attempt, verdict)
         return self._answer(*verdict, attempt=order.attempt)
 
-    def _remember(self, attempt: str | None, verdict: _Verdict) -> None:
-        if attempt is None:
-            return  # Its copies look like new orders.
+    def _remember(self, attempt: str, verdict: _Verdict) -> None:
         self._verdicts[attempt] = verdict
         if len(self._verdicts) > ATTEMPTS_KEPT:
             del self._verdicts[next(iter(self._verdicts))]
@@ -363,23 +360,27 @@ class SafetyMachine:
             self._persisted = self._holds
             effects.append(Persist(self._holds))
         effects += [Answer(answer) for answer in answers]
-        report = self._report(now)
-        said = replace(report, linear=0.0, angular=0.0, feedback_age_s=None)
-        is_news = said != self._said
+        applied = self._limit, self._holds, self._challenge
+        is_news = applied != self._said
         every = REPORT_HELD_EVERY_S if self._holds.holds else REPORT_EVERY_S
         if is_news or now - self._reported_at >= every:
-            self._said, self._reported_at = said, now
+            self._said, self._reported_at = applied, now
             is_measure = is_news or now - self._measured_at >= REPORT_EVERY_S
             if is_measure:  # changes, and two reports a second, also go to the agent
                 self._measured_at = now
-            effects.append(Report(report, is_measure))
+            effects.append(Report(self._report(now), is_measure))
         return tuple(effects)
 
-    def _report(self, now: float) -> SafetyReport:
+    @property
+    def _limit(self) -> Cap:
         """The limit that is applied; a robot that waits for resume says 0, ``hold``."""
-        limit, holds, twist = self.cap, self._holds.holds, self._judgement.twist
-        if not self._free:
-            limit = Cap(0.0, "hold", holds[0].id if holds else None)
+        if self._free:
+            return self.cap
+        holds = self._holds.holds
+        return Cap(0.0, "hold", holds[0].id if holds else None)
+
+    def _report(self, now: float) -> SafetyReport:
+        limit, twist = self._limit, self._judgement.twist
         return SafetyReport(
             self._id,
             Origin(),
@@ -387,7 +388,7 @@ class SafetyMachine:
             limit.reason,
             limit.cause,
             limit.decision_id,
-            holds,
+            self._holds.holds,
             self._holds.released,
             self._challenge,
             twist.linear_x,
