@@ -107,6 +107,8 @@ class Tracker:
         ]
         for is_live in (True, False):
             wanting = [index for index in first_places(picture) if out[index] is None]
+            if not wanting:
+                break
             offered = [
                 (person, earlier)
                 for person, earlier in own
