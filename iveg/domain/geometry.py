@@ -77,6 +77,15 @@ class Box3D:
         )
 
 
+PERSON_RADIUS_M, PERSON_HEIGHT_M = 0.25, 1.75
+
+
+def box_of_a_person(x: float, y: float) -> Box3D:
+    """A box of a person's size on the floor about a position (m)."""
+    r = PERSON_RADIUS_M
+    return Box3D(x - r, x + r, y - r, y + r, 0.0, PERSON_HEIGHT_M)
+
+
 @dataclass(frozen=True, slots=True)
 class Rectangle:
     """An axis-aligned rectangle in ``map`` (m): a crop row, a crate, a lane."""

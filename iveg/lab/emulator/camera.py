@@ -17,10 +17,15 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from iveg.domain.fleet import RobotProfile
-from iveg.domain.geometry import Box3D, Pose2D, wrap_angle
+from iveg.domain.geometry import (
+    PERSON_HEIGHT_M,
+    Box3D,
+    Pose2D,
+    box_of_a_person,
+    wrap_angle,
+)
 from iveg.domain.observations import Detection
 from iveg.lab.emulator.greenhouse import Body, Disc, Scenery, into
-from iveg.lab.emulator.people import HEIGHT_M, box_of_a_person
 
 PERSON = "farmer"
 ROBOT_HEIGHT_M = 1.2
@@ -116,7 +121,7 @@ def person_target(number: int, person: Disc) -> Target:
     """A person as a target."""
     pose, size = Pose2D(person.x, person.y, 0.0), 2 * person.radius
     body = Body(f"person-{number}", pose, size, size)
-    return Target(body.robot_id, PERSON, body, HEIGHT_M)
+    return Target(body.robot_id, PERSON, body, PERSON_HEIGHT_M)
 
 
 def robot_target(body: Body) -> Target:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iveg.domain.fleet import RobotProfile
-from iveg.domain.geometry import Pose2D
+from iveg.domain.geometry import PERSON_HEIGHT_M, Pose2D
 from iveg.lab.emulator.camera import ROBOT_HEIGHT_M
 from iveg.lab.emulator.greenhouse import (
     Body,
@@ -29,7 +29,6 @@ from iveg.lab.emulator.greenhouse import (
     sides_of,
     slab_span,
 )
-from iveg.lab.emulator.people import HEIGHT_M
 from iveg.robot.grounding.cloud import DepthPicture, Pinhole
 from iveg.robot.grounding.locate import Segment
 from iveg.robot.grounding.mask import Mask, write_mask
@@ -134,7 +133,7 @@ def person_shape(person: Disc) -> tuple[Upright, ...]:
     head = Disc(person.x, person.y, _HEAD_RADIUS_M)
     return (
         Upright(person, 0.0, _SHOULDERS_M),
-        Upright(head, _SHOULDERS_M, HEIGHT_M),
+        Upright(head, _SHOULDERS_M, PERSON_HEIGHT_M),
     )
 
 

@@ -11,23 +11,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from iveg.domain.geometry import Box3D
+from iveg.domain.geometry import PERSON_RADIUS_M
 from iveg.lab.emulator.greenhouse import Body, Disc, Scenery
 
 WALKING_SPEED = 1.4
 """(m/s), as in the seed paper; ISO 13855 assumes 1.6."""
 
-RADIUS_M, HEIGHT_M = 0.25, 1.75
 _KEEPS_OFF_M = 0.45
 """Distance between a person and a robot below which the person steps aside (m)."""
 _STEP_ASIDE_SPEED = 0.8
 _ARRIVED_M = 0.05
-
-
-def box_of_a_person(x: float, y: float) -> Box3D:
-    """A box of a person's size about a position (m)."""
-    r = RADIUS_M
-    return Box3D(x - r, x + r, y - r, y + r, 0.0, HEIGHT_M)
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +52,7 @@ class SimulatedPerson:
     @property
     def disc(self) -> Disc:
         """Footprint of the person."""
-        return Disc(self.x, self.y, RADIUS_M)
+        return Disc(self.x, self.y, PERSON_RADIUS_M)
 
     def place(self, x: float, y: float, *, hold: bool) -> None:
         """Move the person to a position; with ``hold`` the person stays there."""
@@ -97,7 +90,7 @@ class SimulatedPerson:
         self, move_x: float, move_y: float, dt: float, robot: Body
     ) -> tuple[float, float]:
         gap, out_x, out_y = robot.gap_to(self.x, self.y)
-        near = _KEEPS_OFF_M + RADIUS_M - gap
+        near = _KEEPS_OFF_M + PERSON_RADIUS_M - gap
         if near <= 0.0:
             return move_x, move_y
         inward = move_x * out_x + move_y * out_y
@@ -117,8 +110,10 @@ class SimulatedPerson:
 
     def _move(self, dx: float, dy: float, scenery: Scenery) -> None:
         """Move by this step, or along an obstacle; a person inside one may leave it."""
-        inside = not scenery.free(self.x, self.y, RADIUS_M)
+        inside = not scenery.free(self.x, self.y, PERSON_RADIUS_M)
         for step_x, step_y in ((dx, dy), (dx, 0.0), (0.0, dy)):
-            if inside or scenery.free(self.x + step_x, self.y + step_y, RADIUS_M):
+            if inside or scenery.free(
+                self.x + step_x, self.y + step_y, PERSON_RADIUS_M
+            ):
                 self.x, self.y = self.x + step_x, self.y + step_y
                 return

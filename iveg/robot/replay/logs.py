@@ -18,7 +18,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from iveg.domain.errors import DataFileError, UnreadableError
-from iveg.domain.geometry import Box3D, Pose2D, Twist2D
+from iveg.domain.geometry import Pose2D, Twist2D, box_of_a_person
 from iveg.domain.observations import Detection, LaserScan, Odometry, Origin
 from iveg.ngsi.codec import load_json
 from iveg.ngsi.payloads import (
@@ -32,7 +32,6 @@ from iveg.ngsi.payloads import (
 _log = logging.getLogger(__name__)
 _FORBIDDEN = re.compile(r"[<>\"'=;()]")
 _LONGEST_LINE = 1 << 20
-_PERSON_RADIUS_M, _PERSON_HEIGHT_M = 0.25, 1.75
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,8 +161,7 @@ class _DetectionLine(_Line):
         # Orion refuses a whole update because of one of these characters.
         if _FORBIDDEN.search(self.class_):
             raise UnreadableError("bad_class", "none of < > \" ' = ; ( ) is allowed")
-        r, top = _PERSON_RADIUS_M, _PERSON_HEIGHT_M
-        box = Box3D(self.x - r, self.x + r, self.y - r, self.y + r, 0.0, top)
+        box = box_of_a_person(self.x, self.y)
         return Detection(self.class_, self.probability, box, "map")
 
 

@@ -2,10 +2,10 @@ import math
 
 import numpy as np
 
-from iveg.domain.geometry import Pose2D, Rectangle
+from iveg.domain.geometry import PERSON_RADIUS_M, Pose2D, Rectangle
 from iveg.domain.greenhouse import Greenhouse
 from iveg.lab.emulator.greenhouse import Body, Scenery
-from iveg.lab.emulator.people import RADIUS_M, WALKING_SPEED, SimulatedPerson, WalkStop
+from iveg.lab.emulator.people import WALKING_SPEED, SimulatedPerson, WalkStop
 
 DT = 0.05
 OPEN = Scenery.of(Greenhouse("yard", Rectangle(-10.0, -10.0, 20.0, 10.0)))
@@ -60,7 +60,7 @@ def test_a_person_walks_round_a_robot_that_stands_in_the_way() -> None:
         walker.step(DT, [robot], OPEN)
         gaps.append(robot.gap_to(walker.x, walker.y)[0])
 
-    assert min(gaps) > RADIUS_M
+    assert min(gaps) > PERSON_RADIUS_M
     assert math.hypot(walker.x - 8.0, walker.y) < 0.1
 
 
@@ -71,7 +71,7 @@ def test_a_person_steps_aside_for_a_robot_that_comes_near() -> None:
     for _ in range(40):
         worker.step(DT, [robot], OPEN)
 
-    assert robot.gap_to(worker.x, worker.y)[0] > RADIUS_M + 0.4
+    assert robot.gap_to(worker.x, worker.y)[0] > PERSON_RADIUS_M + 0.4
 
 
 def test_a_person_never_walks_into_crop() -> None:
@@ -81,7 +81,7 @@ def test_a_person_never_walks_into_crop() -> None:
 
     for _ in range(200):
         walker.step(DT, [], yard)
-        assert not row.contains(walker.x, walker.y, RADIUS_M - 1e-9)
+        assert not row.contains(walker.x, walker.y, PERSON_RADIUS_M - 1e-9)
 
 
 def test_a_person_who_was_placed_stays_when_held() -> None:

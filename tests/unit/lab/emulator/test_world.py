@@ -5,11 +5,10 @@ import pytest
 
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.domain.errors import DataFileError
-from iveg.domain.geometry import Twist2D
+from iveg.domain.geometry import PERSON_RADIUS_M, Twist2D
 from iveg.domain.greenhouse import Greenhouse
 from iveg.lab.emulator.camera import DETECTORS, PERSON
 from iveg.lab.emulator.layout import lay_out
-from iveg.lab.emulator.people import RADIUS_M
 from iveg.lab.emulator.scenarios import SCENARIOS, scenario_named
 from iveg.lab.emulator.world import SimulatedWorld, climate_at
 from tests.touching import bodies_touch, touches
@@ -61,7 +60,7 @@ def test_robots_drive_without_touching_anything_or_anybody(scenario: str) -> Non
         assert not bodies_touch(bodies)
         for person in world.people:
             gaps = [body.gap_to(person.x, person.y)[0] for body in bodies]
-            assert min(gaps) > RADIUS_M
+            assert min(gaps) > PERSON_RADIUS_M
 
 
 @pytest.mark.slow
