@@ -13,12 +13,12 @@ import orjson
 from iveg.lab.embedded.orion_numbers import print_value
 from iveg.lab.embedded.orion_text import (
     UNRESTRICTED,
-    NgsiError,
     bad_request,
     check_name,
     date_json,
     date_text,
     holds_forbidden,
+    not_supported,
     quoted,
     too_many,
 )
@@ -269,11 +269,7 @@ def _operated(attribute: Attribute | None, value: Mapping[str, Any]) -> Any:
     if name == "$inc" and isinstance(argument, int | float):
         return number + argument
     if name in _OPERATORS_NOT_DONE:
-        raise NgsiError(
-            501,
-            "NotImplemented",
-            f"operator {name} is not supported by the embedded broker",
-        )
+        raise not_supported(f"operator {name}")
     return argument
 
 

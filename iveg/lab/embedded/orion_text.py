@@ -56,6 +56,12 @@ def not_found(description: str = ENTITY_NOT_FOUND) -> NgsiError:
     return NgsiError(404, "NotFound", description)
 
 
+def not_supported(what: str) -> NgsiError:
+    """501 for a feature of Orion that the embedded broker leaves out."""
+    sentence = f"{what} is not supported by the embedded broker"
+    return NgsiError(501, "NotImplemented", sentence)
+
+
 def too_many() -> NgsiError:
     """409 for an id that matches several entities."""
     return NgsiError(

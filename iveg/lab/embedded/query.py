@@ -8,7 +8,7 @@ from typing import Any
 import orjson
 
 from iveg.lab.embedded.entities import Entity
-from iveg.lab.embedded.orion_text import NgsiError, bad_request
+from iveg.lab.embedded.orion_text import bad_request, not_supported
 
 _STATEMENT = re.compile(r"([^=!<>~:.]+)(?:(==|!=|>=|<=|>|<)([^,]+))?")
 _COMPARISONS: Mapping[str, Callable[[Any, Any], bool]] = {
@@ -35,11 +35,7 @@ def matches_query(entity: Entity, query: str) -> bool:
 def _fulfils(entity: Entity, statement: str) -> bool:
     found = _STATEMENT.fullmatch(statement)
     if found is None or ".." in statement:
-        raise NgsiError(
-            501,
-            "NotImplemented",
-            f"the query {statement} is not supported by the embedded broker",
-        )
+        raise not_supported(f"the query {statement}")
     name, comparison, operand = found.groups()
     attribute = entity.attributes.get(name)
     if attribute is None or comparison is None:

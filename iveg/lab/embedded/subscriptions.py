@@ -11,10 +11,10 @@ from urllib.parse import urlsplit
 from iveg.lab.embedded.entities import Touched
 from iveg.lab.embedded.orion_text import (
     FORBIDDEN,
-    NgsiError,
     bad_request,
     date_iso,
     date_text,
+    not_supported,
     parse_error,
     read_pattern,
 )
@@ -328,11 +328,7 @@ def _check_condition(condition: Any) -> None:
     for name in _CONDITIONS_NOT_DONE:
         # Ignoring it would notify of every change.
         if name in condition:
-            raise NgsiError(
-                501,
-                "NotImplemented",
-                f"condition/{name} is not supported by the embedded broker",
-            )
+            raise not_supported(f"condition/{name}")
     for one in condition.get("alterationTypes", []):
         if one not in _ALTERATIONS:
             raise bad_request(f"unknown alteration type: {one}")

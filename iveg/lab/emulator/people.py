@@ -112,8 +112,7 @@ class SimulatedPerson:
         """Move by this step, or along an obstacle; a person inside one may leave it."""
         inside = not scenery.free(self.x, self.y, PERSON_RADIUS_M)
         for step_x, step_y in ((dx, dy), (dx, 0.0), (0.0, dy)):
-            if inside or scenery.free(
-                self.x + step_x, self.y + step_y, PERSON_RADIUS_M
-            ):
-                self.x, self.y = self.x + step_x, self.y + step_y
+            x, y = self.x + step_x, self.y + step_y
+            if inside or scenery.free(x, y, PERSON_RADIUS_M):
+                self.x, self.y = x, y
                 return
