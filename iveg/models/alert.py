@@ -45,8 +45,7 @@ class Occurrence(Model):
     acknowledged_at: str | None
     acknowledged_by: str | None
     note: str | None
-    told: list[Told]
-    """Recipients outside iVeg."""
+    told: list[Told] = Field(description="Recipients outside iVeg.")
 
     @classmethod
     def of(cls, one: alert_book.AlertOccurrence) -> "Occurrence":
@@ -83,18 +82,19 @@ class Alert(Model):
     key: str
     slots: Slots
     robot_id: str | None
-    raised_at: str
-    """The first time; ``last_raised_at`` the newest."""
+    raised_at: str = Field(description="The first time; ``last_raised_at`` the newest.")
     last_raised_at: str
     cleared_at: str | None
     acknowledged_at: str | None
     acknowledged_by: str | None
     note: str | None
     count: int
-    told: list[Told]
-    """Recipients of the newest occurrence outside iVeg."""
-    members: list[Occurrence]
-    """The newest occurrences, oldest first."""
+    told: list[Told] = Field(
+        description="Recipients of the newest occurrence outside iVeg."
+    )
+    members: list[Occurrence] = Field(
+        description="The newest occurrences, oldest first."
+    )
 
     @classmethod
     def of(cls, alert: alert_book.BookedAlert) -> "Alert":

@@ -1,5 +1,7 @@
 """The air in the greenhouse, live and remembered."""
 
+from pydantic import Field
+
 from iveg.domain.observations import Climate as DomainClimate
 from iveg.domain.observations import Instant
 from iveg.domain.stamps import format_stamp
@@ -9,12 +11,9 @@ from iveg.models.base import Model, rounded
 class Air(Model):
     """Measured climate; null where a sensor is silent."""
 
-    temperature: float | None
-    """°C."""
-    relative_humidity: float | None
-    """0 to 1."""
-    co2: float | None
-    """ppm."""
+    temperature: float | None = Field(description="°C.")
+    relative_humidity: float | None = Field(description="0 to 1.")
+    co2: float | None = Field(description="ppm.")
 
 
 class Climate(Air):

@@ -4,6 +4,8 @@ from collections.abc import Iterable, Sequence
 from math import isfinite
 from typing import Literal
 
+from pydantic import Field
+
 from iveg.domain import stop
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
@@ -23,15 +25,20 @@ AGENT_LATE_S = 1.0
 class CommandTimes(Model):
     """When each step came to be known; null where it has not yet."""
 
-    pressed: str | None
-    """By the browser's corrected clock; null where no page told, or it cannot be."""
+    pressed: str | None = Field(
+        description=(
+            "By the browser's corrected clock; null where no page told, or it cannot "
+            "be."
+        )
+    )
     requested: str
-    sent: dict[TransportId, str]
-    """By transport, when it took it; one that has not is not there."""
-    answer: dict[TransportId, str]
-    """By transport, when the robot said by it that it has it."""
-    standing: str | None
-    """The first standing sample."""
+    sent: dict[TransportId, str] = Field(
+        description="By transport, when it took it; one that has not is not there."
+    )
+    answer: dict[TransportId, str] = Field(
+        description="By transport, when the robot said by it that it has it."
+    )
+    standing: str | None = Field(description="The first standing sample.")
 
     @classmethod
     def of(
@@ -100,11 +107,19 @@ class Command(Model):
     note: Sentence | None = None
     robot: CommandRobot | None = None
     challenge_fresh: bool = False
-    outcome: Outcome | None = None
-    """How it ended; null on ``/live``, where ``state`` says how it stands."""
+    outcome: Outcome | None = Field(
+        None,
+        description=(
+            "How it ended; null on ``/live``, where ``state`` says how it stands."
+        ),
+    )
     was_loud: bool = False
-    steps: list[CommandStep]
-    """Steps of the audit trail; empty on ``/live``, which reports each step itself."""
+    steps: list[CommandStep] = Field(
+        description=(
+            "Steps of the audit trail; empty on ``/live``, which reports each step "
+            "itself."
+        )
+    )
 
     @classmethod
     def of(
@@ -245,8 +260,12 @@ class RobotLatency(Model):
     robot_id: str
     stops: int
     accepted: LatencySpread
-    sent: dict[TransportId, LatencySpread]
-    """By transport, until it left; ``answer`` until the robot said that it has it."""
+    sent: dict[TransportId, LatencySpread] = Field(
+        description=(
+            "By transport, until it left; ``answer`` until the robot said that it has"
+            " it."
+        )
+    )
     answer: dict[TransportId, LatencySpread]
     standing: LatencySpread
 
@@ -266,7 +285,8 @@ class Drill(Model):
     command_id: str
     drilled_at: str
     by: str
-    passed: bool | None
-    """Standing in time; null while it may still come true."""
+    passed: bool | None = Field(
+        description="Standing in time; null while it may still come true."
+    )
     standstill_ms: float | None
     command: Command

@@ -1,5 +1,7 @@
 """The evening sheet: one day of the fleet (docs/interfaces/resources.md)."""
 
+from pydantic import Field
+
 from iveg.models.base import Model
 from iveg.models.command import Command
 from iveg.models.places import GreenhouseMap, Point
@@ -16,10 +18,8 @@ class Worked(Model):
 class Slowed(Model):
     """Minutes of robots slowed, by what slowed them and the aisle that it was in."""
 
-    cause: str
-    """``person`` or ``robot``."""
-    lane: str | None
-    """Null: outside the aisles, or unknown."""
+    cause: str = Field(description="``person`` or ``robot``.")
+    lane: str | None = Field(description="Null: outside the aisles, or unknown.")
     minutes: float
 
 
@@ -28,8 +28,7 @@ class Pass(Model):
 
     at: str
     robot_id: str
-    distance_m: float
-    """Between the middles of both."""
+    distance_m: float = Field(description="Between the middles of both.")
     speed: float
     robot: Point
     person: Point
@@ -39,20 +38,18 @@ class Pass(Model):
 class Day(Model):
     """Summary of one day of the fleet, Europe/Madrid, and what is due on the next."""
 
-    day: str
-    """ISO date."""
+    day: str = Field(description="ISO date.")
     since: str
-    until: str
-    """The end of the day, or the moment of asking while it goes on."""
+    until: str = Field(
+        description="The end of the day, or the moment of asking while it goes on."
+    )
     robots: list[str]
     worked: list[Worked]
     slowed: list[Slowed]
-    passes: list[Pass]
-    """The nearest, nearest first."""
-    stops: list[Command]
-    """STOPs and drills, oldest first."""
-    drills_due: list[str]
-    """Robots whose STOP drill is due by the end of the next day."""
-    unseen: int
-    """P1s that nobody has acknowledged."""
+    passes: list[Pass] = Field(description="The nearest, nearest first.")
+    stops: list[Command] = Field(description="STOPs and drills, oldest first.")
+    drills_due: list[str] = Field(
+        description="Robots whose STOP drill is due by the end of the next day."
+    )
+    unseen: int = Field(description="P1s that nobody has acknowledged.")
     map: GreenhouseMap

@@ -49,8 +49,9 @@ class Decision(Model):
     class_id: str | None
     confidence: float | None
     position: Position | None
-    distance_m: float | None
-    """From the robot to the centre of the ring."""
+    distance_m: float | None = Field(
+        description="From the robot to the centre of the ring."
+    )
     speed_factor: float | None
     reason: str | None
     rule: DecisionRule
@@ -60,13 +61,18 @@ class Decision(Model):
     applied_at: str | None
     observed_at: str | None
     ended_at: str | None
-    speed_before: float | None
-    """m/s; ``speed_after`` at ``observed_at``."""
+    speed_before: float | None = Field(
+        description="m/s; ``speed_after`` at ``observed_at``."
+    )
     speed_after: float | None
     links: list[DecisionLink]
     sentence: Sentence
-    places: list[DecisionPlace]
-    """Poses of the robot and its observer; empty for those of the earlier version."""
+    places: list[DecisionPlace] = Field(
+        description=(
+            "Poses of the robot and its observer; empty for those of the earlier "
+            "version."
+        )
+    )
 
     @classmethod
     def of_record(cls, record: DecisionRecord) -> "Decision":

@@ -1,5 +1,7 @@
 """Devices of a robot at the IoT Agent, with the time of their last message."""
 
+from pydantic import Field
+
 from iveg.domain.observations import Instant, Observation
 from iveg.domain.robot_state import RobotState
 from iveg.models.base import Model
@@ -10,10 +12,10 @@ class Device(Model):
 
     device: str
     robot_id: str
-    kind: str
-    """``robot`` for the device of all orders, else what it measures."""
-    age_s: float | None
-    """Since something came of it; null: never."""
+    kind: str = Field(
+        description="``robot`` for the device of all orders, else what it measures."
+    )
+    age_s: float | None = Field(description="Since something came of it; null: never.")
 
     @classmethod
     def of(

@@ -2,6 +2,8 @@
 
 from typing import Literal
 
+from pydantic import Field
+
 from iveg.models.base import Model
 
 
@@ -11,24 +13,32 @@ class Experiment(Model):
     name: str
     size: str
     state: Literal["running", "done", "broken"]
-    run: str | None
-    """Which run it is at; null between two."""
-    phase: Literal["counting", "running"] | None
-    """On the virtual clock, or in real time."""
+    run: str | None = Field(description="Which run it is at; null between two.")
+    phase: Literal["counting", "running"] | None = Field(
+        description="On the virtual clock, or in real time."
+    )
     done: int
     of: int
-    left_s: float
-    """About how long it still takes (s)."""
-    why: str
-    """Why it broke off, in a word or the program's own; empty where it did not."""
+    left_s: float = Field(description="About how long it still takes (s).")
+    why: str = Field(
+        description=(
+            "Why it broke off, in a word or the program's own; empty where it did not."
+        )
+    )
     began_at: str
-    report: bool
-    """Whether there is something to open: the report, or what a break left."""
+    report: bool = Field(
+        description=(
+            "Whether there is something to open: the report, or what a break left."
+        )
+    )
 
 
 class Experiments(Model):
     """All of them, newest first."""
 
     items: list[Experiment]
-    refused: str | None
-    """Why none may be started now: ``running``, ``live_robot``; null: one may."""
+    refused: str | None = Field(
+        description=(
+            "Why none may be started now: ``running``, ``live_robot``; null: one may."
+        )
+    )

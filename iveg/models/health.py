@@ -2,6 +2,8 @@
 
 from typing import Literal
 
+from pydantic import Field
+
 from iveg.domain.acknowledgements import ECHO_S, WINDOW_S, Acknowledgements
 from iveg.domain.exposure import Exposure
 from iveg.domain.observations import Instant
@@ -17,8 +19,7 @@ class HopHealth(Model):
     age_s: float | None
     key: str
     detail: str
-    lag_s: float | None
-    """How late measures pass it, at least."""
+    lag_s: float | None = Field(description="How late measures pass it, at least.")
     growing: bool
 
 
@@ -136,5 +137,6 @@ class Health(Model):
     hops: list[HopHealth]
     counters: dict[str, int]
     safety: Safety
-    earlier: Literal["known", "reading", "unknown"]
-    """State of the records of earlier runs."""
+    earlier: Literal["known", "reading", "unknown"] = Field(
+        description="State of the records of earlier runs."
+    )

@@ -2,6 +2,8 @@
 
 from typing import Any
 
+from pydantic import Field
+
 from iveg.domain.latency.segments import Data, Segment, Window
 from iveg.models.base import Model
 
@@ -21,12 +23,11 @@ class SegmentSpread(Model):
 class SegmentBins(Model):
     """All that was measured of one hop, within 1 %."""
 
-    edges_ms: list[float]
-    """Upper ends of the bins that are not empty, rising."""
-    counts: list[int]
-    """How many messages fell into each."""
-    total_ms: float
-    """The sum of all durations, exact."""
+    edges_ms: list[float] = Field(
+        description="Upper ends of the bins that are not empty, rising."
+    )
+    counts: list[int] = Field(description="How many messages fell into each.")
+    total_ms: float = Field(description="The sum of all durations, exact.")
 
 
 class LatencyRow(Model):
@@ -34,10 +35,12 @@ class LatencyRow(Model):
 
     data: Data
     hops: dict[str, SegmentSpread]
-    sampled: list[Segment]
-    """Hops at which only a part of the messages is measured."""
-    bins: dict[str, SegmentBins] | None = None
-    """Null unless they were asked for."""
+    sampled: list[Segment] = Field(
+        description="Hops at which only a part of the messages is measured."
+    )
+    bins: dict[str, SegmentBins] | None = Field(
+        None, description="Null unless they were asked for."
+    )
 
 
 class LatencyClock(Model):
@@ -67,14 +70,16 @@ class LatencyStream(Model):
     heard_hz: float
     agent_hz: float
     orion_hz: float
-    kept_back: float | None
-    """Share (0 to 1) not sent to the agent; null without messages."""
+    kept_back: float | None = Field(
+        description="Share (0 to 1) not sent to the agent; null without messages."
+    )
     throttled: bool
     orion_first: int
     uplink: SegmentOrder
     fiware: SegmentOrder
-    excluded: dict[str, dict[str, int]]
-    """By hop and reason, what is in no statistics."""
+    excluded: dict[str, dict[str, int]] = Field(
+        description="By hop and reason, what is in no statistics."
+    )
 
 
 class SegmentRemark(Model):
@@ -108,21 +113,29 @@ class LatencyTable(Model):
     at: str
     window: Window
     window_s: float
-    robot: str | None
-    """Null: all robots."""
-    direct: bool
-    """Whether iVeg reads the broker itself, so that Δt₁ and Δt₂ are two numbers."""
+    robot: str | None = Field(description="Null: all robots.")
+    direct: bool = Field(
+        description=(
+            "Whether iVeg reads the broker itself, so that Δt₁ and Δt₂ are two numbers."
+        )
+    )
     rows: list[LatencyRow]
-    paper: dict[str, dict[str, dict[str, float]]]
-    """The paper's printed numbers, by place, kind of data and column (ms)."""
+    paper: dict[str, dict[str, dict[str, float]]] = Field(
+        description=(
+            "The paper's printed numbers, by place, kind of data and column (ms)."
+        )
+    )
     clocks: list[LatencyClock]
-    pages_within_ms: float | None
-    """How well pages' clocks are known; null while none has told."""
+    pages_within_ms: float | None = Field(
+        description="How well pages' clocks are known; null while none has told."
+    )
     streams: list[LatencyStream]
     remarks: list[SegmentRemark]
     trace: LatencyTrace | None
-    library: str
-    """Path of the script that draws the figures."""
+    library: str = Field(description="Path of the script that draws the figures.")
     style_ids: list[str]
-    figures: dict[str, Any]
-    """``bars``, ``cdf`` and ``trace`` as Plotly draws them; empty if unwanted."""
+    figures: dict[str, Any] = Field(
+        description=(
+            "``bars``, ``cdf`` and ``trace`` as Plotly draws them; empty if unwanted."
+        )
+    )

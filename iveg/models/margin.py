@@ -1,5 +1,7 @@
 """The gap between a robot and a person, less what stopping takes (ISO 13855)."""
 
+from pydantic import Field
+
 from iveg.domain import margins
 from iveg.domain.limits import LIMITS
 from iveg.models.base import Model
@@ -19,18 +21,14 @@ class Margin(Model):
 
     robot_id: str
     person_id: str
-    gap_m: float
-    """Between surfaces."""
+    gap_m: float = Field(description="Between surfaces.")
     needs_m: float
     margin_m: float
     band: margins.Band
     parts: MarginParts
-    age_s: float
-    """Age of the older position."""
-    braking: float
-    """Counted on (m/s²)."""
-    walking_speed: float
-    """Counted on (m/s)."""
+    age_s: float = Field(description="Age of the older position.")
+    braking: float = Field(description="Counted on (m/s²).")
+    walking_speed: float = Field(description="Counted on (m/s).")
 
     @classmethod
     def of(cls, margin: margins.SafetyMargin | None) -> "Margin | None":

@@ -3,6 +3,8 @@
 from collections.abc import Mapping, Sequence
 from urllib.parse import urlsplit
 
+from pydantic import Field
+
 from iveg.domain import messages
 from iveg.domain.messages import Channel, Contacts, MessageDelivery
 from iveg.domain.stamps import format_stamp
@@ -26,8 +28,9 @@ class PushChannel(Model):
     contact: str
     public_key: str | None
     devices: list[PushDevice]
-    last: list[Told]
-    """Result of the newest message for each recipient."""
+    last: list[Told] = Field(
+        description="Result of the newest message for each recipient."
+    )
 
 
 class Recipient(Model):
@@ -69,8 +72,9 @@ class Messages(Model):
     push: PushChannel
     email: EmailChannel
     webhook: WebhookChannel
-    counts: dict[str, int]
-    """``sent.email`` and so on, since the start."""
+    counts: dict[str, int] = Field(
+        description="``sent.email`` and so on, since the start."
+    )
 
     @classmethod
     def of(

@@ -27,23 +27,22 @@ class Person(Model):
 
     person_id: str
     class_: Class = Field(validation_alias="class", serialization_alias="class")
-    class_id: str
-    """The detector's own class name."""
+    class_id: str = Field(description="The detector's own class name.")
     stage: Stage
     position: Position
-    radius_m: float | None
-    """Radius of the widest ring."""
+    radius_m: float | None = Field(description="Radius of the widest ring.")
     confidence: float
     first_seen: str
     last_seen: str
     age_s: float
     observers: list[str]
-    possible: bool
-    """Below the threshold but seen again and again."""
-    doubtful: bool
-    """Seen beyond the walls: the position is its observer's."""
-    decision_id: str | None
-    """Newest open decision about this person."""
+    possible: bool = Field(description="Below the threshold but seen again and again.")
+    doubtful: bool = Field(
+        description="Seen beyond the walls: the position is its observer's."
+    )
+    decision_id: str | None = Field(
+        description="Newest open decision about this person."
+    )
     lane: str | None
     acting: list[Acting]
     margin: Margin | None
@@ -79,8 +78,12 @@ class Detection(Model):
 
     robot_id: str
     stamp: str | None
-    received_at: str | None = None
-    """When it reached iVeg; null on ``/live``, where its frame has an age."""
+    received_at: str | None = Field(
+        None,
+        description=(
+            "When it reached iVeg; null on ``/live``, where its frame has an age."
+        ),
+    )
     class_: str | None = Field(validation_alias="class", serialization_alias="class")
     class_id: str
     probability: float
@@ -88,10 +91,8 @@ class Detection(Model):
     box: DetectionBox | None
     confident: bool
     person_id: str | None
-    peer: str | None = None
-    """The robot of the fleet that was seen."""
-    transport: TransportId
-    """Transport of the copy that was first."""
+    peer: str | None = Field(None, description="The robot of the fleet that was seen.")
+    transport: TransportId = Field(description="Transport of the copy that was first.")
 
     @classmethod
     def of(

@@ -2,6 +2,8 @@
 
 from dataclasses import asdict
 
+from pydantic import Field
+
 from iveg.domain.greenhouse import Greenhouse
 from iveg.models.base import Model
 
@@ -90,14 +92,14 @@ class Scan(Model):
 class Costmap(Model):
     """Cells from the south-western corner, row by row: 0-100, -1 unknown."""
 
-    resolution: float
-    """Metres a cell."""
+    resolution: float = Field(description="Metres a cell.")
     width: int
     height: int
     origin: Point
     data: list[int]
-    age_s: float | None = None
-    """Since the newest scan in it; null before the first."""
+    age_s: float | None = Field(
+        None, description="Since the newest scan in it; null before the first."
+    )
 
 
 class LaneCoverage(Area):
@@ -106,17 +108,20 @@ class LaneCoverage(Area):
     label: str
     columns: int
     rows: int
-    ages_s: list[int | None]
-    """Whole seconds since a camera last covered a cell; null: never."""
+    ages_s: list[int | None] = Field(
+        description="Whole seconds since a camera last covered a cell; null: never."
+    )
 
 
 class Coverage(Model):
     """When a camera last looked at each cell of the aisles."""
 
     at: str
-    cameras: int
-    """Number of working cameras."""
+    cameras: int = Field(description="Number of working cameras.")
     within_s: float
-    share: float | None
-    """Share of the cells covered within that time (0-1); null without aisles."""
+    share: float | None = Field(
+        description=(
+            "Share of the cells covered within that time (0-1); null without aisles."
+        )
+    )
     lanes: list[LaneCoverage]

@@ -2,6 +2,8 @@
 
 from typing import Any, Literal
 
+from pydantic import Field
+
 from iveg.domain import feedback, observations
 from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import Pose2D, Twist2D
@@ -115,18 +117,15 @@ class MissingPremise(Model):
     """One thing without which a robot is not clear (docs/safety.md, "Clear")."""
 
     premise: Literal["pose", "doubt", "detector"]
-    robot_id: str
-    """Whose pose, word or detector it is."""
+    robot_id: str = Field(description="Whose pose, word or detector it is.")
 
 
 class Detector(Model):
     """Whether the robot's pictures are read whole, and waited for."""
 
-    required: bool
-    """By the fleet file, and not out of service."""
+    required: bool = Field(description="By the fleet file, and not out of service.")
     missing: bool
-    out_by: str | None
-    """Who took it out of service."""
+    out_by: str | None = Field(description="Who took it out of service.")
     out_since: str | None
 
     @classmethod
@@ -144,11 +143,9 @@ class Detector(Model):
 class Battery(Model):
     """The robot's battery, as it said last."""
 
-    percentage: float | None
-    """0 to 1."""
+    percentage: float | None = Field(description="0 to 1.")
     charging: bool | None
-    voltage: float | None
-    """V."""
+    voltage: float | None = Field(description="V.")
     age_s: float | None
 
     @classmethod
@@ -213,22 +210,23 @@ class Robot(Model):
 
     robot_id: str
     link: Link
-    mode: Mode
-    """The robot's recent report; without one, the speed limit."""
+    mode: Mode = Field(
+        description="The robot's recent report; without one, the speed limit."
+    )
     pose: Pose | None
     twist: Twist | None
-    stamp: str | None
-    """As the robot sent it."""
+    stamp: str | None = Field(description="As the robot sent it.")
     received_at: str | None
-    age_s: float | None
-    """At most; null while nobody knows."""
+    age_s: float | None = Field(description="At most; null while nobody knows.")
     age_estimated: bool
-    speed_factor: float | None
-    """Speed factor that the robot reports to apply."""
+    speed_factor: float | None = Field(
+        description="Speed factor that the robot reports to apply."
+    )
     applied: Applied | None
     speed_limit: SpeedLimit
-    missing: list[MissingPremise]
-    """What "clear" lacks, its reason first."""
+    missing: list[MissingPremise] = Field(
+        description='What "clear" lacks, its reason first.'
+    )
     detector: Detector
     holds: list[Hold]
     stop: Command | None
@@ -236,12 +234,10 @@ class Robot(Model):
     navigation: Navigation | None
     replay: bool
     clock_offset_s: float | None
-    transport: TransportId
-    """Transport that feeds the pose."""
+    transport: TransportId = Field(description="Transport that feeds the pose.")
     profile: Profile
     margin: Margin | None
-    cmd_status: str | None
-    """The agent's opinion, never believed."""
+    cmd_status: str | None = Field(description="The agent's opinion, never believed.")
     battery: Battery | None
 
     @staticmethod

@@ -1,5 +1,7 @@
 """The detection rule: when somebody counts, and how wide the ring is."""
 
+from pydantic import Field
+
 from iveg.domain import detection_rule
 from iveg.domain.detection_rule import Class
 from iveg.domain.feedback import HALF_SPEED
@@ -11,13 +13,15 @@ class Rule(Model):
 
     id: str
     version: int
-    confidence_threshold: float
-    """0 to 1, inclusive; ``class_thresholds`` by class."""
+    confidence_threshold: float = Field(
+        description="0 to 1, inclusive; ``class_thresholds`` by class."
+    )
     class_thresholds: dict[Class, float]
     radius_m: float
     factor: float
-    aliases: dict[str, Class]
-    """A detector's word → the class that it stands for."""
+    aliases: dict[str, Class] = Field(
+        description="A detector's word → the class that it stands for."
+    )
     possible_people: bool
     author: str
     since: str | None

@@ -1,5 +1,7 @@
 """The way in for another device."""
 
+from pydantic import Field
+
 from iveg.models.base import Model
 
 
@@ -8,5 +10,6 @@ class SignInCode(Model):
 
     link: str
     image: str
-    local: bool
-    """The address works on the server's own computer alone."""
+    local: bool = Field(
+        description="The address works on the server's own computer alone."
+    )

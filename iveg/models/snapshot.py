@@ -1,5 +1,7 @@
 """Everything that is known, for a browser that has just come."""
 
+from pydantic import Field
+
 from iveg.models.alert import Alert, Flood, LogEntry
 from iveg.models.base import Model
 from iveg.models.climate import Climate
@@ -14,12 +16,10 @@ from iveg.models.rule import Rule
 class Server(Model):
     """Which iVeg speaks."""
 
-    boot: str
-    """Random, new at each start."""
+    boot: str = Field(description="Random, new at each start.")
     version: str
     demo: bool
-    wall: float
-    """Its clock (Unix s)."""
+    wall: float = Field(description="Its clock (Unix s).")
 
 
 class User(Model):
@@ -40,11 +40,9 @@ class Snapshot(Model):
     robots: list[Robot]
     people: list[Person]
     detections: dict[str, DetectionFrame]
-    commands: list[Command]
-    """Those that go on."""
+    commands: list[Command] = Field(description="Those that go on.")
     alerts: list[Alert]
     flood: Flood
-    log: list[LogEntry]
-    """The newest 200, oldest first."""
+    log: list[LogEntry] = Field(description="The newest 200, oldest first.")
     health: Health
     climate: Climate | None
