@@ -5,10 +5,11 @@ whole message for one apostrophe and falls seconds behind under load (docs/fiwar
 and neither people nor poses must vanish for that.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
+from iveg.domain.kinds import KINDS, Kind, Scope
 from iveg.domain.observations import (
     Instant,
     Observation,
@@ -17,9 +18,15 @@ from iveg.domain.observations import (
 )
 from iveg.domain.transports import DIRECT
 from iveg.ngsi import codec, names
-from iveg.pipeline.kinds import Kind, Scope, read_directly
 
 PassedOver = Callable[[str, type[Observation], int], None]
+_WIDER: Sequence[Scope] = ("off", "safety", "all")
+
+
+def _read_in(scope: Scope) -> tuple[Kind, ...]:
+    """Kinds that are read directly in a scope."""
+    within = _WIDER[1 : _WIDER.index(scope) + 1]
+    return tuple(kind for kind in KINDS if kind.direct in within)
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,32 +75,31 @@ class DirectReader:
         self._reject = reject
         self._is_past = is_past
         self._passed_over = passed_over
-        rows = read_directly(scope)
-        self._kinds = tuple(rows)
+        kinds = _read_in(scope)
+        self._kinds = tuple(kind.of for kind in kinds)
         self._due: dict[tuple[str, type[Observation]], float] = {}
         self._sources = {
             topic: source
             for robot_id in robots
-            for topic, source in self._of_robot(apikey, robot_id, rows)
+            for topic, source in self._of_robot(apikey, robot_id, kinds)
         }
 
     def _of_robot(
-        self, apikey: str, robot_id: str, rows: Mapping[type[Observation], Kind]
+        self, apikey: str, robot_id: str, kinds: Iterable[Kind]
     ) -> Iterator[tuple[str, _Source]]:
         """Topics of one robot."""
         past = self._is_past
-        for kind, row in rows.items():
-            device = names.DEVICE_OF.get(kind)
-            if device is None:
+        for kind in kinds:
+            if kind.suffix is None:
                 continue
-            name = robot_id + device.suffix
+            name = robot_id + kind.suffix
             read = partial(codec.read_measure, name, is_past=past, later=True)
-            source = _Source(robot_id, row.qos, read, kind, row.apart_s)
+            source = _Source(robot_id, kind.qos, read, kind.of, kind.apart_s)
             yield names.measure_topic(apikey, name), source
-            if device.speaks_alone:
-                alone = names.direct_topic(robot_id, device.suffix)
+            if kind.speaks_alone:
+                alone = names.direct_topic(robot_id, kind.suffix)
                 yield alone, replace(source, sparse=False)
-        if rows:
+        if kinds:
             whole = partial(codec.read_measure, robot_id, is_past=past, later=True)
             yield names.measure_topic(apikey, robot_id), _Source(robot_id, 1, whole)
             answer = partial(codec.read_answer, robot_id)

@@ -8,14 +8,13 @@ as a whole, so in a common one the robot that sends first in each second would s
 the others.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-from iveg.domain.feeds import Copied
-from iveg.domain.observations import LaserScan, Odometry
+from iveg.domain.kinds import MEASURED, Kind
+from iveg.domain.observations import Observation
 from iveg.ngsi import names
-from iveg.ngsi.sensors import SENSORS
 
 PREFIX = "iVeg: "
 TOKEN_HEADER = "X-Iveg-Notify-Token"  # noqa: S105 - a header's name
@@ -58,7 +57,7 @@ class WantedSubscription:
     entity: tuple[tuple[str, str], ...]
     attributes: tuple[str, ...]
     condition: tuple[str, ...] = ()
-    copied: tuple[str, Copied] | None = None
+    copied: tuple[str, type[Observation]] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,16 +79,22 @@ class Ensured:
 
 _ROBOTS = (("idPattern", ".*"), ("type", names.ROBOT_TYPE))
 
+
+def _names_of(kind: Kind) -> tuple[str, ...]:
+    return tuple(name for name, _ in kind.attributes)
+
+
 WANTED_OF_ALL = (
-    WantedSubscription("detections", _ROBOTS, (names.BOXES, names.BOXES_HEADER)),
-    WantedSubscription("safety", _ROBOTS, (names.SAFETY,)),
-    WantedSubscription("navigation", _ROBOTS, (names.NAVIGATION,)),
-    *(WantedSubscription(one.attribute, _ROBOTS, (one.attribute,)) for one in SENSORS),
+    *(
+        WantedSubscription(one.name, _ROBOTS, _names_of(one))
+        for one in MEASURED
+        if not one.is_copied
+    ),
     WantedSubscription("commands", _ROBOTS, (names.COMMAND_STATUS, names.COMMAND_INFO)),
     WantedSubscription(
         "single uplink",
         _ROBOTS,
-        names.ALGORITHM_1,
+        tuple(names.ALGORITHM_1),
         condition=("timestamp", "pose", "class"),
     ),
     WantedSubscription(
@@ -111,22 +116,16 @@ def wanted_for(robots: Iterable[str]) -> tuple[WantedSubscription, ...]:
     return (*copies, *WANTED_OF_ALL)
 
 
-def _copies_of(robot_id: str) -> tuple[WantedSubscription, WantedSubscription]:
+def _copies_of(robot_id: str) -> Iterator[WantedSubscription]:
     entity = (("id", robot_id), ("type", names.ROBOT_TYPE))
-    return (
-        WantedSubscription(
-            f"odometry {robot_id}",
-            entity,
-            (names.ODOMETRY,),
-            copied=(robot_id, Odometry),
-        ),
-        WantedSubscription(
-            f"lidar {robot_id}",
-            entity,
-            (names.LIDAR, names.LIDAR_HEADER),
-            copied=(robot_id, LaserScan),
-        ),
-    )
+    for one in MEASURED:
+        if one.is_copied:
+            yield WantedSubscription(
+                f"{one.name} {robot_id}",
+                entity,
+                _names_of(one),
+                copied=(robot_id, one.of),
+            )
 
 
 async def ensure_subscriptions(

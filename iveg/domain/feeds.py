@@ -17,11 +17,8 @@ A robot that is silent on both transports changes nothing.
 from collections import defaultdict
 from dataclasses import dataclass, field
 
-from iveg.domain.observations import LaserScan, Odometry
+from iveg.domain.observations import Observation, Odometry
 from iveg.domain.transports import DIRECT, FIWARE, TransportId
-
-Copied = type[Odometry] | type[LaserScan]
-"""Kinds that Orion may throttle; never detections, reports, states of commands."""
 
 SILENT_S = 1.0
 """A direct copy older than this is missed."""
@@ -100,10 +97,10 @@ class Feed:
 class Feeds:
     """The feeds of a fleet, by robot and kind."""
 
-    _known: defaultdict[tuple[str, Copied], Feed] = field(
+    _known: defaultdict[tuple[str, type[Observation]], Feed] = field(
         default_factory=lambda: defaultdict(Feed)
     )
 
-    def of(self, robot_id: str, kind: Copied = Odometry) -> Feed:
+    def of(self, robot_id: str, kind: type[Observation] = Odometry) -> Feed:
         """One feed."""
         return self._known[robot_id, kind]

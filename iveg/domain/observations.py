@@ -5,8 +5,8 @@ are Unix seconds unless said otherwise.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Literal
+from dataclasses import dataclass, field, fields
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -244,18 +244,56 @@ class Navigation(Observation):
 
 
 @dataclass(frozen=True, slots=True)
-class Battery(Observation):
-    """Content of ``sensor_msgs/BatteryState`` that iVeg uses.
+class Quantity:
+    """What one member of a small sensor's value is, on every way it takes.
 
     Attributes:
-        percentage: 0 to 1; None when unknown.
-        charging: Its ``power_supply_status``; None when unknown.
-        voltage: (V); None when unknown.
+        unit: SI, or such as ``0–1``; ``–``: none.
+        least: Smallest value that is read; a smaller one is refused.
+        most: Greatest value that is read.
     """
 
-    percentage: float | None = None
-    charging: bool | None = None
-    voltage: float | None = None
+    unit: str
+    meaning: str
+    least: float | None = None
+    most: float | None = None
+
+
+def quantity(
+    unit: str, meaning: str, least: float | None = None, most: float | None = None
+) -> Any:
+    """A member of a small sensor's observation; None where it is not known."""
+    return field(
+        default=None, metadata={"quantity": Quantity(unit, meaning, least, most)}
+    )
+
+
+def quantities_of(of: type[Observation]) -> dict[str, Quantity]:
+    """The members of a small sensor's value, by name."""
+    found = {one.name: one.metadata.get("quantity") for one in fields(of)}
+    return {name: one for name, one in found.items() if one is not None}
+
+
+def flags_of(of: type[Observation]) -> list[str]:
+    """The quantities of a small sensor that are true or false, by name."""
+    types = {one.name: one.type for one in fields(of)}
+    return [name for name in quantities_of(of) if types[name] == bool | None]
+
+
+def value_of(observation: Observation) -> dict[str, Any]:
+    """What a small sensor says, by name."""
+    return {
+        name: getattr(observation, name) for name in quantities_of(type(observation))
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class Battery(Observation):
+    """The battery, as the robot said last."""
+
+    percentage: float | None = quantity("0–1", "charge", 0, 1)
+    charging: bool | None = quantity("–", "whether it charges")
+    voltage: float | None = quantity("V", "voltage", 0, 1e4)
 
 
 @dataclass(frozen=True, slots=True)

@@ -108,7 +108,7 @@ class Command(Model):
     robot: CommandRobot | None = None
     challenge_fresh: bool = False
     outcome: Outcome | None = Field(
-        None,
+        default=None,
         description=(
             "How it ended; null on ``/live``, where ``state`` says how it stands."
         ),

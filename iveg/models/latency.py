@@ -39,7 +39,7 @@ class LatencyRow(Model):
         description="Hops at which only a part of the messages is measured."
     )
     bins: dict[str, SegmentBins] | None = Field(
-        None, description="Null unless they were asked for."
+        default=None, description="Null unless they were asked for."
     )
 
 

@@ -79,7 +79,7 @@ class Detection(Model):
     robot_id: str
     stamp: str | None
     received_at: str | None = Field(
-        None,
+        default=None,
         description=(
             "When it reached iVeg; null on ``/live``, where its frame has an age."
         ),
@@ -91,7 +91,9 @@ class Detection(Model):
     box: DetectionBox | None
     confident: bool
     person_id: str | None
-    peer: str | None = Field(None, description="The robot of the fleet that was seen.")
+    peer: str | None = Field(
+        default=None, description="The robot of the fleet that was seen."
+    )
     transport: TransportId = Field(description="Transport of the copy that was first.")
 
     @classmethod

@@ -98,7 +98,7 @@ class Costmap(Model):
     origin: Point
     data: list[int]
     age_s: float | None = Field(
-        None, description="Since the newest scan in it; null before the first."
+        default=None, description="Since the newest scan in it; null before the first."
     )
 
 

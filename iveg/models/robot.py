@@ -1,13 +1,14 @@
 """A robot of the fleet, with the age of everything that is said of it."""
 
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, get_type_hints
 
-from pydantic import Field
+from pydantic import Field, create_model
 
 from iveg.domain import feedback, observations
 from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import Pose2D, Twist2D
-from iveg.domain.observations import Instant
+from iveg.domain.kinds import SENSED, Kind
+from iveg.domain.observations import Instant, quantities_of, value_of
 from iveg.domain.robot_state import Link, RobotState
 from iveg.domain.stamps import format_stamp
 from iveg.domain.transports import TransportId
@@ -140,27 +141,36 @@ class Detector(Model):
         )
 
 
-class Battery(Model):
-    """The robot's battery, as it said last."""
+class SensorReading(Model):
+    """The newest reading of a small sensor; its quantities by name."""
 
-    percentage: float | None = Field(description="0 to 1.")
-    charging: bool | None
-    voltage: float | None = Field(description="V.")
     age_s: float | None
 
-    @classmethod
-    def of(cls, robot: RobotState, now: Instant) -> "Battery | None":
-        """None before the first."""
-        read = robot.sensed.get(observations.Battery)
-        if read is None or not isinstance(read.observation, observations.Battery):
-            return None
-        battery = read.observation
-        return cls(
-            percentage=battery.percentage,
-            charging=battery.charging,
-            voltage=battery.voltage,
-            age_s=None if read.at is None else round(now.mono - read.at.mono, 1),
-        )
+
+def _reading_model(kind: Kind) -> type[SensorReading]:
+    """The model of a small sensor: the quantities of its observation, and its age."""
+    types = get_type_hints(kind.of)
+    members: dict[str, Any] = {
+        name: (types[name], Field(description=f"{one.meaning} ({one.unit})"))
+        for name, one in quantities_of(kind.of).items()
+    }
+    return create_model(
+        kind.of.__name__, __base__=SensorReading, __doc__=kind.of.__doc__, **members
+    )
+
+
+_READINGS = {kind.name: _reading_model(kind) for kind in SENSED}
+
+
+def _newest_reading(
+    robot: RobotState, kind: Kind, now: Instant
+) -> SensorReading | None:
+    """What a small sensor said last; None before the first."""
+    read = robot.sensed.get(kind.of)
+    if read is None:
+        return None
+    age_s = None if read.at is None else round(now.mono - read.at.mono, 1)
+    return _READINGS[kind.name](**value_of(read.observation), age_s=age_s)
 
 
 class Navigation(Model):
@@ -205,7 +215,7 @@ class Profile(Model):
         )
 
 
-class Robot(Model):
+class _Robot(Model):
     """One robot with the age of what is said of it."""
 
     robot_id: str
@@ -238,9 +248,19 @@ class Robot(Model):
     profile: Profile
     margin: Margin | None
     cmd_status: str | None = Field(description="The agent's opinion, never believed.")
-    battery: Battery | None
 
     @staticmethod
-    def sensed(robot: RobotState, now: Instant) -> "dict[str, Any]":
-        """The members that are a sensor's newest word."""
-        return {"battery": Battery.of(robot, now)}
+    def sensed(robot: RobotState, now: Instant) -> dict[str, SensorReading | None]:
+        """The members that are small sensors' newest readings."""
+        return {kind.name: _newest_reading(robot, kind, now) for kind in SENSED}
+
+
+if TYPE_CHECKING:
+    Robot = _Robot
+else:
+    Robot = create_model(
+        "Robot",
+        __base__=_Robot,
+        __doc__=_Robot.__doc__,
+        **{name: (made | None, ...) for name, made in _READINGS.items()},
+    )

@@ -1,15 +1,20 @@
-"""The types of the page, from the models: ``python -m iveg.models.typescript``.
+"""What the page has from Python: ``python -m iveg.models.typescript``.
 
-The output is ``static/js/types.d.ts``, checked in; a test fails when it is stale, so
-that a field has one name, one type and one meaning on both sides.
+The output, the types of the models (``static/js/types.d.ts``) and the small sensors
+(``static/js/core/sensors.js``), is checked in; a test fails when it is stale, so that a
+field has one name, one type and one meaning on both sides.
 """
 
-from collections.abc import Iterator, Mapping
+import json
+from collections.abc import Callable, Iterator, Mapping
 from importlib.resources import files
+from pathlib import Path
 from typing import Any
 
 from pydantic.json_schema import models_json_schema
 
+from iveg.domain.kinds import SENSED, Kind, Sensor
+from iveg.domain.observations import flags_of, quantities_of
 from iveg.models.alert import AlertListing
 from iveg.models.base import Model
 from iveg.models.climate import ClimateReading
@@ -54,6 +59,14 @@ _HEAD = """\
  * Written by `python -m iveg.models.typescript`; change the models, not this file.
  * Lengths in metres, angles in radians, ages in seconds, times ISO-8601 UTC.
  */
+"""
+_SENSORS_HEAD = """\
+/**
+ * The small sensors of robots; written by `python -m iveg.models.typescript` from
+ * `iveg/domain/kinds.py`.  `shown` is the quantity on the card, a true flag words it.
+ */
+
+export const SENSORS = /** @type {const} */ ([
 """
 _Schema = Mapping[str, Any]
 
@@ -107,5 +120,35 @@ def _list(schema: _Schema) -> str:
     return f"({inner})[]" if " | " in inner else f"{inner}[]"
 
 
+def write_sensors() -> str:
+    """The small sensors, as cards show them."""
+    rows = [_shown(kind, kind.sensor) for kind in SENSED if kind.sensor]
+    return f"{_SENSORS_HEAD}{''.join(map(_row, rows))}]);\n"
+
+
+def _row(members: Mapping[str, Any]) -> str:
+    lines = "".join(
+        f"    {name}: {json.dumps(value)},\n" for name, value in members.items()
+    )
+    return f"  {{\n{lines}  }},\n"
+
+
+def _shown(kind: Kind, sensor: Sensor) -> dict[str, Any]:
+    shown = quantities_of(kind.of)[sensor.shown]
+    return {
+        "name": kind.name,
+        "shown": sensor.shown,
+        "flags": flags_of(kind.of),
+        "gauge": [shown.least, shown.most] if sensor.gauge else None,
+    }
+
+
+WRITTEN: Mapping[str, Callable[[], str]] = {
+    "types.d.ts": write_types,
+    "core/sensors.js": write_sensors,
+}
+"""Files below ``static/js``."""
+
 if __name__ == "__main__":
-    (files("iveg") / "static/js/types.d.ts").write_text(write_types())  # type: ignore[attr-defined]
+    for name, write in WRITTEN.items():
+        Path(str(files("iveg") / "static/js" / name)).write_text(write())

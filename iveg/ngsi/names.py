@@ -7,6 +7,7 @@ from functools import lru_cache
 from typing import Any
 
 from iveg.domain.errors import UnreadableError
+from iveg.domain.kinds import KIND_OF, MEASURED
 from iveg.domain.observations import (
     DetectionFrame,
     LaserScan,
@@ -15,25 +16,34 @@ from iveg.domain.observations import (
     Odometry,
     SafetyReport,
 )
-from iveg.ngsi.sensors import SENSORS
 
 ROBOT_TYPE = "Robot"
 CLIMATE_ID, CLIMATE_TYPE = "greenhouse-climate", "IndoorEnvironmentObserved"
 HEARTBEAT_ID, HEARTBEAT_TYPE = "iveg-canary", "Probe"
 CLIMATE_DEVICE = "climate"
 
-ODOMETRY = "base_pose_ground_truth"
-LIDAR, LIDAR_HEADER = "lidar_points", "lidar_header"
-BOXES, BOXES_HEADER = "bounding_boxes", "detection_header"
+
+def _attributes(of: type[Observation]) -> list[str]:
+    return [name for name, _ in KIND_OF[of].attributes]
+
+
+(ODOMETRY,) = _attributes(Odometry)
+LIDAR, LIDAR_HEADER = _attributes(LaserScan)
+BOXES, BOXES_HEADER = _attributes(DetectionFrame)
+(SAFETY,) = _attributes(SafetyReport)
+(NAVIGATION,) = _attributes(Navigation)
 UNPLACED = "unplaced"
 """``frame_id`` of what a robot sensed without knowing where."""
-SAFETY = "safety_state"
-NAVIGATION = "navigation"
 COMMAND, COMMAND_STATUS, COMMAND_INFO = "cmd", "cmd_status", "cmd_info"
-ALGORITHM_1 = ("class", "conf", "position_3D", "pose", "laser_scan", "timestamp")
-
-FRAME_SUFFIX = "_yolox_bounding_boxes"
-"""Of the device whose measures are detection frames."""
+ALGORITHM_1 = {
+    "class": "Text",
+    "conf": "Number",
+    "position_3D": "object",
+    "pose": "object",
+    "laser_scan": "array",
+    "timestamp": "Text",
+}
+"""Attributes of the single payload, with their NGSI types."""
 
 FEEDBACK_TOPIC = "/{robot_id}/mqtt_feedback"
 FEEDBACK_FILTER = "/+/mqtt_feedback"
@@ -53,66 +63,29 @@ class Device:
         suffix: After the robot id in the device id and topic; empty for the robot.
         attributes: NGSI attribute name and type.
         of: What its measures observe; None for the device of everything.
-        speaks_alone: Whether it may also speak to iVeg alone, past the IoT Agent.
     """
 
     suffix: str
     attributes: tuple[tuple[str, str], ...]
     of: type[Observation] | None = None
-    speaks_alone: bool = False
-    has_command: bool = False
+
+    @property
+    def has_command(self) -> bool:
+        """Whether the robot's orders go to it: the device of everything."""
+        return self.of is None
 
 
 ROBOT_DEVICES = (
     Device(
-        "",
-        (
-            ("class", "Text"),
-            ("conf", "Number"),
-            ("position_3D", "object"),
-            ("pose", "object"),
-            ("laser_scan", "array"),
-            ("timestamp", "Text"),
-            (ODOMETRY, "object"),
-            (BOXES, "object"),
-            (BOXES_HEADER, "object"),
-            (SAFETY, "object"),
-            (NAVIGATION, "object"),
-            (LIDAR_HEADER, "object"),
-            (LIDAR, "array"),
-            *((sensor.attribute, "object") for sensor in SENSORS),
-        ),
-        has_command=True,
+        "", (*ALGORITHM_1.items(), *(a for one in MEASURED for a in one.attributes))
     ),
-    Device("_odom", ((ODOMETRY, "object"),), Odometry, speaks_alone=True),
-    Device(
-        "_lidar2D",
-        ((LIDAR, "array"), (LIDAR_HEADER, "object")),
-        LaserScan,
-        speaks_alone=True,
-    ),
-    Device(
-        FRAME_SUFFIX,
-        ((BOXES, "object"), (BOXES_HEADER, "object")),
-        DetectionFrame,
-        speaks_alone=True,
-    ),
-    Device("_safety", ((SAFETY, "object"),), SafetyReport, speaks_alone=True),
-    Device("_nav", ((NAVIGATION, "object"),), Navigation),
-    *(
-        Device(sensor.suffix, ((sensor.attribute, "object"),), sensor.of)
-        for sensor in SENSORS
-    ),
+    *(Device(one.suffix or "", one.attributes, one.of) for one in MEASURED),
 )
 """The command device sorts before its sensors, and is provisioned last where the agent
 keeps its registry in memory, so that either registry picks it (docs/fiware.md)."""
 
-DEVICE_OF: Mapping[type[Observation], Device] = {
-    device.of: device for device in ROBOT_DEVICES if device.of is not None
-}
-"""The device that measures a kind of observation."""
 DIRECT_SUFFIXES = tuple(
-    device.suffix for device in ROBOT_DEVICES if device.speaks_alone
+    one.suffix for one in MEASURED if one.suffix and one.speaks_alone
 )
 
 

@@ -1,6 +1,6 @@
 """The rule at work: observations change the world, the world changes speed limits.
 
-``take`` applies one observation and ``settle`` judges the fleet, once for all that was
+``apply`` takes one observation and ``settle`` judges the fleet, once for all that was
 taken; ``tick`` does what time alone brings: silence, expiry, overdue links.  The
 heartbeat to the fleet is sent from here and nowhere else, so that a loop that hangs
 falls silent and slows the robots.
@@ -14,6 +14,8 @@ from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.events import Condition, LogEvent, Slot
 from iveg.domain.feedback import UNSUPERVISED, SpeedLimit
 from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.kinds import kind
+from iveg.domain.low_values import LowValues
 from iveg.domain.observations import (
     Climate,
     DetectionFrame,
@@ -35,12 +37,18 @@ from iveg.pipeline.detections import DetectionTracking
 from iveg.pipeline.event_log import EventLog
 from iveg.pipeline.evidence import places_of, record_of
 from iveg.pipeline.feedback import FeedbackPublisher
-from iveg.pipeline.kinds import LowValues, kind
 from iveg.pipeline.log_messages import evidence_of, speed_line
 from iveg.pipeline.ports import FleetPort, Ids
 from iveg.pipeline.staleness import Staleness
 
 HEARTBEAT_S = 0.1
+
+
+_TOPIC_OF = {
+    "robot": topics.ROBOT,
+    "scan": topics.SCAN,
+    "climate": topics.CLIMATE,
+}
 
 
 class Evaluator:
@@ -131,10 +139,10 @@ class Evaluator:
         if verdict != "new":
             return False
         row, robot_id = kind(observation), observation.robot_id
-        for topic in row.touches:
-            self._event_log.changed(topic.of(robot_id))
-        if row.kept is not None:
-            self._event_log.reading(row.kept, observation, received.at)
+        if row.changes is not None:
+            self._event_log.changed(_TOPIC_OF[row.changes].of(robot_id))
+        if row.sensor is not None:
+            self._event_log.reading(row, observation, received.at)
         match observation:
             case Odometry():
                 self._drove(observation, received.at)

@@ -6,14 +6,21 @@ API and the database agree.
 
 from collections import deque
 from collections.abc import Callable, Iterable
-from dataclasses import asdict, fields, replace
+from dataclasses import asdict, replace
 from functools import wraps
 from typing import Any, Concatenate, ParamSpec
 
 from iveg.domain.alerts.alert_book import AlertOccurrence, BookedAlert
 from iveg.domain.decisions import SlowdownDecision
 from iveg.domain.events import LogEvent
-from iveg.domain.observations import Climate, Instant, Observation, Odometry
+from iveg.domain.kinds import Kind
+from iveg.domain.observations import (
+    Climate,
+    Instant,
+    Observation,
+    Odometry,
+    value_of,
+)
 from iveg.domain.records import (
     AlertRecord,
     ClimateRecord,
@@ -37,7 +44,6 @@ from iveg.pipeline.supervision import Supervision
 _KEPT_LINES = 500
 READING_PERIOD_S = 60.0
 """Air and batteries change slowly: a day is 1,440 rows."""
-_NOT_VALUES = ("robot_id", "origin")
 _P = ParamSpec("_P")
 
 
@@ -282,25 +288,31 @@ class EventLog:
             )
 
     @_guarded
-    def reading(self, name: str, read: Observation, at: Instant) -> None:
-        """Record a reading of a small sensor by its name, once a minute for each."""
-        if not self._is_due(read.robot_id, type(read), at):
+    def reading(self, kind: Kind, read: Observation, at: Instant) -> None:
+        """Record a reading of a small sensor, as often as the history keeps one."""
+        period_s = kind.sensor.kept_every_s if kind.sensor else READING_PERIOD_S
+        if not self._is_due(read.robot_id, type(read), at, period_s):
             return
-        own = (one.name for one in fields(read) if one.name not in _NOT_VALUES)
         self._sink.offer(
             ReadingRecord(
                 at=at.wall,
                 robot_id=read.robot_id,
-                kind=name,
-                value={name: getattr(read, name) for name in own},
+                kind=kind.name,
+                value=value_of(read),
             )
         )
 
-    def _is_due(self, robot_id: str, kind: type[Observation], at: Instant) -> bool:
-        """Whether a minute has passed since the last one; the next counts from now."""
+    def _is_due(
+        self,
+        robot_id: str,
+        kind: type[Observation],
+        at: Instant,
+        period_s: float = READING_PERIOD_S,
+    ) -> bool:
+        """Whether a period has passed since the last one; the next counts from now."""
         kept = self._kept.get((robot_id, kind), float("-inf"))
         # Devices that send every minute are late as often as early.
-        is_due = at.mono - kept >= 0.9 * READING_PERIOD_S
+        is_due = at.mono - kept >= 0.9 * period_s
         if is_due:
             self._kept[robot_id, kind] = at.mono
         return is_due

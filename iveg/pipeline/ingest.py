@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 from iveg.domain.errors import UnknownRobotError
+from iveg.domain.kinds import KIND_OF
 from iveg.domain.observations import (
     DetectionFrame,
     Observation,
@@ -22,7 +23,6 @@ from iveg.domain.observations import (
     RefusedFrame,
     kind_of,
 )
-from iveg.pipeline.kinds import may_drop
 from iveg.pipeline.waiting import wait_set
 
 _log = logging.getLogger(__name__)
@@ -204,5 +204,6 @@ def _stream(received: Received) -> _Stream:
 
 
 def _may_drop(stream: _Stream) -> bool:
-    """Whether it is telemetry: the newest says all that counts."""
-    return may_drop(stream[1])
+    """Whether it is telemetry, of which the newest says all, or a copy or refusal."""
+    row = KIND_OF.get(stream[1])
+    return row is None or row.may_drop

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 from itertools import chain
 
 from iveg.domain.events import LogEvent
+from iveg.domain.kinds import kind
 from iveg.domain.observations import (
     CommandAnswer,
     HeartbeatProbe,
@@ -21,7 +22,6 @@ from iveg.pipeline.evaluate import Evaluator
 from iveg.pipeline.event_log import EventLog
 from iveg.pipeline.health_monitor import HealthMonitor, HopHealth, HopState
 from iveg.pipeline.ingest import Ingest
-from iveg.pipeline.kinds import kind
 from iveg.pipeline.ports import Clock
 from iveg.pipeline.supervision import Supervision
 

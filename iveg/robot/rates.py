@@ -16,17 +16,18 @@ Messages held back still go to iVeg directly.
 """
 
 from dataclasses import dataclass, field
+from operator import itemgetter
 
-from iveg.domain.observations import DetectionFrame, LaserScan, Odometry
-from iveg.ngsi.names import DEVICE_OF
+from iveg.domain.kinds import MEASURED
 
 TOP_HZ = 30.0
-FLOOR_HZ = {
-    DEVICE_OF[LaserScan].suffix: 1.05,
-    DEVICE_OF[DetectionFrame].suffix: 3.2,
-    DEVICE_OF[Odometry].suffix: 5.3,
-}
-"""A little above the contract's 1, 3 and 5, so that a late timer still keeps them."""
+FLOOR_HZ = dict(
+    sorted(
+        ((one.suffix or "", one.floor_hz) for one in MEASURED if one.floor_hz),
+        key=itemgetter(1),
+    )
+)
+"""Least rates by device; who can be rarest gives way first."""
 LEVELS = float(len(FLOOR_HZ))
 
 BEHIND_S, WELL_S = 0.5, 0.25

@@ -14,6 +14,7 @@ from dataclasses import fields, replace
 from operator import attrgetter
 from typing import Any, Literal
 
+from iveg.domain.kinds import KIND_OF, SENSED
 from iveg.domain.observations import (
     CommandAnswer,
     DetectionFrame,
@@ -27,7 +28,6 @@ from iveg.domain.observations import (
     Unplaced,
 )
 from iveg.ngsi import codec, names
-from iveg.ngsi.sensors import SENSOR_OF
 from iveg.robot.echo import Echo
 from iveg.robot.lane import LaneMessage
 from iveg.robot.rates import UplinkRates
@@ -43,10 +43,10 @@ _WRITERS: dict[type, Callable[[Any], bytes]] = {
     DetectionFrame: codec.write_detections,
     Navigation: codec.write_navigation,
     Unplaced: codec.write_unplaced,
-    **dict.fromkeys(SENSOR_OF, codec.write_sensed),
+    **{one.of: codec.write_sensed for one in SENSED},
 }
 _UNPLACED = {"odometry": Odometry, "scan": LaserScan}
-_SAFETY = names.DEVICE_OF[SafetyReport].suffix
+_SAFETY = KIND_OF[SafetyReport].suffix or ""
 _ANSWERS = "cmdexe"
 _SAID = {
     kind: attrgetter(*(one.name for one in fields(kind) if one.name != "robot_id"))
@@ -196,4 +196,4 @@ def _suffix_of(observation: Observation) -> str:
     kind = type(observation)
     if isinstance(observation, Unplaced):
         kind = _UNPLACED[observation.kind]
-    return names.DEVICE_OF[kind].suffix
+    return KIND_OF[kind].suffix or ""

@@ -9,7 +9,7 @@ import pytest
 
 from iveg import settings
 from iveg.ngsi import names
-from tests.architecture import documents
+from tests.architecture import documents, sensor_pages
 from tests.processes import ROOT
 
 TOPICS = documents.named_headings(documents.interfaces())
@@ -50,6 +50,14 @@ def test_every_measure_topic_has_its_heading(device: names.Device) -> None:
 )
 def test_every_other_topic_has_its_heading(topic: str) -> None:
     assert topic in TOPICS
+
+
+@pytest.mark.parametrize("name", sensor_pages.PAGES)
+def test_what_a_page_says_of_small_sensors_is_fresh(name: str) -> None:
+    page = (documents.INTERFACES / name).read_text()
+
+    stale = f"docs/interfaces/{name}: python -m tests.architecture.sensor_pages"
+    assert page == sensor_pages.PAGES[name](page), stale
 
 
 def test_what_robots_subscribe_to_is_in_the_contract() -> None:

@@ -10,6 +10,14 @@
  * @typedef {import("../../iveg/static/js/core/protocol.js").Snapshot} Snapshot
  */
 
+import { SENSORS } from "../../iveg/static/js/core/sensors.js";
+
+/** @typedef {typeof SENSORS[number]["name"]} SensorName */
+
+const NO_READINGS = /** @type {Record<SensorName, null>} */ (
+  Object.fromEntries(SENSORS.map(({ name }) => [name, null]))
+);
+
 export const STAMP = "2026-11-20T09:00:00.000Z";
 
 const CLEAR = {
@@ -45,7 +53,7 @@ export function robot(changes = {}) {
     clock_offset_s: 0,
     transport: "direct",
     margin: null,
-    battery: null,
+    ...NO_READINGS,
     profile: {
       drive: "differential",
       length: 1,

@@ -9,19 +9,17 @@ from dataclasses import dataclass, replace
 
 from iveg.adapters import clock
 from iveg.domain.geometry import REST, Twist2D
-from iveg.domain.observations import Battery, Instant, Origin
+from iveg.domain.observations import Instant
 from iveg.lab.emulator.orders import FaultOrder
 from iveg.lab.emulator.radio import LinkFaults
 from iveg.lab.emulator.relay import Relay
+from iveg.lab.emulator.sensors import EmulatedSensors
 from iveg.lab.emulator.truth import TruthLog
 from iveg.lab.emulator.world import RobotHardware, SimulatedWorld
 from iveg.robot.node import NodeSettings, RobotNode
 from iveg.robot.pacing import LONGEST_STEP_S, SLOTS, in_slots
 
 _NAVIGATION_EVERY_S = 1.0
-_BATTERY_EVERY_S = 5.0
-_BATTERY_LASTS_S = 8 * 3600.0
-_BATTERY_FULL, _BATTERY_SWAPPED = 0.95, 0.30
 LINK_FIELDS = {
     "drop_percent",
     "duplicate_percent",
@@ -77,7 +75,7 @@ class EmulatedRobot:
         self._tasks: asyncio.TaskGroup
         self._run_began = 0.0
         self._navigation_sent: tuple[str, float] = ("", -_NAVIGATION_EVERY_S)
-        self._battery_sent = -_BATTERY_EVERY_S
+        self._sensors = EmulatedSensors()
         self._faults = FaultOrder(robot=self.robot_id)
         self._requested = REST
 
@@ -134,9 +132,8 @@ class EmulatedRobot:
         if navigation.task != task or now - published_at >= _NAVIGATION_EVERY_S:
             self._navigation_sent = (navigation.task, now)
             node.sense(navigation)
-        if now - self._battery_sent >= _BATTERY_EVERY_S:
-            self._battery_sent = now
-            node.sense(battery_after(now))
+        for reading in self._sensors.due(now):
+            node.sense(reading)
 
     def _scan(self, _: float) -> None:
         if self._node_task is not None:
@@ -186,10 +183,3 @@ class EmulatedRobot:
         self._node_task = self._tasks.create_task(
             self._node.run(), name=f"node-{self.robot_id}"
         )
-
-
-def battery_after(driven_s: float) -> Battery:
-    """A battery that drains while driving and is swapped before it is low."""
-    usable = _BATTERY_FULL - _BATTERY_SWAPPED
-    level = _BATTERY_FULL - (driven_s / _BATTERY_LASTS_S) % usable
-    return Battery("", Origin(), round(level, 3), charging=False, voltage=25.6)

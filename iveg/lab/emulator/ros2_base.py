@@ -15,11 +15,13 @@ from iveg.domain.geometry import REST, Pose2D, Twist2D
 from iveg.domain.observations import Detection
 from iveg.lab.emulator.greenhouse import into
 from iveg.lab.emulator.orders import FaultOrder
+from iveg.lab.emulator.sensors import EmulatedSensors
 from iveg.lab.emulator.world import RobotHardware, SimulatedWorld
 from iveg.robot.pacing import LONGEST_STEP_S, SLOTS, every, in_slots
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.reading import read_twist, write_twist
 from iveg.robot.ros2.rig import Network, Writer
+from iveg.robot.ros2.sensors import ROS_SENSORS
 from iveg.ros2 import cdr
 from iveg.ros2 import messages as m
 from iveg.ros2.schema import Message
@@ -108,7 +110,7 @@ class Ros2Base:
         names = config.full_topics
 
         def writer(topic: str, message: type[Message]) -> Writer:
-            name = getattr(names, topic)
+            name = names.names()[topic]
             return network.writer(name, message, config.qualities[topic])
 
         self._commands = network.reader(
@@ -123,7 +125,11 @@ class Ros2Base:
         self._scans = writer("scan", m.LaserScan)
         self._seen = writer("detections_3d", m.Detection3DArray)
         self._paths = writer("path", m.Path)
-        self._batteries = writer("battery", m.BatteryState)
+        self._sensors = EmulatedSensors()
+        self._readings = {
+            sensor.of: (sensor, writer(name, sensor.message))
+            for name, sensor in ROS_SENSORS.items()
+        }
 
     async def run(self, began: float, phase: float) -> None:
         """Drive and sense until cancelled; ``began`` is when the run began."""
@@ -211,8 +217,10 @@ class Ros2Base:
         path = self._rig.navigation().path
         poses = tuple(m.PoseStamped(header, _pose(Pose2D(x, y, 0.0))) for x, y in path)
         self._paths.write(cdr.write(m.Path(header, poses)))
-        battery = m.BatteryState(header, voltage=25.6, percentage=0.8)
-        self._batteries.write(cdr.write(battery))
+        for reading in self._sensors.due(clock.mono() - self._run_began):
+            if type(reading) in self._readings:
+                sensor, out = self._readings[type(reading)]
+                out.write(cdr.write(sensor.write(header, reading)))
 
     def _mounts(self) -> m.TFMessage:
         stamp = m.Time.of(clock.wall())

@@ -10,6 +10,7 @@ from pydantic import ValidationError
 
 from iveg.domain.errors import UnreadableError
 from iveg.domain.geometry import Pose2D, Twist2D
+from iveg.domain.kinds import SENSED
 from iveg.domain.observations import (
     Climate,
     CommandAnswer,
@@ -34,8 +35,8 @@ from iveg.ngsi.codec.fields import (
     refuse_unplaced,
 )
 from iveg.ngsi.codec.scans import read_scan, read_single_scan
+from iveg.ngsi.codec.sensors import read_sensed
 from iveg.ngsi.codec.untrusted import ReadResult, first_complaint, merge, unread
-from iveg.ngsi.sensors import SENSORS, Sensor
 
 Reader = Callable[[str, Any], Observation]
 IsPast = Callable[[str, type[Observation], str, int], bool]
@@ -195,13 +196,6 @@ def _single_pose(robot_id: str, attributes: Mapping[str, Any]) -> Odometry:
     return odometry
 
 
-def _sensed(
-    sensor: Sensor, robot_id: str, attributes: Mapping[str, Any]
-) -> Observation:
-    value = sensor.value.model_validate(attributes[sensor.attribute])
-    return sensor.read(robot_id, read_origin(value), value)
-
-
 _READERS: Mapping[str, Reader] = {
     names.ODOMETRY: _odometry,
     names.LIDAR: read_scan,
@@ -213,7 +207,7 @@ _READERS: Mapping[str, Reader] = {
     "pose": _single_pose,
     "laser_scan": read_single_scan,
     "class": read_single_detection,
-    **{sensor.attribute: partial(_sensed, sensor) for sensor in SENSORS},
+    **{one.name: partial(read_sensed, one) for one in SENSED},
 }
 
 _FRAMES = frozenset({names.BOXES, "class"})

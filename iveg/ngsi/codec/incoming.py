@@ -10,6 +10,8 @@ from typing import Any
 from pydantic import ValidationError
 
 from iveg.domain.errors import UnreadableError
+from iveg.domain.kinds import KIND_OF
+from iveg.domain.observations import DetectionFrame
 from iveg.ngsi import names, payloads
 from iveg.ngsi.codec.attributes import (
     IsPast,
@@ -30,6 +32,7 @@ from iveg.ngsi.codec.untrusted import (
     unread,
 )
 
+_FRAME_SUFFIX = KIND_OF[DetectionFrame].suffix or ""
 _NO_OTHERS: Mapping[str, Reader] = {}
 
 
@@ -116,7 +119,7 @@ def read_measure(
             readers = _readers(later=later)
             return read_attributes(robot_id, attributes, is_past, readers)
         read = unread(device_id, "not_an_object")
-    is_frame = device_id.endswith(names.FRAME_SUFFIX)
+    is_frame = device_id == robot_id + _FRAME_SUFFIX
     return refused_frame(robot_id, read) if is_frame else read
 
 

@@ -5,17 +5,19 @@ from typing import Any
 
 import orjson
 
+from iveg.domain.kinds import kind
 from iveg.domain.observations import (
-    Battery,
     Climate,
     CommandAnswer,
     DetectionFrame,
     LaserScan,
     Navigation,
+    Observation,
     Odometry,
     Origin,
     SafetyReport,
     Unplaced,
+    value_of,
 )
 from iveg.ngsi import names
 from iveg.ngsi.codec.fields import (
@@ -25,7 +27,6 @@ from iveg.ngsi.codec.fields import (
     write_origin,
     write_ranges,
 )
-from iveg.ngsi.sensors import SENSOR_OF
 
 
 def write_odometry(value: Odometry) -> bytes:
@@ -171,11 +172,10 @@ def write_navigation(value: Navigation) -> bytes:
     )
 
 
-def write_sensed(value: Battery) -> bytes:
-    """The bytes of a sensor's topic, ``/{apikey}/{robot}{suffix}/attrs``."""
-    sensor = SENSOR_OF[type(value)]
-    told = {**sensor.write(value), **write_origin(value.origin)}
-    return _measure(value.origin, {sensor.attribute: told})
+def write_sensed(value: Observation) -> bytes:
+    """The bytes of a small sensor's topic, ``/{apikey}/{robot}_{name}/attrs``."""
+    told = {**value_of(value), **write_origin(value.origin)}
+    return _measure(value.origin, {kind(value).name: told})
 
 
 def write_answer(value: CommandAnswer) -> bytes:

@@ -7,11 +7,12 @@ reason.
 import re
 import tomllib
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 from iveg.adapters.toml_positions import place_of, syntax_error
 from iveg.domain.errors import DataFileError, UnreadableError
+from iveg.robot.ros2.sensors import ROS_SENSORS
 from iveg.ros2 import names
 from iveg.ros2.names import Qos
 
@@ -32,6 +33,7 @@ class Topics:
             whole box is used.
         obstacles: Output of people and peers for Nav2's obstacle layer.
         markers: Output of the same for RViz.
+        sensors: Of the small sensors, by name.
     """
 
     odometry: str = "odom"
@@ -43,12 +45,27 @@ class Topics:
     depth: str = "camera/aligned_depth_to_color/image_raw"
     camera_info: str = "camera/color/camera_info"
     mask: str = ""
-    battery: str = "battery_state"
     path: str = "plan"
     cmd_vel_in: str = "cmd_vel_nav"
     cmd_vel_out: str = "cmd_vel"
     obstacles: str = "iveg/obstacles"
     markers: str = "iveg/markers"
+    sensors: Mapping[str, str] = field(
+        default_factory=lambda: {name: one.topic for name, one in ROS_SENSORS.items()}
+    )
+
+    @classmethod
+    def of(cls, names: Mapping[str, str]) -> "Topics":
+        """Topics of which some have another name than the usual one; empty: none."""
+        own = {key: name for key, name in names.items() if key not in ROS_SENSORS}
+        usual = cls()
+        told = {key: names[key] for key in ROS_SENSORS if key in names}
+        return replace(usual, sensors={**usual.sensors, **told}, **own)
+
+    def names(self) -> dict[str, str]:
+        """All of them, by key."""
+        own = {one.name: getattr(self, one.name) for one in fields(self)}
+        return {**own.pop("sensors"), **own}
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +103,7 @@ _QUALITIES: dict[str, Qos] = {
     "depth": names.SENSOR_DATA,
     "camera_info": names.SENSOR_DATA,
     "mask": names.SENSOR_DATA,
-    "battery": names.SENSOR_DATA,
+    **dict.fromkeys(ROS_SENSORS, names.SENSOR_DATA),
     "path": names.SENSOR_DATA,
     "cmd_vel_in": names.SENSOR_DATA,
     "cmd_vel_out": names.DEFAULT,
@@ -114,7 +131,7 @@ class RobotConfig:
     namespace: str = ""
     interface: str = ""
     peers: tuple[str, ...] = ()
-    topics: Topics = Topics()
+    topics: Topics = field(default_factory=Topics)
     frames: Frames = Frames()
     drive: DriveConfig = DriveConfig()
     tf_max_age_s: float = 0.5
@@ -129,10 +146,10 @@ class RobotConfig:
         Raises:
             UnreadableError: a name is not a ROS topic.
         """
-        return Topics(
-            **{
+        return Topics.of(
+            {
                 topic: names.full_name(name, self.namespace) if name else ""
-                for topic, name in asdict(self.topics).items()
+                for topic, name in self.topics.names().items()
             }
         )
 
@@ -222,7 +239,7 @@ _KEYS: dict[str, dict[str, _Reader]] = {
         "interface": _maybe_text,
         "peers": _peers,
     },
-    "topics": {one.name: _topic for one in fields(Topics)},
+    "topics": dict.fromkeys(Topics().names(), _topic),
     "frames": {one.name: _frame for one in fields(Frames)},
     "drive": {
         "stamped_in": _flag,
@@ -258,7 +275,7 @@ def read_config(text: str, file: str) -> RobotConfig:
     }
     return RobotConfig(
         **said["ros"],
-        topics=Topics(**said["topics"]),
+        topics=Topics.of(said["topics"]),
         frames=Frames(**said["frames"]),
         drive=DriveConfig(**said["drive"]),
         tf_max_age_s=said["transforms"].get("max_age_s", 0.5),

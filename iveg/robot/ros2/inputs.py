@@ -8,6 +8,7 @@ more than its bytes.
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from iveg.domain.errors import UnreadableError
@@ -25,6 +26,7 @@ from iveg.robot.ros2 import pictures, reading
 from iveg.robot.ros2.config import RobotConfig, Topics
 from iveg.robot.ros2.input_faults import InputFaults
 from iveg.robot.ros2.rigid import RigidTransform
+from iveg.robot.ros2.sensors import ROS_SENSORS
 from iveg.robot.ros2.transforms import NoTransformError, TransformBuffer
 from iveg.ros2 import cdr
 from iveg.ros2 import messages as m
@@ -39,7 +41,7 @@ TOPICS: dict[str, type[Message]] = {
     "depth": m.Image,
     "camera_info": m.CameraInfo,
     "mask": m.Image,
-    "battery": m.BatteryState,
+    **{name: one.message for name, one in ROS_SENSORS.items()},
     "path": m.Path,
     "tf_static": m.TFMessage,
     "tf": m.TFMessage,
@@ -67,9 +69,9 @@ _BACK_MESSAGES = 5
 _PICTURES = 6
 _SAME_PICTURE_S = 0.05
 _DEPTH_LATE_S = 0.3
-BATTERY_EVERY_S = 5.0
-"""Least time between two reports of the battery (s)."""
 
+_Work = Callable[[Any, Instant], list[Observation]]
+"""What follows from a message of a topic."""
 PICTURES = ("depth", "mask")
 """Topics of large messages, of which few may be pending."""
 
@@ -79,11 +81,12 @@ def listened(topics: Topics) -> dict[str, tuple[str, type[Message]]]:
 
     A camera is read only where detections have no depth.
     """
+    names = topics.names()
     camera = (*PICTURES, "camera_info") if not topics.detections_2d else ()
     return {
         key: (name, message)
         for key, message in TOPICS.items()
-        if (name := getattr(topics, key)) and key not in camera
+        if (name := names[key]) and key not in camera
     }
 
 
@@ -134,7 +137,7 @@ class SensorInputs:
         *,
         sim_time: bool = False,
     ) -> None:
-        self._names = config.full_topics
+        self._names = config.full_topics.names()
         self._frames = config.frames
         self._classes = classes
         self._sim_time = sim_time
@@ -151,7 +154,7 @@ class SensorInputs:
         self._masks: deque[m.Image] = deque(maxlen=_PICTURES)
         self._camera: m.CameraInfo | None = None
         self._look: tuple[m.Detection2DArray, float] | None = None
-        self._battery_told = float("-inf")
+        self._sent_at: dict[str, float] = {}
         self.input_faults = InputFaults()
 
     @property
@@ -188,7 +191,7 @@ class SensorInputs:
         if self._awaits_transforms(now.mono):
             return []
         found: list[Observation] = []
-        for topic, work in (
+        works: tuple[tuple[str, _Work], ...] = (
             ("odometry", self._odometry),
             ("scan", self._scan),
             ("detections_3d", self._detections),
@@ -196,9 +199,10 @@ class SensorInputs:
             ("mask", self._mask),
             ("camera_info", self._camera_info),
             ("detections_2d", self._picture),
-            ("battery", self._battery),
+            *((name, partial(self._sensed, name)) for name in ROS_SENSORS),
             ("path", self._path),
-        ):
+        )
+        for topic, work in works:
             payload = self._newest.pop(topic, None)
             if payload is not None:
                 found += self._attempt(topic, work, payload, now)
@@ -217,7 +221,7 @@ class SensorInputs:
     def _attempt(
         self,
         topic: str,
-        work: Callable[[Any, Instant], list[Observation]],
+        work: _Work,
         payload: bytes,
         now: Instant,
     ) -> list[Observation]:
@@ -255,7 +259,7 @@ class SensorInputs:
         return verdict in ("new", "reset")
 
     def _name(self, topic: str) -> str:
-        return str(getattr(self._names, topic))
+        return self._names[topic]
 
     def _note_silence(self, now: float) -> None:
         for topic in ("odometry", "scan"):
@@ -356,11 +360,12 @@ class SensorInputs:
         place = self._in_map(frame, stamp, now.mono)
         return [] if place is None else [reading.read_path(message, place)]
 
-    def _battery(self, message: m.BatteryState, now: Instant) -> list[Observation]:
-        if now.mono - self._battery_told < BATTERY_EVERY_S:
+    def _sensed(self, name: str, message: Any, now: Instant) -> list[Observation]:
+        sensor, sent_at = ROS_SENSORS[name], self._sent_at.get(name, float("-inf"))
+        if now.mono - sent_at < sensor.every_s:
             return []
-        self._battery_told = now.mono
-        return [reading.read_battery(message)]
+        self._sent_at[name] = now.mono
+        return [sensor.read(message)]
 
     # --- pictures -----------------------------------------------------------------
 

@@ -14,7 +14,6 @@ from iveg.domain.errors import UnreadableError
 from iveg.domain.geometry import Box3D, Twist2D
 from iveg.domain.observations import (
     UNKNOWN_ORIGIN,
-    Battery,
     Detection,
     LaserScan,
     Navigation,
@@ -220,22 +219,6 @@ def read_path(
         raise UnreadableError("not_a_number", "a path")
     way = tuple((float(x), float(y)) for x, y, _ in place.of(points))
     return Navigation("", UNKNOWN_ORIGIN, task, way[-1], way)
-
-
-def read_battery(state: m.BatteryState) -> Battery:
-    """Read the state of the battery.
-
-    ROS writes NaN for unmeasured values, and some drivers per cent instead of a share.
-    """
-    share: float | None = state.percentage
-    if share is None or not math.isfinite(share) or not 0.0 <= share <= 100.0:
-        share = None
-    elif share > 1.0:
-        share /= 100.0
-    volts = state.voltage if math.isfinite(state.voltage) else None
-    charging = {1: True, 2: False, 3: False, 4: False}
-    status = charging.get(state.power_supply_status)
-    return Battery("", UNKNOWN_ORIGIN, share, status, volts)
 
 
 @lru_cache(1024)

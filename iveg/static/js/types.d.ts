@@ -65,14 +65,15 @@ export type Area = {
   ymax: number;
 };
 
-/** The robot's battery, as it said last. */
+/** The battery, as the robot said last. */
 export type Battery = {
-  /** 0 to 1. */
-  percentage: number | null;
-  charging: boolean | null;
-  /** V. */
-  voltage: number | null;
   age_s: number | null;
+  /** charge (0–1) */
+  percentage: number | null;
+  /** whether it charges (–) */
+  charging: boolean | null;
+  /** voltage (V) */
+  voltage: number | null;
 };
 
 /** The newest reading. */

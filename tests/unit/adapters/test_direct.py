@@ -4,6 +4,7 @@ import orjson
 import pytest
 
 from iveg.adapters.direct import DirectReader
+from iveg.domain.kinds import Scope
 from iveg.domain.observations import (
     CommandAnswer,
     DetectionFrame,
@@ -15,7 +16,6 @@ from iveg.domain.observations import (
     kind_of,
 )
 from iveg.ngsi import codec
-from iveg.pipeline.kinds import Scope
 from tests.builders import (
     detection,
     detection_frame,

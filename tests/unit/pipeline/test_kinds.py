@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from iveg.domain import observations
+from iveg.domain.kinds import KINDS, Kind
 from iveg.domain.observations import (
     Battery,
     Climate,
@@ -13,18 +13,12 @@ from iveg.domain.observations import (
     HeartbeatProbe,
     Navigation,
     Observation,
-    Overtaken,
     Received,
-    RefusedFrame,
-    Unplaced,
-    UnreadScan,
 )
 from iveg.domain.records import ReadingRecord
 from iveg.domain.world import World
 from iveg.models.device import Device
-from iveg.ngsi import codec, names
-from iveg.ngsi.sensors import SENSORS, Sensor
-from iveg.pipeline.kinds import KINDS, Kind, read_directly
+from iveg.ngsi import codec
 from tests.builders import (
     at,
     detection_frame,
@@ -55,18 +49,6 @@ def battery(desk: Desk, level: float | None, *, charging: bool | None = False) -
     desk.hear(Battery("AGI", desk.next_origin(), level, charging, 25.1))
 
 
-def test_every_kind_of_observation_has_one_row() -> None:
-    not_received = {Overtaken, RefusedFrame, UnreadScan, Unplaced}
-    kinds = {
-        one
-        for one in vars(observations).values()
-        if isinstance(one, type) and issubclass(one, Observation)
-    } - {Observation, *not_received}
-
-    assert [row.of for row in KINDS if row.of in kinds] == [row.of for row in KINDS]
-    assert {row.of for row in KINDS} == kinds
-
-
 def kept(world: World, place: str) -> object:
     """What a member of the world or of its robot holds, as text."""
     robot = world.robot("AGI")
@@ -93,15 +75,6 @@ def test_a_copy_is_news_only_where_its_row_orders_by_arrival(row: Kind) -> None:
     verdict = world.apply(Received(observation, at(2.0)))
 
     assert verdict == ("duplicate" if row.ordered == "counted" else "new")
-
-
-@pytest.mark.parametrize("sensor", SENSORS, ids=lambda sensor: sensor.attribute)
-def test_a_sensor_has_a_device_a_kind_and_no_name_of_another(sensor: Sensor) -> None:
-    suffixes = [device.suffix for device in names.ROBOT_DEVICES]
-
-    assert suffixes.count(sensor.suffix) == 1
-    assert sensor.of in {row.of for row in KINDS}
-    assert sensor.of in read_directly("all")
 
 
 def test_a_battery_is_read_as_it_was_written() -> None:

@@ -82,7 +82,7 @@ class Emulated:
         senses = SensorInputs(self.config)
         now = clock.now()
         for topic in TOPICS:
-            writer = self.network.writers.get(getattr(self.config.full_topics, topic))
+            writer = self.network.writers.get(self.config.full_topics.names()[topic])
             if writer is not None:
                 senses.hear(topic, writer.sent, now.mono)
         return senses.tick(now)

@@ -65,7 +65,7 @@ def test_what_is_said_counts_and_the_rest_stays() -> None:
         ("10.0.0.5",),
     )
     assert (topics.odometry, topics.scan) == ("/agi/odometry/filtered", "/agi/scan")
-    assert (topics.tf, topics.battery) == ("/tf", "")
+    assert (topics.tf, topics.sensors["battery"]) == ("/tf", "")
     assert (config.frames.map, config.frames.odom) == ("world", "odom")
     assert (config.drive.stamped_in, config.drive.max_speed) == (True, 0.6)
     assert (config.tf_max_age_s, config.p_min) == (0.3, 0.5)

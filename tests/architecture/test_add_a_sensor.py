@@ -1,0 +1,222 @@
+"""A sensor of two words is added to a copy of the program, as CONTRIBUTING says."""
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+
+from tests.processes import ROOT
+
+pytestmark = pytest.mark.slow
+
+# File → where it is added, and what: before the anchor, so that the anchor stays.
+STEPS: Mapping[str, tuple[tuple[str, str], ...]] = {
+    "iveg/domain/observations.py": (
+        (
+            "@dataclass(frozen=True, slots=True)\nclass CommandStatus(",
+            """\
+@dataclass(frozen=True, slots=True)
+class SoilMoisture(Observation):
+    \"\"\"Water in the soil at the robot's probe.\"\"\"
+
+    percentage: float | None = quantity("%", "share of the volume", 0, 100)
+
+
+""",
+        ),
+    ),
+    "iveg/domain/kinds.py": (
+        ("    kind_of,\n", "    SoilMoisture,\n"),
+        (
+            "    Kind(CommandStatus,",
+            """\
+    _sensed(
+        SoilMoisture,
+        "soil_moisture",
+        Sensor(
+            shown="percentage",
+            gauge=True,
+            every_s=1.0,
+            low=Low("percentage", below=15, above=20),
+        ),
+    ),
+""",
+        ),
+    ),
+    "iveg/lab/emulator/sensors.py": (
+        ("\n_BATTERY_LASTS_S", "from iveg.domain.observations import SoilMoisture\n"),
+        (
+            '}\n"""The observation after',
+            '    SoilMoisture: lambda _: SoilMoisture("", UNKNOWN_ORIGIN, 40.0),\n',
+        ),
+    ),
+    "iveg/robot/ros2/sensors.py": (
+        (
+            "\n\n@dataclass(frozen=True, slots=True)\nclass RosSensor",
+            """\
+
+from iveg.domain.observations import SoilMoisture
+from iveg.ros2.schema import Float32 as Real
+
+
+@dataclass(frozen=True, slots=True)
+class Float32(Message, package="std_msgs"):
+    \"\"\"Per cent.\"\"\"
+
+    data: Real = 0.0
+
+
+def read_moisture(message: Float32) -> SoilMoisture:
+    \"\"\"Read per cent of water.\"\"\"
+    return SoilMoisture("", UNKNOWN_ORIGIN, message.data)
+
+
+def write_moisture(_: m.Header, moisture: Any) -> Float32:
+    \"\"\"The inverse.\"\"\"
+    return Float32(moisture.percentage)
+""",
+        ),
+        (
+            "    )\n}\n",
+            """\
+        RosSensor(
+            SoilMoisture, "soil_moisture", Float32, read_moisture, write_moisture
+        ),
+""",
+        ),
+    ),
+    **{
+        f"iveg/static/i18n/{language}.json": (
+            (
+                '    "battery": "',
+                f'    "soil_moisture": "{name}",\n'
+                '    "soil_moisture_level": "{level:0} %",\n',
+            ),
+            (
+                '    "battery_low": "',
+                f'    "soil_moisture_low": "{{robot}}: {name} {{level:0}} %",\n',
+            ),
+            ('      "battery": "', f'      "soil_moisture": "{name}",\n'),
+        )
+        for language, name in (("en", "Soil moisture"), ("es", "Humedad del suelo"))
+    },
+}
+GUARDS = ("tests/architecture/test_sensors.py", "tests/unit/test_page_types.py")
+WRITERS = "iveg.models.typescript", "tests.architecture.sensor_pages"
+WHOLE = """
+from dataclasses import replace
+from iveg.adapters.subscriptions import WANTED_OF_ALL
+from iveg.domain.observations import Instant, Received, SoilMoisture
+from iveg.domain.records import ReadingRecord
+from iveg.domain.world import World
+from iveg.models.device import Device
+from iveg.models.robot import Robot
+from iveg.ngsi import codec, names
+from iveg.robot.uplink import Uplink
+from tests.unit.pipeline.desk import Desk, conditions_of
+import asyncio
+
+sent = {}
+for form in ("per-topic", "single"):
+    uplink = Uplink("AGI", "iveg", "boot", sent.__setitem__, form=form)
+    uplink.send(SoilMoisture("", codec.read_measure, 12.5), Instant(1.0, 1.7e9))
+    ((topic, payload),) = sent.items()
+    assert topic == "/iveg/AGI_soil_moisture/attrs", topic
+    (read,) = codec.read_measure("AGI_soil_moisture", payload).observations
+    assert isinstance(read, SoilMoisture) and read.percentage == 12.5, read
+    sent.clear()
+wet = codec.read_attributes("AGI", {"soil_moisture": {"percentage": 101}})
+assert [one.reason for one in wet.problems] == ["bad_soil_moisture"]
+assert "soil_moisture" in {one.name for one in WANTED_OF_ALL}
+assert "AGI_soil_moisture" in {"AGI" + one.suffix for one in names.ROBOT_DEVICES}
+
+async def main():
+    desk = Desk()
+    desk.hear(SoilMoisture("AGI", desk.next_origin(), 12.5))
+    await desk.wait(0.1)
+    assert "alert.soil_moisture_low" in conditions_of(desk)
+    (kept,) = desk.records(ReadingRecord)
+    assert (kept.kind, kept.value) == ("soil_moisture", {"percentage": 12.5})
+    robot = desk.world.robot("AGI")
+    told = Robot.sensed(robot, desk.clock())["soil_moisture"]
+    assert told.model_dump() == {"age_s": 0.1, "percentage": 12.5}, told
+    device = Device.of(robot, "_soil_moisture", SoilMoisture, desk.clock())
+    assert device.age_s == 0.1, device
+
+asyncio.run(main())
+"""
+
+
+def copy_with(folder: Path, *, without: str = "") -> Path:
+    """A copy of the program with the sensor in it, but for one file."""
+    for name in ("iveg", "tests", "docs"):
+        shutil.copytree(
+            ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__")
+        )
+    shutil.copy(ROOT / "pyproject.toml", folder)
+    for name, additions in STEPS.items():
+        if name != without:
+            (folder / name).write_text(_with(folder / name, additions))
+    return folder
+
+
+def _with(file: Path, additions: tuple[tuple[str, str], ...]) -> str:
+    text = file.read_text()
+    for anchor, added in additions:
+        assert anchor in text, f"{file}: {anchor}"
+        text = text.replace(anchor, added + anchor, 1)
+    return text
+
+
+def python(folder: Path, *words: str) -> tuple[int, str]:
+    """Run Python in a copy: its end and all that it printed."""
+    run = subprocess.run(
+        [sys.executable, *words],
+        cwd=folder,
+        env=os.environ | {"PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    return run.returncode, run.stdout + run.stderr
+
+
+def guards(folder: Path) -> tuple[int, str]:
+    return python(folder, "-m", "pytest", "-q", "-p", "no:cacheprovider", *GUARDS)
+
+
+def test_a_sensor_takes_six_files_and_seventy_lines() -> None:
+    added = [text for additions in STEPS.values() for _, text in additions]
+
+    assert len(STEPS) <= 6
+    assert sum(text.count("\n") for text in added) <= 70
+
+
+def test_a_sensor_of_two_words_reaches_everything(tmp_path: Path) -> None:
+    copy = copy_with(tmp_path / "copy")
+    for writer in WRITERS:
+        assert python(copy, "-m", writer) == (0, "")
+
+    assert guards(copy)[0] == 0
+    assert python(copy, "-c", WHOLE) == (0, "")
+    assert (
+        "soil_moisture: SoilMoisture | null"
+        in (copy / "iveg/static/js/types.d.ts").read_text()
+    )
+    assert (
+        'name: "soil_moisture"' in (copy / "iveg/static/js/core/sensors.js").read_text()
+    )
+    for page in ("mqtt.md", "resources.md", "ros2.md"):
+        assert "soil_moisture" in (copy / "docs/interfaces" / page).read_text()
+
+
+@pytest.mark.parametrize("forgotten", STEPS)
+def test_a_forgotten_step_is_named(forgotten: str, tmp_path: Path) -> None:
+    code, printed = guards(copy_with(tmp_path / "copy", without=forgotten))
+
+    assert code != 0
+    assert forgotten in printed

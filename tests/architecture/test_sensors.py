@@ -1,0 +1,69 @@
+"""A small sensor is whole: who forgets a step of "Add a sensor" reads which file."""
+
+import json
+
+import pytest
+
+from iveg.domain import observations
+from iveg.domain.kinds import KINDS, SENSED, Kind
+from iveg.domain.observations import Observation, flags_of
+from iveg.lab.emulator.sensors import EMULATED
+from iveg.robot.ros2.sensors import ROS_SENSORS
+from tests.processes import ROOT
+
+_RECEIVED_AS_ANOTHER = {"Overtaken", "RefusedFrame", "UnreadScan", "Unplaced"}
+
+
+def words_of(kind: Kind) -> set[str]:
+    """Keys of the sentences that pages and alerts have of a small sensor."""
+    low = [f"alert.{kind.name}_low"] if kind.sensor and kind.sensor.low else []
+    endings = ("", "_level", *(f"_{flag}" for flag in flags_of(kind.of)))
+    return {
+        *(f"robot.{kind.name}{ending}" for ending in endings),
+        *low,
+        f"fleet.measures.{kind.name}",
+    }
+
+
+def found(words: object, key: str) -> object:
+    for part in key.split("."):
+        words = words.get(part) if isinstance(words, dict) else None
+    return words
+
+
+def test_every_observation_has_one_row() -> None:
+    kinds = {
+        name
+        for name, one in vars(observations).items()
+        if isinstance(one, type) and issubclass(one, Observation)
+    } - {"Observation", *_RECEIVED_AS_ANOTHER}
+
+    told = sorted(row.of.__name__ for row in KINDS)
+    assert told == sorted(kinds), "iveg/domain/kinds.py"
+
+
+def test_no_two_kinds_share_a_name_or_a_device() -> None:
+    names = [row.name for row in KINDS]
+    suffixes = [row.suffix for row in KINDS if row.suffix is not None]
+
+    assert len(set(names)) == len(names), "iveg/domain/kinds.py"
+    assert len(set(suffixes)) == len(suffixes), "iveg/domain/kinds.py"
+
+
+@pytest.mark.parametrize("kind", SENSED, ids=lambda kind: kind.name)
+@pytest.mark.parametrize("language", ["en", "es"])
+def test_every_sensor_has_its_words(language: str, kind: Kind) -> None:
+    file = f"iveg/static/i18n/{language}.json"
+    words = json.loads((ROOT / file).read_text())
+
+    assert {key for key in words_of(kind) if not found(words, key)} == set(), file
+
+
+def test_every_sensor_is_emulated() -> None:
+    assert set(EMULATED) == {one.of for one in SENSED}, "iveg/lab/emulator/sensors.py"
+
+
+def test_every_sensor_has_its_topic_on_a_ros_2_robot() -> None:
+    assert set(ROS_SENSORS) == {one.name for one in SENSED}, (
+        "iveg/robot/ros2/sensors.py"
+    )
