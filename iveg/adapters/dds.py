@@ -16,8 +16,6 @@ from types import TracebackType
 from typing import Any
 from xml.sax.saxutils import quoteattr
 
-# Its own reader and writer make objects of every sample; these leave it in bytes.
-from cyclonedds._clayer import ddspy_take, ddspy_write
 from cyclonedds.builtin import (
     BuiltinDataReader,
     BuiltinTopicDcpsPublication,
@@ -52,7 +50,6 @@ _REARM_S = 0.002
 _MOST_TAKEN = 200
 _FEW = 8
 """Cyclone makes room for as many as are asked for, and mostly one waits."""
-_ANY = SampleState.Any | ViewState.Any | InstanceState.Any
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,6 +125,7 @@ class Dds(AbstractContextManager["Dds"]):
     def __init__(self, network: DdsNetwork) -> None:
         self._watches: list[_Watch] = []
         self._topics: dict[tuple[str, str], Topic] = {}
+        self._own: list[DdsReader | DdsWriter] = []
         self._endpoints: dict[str, Endpoint] = {}
         try:
             _configure(network)
@@ -154,8 +152,13 @@ class Dds(AbstractContextManager["Dds"]):
         for watch in self._watches:
             watch.stop()
         self._watches.clear()
-        # Cyclone's Python has no other word for "delete this and all that is in it".
-        self._participant.__del__()
+        # Cyclone deletes an entity with its last reference, the participant last.
+        for endpoint in self._own:
+            endpoint.close()
+        self._own.clear()
+        self._topics.clear()
+        self._discovery.clear()
+        del self._participant
 
     # --- endpoints of ours --------------------------------------------------------
 
@@ -164,12 +167,16 @@ class Dds(AbstractContextManager["Dds"]):
         reader = DataReader(
             self._participant, self._topic(name, message), write_qos(qos)
         )
-        return DdsReader(reader)
+        made = DdsReader(reader)
+        self._own.append(made)
+        return made
 
     def writer(self, name: str, message: type[Message], qos: Qos) -> "DdsWriter":
         """Publish on a topic by its full ROS name."""
         topic = self._topic(name, message)
-        return DdsWriter(DataWriter(self._participant, topic, write_qos(qos)))
+        made = DdsWriter(DataWriter(self._participant, topic, write_qos(qos)), topic)
+        self._own.append(made)
+        return made
 
     def _topic(self, name: str, message: type[Message]) -> Topic:
         key = name, message.ROS
@@ -219,7 +226,7 @@ class DdsReader:
     """A subscription."""
 
     def __init__(self, reader: DataReader) -> None:
-        self.entity = reader
+        self._reader: DataReader | None = reader
 
     def take(self) -> list[bytes]:
         """Every waiting message, oldest first.
@@ -230,41 +237,68 @@ class DdsReader:
         found = self._take(_FEW)
         if len(found) == _FEW:
             found += self._take(_MOST_TAKEN)
-        return [payload for payload, about in found if about.valid_data]
+        return [one.payload for one in found if one.sample_info.valid_data]
 
-    def _take(self, most: int) -> list[tuple[bytes, Any]]:
-        found: list[tuple[bytes, Any]] | int = ddspy_take(self.entity._ref, _ANY, most)
-        if isinstance(found, int):
-            raise HopError("dds", DDSException(found, "taking").msg)
+    def _take(self, most: int) -> list[Any]:
+        try:
+            found: list[Any] = self.entity.take(most)
+        except DDSException as error:
+            raise HopError("dds", error.msg) from error
         return found
+
+    @property
+    def entity(self) -> DataReader:
+        """Cyclone's.
+
+        Raises:
+            HopError: closed.
+        """
+        if self._reader is None:
+            raise HopError("dds", "closed")
+        return self._reader
 
     @property
     def writers(self) -> int:
         """Number of writers that serve it."""
         return len(self.entity.get_matched_publications())
 
+    def close(self) -> None:
+        """Let go of Cyclone's entity."""
+        self._reader = None
+
 
 class DdsWriter:
     """A publication."""
 
-    def __init__(self, writer: DataWriter) -> None:
-        self._writer = writer
+    def __init__(self, writer: DataWriter, topic: Topic) -> None:
+        self._writer: DataWriter | None = writer
+        self._kind: Any = topic.data_type
 
     def write(self, payload: bytes) -> None:
         """Send a message with its encapsulation.
 
         Raises:
-            HopError: DDS refuses.
+            HopError: DDS refuses, or closed.
         """
-        whole = payload + bytes(-len(payload) % 4)
-        code = ddspy_write(self._writer._ref, whole)
-        if code < 0:
-            raise HopError("dds", DDSException(code, "writing").msg)
+        try:
+            self._entity.write(self._kind.deserialize(payload))
+        except DDSException as error:
+            raise HopError("dds", error.msg) from error
+
+    @property
+    def _entity(self) -> DataWriter:
+        if self._writer is None:
+            raise HopError("dds", "closed")
+        return self._writer
 
     @property
     def readers(self) -> int:
         """Number of readers that it serves."""
-        return len(self._writer.get_matched_subscriptions())
+        return len(self._entity.get_matched_subscriptions())
+
+    def close(self) -> None:
+        """Let go of Cyclone's entity."""
+        self._writer = None
 
 
 # --- Cyclone's side ----------------------------------------------------------------
@@ -282,6 +316,23 @@ def _configure(network: DdsNetwork) -> None:
         raise HopError("dds", f"domain {network.domain} is configured otherwise")
 
 
+def _leave_in_bytes(kind: type[IdlStruct]) -> None:
+    """Let samples of a type of ours stay bytes: ``iveg.ros2.cdr`` reads them.
+
+    Cyclone's reader and writer ask a type to deserialize and serialize its samples, and
+    a base of ours would be announced with it.
+    """
+
+    def deserialize(cls: type[Any], data: bytes, /, **_: object) -> Any:
+        made = cls()
+        made.payload = data
+        return made
+
+    kind.deserialize = classmethod(deserialize)
+    kind.deserialize_key = classmethod(deserialize)
+    kind.serialize = lambda sample, **_: sample.payload
+
+
 @cache
 def announced(message: type[Message], *, decodes: bool = False) -> type[IdlStruct]:
     """The type that DDS announces for a message.
@@ -295,6 +346,8 @@ def announced(message: type[Message], *, decodes: bool = False) -> type[IdlStruc
     kind: type[IdlStruct] = make_idl_struct(
         message.__name__, typename, members, dataclassify=decodes
     )
+    if not decodes:
+        _leave_in_bytes(kind)
     return kind
 
 

@@ -6,9 +6,9 @@ the end of the four bytes of encapsulation; a string has its length (with the ze
 its end) before it, a sequence its count.  XCDR2 and parameter lists are left out: ROS 2
 sends neither.
 
-Primitives that follow each other in every message of a type are written by one
-``struct`` call, prepared for each of the eight ways in which they can lie; ``decoder``
-reads them so.
+A message type has one list of steps, each of which reads and writes; primitives that
+follow each other are one step, with one ``struct`` prepared for each of the eight ways
+in which they can lie.
 """
 
 import itertools
@@ -17,12 +17,11 @@ import struct
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cache
-from typing import Any, TypeVar
+from typing import Any, Literal, Protocol, TypeVar
 
 import numpy as np
 
 from iveg.domain.errors import UnreadableError
-from iveg.ros2.decoder import ByteOrder, Fields, decoder_of, layout
 from iveg.ros2.schema import (
     PRIMITIVES,
     Kind,
@@ -30,27 +29,25 @@ from iveg.ros2.schema import (
     Message,
     One,
     Structure,
-    Text,
     fields_of,
 )
 
+ByteOrder = Literal["<", ">"]
 _ORDERS: dict[bytes, ByteOrder] = {b"\x00\x00": ">", b"\x00\x01": "<"}
 _HEADS: dict[ByteOrder, bytes] = {">": b"\x00\x00\x00\x00", "<": b"\x00\x01\x00\x00"}
 _COUNT: dict[ByteOrder, struct.Struct] = {
     order: struct.Struct(order + "I") for order in _HEADS
 }
-_ALL: Fields = frozenset()
 
 _M = TypeVar("_M", bound=Message)
 
 
-def read(message: type[_M], payload: bytes, left_out: Fields = _ALL) -> _M:
+def read(message: type[_M], payload: bytes) -> _M:
     """Read one message; bytes after it are padding and ignored.
 
     Args:
         message: Its type.
         payload: With its encapsulation.
-        left_out: Unused fields; they keep their default.
 
     Raises:
         UnreadableError: bytes that this type does not describe.
@@ -59,55 +56,58 @@ def read(message: type[_M], payload: bytes, left_out: Fields = _ALL) -> _M:
     if order is None or len(payload) < 4:
         raise UnreadableError("bad_encapsulation", payload[:4].hex())
     try:
-        decoded: _M = decoder_of(message, order, left_out)(memoryview(payload)[4:])
+        found: _M = _codec_of(message).read(_In(order, memoryview(payload)[4:]))
     except struct.error as error:
         raise UnreadableError("too_short", f"{len(payload)} bytes") from error
     except UnicodeDecodeError as error:
         raise UnreadableError("bad_text", error.reason) from error
-    return decoded
+    return found
 
 
 def write(message: Message, order: ByteOrder = "<") -> bytes:
     """The bytes of one message, with its encapsulation."""
     out = _Out(order)
-    _writer_of(type(message))(out, message)
+    _codec_of(type(message)).write(out, message)
     return _HEADS[order] + bytes(out.data)
 
 
-# --- a message ---------------------------------------------------------------------
+# --- the bytes ---------------------------------------------------------------------
 
 
-@cache
-def _writer_of(message: type[Message]) -> "Callable[[_Out, Message], None]":
-    """The function that writes a message of this type."""
-    leaves = list(_leaves(message))
-    steps = _merged(kind for _, kind in leaves)
-    # With a name too many it gives a tuple of one leaf as well.
-    values_of = operator.attrgetter(*(name for name, _ in leaves), "ROS")
+@dataclass(slots=True)
+class _In:
+    """Bytes that are read, from ``at`` on."""
 
-    def write(out: _Out, message: Message) -> None:
-        values = iter(values_of(message))
-        for step in steps:
-            step(out, values)
+    order: ByteOrder
+    data: memoryview
+    at: int = 0
 
-    return write
+    def align(self, size: int) -> None:
+        """Go on at the next multiple of ``size``."""
+        self.at += -self.at % size
 
+    def count(self) -> int:
+        """A length or count."""
+        self.align(4)
+        (count,) = _COUNT[self.order].unpack_from(self.data, self.at)
+        self.at += 4
+        return int(count)
 
-def _leaves(message: type[Message], within: str = "") -> Iterator[tuple[str, Kind]]:
-    """Values in the order of the wire, by dotted name, structures dissolved."""
-    for name, kind in fields_of(message):
-        if isinstance(kind, Structure) and not kind.many:
-            yield from _leaves(kind.message, f"{within}{name}.")
-        else:
-            yield within + name, kind
+    def pass_over(self, size: int) -> int:
+        """Where the next ``size`` bytes begin; the reader stands behind them.
 
-
-# --- steps over the wire -----------------------------------------------------------
+        Raises:
+            UnreadableError: there are fewer.
+        """
+        begin, self.at = self.at, self.at + size
+        if self.at > len(self.data):
+            raise UnreadableError("too_short", f"at byte {begin}")
+        return begin
 
 
 @dataclass(slots=True)
 class _Out:
-    """Output buffer."""
+    """Bytes that are written."""
 
     order: ByteOrder
     data: bytearray = field(default_factory=bytearray)
@@ -122,83 +122,181 @@ class _Out:
         self.data += _COUNT[self.order].pack(count)
 
 
-_Step = Callable[[_Out, Iterator[Any]], None]
-"""Writes the next one or more of the values."""
+# --- a message ---------------------------------------------------------------------
 
 
-def _run(primitives: list[str]) -> _Step:
+class _Step(Protocol):
+    """The next one or more values of a message."""
+
+    def read(self, source: _In) -> Iterable[object]:
+        """Read them."""
+
+    def write(self, out: _Out, values: Iterator[Any]) -> None:
+        """Write them, taken from all that are left."""
+
+
+class _Codec:
+    """One type of message: its steps, and how a message is made of their values."""
+
+    def __init__(self, message: type[Message]) -> None:
+        leaves = list(_leaves(message))
+        self._steps = list(_steps(kind for _, kind in leaves))
+        # With a name too many it gives a tuple of one leaf as well.
+        self._values_of = operator.attrgetter(*(name for name, _ in leaves), "ROS")
+        self._make = _maker(message)
+
+    def read(self, source: _In) -> Any:
+        """The message at the reader's place."""
+        found = (value for step in self._steps for value in step.read(source))
+        return self._make(found)
+
+    def write(self, out: _Out, message: Message) -> None:
+        """Write a message of this type."""
+        values = iter(self._values_of(message))
+        for step in self._steps:
+            step.write(out, values)
+
+
+_codec_of = cache(_Codec)
+
+
+def _leaves(message: type[Message], within: str = "") -> Iterator[tuple[str, Kind]]:
+    """Values in the order of the wire, by dotted name, structures dissolved."""
+    for name, kind in fields_of(message):
+        if isinstance(kind, Structure) and not kind.many:
+            yield from _leaves(kind.message, f"{within}{name}.")
+        else:
+            yield within + name, kind
+
+
+def _maker(message: type[Message]) -> Callable[[Iterator[object]], object]:
+    """The function that makes a message of its values in the order of the wire."""
+    parts = [
+        _maker(kind.message) if isinstance(kind, Structure) and not kind.many else next
+        for _, kind in fields_of(message)
+    ]
+
+    def make(values: Iterator[object]) -> object:
+        return message(*[part(values) for part in parts])
+
+    return make
+
+
+def _steps(kinds: Iterable[Kind]) -> Iterator[_Step]:
+    """Steps over the values, as many primitives together as follow each other."""
+    for is_one, group in itertools.groupby(kinds, lambda kind: isinstance(kind, One)):
+        if is_one:
+            yield _Run([one.primitive for one in group if isinstance(one, One)])
+            continue
+        for kind in group:
+            match kind:
+                case Many():
+                    yield _Numbers(kind)
+                case Structure():
+                    yield _Messages(kind.message)
+                case _:
+                    yield _String()
+
+
+# --- steps -------------------------------------------------------------------------
+
+
+class _Run:
     """Primitives that follow each other in every message of a type."""
-    run = [(*PRIMITIVES[one], 1) for one in primitives]
-    layouts = {
-        order: [struct.Struct(order + layout(run, n)) for n in range(8)]
-        for order in _HEADS
-    }
 
-    def write(out: _Out, values: Iterator[Any]) -> None:
-        prepared = layouts[out.order][len(out.data) % 8]
-        out.data += prepared.pack(*itertools.islice(values, len(run)))
+    def __init__(self, primitives: list[str]) -> None:
+        self._length = len(primitives)
+        self._layouts = {
+            order: [struct.Struct(order + _layout(primitives, n)) for n in range(8)]
+            for order in _HEADS
+        }
 
-    return write
+    def read(self, source: _In) -> Iterable[object]:
+        """The values, by one ``struct``."""
+        prepared = self._layouts[source.order][source.at % 8]
+        found = prepared.unpack_from(source.data, source.at)
+        source.at += prepared.size
+        return found
+
+    def write(self, out: _Out, values: Iterator[Any]) -> None:
+        """The inverse."""
+        prepared = self._layouts[out.order][len(out.data) % 8]
+        out.data += prepared.pack(*itertools.islice(values, self._length))
 
 
-def _text(out: _Out, values: Iterator[Any]) -> None:
-    raw = str(next(values)).encode() + b"\x00"
-    out.count(len(raw))
-    out.data += raw
+def _layout(primitives: Iterable[str], start: int) -> str:
+    """Format of ``struct`` for a run that begins at ``start`` modulo eight."""
+    at, words = start, ""
+    for primitive in primitives:
+        code, size = PRIMITIVES[primitive]
+        gap = -at % size
+        words += "x" * gap + code
+        at += gap + size
+    return words
 
 
-def _numbers(kind: Many) -> _Step:
-    """Primitives of one kind, as a numpy array: ``count`` of them, or a sequence."""
-    code, size = PRIMITIVES[kind.primitive]
-    types = {order: np.dtype(order + code) for order in _HEADS}
+class _String:
+    """A text: its length with the zero at its end, and its bytes."""
 
-    def write(out: _Out, values: Iterator[Any]) -> None:
-        numbers = np.asarray(next(values), types[out.order])
-        if kind.count is None:
+    def read(self, source: _In) -> Iterable[object]:
+        """The text; some senders leave an empty one without its zero."""
+        size = source.count()
+        begin = source.pass_over(size)
+        return (str(source.data[begin : max(begin, source.at - 1)], "utf-8"),)
+
+    def write(self, out: _Out, values: Iterator[Any]) -> None:
+        """The inverse."""
+        raw = str(next(values)).encode() + b"\x00"
+        out.count(len(raw))
+        out.data += raw
+
+
+class _Numbers:
+    """Primitives of one kind, as a numpy array: a fixed count, or a sequence."""
+
+    def __init__(self, kind: Many) -> None:
+        self._fixed = kind.count
+        code, self._size = PRIMITIVES[kind.primitive]
+        self._types = {order: np.dtype(order + code) for order in _HEADS}
+
+    def read(self, source: _In) -> Iterable[object]:
+        """The array, in this machine's byte order."""
+        count = source.count() if self._fixed is None else self._fixed
+        if count:
+            source.align(self._size)
+        begin = source.pass_over(count * self._size)
+        kind = self._types[source.order]
+        found = np.frombuffer(source.data, kind, count, begin)
+        return (found if kind.isnative else found.astype(kind.newbyteorder("=")),)
+
+    def write(self, out: _Out, values: Iterator[Any]) -> None:
+        """The inverse."""
+        numbers = np.asarray(next(values), self._types[out.order])
+        if self._fixed is None:
             out.count(numbers.size)
-        elif numbers.size != kind.count:
-            raise ValueError(f"{numbers.size} numbers instead of {kind.count}")
+        elif numbers.size != self._fixed:
+            raise ValueError(f"{numbers.size} numbers instead of {self._fixed}")
         if numbers.size:
-            out.align(size)
+            out.align(self._size)
         out.data += numbers.tobytes()
 
-    return write
 
+class _Messages:
+    """A sequence of messages."""
 
-def _messages(kind: Structure) -> _Step:
-    """A sequence of structures."""
-    write_one = _writer_of(kind.message)
+    def __init__(self, message: type[Message]) -> None:
+        self._codec = _codec_of(message)
 
-    def write(out: _Out, values: Iterator[Any]) -> None:
+    def read(self, source: _In) -> Iterable[object]:
+        """The messages; each has a byte at least."""
+        count = source.count()
+        if count > len(source.data) - source.at:
+            raise UnreadableError("too_short", f"at byte {source.at}")
+        return (tuple(self._codec.read(source) for _ in range(count)),)
+
+    def write(self, out: _Out, values: Iterator[Any]) -> None:
+        """The inverse."""
         items = next(values)
         out.count(len(items))
         for item in items:
-            write_one(out, item)
-
-    return write
-
-
-def _step(kind: Many | Text | Structure) -> _Step:
-    match kind:
-        case Many():
-            return _numbers(kind)
-        case Text():
-            return _text
-        case Structure():
-            return _messages(kind)
-
-
-def _merged(kinds: Iterable[Kind]) -> list[_Step]:
-    steps: list[_Step] = []
-    run: list[str] = []
-    for kind in kinds:
-        if isinstance(kind, One):
-            run.append(kind.primitive)
-            continue
-        if run:
-            steps.append(_run(run))
-            run = []
-        steps.append(_step(kind))
-    if run:
-        steps.append(_run(run))
-    return steps
+            self._codec.write(out, item)

@@ -30,7 +30,6 @@ from iveg.robot.ros2.sensors import ROS_SENSORS
 from iveg.robot.ros2.transforms import NoTransformError, TransformBuffer
 from iveg.ros2 import cdr
 from iveg.ros2 import messages as m
-from iveg.ros2.decoder import Fields
 from iveg.ros2.schema import Message
 
 TOPICS: dict[str, type[Message]] = {
@@ -54,14 +53,6 @@ published before it, though both arrive while the topics are being read.
 _TREE = frozenset({"tf_static", "tf"})
 _ORDERED = frozenset({"odometry", "scan", "detections_3d", "detections_2d"})
 """Topics whose old messages do not count."""
-_UNREAD: Fields = frozenset(
-    {
-        (m.PoseWithCovariance, "covariance"),
-        (m.TwistWithCovariance, "covariance"),
-        (m.ObjectHypothesisWithPose, "pose"),
-    }
-)
-"""Fields that are not needed; the box has the position."""
 
 SILENT_S = 1.0
 _CLOCK_OFF_S = 10.0
@@ -240,7 +231,7 @@ class SensorInputs:
     def _read(self, topic: str, payload: bytes, now: float) -> Any:
         """A message of a topic; None for one that cannot be read."""
         try:
-            return cdr.read(TOPICS[topic], payload, _UNREAD)
+            return cdr.read(TOPICS[topic], payload)
         except UnreadableError:
             self.input_faults.note("unreadable", self._name(topic), now)
             return None

@@ -311,23 +311,3 @@ def test_a_stamp_keeps_its_nanoseconds() -> None:
     assert m.Time.of(1700000000.25) == m.Time(1700000000, 250_000_000)
     assert m.Time(3, 500_000_000).seconds == 3.5
     assert m.Time.of(-0.25) == m.Time(-1, 750_000_000)
-
-
-@pytest.mark.parametrize("order", ["<", ">"])
-def test_what_nobody_looks_at_keeps_its_default_and_shifts_nothing(
-    order: Literal["<", ">"],
-) -> None:
-    message, words = CASES["Detection3DArray, score after 51 bytes"]
-    left_out = frozenset({(m.ObjectHypothesisWithPose, "pose")})
-
-    read = cdr.read(type(message), payload(words, order), left_out)
-
-    (one,) = read.detections
-    assert one.results[0].pose.pose == m.Pose()
-    assert one.results[0].hypothesis == m.ObjectHypothesis("farmer", 0.5)
-    assert (one.bbox, one.id) == (message.detections[0].bbox, "7")
-
-
-def test_what_has_no_size_of_its_own_cannot_be_left_out() -> None:
-    with pytest.raises(ValueError, match="size"):
-        cdr.read(m.Path, cdr.write(m.Path()), frozenset({(m.Path, "poses")}))
