@@ -5,7 +5,7 @@ the operations, which the embedded IoT Agent also calls directly.
 """
 
 import asyncio
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from iveg.adapters import clock
@@ -13,15 +13,20 @@ from iveg.lab.embedded.entities import (
     Entity,
     EntityChange,
     EntityStore,
+    Scope,
     Touched,
     apply,
     under,
 )
-from iveg.lab.embedded.orion_text import NgsiError, not_found
+from iveg.lab.embedded.errors import ATTRIBUTE_NOT_FOUND, FiwareError, not_found
 from iveg.lab.embedded.outbox import Outbox
 from iveg.lab.embedded.outcomes import Outcome
-from iveg.lab.embedded.registrations import Registration, forward_update, providers
-from iveg.lab.embedded.scope import Scope
+from iveg.lab.embedded.registrations import (
+    Forwards,
+    Registration,
+    forward_update,
+    providers,
+)
 from iveg.lab.embedded.subscriptions import Subscription
 
 _MOST_CONCERNED = 10_000
@@ -95,7 +100,7 @@ class ContextBroker:
         """The entity of an id and an optional type, if there is one.
 
         Raises:
-            NgsiError: 409 several.
+            FiwareError: 409 several.
         """
         entities = self.tenant(scope.service).entities
         return entities.find(scope.path, entity_id, entity_type)
@@ -104,7 +109,7 @@ class ContextBroker:
         """Find the entity of an id and an optional type.
 
         Raises:
-            NgsiError: 404 none, 409 several.
+            FiwareError: 404 none, 409 several.
         """
         found = self.known(scope, entity_id, entity_type)
         if found is None:
@@ -117,20 +122,19 @@ class ContextBroker:
         entity_id: str,
         entity_type: str,
         changes: Mapping[str, EntityChange],
-    ) -> Entity:
+    ) -> None:
         """Create an entity and notify its subscriptions.
 
         Raises:
-            NgsiError: 422, the entity exists already.
+            FiwareError: 422, the entity exists already.
         """
         entities = self.tenant(scope.service).entities
         if entities.get(scope.path, entity_id, entity_type) is not None:
-            raise NgsiError(422, "Unprocessable", "Already Exists")
+            raise FiwareError("Unprocessable", "Already Exists")
         entity = Entity(entity_id, entity_type, scope.path, scope.now, scope.now)
         touched = apply(entity, changes, scope.now)
         entities.add(entity)
         self._tell(scope, entity, touched, "entityCreate")
-        return entity
 
     def upsert(
         self,
@@ -161,33 +165,6 @@ class ContextBroker:
             touched = apply(entity, changes, scope.now, forced=forced)
             self._tell(scope, entity, touched, "entityChange")
 
-    def append_new(
-        self,
-        scope: Scope,
-        entity: Entity,
-        changes: Mapping[str, EntityChange],
-        kind: str,
-    ) -> Outcome:
-        """Create attributes; existing ones stay unchanged.
-
-        Args:
-            scope: Whose data.
-            entity: The entity.
-            changes: The attributes.
-            kind: The entity's type, as the request named it.
-        """
-        there = tuple(name for name in changes if name in entity.attributes)
-        made = {name: one for name, one in changes.items() if name not in there}
-        self.append(scope, entity, made)
-        return Outcome(
-            entity.id,
-            kind,
-            entity.type,
-            exists=True,
-            updated=tuple(made),
-            refused=there,
-        )
-
     def replace(
         self, scope: Scope, entity: Entity, changes: Mapping[str, EntityChange]
     ) -> None:
@@ -202,16 +179,16 @@ class ContextBroker:
         tenant.entities.remove(entity)
         self._tell(scope, entity, Touched(entity.attributes, all=True), "entityDelete")
 
-    def delete_attributes(
-        self, scope: Scope, entity: Entity, names: Iterable[str]
-    ) -> tuple[str, ...]:
-        """Delete attributes; returns the names of missing ones."""
-        names = list(names)
-        missing = tuple(name for name in names if name not in entity.attributes)
-        for name in names:
-            entity.attributes.pop(name, None)
+    def delete_attribute(self, scope: Scope, entity: Entity, name: str) -> None:
+        """Delete an attribute, of which nobody is notified.
+
+        Raises:
+            FiwareError: 404.
+        """
+        if name not in entity.attributes:
+            raise not_found(ATTRIBUTE_NOT_FOUND)
+        del entity.attributes[name]
         entity.modified = scope.now
-        return missing
 
     # --- updates that may have to be passed on ----------------------------------
 
@@ -239,28 +216,20 @@ class ContextBroker:
         forwards = providers(tenant.registrations, scope, entity_id, kind, rest)
         taken = await asyncio.gather(
             *(
-                forward_update(
-                    registration,
-                    entity_id,
-                    kind,
-                    {name: rest[name] for name in names},
-                    scope,
-                )
-                for registration, names in forwards
+                forward_update(one, entity_id, kind, {n: rest[n] for n in names}, scope)
+                for one, names in forwards
             )
         )
-        passed: list[str] = []
-        failed: list[str] = []
-        for (_, names), is_taken in zip(forwards, taken, strict=True):
-            (passed if is_taken else failed).extend(names)
+        passed = _names(forwards, taken, wanted=True)
+        failed = _names(forwards, taken, wanted=False)
         return Outcome(
             entity_id,
             entity_type,
             kind,
             exists=entity is not None,
             updated=tuple(local),
-            passed=tuple(passed),
-            failed=tuple(failed),
+            passed=passed,
+            failed=failed,
             refused=tuple(name for name in rest if name not in (*passed, *failed)),
         )
 
@@ -296,3 +265,11 @@ class ContextBroker:
                     correlator,
                     scope.now,
                 )
+
+
+def _names(
+    forwards: Forwards, taken: Sequence[bool], *, wanted: bool
+) -> tuple[str, ...]:
+    """Attributes that their providers accepted, or did not."""
+    pairs = zip(forwards, taken, strict=True)
+    return tuple(name for (_, names), one in pairs if one is wanted for name in names)

@@ -1,212 +1,193 @@
 """Groups and devices as the IoT Agent stores and lists them."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from typing import Any
+from functools import cached_property
+from typing import Any, NamedTuple, Self, TypeVar
 
-from iveg.domain.errors import IvegError
-from iveg.lab.embedded.subscriptions import new_id
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-DEFAULT_APIKEY = "1234"
+from iveg.lab.embedded.documents import new_id
+from iveg.lab.embedded.errors import (
+    FiwareError,
+    no_device,
+    not_supported,
+    wrong_syntax,
+)
 
-
-class AgentError(IvegError):
-    """A request that the IoT Agent would refuse.
-
-    Attributes:
-        status: HTTP status.
-        name: The agent's error name, such as ``DUPLICATE_DEVICE_ID``.
-        message: The agent's sentence.
-    """
-
-    def __init__(self, status: int, name: str, message: str) -> None:
-        super().__init__(f"{status} {name}: {message}")
-        self.status = status
-        self.name = name
-        self.message = message
+_Read = TypeVar("_Read", bound="_Provisioned")
+_NotDone = list[object]
 
 
-@dataclass(frozen=True, slots=True)
-class Tenancy:
+class Tenancy(NamedTuple):
     """Service and subservice that a request is about."""
 
     service: str
     subservice: str
 
 
-@dataclass(frozen=True, slots=True)
-class Group:
+class DeviceAttribute(BaseModel):
+    """An attribute: its name at the device and at the context broker."""
+
+    object_id: str = ""
+    name: str
+    type: str = "Text"
+
+
+class Command(BaseModel):
+    """A command; ``mqtt`` says how it is published."""
+
+    object_id: str = ""
+    name: str
+    type: str = "command"
+    mqtt: "Publishing | None" = None
+
+
+class Publishing(BaseModel):
+    """Quality of service of a command, and whether the broker keeps it."""
+
+    qos: int = 0
+    retain: bool = False
+
+
+class _Provisioned(BaseModel):
+    """What groups and devices have in common; other fields are taken and ignored."""
+
+    model_config = ConfigDict(frozen=True, populate_by_name=True)
+
+    apikey: str
+    service: str
+    entity_type: str
+    attributes: list[DeviceAttribute] = []
+    lazy: _NotDone = Field([], max_length=0)
+    commands: list[Command] = []
+    static_attributes: _NotDone = Field([], max_length=0)
+
+    def show(self) -> dict[str, Any]:
+        """It as the agent shows it."""
+        shown = self.model_dump(by_alias=True, exclude_none=True)
+        for one in (*shown["attributes"], *shown["commands"]):
+            one["object_id"] = one["object_id"] or one["name"]
+        return shown
+
+
+class Group(_Provisioned):
     """Common settings of the devices with one API key."""
 
-    tenancy: Tenancy
-    apikey: str
+    id: str = Field(default_factory=new_id, alias="_id")
+    version: int = Field(0, alias="__v")
+    subservice: str
     resource: str
-    entity_type: str
-    document: Mapping[str, Any]
-    id: str = field(default_factory=new_id)
+    internal_attributes: _NotDone = Field([], max_length=0)
+    entity_name_exp: str | None = Field(None, alias="entityNameExp")
+    autoprovision: bool | None = None
 
     @property
-    def commands(self) -> list[dict[str, Any]]:
-        """Commands of every device of the group."""
-        return list(self.document.get("commands") or [])
+    def tenancy(self) -> Tenancy:
+        """Whose it is."""
+        return Tenancy(self.service, self.subservice)
 
     def entity_name(self, device_id: str) -> str:
         """Entity name of a device that was not provisioned.
 
         Of the agent's expressions only the plain ``id`` is supported.
         """
-        if self.document.get("entityNameExp") == "id":
+        if self.entity_name_exp == "id":
             return device_id
         return f"{self.entity_type}:{device_id}"
 
-    def show(self) -> dict[str, Any]:
-        """The group as the agent lists it, without the broker's address."""
-        document = self.document
-        shown = {
-            "_id": self.id,
-            "commands": self.commands,
-            "lazy": document.get("lazy") or [],
-            "attributes": document.get("attributes") or [],
-            "resource": self.resource,
-            "apikey": self.apikey,
-            "service": self.tenancy.service,
-            "subservice": self.tenancy.subservice,
-            "__v": 0,
-            "internal_attributes": document.get("internal_attributes") or [],
-            "static_attributes": document.get("static_attributes") or [],
-            "entity_type": self.entity_type,
-        }
-        for name in ("entityNameExp", "timestamp", "explicitAttrs", "autoprovision"):
-            if name in document:
-                shown[name] = document[name]
-        return shown
 
-
-@dataclass(frozen=True, slots=True)
-class Device:
+class Device(_Provisioned):
     """One device.
 
     Attributes:
-        mapping: Attribute name of the device → its NGSI name and type.
         registration_id: Its registration at the context broker; empty for none.
     """
 
-    tenancy: Tenancy
     device_id: str
-    apikey: str
+    service_path: str
     entity_name: str
-    entity_type: str
-    document: Mapping[str, Any]
-    mapping: Mapping[str, tuple[str, str]]
-    registration_id: str = ""
+    transport: str = "MQTT"
+    protocol: str | None = None
+    registration_id: str = Field("", exclude=True)
 
     @property
-    def commands(self) -> dict[str, dict[str, Any]]:
-        """Commands by name."""
-        return {one["name"]: one for one in self.document.get("commands") or []}
+    def tenancy(self) -> Tenancy:
+        """Whose it is."""
+        return Tenancy(self.service, self.service_path)
 
-    @property
-    def static_attributes(self) -> list[dict[str, Any]]:
-        """Attributes that are added to every measure."""
-        return list(self.document.get("static_attributes") or [])
-
-    def show(self) -> dict[str, Any]:
-        """The device as the agent shows it."""
-        document = self.document
-        shown = {
-            "device_id": self.device_id,
-            "apikey": self.apikey,
-            "service": self.tenancy.service,
-            "service_path": self.tenancy.subservice,
-            "entity_name": self.entity_name,
-            "entity_type": self.entity_type,
-            "transport": document.get("transport", "MQTT"),
-            "attributes": document.get("attributes") or [],
-            "lazy": document.get("lazy") or [],
-            "commands": [
-                {"object_id": one["name"], **one} for one in self.commands.values()
-            ],
-            "static_attributes": self.static_attributes,
+    @cached_property
+    def mapping(self) -> Mapping[str, tuple[str, str]]:
+        """Attribute name of the device → its NGSI name and type."""
+        return {
+            one.object_id or one.name: (one.name, one.type) for one in self.attributes
         }
-        if "protocol" in document:
-            shown["protocol"] = document["protocol"]
-        return shown
+
+    @cached_property
+    def commands_by_name(self) -> Mapping[str, Command]:
+        """Its commands."""
+        return {one.name: one for one in self.commands}
+
+    def changed(self, raw: Mapping[str, Any]) -> Self:
+        """The device after a ``PUT``; absent fields stay.
+
+        Raises:
+            FiwareError: 400.
+        """
+        return _read(type(self), {**self.model_dump(), **raw})
+
+
+def _read(kind: type[_Read], raw: Mapping[str, Any]) -> _Read:
+    try:
+        return kind.model_validate(raw)
+    except ValidationError as error:
+        for one in error.errors():
+            if one["type"] == "too_long":
+                raise not_supported(str(one["loc"][0])) from error
+        raise wrong_syntax() from error
 
 
 def read_group(raw: Any, tenancy: Tenancy) -> Group:
     """Read a group from a ``POST``.
 
     Raises:
-        AgentError: 400.
+        FiwareError: 400.
     """
     if not isinstance(raw, dict) or "apikey" not in raw or "resource" not in raw:
         raise wrong_syntax()
     kind = raw.get("entity_type") or raw.get("type")
     if not kind:
-        raise AgentError(
-            400,
+        raise FiwareError(
             "MISSING_CONFIG_PARAMS",
             'The following mandatory configuration parameters were missing: ["type"]',
         )
-    return Group(tenancy, raw["apikey"], raw["resource"], kind, raw)
+    return _read(Group, {**raw, **tenancy._asdict(), "entity_type": kind})
 
 
 def read_device(raw: Any, tenancy: Tenancy, group: Group | None) -> Device:
-    """Read a device from a ``POST``.
+    """Read a device from a ``POST``; a group completes it.
 
     Raises:
-        AgentError: 400.
+        FiwareError: 400.
     """
     if not isinstance(raw, dict):
         raise wrong_syntax()
-    device_id = raw.get("device_id")
-    if not isinstance(device_id, str):
-        raise AgentError(
-            400,
+    if "device_id" not in raw:
+        raise FiwareError(
             "MISSING_ATTRIBUTES",
             "The request was not well formed:"
             'Missing attributes: ["device_id"] with: the device',
         )
     kind = raw.get("entity_type") or (group.entity_type if group else "Thing")
-    apikey = raw.get("apikey") or (group.apikey if group else "")
-    name = raw.get("entity_name") or (
-        group.entity_name(device_id) if group else f"{kind}:{device_id}"
-    )
-    return Device(tenancy, device_id, apikey, name, kind, raw, _mapping(raw))
-
-
-def changed_device(device: Device, raw: Mapping[str, Any]) -> Device:
-    """The device after a ``PUT``; absent fields stay."""
-    document = {**device.document, **raw}
-    return replace(
-        device,
-        document=document,
-        mapping=_mapping(document),
-        entity_name=raw.get("entity_name", device.entity_name),
-        entity_type=raw.get("entity_type", device.entity_type),
-    )
-
-
-def _mapping(raw: Mapping[str, Any]) -> dict[str, tuple[str, str]]:
-    for part in ("attributes", "commands", "static_attributes"):
-        listed = raw.get(part) or []
-        if not isinstance(listed, list) or not all(map(_named, listed)):
-            raise wrong_syntax()
-    return {
-        one.get("object_id") or one["name"]: (one["name"], one.get("type", "Text"))
-        for one in raw.get("attributes") or []
+    name = f"{kind}:{raw['device_id']}"
+    defaults = {
+        "apikey": group.apikey if group else "",
+        "entity_name": group.entity_name(raw["device_id"]) if group else name,
+        "entity_type": kind,
+        "service": tenancy.service,
+        "service_path": tenancy.subservice,
     }
-
-
-def _named(one: Any) -> bool:
-    return isinstance(one, dict) and isinstance(one.get("name"), str)
-
-
-def wrong_syntax() -> AgentError:
-    """400 for a body of another shape."""
-    return AgentError(
-        400, "WRONG_SYNTAX", "Wrong syntax in request: Errors found validating request."
-    )
+    given = {name: one for name, one in raw.items() if name not in defaults or one}
+    return _read(Device, {**defaults, **given})
 
 
 class Registry:
@@ -220,25 +201,18 @@ class Registry:
     # --- groups -----------------------------------------------------------------
 
     def groups(self, tenancy: Tenancy) -> list[Group]:
-        """The groups of a tenancy; of all its subservices for ``/*``."""
-        everywhere = tenancy.subservice in ("/*", "/#")
-        return [
-            one
-            for one in self._groups.values()
-            if one.tenancy == tenancy
-            or (everywhere and one.tenancy.service == tenancy.service)
-        ]
+        """The groups of a tenancy."""
+        return [one for one in self._groups.values() if one.tenancy == tenancy]
 
     def add_group(self, group: Group) -> None:
         """Keep a group.
 
         Raises:
-            AgentError: 409, the API key and resource are in use.
+            FiwareError: 409, the API key and resource are in use.
         """
         key = (group.tenancy, group.resource, group.apikey)
         if key in self._groups:
-            raise AgentError(
-                409,
+            raise FiwareError(
                 "DUPLICATE_GROUP",
                 "A device configuration already exists for resource "
                 f"{group.resource} and API Key {group.apikey}",
@@ -251,30 +225,22 @@ class Registry:
         """Change a group.
 
         Raises:
-            AgentError: 404.
+            FiwareError: 400 or 404.
         """
-        group = self._group(tenancy, resource, apikey)
-        document = {**group.document, **raw}
-        self._groups[tenancy, resource, apikey] = replace(
-            group,
-            document=document,
-            entity_type=raw.get("entity_type", group.entity_type),
+        group = self.remove_group(tenancy, resource, apikey)
+        self._groups[tenancy, resource, apikey] = _read(
+            Group, {**group.model_dump(), **raw}
         )
 
-    def remove_group(self, tenancy: Tenancy, resource: str, apikey: str) -> None:
+    def remove_group(self, tenancy: Tenancy, resource: str, apikey: str) -> Group:
         """Forget a group; its devices stay.
 
         Raises:
-            AgentError: 404.
+            FiwareError: 404.
         """
-        self._group(tenancy, resource, apikey)
-        del self._groups[tenancy, resource, apikey]
-
-    def _group(self, tenancy: Tenancy, resource: str, apikey: str) -> Group:
-        found = self._groups.get((tenancy, resource, apikey))
+        found = self._groups.pop((tenancy, resource, apikey), None)
         if found is None:
-            raise AgentError(
-                404,
+            raise FiwareError(
                 "DEVICE_GROUP_NOT_FOUND",
                 "Couldn\t find device group for fields: "
                 '["resource","apikey"] and values: '
@@ -290,7 +256,7 @@ class Registry:
 
     def group_in(self, tenancy: Tenancy, apikey: str | None) -> Group | None:
         """A group of a tenant: that of the API key, else the first one."""
-        found = [one for one in self._groups.values() if one.tenancy == tenancy]
+        found = self.groups(tenancy)
         return next((one for one in found if not apikey or apikey == one.apikey), None)
 
     # --- devices ----------------------------------------------------------------
@@ -303,14 +269,12 @@ class Registry:
         """One device of a tenancy.
 
         Raises:
-            AgentError: 404.
+            FiwareError: 404.
         """
-        for one in self._devices.values():
-            if one.tenancy == tenancy and one.device_id == device_id:
+        for one in self.devices(tenancy):
+            if one.device_id == device_id:
                 return one
-        raise AgentError(
-            404, "DEVICE_NOT_FOUND", f"No device was found with id:{device_id}"
-        )
+        raise no_device(device_id)
 
     def is_known(self, device: Device) -> bool:
         """Whether a device with this id, API key and tenant is stored."""
@@ -327,24 +291,23 @@ class Registry:
         self._by_topic.pop((device.apikey, device.device_id), None)
 
     def device_of(self, apikey: str, device_id: str) -> Device | None:
-        """The device of a topic; the agent's default key finds any by its id."""
-        found = self._by_topic.get((apikey, device_id))
-        if found is not None or apikey != DEFAULT_APIKEY:
-            return found
-        return next(
-            (one for one in self._devices.values() if one.device_id == device_id), None
-        )
+        """The device of a topic."""
+        return self._by_topic.get((apikey, device_id))
 
-    def device_for(self, tenancy: Tenancy, name: str, kind: str) -> Device | None:
+    def device_for(self, tenancy: Tenancy, name: str, kind: str) -> Device:
         """The device that commands for an entity are sent to.
 
         Several may share the entity; MongoDB answers in the order of its index, so it
         is the one whose API key and id sort first, with the command or without.
+
+        Raises:
+            FiwareError: 404.
         """
         found = [
             one
-            for one in self._devices.values()
-            if one.tenancy == tenancy
-            and (one.entity_name, one.entity_type) == (name, kind)
+            for one in self.devices(tenancy)
+            if (one.entity_name, one.entity_type) == (name, kind)
         ]
-        return min(found, key=lambda one: (one.apikey, one.device_id), default=None)
+        if not found:
+            raise no_device(name)
+        return min(found, key=lambda one: (one.apikey, one.device_id))

@@ -10,21 +10,11 @@ from typing import Any, NamedTuple
 
 import orjson
 
+from iveg.lab.embedded.errors import not_supported, too_many
 from iveg.lab.embedded.orion_numbers import print_value
-from iveg.lab.embedded.orion_text import (
-    UNRESTRICTED,
-    bad_request,
-    check_name,
-    date_json,
-    date_text,
-    holds_forbidden,
-    not_supported,
-    quoted,
-    too_many,
-)
+from iveg.lab.embedded.orion_text import date_json, date_text, quoted
 
-_BUILTIN = ("dateCreated", "dateModified")
-_OPERATORS_NOT_DONE = ("$min", "$max", "$mul", "$push", "$addToSet", "$pull")
+BUILTIN_DATES = ("dateCreated", "dateModified")
 
 
 class Value:
@@ -81,16 +71,12 @@ class Attribute(NamedTuple):
             inner,
         )
 
-    def noted(self, notes: Mapping[str, bytes]) -> "Attribute":
-        """The same with metadata that are not stored."""
-        return self._replace(metadata={**self.metadata, **notes})
-
     def _metadata(self, wanted: Iterable[str]) -> dict[str, bytes]:
         chosen: dict[str, bytes] = {}
         for name in wanted:
             if name == "*":
                 chosen.update(self.metadata)
-            elif name in _BUILTIN:
+            elif name in BUILTIN_DATES:
                 at = self.created if name == "dateCreated" else self.modified
                 chosen[name] = b'{"type":"DateTime","value":%b}' % date_json(at)
             elif name in self.metadata:
@@ -158,6 +144,23 @@ class Touched:
         ) or old.json != new.json
 
 
+@dataclass(frozen=True, slots=True)
+class Scope:
+    """Tenant and service path of a request, and its time.
+
+    Attributes:
+        service: Tenant, lower case; empty for the default one.
+        path: Service path, or ``/#`` for reading all.
+        correlator: Correlator of the chain of requests.
+        now: Seconds, Unix time.
+    """
+
+    service: str
+    path: str
+    correlator: str
+    now: float
+
+
 class EntityStore:
     """All entities of one tenant."""
 
@@ -173,7 +176,7 @@ class EntityStore:
         """Find the entity of an id and an optional type.
 
         Raises:
-            NgsiError: 409, several entities match.
+            FiwareError: 409, several entities match.
         """
         found = [
             entity
@@ -201,13 +204,8 @@ class EntityStore:
 
 
 def under(paths: str, path: str) -> bool:
-    """Whether a service path is one of the requested ones (``/a,/b/#``)."""
-    for wanted in paths.split(","):
-        if wanted == path or wanted == "/#":
-            return True
-        if wanted.endswith("/#") and (path + "/").startswith(wanted[:-1]):
-            return True
-    return False
+    """Whether a service path is the requested one; ``/#`` requests all."""
+    return paths in (path, "/#")
 
 
 def apply(
@@ -264,13 +262,12 @@ def _operated(attribute: Attribute | None, value: Mapping[str, Any]) -> Any:
     if not name:
         return value
     argument = value[name]
-    old = None if attribute is None else orjson.loads(attribute.json)
-    number = old if isinstance(old, int | float) else 0
-    if name == "$inc" and isinstance(argument, int | float):
-        return number + argument
-    if name in _OPERATORS_NOT_DONE:
+    if name == "$set":
+        return argument
+    if name != "$inc" or not isinstance(argument, int | float):
         raise not_supported(f"operator {name}")
-    return argument
+    old = None if attribute is None else orjson.loads(attribute.json)
+    return argument + (old if isinstance(old, int | float) else 0)
 
 
 def default_type(value: Any) -> str:
@@ -282,76 +279,6 @@ def default_type(value: Any) -> str:
     if value is None:
         return "None"
     return "Text" if isinstance(value, str) else "StructuredValue"
-
-
-# --- requests ---------------------------------------------------------------------
-
-
-def read_changes(
-    attributes: Mapping[str, Any], *, key_values: bool, clean: bool
-) -> dict[str, EntityChange]:
-    """Read attributes from a request.
-
-    Args:
-        attributes: Name → attribute, without ``id`` and ``type``.
-        key_values: Whether an attribute is its bare value.
-        clean: Whether the body is known to hold no forbidden character.
-
-    Raises:
-        NgsiError: 400, with the sentence of the first complaint.
-    """
-    return {
-        name: _read_change(name, attribute, key_values=key_values, clean=clean)
-        for name, attribute in attributes.items()
-    }
-
-
-def _read_change(name: str, raw: Any, *, key_values: bool, clean: bool) -> EntityChange:
-    check_name(name, "attribute name")
-    if key_values:
-        raw = {"value": raw}
-    elif not isinstance(raw, dict):
-        raise bad_request(
-            "attribute must be a JSON object, unless keyValues option is used"
-        )
-    if not raw.keys() <= {"type", "value", "metadata"}:
-        raise bad_request("unrecognized property for context attribute")
-    kind = _read_type(raw, "attribute type")
-    value = raw.get("value")
-    if not clean and kind != UNRESTRICTED and holds_forbidden(value):
-        raise bad_request("Invalid characters in attribute value")
-    if kind == "DateTime" and value is not None:
-        date_text(value)
-    metadata = raw.get("metadata")
-    return EntityChange(
-        kind, value, None if metadata is None else _read_metadata(metadata, clean=clean)
-    )
-
-
-def _read_type(raw: Mapping[str, Any], what: str) -> str | None:
-    kind = raw.get("type")
-    if kind is None:
-        return None
-    if not isinstance(kind, str):
-        raise bad_request(f"invalid JSON type for {what}")
-    check_name(kind, what)
-    return kind
-
-
-def _read_metadata(raw: Any, *, clean: bool) -> dict[str, bytes]:
-    if not isinstance(raw, dict):
-        raise bad_request("metadata must be a JSON object")
-    metadata = {}
-    for name, one in raw.items():
-        check_name(name, "metadata name")
-        if not isinstance(one, dict) or not one.keys() <= {"type", "value"}:
-            raise bad_request("unrecognized property for metadata")
-        value = one.get("value")
-        if not clean and holds_forbidden(value):
-            raise bad_request("Invalid characters in metadata value")
-        kind = _read_type(one, "metadata type") or default_type(value)
-        metadata[name] = metadata_json(kind, value)
-    return metadata
 
 
 def metadata_json(kind: str, value: Any) -> bytes:

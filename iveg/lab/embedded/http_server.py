@@ -1,28 +1,25 @@
 """A small HTTP/1.1 server with keep-alive: request in, response out.
 
-Orion and the agent set their own headers, refuse bodies before reading them and send no
-``Server`` header, which web frameworks do not allow easily.
+Orion and the agent set their own headers and send no ``Server`` header, which web
+frameworks do not allow easily.
 """
 
 import asyncio
-import contextlib
 import logging
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from contextlib import asynccontextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from http import HTTPStatus
-from urllib.parse import parse_qsl, unquote, urlsplit
-
-import httptools
-import orjson
+from typing import Generic, TypeVar
+from urllib.parse import parse_qsl, unquote
 
 from iveg.adapters import clock
 from iveg.adapters.connections import Connection, ConnectionCaps, ConnectionTable
 
 _log = logging.getLogger(__name__)
 _MAX_BODY = 8 << 20
-_MAX_WAITING = 64
-_PIECE = 8192
+_CLOSED = (asyncio.IncompleteReadError, ConnectionError)
+_Route = TypeVar("_Route")
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +38,11 @@ class Request:
     headers: dict[str, str]
     body: bytes
 
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """The parts of the path that are not empty."""
+        return tuple(part for part in self.path.split("/") if part)
+
 
 @dataclass(frozen=True, slots=True)
 class Response:
@@ -52,12 +54,30 @@ class Response:
     content_type: str = "application/json"
 
 
-def json_response(value: object, status: int = 200) -> Response:
-    """A response with a JSON body."""
-    return Response(status, orjson.dumps(value))
-
-
 Handler = Callable[[Request], Awaitable[Response]]
+
+
+class Routes(Generic[_Route]):
+    """A table of routes.
+
+    Args:
+        table: By method and path, such as ``GET /v2/entities/*``.
+    """
+
+    def __init__(self, table: Mapping[str, _Route]) -> None:
+        self._table = []
+        for line, route in table.items():
+            method, *shape = line.replace("/", " ").split()
+            self._table.append((shape, method, route))
+
+    def of_path(self, parts: tuple[str, ...]) -> dict[str, _Route]:
+        """Methods of a path with their routes, in the order of the table."""
+        return {
+            method: route
+            for shape, method, route in self._table
+            if len(shape) == len(parts)
+            and all(one in ("*", part) for one, part in zip(shape, parts, strict=True))
+        }
 
 
 @asynccontextmanager
@@ -72,188 +92,111 @@ async def http_server(handler: Handler, host: str, port: int) -> AsyncIterator[i
     Yields:
         The port in use.
     """
-    connections: set[_Connection] = set()  # from the first byte to the last response
     table = ConnectionTable(clock.mono, ConnectionCaps.on_loopback())
-    server = await asyncio.get_running_loop().create_server(
-        lambda: _Connection(handler, connections, table), host, port
+    serving: set[asyncio.Task[None]] = set()
+
+    def connected(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        task = asyncio.create_task(
+            _serve(handler, table, reader, writer), name="embedded-http-connection"
+        )
+        serving.add(task)
+        task.add_done_callback(serving.discard)
+
+    server = await asyncio.start_server(
+        connected, host, port, limit=table.caps.head_bytes
     )
     ending = asyncio.create_task(table.run(), name="embedded-late-requests")
     try:
         yield server.sockets[0].getsockname()[1]
     finally:
-        ending.cancel()
         server.close()
-        tasks = [connection.close() for connection in list(connections)]
+        tasks = [ending, *serving]
+        for task in tasks:
+            task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
         await server.wait_closed()
 
 
-class _HeadTooLongError(Exception):
-    """Leaves the parser."""
+class _RefusedError(Exception):
+    """A request that cannot be read; the argument is the status of the answer."""
 
 
-class _Connection(asyncio.Protocol):
-    """One client: bytes → requests → handler, in order → bytes."""
-
-    def __init__(
-        self,
-        handler: Handler,
-        connections: "set[_Connection]",
-        table: ConnectionTable,
-    ) -> None:
-        self._handler = handler
-        self._connections = connections
-        self._table = table
-        self._place: Connection | None = None
-        self._head = self._unparsed = 0
-        self._requests: asyncio.Queue[tuple[Request, bool] | None] = asyncio.Queue()
-        self._parser = httptools.HttpRequestParser(self)
-        self._transport: asyncio.Transport | None = None
-        self._task: asyncio.Task[None] | None = None
-
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        self._transport = transport  # type: ignore[assignment]
-        peer = transport.get_extra_info("peername") or ("",)
-        self._place = self._table.admit(peer[0], transport.abort)  # type: ignore[attr-defined]
-        if self._place is None:
-            transport.close()
-        self._connections.add(self)
-        self._task = asyncio.get_running_loop().create_task(
-            self._answer_all(), name="embedded-http-connection"
-        )
-
-    def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002
-        """The client disconnected; its request is still executed."""
-        self._transport = None
-        self._requests.put_nowait(None)
-        if self._place is not None:
-            self._place.leave()
-
-    async def close(self) -> None:
-        """Close the connection and wait until its handler has ended."""
-        if self._transport is not None:
-            self._transport.abort()
-        if self._task is not None:
-            self._task.cancel()
-            with contextlib.suppress(asyncio.CancelledError):
-                await self._task
-
-    def data_received(self, data: bytes) -> None:
-        for start in range(0, len(data), _PIECE):
-            if self._transport is None or self._transport.is_closing():
-                return
-            self._feed(data[start : start + _PIECE])
-
-    def _feed(self, data: bytes) -> None:
-        self._unparsed += len(data)
-        try:
-            self._parser.feed_data(data)
-            if self._unparsed > self._table.caps.head_bytes:
-                raise _HeadTooLongError
-        except (httptools.HttpParserError, UnicodeDecodeError, ValueError) as error:
-            is_long = isinstance(error.__context__, _HeadTooLongError)
-            self._refuse(431 if is_long else 400)
-        except _HeadTooLongError:
-            self._refuse(431)
-
-    def _refuse(self, status: int) -> None:
-        if self._transport is not None:
-            told = f"HTTP/1.1 {status} {HTTPStatus(status).phrase}\r\n\r\n"
-            self._transport.write(told.encode())
-            self._transport.close()
-
-    # --- httptools callbacks ----------------------------------------------------
-
-    def on_message_begin(self) -> None:
-        """A request begins."""
-        self._url = b""
-        self._headers: dict[str, str] = {}
-        self._body: list[bytes] = []
-        self._size = self._head = self._unparsed = 0
-        if self._place is not None:
-            self._place.await_head()
-
-    def on_url(self, url: bytes) -> None:
-        """Part of the request target."""
-        self._count(len(url))
-        self._url += url
-
-    def on_header(self, name: bytes, value: bytes) -> None:
-        """One header."""
-        self._count(len(name) + len(value))
-        self._headers[name.decode("latin-1").lower()] = value.decode("latin-1")
-
-    def on_headers_complete(self) -> None:
-        """The head is complete."""
-        self._unparsed = 0
-        if self._place is not None:
-            self._place.await_body()
-
-    def on_body(self, body: bytes) -> None:
-        """Part of the body; bytes beyond all limits are counted, not stored."""
-        self._unparsed = 0
-        self._size += len(body)
-        if self._size <= _MAX_BODY:
-            self._body.append(body)
-
-    def on_message_complete(self) -> None:
-        """The request is complete."""
-        self._unparsed = 0
-        if self._place is not None:
-            # Nobody signs in here: who sends whole requests is as good as known.
-            self._place.serve()
-            self._place.vouch()
-        target = urlsplit(self._url.decode("ascii"), allow_fragments=False)
-        # Orion requests "//op/update" from agents, which urlsplit would read as a host.
-        path = self._url.decode("ascii").partition("?")[0]
-        request = Request(
-            self._parser.get_method().decode("ascii"),
-            unquote(path),
-            dict(parse_qsl(target.query, keep_blank_values=True)),
-            self._headers,
-            b"".join(self._body),
-        )
-        self._requests.put_nowait((request, self._parser.should_keep_alive()))
-        if self._requests.qsize() > _MAX_WAITING and self._transport is not None:
-            self._transport.pause_reading()
-
-    def _count(self, size: int) -> None:
-        self._unparsed = 0
-        self._head += size
-        if self._head > self._table.caps.head_bytes:
-            raise _HeadTooLongError
-
-    # --- answers ----------------------------------------------------------------
-
-    async def _answer_all(self) -> None:
-        try:
-            while (asked := await self._requests.get()) is not None:
-                request, keep = asked
-                response = await self._answer(request)
-                self._write(_written(response, request.method, keep), keep=keep)
-        finally:
-            self._connections.discard(self)
-
-    def _write(self, data: bytes, *, keep: bool) -> None:
-        if self._transport is None:
-            return
-        self._transport.write(data)
-        if self._place is not None and self._place.is_busy and self._requests.empty():
-            self._place.rest()
-        if not keep:
-            self._transport.close()
-        elif self._requests.qsize() <= _MAX_WAITING:
-            self._transport.resume_reading()
-
-    async def _answer(self, request: Request) -> Response:
-        try:
-            return await self._handler(request)
-        except Exception:
-            _log.exception("%s %s failed", request.method, request.path)
-            return Response(500)
+async def _serve(
+    handler: Handler,
+    table: ConnectionTable,
+    reader: asyncio.StreamReader,
+    writer: asyncio.StreamWriter,
+) -> None:
+    """Answer the requests of one client, in order, until it leaves."""
+    peer = writer.get_extra_info("peername") or ("",)
+    place = table.admit(peer[0], writer.transport.abort)
+    keep = place is not None
+    try:
+        while keep and place is not None:
+            request = await _read(reader, place)
+            response = await _answer(handler, request)
+            keep = request.headers.get("connection", "").lower() != "close"
+            writer.write(_written(response, request.method, keep=keep))
+            await writer.drain()
+            place.rest()
+    except _RefusedError as refused:
+        writer.write(_written(Response(refused.args[0]), "", keep=False))
+    except _CLOSED:
+        pass  # the client has left; what it asked for whole was done
+    finally:
+        if place is not None:
+            place.leave()
+        writer.close()
 
 
-def _written(response: Response, method: str, keep: bool) -> bytes:
+async def _read(reader: asyncio.StreamReader, place: Connection) -> Request:
+    """The next request.
+
+    Raises:
+        _RefusedError: it is too long, or nothing that can be read.
+    """
+    first = await reader.readexactly(1)
+    place.await_head()
+    try:
+        head = first + await reader.readuntil(b"\r\n\r\n")
+    except asyncio.LimitOverrunError:
+        raise _RefusedError(431) from None
+    place.await_body()
+    request = _parse(head.decode("latin-1"))
+    length = request.headers.get("content-length", "0")
+    if not length.isdecimal() or "transfer-encoding" in request.headers:
+        raise _RefusedError(411)
+    if int(length) > _MAX_BODY:
+        raise _RefusedError(413)
+    body = await reader.readexactly(int(length))
+    # Nobody signs in here: who sends whole requests is as good as known.
+    place.serve()
+    place.vouch()
+    return replace(request, body=body)
+
+
+def _parse(head: str) -> Request:
+    start, *lines = head.strip("\r\n").split("\r\n")
+    match start.split(" "):
+        case [method, target, version] if version.startswith("HTTP/1."):
+            path, _, query = target.partition("?")
+        case _:
+            raise _RefusedError(400)
+    pairs = (line.partition(":") for line in lines)
+    headers = {name.strip().lower(): value.strip() for name, _, value in pairs}
+    asked = dict(parse_qsl(query, keep_blank_values=True))
+    return Request(method, unquote(path), asked, headers, b"")
+
+
+async def _answer(handler: Handler, request: Request) -> Response:
+    try:
+        return await handler(request)
+    except Exception:
+        _log.exception("%s %s failed", request.method, request.path)
+        return Response(500)
+
+
+def _written(response: Response, method: str, *, keep: bool) -> bytes:
     head = [f"HTTP/1.1 {response.status} {HTTPStatus(response.status).phrase}"]
     if response.body:
         head.append(f"Content-Type: {response.content_type}")

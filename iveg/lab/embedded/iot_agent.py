@@ -7,7 +7,6 @@ are listed in ``docs/fiware.md``.
 
 import logging
 from collections.abc import Mapping
-from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
@@ -16,22 +15,19 @@ import orjson
 from iveg.adapters import clock
 from iveg.lab.embedded.context_broker import ContextBroker
 from iveg.lab.embedded.devices import (
-    DEFAULT_APIKEY,
-    AgentError,
+    Command,
     Device,
+    Publishing,
     Registry,
     Tenancy,
     read_device,
 )
-from iveg.lab.embedded.entities import EntityChange
+from iveg.lab.embedded.entities import EntityChange, Scope
+from iveg.lab.embedded.errors import FiwareError
 from iveg.lab.embedded.measures import read_measures, read_single, status_changes
 from iveg.lab.embedded.mqtt_broker import MqttBroker
-from iveg.lab.embedded.orion_text import (
-    NgsiError,
-    load_json,
-)
+from iveg.lab.embedded.orion_text import load_json
 from iveg.lab.embedded.registrations import Registration, read_registration
-from iveg.lab.embedded.scope import Scope
 
 _log = logging.getLogger(__name__)
 
@@ -59,7 +55,11 @@ def _read_answer(
     answers = load_json(payload)
     if not isinstance(answers, dict):
         return []
-    known = {name: ("OK", answers[name]) for name in answers if name in device.commands}
+    known = {
+        name: ("OK", answers[name])
+        for name in answers
+        if name in device.commands_by_name
+    }
     return [status_changes(known, now)] if known else []
 
 
@@ -92,7 +92,7 @@ class IotAgent:
             return
         try:
             self._take_from(spoken, payload, clock.wall())
-        except (NgsiError, AgentError) as error:
+        except FiwareError as error:
             # Devices get no error.
             _log.debug("a message on %s was discarded: %s", topic, error)
 
@@ -115,20 +115,16 @@ class IotAgent:
     def _write(
         self, device: Device, changes: Mapping[str, EntityChange], now: float
     ) -> None:
-        tenancy = device.tenancy
         # A correlator is made if somebody is notified.
-        scope = Scope(tenancy.service, tenancy.subservice, "", now)
+        scope = Scope(device.service, device.service_path, "", now)
         self._broker.upsert(scope, device.entity_name, device.entity_type, changes)
 
     def _autoprovision(self, apikey: str, device_id: str) -> Device | None:
-        group = None if apikey == DEFAULT_APIKEY else self.registry.group_of(apikey)
-        if group is None or group.document.get("autoprovision") is False:
+        group = self.registry.group_of(apikey)
+        if group is None or group.autoprovision is False:
             return None
-        raw: dict[str, Any] = {"device_id": device_id}
-        if group.commands:
-            raw["commands"] = group.commands
-        device = read_device(raw, group.tenancy, group)
-        return self._keep(device)
+        raw = {"device_id": device_id, "commands": group.commands}
+        return self._keep(read_device(raw, group.tenancy, group))
 
     # --- devices ----------------------------------------------------------------
 
@@ -136,13 +132,12 @@ class IotAgent:
         """Create one device from a ``POST``.
 
         Raises:
-            AgentError: 400, or 409 if the device exists.
+            FiwareError: 400, or 409 if the device exists.
         """
         apikey = raw.get("apikey") if isinstance(raw, dict) else None
         device = read_device(raw, tenancy, self.registry.group_in(tenancy, apikey))
         if self.registry.is_known(device):
-            raise AgentError(
-                409,
+            raise FiwareError(
                 "DUPLICATE_DEVICE_ID",
                 "A device with the same info (DeviceId, ApiKey, Service, Subservice) "
                 f"was found:{device.device_id}",
@@ -159,20 +154,23 @@ class IotAgent:
         """Register the commands of an entity at the context broker."""
         entity = {"type": device.entity_type, "id": device.entity_name}
         document = {
-            "dataProvided": {"entities": [entity], "attrs": list(device.commands)},
+            "dataProvided": {
+                "entities": [entity],
+                "attrs": list(device.commands_by_name),
+            },
             "provider": {"http": {"url": self.url}},
         }
-        registration = read_registration(document, device.tenancy.subservice)
+        registration = read_registration(document, device.service_path)
         self._registrations(device)[registration.id] = registration
-        return replace(device, registration_id=registration.id)
+        return device.model_copy(update={"registration_id": registration.id})
 
     def change(self, old: Device, new: Device) -> None:
         """Replace a device; new attributes are written as null."""
         self.forget(old)
-        self._keep(replace(new, registration_id=""))
+        self._keep(new)
         gained = dict(new.mapping.values()).items() - dict(old.mapping.values()).items()
-        tenant = self._broker.tenant(new.tenancy.service)
-        key = (new.tenancy.subservice, new.entity_name, new.entity_type)
+        tenant = self._broker.tenant(new.service)
+        key = (new.service_path, new.entity_name, new.entity_type)
         if gained and tenant.entities.get(*key) is not None:
             nothing = {name: EntityChange(kind, None) for name, kind in gained}
             self._write(new, nothing, clock.wall())
@@ -183,7 +181,7 @@ class IotAgent:
         self.registry.remove(device)
 
     def _registrations(self, device: Device) -> dict[str, Registration]:
-        return self._broker.tenant(device.tenancy.service).registrations
+        return self._broker.tenant(device.service).registrations
 
     # --- commands ----------------------------------------------------------------
 
@@ -196,25 +194,23 @@ class IotAgent:
         agent answers 204 to both.
 
         Raises:
-            AgentError: 404, no device has this entity.
+            FiwareError: 404, no device has this entity.
         """
-        device = self._device_for(tenancy, name, kind)
+        device = self.registry.device_for(tenancy, name, kind)
         now = clock.wall()
-        known = {one: values[one] for one in values if one in device.commands}
+        commands = device.commands_by_name
+        known = {one: values[one] for one in values if one in commands}
         for command, value in known.items():
-            await self._publish(device, command, value)
+            self._publish(device, commands[command], value)
         if known:
             pending = dict.fromkeys(known, ("PENDING", None))
             self._write(device, status_changes(pending, now), now)
 
-    async def _publish(self, device: Device, command: str, value: Any) -> None:
-        options = device.commands[command].get("mqtt") or {}
-        self._mqtt.publish(
-            f"/{device.apikey}/{device.device_id}/cmd",
-            orjson.dumps({command: value}),
-            int(options.get("qos", 0)),
-            retain=bool(options.get("retain", False)),
-        )
+    def _publish(self, device: Device, command: Command, value: Any) -> None:
+        how = command.mqtt or Publishing()
+        topic = f"/{device.apikey}/{device.device_id}/cmd"
+        payload = orjson.dumps({command.name: value})
+        self._mqtt.publish(topic, payload, how.qos, retain=how.retain)
 
     async def query(
         self, tenancy: Tenancy, name: str, kind: str, names: list[str]
@@ -222,20 +218,12 @@ class IotAgent:
         """Execute an ``op/query`` of one entity: its commands, with empty values.
 
         Raises:
-            AgentError: 404, no device has this entity.
+            FiwareError: 404, no device has this entity.
         """
-        device = self._device_for(tenancy, name, kind)
+        device = self.registry.device_for(tenancy, name, kind)
         told = {
             command: {"type": "command", "value": ""}
-            for command in device.commands
+            for command in device.commands_by_name
             if not names or command in names
         }
         return {"type": kind, "id": name, **told}
-
-    def _device_for(self, tenancy: Tenancy, name: str, kind: str) -> Device:
-        device = self.registry.device_for(tenancy, name, kind)
-        if device is None:
-            raise AgentError(
-                404, "DEVICE_NOT_FOUND", f"No device was found with id:{name}"
-            )
-        return device

@@ -1,18 +1,13 @@
 """North port of the agent: groups, devices, and requests of the context broker."""
 
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Sequence
 from typing import Any
 
 import orjson
 
-from iveg.lab.embedded.devices import (
-    AgentError,
-    Tenancy,
-    changed_device,
-    read_group,
-    wrong_syntax,
-)
-from iveg.lab.embedded.http_server import Request, Response
+from iveg.lab.embedded.devices import Device, Group, Tenancy, read_group
+from iveg.lab.embedded.errors import FiwareError, wrong_syntax
+from iveg.lab.embedded.http_server import Request, Response, Routes
 from iveg.lab.embedded.iot_agent import IotAgent
 
 _ABOUT = {
@@ -36,14 +31,14 @@ class IotaApi:
 
     async def handle(self, request: Request) -> Response:
         """Answer one request."""
-        route = _route_of(request)
+        route = _ROUTES.of_path(request.parts).get(request.method)
         if route is None:
             return _no_such_page(request)
         try:
             return await route(self, request)
-        except AgentError as error:
-            body = {"name": error.name, "message": error.message}
-            return _json(body, error.status)
+        except FiwareError as error:
+            body = error.body("name", "message")
+            return Response(error.status, body, content_type=_JSON)
 
     async def about(self, request: Request) -> Response:  # noqa: ARG002
         """``GET /iot/about`` and ``GET /version``."""
@@ -54,9 +49,7 @@ class IotaApi:
     async def list_groups(self, request: Request) -> Response:
         """``GET /iot/services``."""
         groups = self.agent.registry.groups(_tenancy(request))
-        limit, offset = _paging(request)
-        shown = [one.show() for one in groups[offset : offset + limit]]
-        return _json({"count": len(groups), "services": shown})
+        return _page(request, "services", groups)
 
     async def create_groups(self, request: Request) -> Response:
         """``POST /iot/services``."""
@@ -82,12 +75,7 @@ class IotaApi:
     async def list_devices(self, request: Request) -> Response:
         """``GET /iot/devices``."""
         devices = self.agent.registry.devices(_tenancy(request))
-        entity = request.query.get("entity")
-        if entity is not None:
-            devices = [one for one in devices if one.entity_name == entity]
-        limit, offset = _paging(request)
-        shown = [one.show() for one in devices[offset : offset + limit]]
-        return _json({"count": len(devices), "devices": shown})
+        return _page(request, "devices", devices)
 
     async def create_devices(self, request: Request) -> Response:
         """``POST /iot/devices``."""
@@ -104,7 +92,7 @@ class IotaApi:
     async def change_device(self, request: Request) -> Response:
         """``PUT /iot/devices/{id}``."""
         old = self.agent.registry.device(_tenancy(request), _last(request))
-        self.agent.change(old, changed_device(old, _object(request)))
+        self.agent.change(old, old.changed(_object(request)))
         return Response(204)
 
     async def delete_device(self, request: Request) -> Response:
@@ -139,30 +127,23 @@ class IotaApi:
         return _json(told)
 
 
-_TABLE: Mapping[tuple[str, str], _Route] = {
-    ("GET", "iot/about"): IotaApi.about,
-    ("GET", "version"): IotaApi.about,
-    ("GET", "iot/services"): IotaApi.list_groups,
-    ("POST", "iot/services"): IotaApi.create_groups,
-    ("PUT", "iot/services"): IotaApi.change_group,
-    ("DELETE", "iot/services"): IotaApi.delete_group,
-    ("GET", "iot/devices"): IotaApi.list_devices,
-    ("POST", "iot/devices"): IotaApi.create_devices,
-    ("GET", "iot/devices/*"): IotaApi.get_device,
-    ("PUT", "iot/devices/*"): IotaApi.change_device,
-    ("DELETE", "iot/devices/*"): IotaApi.delete_device,
-    ("POST", "op/update"): IotaApi.update,
-    ("POST", "op/query"): IotaApi.query,
-    ("POST", "v2/op/update"): IotaApi.update,
-    ("POST", "v2/op/query"): IotaApi.query,
-}
-
-
-def _route_of(request: Request) -> _Route | None:
-    parts = [part for part in request.path.split("/") if part]
-    if parts[:2] == ["iot", "devices"] and len(parts) == 3:
-        parts[2] = "*"
-    return _TABLE.get((request.method, "/".join(parts)))
+_ROUTES: Routes[_Route] = Routes(
+    {
+        "GET /iot/about": IotaApi.about,
+        "GET /version": IotaApi.about,
+        "GET /iot/services": IotaApi.list_groups,
+        "POST /iot/services": IotaApi.create_groups,
+        "PUT /iot/services": IotaApi.change_group,
+        "DELETE /iot/services": IotaApi.delete_group,
+        "GET /iot/devices": IotaApi.list_devices,
+        "POST /iot/devices": IotaApi.create_devices,
+        "GET /iot/devices/*": IotaApi.get_device,
+        "PUT /iot/devices/*": IotaApi.change_device,
+        "DELETE /iot/devices/*": IotaApi.delete_device,
+        "POST /op/update": IotaApi.update,
+        "POST /op/query": IotaApi.query,
+    }
+)
 
 
 def _tenancy(request: Request) -> Tenancy:
@@ -172,8 +153,7 @@ def _tenancy(request: Request) -> Tenancy:
         if not request.headers.get(name)
     ]
     if missing:
-        raise AgentError(
-            400,
+        raise FiwareError(
             "MISSING_HEADERS",
             "Some headers were missing from the request: "
             + orjson.dumps(missing).decode(),
@@ -191,7 +171,7 @@ def _object(request: Request) -> dict[str, Any]:
         value = orjson.loads(request.body)
     except orjson.JSONDecodeError as error:
         # The real agent returns its parser's error as a 500.
-        raise AgentError(500, "SyntaxError", str(error)) from None
+        raise FiwareError("SyntaxError", str(error)) from None
     if not isinstance(value, dict):
         raise wrong_syntax()
     return value
@@ -214,15 +194,18 @@ def _entity_key(entity: Any) -> tuple[str, str]:
     return str(entity.get("id", "")), str(entity.get("type", ""))
 
 
-def _paging(request: Request) -> tuple[int, int]:
+def _page(
+    request: Request, name: str, listed: Sequence[Group] | Sequence[Device]
+) -> Response:
     limit, offset = request.query.get("limit", "20"), request.query.get("offset", "0")
     if not (limit.isdigit() and offset.isdigit()):
         raise wrong_syntax()
-    return int(limit), int(offset)
+    shown = [one.show() for one in listed[int(offset) : int(offset) + int(limit)]]
+    return _json({"count": len(listed), name: shown})
 
 
 def _last(request: Request) -> str:
-    return request.path.rpartition("/")[2]
+    return request.parts[-1]
 
 
 def _json(value: Any, status: int = 200) -> Response:

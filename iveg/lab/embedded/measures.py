@@ -13,12 +13,10 @@ from iveg.lab.embedded.devices import Device
 from iveg.lab.embedded.entities import (
     EntityChange,
     Value,
-    default_type,
 )
+from iveg.lab.embedded.errors import FiwareError, bad_request
 from iveg.lab.embedded.orion_text import (
     UNRESTRICTED,
-    NgsiError,
-    bad_request,
     check_name,
     date_json,
     date_text,
@@ -42,7 +40,7 @@ def read_measures(
         One set of changes for each measure; none for a discarded payload.
 
     Raises:
-        NgsiError: 400 or 413, what Orion says to the agent about it.
+        FiwareError: 400 or 413, what Orion says to the agent about it.
     """
     value = load_json(payload)
     clean = _check(payload)
@@ -73,7 +71,7 @@ def read_single(
         The changes; none for a discarded payload.
 
     Raises:
-        NgsiError: 400 or 413, what Orion says to the agent about it.
+        FiwareError: 400 or 413, what Orion says to the agent about it.
     """
     if not payload:
         return []
@@ -88,7 +86,7 @@ def read_single(
 
 def _check(payload: bytes) -> bool:
     if len(payload) > MAX_MEASURE:
-        raise NgsiError(413, "RequestEntityTooLarge", f"payload size: {len(payload)}")
+        raise FiwareError("RequestEntityTooLarge", f"payload size: {len(payload)}")
     return looks_clean(payload)
 
 
@@ -98,7 +96,7 @@ def _read_one(
     given = measure.get(_INSTANT)
     try:
         instant = date_json(now) if given is None else date_text(given)
-    except NgsiError:
+    except FiwareError:
         return None
     metadata = {_INSTANT: b'{"type":"DateTime","value":%b}' % instant}
     changes = {}
@@ -111,12 +109,6 @@ def _read_one(
         if not clean and kind != UNRESTRICTED and holds_forbidden(value):
             raise bad_request("Invalid characters in attribute value")
         changes[name] = EntityChange(kind, value, metadata)
-    for one in device.static_attributes:
-        changes[one["name"]] = EntityChange(
-            one.get("type") or default_type(one.get("value")),
-            one.get("value"),
-            metadata,
-        )
     changes[_INSTANT] = EntityChange("DateTime", Value(json=instant))
     return changes
 
@@ -131,7 +123,7 @@ def status_changes(
         now: Seconds, Unix time.
 
     Raises:
-        NgsiError: 400, a forbidden character in an answer.
+        FiwareError: 400, a forbidden character in an answer.
     """
     instant = date_json(now)
     metadata = {_INSTANT: b'{"type":"DateTime","value":%b}' % instant}

@@ -5,27 +5,32 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from iveg.lab.embedded.entities import EntityChange, read_changes
-from iveg.lab.embedded.http_server import Request
-from iveg.lab.embedded.orion_text import (
-    NgsiError,
+from iveg.lab.embedded.changes import read_changes
+from iveg.lab.embedded.entities import EntityChange, Scope
+from iveg.lab.embedded.errors import (
+    FiwareError,
     bad_request,
-    check_name,
-    load_json,
-    looks_clean,
+    not_supported,
     parse_error,
 )
-from iveg.lab.embedded.scope import Scope
+from iveg.lab.embedded.http_server import Request, Response
+from iveg.lab.embedded.orion_text import check_name, load_json, looks_clean
 from iveg.lab.embedded.views import EntityView
 
-MAX_BODY = 1 << 20
+_MAX_BODY = 1 << 20
 _SERVICE = re.compile(r"[a-z0-9_]{0,50}")
-_PATH = re.compile(r"/|(/[A-Za-z0-9_]{1,50}){1,10}(/#)?|/#")
+_PATH = re.compile(r"/|(/[A-Za-z0-9_]{1,50}){1,10}")
 _OPTIONS = {
-    "keyValues", "values", "unique", "count", "append", "upsert", "skipForwarding",
-    "forcedUpdate", "overrideMetadata", "normalized", "skipInitialNotification",
-    "flowControl", "noAttrDetail",
+    "keyValues", "values", "count", "upsert", "skipForwarding", "forcedUpdate",
+    "normalized", "skipInitialNotification",
 }  # fmt: skip
+_OPTIONS_NOT_DONE = {
+    "append",
+    "unique",
+    "overrideMetadata",
+    "flowControl",
+    "noAttrDetail",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,30 +48,22 @@ class Call:
     parts: tuple[str, ...]
 
     @property
-    def key_values(self) -> bool:
-        """Whether the body's attributes are plain values."""
-        return "keyValues" in self.options
+    def query(self) -> Mapping[str, str]:
+        """Names and values after ``?``."""
+        return self.request.query
 
     @property
     def kind(self) -> str:
         """``?type=``."""
-        return self.request.query.get("type", "")
-
-    def json(self) -> Any:
-        """The body.
-
-        Raises:
-            NgsiError: 400, not JSON.
-        """
-        return load_json(self.request.body)
+        return self.query.get("type", "")
 
     def object(self) -> dict[str, Any]:
         """The body, which must be an object.
 
         Raises:
-            NgsiError: 400.
+            FiwareError: 400.
         """
-        value = self.json()
+        value = load_json(self.request.body)
         if not isinstance(value, dict):
             raise parse_error()
         return value
@@ -75,91 +72,90 @@ class Call:
         """Read attributes of the body.
 
         Raises:
-            NgsiError: 400.
+            FiwareError: 400.
         """
         return read_changes(
             {name: one for name, one in raw.items() if name not in ("id", "type")},
-            key_values=self.key_values,
+            key_values="keyValues" in self.options,
             clean=looks_clean(self.request.body),
         )
 
     def view(self) -> EntityView:
-        """The requested representation.
+        """The requested representation."""
+        forms = self.options & {"keyValues", "values"}
+        return EntityView(
+            next(iter(forms), "normalized"),
+            split_names(self.query.get("attrs")),
+            split_names(self.query.get("metadata")),
+        )
+
+    def page(self, shown: list[bytes], total: int) -> Response:
+        """The requested part of a list of JSON texts.
 
         Raises:
-            NgsiError: 400.
+            FiwareError: 400, no such page.
         """
-        forms = self.options & {"keyValues", "values", "unique"}
-        form = next(iter(forms), "normalized")
-        query = self.request.query
-        return EntityView(form, names(query.get("attrs")), names(query.get("metadata")))
+        limit, offset = _read_paging(self.query)
+        body = b"[%b]" % b",".join(shown[offset : offset + limit])
+        counted = {"Fiware-Total-Count": str(total)} if "count" in self.options else {}
+        return Response(200, body, counted)
 
 
-def check_size(request: Request) -> None:
-    """Refuse a body that is too large.
+def check_content(request: Request) -> None:
+    """Refuse a body that is too large, missing or of another type.
 
     Raises:
-        NgsiError: 413.
+        FiwareError: 411, 413 or 415.
     """
-    if len(request.body) > MAX_BODY:
-        raise NgsiError(
-            413,
+    size = len(request.body)
+    if size > _MAX_BODY:
+        raise FiwareError(
             "RequestEntityTooLarge",
-            f"payload size: {len(request.body)}, max size supported: {MAX_BODY}",
+            f"payload size: {size}, max size supported: {_MAX_BODY}",
         )
-
-
-def check_body(request: Request) -> None:
-    """Refuse a body that is missing or of another type.
-
-    Raises:
-        NgsiError: 411 or 415.
-    """
     if request.method not in ("POST", "PUT", "PATCH"):
         return
-    if not request.body:
-        raise NgsiError(
-            411,
-            "ContentLengthRequired",
-            "Zero/No Content-Length in PUT/POST/PATCH request",
+    if not size:
+        raise FiwareError(
+            "ContentLengthRequired", "Zero/No Content-Length in PUT/POST/PATCH request"
         )
     kind = request.headers.get("content-type", "").partition(";")[0].strip()
-    plain = request.path.endswith("/value")
-    if kind == "application/json" or (plain and kind == "text/plain"):
-        return
-    sentence = (
-        f"not supported content type: {kind}"
-        if kind
-        else "Content-Type header not used, default application/octet-stream is not "
-        "supported"
-    )
-    raise NgsiError(415, "UnsupportedMediaType", sentence)
+    if kind not in _readable(request):
+        raise FiwareError(
+            "UnsupportedMediaType",
+            f"not supported content type: {kind}" if kind else _NO_CONTENT_TYPE,
+        )
+
+
+_NO_CONTENT_TYPE = (
+    "Content-Type header not used, default application/octet-stream is not supported"
+)
 
 
 def check_accept(request: Request) -> None:
-    """Refuse a client that does not accept JSON.
+    """Refuse a client that does not accept what it would get.
 
     Raises:
-        NgsiError: 406.
+        FiwareError: 406.
     """
-    accepted = {
-        one.partition(";")[0].strip()
-        for one in request.headers.get("accept", "*/*").split(",")
-    }
-    usable = {"*/*", "application/json", "application/*"}
+    accepted = request.headers.get("accept", "*/*").split(",")
+    kinds = {one.partition(";")[0].strip() for one in accepted}
+    usable = {"*/*", "application/*", *_readable(request)}
+    if kinds.isdisjoint(usable):
+        raise FiwareError("NotAcceptable", "no acceptable mime-type in accept header")
+
+
+def _readable(request: Request) -> tuple[str, ...]:
     if request.path.endswith("/value"):
-        usable |= {"text/plain", "text/*"}
-    if not accepted & usable:
-        raise NgsiError(
-            406, "NotAcceptable", "no acceptable mime-type in accept header"
-        )
+        return ("application/json", "text/plain")
+    return ("application/json",)
 
 
-def scope(request: Request, correlator: str, now: float) -> Scope:
+def read_scope(request: Request, correlator: str, now: float) -> Scope:
     """Tenant and service path of a request.
 
     Raises:
-        NgsiError: 400, invalid tenant or service path.
+        FiwareError: 400, invalid tenant or service path.
     """
     service = request.headers.get("fiware-service", "").lower()
     if _SERVICE.fullmatch(service) is None:
@@ -169,33 +165,24 @@ def scope(request: Request, correlator: str, now: float) -> Scope:
         )
     reads = request.method == "GET"
     path = request.headers.get("fiware-servicepath", "/#" if reads else "/")
-    for one in path.split(","):
-        if not one.startswith("/"):
-            raise bad_request(
-                "Only /absolute/ Service Paths allowed "
-                "[a service path must begin with /]"
-            )
-        if _PATH.fullmatch(one) is None or (one.endswith("#") and not reads):
-            raise bad_request("Bad Character in Service-Path")
+    if not path.startswith("/"):
+        raise bad_request(
+            "Only /absolute/ Service Paths allowed [a service path must begin with /]"
+        )
+    if _PATH.fullmatch(path) is None and not (reads and path == "/#"):
+        raise bad_request("Bad Character in Service-Path")
     return Scope(service, path, correlator, now)
 
 
-def paging(query: Mapping[str, str]) -> tuple[int, int]:
-    """``?limit=`` and ``?offset=``.
-
-    Raises:
-        NgsiError: 400.
-    """
+def _read_paging(query: Mapping[str, str]) -> tuple[int, int]:
+    """``?limit=`` and ``?offset=``."""
     limit, offset = query.get("limit", "20"), query.get("offset", "0")
     for name, text in (("limit", limit), ("offset", offset)):
+        wrong = f"Bad pagination {name}: /{text}/"
         if text.startswith("-"):
-            raise bad_request(
-                f"Bad pagination {name}: /{text}/ [must be a positive integer number]"
-            )
+            raise bad_request(f"{wrong} [must be a positive integer number]")
         if not (text.isascii() and text.isdigit()):
-            raise bad_request(
-                f"Bad pagination {name}: /{text}/ [must be a decimal number]"
-            )
+            raise bad_request(f"{wrong} [must be a decimal number]")
     if int(limit) > 1000:
         raise bad_request(f"Bad pagination limit: /{limit}/ [max: 1000]")
     return int(limit), int(offset)
@@ -205,48 +192,45 @@ def read_options(request: Request) -> frozenset[str]:
     """``?options=``.
 
     Raises:
-        NgsiError: 400, unknown to Orion.
+        FiwareError: 400, unknown to Orion; 501, not supported.
     """
-    options = frozenset(names(request.query.get("options")))
+    options = frozenset(split_names(request.query.get("options")))
+    for one in options & _OPTIONS_NOT_DONE:
+        raise not_supported(f"options={one}")
     if not options <= _OPTIONS:
         raise bad_request("Invalid value for URI param /options/")
     return options
 
 
-def names(text: str | None) -> tuple[str, ...]:
+def split_names(text: str | None) -> tuple[str, ...]:
     """A comma-separated list."""
     return tuple(name for name in (text or "").split(",") if name)
 
 
-def read_id(raw: Any) -> tuple[str, str]:
-    """Id and type of an entity in a body.
+def read_id(raw: Mapping[str, Any]) -> tuple[str, str]:
+    """Id and type of an entity in a body; the type is empty where it has none.
 
     Raises:
-        NgsiError: 400.
+        FiwareError: 400.
     """
-    if not isinstance(raw, dict):
-        raise parse_error()
-    entity_id, kind = raw.get("id", ""), raw.get("type", "Thing")
-    for text, what in ((entity_id, "entity id"), (kind, "entity type")):
-        if not isinstance(text, str):
-            raise bad_request(f"Invalid JSON type for {what}")
-        check_name(text, what)
-    return entity_id, kind
+    check_name(entity_id := raw.get("id", ""), "entity id")
+    if "type" in raw:
+        check_name(raw["type"], "entity type")
+    return str(entity_id), str(raw.get("type", ""))
 
 
-def read_value(call: Call) -> Any:
+def read_value(request: Request) -> Any:
     """The body of ``PUT …/value``.
 
     Raises:
-        NgsiError: 400.
+        FiwareError: 400.
     """
-    kind = call.request.headers.get("content-type", "")
+    if request.headers.get("content-type", "").startswith("application/json"):
+        value = load_json(request.body)
+        if not isinstance(value, dict | list):
+            raise bad_request("Neither JSON Object nor JSON Array for attribute::value")
+        return value
     try:
-        value = load_json(call.request.body)
-    except NgsiError:
-        if kind.startswith("application/json"):
-            raise parse_error() from None
+        return load_json(request.body)
+    except FiwareError:
         raise bad_request("attribute value type not recognized") from None
-    if kind.startswith("application/json") and not isinstance(value, dict | list):
-        raise bad_request("Neither JSON Object nor JSON Array for attribute::value")
-    return value

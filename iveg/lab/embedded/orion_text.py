@@ -1,8 +1,4 @@
-"""Orion's errors, dates and text: JSON of limited depth without forbidden characters.
-
-Values are stored as the JSON text that Orion would print, made once when a measure
-arrives, so that a LiDAR scan is not traversed or encoded again for each subscriber.
-"""
+"""Orion's dates and text: JSON of limited depth without forbidden characters."""
 
 import re
 from datetime import UTC, datetime
@@ -11,65 +7,7 @@ from typing import Any
 
 import orjson
 
-from iveg.domain.errors import IvegError
-
-ENTITY_NOT_FOUND = "The requested entity has not been found. Check type and id"
-ATTRIBUTE_NOT_FOUND = "The entity does not have such an attribute"
-
-
-class NgsiError(IvegError):
-    """A request that Orion would refuse.
-
-    Attributes:
-        status: HTTP status.
-        error: Orion's error name, such as ``BadRequest``.
-        description: Orion's sentence.
-    """
-
-    def __init__(
-        self, status: int, error: str, description: str, allow: str = ""
-    ) -> None:
-        super().__init__(f"{status} {error}: {description}")
-        self.status = status
-        self.error = error
-        self.description = description
-        self.allow = allow
-
-    @property
-    def body(self) -> bytes:
-        """The JSON body of the response."""
-        return orjson.dumps({"error": self.error, "description": self.description})
-
-
-def bad_request(description: str) -> NgsiError:
-    """400, with Orion's sentence."""
-    return NgsiError(400, "BadRequest", description)
-
-
-def parse_error() -> NgsiError:
-    """400 for a body that is not JSON, or not an object."""
-    return NgsiError(400, "ParseError", "Errors found in incoming JSON buffer")
-
-
-def not_found(description: str = ENTITY_NOT_FOUND) -> NgsiError:
-    """404, by default for an entity."""
-    return NgsiError(404, "NotFound", description)
-
-
-def not_supported(what: str) -> NgsiError:
-    """501 for a feature of Orion that the embedded broker leaves out."""
-    sentence = f"{what} is not supported by the embedded broker"
-    return NgsiError(501, "NotImplemented", sentence)
-
-
-def too_many() -> NgsiError:
-    """409 for an id that matches several entities."""
-    return NgsiError(
-        409,
-        "TooManyResults",
-        "More than one matching entity. Please refine your query",
-    )
-
+from iveg.lab.embedded.errors import bad_request, parse_error
 
 # --- dates ----------------------------------------------------------------------
 
@@ -80,7 +18,7 @@ def date_text(value: Any) -> bytes:
     """A ``DateTime`` as Orion prints it: UTC with milliseconds.
 
     Raises:
-        NgsiError: 400, not a date.
+        FiwareError: 400, not a date.
     """
     if value is None:
         return b"null"
@@ -123,7 +61,7 @@ def load_json(body: bytes) -> Any:
     """Parse JSON from an untrusted client.
 
     Raises:
-        NgsiError: 400, not JSON, or nested too deeply.
+        FiwareError: 400, not JSON, or nested too deeply.
     """
     try:
         value = orjson.loads(body)
@@ -179,13 +117,19 @@ def holds_forbidden(value: Any) -> bool:
     return False
 
 
-@lru_cache(maxsize=4096)
-def check_name(name: str, what: str) -> None:
+def check_name(name: object, what: str) -> None:
     """Refuse a name that Orion refuses.
 
     Raises:
-        NgsiError: 400, with Orion's sentence.
+        FiwareError: 400, with Orion's sentence.
     """
+    if not isinstance(name, str):
+        raise bad_request(f"invalid JSON type for {what}")
+    _check_text(name, what)
+
+
+@lru_cache(maxsize=4096)
+def _check_text(name: str, what: str) -> None:
     if len(name) > 256:
         raise bad_request(f"{what} length: {len(name)}, max length supported: 256")
     if not name:
@@ -198,7 +142,7 @@ def read_pattern(text: Any, name: str) -> re.Pattern[str] | None:
     """A regular expression from a client; None where there is none.
 
     Raises:
-        NgsiError: 400.
+        FiwareError: 400.
     """
     try:
         return None if text is None else re.compile(text)

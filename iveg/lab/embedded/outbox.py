@@ -1,24 +1,23 @@
 """From a change to its notifications."""
 
 import itertools
-import re
 import secrets
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 from urllib.parse import urlsplit
 
-import orjson
-
 from iveg.lab.embedded.entities import Entity, Touched
-from iveg.lab.embedded.notifier import Delivery, DeliveryLane, NotificationTarget
+from iveg.lab.embedded.notifier import (
+    AGENT,
+    Delivery,
+    DeliveryLane,
+    NotificationTarget,
+    with_length,
+    write_head,
+)
 from iveg.lab.embedded.orion_text import quoted
-from iveg.lab.embedded.subscriptions import Subscription
-from iveg.lab.embedded.views import EntityView, annotated, write_entity
-
-AGENT = "orion/4.7.0-next libcurl/7.88.1"
-_MACRO = re.compile(r"\$\{([^}]*)\}")
-_WHOLE_MACRO = re.compile(r'"\$\{([^}"]*)\}"')
+from iveg.lab.embedded.subscriptions import Subscription, SubscriptionDocument
+from iveg.lab.embedded.views import write_entity
 
 
 class Outbox:
@@ -48,11 +47,20 @@ class Outbox:
         now: float,
     ) -> None:
         """Send one entity to one subscriber."""
-        view = subscription.shown(touched)
-        entity = annotated(entity, touched, view.metadata, alteration)
-        body = self._body(subscription, entity, view, alteration)
+        notification = subscription.document.notification
+        view = notification.shown(touched)
+        body = write_entity(entity, view, alteration=alteration)
+        if not view.form.startswith("simplified"):
+            body = b'{"subscriptionId":%b,"data":[%b]}' % (
+                quoted(subscription.id),
+                body,
+            )
         route = self._route(subscription)
-        request = _write_request(route.head, entity, body, correlator)
+        request = b"%bFiware-Correlator: %b; cbnotif=1\r\n%b" % (
+            route.head,
+            correlator.encode(),
+            with_length(body),
+        )
         subscription.sent(now)
 
         def done(status: int, answer: bytes | str) -> None:
@@ -61,38 +69,25 @@ class Outbox:
             else:
                 subscription.failed(self._now(), str(answer))
 
-        route.lane.send(Delivery(request, subscription.timeout_s, done))
-
-    def _body(
-        self,
-        subscription: Subscription,
-        entity: Entity,
-        view: EntityView,
-        alteration: str,
-    ) -> bytes:
-        endpoint = subscription.endpoint
-        if "payload" in endpoint:
-            return _filled(endpoint["payload"], entity).encode()
-        if "json" in endpoint:
-            return _filled_json(endpoint["json"], entity)
-        text = write_entity(entity, view, alteration=alteration)
-        if view.form.startswith("simplified"):
-            return text
-        return b'{"subscriptionId":%b,"data":[%b]}' % (quoted(subscription.id), text)
+        route.lane.send(Delivery(request, route.timeout_s, done))
 
     def _route(self, subscription: Subscription) -> "_Route":
         """Head and lane, made again only when the subscription changed."""
         known = self._routes.get(subscription.id)
         if known is not None and known.document is subscription.document:
             return known
-        target = NotificationTarget.from_url(subscription.endpoint["url"])
+        endpoint = subscription.document.notification.endpoint
+        target = NotificationTarget.from_url(endpoint.url)
         if known is not None and known.target != target:
             self.forget(subscription.id)
             known = None
-        lane = DeliveryLane(target) if known is None else known.lane
-        head = _write_head(subscription)
-        made = _Route(subscription.document, head, target, lane)
-        self._routes[subscription.id] = made
+        made = self._routes[subscription.id] = _Route(
+            subscription.document,
+            _write_head(subscription),
+            target,
+            DeliveryLane(target) if known is None else known.lane,
+            endpoint.timeout_s,
+        )
         return made
 
     def forget(self, subscription_id: str) -> None:
@@ -113,70 +108,30 @@ class _Route:
 
     Attributes:
         head: Constant part of the head.
+        timeout_s: Time limit of a response (s).
     """
 
-    document: Mapping[str, Any]
+    document: SubscriptionDocument
     head: bytes
     target: NotificationTarget
     lane: DeliveryLane
-
-
-def _write_request(head: bytes, entity: Entity, body: bytes, correlator: str) -> bytes:
-    if b"${" in head:
-        head = _filled(head.decode(), entity).encode()
-    return b"%bContent-Length: %d\r\nFiware-Correlator: %b; cbnotif=1\r\n\r\n%b" % (
-        head,
-        len(body),
-        correlator.encode(),
-        body,
-    )
+    timeout_s: float
 
 
 def _write_head(subscription: Subscription) -> bytes:
-    endpoint, view = subscription.endpoint, subscription.view
-    custom = "httpCustom" in subscription.notification
-    parts = urlsplit(endpoint["url"])
-    query = "&".join(
-        f"{name}={value}" for name, value in endpoint.get("qs", {}).items()
-    )
-    query = "&".join(part for part in (parts.query, query) if part)
-    target = (parts.path or "/") + (f"?{query}" if query else "")
-    kind = "text/plain" if "payload" in endpoint else "application/json; charset=utf-8"
+    notification = subscription.document.notification
+    url = urlsplit(notification.endpoint.url)
+    given = notification.endpoint.headers or {}
+    custom = {name.lower(): value for name, value in given.items()}
     headers = {
-        "Host": parts.netloc,
+        "Host": url.netloc,
         "User-Agent": AGENT,
         "Fiware-Service": subscription.service,
         "Fiware-Servicepath": subscription.path,
         "Accept": "application/json",
-        "Content-Type": kind,
-        "Ngsiv2-AttrsFormat": (
-            "custom" if "payload" in endpoint or "json" in endpoint else view.form
-        ),
+        "Content-Type": "application/json; charset=utf-8",
+        "Ngsiv2-AttrsFormat": notification.view.form,
     }
-    if custom:
-        for name, value in endpoint.get("headers", {}).items():
-            headers = {k: v for k, v in headers.items() if k.lower() != name.lower()}
-            headers[name.lower()] = str(value)
-    lines = [
-        f"{endpoint.get('method', 'POST') if custom else 'POST'} {target} HTTP/1.1"
-    ]
-    lines += [f"{name}: {value}" for name, value in headers.items() if value]
-    return "\r\n".join((*lines, "")).encode()
-
-
-def _filled(text: str, entity: Entity) -> str:
-    return _MACRO.sub(lambda found: _macro(found[1], entity).strip('"'), text)
-
-
-def _filled_json(template: object, entity: Entity) -> bytes:
-    text = orjson.dumps(template).decode()
-    text = _WHOLE_MACRO.sub(lambda found: _macro(found[1], entity), text)
-    return _filled(text, entity).encode()
-
-
-def _macro(name: str, entity: Entity) -> str:
-    """Value of ``${name}`` as JSON text."""
-    if name in ("id", "type"):
-        return quoted(getattr(entity, name)).decode()
-    attribute = entity.attributes.get(name)
-    return "null" if attribute is None else attribute.json.decode()
+    own = {name: one for name, one in headers.items() if name.lower() not in custom}
+    target = (url.path or "/") + (f"?{url.query}" if url.query else "")
+    return write_head(target, {**own, **custom})

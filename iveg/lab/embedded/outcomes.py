@@ -12,10 +12,9 @@ error depends on whether any part was done::
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from iveg.lab.embedded.orion_text import NgsiError, not_found
+from iveg.lab.embedded.errors import FiwareError, not_found
 
-MISSING = "do not exist: "
-EXISTING = "one or more of the attributes in the request already exist: "
+_MISSING = "do not exist: "
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +28,7 @@ class Outcome:
         updated: Own attributes that were changed.
         passed: Attributes that a provider accepted.
         failed: Attributes that a provider did not accept.
-        refused: Attributes that do not exist, or that exist and must not.
+        refused: Attributes that do not exist.
     """
 
     entity_id: str
@@ -61,13 +60,13 @@ class Outcome:
         """The entity as in Orion's sentences."""
         return f"{self.entity_id}/{self.asked_kind}".removesuffix("/")
 
-    def raise_for_one(self, sentence: str = MISSING) -> None:
+    def raise_for_one(self) -> None:
         """Raise Orion's error for an update of one entity, if there is one.
 
         A changed own attribute hides a command that was not forwarded.
 
         Raises:
-            NgsiError: 404 or 422.
+            FiwareError: 404 or 422.
         """
         if self.complete or (self.updated and not self.refused):
             return
@@ -75,16 +74,14 @@ class Outcome:
             raise not_found()
         if self.forwarded:
             raise _not_passed_on([self])
-        raise _refused(
-            bool(self.updated), f"{sentence}{self.named} - {_listed(self.refused)}"
-        )
+        raise _refused(bool(self.updated), _MISSING + _complaint(self, first=True))
 
 
-def raise_for_batch(outcomes: Sequence[Outcome], sentence: str = MISSING) -> None:
+def raise_for_batch(outcomes: Sequence[Outcome]) -> None:
     """Raise Orion's error for ``op/update``, if there is one.
 
     Raises:
-        NgsiError: 404 or 422.
+        FiwareError: 404 or 422.
     """
     bad = [one for one in outcomes if not one.complete]
     if any(one.forwarded for one in outcomes):
@@ -94,7 +91,7 @@ def raise_for_batch(outcomes: Sequence[Outcome], sentence: str = MISSING) -> Non
             raise _not_passed_on(bad)
     if not bad:
         return
-    description = sentence + ", ".join(
+    description = _MISSING + ", ".join(
         _complaint(one, first=number == 0) for number, one in enumerate(bad)
     )
     if not any(one.exists for one in outcomes):
@@ -110,19 +107,19 @@ def _complaint(outcome: Outcome, *, first: bool) -> str:
     return f"{outcome.named} {'- ' if first else ''}[entity itself]"
 
 
-def _refused(some: bool, description: str) -> NgsiError:
-    return NgsiError(422, "PartialUpdate" if some else "Unprocessable", description)
+def _refused(some: bool, description: str) -> FiwareError:
+    return FiwareError("PartialUpdate" if some else "Unprocessable", description)
 
 
-def _not_passed_on(outcomes: Iterable[Outcome]) -> NgsiError:
+def _not_passed_on(outcomes: Iterable[Outcome]) -> FiwareError:
     named = ", ".join(
         f"{one.entity_id}-{one.kind} : [{', '.join((*one.refused, *one.failed))}]"
         for one in outcomes
     )
-    return NgsiError(
-        404,
+    return FiwareError(
         "PartialUpdate",
         f"Some of the following attributes were not updated: {{ {named} }}",
+        status=404,
     )
 
 

@@ -6,30 +6,70 @@ an entity that does not exist.
 """
 
 import asyncio
-import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 from urllib.parse import urlsplit
 
 import orjson
+from pydantic import Field
 
+from iveg.lab.embedded.documents import Document, new_id, read_document
 from iveg.lab.embedded.entities import (
     Attribute,
     EntityChange,
+    Scope,
     Value,
     default_type,
     metadata_json,
     under,
 )
-from iveg.lab.embedded.notifier import NotificationTarget, exchange
-from iveg.lab.embedded.orion_text import bad_request
-from iveg.lab.embedded.outbox import AGENT
-from iveg.lab.embedded.scope import Scope
-from iveg.lab.embedded.subscriptions import new_id
+from iveg.lab.embedded.notifier import (
+    AGENT,
+    NotificationTarget,
+    exchange,
+    with_length,
+    write_head,
+)
 
 PATIENCE_S = 5.0
 Foreign = Mapping[tuple[str, str], Mapping[str, Attribute]]
+
+
+class RegisteredEntity(Document):
+    """One entity with attributes of a provider; without a type, of any type."""
+
+    id: str
+    type: str | None = None
+
+    def matches(self, entity_id: str, entity_type: str) -> bool:
+        """Whether an entity is meant."""
+        return self.id == entity_id and self.type in (None, entity_type)
+
+
+class DataProvided(Document):
+    """Entities, and the attributes of each that a provider has."""
+
+    entities: list[RegisteredEntity]
+    attrs: list[str] = Field(min_length=1)
+
+
+class _Address(Document):
+    url: str = Field(pattern="^https?://[^/]")
+
+
+class _Provider(Document):
+    http: _Address
+    supported_forwarding_mode: Literal["all"] = "all"
+    legacy_forwarding: Literal[False] = False
+
+
+class RegistrationDocument(Document):
+    """What a client says of a registration."""
+
+    description: str | None = None
+    data_provided: DataProvided
+    provider: _Provider
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,77 +78,40 @@ class Registration:
 
     Attributes:
         path: Service path.
-        url: Address of the provider.
-        attributes: Names of its attributes; empty means all.
-        entities: Entities with attributes of the provider.
-        described: ``description``, if the client gave one.
     """
 
     id: str
     path: str
-    url: str
-    attributes: tuple[str, ...]
-    entities: list[dict[str, str]]
-    described: Mapping[str, Any]
+    document: RegistrationDocument
 
-    def concerns(self, entity_id: str, entity_type: str) -> bool:
-        """Whether it has attributes of an entity; an unknown type fits none."""
-        return any(
-            _fits(one, "id", entity_id) and _fits(one, "type", entity_type)
-            for one in self.entities
-        )
+    @property
+    def provided(self) -> DataProvided:
+        """Its entities and attributes."""
+        return self.document.data_provided
+
+    @property
+    def url(self) -> str:
+        """Address of the provider."""
+        return self.document.provider.http.url
 
     def show(self) -> dict[str, Any]:
         """The registration as a client gets it."""
-        provided = {"entities": self.entities, "attrs": list(self.attributes)}
-        provider = {
-            "http": {"url": self.url},
-            "supportedForwardingMode": "all",
-            "legacyForwarding": False,
-        }
-        return {
-            "id": self.id,
-            **self.described,
-            "dataProvided": provided,
-            "provider": provider,
-            "status": "active",
-        }
+        return {"id": self.id, **self.document.show(), "status": "active"}
 
 
-def _fits(one: Mapping[str, str], name: str, text: str) -> bool:
-    if name in one:
-        return one[name] == text
-    pattern = one.get(f"{name}Pattern")
-    return pattern is None or re.search(pattern, text) is not None
-
-
-def read_registration(raw: Any, path: str) -> Registration:
+def read_registration(raw: object, path: str) -> Registration:
     """Read a registration from a ``POST``.
 
     Raises:
-        NgsiError: 400.
+        FiwareError: 400 or 501.
     """
-    document = raw if isinstance(raw, dict) else {}
-    provided, provider = document.get("dataProvided"), document.get("provider")
-    if not isinstance(provided, dict) or not isinstance(provided.get("entities"), list):
-        raise bad_request("/dataProvided/ field missing in registration")
-    if not isinstance(provider, dict) or not isinstance(provider.get("http"), dict):
-        raise bad_request("/provider/ field missing in registration")
-    if not urlsplit(str(provider["http"].get("url", ""))).hostname:
-        raise bad_request("/url/ field missing in registration")
-    return Registration(
-        new_id(),
-        path,
-        provider["http"]["url"],
-        tuple(provided.get("attrs") or ()),
-        provided["entities"],
-        {name: one for name, one in document.items() if name == "description"},
-    )
+    return Registration(new_id(), path, read_document(RegistrationDocument, raw))
 
 
 # --- choosing providers ------------------------------------------------------------
 
 Registrations = Mapping[str, Registration]
+Forwards = list[tuple[Registration, list[str]]]
 
 
 def providers(
@@ -117,20 +120,17 @@ def providers(
     entity_id: str,
     kind: str,
     names: Iterable[str],
-) -> list[tuple[Registration, list[str]]]:
+) -> Forwards:
     """Names by registration; the oldest registration of a name gets it."""
     left = list(names)
     found = []
     for registration in registrations.values():
-        mine = [
-            name
-            for name in left
-            if not registration.attributes or name in registration.attributes
-        ]
+        provided = registration.provided
+        mine = [name for name in left if name in provided.attrs]
         if (
             mine
             and under(scope.path, registration.path)
-            and registration.concerns(entity_id, kind)
+            and any(one.matches(entity_id, kind) for one in provided.entities)
         ):
             found.append((registration, mine))
             left = [name for name in left if name not in mine]
@@ -155,13 +155,13 @@ async def foreign(
     """
     asked = []
     for registration in registrations.values():
-        attrs = [n for n in registration.attributes if not names or n in names]
+        provided = registration.provided
+        attrs = [one for one in provided.attrs if not names or one in names]
         entities = [
             one
-            for one in registration.entities
-            if "id" in one
-            and (not entity_id or one["id"] == entity_id)
-            and (not entity_type or one.get("type") in (entity_type, None))
+            for one in provided.entities
+            if entity_id in ("", one.id)
+            and (not entity_type or one.type in (entity_type, None))
         ]
         if attrs and entities and under(scope.path, registration.path):
             asked.append(_forward_query(registration, entities, attrs, scope))
@@ -183,13 +183,11 @@ def bare_entities(
     if not names or "*" in names:
         return []
     return [
-        (one["id"], one.get("type", ""))
+        (one.id, one.type or "")
         for registration in registrations.values()
-        if registration.attributes
-        and not set(names) & set(registration.attributes)
+        if not set(names) & set(registration.provided.attrs)
         and under(scope.path, registration.path)
-        for one in registration.entities
-        if "id" in one
+        for one in registration.provided.entities
     ]
 
 
@@ -220,8 +218,8 @@ async def forward_update(
 
 async def _forward_query(
     registration: Registration,
-    entities: Iterable[Mapping[str, str]],
-    names: Iterable[str],
+    entities: Iterable[RegisteredEntity],
+    names: list[str],
     scope: Scope,
 ) -> dict[tuple[str, str], dict[str, Attribute]]:
     """Query a provider for attributes; empty if it does not answer.
@@ -229,7 +227,8 @@ async def _forward_query(
     Returns:
         Id and type of each returned entity, with its attributes.
     """
-    body = orjson.dumps({"entities": list(entities), "attrs": list(names)})
+    asked = [one.show() for one in entities]
+    body = orjson.dumps({"entities": asked, "attrs": names})
     resource = "/op/query?limit=20&offset=0&options=count"
     status, answer = await _ask(registration.url, resource, body, scope)
     if status != 200:
@@ -266,22 +265,16 @@ async def _ask(
     url: str, resource: str, body: bytes, scope: Scope
 ) -> tuple[int, bytes | str]:
     parts = urlsplit(url)
-    head = "\r\n".join(
-        (
-            # Orion puts a slash between the two, whatever the address ends in.
-            f"POST {parts.path or '/'}{resource} HTTP/1.1",
-            f"Host: {parts.netloc}",
-            f"User-Agent: {AGENT}",
-            f"Fiware-Service: {scope.service}",
-            f"Fiware-ServicePath: {scope.path}",
-            "Accept: application/json",
-            "Content-Type: application/json; charset=utf-8",
-            f"Content-Length: {len(body)}",
-            f"Fiware-Correlator: {scope.correlator}; cbfwd=1",
-            "",
-            "",
-        )
-    )
-    return await exchange(
-        NotificationTarget.from_url(url), head.encode() + body, PATIENCE_S
-    )
+    headers = {
+        "Host": parts.netloc,
+        "User-Agent": AGENT,
+        "Fiware-Service": scope.service,
+        "Fiware-ServicePath": scope.path,
+        "Accept": "application/json",
+        "Content-Type": "application/json; charset=utf-8",
+        "Fiware-Correlator": f"{scope.correlator}; cbfwd=1",
+    }
+    # Orion puts a slash between the two, whatever the address ends in.
+    head = write_head((parts.path or "/") + resource, headers)
+    target = NotificationTarget.from_url(url)
+    return await exchange(target, head + with_length(body), PATIENCE_S)

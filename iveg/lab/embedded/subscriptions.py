@@ -1,41 +1,194 @@
 """Subscriptions: which changes they match, and the state of their notifications."""
 
 import re
-import secrets
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
-from functools import lru_cache
-from typing import Any
+from collections.abc import Collection
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Annotated, Any, Literal
 from urllib.parse import urlsplit
 
+from pydantic import AfterValidator, Field, NonNegativeInt, model_validator
+
+from iveg.lab.embedded.documents import Document, new_id, read_document
 from iveg.lab.embedded.entities import Touched
+from iveg.lab.embedded.errors import bad_request, not_supported, parse_error
 from iveg.lab.embedded.orion_text import (
     FORBIDDEN,
-    bad_request,
     date_iso,
     date_text,
-    not_supported,
-    parse_error,
     read_pattern,
 )
 from iveg.lab.embedded.views import EntityView
 
-FORMATS = (
-    "normalized",
-    "simplifiedNormalized",
-    "keyValues",
-    "simplifiedKeyValues",
-    "values",
-)
-_FIELDS = {
-    "description", "subject", "notification", "expires", "status", "throttling",
-}  # fmt: skip
-_ENDPOINTS = ("http", "httpCustom")
-_UNSUPPORTED = ("mqtt", "mqttCustom", "kafka", "kafkaCustom")
-_CONDITIONS_NOT_DONE = ("expression", "jexlExpression")
-_ALTERATIONS = {"entityChange", "entityUpdate", "entityCreate", "entityDelete"}
-_DEFAULT_TIMEOUT_S = 5.0
-_Matcher = re.Pattern[str] | str
+_FORMATS = (
+    "normalized", "simplifiedNormalized", "keyValues", "simplifiedKeyValues", "values",
+)  # fmt: skip
+_NOTIFIED_METADATA = {"previousValue", "actionType"}
+_DEFAULT_TIMEOUT_MS = 5000
+_Alteration = Literal["entityChange", "entityUpdate", "entityCreate", "entityDelete"]
+
+
+def _read_description(text: str | None) -> str | None:
+    if not FORBIDDEN.isdisjoint(text or ""):
+        raise bad_request("forbidden characters in description")
+    return text or None
+
+
+def _read_date(text: str | None) -> str | None:
+    return date_text(text).decode().strip('"') if text else None
+
+
+def _read_url(text: str) -> str:
+    parts = urlsplit(text)
+    if parts.scheme not in ("http", "https") or not parts.hostname:
+        raise bad_request("Invalid URL parsing notification url")
+    return text
+
+
+def _read_format(text: str) -> str:
+    if text not in _FORMATS:
+        raise bad_request(f"invalid attrsFormat, accepted: {', '.join(_FORMATS)}")
+    return text
+
+
+def _read_headers(headers: dict[str, str]) -> dict[str, str]:
+    if any("${" in value for value in headers.values()):
+        raise not_supported("a macro in a header")
+    return headers
+
+
+class SubscribedEntity(Document):
+    """One entity, or those whose ids match a pattern."""
+
+    id: str | None = None
+    id_pattern: str | None = None
+    type: str | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> "SubscribedEntity":
+        read_pattern(self.id_pattern, "idPattern")
+        if self.id is None and self.id_pattern is None:
+            raise bad_request("subject entities element has neither id nor idPattern")
+        if self.id is not None and self.id_pattern is not None:
+            raise bad_request("/entities/ vector item has both /id/ and /idPattern/")
+        return self
+
+    def matches(self, entity_id: str, entity_type: str) -> bool:
+        """Whether an entity is meant."""
+        if self.type not in (None, entity_type):
+            return False
+        if self.id is not None:
+            return self.id == entity_id
+        return re.search(self.id_pattern or "", entity_id) is not None
+
+
+class Condition(Document):
+    """Changes that lead to a notification."""
+
+    attrs: tuple[str, ...] = ()
+    alteration_types: list[_Alteration] | None = None
+    notify_on_metadata_change: bool = True
+
+    @cached_property
+    def watched(self) -> frozenset[str]:
+        """Attributes that are watched; empty for all."""
+        return frozenset(self.attrs)
+
+    @cached_property
+    def any_update(self) -> bool:
+        """Whether an update counts that changes nothing."""
+        return "entityUpdate" in (self.alteration_types or ())
+
+    def wants(self, touched: Touched, alteration: str) -> bool:
+        """Whether a change leads to a notification."""
+        wanted = self.alteration_types
+        if wanted is None:
+            if alteration == "entityDelete":
+                return False
+        elif alteration not in wanted and not (
+            alteration == "entityChange" and self.any_update
+        ):
+            return False
+        if alteration == "entityDelete" or (self.any_update and touched.now):
+            return True
+        if not self.watched and alteration == "entityCreate":
+            return True
+        return any(
+            touched.has_changed(name, metadata_too=self.notify_on_metadata_change)
+            for name in self.watched or touched.now
+        )
+
+
+class Subject(Document):
+    """Entities, and their changes."""
+
+    entities: list[SubscribedEntity] = Field(min_length=1)
+    condition: Condition = Condition()
+
+
+class Endpoint(Document):
+    """The receiver; only a custom one has headers."""
+
+    url: Annotated[str, AfterValidator(_read_url)]
+    timeout: NonNegativeInt | None = None
+    headers: Annotated[dict[str, str], AfterValidator(_read_headers)] | None = None
+
+    @property
+    def timeout_s(self) -> float:
+        """Time limit of a response (s)."""
+        return (self.timeout or _DEFAULT_TIMEOUT_MS) / 1000
+
+
+class Notification(Document):
+    """Content and receiver of the notifications."""
+
+    attrs: tuple[str, ...] = ()
+    only_changed_attrs: bool = False
+    attrs_format: Annotated[str, AfterValidator(_read_format)] = "normalized"
+    http: Endpoint | None = None
+    http_custom: Endpoint | None = None
+    metadata: tuple[str, ...] | None = None
+    max_fails_limit: NonNegativeInt | None = None
+    covered: Literal[False] = False
+
+    @model_validator(mode="after")
+    def _check(self) -> "Notification":
+        if self.http is None and self.http_custom is None:
+            raise bad_request(
+                "http, httpCustom, mqtt, mqttCustom, kafka or kafkaCustom is missing"
+            )
+        if not _NOTIFIED_METADATA.isdisjoint(self.metadata or ()):
+            raise not_supported("metadata previousValue and actionType")
+        return self
+
+    @property
+    def endpoint(self) -> Endpoint:
+        """The receiver."""
+        return next(one for one in (self.http, self.http_custom) if one is not None)
+
+    @cached_property
+    def view(self) -> EntityView:
+        """Representation of an entity in the notification."""
+        return EntityView(self.attrs_format, self.attrs, self.metadata or ())
+
+    def shown(self, touched: Touched) -> EntityView:
+        """The same with the changed attributes alone, where that is wanted."""
+        if not self.only_changed_attrs:
+            return self.view
+        names = self.view.names or touched.now
+        chosen = tuple(name for name in names if touched.has_changed(name))
+        return EntityView(self.view.form, chosen or ("",), self.view.metadata)
+
+
+class SubscriptionDocument(Document):
+    """What a client says of a subscription, with Orion's defaults."""
+
+    description: Annotated[str | None, AfterValidator(_read_description)] = None
+    subject: Subject
+    notification: Notification
+    expires: Annotated[str | None, AfterValidator(_read_date)] = None
+    status: Literal["active", "inactive", "oneshot"] = "active"
+    throttling: NonNegativeInt | None = None
 
 
 @dataclass(slots=True)
@@ -47,13 +200,10 @@ class Subscription:
         path: Service path of its entities.
         service: Tenant, as in the notification's header.
         status: ``active``, ``inactive`` or ``oneshot``; expiry is by the clock.
-        notification: The part of that name in the document, as ``condition`` is.
-        endpoint: The ``http`` or ``httpCustom`` part of the document.
-        timeout_s: Time limit of a receiver's response (s).
     """
 
     id: str
-    document: dict[str, Any]
+    document: SubscriptionDocument
     path: str
     service: str
     status: str = "active"
@@ -64,98 +214,49 @@ class Subscription:
     last_failure: float | None = None
     last_failure_reason: str = ""
     fails: int = 0
-    notification: dict[str, Any] = field(init=False)
-    condition: dict[str, Any] = field(init=False)
-    endpoint: dict[str, Any] = field(init=False)
-    view: EntityView = field(init=False)
-    timeout_s: float = field(init=False)
-    _throttling: float = field(init=False)
-    _watched: frozenset[str] = field(init=False)
-    _metadata_too: bool = field(init=False)
-    _any_update: bool = field(init=False)
-    _only_changed: bool = field(init=False)
-    _alterations: Collection[str] | None = field(init=False)
-    _entities: list[tuple[_Matcher, _Matcher]] = field(init=False)
-
-    def __post_init__(self) -> None:
-        """Prepare the document for fast evaluation at every change."""
-        self.prepare()
-
-    def prepare(self) -> None:
-        """Parse the document again after a change."""
-        self.notification = notification = self.document["notification"]
-        self.condition = condition = self.document["subject"].get("condition", {})
-        self.endpoint = notification.get("http") or notification["httpCustom"]
-        self.view = EntityView(
-            notification.get("attrsFormat", "normalized"),
-            tuple(notification.get("attrs", ())),
-            tuple(notification.get("metadata", ())),
-        )
-        self._only_changed = bool(notification.get("onlyChangedAttrs"))
-        self.timeout_s = self.endpoint.get("timeout", 0) / 1000 or _DEFAULT_TIMEOUT_S
-        self._alterations = condition.get("alterationTypes")
-        self._throttling = self.document.get("throttling", 0)
-        self._watched = frozenset(condition.get("attrs") or ())
-        self._metadata_too = condition.get("notifyOnMetadataChange", True)
-        self._any_update = "entityUpdate" in (self._alterations or ())
-        self._entities = [_matcher(one) for one in self.document["subject"]["entities"]]
 
     def concerns(self, entity_id: str, entity_type: str) -> bool:
         """Whether an entity is subscribed to."""
-        return any(
-            _matches(kind, entity_type) and _matches(name, entity_id)
-            for name, kind in self._entities
-        )
+        entities = self.document.subject.entities
+        return any(one.matches(entity_id, entity_type) for one in entities)
 
     def may_want(self, names: Collection[str]) -> bool:
         """Whether an update of these attributes can lead to a notification."""
-        return (
-            self._any_update or not self._watched or not self._watched.isdisjoint(names)
-        )
+        condition = self.document.subject.condition
+        watched = condition.watched
+        return condition.any_update or not watched or not watched.isdisjoint(names)
 
     def expired(self, now: float) -> bool:
         """Whether it has expired."""
-        expires: str = self.document.get("expires") or ""
-        return bool(expires) and expires <= date_iso(now)
+        expires = self.document.expires
+        return expires is not None and expires <= date_iso(now)
 
     def wants(self, touched: Touched, alteration: str, now: float) -> bool:
         """Whether a change is to be notified now.
 
         Throttling drops notifications that come too early; they are not sent later.
         """
-        last = self.last_notification
-        if self._throttling and last is not None and now - last < self._throttling:
+        document, last = self.document, self.last_notification
+        throttling = document.throttling
+        if throttling and last is not None and now - last < throttling:
             return False
         if self.status == "inactive" or self.expired(now):
             return False
-        return self._alteration_wanted(alteration) and self._attributes_wanted(
-            touched, alteration
-        )
+        return document.subject.condition.wants(touched, alteration)
 
-    def _alteration_wanted(self, alteration: str) -> bool:
-        wanted = self._alterations
-        if wanted is None:
-            return alteration != "entityDelete"
-        return alteration in wanted or (
-            alteration == "entityChange" and "entityUpdate" in wanted
-        )
+    def change(self, raw: object) -> None:
+        """Apply a ``PATCH``; each part in it replaces the old one completely.
 
-    def _attributes_wanted(self, touched: Touched, alteration: str) -> bool:
-        if alteration == "entityDelete" or (self._any_update and touched.now):
-            return True
-        watched = self._watched or touched.now
-        return (not self._watched and alteration == "entityCreate") or any(
-            touched.has_changed(name, metadata_too=self._metadata_too)
-            for name in watched
-        )
-
-    def shown(self, touched: Touched) -> EntityView:
-        """Attributes in the notification."""
-        if not self._only_changed:
-            return self.view
-        names = self.view.names or touched.now
-        chosen = tuple(name for name in names if touched.has_changed(name))
-        return EntityView(self.view.form, chosen or ("",), self.view.metadata)
+        Raises:
+            FiwareError: 400 or 501.
+        """
+        if not isinstance(raw, dict):
+            raise parse_error()
+        kept = self.document.model_dump(by_alias=True, exclude_unset=True)
+        self.document = read_document(SubscriptionDocument, {**kept, **raw})
+        if "status" in raw:
+            self.status = self.document.status
+            self.fails = 0
 
     def sent(self, now: float) -> None:
         """Count a notification that was sent."""
@@ -172,187 +273,46 @@ class Subscription:
         """Record a missing response."""
         self.last_failure, self.last_failure_reason = now, reason
         self.fails += 1
-        limit = self.notification.get("maxFailsLimit")
+        limit = self.document.notification.max_fails_limit
         if limit is not None and self.fails > limit:
             self.status = "inactive"
 
     def show(self, now: float) -> dict[str, Any]:
         """The subscription as a client gets it."""
-        document, condition = self.document, self.condition
-        shown = {
-            "id": self.id,
-            "description": document.get("description") or None,
-            "expires": document.get("expires") or None,
-            "status": "expired" if self.expired(now) else self.status,
-            "subject": {
-                "entities": document["subject"]["entities"],
-                "condition": {
-                    "attrs": [],
-                    **condition,
-                    "notifyOnMetadataChange": self._metadata_too,
-                },
-            },
-            "notification": self._show_notification(),
-            "throttling": document.get("throttling") or None,
-        }
-        return _without_none(shown)
+        shown = self.document.show()
+        if not self.document.throttling:
+            shown.pop("throttling", None)
+        shown["notification"] |= self._counters()
+        status = "expired" if self.expired(now) else self.status
+        return {"id": self.id, **shown, "status": status}
 
-    def _show_notification(self) -> dict[str, Any]:
-        asked = self.notification
-        shown = {
-            "timesSent": self.times_sent or None,
+    def _counters(self) -> dict[str, Any]:
+        """What became of the notifications; nothing is said of what never was."""
+        counters = {
+            "timesSent": self.times_sent,
             "lastNotification": _whole_seconds(self.last_notification),
-            "attrs": asked.get("attrs", []),
-            "onlyChangedAttrs": asked.get("onlyChangedAttrs", False),
-            "attrsFormat": self.view.form,
-            "http": asked.get("http"),
-            "httpCustom": asked.get("httpCustom"),
-            "metadata": asked.get("metadata"),
-            "maxFailsLimit": asked.get("maxFailsLimit"),
-            "lastFailure": _whole_seconds(self.last_failure),
-            "lastFailureReason": self.last_failure_reason or None,
-            "failsCounter": self.fails or None,
             "lastSuccess": _whole_seconds(self.last_success),
-            "lastSuccessCode": self.last_success_code or None,
-            "covered": asked.get("covered", False),
+            "lastSuccessCode": self.last_success_code,
+            "lastFailure": _whole_seconds(self.last_failure),
+            "lastFailureReason": self.last_failure_reason,
+            "failsCounter": self.fails,
         }
-        return _without_none(shown)
-
-
-def _without_none(shown: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: value for name, value in shown.items() if value is not None}
+        return {name: value for name, value in counters.items() if value}
 
 
 def _whole_seconds(at: float | None) -> str | None:
     return None if at is None else date_iso(int(at))
 
 
-@lru_cache(maxsize=256)
-def _pattern(text: str) -> re.Pattern[str]:
-    return re.compile(text)
-
-
-def _matcher(one: Mapping[str, str]) -> tuple[_Matcher, _Matcher]:
-    name = one.get("id") or _pattern(one.get("idPattern", ".*"))
-    kind = one.get("type") or _pattern(one.get("typePattern", ".*"))
-    return name, kind
-
-
-def _matches(matcher: _Matcher, text: str) -> bool:
-    if isinstance(matcher, str):
-        return matcher == text
-    return matcher.search(text) is not None
-
-
-# --- requests ---------------------------------------------------------------------
-
-
-def new_id() -> str:
-    """24 hexadecimal digits, as MongoDB names its documents."""
-    return secrets.token_hex(12)
-
-
-def read_subscription(raw: Any, service: str, path: str) -> Subscription:
+def read_subscription(raw: object, service: str, path: str) -> Subscription:
     """Read a subscription from a ``POST``.
 
     Raises:
-        NgsiError: 400, with Orion's sentence.
+        FiwareError: 400 or 501.
     """
-    document = _read_document(raw)
-    if not document:
+    if raw == {}:
         raise bad_request("empty payload")
-    for part in ("subject", "notification"):
-        if part not in document:
-            raise bad_request(f"no {part} for subscription specified")
-    status = document.pop("status", "active")
-    return Subscription(new_id(), document, path, service, status)
-
-
-def update_subscription(subscription: Subscription, raw: Any) -> None:
-    """Apply a ``PATCH``; each part in it replaces the old one completely.
-
-    Raises:
-        NgsiError: 400, with Orion's sentence.
-    """
-    changes = _read_document(raw)
-    status = changes.pop("status", None)
-    subscription.document = {**subscription.document, **changes}
-    if status is not None:
-        subscription.status = status
-        subscription.fails = 0
-    subscription.prepare()
-
-
-def _read_document(raw: Any) -> dict[str, Any]:
     if not isinstance(raw, dict):
         raise parse_error()
-    document = dict(raw)
-    if unknown := document.keys() - _FIELDS:
-        raise bad_request(f"invalid field: {sorted(unknown)[0]}")
-    if not FORBIDDEN.isdisjoint(str(document.get("description", ""))):
-        raise bad_request("forbidden characters in description")
-    if "subject" in document:
-        _check_subject(document["subject"])
-    if "notification" in document:
-        document["notification"] = _read_notification(document["notification"])
-    if document.get("expires"):
-        document["expires"] = date_text(document["expires"]).decode().strip('"')
-    if document.get("status", "active") not in ("active", "inactive", "oneshot"):
-        raise bad_request(f"invalid status: {document['status']}")
-    throttling = document.get("throttling", 0)
-    if not isinstance(throttling, int) or throttling < 0:
-        raise bad_request("throttling must be a non-negative integer")
-    return document
-
-
-def _check_subject(subject: Any) -> None:
-    entities = subject.get("entities") if isinstance(subject, dict) else None
-    if not isinstance(entities, list) or not entities:
-        raise bad_request("no subject entities specified")
-    for one in entities:
-        if not isinstance(one, dict) or not ("id" in one or "idPattern" in one):
-            raise bad_request("subject entities element has neither id nor idPattern")
-        for name in ("id", "type"):
-            if name in one and f"{name}Pattern" in one:
-                raise bad_request(
-                    f"/entities/ vector item has both /{name}/ and /{name}Pattern/"
-                )
-        for name in ("idPattern", "typePattern"):
-            read_pattern(one.get(name, ".*"), name)
-    _check_condition(subject.get("condition", {}))
-
-
-def _check_condition(condition: Any) -> None:
-    if not isinstance(condition, dict):
-        raise bad_request("condition must be a JSON object")
-    for name in _CONDITIONS_NOT_DONE:
-        # Ignoring it would notify of every change.
-        if name in condition:
-            raise not_supported(f"condition/{name}")
-    for one in condition.get("alterationTypes", []):
-        if one not in _ALTERATIONS:
-            raise bad_request(f"unknown alteration type: {one}")
-
-
-def _read_notification(raw: Any) -> dict[str, Any]:
-    if not isinstance(raw, dict):
-        raise bad_request("notification must be a JSON object")
-    chosen = [name for name in (*_ENDPOINTS, *_UNSUPPORTED) if name in raw]
-    if not chosen:
-        raise bad_request(
-            "http, httpCustom, mqtt, mqttCustom, kafka or kafkaCustom is missing"
-        )
-    if chosen[0] in _UNSUPPORTED:
-        raise bad_request(f"{chosen[0]} is not supported by the embedded broker")
-    endpoint = raw[chosen[0]]
-    url = endpoint.get("url", "") if isinstance(endpoint, dict) else ""
-    parts = urlsplit(str(url))
-    if parts.scheme not in ("http", "https") or not parts.hostname:
-        raise bad_request("Invalid URL parsing notification url")
-    form = raw.get("attrsFormat", "normalized")
-    if form not in FORMATS:
-        raise bad_request(
-            "invalid attrsFormat, accepted values: normalized, simplifiedNormalized, "
-            "keyValues, simplifiedkeyValues, values"
-        )
-    return dict(raw)
+    document = read_document(SubscriptionDocument, raw)
+    return Subscription(new_id(), document, path, service, document.status)

@@ -5,11 +5,8 @@ from typing import Any
 import pytest
 
 from iveg.lab.embedded.entities import Entity, EntityChange, Touched, apply
-from iveg.lab.embedded.orion_text import (
-    NgsiError,
-    date_text,
-)
-from iveg.lab.embedded.query import matches_query
+from iveg.lab.embedded.errors import FiwareError
+from iveg.lab.embedded.orion_text import date_text
 from iveg.lab.embedded.subscriptions import Subscription, read_subscription
 
 UNPRINTABLE = object()
@@ -88,46 +85,11 @@ def test_a_date_is_kept_in_utc_to_the_millisecond(told: str, kept: bytes) -> Non
     assert date_text(told) == kept
 
 
-@pytest.mark.parametrize(
-    ("query", "fits"),
-    [
-        ("n", True),
-        ("n;missing", False),
-        ("n==2", True),
-        ("n!=2", False),
-        ("n<=2", True),
-        ("n<2", False),
-        ("n>1;n>=2", True),
-        ("n==text", False),
-        ("n!=text", True),
-        ("s=='text'", True),
-        ("s==text", True),
-        ("s>1", False),
-        ("missing!=1", False),
-    ],
-)
-def test_a_query_names_an_attribute_or_compares_it(query: str, fits: bool) -> None:
-    robot = entity()
-    apply(
-        robot,
-        {"n": EntityChange("Number", 2, {}), "s": EntityChange("Text", "text", {})},
-        1.0,
-    )
-
-    assert matches_query(robot, query) == fits
-
-
-@pytest.mark.parametrize("query", ["!n", "n==1..3", "n==1,2", "n.part>1", "n~=x", ">1"])
-def test_a_query_beyond_that_is_refused(query: str) -> None:
-    with pytest.raises(NgsiError, match="501"):
-        matches_query(entity(), query)
-
-
 @pytest.mark.parametrize("operator", ["$min", "$push", "$pull"])
 def test_an_operator_that_is_not_supported_changes_nothing(operator: str) -> None:
     robot = entity()
 
-    with pytest.raises(NgsiError, match="501"):
+    with pytest.raises(FiwareError, match="501"):
         apply(robot, {"n": EntityChange("Number", {operator: 1}, {})}, 1.0)
 
     assert robot.attributes == {}

@@ -68,30 +68,21 @@ async def test_what_is_discarded_changes_nothing(
     assert await orion.read_robots() == before == [{"id": "AGI", "type": "Robot"}]
 
 
-async def test_static_attributes_go_along(up: Running, orion: OrionClient) -> None:
-    static = {"name": "maker", "type": "Text", "value": "us"}
-    device = {
-        "device_id": "S1",
-        "entity_name": "S1",
-        "entity_type": "Sensor",
-        "apikey": "iveg",
-        "static_attributes": [static],
-    }
-    async with IotAgentClient(up.iota_url, *TENANT) as agent:
-        await agent.create_device(device)
-    up.agent.hear("/iveg/S1/attrs", b'{"t":1}')
-    (entity,) = await orion.read_entities("Sensor", ["maker", "t"])
-    assert (entity["maker"]["value"], entity["t"]["value"]) == ("us", 1)
-
-
 @pytest.mark.parametrize(
-    "part", [{"attributes": [1]}, {"commands": "x"}, {"static_attributes": [{}]}]
+    ("part", "status"),
+    [
+        ({"attributes": [1]}, "400"),
+        ({"commands": "x"}, "400"),
+        ({"device_id": 5}, "400"),
+        ({"static_attributes": [{"name": "maker", "value": "us"}]}, "501"),
+        ({"lazy": [{"name": "color"}]}, "501"),
+    ],
 )
-async def test_a_device_of_another_shape_is_refused(
-    up: Running, part: dict[str, object]
+async def test_a_device_of_another_shape_or_with_what_is_not_supported_is_refused(
+    up: Running, part: dict[str, object], status: str
 ) -> None:
     async with IotAgentClient(up.iota_url, *TENANT) as agent:
-        with pytest.raises(HopError, match="400"):
+        with pytest.raises(HopError, match=status):
             await agent.create_device({"device_id": "D", "apikey": "iveg", **part})
 
 

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from iveg.lab.embedded.errors import FiwareError
 from iveg.lab.embedded.orion_text import (
-    NgsiError,
     check_name,
     holds_forbidden,
     looks_clean,
@@ -41,5 +41,5 @@ def test_an_escaped_forbidden_character_does_not_look_clean() -> None:
 
 @pytest.mark.parametrize("name", ["", "x" * 257, "a b", "a<", "a/b", "a#b", "a?b"])
 def test_a_bad_name_is_refused(name: str) -> None:
-    with pytest.raises(NgsiError):
+    with pytest.raises(FiwareError):
         check_name(name, "entity id")
