@@ -23,13 +23,18 @@ OTHER = "other"
 FRAMES_HZ = 45.0
 """Of one robot, in the mean of a second; the contract's rate is 30 Hz."""
 
-Flaw = Literal["unreadable", "overload"]
-"""Why a frame was not read whole: it or a box of a person or robot was refused, or more
-came than can be judged."""
+Flaw = Literal["unreadable", "overload", "unplaced"]
+"""Why a frame was not read whole: it or a box of a person or robot was refused, more
+came than can be judged, or the robot's pose has never been told."""
 
 
 def flaw_of(
-    frame: DetectionFrame, rule: DetectionRule, turned_away: int = 0, unplaced: int = 0
+    frame: DetectionFrame,
+    rule: DetectionRule,
+    turned_away: int = 0,
+    unplaced: int = 0,
+    *,
+    has_pose: bool = True,
 ) -> Flaw | None:
     """Why a judged frame does not count as read whole; None: it does.
 
@@ -38,12 +43,15 @@ def flaw_of(
         rule: Knows which classes these are.
         turned_away: Detections for which there was no room.
         unplaced: Detections of somebody whose place nobody knows.
+        has_pose: Whether the robot's pose has ever been told.
     """
     if turned_away:
         return "overload"
     unread = frame.unread
-    if unplaced or None in unread or any(map(rule.class_of, unread)):
+    if None in unread or any(map(rule.class_of, unread)):
         return "unreadable"
+    if unplaced:
+        return "unreadable" if has_pose else "unplaced"
     return None
 
 

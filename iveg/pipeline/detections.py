@@ -68,8 +68,9 @@ class DetectionTracking:
         A frame that is later than a ring lives protects nobody, and would only show
         ghosts.
         """
-        robot_id, detector = frame.robot_id, self._world.robot(frame.robot_id).detector
-        seen_at = self._world.robot(robot_id).sighted_at or received.at
+        robot_id, robot = frame.robot_id, self._world.robot(frame.robot_id)
+        detector, has_pose = robot.detector, robot.odometry is not None
+        seen_at = robot.sighted_at or received.at
         late = verdict == "late" and not received.asked
         protects = late and received.at.mono - seen_at.mono <= LIMITS.ring_lasts_s
         if verdict != "new" and not protects:
@@ -85,11 +86,11 @@ class DetectionTracking:
             self._world.counters["people.turned_away"] += turned_away
         if unplaced:
             self._world.counters["people.unplaced"] += unplaced
-        flaw = flaw_of(frame, rule, turned_away, unplaced)
+        flaw = flaw_of(frame, rule, turned_away, unplaced, has_pose=has_pose)
         if flaw is not None:
             detector.note_flaw(flaw, received.at)
         elif verdict == "new":
-            detector.note_whole(self._world.robot(robot_id).detections_at)
+            detector.note_whole(robot.detections_at)
         if verdict == "new":
             self.placed[robot_id] = placed
             self._event_log.changed(topics.DETECTIONS.of(robot_id))

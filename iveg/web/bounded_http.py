@@ -35,7 +35,12 @@ def bounded_http(
         endpoint: Where its notifications go.
         table: Its connections.
     """
-    return type("BoundHttp", (BoundedHttp,), {"endpoint": endpoint, "table": table})
+
+    class BoundHttp(BoundedHttp):
+        """Of this server."""
+
+    BoundHttp.endpoint, BoundHttp.table = endpoint, table
+    return BoundHttp
 
 
 class _HeadTooLongError(Exception):

@@ -63,7 +63,9 @@ def of_detector(
     name, detector = robot.robot_id, robot.detector
     if not robot.description.has_detector:
         return
-    if _is_recent(detector.flawed_at.get("unreadable"), now):
+    if _is_recent(detector.flawed_at.get("unreadable"), now) or _is_unplaced(
+        robot, now, started
+    ):
         yield Condition.of_robot("P2", "alert.unreadable_detection", name)
     if _is_recent(robot.clock.detector_apart_at, now):
         yield Condition.of_robot("P2", "alert.detector_clock", name)
@@ -72,6 +74,16 @@ def of_detector(
     if detector.out_of_service is not None:
         by = detector.out_of_service.by
         yield Condition.of_robot("P3", "alert.detector_out_of_service", name, by=by)
+
+
+def _is_unplaced(robot: RobotState, now: Instant, started: Instant) -> bool:
+    """Whether it still sees somebody without knowing where it is: not while it starts.
+
+    A robot's first pictures may come before its first odometry.
+    """
+    unplaced_at = robot.detector.flawed_at.get("unplaced")
+    is_starting = now.mono - started.mono < DETECTOR_STARTS_S
+    return not is_starting and _is_recent(unplaced_at, now, LIMITS.silence_s)
 
 
 def _is_silent(robot: RobotState, now: Instant, started: Instant) -> bool:

@@ -96,6 +96,24 @@ def test_a_refused_frame_is_told_for_ten_seconds() -> None:
     assert keys(world, 10.1) == []
 
 
+@pytest.mark.parametrize(
+    ("now", "flawed", "told"),
+    [
+        (0.5, 0.5, []),
+        (9.9, 9.9, []),
+        (10.0, 10.0, ["alert.unreadable_detection"]),
+        (10.5, 9.4, ["alert.detector_silent"]),
+    ],
+)
+def test_somebody_seen_before_the_first_pose_is_no_alert_while_iveg_starts(
+    now: float, flawed: float, told: list[str]
+) -> None:
+    world = World(["AGI"])
+    world.robot("AGI").detector.note_flaw("unplaced", at(flawed))
+
+    assert keys(world, now, 0.0) == told
+
+
 def test_a_detector_by_another_clock_is_not_called_silent() -> None:
     world = driving()
     frame = detection_frame("AGI", origin=origin(1, after=-600.0))
