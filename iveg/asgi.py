@@ -61,7 +61,7 @@ def _past_routers(dss: Dss, pages: routes.Pages) -> Iterator[APIRouter]:
         queries,
         worker,
         threshold=lambda: evaluator.rule.threshold,
-        present=lambda name: evaluator.decision_record(name, clock()),
+        present=evaluator.decision_record,
         flood=views.flood,
         fleet=dss.fleet,
     )

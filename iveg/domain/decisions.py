@@ -139,9 +139,14 @@ class SlowdownDecision:
         """The robot was let go."""
         return replace(self, ended=at)
 
-    def aged(self, now: Instant) -> "SlowdownDecision":
-        """Let time pass; a link that did not come is missing from now on."""
-        if self.waited_out or now.mono - self.crossing.entered.mono < MISSING_S:
+    def aged(self, heard_s: float) -> "SlowdownDecision":
+        """Let time pass; a link that did not come is missing from now on.
+
+        Args:
+            heard_s: How long the robot has been heard since it began, without a silence
+                (s): what nobody could hear is not judged.
+        """
+        if self.waited_out or heard_s < MISSING_S:
             return self
         return replace(self, waited_out=True)
 
@@ -149,14 +154,14 @@ class SlowdownDecision:
         """Close the decision unfinished: iVeg stops, and its end stays unknown."""
         return replace(self, ended=at, interrupted=True)
 
-    def overdue(self, now: Instant) -> bool:
+    @property
+    def is_overdue(self) -> bool:
         """Whether the slow-down should have been seen by now and was not."""
-        waited = now.mono - self.crossing.entered.mono
-        if self.ended is not None or waited < MISSING_S:
+        if self.ended is not None or not self.waited_out:
             return False
         return self.applied is None or (self.judged and self.observed is None)
 
-    def links(self, now: Instant) -> tuple[Link, ...]:
+    def links(self) -> tuple[Link, ...]:
         """The chain as it stands."""
         crossing, rule = self.crossing, self.rule
         sighting = crossing.zone.sighting
@@ -176,9 +181,9 @@ class SlowdownDecision:
             passed,
             Link("geometry", "ok", entered, crossing.entered_m),
             Link("rule", "ok", entered, f"{rule.id} {rule.version}"),
-            self._step("feedback", self.feedback, None, now),
-            self._step("applied", self.applied, HALF_SPEED, now),
-            self._step("observed", self.observed, self.speed_after, now)
+            self._step("feedback", self.feedback, None),
+            self._step("applied", self.applied, HALF_SPEED),
+            self._step("observed", self.observed, self.speed_after)
             if self.judged
             else Link("observed", "n/a", None, crossing.speed_before),
             *self._interruption(),
@@ -188,14 +193,12 @@ class SlowdownDecision:
         if self.interrupted and self.ended is not None:
             yield Link("interrupted", "unknown", self.ended.wall)
 
-    def _step(
-        self, name: LinkName, at: Instant | None, value: float | None, now: Instant
-    ) -> Link:
+    def _step(self, name: LinkName, at: Instant | None, value: float | None) -> Link:
         start = self.crossing.entered.mono
         if at is not None:
             took = at.mono - start
             return Link(name, "ok" if took <= LATE_S else "late", at.wall, value)
-        if now.mono - start >= MISSING_S:
+        if self.waited_out:
             return Link(name, "missing")
         if self.ended is None:
             return Link(name, "open")
@@ -276,10 +279,15 @@ class Decisions:
         """Feedback was published."""
         return self._change(self.open, lambda one: one.published(at))
 
-    def age(self, now: Instant, known: Container[str]) -> list[SlowdownDecision]:
-        """Time passes; notices of persons who are no longer known are forgotten."""
+    def age(
+        self, heard_s: Callable[[Crossing], float], known: Container[str]
+    ) -> list[SlowdownDecision]:
+        """Time passes; notices of persons who are no longer known are forgotten.
+
+        ``heard_s``: how long a crossing's robot has been heard since it began (s).
+        """
         self._first_reports.forget(known)
-        return self._change(self.open, lambda one: one.aged(now))
+        return self._change(self.open, lambda one: one.aged(heard_s(one.crossing)))
 
     def break_off(self, at: Instant) -> list[SlowdownDecision]:
         """End every open one: iVeg stops."""

@@ -33,7 +33,8 @@ class DecisionRecord:
         in_sight: Whether the robot itself could see the cause; None when unknown.
         started_at: When the rule fired; ``ended_at`` when it let go.
         observed_at: When the speed had come down.
-        speed_before: At ``started_at`` (m/s); ``speed_after`` at ``observed_at``.
+        speed_before: Greatest of the second before ``started_at`` (m/s);
+            ``speed_after`` at ``observed_at``.
         links: Each ``{"link", "at", "value", "verdict"}``.
     """
 

@@ -60,6 +60,8 @@ class RobotState:
         unproven_since: When odometry first came whose age nobody knows (monotonic, s).
         alive_since: When odometry came again after a silence (monotonic, s).
         heard_at: Arrival of the newest message of any kind (monotonic, s).
+        heard_since: Since when odometry or reports have come without a silence, by the
+            moments at which they were measured; ``heard_until`` (monotonic, s).
         detections_at: Like ``pose_at``, of the newest detection frame.
         sighted_at: The same of the frame that was taken last, newest or not; where
             nothing is known, the moment that is likely.
@@ -100,6 +102,8 @@ class RobotState:
     navigation_received: Instant | None = None
     command_status: str | None = None
     heard_at: float | None = None
+    heard_since: float = float("-inf")
+    heard_until: float = float("-inf")
     live_at: float | None = None
     refused_at: float | None = None
     map_frame: str | None = None
@@ -190,6 +194,20 @@ class RobotState:
             return poses[0][1]
         (before, earlier), (after, later) = poses[index - 1], poses[index]
         return earlier.interpolate(later, (stamp_s - before) / (after - before))
+
+    def note_heard(self, moment: float) -> None:
+        """Note odometry or a report that was measured then (monotonic, s)."""
+        if moment - self.heard_until > LIMITS.silence_s:
+            self.heard_since = moment
+        self.heard_until = max(self.heard_until, moment)
+
+    def heard_for_s(self, since: float) -> float:
+        """How long it has been heard without a silence since a moment (s)."""
+        return self.heard_until - max(since, self.heard_since)
+
+    def fastest_lately(self) -> float:
+        """Greatest speed of its last second (m/s)."""
+        return max((speed for _, speed in self._speeds), default=0.0)
 
     def speed_gained(self) -> float:
         """Gain of speed over the mean of its last second (m/s)."""

@@ -34,6 +34,8 @@ def learn_kind(robot: RobotState, received: Received, origin: Origin) -> None:
 def apply_newest(robot: RobotState, received: Received, moment: float | None) -> None:
     """Take the newest of its kind in; ``moment`` is when it was measured, or None."""
     observation, at = received.observation, received.at
+    if isinstance(observation, Odometry | SafetyReport) and not received.asked:
+        robot.note_heard(at.mono if moment is None else moment)
     match observation:
         case Odometry():
             _drive(robot, observation, at, moment)

@@ -62,7 +62,7 @@ class Decision(Model):
     observed_at: str | None
     ended_at: str | None
     speed_before: float | None = Field(
-        description="m/s; ``speed_after`` at ``observed_at``."
+        description="m/s, the greatest of the second before ``started_at``."
     )
     speed_after: float | None
     links: list[DecisionLink]

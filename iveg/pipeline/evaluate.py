@@ -107,10 +107,10 @@ class Evaluator:
         """What the claim "clear" lacks for a robot now, the reason first."""
         return self._speed_limits.missing.get(robot_id, ())
 
-    def decision_record(self, decision_id: str, now: Instant) -> DecisionRecord | None:
-        """A decision that is still in memory, with the verdicts of now."""
+    def decision_record(self, decision_id: str) -> DecisionRecord | None:
+        """A decision that is still in memory."""
         decision = self.decisions.get(decision_id)
-        return None if decision is None else record_of(decision, now)
+        return None if decision is None else record_of(decision)
 
     def live_decisions(self) -> Iterable[SlowdownDecision]:
         """Decisions in memory about live robots, without recordings."""
@@ -178,14 +178,14 @@ class Evaluator:
         self._moved.clear()
 
     def _drove(self, odometry: Odometry, at: Instant) -> None:
-        self._event_log.decisions(self.decisions.moved(odometry, at), at)
+        self._event_log.decisions(self.decisions.moved(odometry, at))
         self._unjudged = _later(self._unjudged, at)
         self._moved[odometry.robot_id] = odometry
 
     def _reported(self, report: SafetyReport, at: Instant) -> None:
         published_at = self._feedback_publisher.published_at
         changed = self.decisions.reported(report, published_at, at)
-        self._event_log.decisions(changed, at)
+        self._event_log.decisions(changed)
         self._doubt_ignored_limit(report, at)
         if report.speed_factor != self._applied.get(report.robot_id):
             self._applied[report.robot_id] = report.speed_factor
@@ -235,18 +235,18 @@ class Evaluator:
         crossing = change.crossing
         if not change.began:
             ended = self.decisions.end(crossing.decision_id, now)
-            self._event_log.decisions(ended, now)
+            self._event_log.decisions(ended)
             return
         self.protected_unseen += not crossing.in_sight
         places = places_of(crossing, self.world)
         begun = self.decisions.begin(crossing, self.rule, places)
-        self._event_log.decisions([begun], now)
+        self._event_log.decisions([begun])
 
     def publish(self, now: Instant) -> None:
         """Publish feedback to the fleet (Algorithm 2, line 13)."""
         self._untold = False
         self._feedback_publisher.publish(self.speed_limits, self.rule, now)
-        self._event_log.decisions(self.decisions.published(now), now)
+        self._event_log.decisions(self.decisions.published(now))
 
     # --- time ---------------------------------------------------------------------
 
@@ -260,8 +260,8 @@ class Evaluator:
         self._judge(now)
         if now.mono - self._feedback_publisher.published_at >= HEARTBEAT_S - 1e-3:
             self.publish(now)
-        aged = self.decisions.age(now, self.people.known)
-        self._event_log.decisions(aged, now)
+        aged = self.decisions.age(self._heard_s, self.people.known)
+        self._event_log.decisions(aged)
         self.alerts.sync([*self._conditions(now), *more], now)
 
     def _log_returned_detectors(self, now: Instant) -> None:
@@ -274,7 +274,7 @@ class Evaluator:
 
     def _conditions(self, now: Instant) -> Iterable[Condition]:
         for decision in self.decisions.open:
-            yield from conditions.of_decision(decision, now)
+            yield from conditions.of_decision(decision)
         for robot in self.world.live_robots():
             yield from conditions.of_robot(robot, now)
             yield from conditions.of_detector(robot, now, started=self._started or now)
@@ -283,6 +283,10 @@ class Evaluator:
         yield from conditions.of_fleet(self.world.live_robots(), now)
         yield from conditions.of_overload(self.world.robots.values(), now)
         yield from conditions.of_rule(self.rule)
+
+    def _heard_s(self, crossing: Crossing) -> float:
+        robot = self.world.robot(crossing.robot_id)
+        return robot.heard_for_s(crossing.entered.mono)
 
     def close_earlier(
         self,
@@ -302,7 +306,7 @@ class Evaluator:
 
     def leave(self, now: Instant) -> None:
         """Break off open decisions when iVeg stops, so that the record says so."""
-        self._event_log.decisions(self.decisions.break_off(now), now)
+        self._event_log.decisions(self.decisions.break_off(now))
 
     def leave_unsupervised(self, now: Instant) -> None:
         """Tell every robot to slow, once: a part without which nobody watches ended."""

@@ -121,10 +121,10 @@ class EventLog:
             self._hub.append(topics.EARLIER_LOG.name, before)
 
     @_guarded
-    def decisions(self, changed: Iterable[SlowdownDecision], now: Instant) -> None:
+    def decisions(self, changed: Iterable[SlowdownDecision]) -> None:
         """Record decisions that are new or have a new link."""
         for decision in changed:
-            self._sink.offer(record_of(decision, now))
+            self._sink.offer(record_of(decision))
 
     @_guarded
     def left_behind(

@@ -13,8 +13,8 @@ from iveg.domain.rule.zones import Zone
 from iveg.domain.world import World
 
 
-def record_of(decision: SlowdownDecision, now: Instant) -> DecisionRecord:
-    """The whole chain as it stands at ``now``; open links may yet come."""
+def record_of(decision: SlowdownDecision) -> DecisionRecord:
+    """The whole chain as it stands; open links may yet come."""
     crossing = decision.crossing
     zone, sighting = crossing.zone, crossing.zone.sighting
     return DecisionRecord(
@@ -46,7 +46,7 @@ def record_of(decision: SlowdownDecision, now: Instant) -> DecisionRecord:
         ended_at=wall_of(decision.ended),
         speed_before=crossing.speed_before,
         speed_after=decision.speed_after,
-        links=[_link(link) for link in decision.links(now)],
+        links=[_link(link) for link in decision.links()],
     )
 
 

@@ -20,14 +20,14 @@ SHOWN_S = 10.0
 alert and not one a second."""
 
 
-def of_decision(decision: SlowdownDecision, now: Instant) -> Iterable[Condition]:
+def of_decision(decision: SlowdownDecision) -> Iterable[Condition]:
     """A decision that is not obeyed is a P1; a slow-down as such is no alert.
 
     The slow-down is on the robot's card, on the map and in the log.
     """
     crossing = decision.crossing
     zone, robot_id = crossing.zone, crossing.robot_id
-    if not decision.overdue(now):
+    if not decision.is_overdue:
         return
     is_person = zone.reason == "person"
     key = "alert.person_not_slowing" if is_person else "alert.no_slow_down"

@@ -141,7 +141,7 @@ class SpeedLimits:
             zone,
             entered=now,
             entered_m=distance,
-            speed_before=speed,
+            speed_before=max(speed, robot.fastest_lately()),
             # Whom its own detector found it sees, whatever leaves the plan knows of.
             in_sight=zone.observer == robot.robot_id
             or self._greenhouse.in_sight(pose.x, pose.y, zone.x, zone.y),

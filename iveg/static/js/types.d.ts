@@ -199,7 +199,7 @@ export type Decision = {
   applied_at: string | null;
   observed_at: string | null;
   ended_at: string | null;
-  /** m/s; ``speed_after`` at ``observed_at``. */
+  /** m/s, the greatest of the second before ``started_at``. */
   speed_before: number | null;
   speed_after: number | null;
   links: DecisionLink[];

@@ -59,7 +59,8 @@ def slow() -> SafetyReport:
 
 
 def verdicts(one: SlowdownDecision, after: float) -> dict[str, str]:
-    return {link.name: link.verdict for link in one.links(at(after))}
+    """Of a robot that has been heard all the time (s)."""
+    return {link.name: link.verdict for link in one.aged(after).links()}
 
 
 def obeyed(one: SlowdownDecision, after: float = 0.2) -> SlowdownDecision:
@@ -80,7 +81,7 @@ def test_a_decision_that_was_obeyed_has_every_link() -> None:
 
 
 def test_every_link_has_its_time_and_value() -> None:
-    links = {link.name: link for link in obeyed(decision()).links(at(0.3))}
+    links = {link.name: link for link in obeyed(decision()).links()}
 
     assert links["detection"].value == "farmer"
     assert links["filter"].value == 0.94
@@ -162,7 +163,7 @@ def test_what_is_reported_after_the_end_is_not_for_this_decision() -> None:
 
 
 def keys(one: SlowdownDecision, after: float) -> list[tuple[str, str]]:
-    return [(wrong.priority, wrong.key) for wrong in of_decision(one, at(after))]
+    return [(wrong.priority, wrong.key) for wrong in of_decision(one.aged(after))]
 
 
 def test_a_slow_down_that_is_obeyed_is_no_alert() -> None:
@@ -189,7 +190,7 @@ def test_a_robot_that_was_slow_already_only_has_to_say_so() -> None:
 
 
 def test_an_ended_decision_is_never_overdue() -> None:
-    assert not decision().closed(at(1.0)).overdue(at(60.0))
+    assert not decision().closed(at(1.0)).aged(60.0).is_overdue
 
 
 def test_a_peer_that_slows_is_no_notice_and_one_that_does_not_is_grave() -> None:
@@ -286,10 +287,10 @@ def test_old_ended_decisions_make_room_and_open_ones_never_do() -> None:
 def test_what_did_not_come_in_time_is_missing_from_then_on() -> None:
     one = decision()
 
-    assert one.aged(at(1.9)) is one
-    aged = one.aged(at(2.0))
+    assert one.aged(1.9) is one
+    aged = one.aged(2.0)
     assert aged.waited_out
-    assert aged.aged(at(9.0)) is aged
+    assert aged.aged(9.0) is aged
     assert verdicts(aged, 2.0)["applied"] == "missing"
 
 
@@ -297,7 +298,7 @@ def test_what_was_open_when_iveg_went_away_is_unknown_and_says_when() -> None:
     broken = decision().published(at(0.01)).broken_off(at(0.5))
 
     assert verdicts(broken, 99.0)["feedback"] == "ok"
-    assert broken.links(at(0.5))[-1].at == at(0.5).wall
+    assert broken.links()[-1].at == at(0.5).wall
     assert {name: verdicts(broken, 0.5)[name] for name in ("applied", "observed")} == {
         "applied": "unknown",
         "observed": "unknown",
@@ -306,6 +307,6 @@ def test_what_was_open_when_iveg_went_away_is_unknown_and_says_when() -> None:
 
 
 def test_what_was_missing_when_iveg_went_away_is_missing() -> None:
-    broken = decision().aged(at(3.0)).broken_off(at(5.0))
+    broken = decision().aged(3.0).broken_off(at(5.0))
 
     assert verdicts(broken, 5.0)["applied"] == "missing"

@@ -284,7 +284,7 @@ async def test_the_stored_decision_says_missing_as_soon_as_it_is() -> None:
     meet(desk)
     assert "open" in stored_verdicts(desk)
 
-    for _ in range(5):
+    for _ in range(6):
         desk.drive("AGI", 0.0)
         meet(desk)
         await desk.wait(0.45)
@@ -292,6 +292,41 @@ async def test_the_stored_decision_says_missing_as_soon_as_it_is() -> None:
     assert "alert.person_not_slowing" in conditions_of(desk)
     assert desk.evaluator.decisions.open
     assert stored_verdicts(desk) == {"ok", "missing"}
+
+
+async def drive_on(desk: Desk, seconds: float) -> None:
+    """AGI drives on at 0.5 m/s and is heard; it reports nothing."""
+    for _ in range(round(seconds / 0.1)):
+        desk.drive("AGI", 0.0)
+        meet(desk)
+        await desk.wait(0.1)
+
+
+async def test_a_robot_that_nobody_can_hear_is_not_judged_until_it_is_heard_again() -> (
+    None
+):
+    desk = watched(Desk())
+    meet(desk)
+    await desk.wait(5.0)
+    told = ["alert.person_not_slowing" in conditions_of(desk)]
+    for _ in range(3):
+        await drive_on(desk, 1.0)
+        told.append("alert.person_not_slowing" in conditions_of(desk))
+
+    assert told == [False, False, False, True]
+
+
+async def test_a_robot_that_braked_before_the_ring_is_judged_by_its_speed_before() -> (
+    None
+):
+    desk = watched(Desk())
+    for linear in (0.6, 0.6, 0.5, 0.44):
+        desk.drive("AGI", 0.0, linear=linear)
+        await desk.wait(0.1)
+    meet(desk)
+
+    (decision,) = desk.evaluator.decisions.open
+    assert decision.crossing.speed_before == 0.6
 
 
 async def test_a_decision_that_waits_is_not_stored_again_and_again() -> None:
@@ -337,7 +372,7 @@ def test_what_a_crash_left_open_is_closed_and_says_that_nobody_knows() -> None:
 async def test_what_this_run_has_open_is_left_alone() -> None:
     desk = watched(Desk())
     meet(desk)
-    await desk.wait(2.5)
+    await drive_on(desk, 2.5)
     decisions, alerts = desk.records(DecisionRecord), desk.records(AlertRecord)
     before = len(desk.sink.records)
 
