@@ -195,8 +195,8 @@ MUTANTS = (
     ),
     Mutant(
         "clear: a frame with somebody who could not be placed is whole",
-        "    if unplaced:",
-        "    if False:",
+        '    if unplaced:\n        return "unreadable" if has_pose',
+        '    if False:\n        return "unreadable" if has_pose',
         ("unit/domain/test_detector.py",),
     ),
     Mutant(
