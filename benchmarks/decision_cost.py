@@ -59,7 +59,7 @@ class Recorded:
 class Sink:
     """Takes records and keeps none."""
 
-    def offer(self, record: Record) -> None:
+    def enqueue(self, record: Record) -> None:
         """Take one."""
         self.last = record
 

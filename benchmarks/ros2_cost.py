@@ -164,7 +164,7 @@ async def iveg(address: BrokerAddress, ended: asyncio.Event) -> None:
         seq += 1
         clear = {"AGI": CLEAR}
         said = Feedback("AGI", Origin("b", seq), speed_limits=clear, seen=dict(seen))
-        link.offer("/AGI/mqtt_feedback", codec.write_feedback(said), 1)
+        link.enqueue("/AGI/mqtt_feedback", codec.write_feedback(said), 1)
     running.cancel()
     await asyncio.gather(running, return_exceptions=True)
 

@@ -52,7 +52,7 @@ class DirectReader:
     """Turns messages of robots into observations of the ``direct`` transport.
 
     Args:
-        offer: Where observations go; ``reject`` where the unreadable is counted.
+        enqueue: Where observations go; ``reject`` where the unreadable is counted.
         scope: What is read; ``safety`` leaves poses, scans and intent to FIWARE.
         is_past: Tells by its identity what FIWARE has already brought.
         passed_over: Told of a robot's messages of one kind that reached the broker and
@@ -64,14 +64,14 @@ class DirectReader:
         apikey: str,
         robots: Iterable[str],
         clock: Callable[[], Instant],
-        offer: Callable[[Received], None],
+        enqueue: Callable[[Received], None],
         reject: Callable[[str, str, str], None],
         scope: Scope = "all",
         is_past: codec.IsPast | None = None,
         passed_over: PassedOver = lambda _robot, _kind, _count: None,
     ) -> None:
         self._clock = clock
-        self._offer = offer
+        self._enqueue = enqueue
         self._reject = reject
         self._is_past = is_past
         self._passed_over = passed_over
@@ -129,7 +129,9 @@ class DirectReader:
             self._reject(problem.source, problem.reason, problem.detail)
         for observation in reading.observations:
             if issubclass(kind_of(observation), self._kinds):
-                self._offer(Received(observation, at, DIRECT.id, sparse=source.sparse))
+                self._enqueue(
+                    Received(observation, at, DIRECT.id, sparse=source.sparse)
+                )
 
     def _is_early(self, source: _Source, now: float) -> bool:
         """Whether nobody would look at it: one of its kind has just been read."""

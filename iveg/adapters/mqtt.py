@@ -2,7 +2,7 @@
 
 ``run`` connects, subscribes and hands every message on; when the broker goes it tries
 again with a growing, jittered pause.  ``publish`` waits for the broker's confirmation
-(QoS 1) and raises; ``offer`` keeps only the newest message of each topic, for
+(QoS 1) and raises; ``enqueue`` keeps only the newest message of each topic, for
 telemetry.
 """
 
@@ -248,7 +248,7 @@ class MqttLink:
             if not (self._in_flight or self._offered):
                 self._drained.set()
 
-    def offer(self, topic: str, payload: bytes, qos: int = 0) -> None:
+    def enqueue(self, topic: str, payload: bytes, qos: int = 0) -> None:
         """Send when possible; a newer message of the topic takes its place."""
         if topic in self._offered:
             self.replaced += 1

@@ -23,7 +23,7 @@ class MqttTransport:
     def publish_feedback(self, feedback: Feedback) -> None:
         """Offer feedback; a newer one overtakes what has not left yet."""
         topic = names.FEEDBACK_TOPIC.format(robot_id=feedback.robot_id)
-        self._link.offer(topic, self._writer.write(feedback), qos=1)
+        self._link.enqueue(topic, self._writer.write(feedback), qos=1)
 
     async def stop(self, robot_id: str, hold_id: str, by: str) -> None:
         """Publish a STOP, never retained; returns when the broker has it."""

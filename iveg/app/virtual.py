@@ -61,7 +61,7 @@ class VirtualPipeline:
         """Keep the feedback."""
         self.feedback.append(feedback)
 
-    def offer(self, record: Record) -> None:
+    def enqueue(self, record: Record) -> None:
         """Keep a decision; ignore other records."""
         if isinstance(record, DecisionRecord):
             self.decisions[record.decision_id] = record

@@ -100,7 +100,7 @@ class EventLog:
             decision_id=event.decision_id,
         )
         self.lines.append(record)
-        self._sink.offer(record)
+        self._sink.enqueue(record)
         self._hub.append(topics.LOG.name, record)
 
     @_guarded
@@ -124,7 +124,7 @@ class EventLog:
     def decisions(self, changed: Iterable[SlowdownDecision]) -> None:
         """Record decisions that are new or have a new link."""
         for decision in changed:
-            self._sink.offer(record_of(decision))
+            self._sink.enqueue(record_of(decision))
 
     @_guarded
     def left_behind(
@@ -135,9 +135,9 @@ class EventLog:
     ) -> None:
         """Close decisions and alerts that an earlier run left open."""
         for decision in decisions:
-            self._sink.offer(left_behind(decision, now.wall))
+            self._sink.enqueue(left_behind(decision, now.wall))
         for alert in alerts:
-            self._sink.offer(cleared_behind(alert, now.wall))
+            self._sink.enqueue(cleared_behind(alert, now.wall))
 
     @_guarded
     def detection(
@@ -145,7 +145,7 @@ class EventLog:
     ) -> None:
         """Record one detection."""
         x, y, z = one.position
-        self._sink.offer(
+        self._sink.enqueue(
             DetectionRecord(
                 at=at.wall,
                 robot_id=robot_id,
@@ -189,7 +189,7 @@ class EventLog:
             )
         )
         if record is not None:
-            self._sink.offer(record)
+            self._sink.enqueue(record)
 
     @_guarded
     def command(
@@ -197,7 +197,7 @@ class EventLog:
     ) -> None:
         """Record a command that is new or has taken a step."""
         times = command.times
-        self._sink.offer(
+        self._sink.enqueue(
             CommandRecord(
                 command_id=command.command_id,
                 robot_id=command.robot_id,
@@ -236,7 +236,7 @@ class EventLog:
             at: This moment.
         """
         state = "EXPIRED" if heir is None else "REPLACED"
-        self._sink.offer(replace(row, state=state, reason="restarted"))
+        self._sink.enqueue(replace(row, state=state, reason="restarted"))
         told = "followed no more" if heir is None else f"asserted again under {heir}"
         self._audit(row, state, f"server restarted; {told}", at)
 
@@ -264,7 +264,7 @@ class EventLog:
         why: str,
         at: Instant,
     ) -> None:
-        self._sink.offer(
+        self._sink.enqueue(
             CommandEventRecord(
                 command_id=command.command_id,
                 robot_id=command.robot_id,
@@ -278,7 +278,7 @@ class EventLog:
     def climate(self, read: Climate, at: Instant) -> None:
         """Record a climate reading, once a minute."""
         if self._is_due("", Climate, at):
-            self._sink.offer(
+            self._sink.enqueue(
                 ClimateRecord(
                     at=at.wall,
                     temperature=read.temperature,
@@ -293,7 +293,7 @@ class EventLog:
         period_s = kind.sensor.kept_every_s if kind.sensor else READING_PERIOD_S
         if not self._is_due(read.robot_id, type(read), at, period_s):
             return
-        self._sink.offer(
+        self._sink.enqueue(
             ReadingRecord(
                 at=at.wall,
                 robot_id=read.robot_id,
@@ -321,7 +321,7 @@ class EventLog:
     def alert(self, alert: BookedAlert) -> None:
         """Record an alert that was raised, acknowledged or cleared."""
         condition, last = alert.condition, alert.last
-        self._sink.offer(
+        self._sink.enqueue(
             AlertRecord(
                 alert_id=alert.alert_id,
                 priority=alert.priority,

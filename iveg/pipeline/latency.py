@@ -36,7 +36,7 @@ class LatencyMonitor:
         """Let time pass."""
         self.watch.tick(now)
         for began_at, minute in self.watch.ended:
-            self._sink.offer(_record(began_at, minute))
+            self._sink.enqueue(_record(began_at, minute))
         self.watch.ended.clear()
         for remark in self.watch.overloads.remarks:
             self._tell(remark, now)

@@ -18,7 +18,7 @@ ODOMETRY_PERIOD_S = 0.5
 class RecordSink(Protocol):
     """Port of the history's recorder."""
 
-    def offer(self, record: Record) -> None:
+    def enqueue(self, record: Record) -> None:
         """Queue a record; never blocks and never fails."""
 
     async def flushed(self) -> None:
@@ -83,7 +83,7 @@ class RecordQueue:
     def __len__(self) -> int:
         return len(self._kept) + len(self._telemetry)
 
-    def offer(self, waiting: Waiting) -> None:
+    def enqueue(self, waiting: Waiting) -> None:
         """Append a record; a full queue lets go of its oldest telemetry.
 
         A queue full of records that may not be dropped grows: losing one of those is

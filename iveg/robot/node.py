@@ -128,7 +128,7 @@ class RobotNode:
             robot_id,
             settings.apikey,
             self.boot,
-            self._link.offer,
+            self._link.enqueue,
             form=settings.uplink,
             first_report=1 + secrets.randbelow(2**31),
             echo=self._echo if replay is None else None,

@@ -62,7 +62,7 @@ class Uplink:
         robot_id: This robot.
         apikey: First part of its topics.
         boot: Random text of this start.
-        offer: Takes telemetry; the newest of a topic wins.
+        enqueue: Takes telemetry; the newest of a topic wins.
         form: One message a topic, or Algorithm 1's single payload.
         first_report: ``seq`` of the first safety report; random, so that a number from
             an earlier boot is not taken for one of this.
@@ -77,7 +77,7 @@ class Uplink:
         robot_id: str,
         apikey: str,
         boot: str,
-        offer: Callable[[str, bytes], None],
+        enqueue: Callable[[str, bytes], None],
         *,
         form: Form = "per-topic",
         first_report: int = 1,
@@ -87,7 +87,7 @@ class Uplink:
         self._id = robot_id
         self._apikey = apikey
         self._boot = boot
-        self._offer = offer
+        self._enqueue = enqueue
         self._echo = echo
         self._replay = replay
         self._single = SinglePayload(robot_id) if form == "single" else None
@@ -153,9 +153,9 @@ class Uplink:
         self, suffix: str, payload: bytes, now: float, *, news: bool = False
     ) -> None:
         if self.rates.is_measure(suffix, now, news=news):
-            self._offer(self._topic(suffix), payload)
+            self._enqueue(self._topic(suffix), payload)
         else:
-            self._offer(names.direct_topic(self._id, suffix), payload)
+            self._enqueue(names.direct_topic(self._id, suffix), payload)
 
     def _stamp_of(self, wall: float) -> str:
         """Text of a wall-clock time, written once for simultaneous observations."""

@@ -104,7 +104,7 @@ class Puppet:
         word = {"id": hold_id, "r": result, "v": self.speed, "why": None}
         answer = {"cmd": {**word, **self._held(), **self._origin()}}
         topic = names.answer_topic(_APIKEY, self.robot_id)
-        self._link.offer(topic, orjson.dumps(answer), qos=1)
+        self._link.enqueue(topic, orjson.dumps(answer), qos=1)
 
     def _report(self) -> None:
         pose = {"x": 2.0, "y": 2.0, "yaw": 0.0}
@@ -129,7 +129,7 @@ class Puppet:
         origin = self._origin()
         message = {attribute: {**value, **origin}, "TimeInstant": origin["stamp"]}
         topic = names.measure_topic(_APIKEY, self.robot_id + suffix)
-        self._link.offer(topic, orjson.dumps(message), qos=qos)
+        self._link.enqueue(topic, orjson.dumps(message), qos=qos)
 
     def _held(self) -> dict[str, object]:
         holds = [{"id": it, "source": "iveg", "ack": "remote"} for it in self.holds]

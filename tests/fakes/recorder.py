@@ -21,7 +21,7 @@ class FakeRecorder:
         self.opened.set()
         self.mistake: Exception | None = None
 
-    def offer(self, record: Record) -> None:
+    def enqueue(self, record: Record) -> None:
         if self.mistake is not None:
             raise self.mistake
         self.records.append(record)

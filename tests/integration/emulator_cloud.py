@@ -123,7 +123,7 @@ class Cloud:
                     speed_limits=dict.fromkeys(self.heard, CLEAR) | self.speed_limits,
                     seen=seen,
                 )
-                self.link.offer(
+                self.link.enqueue(
                     f"/{robot_id}/mqtt_feedback", codec.write_feedback(feedback), 1
                 )
 

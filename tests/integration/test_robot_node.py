@@ -94,7 +94,7 @@ class Cloud:
                     seen={"AGI": newest},
                     backlog_s=self.backlog_s,
                 )
-                self.link.offer(
+                self.link.enqueue(
                     "/AGII/mqtt_feedback", codec.write_feedback(feedback), qos=1
                 )
 

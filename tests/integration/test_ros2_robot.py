@@ -84,7 +84,7 @@ class Iveg:
                 ROBOT, Origin("b", seq), speed_limits=clear, seen={ROBOT: heard}
             )
             topic = f"/{ROBOT}/mqtt_feedback"
-            self.link.offer(topic, codec.write_feedback(said), 1)
+            self.link.enqueue(topic, codec.write_feedback(said), 1)
             await asyncio.sleep(0.1)
 
 

@@ -39,7 +39,7 @@ class Field:
             self.stopped.add(robot_id)
 
     def say(self, robot_id: str, suffix: str, payload: bytes) -> None:
-        self.link.offer(names.direct_topic(robot_id, suffix), payload)
+        self.link.enqueue(names.direct_topic(robot_id, suffix), payload)
 
     async def drive(self) -> None:
         """Poses of both at 20 Hz, and scans of AGI whose rays have no angle."""

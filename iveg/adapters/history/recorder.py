@@ -3,7 +3,7 @@
 One task gathers batches, one thread writes them.  While the database is away, records
 that may not be lost go to the journal and telemetry waits its turn in the queue::
 
-    offer ──> queue ──> batch ──> database
+    enqueue ──> queue ──> batch ──> database
                 └─ away ─> journal ─┘  on its return, and at the next start
 
 Commands do not wait for a batch:  ``flushed`` puts them into the journal at once, and a
@@ -52,7 +52,7 @@ class RecorderHealth:
 
 
 class Recorder:
-    """The history's writing side; ``offer`` from the event loop's thread only.
+    """The history's writing side; ``enqueue`` from the event loop's thread only.
 
     Args:
         database_url: Brought to the newest shape before the first write.
@@ -91,12 +91,12 @@ class Recorder:
 
     # --- what the pipeline calls --------------------------------------------------
 
-    def offer(self, record: Record) -> None:
+    def enqueue(self, record: Record) -> None:
         """Queue a record; never blocks, never awaits, never fails."""
         waiting = self._stamp(record)
         if isinstance(record, CommandRecord | CommandEventRecord):
             self._unflushed.append(waiting)
-        self._queue.offer(waiting)
+        self._queue.enqueue(waiting)
         self._awake.set()
         if len(self._queue) >= _BATCH:
             self._full.set()

@@ -161,7 +161,7 @@ class SimulatedFleet:
 
         def tell(_: float) -> None:
             wall = clock.wall()
-            link.offer(topic, write_climate(climate_at(wall), format_stamp(wall)))
+            link.enqueue(topic, write_climate(climate_at(wall), format_stamp(wall)))
 
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(link.run(), name="climate-link")

@@ -112,7 +112,7 @@ async def test_everything_that_is_offered_is_stored(
 ) -> None:
     async with recording(database_url, tmp_path) as recorder:
         for record in EVERYTHING:
-            recorder.offer(record)
+            recorder.enqueue(record)
         await until(lambda: recorder.counters["history_written"] == len(EVERYTHING))
         assert state(recorder) == "ok"
 
@@ -124,7 +124,7 @@ async def test_closing_stores_what_still_waits(
 ) -> None:
     recorder = Recorder(database_url, tmp_path / "journal")
     for number in range(1200):
-        recorder.offer(odometry_record(at=NOON + number))
+        recorder.enqueue(odometry_record(at=NOON + number))
 
     await recorder.close()
 
@@ -137,8 +137,8 @@ async def test_a_command_is_one_row_that_changes_and_a_trail_that_grows(
 ) -> None:
     async with recording(database_url, tmp_path) as recorder:
         for number, step in enumerate(("REQUESTED", "SENT", "STANDING")):
-            recorder.offer(command_record(state=step))
-            recorder.offer(command_event_record(state=step, at=NOON + number))
+            recorder.enqueue(command_record(state=step))
+            recorder.enqueue(command_event_record(state=step, at=NOON + number))
             await until(lambda: recorder.counters["history_waiting"] == 0)
 
     assert scalar(database_url, "SELECT count(*) FROM commands") == 1
@@ -150,8 +150,8 @@ async def test_two_states_in_one_batch_leave_the_later_one(
     database_url: str, tmp_path: Path
 ) -> None:
     recorder = Recorder(database_url, tmp_path / "journal")
-    recorder.offer(alert_record(count=1))
-    recorder.offer(alert_record(count=2))
+    recorder.enqueue(alert_record(count=1))
+    recorder.enqueue(alert_record(count=2))
 
     await recorder.close()
 
@@ -166,7 +166,7 @@ async def test_offering_never_waits_for_a_locked_database(
     async with recording(f"{sqlite_url}?timeout=0.2", tmp_path) as recorder:
         started = time.perf_counter()
         for number in range(5000):
-            recorder.offer(odometry_record(at=NOON + number))
+            recorder.enqueue(odometry_record(at=NOON + number))
         took = time.perf_counter() - started
         await until(lambda: state(recorder) == "down")
         other.close()
@@ -186,9 +186,9 @@ async def test_while_the_database_is_locked_nothing_that_matters_is_lost(
     url = f"{sqlite_url}?timeout=0.2"
     async with recording(url, tmp_path, 10) as recorder:
         for record in EVERYTHING:
-            recorder.offer(record)
+            recorder.enqueue(record)
         for number in range(100):
-            recorder.offer(odometry_record(at=NOON + number))
+            recorder.enqueue(odometry_record(at=NOON + number))
         await until(lambda: recorder.counters["history_journalled"] == KEPT)
         assert state(recorder) == "down"
         assert len(journal.read_bytes().splitlines()) == KEPT
@@ -211,14 +211,14 @@ async def test_a_full_disk_stops_the_history_and_not_what_matters(
     sqlite_url: str, tmp_path: Path
 ) -> None:
     async with recording(sqlite_url, tmp_path) as recorder:
-        recorder.offer(command_record())
+        recorder.enqueue(command_record())
         await until(lambda: recorder.counters["history_written"] == 1)
         with files_no_longer_than(64 * 1024):
             for number in range(2000):
-                recorder.offer(odometry_record(at=NOON + number))
-            recorder.offer(log_record())
+                recorder.enqueue(odometry_record(at=NOON + number))
+            recorder.enqueue(log_record())
             await until(lambda: state(recorder) == "down")
-            recorder.offer(log_record(id=2))
+            recorder.enqueue(log_record(id=2))
             await until(lambda: recorder.counters["history_journalled"] >= 1)
         await until(lambda: state(recorder) == "ok")
         await until(lambda: recorder.counters["history_waiting"] == 0)
@@ -232,11 +232,11 @@ async def test_a_server_that_dies_is_missed_and_welcomed_back(
 ) -> None:
     journal = tmp_path / "history.spill_file"
     async with recording(postgresql_url, tmp_path) as recorder:
-        recorder.offer(command_record(state="REQUESTED"))
+        recorder.enqueue(command_record(state="REQUESTED"))
         await until(lambda: recorder.counters["history_written"] == 1)
         postgresql.stop()
-        recorder.offer(command_record(state="STANDING"))
-        recorder.offer(odometry_record())
+        recorder.enqueue(command_record(state="STANDING"))
+        recorder.enqueue(odometry_record())
         await until(lambda: recorder.counters["history_journalled"] == 1)
         assert state(recorder) == "down"
 
@@ -253,7 +253,7 @@ async def test_what_a_crashed_run_left_in_its_journal_is_stored_at_the_next_star
     database_url: str, tmp_path: Path
 ) -> None:
     crashed = Recorder(database_url, tmp_path / "journal")
-    crashed.offer(command_record(state="REQUESTED"))
+    crashed.enqueue(command_record(state="REQUESTED"))
     await crashed.flushed()
 
     upgrade(database_url)
@@ -272,7 +272,7 @@ async def test_it_has_caught_up_when_the_database_holds_what_a_crash_left(
     database_url: str, tmp_path: Path
 ) -> None:
     crashed = Recorder(database_url, tmp_path / "journal")
-    crashed.offer(command_record(state="REQUESTED"))
+    crashed.enqueue(command_record(state="REQUESTED"))
     await crashed.flushed()
 
     recorder = Recorder(database_url, tmp_path / "journal")
@@ -291,10 +291,10 @@ async def test_an_old_state_in_a_journal_never_overwrites_a_newer_one(
 ) -> None:
     journal = tmp_path / "journal"
     first = Recorder(database_url, journal)
-    first.offer(command_record(state="REQUESTED"))
+    first.enqueue(command_record(state="REQUESTED"))
     await first.flushed()
     old = journal.read_bytes()
-    first.offer(command_record(state="STANDING"))
+    first.enqueue(command_record(state="STANDING"))
     await first.close()
     journal.write_bytes(old)
 
@@ -314,7 +314,7 @@ async def test_replaying_the_audit_trail_twice_writes_it_once(
     journal = tmp_path / "journal"
     for _ in range(2):
         recorder = Recorder(database_url, journal)
-        recorder.offer(command_event_record())
+        recorder.enqueue(command_event_record())
         await recorder.flushed()
         await recorder.close()
 
@@ -328,7 +328,7 @@ async def test_closing_while_the_database_is_away_leaves_it_to_the_journal(
     other = lock(sqlite_url)
     recorder = Recorder(f"{sqlite_url}?timeout=0.1", tmp_path / "journal")
     for record in EVERYTHING:
-        recorder.offer(record)
+        recorder.enqueue(record)
 
     await recorder.close()
     other.close()
@@ -341,10 +341,10 @@ async def test_one_bad_row_does_not_hold_up_its_neighbours(
     database_url: str, tmp_path: Path
 ) -> None:
     async with recording(database_url, tmp_path) as recorder:
-        recorder.offer(odometry_record(x=None))
-        recorder.offer(log_record(id=2**70))
-        recorder.offer(log_record(id=2))
-        recorder.offer(odometry_record())
+        recorder.enqueue(odometry_record(x=None))
+        recorder.enqueue(log_record(id=2**70))
+        recorder.enqueue(log_record(id=2))
+        recorder.enqueue(odometry_record())
         await until(lambda: recorder.counters["history_waiting"] == 0)
         await until(lambda: state(recorder) == "ok")
         await until(lambda: recorder.counters["history_written"] == 4)
@@ -358,8 +358,8 @@ async def test_text_that_postgresql_cannot_hold_is_left_out(
     postgresql_url: str, tmp_path: Path
 ) -> None:
     recorder = Recorder(postgresql_url, tmp_path / "journal")
-    recorder.offer(alert_record(note="nul \0"))
-    recorder.offer(alert_record(alert_id="A2"))
+    recorder.enqueue(alert_record(note="nul \0"))
+    recorder.enqueue(alert_record(alert_id="A2"))
 
     await recorder.close()
 
@@ -373,7 +373,7 @@ async def test_a_file_that_rots_while_in_use_is_moved_aside(
     file = tmp_path / "history.db"
     recorder = Recorder(sqlite_url, tmp_path / "journal")
     task = asyncio.create_task(recorder.run())
-    recorder.offer(command_record())
+    recorder.enqueue(command_record())
     await until(lambda: recorder.counters["history_written"] == 1)
     with sqlite3.connect(file, isolation_level=None) as other:
         other.execute("PRAGMA wal_checkpoint(TRUNCATE)")
@@ -381,7 +381,7 @@ async def test_a_file_that_rots_while_in_use_is_moved_aside(
     with file.open("r+b") as raw:
         raw.write(os.urandom(100))
 
-    recorder.offer(command_record(command_id="C2"))
+    recorder.enqueue(command_record(command_id="C2"))
     await until(lambda: recorder.counters["history_replayed"] == 1)
     task.cancel()
     await asyncio.wait({task})
@@ -395,7 +395,7 @@ async def test_what_waits_too_long_is_late(sqlite_url: str, tmp_path: Path) -> N
     recorder = Recorder(
         sqlite_url, tmp_path / "journal", read_clock=lambda: Instant(100.0, NOON)
     )
-    recorder.offer(odometry_record())
+    recorder.enqueue(odometry_record())
 
     fresh = recorder.health(Instant(101.0, NOON))
     late = recorder.health(Instant(103.0, NOON))
@@ -411,7 +411,7 @@ async def test_securing_a_stop_returns_when_the_journal_holds_it(
 ) -> None:
     recorder = Recorder(sqlite_url, tmp_path / "journal")
 
-    recorder.offer(command_record())
+    recorder.enqueue(command_record())
     await recorder.flushed()
 
     assert b'"C1"' in (tmp_path / "journal").read_bytes()
@@ -422,7 +422,7 @@ async def test_whoever_secures_at_the_same_time_waits_for_the_same_write(
     sqlite_url: str, tmp_path: Path
 ) -> None:
     recorder = Recorder(sqlite_url, tmp_path / "journal")
-    recorder.offer(command_record())
+    recorder.enqueue(command_record())
 
     await asyncio.gather(*(recorder.flushed() for _ in range(3)))
 
@@ -436,7 +436,7 @@ async def test_what_the_disk_did_not_take_waits_for_the_database(
     (tmp_path / "journal").mkdir()
     recorder = Recorder(sqlite_url, tmp_path / "journal")
 
-    recorder.offer(command_record())
+    recorder.enqueue(command_record())
     await recorder.flushed()
 
     (tmp_path / "journal").rmdir()

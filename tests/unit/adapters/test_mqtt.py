@@ -97,7 +97,7 @@ async def test_what_is_published_and_offered_arrives() -> None:
         async with running(heard.link):
             await until(lambda: heard.link.connected)
             await heard.link.publish("/a", b"1")
-            heard.link.offer("/b", b"2")
+            heard.link.enqueue("/b", b"2")
             await until(lambda: len(heard.messages) == 2)
 
     assert sorted(heard.messages) == [("/a", b"1"), ("/b", b"2")]
@@ -108,8 +108,8 @@ async def test_of_what_is_offered_while_away_the_newest_of_each_topic_arrives() 
         port = broker.port
         heard = Heard(port, "/a", "/b")
         for number in range(10):
-            heard.link.offer("/a", str(number).encode())
-        heard.link.offer("/b", b"b")
+            heard.link.enqueue("/a", str(number).encode())
+        heard.link.enqueue("/b", b"b")
         async with running(heard.link):
             await until(lambda: len(heard.messages) == 2)
 
@@ -138,11 +138,11 @@ async def test_messages_at_qos_1_go_together_and_newer_ones_after_their_pubacks(
     async with await asyncio.start_server(broker, "127.0.0.1", 0) as server:
         port = server.sockets[0].getsockname()[1]
         link = MqttLink(BrokerAddress("127.0.0.1", port), "test")
-        link.offer("a", b"1", qos=1)
-        link.offer("b", b"2", qos=1)
+        link.enqueue("a", b"1", qos=1)
+        link.enqueue("b", b"2", qos=1)
         async with running(link):
             assert await said.get() == first + b"\x32\x06\x00\x01b\x00\x022"
-            link.offer("a", b"3", qos=1)
+            link.enqueue("a", b"3", qos=1)
             assert said.empty()
             acknowledges.set()
             assert await said.get() == b"\x32\x06\x00\x01a\x00\x033"
@@ -167,11 +167,11 @@ async def test_while_the_socket_is_full_only_the_newest_of_a_topic_waits() -> No
     async with server, running(link):
         await until(lambda: link.connected)
 
-        link.offer("/large", bytes(16 * 2**20))
+        link.enqueue("/large", bytes(16 * 2**20))
         await asyncio.sleep(0)  # the sender takes it, and finds no room for all of it
         await asyncio.sleep(0)
         for number in range(5):
-            link.offer("/small", b"number %d" % number)
+            link.enqueue("/small", b"number %d" % number)
             await asyncio.sleep(0)
         reads.set()
         await until(lambda: b"number 4" in heard)

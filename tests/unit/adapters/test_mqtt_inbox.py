@@ -191,7 +191,7 @@ async def test_a_line_that_ends_during_a_rest_is_lost_after_it() -> None:
             "test",
             {"t": 0},
             # The broker hangs up as soon as it hears from us again.
-            lambda *_: link.offer("bye", b""),
+            lambda *_: link.enqueue("bye", b""),
             on_loss=lost.set,
             apart_s=0.05,
         )

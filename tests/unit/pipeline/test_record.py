@@ -31,7 +31,7 @@ def waiting(record: Record, since: float = 0.0) -> Waiting:
 def queue_of(capacity: int, *records: Record) -> RecordQueue:
     queue = RecordQueue(capacity)
     for since, record in enumerate(records):
-        queue.offer(waiting(record, float(since)))
+        queue.enqueue(waiting(record, float(since)))
     return queue
 
 
@@ -51,7 +51,7 @@ def test_only_telemetry_may_be_dropped() -> None:
 def test_a_full_queue_drops_its_oldest_telemetry_and_counts_it() -> None:
     queue = queue_of(2, odometry_record(x=1.0), odometry_record(x=2.0))
 
-    queue.offer(waiting(odometry_record(x=3.0)))
+    queue.enqueue(waiting(odometry_record(x=3.0)))
 
     assert queue.dropped == 1
     assert records(queue.take(10)) == [odometry_record(x=2.0), odometry_record(x=3.0)]
@@ -107,7 +107,7 @@ def test_what_is_put_back_stands_where_it_stood() -> None:
 def test_putting_back_into_a_full_queue_drops_the_oldest() -> None:
     queue = queue_of(2, odometry_record(x=1.0), odometry_record(x=2.0))
     batch = queue.take(1)
-    queue.offer(waiting(odometry_record(x=3.0)))
+    queue.enqueue(waiting(odometry_record(x=3.0)))
 
     queue.put_back(batch)
 

@@ -47,7 +47,7 @@ async def asking(tmp_path: Path) -> AsyncIterator[httpx.AsyncClient]:
     desk = WebDesk()
     recorder = Recorder(url, journal_file(url, tmp_path))
     for row in ROWS:
-        recorder.offer(row)
+        recorder.enqueue(row)
     await recorder.close()
     queries = Queries(url)
     desk.app.include_router(
