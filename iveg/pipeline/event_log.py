@@ -172,7 +172,7 @@ class EventLog:
     ) -> None:
         """Record a pose, if it is one of the two a second that are kept."""
         pose, twist = read.pose, read.twist
-        record = self._thinner.take(
+        record = self._thinner.thin(
             OdometryRecord(
                 at=at.wall,
                 robot_id=robot.robot_id,

@@ -60,15 +60,15 @@ class Subscriber:
         """Wait until there may be something to take, or for that long (s)."""
         await wait_set(self._awake, within_s)
 
-    def take_events(self) -> list[tuple[str, Any]]:
+    def drain_events(self) -> list[tuple[str, Any]]:
         """Every event since the last time, in order."""
         return _taken(self.pending)
 
-    def take_topics(self) -> list[str]:
+    def drain_topics(self) -> list[str]:
         """The topics that changed and are sent at once."""
         return _taken(self.dirty)
 
-    def take_telemetry(self) -> list[str]:
+    def drain_telemetry(self) -> list[str]:
         """The topics that changed and are paced."""
         return _taken(self.telemetry)
 

@@ -35,7 +35,7 @@ class OdometryThinner:
     def __init__(self) -> None:
         self._last: dict[str, OdometryRecord] = {}
 
-    def take(self, record: OdometryRecord) -> OdometryRecord | None:
+    def thin(self, record: OdometryRecord) -> OdometryRecord | None:
         """The record if it is worth keeping, else None."""
         last = self._last.get(record.robot_id)
         if last is not None and not _tells_more(last, record):
@@ -93,14 +93,14 @@ class RecordQueue:
         lane.append(waiting)
         self._make_room()
 
-    def take(self, most: int) -> list[Waiting]:
+    def dequeue(self, most: int) -> list[Waiting]:
         """Remove the next records, those that may not be lost first."""
-        batch = self.take_kept(most)
+        batch = self.dequeue_kept(most)
         while self._telemetry and len(batch) < most:
             batch.append(self._telemetry.popleft())
         return batch
 
-    def take_kept(self, most: int) -> list[Waiting]:
+    def dequeue_kept(self, most: int) -> list[Waiting]:
         """Remove only records that may not be lost."""
         return [self._kept.popleft() for _ in range(min(most, len(self._kept)))]
 

@@ -233,7 +233,7 @@ class RobotNode:
         """
         self._machine.limit(FREE if factor >= 1.0 else Cap(factor, "stale", cause))
 
-    def tell_faults(self, faults: tuple[RobotFault, ...]) -> None:
+    def set_faults(self, faults: tuple[RobotFault, ...]) -> None:
         """Set the data faults that the next reports carry."""
         self._faults = faults
 
@@ -286,7 +286,7 @@ class RobotNode:
         except UnreadableError:
             return  # Counts as no feedback: the watchdog does the rest.
         self._echo.note(feedback.origin)
-        self._uplink.rates.take_backlog(feedback.backlog_s, now)
+        self._uplink.rates.note_backlog(feedback.backlog_s, now)
         peer = topic.removeprefix("/").partition("/")[0]
         self._perform(self._machine.feedback(peer, feedback, now), now)
         if self._on_feedback_read is not None:

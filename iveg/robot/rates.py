@@ -55,7 +55,7 @@ class UplinkRates:
     _sank: bool = False
     _due: dict[str, float] = field(default_factory=dict)
 
-    def take_backlog(self, backlog_s: float | None, now: float) -> None:
+    def note_backlog(self, backlog_s: float | None, now: float) -> None:
         """Take Orion's reported lag; None, when unknown, changes nothing."""
         before, self._told_at = self._told_at, now
         if backlog_s is None or before is None:

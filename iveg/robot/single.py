@@ -34,8 +34,8 @@ class SinglePayload:
         self._saw_nothing = False
         self._unread: tuple[str | None, ...] = ()
 
-    def take(self, frame: DetectionFrame) -> None:
-        """Take a detection frame; it replaces what is left of the one before."""
+    def replace_frame(self, frame: DetectionFrame) -> None:
+        """Note a detection frame; it replaces what is left of the one before."""
         self._detections = sorted(frame.detections, key=lambda one: one.probability)
         self._saw_nothing = not frame.detections and not frame.unread
         self._unread = frame.unread

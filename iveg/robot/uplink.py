@@ -143,7 +143,7 @@ class Uplink:
         if isinstance(observation, LaserScan):
             single.scan = observation
         elif isinstance(observation, DetectionFrame):
-            single.take(observation)
+            single.replace_frame(observation)
         elif isinstance(observation, Odometry):
             origin = self._origin("", at)
             payload = single.write(replace(observation, origin=origin))

@@ -50,7 +50,7 @@ class NotificationHttp(HttpToolsProtocol):
             super().on_message_complete()
             return
         body, self._body = b"".join(self._body), None
-        self._answer(self.endpoint.take(body))
+        self._answer(self.endpoint.receive(body))
         self.on_response_complete()
 
     def _is_plain(self) -> bool:
@@ -64,7 +64,7 @@ class NotificationHttp(HttpToolsProtocol):
             and self.parser.get_method() == b"POST"
             and self.parser.should_keep_alive()
             and not self.parser.should_upgrade()
-            and self.endpoint.takes_at_once(dict(reversed(self.headers)))
+            and self.endpoint.fits_at_once(dict(reversed(self.headers)))
         )
 
     def _answer(self, problem: Problem | None) -> None:

@@ -78,14 +78,16 @@ class NotificationEndpoint:
                 body = await _body(receive)
             except _GoneError:
                 return
-            problem = Problem(413, TOO_LONG) if body is None else self._take(body, at)
+            problem = (
+                Problem(413, TOO_LONG) if body is None else self._receive(body, at)
+            )
         if problem is None:
             for message in _TAKEN:
                 await send(message)
         else:
             await problem.response()(scope, receive, send)
 
-    def takes_at_once(self, headers: Mapping[bytes, bytes]) -> bool:
+    def fits_at_once(self, headers: Mapping[bytes, bytes]) -> bool:
         """Whether nothing but the body can be wrong; names are in lower case.
 
         A body of undeclared length takes the slow path, which counts bytes.
@@ -99,9 +101,9 @@ class NotificationEndpoint:
             and self._is_admitted(headers)
         )
 
-    def take(self, body: bytes) -> Problem | None:
+    def receive(self, body: bytes) -> Problem | None:
         """Take a body that has just come; what is wrong with it, or None."""
-        return self._take(body, self._clock())
+        return self._receive(body, self._clock())
 
     def _refusal(self, scope: Scope, headers: Mapping[bytes, bytes]) -> Problem | None:
         """The reason not to read the body at all; None to read it."""
@@ -126,7 +128,7 @@ class NotificationEndpoint:
         self._ingest.reject(_tenant_of(headers)[0] or "?", "foreign_tenant")
         return True
 
-    def _take(self, body: bytes, at: Instant) -> Problem | None:
+    def _receive(self, body: bytes, at: Instant) -> Problem | None:
         try:
             subscription_id, reading = read_notification(
                 body, self._ingest.is_past, later=True

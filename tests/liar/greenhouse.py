@@ -111,7 +111,7 @@ class Field:
 
     def notify(self, body: bytes) -> None:
         """Orion posts something."""
-        self.desk.notifications.take(body)
+        self.desk.notifications.receive(body)
 
     def _looked(self, rig: RobotHardware) -> None:
         if rig.robot_id not in HONEST:

@@ -156,9 +156,9 @@ class Recorder:
         if self._writing is not None:
             await asyncio.wait({self._writing})
         while len(self._queue) and self._lost_since is None:
-            await self._write_batch(self._queue.take(_BATCH))
+            await self._write_batch(self._queue.dequeue(_BATCH))
         await self._spill()
-        self._lost_at_close += len(self._queue.take(len(self._queue)))
+        self._lost_at_close += len(self._queue.dequeue(len(self._queue)))
         await asyncio.get_running_loop().run_in_executor(
             self._thread, self._store.close
         )
@@ -177,7 +177,7 @@ class Recorder:
             self._full.clear()
 
     async def _round(self) -> None:
-        batch = self._queue.take(_BATCH)
+        batch = self._queue.dequeue(_BATCH)
         self._writing = asyncio.create_task(
             self._write_batch(batch), name="history-batch"
         )
@@ -248,7 +248,7 @@ class Recorder:
 
     async def _spill(self) -> None:
         """Move records that may not be lost from memory to the journal."""
-        kept = self._queue.take_kept(len(self._queue))
+        kept = self._queue.dequeue_kept(len(self._queue))
         safe = not kept
         try:
             safe = safe or await self._append(kept)

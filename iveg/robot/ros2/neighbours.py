@@ -60,7 +60,7 @@ class Neighbours:
         self._me = robot_id
         self._told: dict[str, tuple[Feedback, float]] = {}
 
-    def take(self, peer: str, feedback: Feedback, now: float) -> None:
+    def note(self, peer: str, feedback: Feedback, now: float) -> None:
         """Store the content of ``/{peer}/mqtt_feedback``."""
         self._told[peer] = feedback, now
         while len(self._told) > _MOST:

@@ -239,7 +239,7 @@ class Ros2Robot:
     def _judge(self, now: float) -> None:
         faults = self._input_faults.faults(now)
         self.node.limit(*speed_of(faults))
-        self.node.tell_faults(faults)
+        self.node.set_faults(faults)
         if faults or self._said:
             self._log(faults)
 
@@ -282,7 +282,7 @@ class Ros2Robot:
         if self._first_feedback is None:
             self._first_feedback = now
         self._known = self._known or self._id in feedback.seen
-        self._neighbours.take(peer, feedback, now)
+        self._neighbours.note(peer, feedback, now)
 
     # --- out ----------------------------------------------------------------------
 

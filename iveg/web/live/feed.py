@@ -87,7 +87,7 @@ class TelemetryFeed:
         return told
 
     def _absorb(self) -> None:
-        for topic in self._subscriber.take_telemetry():
+        for topic in self._subscriber.drain_telemetry():
             row, robot_id = topics.find(topic)
             if row is topics.ROBOT:
                 self._moved[topic] = None

@@ -199,9 +199,9 @@ class Line:
             await _sent(self._websocket.send_bytes(frame))
 
     async def _send_news(self) -> None:
-        for topic, item in self._subscriber.take_events():
+        for topic, item in self._subscriber.drain_events():
             await self.say(self._encoder.event(topic, item))
-        for topic in self._subscriber.take_topics():
+        for topic in self._subscriber.drain_topics():
             frame = self._encoder.frame(topic)
             if frame is not None:
                 await self.say(frame)

@@ -18,7 +18,7 @@ async def test_the_loop_takes_what_waits_without_being_called() -> None:
     async with asyncio.timeout(30):
         await browser.news()
 
-    assert "robots/AGI" in browser.take_telemetry()
+    assert "robots/AGI" in browser.drain_telemetry()
 
     running.cancel()
     await asyncio.gather(running, return_exceptions=True)
@@ -107,8 +107,8 @@ def test_a_browser_gets_the_newest_of_each_topic_and_every_event() -> None:
         hub.changed("robots/AGI")
         hub.append("log", number)
 
-    assert browser.take_events() == [("log", 0), ("log", 1), ("log", 2)]
-    assert browser.take_telemetry() == ["robots/AGI"]
+    assert browser.drain_events() == [("log", 0), ("log", 1), ("log", 2)]
+    assert browser.drain_telemetry() == ["robots/AGI"]
 
 
 async def test_a_browser_that_lets_events_pile_up_is_marked_and_keeps_no_more() -> None:

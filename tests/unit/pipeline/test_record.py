@@ -54,13 +54,16 @@ def test_a_full_queue_drops_its_oldest_telemetry_and_counts_it() -> None:
     queue.enqueue(waiting(odometry_record(x=3.0)))
 
     assert queue.dropped == 1
-    assert records(queue.take(10)) == [odometry_record(x=2.0), odometry_record(x=3.0)]
+    assert records(queue.dequeue(10)) == [
+        odometry_record(x=2.0),
+        odometry_record(x=3.0),
+    ]
 
 
 def test_telemetry_makes_room_for_what_may_not_be_lost() -> None:
     queue = queue_of(2, odometry_record(), detection_record(), *KEPT)
 
-    assert records(queue.take(10)) == list(KEPT)
+    assert records(queue.dequeue(10)) == list(KEPT)
     assert queue.dropped == 2
 
 
@@ -74,22 +77,22 @@ def test_what_may_not_be_lost_stays_even_when_there_is_no_room() -> None:
 def test_telemetry_offered_to_a_queue_full_of_better_things_is_dropped() -> None:
     queue = queue_of(1, command_record(), odometry_record())
 
-    assert records(queue.take(10)) == [command_record()]
+    assert records(queue.dequeue(10)) == [command_record()]
     assert queue.dropped == 1
 
 
 def test_what_may_not_be_lost_is_taken_first() -> None:
     queue = queue_of(10, odometry_record(), command_record())
 
-    assert records(queue.take(1)) == [command_record()]
-    assert records(queue.take(1)) == [odometry_record()]
-    assert queue.take(1) == []
+    assert records(queue.dequeue(1)) == [command_record()]
+    assert records(queue.dequeue(1)) == [odometry_record()]
+    assert queue.dequeue(1) == []
 
 
 def test_only_what_may_not_be_lost_can_be_taken_alone() -> None:
     queue = queue_of(10, odometry_record(), command_record(), log_record())
 
-    assert records(queue.take_kept(10)) == [command_record(), log_record()]
+    assert records(queue.dequeue_kept(10)) == [command_record(), log_record()]
     assert len(queue) == 1
 
 
@@ -98,28 +101,28 @@ def test_what_is_put_back_stands_where_it_stood() -> None:
         10, odometry_record(x=1.0), odometry_record(x=2.0), odometry_record(x=3.0)
     )
 
-    queue.put_back(queue.take(2))
+    queue.put_back(queue.dequeue(2))
 
-    xs = [getattr(record, "x", None) for record in records(queue.take(10))]
+    xs = [getattr(record, "x", None) for record in records(queue.dequeue(10))]
     assert xs == [1.0, 2.0, 3.0]
 
 
 def test_putting_back_into_a_full_queue_drops_the_oldest() -> None:
     queue = queue_of(2, odometry_record(x=1.0), odometry_record(x=2.0))
-    batch = queue.take(1)
+    batch = queue.dequeue(1)
     queue.enqueue(waiting(odometry_record(x=3.0)))
 
     queue.put_back(batch)
 
     assert queue.dropped == 1
-    assert records(queue.take(1)) == [odometry_record(x=2.0)]
+    assert records(queue.dequeue(1)) == [odometry_record(x=2.0)]
 
 
 def test_the_queue_knows_how_long_its_oldest_record_waits() -> None:
     queue = queue_of(10, odometry_record(), command_record())
 
     assert queue.oldest_since() == 0.0
-    queue.take(2)
+    queue.dequeue(2)
     assert queue.oldest_since() is None
 
 
@@ -131,7 +134,7 @@ def test_odometry_is_thinned_to_two_a_second_for_each_robot() -> None:
         for robot in ("AGI", "AGII")
     ]
 
-    kept = [one for one in ticks if thinner.take(one) is not None]
+    kept = [one for one in ticks if thinner.thin(one) is not None]
 
     assert sum(one.robot_id == "AGI" for one in kept) == 21
     assert sum(one.robot_id == "AGII" for one in kept) == 21
@@ -139,11 +142,11 @@ def test_odometry_is_thinned_to_two_a_second_for_each_robot() -> None:
 
 def test_a_pose_that_comes_half_a_tick_early_is_kept() -> None:
     thinner = OdometryThinner()
-    thinner.take(odometry_record(at=NOON))
+    thinner.thin(odometry_record(at=NOON))
 
     early = odometry_record(at=NOON + 0.48)
 
-    assert thinner.take(early) is early
+    assert thinner.thin(early) is early
 
 
 def test_every_change_of_what_a_robot_is_told_or_applies_is_kept() -> None:
@@ -163,13 +166,13 @@ def test_every_change_of_what_a_robot_is_told_or_applies_is_kept() -> None:
         ),
     ]
 
-    kept = [thinner.take(one) for one in [first, *changes, changes[-1]]]
+    kept = [thinner.thin(one) for one in [first, *changes, changes[-1]]]
 
     assert kept == [first, *changes, None]
 
 
 def test_a_clock_that_was_set_back_does_not_silence_a_robot() -> None:
     thinner = OdometryThinner()
-    thinner.take(odometry_record(at=NOON))
+    thinner.thin(odometry_record(at=NOON))
 
-    assert thinner.take(odometry_record(at=NOON - 3600.0)) is not None
+    assert thinner.thin(odometry_record(at=NOON - 3600.0)) is not None

@@ -88,7 +88,7 @@ async def test_the_log_goes_on_where_it_broke_off_for_open_pages_too() -> None:
     await take_up(desk, LeftBehind(lines=tuple(lines)))
 
     assert [one.id for one in desk.event_log.lines] == [1, 2, 3]
-    assert [topic for topic, _ in page.take_events()] == ["log/earlier"]
+    assert [topic for topic, _ in page.drain_events()] == ["log/earlier"]
 
 
 def test_an_alert_keeps_its_life_over_the_restart() -> None:

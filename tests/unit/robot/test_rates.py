@@ -20,7 +20,7 @@ def told_for(
     """Feedback at 5 Hz that says so; the time after it."""
     for _ in range(round(seconds * 5)):
         now += 0.2
-        rates.take_backlog(backlog_s, now)
+        rates.note_backlog(backlog_s, now)
     return now
 
 
@@ -95,7 +95,7 @@ def test_silence_of_iveg_changes_nothing() -> None:
     rates = UplinkRates()
     now = told_for(rates, 5.0, 2.0, 0.0)
     level = rates.level
-    rates.take_backlog(5.0, now + 3600.0)
+    rates.note_backlog(5.0, now + 3600.0)
     assert rates.level - level <= 0.5
 
 
@@ -153,7 +153,7 @@ class Stack:
             lag = self.probe.lag(self.at())
             lags.append(lag or 0.0)
             for rates in self.rates:
-                rates.take_backlog(lag, self.now)
+                rates.note_backlog(lag, self.now)
         return lags
 
     def at(self) -> Instant:

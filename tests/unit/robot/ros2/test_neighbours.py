@@ -29,7 +29,7 @@ def told(*alerts: FeedbackAlert, who: str = "AGII", x: float = 9.0) -> Feedback:
 def present(*feedback: Feedback, age: float = 0.0) -> list[Neighbour]:
     known = Neighbours("AGI")
     for one in feedback:
-        known.take(one.robot_id, one, 10.0)
+        known.note(one.robot_id, one, 10.0)
     return known.present(HERE, 10.0 + age)
 
 
