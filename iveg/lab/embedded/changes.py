@@ -7,6 +7,7 @@ from iveg.lab.embedded.entities import EntityChange, default_type, metadata_json
 from iveg.lab.embedded.errors import bad_request
 from iveg.lab.embedded.orion_text import (
     UNRESTRICTED,
+    check_given_name,
     check_name,
     date_text,
     holds_forbidden,
@@ -67,7 +68,7 @@ def _read_typed(
         raise bad_request(f"unrecognized property for {_PLACES[what]}")
     kind, value = raw.get("type"), raw.get("value")
     if kind is not None:
-        check_name(kind, f"{what} type")
+        check_given_name(kind, f"{what} type")
     if not clean and kind != UNRESTRICTED and holds_forbidden(value):
         raise bad_request(f"Invalid characters in {what} value")
     return kind, value

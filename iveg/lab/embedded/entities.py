@@ -166,7 +166,6 @@ class EntityStore:
 
     def __init__(self) -> None:
         self._by_key: dict[tuple[str, str, str], Entity] = {}
-        self._by_id: dict[str, list[Entity]] = {}
 
     def get(self, path: str, entity_id: str, entity_type: str) -> Entity | None:
         """The entity of exactly this key."""
@@ -179,10 +178,9 @@ class EntityStore:
             FiwareError: 409, several entities match.
         """
         found = [
-            entity
-            for entity in self._by_id.get(entity_id, ())
-            if (not entity_type or entity.type == entity_type)
-            and under(paths, entity.path)
+            one
+            for one in self.all(paths)
+            if one.id == entity_id and entity_type in ("", one.type)
         ]
         if len(found) > 1:
             raise too_many()
@@ -195,12 +193,10 @@ class EntityStore:
     def add(self, entity: Entity) -> None:
         """Store a new entity."""
         self._by_key[entity.key] = entity
-        self._by_id.setdefault(entity.id, []).append(entity)
 
     def remove(self, entity: Entity) -> None:
         """Delete an entity."""
         del self._by_key[entity.key]
-        self._by_id[entity.id].remove(entity)
 
 
 def under(paths: str, path: str) -> bool:

@@ -17,7 +17,6 @@ from iveg.adapters.mqtt_packets import (
     publish_packet,
     remaining_length,
 )
-from iveg.lab.embedded.loopback import require_loopback
 from iveg.lab.embedded.mqtt_broker import (
     LARGEST_PACKET,
     Client,
@@ -43,19 +42,18 @@ async def mqtt_broker(host: str, port: int) -> AsyncIterator[MqttBroker]:
     """Run a broker while the block lasts.
 
     Args:
-        host: A loopback address.
+        host: Address to bind.
         port: TCP port; 0 for a free one.
 
     Yields:
         The broker, ready.
 
     Raises:
-        SettingsError: the address is not loopback.
         OSError: the port is taken.
     """
     broker = MqttBroker()
     server = await asyncio.get_running_loop().create_server(
-        lambda: _ClientLine(broker), require_loopback("IVEG_MQTT_URL", host), port
+        lambda: _ClientLine(broker), host, port
     )
     broker.port = int(server.sockets[0].getsockname()[1])
     ending = asyncio.create_task(broker.table.run(), name="mqtt-late-clients")

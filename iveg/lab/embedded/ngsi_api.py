@@ -102,7 +102,6 @@ _ROUTES: Routes[_Route] = Routes(
         "PATCH /v2/subscriptions/*": subscription_paths.patch_subscription,
         "POST /v2/registrations": subscription_paths.create_registration,
         "GET /v2/registrations": subscription_paths.list_registrations,
-        "GET /v2/registrations/*": subscription_paths.get_registration,
         "DELETE /v2/registrations/*": subscription_paths.delete_registration,
     }
 )

@@ -14,7 +14,7 @@ from iveg.lab.embedded.errors import (
     parse_error,
 )
 from iveg.lab.embedded.http_server import Request, Response
-from iveg.lab.embedded.orion_text import check_name, load_json, looks_clean
+from iveg.lab.embedded.orion_text import check_given_name, load_json, looks_clean
 from iveg.lab.embedded.views import EntityView
 
 _MAX_BODY = 1 << 20
@@ -213,10 +213,10 @@ def read_id(raw: Mapping[str, Any]) -> tuple[str, str]:
     Raises:
         FiwareError: 400.
     """
-    check_name(entity_id := raw.get("id", ""), "entity id")
-    if "type" in raw:
-        check_name(raw["type"], "entity type")
-    return str(entity_id), str(raw.get("type", ""))
+    entity_id = check_given_name(raw.get("id", ""), "entity id")
+    if "type" not in raw:
+        return entity_id, ""
+    return entity_id, check_given_name(raw["type"], "entity type")
 
 
 def read_value(request: Request) -> Any:

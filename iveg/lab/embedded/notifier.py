@@ -105,7 +105,7 @@ class DeliveryLane:
         self._waiting.clear()
         self._flying.clear()
         if self._wire is not None:
-            self._wire.abort()
+            self._wire.transport.abort()
 
     def _pump(self) -> None:
         if self._closed or not self._waiting:
@@ -122,7 +122,7 @@ class DeliveryLane:
             if not self._flying:
                 self._await_first(delivery.timeout_s)
             self._flying.append(delivery)
-            self._wire.write(delivery.request)
+            self._wire.transport.write(delivery.request)
             room -= 1
         if not self._waiting:
             self._overflowing = False
@@ -138,33 +138,26 @@ class DeliveryLane:
                     ssl=ssl.create_default_context() if target.tls else None,
                 )
             self._proven = False
-        except TimeoutError:
-            self._fail_first(TIMED_OUT)
-        except OSError:
-            self._fail_first(REFUSED)
+        except OSError as error:
+            timed_out = isinstance(error, TimeoutError)
+            self._waiting.popleft().done(0, TIMED_OUT if timed_out else REFUSED)
         finally:
             self._connecting = None
-        if self._closed and self._wire is not None:
-            self._wire.abort()
         self._pump()
-
-    def _fail_first(self, reason: str) -> None:
-        if self._waiting:
-            self._waiting.popleft().done(0, reason)
 
     def answered(self, wire: "_Wire", status: int, body: bytes, *, keep: bool) -> None:
         """The oldest delivery under way got its response."""
         if wire is not self._wire or not self._flying:
             return
         self._flying.popleft().done(status, body)
-        if keep:
-            self._proven = True
-            if self._flying:
-                self._await_first(self._flying[0].timeout_s)
-            self._pump()
-        else:
+        if not keep:
             self.lost(wire)
-            wire.close()
+            wire.transport.close()
+            return
+        self._proven = True
+        if self._flying:
+            self._await_first(self._flying[0].timeout_s)
+        self._pump()
 
     def lost(self, wire: "_Wire") -> None:
         """The connection was lost; unanswered deliveries may be sent once more."""
@@ -201,48 +194,30 @@ class DeliveryLane:
 
     def _check_first(self) -> None:
         self._timer = None
-        if not self._flying:
-            return
         loop = asyncio.get_running_loop()
-        if loop.time() < self._first_until:
+        if self._flying and loop.time() < self._first_until:
             self._timer = loop.call_at(self._first_until, self._check_first)
-            return
-        self._flying.popleft().done(0, TIMED_OUT)
-        if self._wire is not None:
-            self._wire.abort()
+        elif self._flying and self._wire is not None:
+            self._flying.popleft().done(0, TIMED_OUT)
+            self._wire.transport.abort()
 
 
 class _Wire(asyncio.Protocol):
-    """One connection of a lane: writes requests, reads responses."""
+    """One connection of a lane: tells it the responses."""
+
+    transport: asyncio.Transport
 
     def __init__(self, lane: DeliveryLane) -> None:
         self._lane = lane
         self._parser = httptools.HttpResponseParser(self)
         self._body: list[bytes] = []
-        self._transport: asyncio.Transport | None = None
-
-    def write(self, request: bytes) -> None:
-        """Send bytes."""
-        if self._transport is not None:
-            self._transport.write(request)
-
-    def close(self) -> None:
-        """Close after pending data was sent."""
-        if self._transport is not None:
-            self._transport.close()
-
-    def abort(self) -> None:
-        """Close at once."""
-        if self._transport is not None:
-            self._transport.abort()
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Connected."""
-        self._transport = cast("asyncio.Transport", transport)
+        self.transport = cast("asyncio.Transport", transport)
 
     def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002 - asyncio's
         """The receiver or this side closed the connection."""
-        self._transport = None
         self._lane.lost(self)
 
     def data_received(self, data: bytes) -> None:
@@ -250,7 +225,7 @@ class _Wire(asyncio.Protocol):
         try:
             self._parser.feed_data(data)
         except httptools.HttpParserError:
-            self.abort()
+            self.transport.abort()
 
     def on_message_begin(self) -> None:
         """A response begins."""

@@ -117,19 +117,25 @@ def holds_forbidden(value: Any) -> bool:
     return False
 
 
-def check_name(name: object, what: str) -> None:
-    """Refuse a name that Orion refuses.
+def check_given_name(name: object, what: str) -> str:
+    """A name that a client gave, if it is one that Orion takes.
 
     Raises:
         FiwareError: 400, with Orion's sentence.
     """
     if not isinstance(name, str):
         raise bad_request(f"invalid JSON type for {what}")
-    _check_text(name, what)
+    check_name(name, what)
+    return name
 
 
 @lru_cache(maxsize=4096)
-def _check_text(name: str, what: str) -> None:
+def check_name(name: str, what: str) -> None:
+    """Refuse a name that Orion refuses.
+
+    Raises:
+        FiwareError: 400, with Orion's sentence.
+    """
     if len(name) > 256:
         raise bad_request(f"{what} length: {len(name)}, max length supported: 256")
     if not name:

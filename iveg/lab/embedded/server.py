@@ -4,13 +4,14 @@ import asyncio
 from collections.abc import AsyncIterator, Callable
 from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass
+from ipaddress import ip_address
 
 from iveg.adapters import clock
+from iveg.domain.errors import SettingsError
 from iveg.lab.embedded.context_broker import ContextBroker
 from iveg.lab.embedded.http_server import http_server
 from iveg.lab.embedded.iot_agent import IotAgent
 from iveg.lab.embedded.iota_api import IotaApi
-from iveg.lab.embedded.loopback import require_loopback
 from iveg.lab.embedded.mqtt_broker import MqttBroker
 from iveg.lab.embedded.mqtt_server import mqtt_broker
 from iveg.lab.embedded.ngsi_api import NgsiApi
@@ -76,10 +77,11 @@ async def embedded_fiware(
         SettingsError: an address that is not loopback.
         OSError: a port that is taken.
     """
+    mqtt_host = require_loopback("IVEG_MQTT_URL", mqtt[0])
     orion_host = require_loopback("IVEG_ORION_URL", orion[0])
     iota_host = require_loopback("IVEG_IOTA_URL", iota[0])
     async with AsyncExitStack() as stack:
-        south = await stack.enter_async_context(mqtt_broker(*mqtt))
+        south = await stack.enter_async_context(mqtt_broker(mqtt_host, mqtt[1]))
         broker = ContextBroker(clock.wall())
         stack.callback(broker.close)
         agent = make_agent(broker, south)
@@ -123,3 +125,25 @@ async def serve_fiware(
     async with running:
         notify_ready()
         await asyncio.Event().wait()
+
+
+def require_loopback(setting: str, host: str) -> str:
+    """The host, if only this machine reaches it: nobody signs in here.
+
+    Raises:
+        SettingsError: any other address; names the setting.
+    """
+    if host == "localhost":
+        return "127.0.0.1"
+    try:
+        usable = ip_address(host).is_loopback
+    except ValueError:
+        usable = False
+    if not usable:
+        raise SettingsError(
+            setting,
+            host,
+            "a loopback address such as 127.0.0.1, because the embedded FIWARE "
+            "asks nobody who they are",
+        )
+    return host

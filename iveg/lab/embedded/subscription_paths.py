@@ -7,11 +7,10 @@ from iveg.lab.embedded.errors import bad_request, not_found
 from iveg.lab.embedded.http_server import Response
 from iveg.lab.embedded.ngsi_request import Call
 from iveg.lab.embedded.orion_text import load_json
-from iveg.lab.embedded.registrations import Registration, read_registration
+from iveg.lab.embedded.registrations import read_registration
 from iveg.lab.embedded.subscriptions import Subscription, read_subscription
 
 _NO_SUBSCRIPTION = "The requested subscription has not been found. Check id"
-_NO_REGISTRATION = "The requested registration has not been found. Check id"
 
 
 async def list_subscriptions(broker: ContextBroker, call: Call) -> Response:
@@ -75,20 +74,9 @@ async def create_registration(broker: ContextBroker, call: Call) -> Response:
     return Response(201, headers={"Location": f"/v2/registrations/{made.id}"})
 
 
-async def get_registration(broker: ContextBroker, call: Call) -> Response:
-    """``GET /v2/registrations/{id}``."""
-    return Response(200, orjson.dumps(_registration(broker, call).show()))
-
-
 async def delete_registration(broker: ContextBroker, call: Call) -> Response:
     """``DELETE /v2/registrations/{id}``."""
-    made = _registration(broker, call)
-    del broker.tenant(call.scope.service).registrations[made.id]
+    known = broker.tenant(call.scope.service).registrations
+    if known.pop(call.parts[1], None) is None:
+        raise not_found("The requested registration has not been found. Check id")
     return Response(204)
-
-
-def _registration(broker: ContextBroker, call: Call) -> Registration:
-    known = broker.tenant(call.scope.service).registrations.get(call.parts[1])
-    if known is None:
-        raise not_found(_NO_REGISTRATION)
-    return known
