@@ -5,7 +5,6 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic.alias_generators import to_camel
-from pydantic_core import ErrorDetails
 
 from iveg.lab.embedded.errors import bad_request, not_supported
 
@@ -36,13 +35,10 @@ def read_document(kind: type[_Read], raw: object) -> _Read:
     try:
         return kind.model_validate(raw)
     except ValidationError as error:
-        complaints = {one["type"]: one for one in reversed(error.errors())}
-        unknown = complaints.get("extra_forbidden")
-        if unknown is not None:
-            raise not_supported(_place(unknown)) from error
-        first = error.errors()[0]
-        raise bad_request(f"{_place(first)}: {first['msg']}") from error
-
-
-def _place(complaint: ErrorDetails) -> str:
-    return "/".join(map(str, complaint["loc"]))
+        complaints = error.errors()
+        unknown = [one for one in complaints if one["type"] == "extra_forbidden"]
+        first = (unknown or complaints)[0]
+        place = "/".join(map(str, first["loc"]))
+        if unknown:
+            raise not_supported(place) from error
+        raise bad_request(f"{place}: {first['msg']}") from error

@@ -18,6 +18,7 @@ from iveg.adapters.connections import Connection, ConnectionCaps, ConnectionTabl
 
 _log = logging.getLogger(__name__)
 _MAX_BODY = 8 << 20
+_MOST_DIGITS = 10
 _CLOSED = (asyncio.IncompleteReadError, ConnectionError)
 _Route = TypeVar("_Route")
 
@@ -166,7 +167,7 @@ async def _read(reader: asyncio.StreamReader, place: Connection) -> Request:
     length = request.headers.get("content-length", "0")
     if not length.isdecimal() or "transfer-encoding" in request.headers:
         raise _RefusedError(411)
-    if int(length) > _MAX_BODY:
+    if len(length) > _MOST_DIGITS or int(length) > _MAX_BODY:
         raise _RefusedError(413)
     body = await reader.readexactly(int(length))
     # Nobody signs in here: who sends whole requests is as good as known.
@@ -184,6 +185,8 @@ def _parse(head: str) -> Request:
             raise _RefusedError(400)
     pairs = (line.partition(":") for line in lines)
     headers = {name.strip().lower(): value.strip() for name, _, value in pairs}
+    if version == "HTTP/1.0":
+        headers.setdefault("connection", "close")
     asked = dict(parse_qsl(query, keep_blank_values=True))
     return Request(method, unquote(path), asked, headers, b"")
 
