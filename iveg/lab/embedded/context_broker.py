@@ -4,69 +4,16 @@ Its limits are listed in ``docs/fiware.md``.  HTTP is in ``ngsi_api``; this modu
 the operations, which the embedded IoT Agent also calls directly.
 """
 
-import asyncio
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping
 
 from iveg.adapters import clock
-from iveg.lab.embedded.entities import (
-    Entity,
-    EntityChange,
-    EntityStore,
-    Scope,
-    Touched,
-    apply,
-    under,
-)
+from iveg.lab.embedded.entities import Entity, EntityChange, Scope, Touched, apply
 from iveg.lab.embedded.errors import ATTRIBUTE_NOT_FOUND, FiwareError, not_found
 from iveg.lab.embedded.outbox import Outbox
 from iveg.lab.embedded.outcomes import Outcome
-from iveg.lab.embedded.registrations import (
-    Forwards,
-    Registration,
-    forward_update,
-    providers,
-)
+from iveg.lab.embedded.providers import forward_updates
 from iveg.lab.embedded.subscriptions import Subscription
-
-_MOST_CONCERNED = 10_000
-
-
-@dataclass(slots=True)
-class Tenant:
-    """All data of one tenant."""
-
-    entities: EntityStore = field(default_factory=EntityStore)
-    subscriptions: dict[str, Subscription] = field(default_factory=dict)
-    registrations: dict[str, Registration] = field(default_factory=dict)
-    _concerned: dict[object, tuple[Subscription, ...]] = field(default_factory=dict)
-    """By entity and attributes; cleared at every change of a subscription."""
-
-    def concerned(
-        self, entity: Entity, names: tuple[str, ...] | None
-    ) -> tuple[Subscription, ...]:
-        """Subscriptions that a change of an entity may concern.
-
-        Args:
-            entity: The entity.
-            names: Attributes that were named; None for a deleted entity.
-        """
-        known = self._concerned.get(key := (entity.key, names))
-        if known is None:
-            if len(self._concerned) >= _MOST_CONCERNED:
-                self._concerned.clear()
-            known = self._concerned[key] = tuple(
-                one
-                for one in self.subscriptions.values()
-                if one.concerns(entity.id, entity.type)
-                and under(one.path, entity.path)
-                and (names is None or one.may_want(names))
-            )
-        return known
-
-    def forget_concerned(self) -> None:
-        """Clear the cache after a change of the subscriptions."""
-        self._concerned.clear()
+from iveg.lab.embedded.tenants import Tenant
 
 
 class ContextBroker:
@@ -213,23 +160,17 @@ class ContextBroker:
         if entity is not None and local:
             self.append(scope, entity, local, forced=forced)
         rest = {name: one for name, one in changes.items() if name not in own}
-        forwards = providers(tenant.registrations, scope, entity_id, kind, rest)
-        taken = await asyncio.gather(
-            *(
-                forward_update(one, entity_id, kind, {n: rest[n] for n in names}, scope)
-                for one, names in forwards
-            )
+        passed, failed = await forward_updates(
+            tenant.registrations, scope, entity_id, kind, rest
         )
-        passed = _names(forwards, taken, wanted=True)
-        failed = _names(forwards, taken, wanted=False)
         return Outcome(
             entity_id,
             entity_type,
             kind,
             exists=entity is not None,
             updated=tuple(local),
-            passed=passed,
-            failed=failed,
+            passed=tuple(passed),
+            failed=tuple(failed),
             refused=tuple(name for name in rest if name not in (*passed, *failed)),
         )
 
@@ -265,11 +206,3 @@ class ContextBroker:
                     correlator,
                     scope.now,
                 )
-
-
-def _names(
-    forwards: Forwards, taken: Sequence[bool], *, wanted: bool
-) -> tuple[str, ...]:
-    """Attributes that their providers accepted, or did not."""
-    pairs = zip(forwards, taken, strict=True)
-    return tuple(name for (_, names), one in pairs if one is wanted for name in names)

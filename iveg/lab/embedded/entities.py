@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import orjson
 
-from iveg.lab.embedded.errors import not_supported, too_many
+from iveg.lab.embedded.errors import not_supported
 from iveg.lab.embedded.orion_numbers import print_value
 from iveg.lab.embedded.orion_text import date_json, date_text, quoted
 
@@ -159,44 +159,6 @@ class Scope:
     path: str
     correlator: str
     now: float
-
-
-class EntityStore:
-    """All entities of one tenant."""
-
-    def __init__(self) -> None:
-        self._by_key: dict[tuple[str, str, str], Entity] = {}
-
-    def get(self, path: str, entity_id: str, entity_type: str) -> Entity | None:
-        """The entity of exactly this key."""
-        return self._by_key.get((path, entity_id, entity_type))
-
-    def find(self, paths: str, entity_id: str, entity_type: str = "") -> Entity | None:
-        """Find the entity of an id and an optional type.
-
-        Raises:
-            FiwareError: 409, several entities match.
-        """
-        found = [
-            one
-            for one in self.all(paths)
-            if one.id == entity_id and entity_type in ("", one.type)
-        ]
-        if len(found) > 1:
-            raise too_many()
-        return found[0] if found else None
-
-    def all(self, paths: str) -> list[Entity]:
-        """Every entity under a service path, oldest first."""
-        return [one for one in self._by_key.values() if under(paths, one.path)]
-
-    def add(self, entity: Entity) -> None:
-        """Store a new entity."""
-        self._by_key[entity.key] = entity
-
-    def remove(self, entity: Entity) -> None:
-        """Delete an entity."""
-        del self._by_key[entity.key]
 
 
 def under(paths: str, path: str) -> bool:

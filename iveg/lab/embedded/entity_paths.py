@@ -17,7 +17,7 @@ from iveg.lab.embedded.errors import (
 from iveg.lab.embedded.http_server import Response
 from iveg.lab.embedded.ngsi_request import Call, read_id, read_value, split_names
 from iveg.lab.embedded.orion_text import load_json, looks_clean, read_pattern
-from iveg.lab.embedded.registrations import bare_entities, foreign
+from iveg.lab.embedded.providers import bare_entities, foreign
 from iveg.lab.embedded.views import write_entity
 
 _NOT_DONE = ("q", "mq", "georel", "typePattern")
@@ -176,9 +176,6 @@ async def replace_attributes(broker: ContextBroker, call: Call) -> Response:
     return Response(204)
 
 
-# --- one attribute or its bare value --------------------------------------------
-
-
 async def get_attribute(broker: ContextBroker, call: Call) -> Response:
     """``GET /v2/entities/{id}/attrs/{name}``."""
     attribute = await _attribute(broker, call, call.parts[1])
@@ -227,11 +224,10 @@ async def put_attribute(broker: ContextBroker, call: Call) -> Response:
 
 async def put_value(broker: ContextBroker, call: Call) -> Response:
     """``PUT /v2/entities/{id}/attrs/{name}/value``."""
-    value = read_value(call.request)
     changes = read_changes(
-        {call.parts[3]: {"value": value}},
-        key_values=False,
-        clean=looks_clean(call.request.body.strip(b'"')),
+        {call.parts[3]: read_value(call.request)},
+        key_values=True,
+        clean=looks_clean(call.request.body),
     )
     await _update(broker, call, changes)
     return Response(204)
@@ -244,17 +240,10 @@ async def delete_attribute(broker: ContextBroker, call: Call) -> Response:
     return Response(204)
 
 
-# --- what they share --------------------------------------------------------------
-
-
 async def _update(
     broker: ContextBroker, call: Call, changes: Mapping[str, EntityChange]
 ) -> None:
-    """Update attributes here or at providers, according to the options.
-
-    Raises:
-        FiwareError: 404 or 422, as Orion; the possible part is done.
-    """
+    """Update attributes here or at providers; what is possible is done."""
     outcome = await broker.update(
         call.scope,
         call.parts[1],

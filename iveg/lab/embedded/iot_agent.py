@@ -18,7 +18,6 @@ from iveg.lab.embedded.devices import (
     Command,
     Device,
     Publishing,
-    Registry,
     Tenancy,
     read_device,
 )
@@ -28,6 +27,7 @@ from iveg.lab.embedded.measures import read_measures, read_single, status_change
 from iveg.lab.embedded.mqtt_broker import MqttBroker
 from iveg.lab.embedded.orion_text import load_json
 from iveg.lab.embedded.registrations import Registration, read_registration
+from iveg.lab.embedded.registry import Registry
 
 _log = logging.getLogger(__name__)
 

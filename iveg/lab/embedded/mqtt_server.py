@@ -39,14 +39,7 @@ LARGEST_CONNECT = 16 << 10
 
 @asynccontextmanager
 async def mqtt_broker(host: str, port: int) -> AsyncIterator[MqttBroker]:
-    """Run a broker while the block lasts.
-
-    Args:
-        host: Address to bind.
-        port: TCP port; 0 for a free one.
-
-    Yields:
-        The broker, ready.
+    """Run a broker while the block lasts; port 0 takes a free one.
 
     Raises:
         OSError: the port is taken.
@@ -68,8 +61,7 @@ async def mqtt_broker(host: str, port: int) -> AsyncIterator[MqttBroker]:
 class _ClientLine(Client, asyncio.Protocol):
     """Splits the bytes of one client into packets and answers them.
 
-    Anything but CONNECT before the client is admitted, and anything that cannot be
-    read, ends the connection.
+    Anything but CONNECT at first, and what cannot be read, ends the connection.
 
     Args:
         broker: Gets the client's messages.
@@ -106,7 +98,7 @@ class _ClientLine(Client, asyncio.Protocol):
             self._broker.receive(self._will)
 
     def data_received(self, data: bytes) -> None:
-        """Handle complete packets; keep an incomplete one."""
+        """Handle complete packets; keep the rest."""
         self._heard_at = asyncio.get_running_loop().time()
         if self._held:
             self._held += data

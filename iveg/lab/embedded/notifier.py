@@ -10,48 +10,21 @@ import asyncio
 import logging
 import ssl
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import cast
-from urllib.parse import urlsplit
 
 import httptools
+
+from iveg.lab.embedded.http_requests import NotificationTarget
 
 _log = logging.getLogger(__name__)
 _AHEAD = 8
 _MAX_QUEUED = 1000
 
-AGENT = "orion/4.7.0-next libcurl/7.88.1"
 REFUSED = "Couldn't connect to server"
 TIMED_OUT = "Timeout was reached"
 CLOSED = "Server returned nothing (no headers, no data)"
-
-
-@dataclass(frozen=True, slots=True)
-class NotificationTarget:
-    """Address of a lane's receiver."""
-
-    host: str
-    port: int
-    tls: bool = False
-
-    @classmethod
-    def from_url(cls, url: str) -> "NotificationTarget":
-        """The server of an ``http`` or ``https`` address."""
-        parts = urlsplit(url)
-        tls = parts.scheme == "https"
-        return cls(parts.hostname or "", parts.port or (443 if tls else 80), tls)
-
-
-def write_head(target: str, headers: Mapping[str, str]) -> bytes:
-    """The part of a POST's head that does not change; no header is empty."""
-    lines = [f"{name}: {value}" for name, value in headers.items() if value]
-    return "\r\n".join((f"POST {target} HTTP/1.1", *lines, "")).encode()
-
-
-def with_length(body: bytes) -> bytes:
-    """The last header, the end of the head, and the body."""
-    return b"Content-Length: %d\r\n\r\n%b" % (len(body), body)
 
 
 @dataclass(slots=True)

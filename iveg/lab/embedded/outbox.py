@@ -7,16 +7,16 @@ from dataclasses import dataclass
 from urllib.parse import urlsplit
 
 from iveg.lab.embedded.entities import Entity, Touched
-from iveg.lab.embedded.notifier import (
+from iveg.lab.embedded.http_requests import (
     AGENT,
-    Delivery,
-    DeliveryLane,
     NotificationTarget,
     with_length,
     write_head,
 )
+from iveg.lab.embedded.notifier import Delivery, DeliveryLane
 from iveg.lab.embedded.orion_text import quoted
-from iveg.lab.embedded.subscriptions import Subscription, SubscriptionDocument
+from iveg.lab.embedded.subscription_documents import SubscriptionDocument
+from iveg.lab.embedded.subscriptions import Subscription
 from iveg.lab.embedded.views import write_entity
 
 

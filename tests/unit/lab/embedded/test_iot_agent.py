@@ -111,3 +111,23 @@ async def test_a_command_with_quality_and_retain_is_published_so(
     assert isinstance(message.payload, bytes)
     assert orjson.loads(message.payload) == {"go": 1}
     assert (message.qos, message.retain) == (1, True)
+
+
+async def test_a_device_is_of_the_tenant_of_the_request_whatever_it_says(
+    up: Running,
+) -> None:
+    device = {"device_id": "D", "apikey": "iveg", "service": "other"}
+    async with IotAgentClient(up.iota_url, *TENANT) as agent:
+        await agent.create_device(device)
+        (made,) = await agent.read_devices()
+    assert (made["service"], made["service_path"]) == TENANT
+
+
+async def test_a_group_that_is_changed_wrongly_stays_as_it_was(up: Running) -> None:
+    group = {"apikey": "iveg", "resource": "/iot/json", "entity_type": "Robot"}
+    async with IotAgentClient(up.iota_url, *TENANT) as agent:
+        await agent.create_group(group)
+        with pytest.raises(HopError, match="400"):
+            await agent.change_group("iveg", {"entity_type": ["Robot"]})
+        (kept,) = await agent.read_groups()
+    assert kept["entity_type"] == "Robot"

@@ -6,6 +6,7 @@ from contextlib import asynccontextmanager
 import pytest
 
 from iveg.lab.embedded import notifier
+from iveg.lab.embedded.http_requests import NotificationTarget
 from iveg.lab.embedded.http_server import Request, Response, http_server
 from iveg.lab.embedded.notifier import (
     CLOSED,
@@ -13,7 +14,6 @@ from iveg.lab.embedded.notifier import (
     TIMED_OUT,
     Delivery,
     DeliveryLane,
-    NotificationTarget,
     exchange,
 )
 
