@@ -23,9 +23,11 @@ def in_view(
 class TruthLog:
     """Ground truth as one line of JSON per picture.
 
-    ``{"robot", "at": Unix s, "visible": [{"key", "class", "x", "y", "part"}]}``: all
-    targets of which a part (0 to 1) is in view, by their true position in ``map`` (m),
-    whatever the detector reports.
+    ``{"robot", "at": Unix s, "pose": {"x", "y", "yaw"}, "speed", "visible": [{"key",
+    "class", "x", "y", "part"}], "people": [{"key", "x", "y"}]}``: the robot's true pose
+    in ``map`` (m, rad) and speed (m/s), all targets of which a part (0 to 1) is in its
+    view, and every person in the greenhouse, by their true positions, whatever the
+    detector reports.  Robots and people of all lines are enough to score protection.
     """
 
     def __init__(self, file: Path) -> None:
@@ -45,7 +47,22 @@ class TruthLog:
                     "part": round(part, 2),
                 }
             )
-        picture = {"robot": rig.robot_id, "at": at, "visible": visible}
+        true = rig.vehicle.pose
+        picture = {
+            "robot": rig.robot_id,
+            "at": at,
+            "pose": {
+                "x": round(true.x, 3),
+                "y": round(true.y, 3),
+                "yaw": round(true.yaw, 4),
+            },
+            "speed": round(rig.vehicle.twist.linear_x, 3),
+            "visible": visible,
+            "people": [
+                {"key": f"person-{number}", "x": round(one.x, 3), "y": round(one.y, 3)}
+                for number, one in enumerate(world.discs())
+            ],
+        }
         self._file.write(orjson.dumps(picture).decode() + "\n")
 
     def close(self) -> None:

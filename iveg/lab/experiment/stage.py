@@ -115,6 +115,11 @@ class StagedRobot:
         """True speed (m/s)."""
         return abs(self._rig.vehicle.twist.linear_x)
 
+    @property
+    def factor(self) -> float:
+        """Greatest share of its speed that its safety machine allows now."""
+        return self._machine.cap.factor if self._machine.may_drive else 0.0
+
     def _perform(self, effects: Sequence[Effect], now: Instant) -> None:
         for effect in effects:
             match effect:

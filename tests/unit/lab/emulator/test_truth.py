@@ -3,6 +3,8 @@
 from contextlib import closing
 from pathlib import Path
 
+import orjson
+
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.lab.emulator.camera import Counts, DetectorModel
 from iveg.lab.emulator.layout import lay_out
@@ -30,3 +32,20 @@ def test_a_person_whom_the_detector_misses_is_in_the_truth(tmp_path: Path) -> No
     assert (picture.robot_id, picture.at) == ("AGI", 1000.5)
     [seen] = [one for one in picture.seen if one.class_id == "farmer"]
     assert (seen.x, seen.y) == (round(person.x, 3), round(person.y, 3))
+
+
+def test_everybody_is_in_the_truth_with_the_robot_s_true_pose(tmp_path: Path) -> None:
+    greenhouse = load_greenhouse(scenario_named("demo").greenhouse)
+    layout = lay_out(scenario_named("demo"), ("AGI", "AGII"), greenhouse)
+    world = SimulatedWorld(greenhouse, layout, BLIND, seed=1)
+
+    with closing(TruthLog(tmp_path / "truth.jsonl")) as log:
+        log.record(world.rigs["AGI"], world, 1000.5)
+
+    told = orjson.loads((tmp_path / "truth.jsonl").read_bytes())
+    pose = world.rigs["AGI"].vehicle.pose
+    assert [one["key"] for one in told["people"]] == [f"person-{n}" for n in range(4)]
+    assert [one["x"] for one in told["people"]] == [
+        round(one.x, 3) for one in world.discs()
+    ]
+    assert (told["pose"]["x"], told["speed"]) == (round(pose.x, 3), 0.0)
