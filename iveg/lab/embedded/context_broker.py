@@ -168,10 +168,10 @@ class ContextBroker:
             entity_type,
             kind,
             exists=entity is not None,
-            updated=tuple(local),
-            passed=tuple(passed),
-            failed=tuple(failed),
-            refused=tuple(name for name in rest if name not in (*passed, *failed)),
+            updated=list(local),
+            passed=passed,
+            failed=failed,
+            refused=[name for name in rest if name not in (*passed, *failed)],
         )
 
     # --- subscriptions ----------------------------------------------------------

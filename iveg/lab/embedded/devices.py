@@ -148,13 +148,13 @@ def _read(kind: type[_Read], raw: Mapping[str, Any]) -> _Read:
         raise wrong_syntax() from error
 
 
-def read_group(raw: Any, tenancy: Tenancy) -> Group:
+def read_group(raw: Mapping[str, Any], tenancy: Tenancy) -> Group:
     """Read a group from a ``POST``.
 
     Raises:
         FiwareError: 400.
     """
-    if not isinstance(raw, dict) or "apikey" not in raw or "resource" not in raw:
+    if "apikey" not in raw or "resource" not in raw:
         raise wrong_syntax()
     kind = raw.get("entity_type") or raw.get("type")
     if not kind:
@@ -165,14 +165,14 @@ def read_group(raw: Any, tenancy: Tenancy) -> Group:
     return _read(Group, {**raw, **tenancy._asdict(), "entity_type": kind})
 
 
-def read_device(raw: Any, tenancy: Tenancy, group: Group | None) -> Device:
+def read_device(
+    raw: Mapping[str, Any], tenancy: Tenancy, group: Group | None
+) -> Device:
     """Read a device from a ``POST``; a group completes it.
 
     Raises:
         FiwareError: 400.
     """
-    if not isinstance(raw, dict):
-        raise wrong_syntax()
     if "device_id" not in raw:
         raise FiwareError(
             "MISSING_ATTRIBUTES",

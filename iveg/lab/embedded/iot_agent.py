@@ -128,14 +128,14 @@ class IotAgent:
 
     # --- devices ----------------------------------------------------------------
 
-    def provision(self, raw: Any, tenancy: Tenancy) -> None:
+    def provision(self, raw: Mapping[str, Any], tenancy: Tenancy) -> None:
         """Create one device from a ``POST``.
 
         Raises:
             FiwareError: 400, or 409 if the device exists.
         """
-        apikey = raw.get("apikey") if isinstance(raw, dict) else None
-        device = read_device(raw, tenancy, self.registry.group_in(tenancy, apikey))
+        group = self.registry.group_in(tenancy, raw.get("apikey"))
+        device = read_device(raw, tenancy, group)
         if self.registry.is_known(device):
             raise FiwareError(
                 "DUPLICATE_DEVICE_ID",

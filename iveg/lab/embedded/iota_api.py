@@ -1,6 +1,6 @@
 """North port of the agent: groups, devices, and requests of the context broker."""
 
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from typing import Any
 
 import orjson
@@ -87,17 +87,17 @@ class IotaApi:
     async def get_device(self, request: Request) -> Response:
         """``GET /iot/devices/{id}``."""
         registry = self.agent.registry
-        return _json(registry.device(_tenancy(request), _last(request)).show())
+        return _json(registry.device(_tenancy(request), request.parts[-1]).show())
 
     async def change_device(self, request: Request) -> Response:
         """``PUT /iot/devices/{id}``."""
-        old = self.agent.registry.device(_tenancy(request), _last(request))
+        old = self.agent.registry.device(_tenancy(request), request.parts[-1])
         self.agent.change(old, old.changed(_object(request)))
         return Response(204)
 
     async def delete_device(self, request: Request) -> Response:
         """``DELETE /iot/devices/{id}``."""
-        device = self.agent.registry.device(_tenancy(request), _last(request))
+        device = self.agent.registry.device(_tenancy(request), request.parts[-1])
         self.agent.forget(device)
         return Response(204)
 
@@ -107,23 +107,22 @@ class IotaApi:
         """``POST /op/update``."""
         tenancy = _tenancy(request)
         for entity in _listed(request, "entities"):
-            name, kind = _entity_key(entity)
             values = {
                 one: part.get("value")
                 for one, part in entity.items()
-                if one not in ("id", "type") and isinstance(part, dict)
+                if isinstance(part, dict)
             }
-            await self.agent.command(tenancy, name, kind, values)
+            await self.agent.command(tenancy, *_entity_key(entity), values)
         return Response(204)
 
     async def query(self, request: Request) -> Response:
         """``POST /op/query``."""
         tenancy, raw = _tenancy(request), _object(request)
         names = [name for name in raw.get("attrs", []) if isinstance(name, str)]
-        told = []
-        for entity in _listed(request, "entities"):
-            name, kind = _entity_key(entity)
-            told.append(await self.agent.query(tenancy, name, kind, names))
+        told = [
+            await self.agent.query(tenancy, *_entity_key(entity), names)
+            for entity in _listed(request, "entities")
+        ]
         return _json(told)
 
 
@@ -177,9 +176,9 @@ def _object(request: Request) -> dict[str, Any]:
     return value
 
 
-def _listed(request: Request, name: str) -> list[Any]:
+def _listed(request: Request, name: str) -> list[dict[str, Any]]:
     listed = _object(request).get(name)
-    if not isinstance(listed, list):
+    if not isinstance(listed, list) or not all(isinstance(one, dict) for one in listed):
         raise wrong_syntax()
     return listed
 
@@ -188,9 +187,7 @@ def _group_key(request: Request) -> tuple[str, str]:
     return request.query.get("resource", ""), request.query.get("apikey", "")
 
 
-def _entity_key(entity: Any) -> tuple[str, str]:
-    if not isinstance(entity, dict):
-        raise wrong_syntax()
+def _entity_key(entity: Mapping[str, object]) -> tuple[str, str]:
     return str(entity.get("id", "")), str(entity.get("type", ""))
 
 
@@ -204,11 +201,7 @@ def _page(
     return _json({"count": len(listed), name: shown})
 
 
-def _last(request: Request) -> str:
-    return request.parts[-1]
-
-
-def _json(value: Any, status: int = 200) -> Response:
+def _json(value: object, status: int = 200) -> Response:
     return Response(status, orjson.dumps(value), content_type=_JSON)
 
 

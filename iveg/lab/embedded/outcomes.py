@@ -35,20 +35,10 @@ class Outcome:
     asked_kind: str
     kind: str
     exists: bool
-    updated: tuple[str, ...] = ()
-    passed: tuple[str, ...] = ()
-    failed: tuple[str, ...] = ()
-    refused: tuple[str, ...] = ()
-
-    @property
-    def complete(self) -> bool:
-        """Whether the whole request was done."""
-        return self.exists_somewhere and not self.refused and not self.failed
-
-    @property
-    def exists_somewhere(self) -> bool:
-        """Whether the broker or a provider knows the entity."""
-        return self.exists or self.forwarded
+    updated: list[str]
+    passed: list[str]
+    failed: list[str]
+    refused: list[str]
 
     @property
     def forwarded(self) -> bool:
@@ -56,9 +46,10 @@ class Outcome:
         return bool(self.passed or self.failed)
 
     @property
-    def named(self) -> str:
-        """The entity as in Orion's sentences."""
-        return f"{self.entity_id}/{self.asked_kind}".removesuffix("/")
+    def complete(self) -> bool:
+        """Whether the whole request was done."""
+        known = self.exists or self.forwarded
+        return known and not self.refused and not self.failed
 
     def raise_for_one(self) -> None:
         """Raise Orion's error for an update of one entity, if there is one.
@@ -101,10 +92,11 @@ def raise_for_batch(outcomes: Sequence[Outcome]) -> None:
 
 
 def _complaint(outcome: Outcome, *, first: bool) -> str:
+    named = f"{outcome.entity_id}/{outcome.asked_kind}".removesuffix("/")
     if outcome.exists:
-        return f"{outcome.named} - {_listed(outcome.refused)}"
+        return f"{named} - [ {', '.join(outcome.refused)} ]"
     # Orion omits the dash for all but the first.
-    return f"{outcome.named} {'- ' if first else ''}[entity itself]"
+    return f"{named} {'- ' if first else ''}[entity itself]"
 
 
 def _refused(some: bool, description: str) -> FiwareError:
@@ -121,7 +113,3 @@ def _not_passed_on(outcomes: Iterable[Outcome]) -> FiwareError:
         f"Some of the following attributes were not updated: {{ {named} }}",
         status=404,
     )
-
-
-def _listed(names: Iterable[str]) -> str:
-    return f"[ {', '.join(names)} ]"
