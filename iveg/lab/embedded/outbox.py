@@ -121,8 +121,7 @@ class _Route:
 def _write_head(subscription: Subscription) -> bytes:
     notification = subscription.document.notification
     url = urlsplit(notification.endpoint.url)
-    given = notification.endpoint.headers or {}
-    custom = {name.lower(): value for name, value in given.items()}
+    custom = {name.lower(): value for name, value in notification.headers.items()}
     headers = {
         "Host": url.netloc,
         "User-Agent": AGENT,

@@ -1,6 +1,7 @@
 """What a client says of a subscription: changes to be told of, and to whom."""
 
 import re
+from collections.abc import Mapping
 from functools import cached_property
 from typing import Annotated, Literal
 from urllib.parse import urlsplit
@@ -124,16 +125,21 @@ class Subject(Document):
 
 
 class Endpoint(Document):
-    """The receiver; only a custom one has headers."""
+    """The receiver of the notifications."""
 
     url: Annotated[str, AfterValidator(_read_url)]
     timeout: NonNegativeInt | None = None
-    headers: Annotated[dict[str, str], AfterValidator(_read_headers)] | None = None
 
     @property
     def timeout_s(self) -> float:
         """Time limit of a response (s)."""
         return (self.timeout or _DEFAULT_TIMEOUT_MS) / 1000
+
+
+class CustomEndpoint(Endpoint):
+    """A receiver that gets headers of its own."""
+
+    headers: Annotated[dict[str, str], AfterValidator(_read_headers)] | None = None
 
 
 class Notification(Document):
@@ -143,7 +149,7 @@ class Notification(Document):
     only_changed_attrs: bool = False
     attrs_format: Annotated[str, AfterValidator(_read_format)] = "normalized"
     http: Endpoint | None = None
-    http_custom: Endpoint | None = None
+    http_custom: CustomEndpoint | None = None
     metadata: tuple[str, ...] | None = None
     max_fails_limit: NonNegativeInt | None = None
     covered: Literal[False] = False
@@ -162,6 +168,13 @@ class Notification(Document):
     def endpoint(self) -> Endpoint:
         """The receiver."""
         return next(one for one in (self.http, self.http_custom) if one is not None)
+
+    @property
+    def headers(self) -> Mapping[str, str]:
+        """Headers that the receiver asked for."""
+        if self.http_custom is None:
+            return {}
+        return self.http_custom.headers or {}
 
     @cached_property
     def view(self) -> EntityView:
