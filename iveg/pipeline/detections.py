@@ -163,6 +163,6 @@ def _line(one: Placed, robot_id: str, subject: str) -> LogEvent:
     key = _KEYS[one.kind]
     if one.doubtful is not None:
         key = "log.detection_doubtful"
-    elif one.possible:
+    elif one.looks is not None:
         key = "log.detection_possible"
     return LogEvent("detection", key, slots, robot_id, one.class_)

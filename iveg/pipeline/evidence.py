@@ -83,12 +83,14 @@ def cleared_behind(record: AlertRecord, found: float) -> AlertRecord:
 
 
 def _parameters(rule: DetectionRule, zone: Zone) -> dict[str, object]:
+    looks = None if zone.sighting is None else zone.sighting.looks
     return {
         "threshold": rule.threshold_of(zone.reason),
         "radius_m": rule.radius_m,
         "ring_m": round(zone.radius_m, 3),
         "author": rule.author,
-        "possible": zone.sighting is not None and zone.sighting.possible,
+        "possible": looks is not None,
+        "looks": None if looks is None else asdict(looks),
     }
 
 

@@ -15,9 +15,15 @@ from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Detection, DetectionFrame, Instant
 from iveg.domain.robot_state import RobotState
+from iveg.domain.tracking.looks import (
+    FAINT_FROM,
+    MOST_SUSPECTS,
+    FaintPerson,
+    Looks,
+    Suspicions,
+)
 from iveg.domain.tracking.person import Sighting, TrackedPerson
 from iveg.domain.tracking.picture import PlacedDetection
-from iveg.domain.tracking.possible_people import POSSIBLE_FROM, PossiblePeople
 from iveg.domain.tracking.tracker import Tracker
 from iveg.domain.world import World
 
@@ -37,7 +43,7 @@ class Placed:
         index: Of the detection in its frame.
         person: The person it belongs to; None when faint, another class, or a peer.
         peer: The fleet member that it is a sighting of.
-        possible: Below the threshold, but seen again and again.
+        looks: Why it counts though it is below the threshold; None: it need not.
         doubtful: Outside the greenhouse, so nobody knows where it is: where its
             observer stood, and how far that one sees (m).
     """
@@ -50,7 +56,7 @@ class Placed:
     class_: Class | None
     person: TrackedPerson | None = None
     peer: str | None = None
-    possible: bool = False
+    looks: Looks | None = None
     doubtful: tuple[Pose2D, float] | None = None
 
 
@@ -63,7 +69,7 @@ class People:
 
     def __init__(self, bounds: Rectangle | None = None) -> None:
         self._bounds = bounds
-        self._possible_people = PossiblePeople()
+        self._suspicions = Suspicions()
         self._tracker = Tracker()
         self._faint: dict[str, list[Placed]] = {}
         self.turned_away = 0
@@ -98,7 +104,7 @@ class People:
         pose = observer.pose_at_stamp(frame.origin.own_s)
         placed = self._place(frame, observer, pose, rule)
         if rule.possible_people:
-            placed = self._suspect(placed, frame.robot_id, at)
+            placed = self._suspect(placed, frame.robot_id, rule, at)
         placed = [
             self._doubt(_match_peer(one, observer, world, at), pose, observer)
             for one in placed
@@ -131,15 +137,21 @@ class People:
         return placed
 
     def _suspect(
-        self, placed: Sequence[Placed], observer: str, at: Instant
+        self, placed: list[Placed], observer: str, rule: DetectionRule, at: Instant
     ) -> list[Placed]:
-        """Raise faint people who are seen again and again to possible ones."""
-        spots = [one.position[:2] for one in placed if _is_suspect(one)]
-        again = set(self._possible_people.seen_again(spots, observer, at))
+        """Raise faint people of whom all looks together are sure enough."""
+        suspects = sorted(filter(_is_suspect, placed), key=_confidence, reverse=True)
+        del suspects[MOST_SUSPECTS:]
+        seen = [FaintPerson(*one.position[:2], _confidence(one)) for one in suspects]
+        known = self._suspicions.look(observer, seen, at)
+        least = rule.threshold_of("person")
+        sure = {
+            id(one): looks
+            for one, looks in zip(suspects, known, strict=True)
+            if one.kind == "faint" and looks.probability >= least
+        }
         return [
-            replace(one, kind="alert", possible=True)
-            if one.kind == "faint" and _is_suspect(one) and one.position[:2] in again
-            else one
+            replace(one, kind="alert", looks=sure[id(one)]) if id(one) in sure else one
             for one in placed
         ]
 
@@ -188,7 +200,7 @@ class People:
                     one.kind,
                     one.class_,
                     self.known[track],
-                    possible=one.possible,
+                    looks=one.looks,
                     doubtful=one.doubtful,
                 )
         return out
@@ -231,7 +243,7 @@ def _placed(
 def _may_be_somebody(detection: Detection, rule: DetectionRule) -> bool:
     """Whether a detection would slow robots if its place were known."""
     verdict = rule.judge(detection.class_id, detection.probability)
-    suspected = verdict.class_ == "person" and detection.probability >= POSSIBLE_FROM
+    suspected = verdict.class_ == "person" and detection.probability >= FAINT_FROM
     return verdict.kind == "alert" or (rule.possible_people and suspected)
 
 
@@ -272,11 +284,15 @@ def _sighting(one: Placed, observer: RobotState, at: Instant) -> Sighting:
         at,
         said.class_id,
         said.probability,
-        one.possible,
+        one.looks,
         reach,
         recording=observer.recording,
     )
 
 
 def _is_suspect(one: Placed) -> bool:
-    return one.class_ == "person" and one.detection.probability >= POSSIBLE_FROM
+    return one.class_ == "person" and one.detection.probability >= FAINT_FROM
+
+
+def _confidence(one: Placed) -> float:
+    return one.detection.probability

@@ -13,6 +13,7 @@ from typing import Literal
 from iveg.domain.detection_rule import Class, DetectionRule
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
+from iveg.domain.tracking.looks import Looks
 
 Stage = Literal["seen", "remembered", "last_seen", "gone"]
 
@@ -23,7 +24,7 @@ class Sighting:
 
     Attributes:
         at: Source moment on our clocks.
-        possible: It was below the threshold, but seen again and again.
+        looks: Why it counts though it was below the threshold; None: it need not.
         reach_m: Where the position is doubtful, x and y are the observer's own, and
             this is how far its camera reaches (m); else 0.
         chain: Number of the chain of sightings whose newest this is; negative: of the
@@ -38,7 +39,7 @@ class Sighting:
     at: Instant
     class_id: str
     confidence: float
-    possible: bool = False
+    looks: Looks | None = None
     reach_m: float = 0.0
     chain: int = 0
     recording: str | None = None
@@ -58,7 +59,7 @@ class Sighting:
             self.at,
             self.class_id,
             self.confidence,
-            self.possible,
+            self.looks,
             self.reach_m,
             chain,
             self.recording,

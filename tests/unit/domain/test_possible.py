@@ -12,9 +12,13 @@ from tests.builders import detection
 from tests.unit.domain.scene import Scene, person
 
 ON = DetectionRule(possible_people=True)
+OFF = DetectionRule(possible_people=False)
+LOOK_S = 0.3
 
 
-def looked(scene: Scene, *chances: float, every_s: float = 0.1, x: float = 5.0) -> None:
+def looked(
+    scene: Scene, *chances: float, every_s: float = LOOK_S, x: float = 5.0
+) -> None:
     """AGI looks at somebody, each time this sure."""
     for chance in chances:
         scene.now += every_s
@@ -22,33 +26,36 @@ def looked(scene: Scene, *chances: float, every_s: float = 0.1, x: float = 5.0) 
         scene.look("AGI", person(x, probability=chance))
 
 
-def test_the_possible_person_is_off_by_default() -> None:
-    scene = Scene()
-    looked(scene, 0.7, 0.7, 0.7, 0.7)
+def test_where_the_rule_says_so_only_single_boxes_count() -> None:
+    scene = Scene(rule=OFF)
+    looked(scene, 0.79, 0.79, 0.79, 0.79)
 
     assert scene.everyone == []
 
 
-def test_three_faint_looks_of_five_make_a_possible_person() -> None:
+def test_two_looks_that_come_to_the_threshold_are_a_person_and_say_why() -> None:
     scene = Scene(rule=ON)
-    looked(scene, 0.7, 0.3, 0.7)
+    looked(scene, 0.7)
     assert scene.everyone == []
 
-    looked(scene, 0.5)
+    looked(scene, 0.7)
 
     (somebody,) = scene.everyone
-    assert somebody.newest.possible
-    assert somebody.newest.confidence == 0.5
+    looks = somebody.newest.looks
+    assert looks is not None
+    assert (looks.count, looks.least, looks.most, looks.over_s) == (2, 0.7, 0.7, 0.3)
+    assert looks.probability == pytest.approx(0.845, abs=0.001)
 
 
 @pytest.mark.parametrize(
     ("chances", "every_s"),
     [
-        ((0.49, 0.7, 0.7), 0.1),
-        ((0.7, 0.3, 0.3, 0.3, 0.7, 0.7), 0.1),
-        ((0.7, 0.7, 0.7), 0.6),
+        ((0.49, 0.7), LOOK_S),
+        ((0.7, 0.7, 0.7), 0.1),
+        ((0.7, 0.7, 0.7), 1.1),
+        ((0.6, 0.6, 0.6), LOOK_S),
     ],
-    ids=["too faint", "three of six", "too slow"],
+    ids=["too faint", "one moment", "too slow", "not sure together"],
 )
 def test_less_is_nobody(chances: tuple[float, ...], every_s: float) -> None:
     scene = Scene(rule=ON)
@@ -57,9 +64,18 @@ def test_less_is_nobody(chances: tuple[float, ...], every_s: float) -> None:
     assert scene.everyone == []
 
 
+def test_a_person_who_is_known_is_kept_by_weak_looks() -> None:
+    scene = Scene(rule=ON)
+    looked(scene, 0.85, 0.55, 0.55)
+
+    (somebody,) = scene.everyone
+    assert somebody.newest.confidence == 0.55
+    assert somebody.newest.looks is not None
+
+
 def test_faint_looks_at_different_places_are_nobody() -> None:
     scene = Scene(rule=ON)
-    for x in (5.0, 6.5, 8.0):
+    for x in (5.0, 8.0, 11.0):
         looked(scene, 0.7, x=x)
 
     assert scene.everyone == []
@@ -78,7 +94,7 @@ def test_a_sure_look_is_possible_no_more() -> None:
     looked(scene, 0.7, 0.7, 0.7, 0.9)
 
     (somebody,) = scene.everyone
-    assert not somebody.newest.possible
+    assert somebody.newest.looks is None
 
 
 def test_a_possible_person_slows_like_any_other() -> None:
