@@ -4,6 +4,7 @@ On the virtual clock, two robots and four people (scenario ``demo``), the rule a
 stands, by detector profile; the same seed gives the same numbers on any machine.
 
     python -m benchmarks.protection --profiles field,simulation --seeds 11,12,13
+    python -m benchmarks.protection --single-boxes
 """
 
 import argparse
@@ -79,9 +80,9 @@ def main() -> None:
     options.add_argument("--profiles", default="field,simulation")
     options.add_argument("--seeds", default="11,12,13")
     options.add_argument("--seconds", type=float, default=600.0)
-    options.add_argument("--possible-people", action="store_true")
+    options.add_argument("--single-boxes", action="store_true")
     asked = options.parse_args()
-    rule = DetectionRule(possible_people=asked.possible_people)
+    rule = DetectionRule(possible_people=not asked.single_boxes)
     rows = []
     for profile in asked.profiles.split(","):
         seeds = [int(one) for one in asked.seeds.split(",")]

@@ -60,7 +60,7 @@ class DetectionRule:
     class_thresholds: Mapping[Class, float] = field(default_factory=dict)
     radius_m: float = LIMITS.ring_default_m
     aliases: Mapping[str, Class] = field(default_factory=lambda: ALIASES)
-    possible_people: bool = False
+    possible_people: bool = True
     author: str = "settings"
     since: float | None = None
 

@@ -160,9 +160,16 @@ def _line(one: Placed, robot_id: str, subject: str) -> LogEvent:
         "y": round(y, 2),
         "person": subject,
     }
-    key = _KEYS[one.kind]
+    key, looks = _KEYS[one.kind], one.looks
     if one.doubtful is not None:
         key = "log.detection_doubtful"
-    elif one.looks is not None:
+    elif looks is not None:
         key = "log.detection_possible"
+        slots |= {
+            "looks": looks.count,
+            "least": looks.least,
+            "most": looks.most,
+            "over": looks.over_s,
+            "probability": round(looks.probability, 4),
+        }
     return LogEvent("detection", key, slots, robot_id, one.class_)

@@ -10,6 +10,7 @@ from iveg.domain.observations import Instant
 from iveg.domain.records import AlertRecord, DecisionRecord
 from iveg.domain.rule.speed_limits import Crossing
 from iveg.domain.rule.zones import Zone
+from iveg.domain.tracking.looks import Looks
 from iveg.domain.world import World
 
 
@@ -90,8 +91,12 @@ def _parameters(rule: DetectionRule, zone: Zone) -> dict[str, object]:
         "ring_m": round(zone.radius_m, 3),
         "author": rule.author,
         "possible": looks is not None,
-        "looks": None if looks is None else asdict(looks),
+        "looks": None if looks is None else _looks(looks),
     }
+
+
+def _looks(looks: Looks) -> dict[str, object]:
+    return asdict(looks) | {"probability": round(looks.probability, 4)}
 
 
 def _link(link: Link) -> dict[str, object]:

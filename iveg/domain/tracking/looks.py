@@ -48,6 +48,10 @@ class Looks:
     over_s: float
     probability: float
 
+    def reach(self, threshold: float) -> bool:
+        """Whether they are enough together; one look alone is a box like any other."""
+        return self.count > 1 and self.probability >= threshold
+
 
 @dataclass(frozen=True, slots=True)
 class FaintPerson:
@@ -121,7 +125,7 @@ class _Suspect:
             self.least,
             self.most,
             round(self.seen_at - self.first_at, 3),
-            round(1.0 / (1.0 + math.exp(-self._log_odds)), 4),
+            1.0 / (1.0 + math.exp(-self._log_odds)),
         )
 
 

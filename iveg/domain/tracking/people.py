@@ -148,7 +148,7 @@ class People:
         sure = {
             id(one): looks
             for one, looks in zip(suspects, known, strict=True)
-            if one.kind == "faint" and looks.probability >= least
+            if one.kind == "faint" and looks.reach(least)
         }
         return [
             replace(one, kind="alert", looks=sure[id(one)]) if id(one) in sure else one

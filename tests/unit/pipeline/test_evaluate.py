@@ -499,12 +499,36 @@ def test_a_possible_person_is_told_as_such_where_the_rule_counts_them() -> None:
     desk = watched(Desk())
     desk.evaluator.rule = DetectionRule(possible_people=True)
     # Faint looks at one spot are told once; the possible one is another line.
-    for _ in range(3):
-        desk.clock.now += 0.1
-        desk.look("AGI", detection("farmer", 5.0, probability=0.7))
+    for confidence in (0.7, 0.68, 0.75):
+        desk.clock.now += 0.3
+        desk.look("AGI", detection("farmer", 5.0, probability=confidence))
 
     assert desk.sentences().count("log.detection_faint") == 1
     assert desk.sentences().count("log.detection_possible") == 1
+    (line,) = [
+        one for one in desk.event_log.lines if one.key == "log.detection_possible"
+    ]
+    told = [line.slots[name] for name in ("looks", "least", "most", "over")]
+    assert told == [2, 0.68, 0.7, 0.3]
+    assert line.slots["probability"] == 0.8322
+
+
+def test_the_record_of_a_possible_person_says_from_how_many_looks() -> None:
+    desk = watched(Desk())
+    for _ in range(2):
+        desk.clock.now += 0.3
+        desk.drive("AGI", 0.0)
+        desk.look("AGII", detection("farmer", 1.5, probability=0.75))
+
+    record = desk.records(DecisionRecord)[-1]
+    assert isinstance(record, DecisionRecord)
+    assert record.rule_parameters["looks"] == {
+        "count": 2,
+        "least": 0.75,
+        "most": 0.75,
+        "over_s": 0.3,
+        "probability": 0.9,
+    }
 
 
 def test_looks_at_ever_new_things_do_not_fill_the_memory() -> None:

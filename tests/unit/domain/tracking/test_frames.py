@@ -170,6 +170,7 @@ def test_a_person_in_a_frame_that_nobody_described_is_not_placed_but_counted() -
 
 def test_a_thing_in_a_frame_that_nobody_described_is_named_and_not_counted() -> None:
     scene = scene_of("AGI")
+    scene.rule = replace(scene.rule, possible_people=False)
     faint = replace(somebody("AGI", "map", "odom"), probability=0.6)
 
     scene.look("AGI", Detection("tomato", 0.9, box_at(1.0, 0.0), "odom"), faint)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.tracking.sight import visible_from
 from tests.builders import at, detection
 from tests.unit.domain.scene import HEDGE, Scene, person
@@ -84,8 +85,19 @@ def test_somebody_who_is_still_seen_keeps_the_ring() -> None:
     assert scene.everyone[0].sightings
 
 
-def test_somebody_who_is_seen_faintly_keeps_the_ring() -> None:
+def test_somebody_who_is_seen_faintly_has_a_ring_all_the_time() -> None:
     scene = remembered(Scene())
+    for _ in range(30):
+        scene.drive("AGI", 0.0, linear=0.0)
+        scene.look("AGI", person(4.0, probability=0.6))
+        scene.sweep()
+        scene.now = round(scene.now + 0.1, 6)
+
+        assert any(one.x == 4.0 for p in scene.everyone for one in p.sightings)
+
+
+def test_where_only_single_boxes_count_a_faint_one_keeps_the_ring() -> None:
+    scene = remembered(Scene(rule=DetectionRule(possible_people=False)))
     for _ in range(30):
         scene.drive("AGI", 0.0, linear=0.0)
         scene.look("AGI", person(4.0, probability=0.6))

@@ -34,7 +34,7 @@ async def test_the_first_version_is_that_of_the_settings() -> None:
     assert (told["confidence_threshold"], told["radius_m"]) == (0.8, 2.0)
     assert told["factor"] == 0.5
     assert told["aliases"]["farmer"] == "person"
-    assert told["possible_people"] is False
+    assert told["possible_people"] is True
 
 
 async def test_a_change_is_a_new_version_with_author_and_time() -> None:
