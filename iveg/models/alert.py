@@ -5,8 +5,10 @@ from typing import cast
 from pydantic import Field
 
 from iveg.domain.alerts import alert_book, flood
+from iveg.domain.alerts.stored import read_occurrence
 from iveg.domain.messages import Channel, MessageDelivery, Priority
-from iveg.domain.records import AlertRecord, Json, LogRecord
+from iveg.domain.observations import Instant
+from iveg.domain.records import AlertRecord, LogRecord
 from iveg.domain.stamps import format_stamp
 from iveg.models.base import Listing, Model, Slots, moment, stamp
 
@@ -24,16 +26,6 @@ class Told(Model):
         """One that is in memory."""
         at = format_stamp(one.at.wall)
         return cls(channel=one.channel, to=one.to, at=at, failed=one.failed)
-
-    @classmethod
-    def of_object(cls, one: Json) -> "Told":
-        """One that is remembered."""
-        return cls(
-            channel=one["channel"],
-            to=one["to"],
-            at=format_stamp(one["at"]),
-            failed=one.get("failed"),
-        )
 
 
 class Occurrence(Model):
@@ -58,19 +50,6 @@ class Occurrence(Model):
             acknowledged_by=one.acknowledged_by,
             note=one.note or None,
             told=[Told.of(told) for told in one.deliveries],
-        )
-
-    @classmethod
-    def of_object(cls, one: Json) -> "Occurrence":
-        """One that is remembered."""
-        return cls(
-            priority=one["priority"],
-            raised_at=format_stamp(one["raised_at"]),
-            cleared_at=stamp(one.get("cleared_at")),
-            acknowledged_at=stamp(one.get("acknowledged_at")),
-            acknowledged_by=one.get("acknowledged_by"),
-            note=one.get("note"),
-            told=[Told.of_object(told) for told in one.get("told", ())],
         )
 
 
@@ -120,7 +99,9 @@ class Alert(Model):
     @classmethod
     def of_record(cls, record: AlertRecord) -> "Alert":
         """One alert as it is remembered."""
-        members = [Occurrence.of_object(one) for one in record.members]
+        members = [
+            Occurrence.of(read_occurrence(one, _by_the_wall)) for one in record.members
+        ]
         return cls(
             alert_id=record.alert_id,
             priority=cast("Priority", record.priority),
@@ -137,6 +118,11 @@ class Alert(Model):
             told=members[-1].told if members else [],
             members=members,
         )
+
+
+def _by_the_wall(seconds: float) -> Instant:
+    """A moment of an earlier run, of which only the wall clock is shown."""
+    return Instant(0.0, seconds)
 
 
 class Flood(Model):

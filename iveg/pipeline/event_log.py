@@ -8,9 +8,10 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, replace
 from functools import wraps
-from typing import Any, Concatenate, ParamSpec
+from typing import Concatenate, ParamSpec
 
-from iveg.domain.alerts.alert_book import AlertOccurrence, BookedAlert
+from iveg.domain.alerts.alert_book import BookedAlert
+from iveg.domain.alerts.stored import write_occurrence
 from iveg.domain.decisions import SlowdownDecision
 from iveg.domain.events import LogEvent
 from iveg.domain.kinds import Kind
@@ -335,27 +336,7 @@ class EventLog:
                 acknowledged_by=last.acknowledged_by,
                 note=last.note or None,
                 count=alert.count,
-                members=[_member(one) for one in alert.members],
+                members=[write_occurrence(one) for one in alert.members],
             )
         )
         self.changed(topics.ALERTS.name)
-
-
-def _member(one: AlertOccurrence) -> dict[str, Any]:
-    return {
-        "priority": one.priority,
-        "raised_at": one.raised.wall,
-        "cleared_at": wall_of(one.cleared),
-        "acknowledged_at": wall_of(one.acknowledged),
-        "acknowledged_by": one.acknowledged_by,
-        "note": one.note or None,
-        "told": [
-            {
-                "channel": told.channel,
-                "to": told.to,
-                "at": told.at.wall,
-                "failed": told.failed,
-            }
-            for told in one.deliveries
-        ],
-    }

@@ -6,17 +6,19 @@ that earlier alerts are unknown.
 """
 
 import asyncio
-from collections.abc import Mapping, Sequence
-from typing import Any, Protocol, cast
+from collections.abc import Sequence
+from functools import partial
+from typing import Protocol, cast
 
 from iveg.domain.alerts.alert_book import (
     MOST_KEPT,
     AlertOccurrence,
     BookedAlert,
 )
+from iveg.domain.alerts.stored import read_occurrence
 from iveg.domain.errors import HopError
 from iveg.domain.events import Condition
-from iveg.domain.messages import MessageDelivery, Priority
+from iveg.domain.messages import Priority
 from iveg.domain.observations import Instant
 from iveg.domain.records import (
     AlertRecord,
@@ -93,7 +95,8 @@ def alert_of(record: AlertRecord, now: Instant) -> BookedAlert:
     if record.cleared_at is None:
         record = cleared_behind(record, now.wall)
     priority = cast("Priority", record.priority)
-    members = tuple(_occurrence(one, now) for one in record.members)
+    moment = partial(_moment, now=now)
+    members = tuple(read_occurrence(one, moment) for one in record.members)
     last = AlertOccurrence(
         priority,
         _moment(record.last_raised_at, now),
@@ -120,24 +123,6 @@ def _subject(record: AlertRecord) -> str:
     if record.robot_id is None or "person" in record.slots:
         return record.alert_id
     return record.robot_id
-
-
-def _occurrence(stored: Mapping[str, Any], now: Instant) -> AlertOccurrence:
-    cleared, seen = stored["cleared_at"], stored["acknowledged_at"]
-    return AlertOccurrence(
-        stored["priority"],
-        _moment(stored["raised_at"], now),
-        None if cleared is None else _moment(cleared, now),
-        None if seen is None else _moment(seen, now),
-        stored["acknowledged_by"],
-        stored["note"] or "",
-        tuple(_delivery(one, now) for one in stored.get("told", ())),
-    )
-
-
-def _delivery(one: Mapping[str, Any], now: Instant) -> MessageDelivery:
-    at = _moment(one["at"], now)
-    return MessageDelivery(one["channel"], one["to"], at, one["failed"])
 
 
 def _moment(wall: float, now: Instant) -> Instant:
