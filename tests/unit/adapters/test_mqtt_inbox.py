@@ -9,6 +9,7 @@ import struct
 import threading
 from collections.abc import Callable, Iterator
 
+import aiomqtt
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -286,16 +287,33 @@ def test_what_is_no_telemetry_is_left_to_the_library() -> None:
     assert begun == b"\x40\x02"
 
 
-async def test_the_private_parts_of_the_libraries_are_those_that_are_known() -> None:
-    """aiomqtt 2.5 and paho 2.1: a version that moves one of them fails here."""
-    client = TelemetryClient("nowhere", on_telemetry=lambda _: None)
-    reads = inspect.getsource(paho.Client._sock_recv)
+MOVED = "docs/decisions/0005-newest-telemetry.md: a private part has moved: "
 
-    assert client._client.on_socket_open == client._on_socket_open
-    assert isinstance(client._disconnected, asyncio.Future)
-    assert client._loop is asyncio.get_running_loop()
-    assert "self._sock.recv(" in reads
-    assert client._client._sock is None
+
+async def test_the_private_parts_of_the_libraries_are_those_that_are_known() -> None:
+    client = TelemetryClient("nowhere", on_telemetry=lambda _: None)
+    opened = list(inspect.signature(aiomqtt.Client._on_socket_open).parameters)
+
+    assert isinstance(client._client, paho.Client), MOVED + "Client._client"
+    assert client._client._sock is None, MOVED + "paho's _sock"
+    assert isinstance(client._disconnected, asyncio.Future), MOVED + "_disconnected"
+    assert client._loop is asyncio.get_running_loop(), MOVED + "_loop"
+    assert opened == ["self", "client", "userdata", "sock"], MOVED + "_on_socket_open"
+
+
+def test_paho_reads_from_the_socket_that_it_was_given() -> None:
+    client = paho.Client(paho.CallbackAPIVersion.VERSION2)
+    far, near = socket.socketpair()
+    with far, near:
+        near.setblocking(False)
+        read = client._sock = ReadAhead(near, lambda _: None)
+        far.sendall(b"\xe0\x00")
+        assert read.read()
+
+        client.loop_read()
+
+        assert not read.pending(), MOVED + "paho's _sock"
+        client._sock = None
 
 
 @pytest.mark.parametrize("packet", [publish_packet, confirmed_packet])
