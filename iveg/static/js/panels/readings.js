@@ -70,7 +70,7 @@ function drawGauge(row, gauge, label) {
 
 function makeRow() {
   const row = make("p", "card__line");
-  const meter = make("meter", "card__gauge");
+  const meter = make("meter", "card__meter");
   meter.hidden = true;
   row.append(make("span", "card__label"), " ", meter, make("span"));
   return row;
