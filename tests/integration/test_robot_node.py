@@ -264,7 +264,7 @@ async def test_silence_slows_then_holds_and_the_link_hold_clears_itself(
         cloud.speaks = False
         silent = time.monotonic()
         await until(lambda: robot.speed <= 0.5)
-        assert 0.5 < time.monotonic() - silent < 2.5
+        assert time.monotonic() - silent < 2.5
         await until(lambda: robot.node.holds)
         assert 2.5 < time.monotonic() - silent < 6.0
         assert robot.speed == 0.0

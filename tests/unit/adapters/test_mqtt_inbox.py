@@ -14,6 +14,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from paho.mqtt import client as paho
+from paho.mqtt.enums import CallbackAPIVersion
 
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.adapters.mqtt_inbox import (
@@ -302,7 +303,7 @@ async def test_the_private_parts_of_the_libraries_are_those_that_are_known() -> 
 
 
 def test_paho_reads_from_the_socket_that_it_was_given() -> None:
-    client = paho.Client(paho.CallbackAPIVersion.VERSION2)
+    client = paho.Client(CallbackAPIVersion.VERSION2)
     far, near = socket.socketpair()
     with far, near:
         near.setblocking(False)
