@@ -85,6 +85,8 @@ class TelemetryClient(aiomqtt.Client):
         )
         self._on_telemetry = on_telemetry
         self._apart_s = apart_s
+        # Who waits for the end hears why; where nobody does, nobody is missing it.
+        self._disconnected.add_done_callback(_retrieve)
 
     def _on_socket_open(self, client: paho.Client, userdata: Any, sock: Any) -> None:
         # Paho reads from this; it has no public way to say which socket.
@@ -119,6 +121,12 @@ class TelemetryClient(aiomqtt.Client):
         """After a rest: the connection may have ended meanwhile."""
         if line is self._client._sock:
             self._read(line)
+
+
+def _retrieve(ended: asyncio.Future[Any]) -> None:
+    """Look at an exception, so that asyncio does not complain that nobody did."""
+    if not ended.cancelled():
+        ended.exception()
 
 
 class ReadAhead:
