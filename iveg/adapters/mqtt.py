@@ -200,23 +200,22 @@ class MqttLink:
     async def _send_offered(self, client: TelemetryClient) -> None:
         self._in_flight = 0
         self._room.set()
+        if not self._offered:
+            self._drained.set()
         async with asyncio.TaskGroup() as tasks:
             while True:
                 await self._wake.wait()
                 self._wake.clear()
                 while self._offered:
                     offered, self._offered = self._offered, {}
-                    sending = [
-                        (
-                            qos,
-                            tasks.create_task(self._send(client, topic, payload, qos)),
-                        )
-                        for topic, (payload, qos) in offered.items()
-                    ]
-                    if confirmed := [task for qos, task in sending if qos]:
+                    confirmed = []
+                    for topic, (payload, qos) in offered.items():
+                        sending = self._send(client, topic, payload, qos)
+                        task = tasks.create_task(sending)
+                        confirmed += [task] if qos else []
+                    if confirmed:
                         await asyncio.wait(confirmed)
                     await self._room.wait()
-                self._drained.set()
 
     def _send(
         self, client: TelemetryClient, topic: str, payload: bytes, qos: int
