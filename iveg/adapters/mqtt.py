@@ -8,27 +8,27 @@ telemetry.
 
 import asyncio
 import logging
-import math
 import random
 import socket
 import ssl
-from collections.abc import Callable, Coroutine, Mapping
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
 from urllib.parse import unquote, urlsplit
 
 import aiomqtt
 
 from iveg.adapters.log_filter import quiet
-from iveg.adapters.mqtt_inbox import Arrived, TelemetryClient
+from iveg.adapters.mqtt_inbox import Arrived, Qos1Message
+from iveg.adapters.mqtt_outbox import OutboxClient
 from iveg.domain.errors import HopError
 
 _log = logging.getLogger(__name__)
 # aiomqtt's own: it complains of every message that finds no room or no confirmation.
 quiet("mqtt")
 NODELAY = [(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)]
-MOST_IN_FLIGHT = 256 * 1024
-"""Of messages that the socket has not taken yet (bytes)."""
+MOST_EARLY = 2000
+"""Messages at QoS 1 that wait until all subscriptions stand; the oldest give way."""
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.2, 2.0
 _KEEPALIVE_S = 5
 _ANSWERED_WITHIN_S, _CONFIRMED_WITHIN_S = 5.0, 1.5
@@ -90,12 +90,12 @@ class MqttLink:
         self.attach(
             subscriptions or {}, on_message, on_connect, on_loss, on_passed_over
         )
-        self._client: TelemetryClient | None = None
+        self._client: OutboxClient | None = None
         self._offered: dict[str, tuple[bytes, int]] = {}
+        self._early: deque[Qos1Message] = deque(maxlen=MOST_EARLY)
+        """Came before all subscriptions were in place, when nothing can be answered."""
         self._wake, self._drained = asyncio.Event(), asyncio.Event()
         self._drained.set()
-        self._room = asyncio.Event()
-        self._in_flight = 0
         self._loss_told = False
         self._mistake: Exception | None = None
         self.replaced = 0
@@ -157,7 +157,7 @@ class MqttLink:
 
     async def _session(self) -> None:
         address = self._address
-        async with TelemetryClient(
+        async with OutboxClient(
             address.host,
             address.port,
             username=address.user,
@@ -166,9 +166,10 @@ class MqttLink:
             timeout=_ANSWERED_WITHIN_S,
             tls_context=ssl.create_default_context() if address.tls else None,
             socket_options=NODELAY,
-            on_telemetry=self._hand_telemetry,
+            take=self._take,
             apart_s=self._apart_s,
         ) as client:
+            self._early.clear()
             for topic_filter, qos in self._subscriptions.items():
                 await client.subscribe(topic_filter, qos=qos)
             _heed_cancellation()
@@ -181,71 +182,51 @@ class MqttLink:
                 self._send_offered(client), name=f"mqtt-send-{self._name}"
             )
             try:
-                async for message in client.messages:
-                    self._on_message(str(message.topic), message.payload)
+                self._hand_qos1(self._early)
+                await client.lost()
             finally:
                 sender.cancel()
 
-    def _hand_telemetry(self, arrived: Arrived) -> None:
+    def _take(self, arrived: Arrived) -> None:
         """A mistake of ours in here must end ``run``, and not the connection alone."""
         try:
             for topic, count in arrived.passed_over.items():
                 self._on_passed_over(topic, count)
             for topic, payload in arrived.telemetry.items():
                 self._on_message(topic, payload)
+            if self._client is None:
+                self._early.extend(arrived.qos1)
+            else:
+                self._hand_qos1(arrived.qos1)
         except Exception as error:
             self._mistake = error
             raise
 
-    async def _send_offered(self, client: TelemetryClient) -> None:
-        self._in_flight = 0
-        self._room.set()
-        if not self._offered:
+    def _hand_qos1(self, messages: Iterable[Qos1Message]) -> None:
+        for message in messages:
+            self._on_message(message.topic, message.payload)
+
+    async def _send_offered(self, client: OutboxClient) -> None:
+        while True:
+            await self._wake.wait()
+            self._wake.clear()
+            while self._offered:
+                offered, self._offered = self._offered, {}
+                client.send(_of_qos(0, offered))
+                if confirmed := _of_qos(1, offered):
+                    await self._send_confirmed(client, confirmed)
+                await client.written()
             self._drained.set()
-        async with asyncio.TaskGroup() as tasks:
-            while True:
-                await self._wake.wait()
-                self._wake.clear()
-                while self._offered:
-                    offered, self._offered = self._offered, {}
-                    confirmed = []
-                    for topic, (payload, qos) in offered.items():
-                        sending = self._send(client, topic, payload, qos)
-                        task = tasks.create_task(sending)
-                        confirmed += [task] if qos else []
-                    if confirmed:
-                        await asyncio.wait(confirmed)
-                    await self._room.wait()
 
-    def _send(
-        self, client: TelemetryClient, topic: str, payload: bytes, qos: int
-    ) -> Coroutine[Any, Any, None]:
-        """Count a message as under way until the socket has it, or the broker.
-
-        While too much is, newer messages of a topic take the place of older ones.
-        """
-        size = len(topic) + len(payload)
-        self._in_flight += size
-        if self._in_flight > MOST_IN_FLIGHT:
-            self._room.clear()
-        return self._sent(client, topic, payload, qos, size)
-
-    async def _sent(
-        self, client: TelemetryClient, topic: str, payload: bytes, qos: int, size: int
+    async def _send_confirmed(
+        self, client: OutboxClient, messages: list[tuple[str, bytes]]
     ) -> None:
-        within_s = _ANSWERED_WITHIN_S if qos else math.inf
         try:
-            await client.publish(topic, payload, qos, timeout=within_s)
-        except aiomqtt.MqttError as error:
+            await client.confirmed(messages, _ANSWERED_WITHIN_S)
+        except aiomqtt.MqttError:
             # A broker that is slow to confirm may still be there; when it is gone, the
             # session ends and this task with it.
-            _log.debug("%s: not confirmed: %s", self._name, error)
-        finally:
-            self._in_flight -= size
-            if self._in_flight <= MOST_IN_FLIGHT:
-                self._room.set()
-            if not (self._in_flight or self._offered):
-                self._drained.set()
+            _log.debug("%s: not all of %d confirmed", self._name, len(messages))
 
     def enqueue(self, topic: str, payload: bytes, qos: int = 0) -> None:
         """Send when possible; a newer message of the topic takes its place."""
@@ -271,13 +252,24 @@ class MqttLink:
         if client is None:
             raise HopError("mqtt", "not connected")
         try:
-            await client.publish(
-                topic, payload, qos, retain, timeout=_CONFIRMED_WITHIN_S
-            )
+            within_s = _CONFIRMED_WITHIN_S
+            if qos:
+                await client.confirmed([(topic, payload)], within_s, retain=retain)
+            else:
+                await client.publish(topic, payload, retain=retain, timeout=within_s)
         except aiomqtt.MqttError as error:
             _heed_cancellation()
             raise HopError("mqtt", str(error)) from error
         _heed_cancellation()
+
+
+def _of_qos(
+    wanted: int, offered: Mapping[str, tuple[bytes, int]]
+) -> list[tuple[str, bytes]]:
+    """The offered topics and payloads of one quality of service."""
+    return [
+        (topic, payload) for topic, (payload, qos) in offered.items() if qos == wanted
+    ]
 
 
 def _heed_cancellation() -> None:

@@ -1,12 +1,12 @@
-"""Reading telemetry: all that has arrived in one call, and of a topic only the newest.
+"""Reading MQTT: all that has arrived in one call, and of telemetry only the newest.
 
 The client library reads a packet's parts one by one from the socket, one packet a turn
 of the loop, and makes two tasks for each message.  While the loop has much else to do,
 that is slower than a fleet sends: messages on the wire grow old, and robots' answers to
-a STOP behind them.  Here messages at QoS 0 are read; the rest is left to it.
+a STOP behind them.  Here messages and PUBACKs are read; the rest is left to it.
 
-No other place touches private parts of aiomqtt and paho; neither has a public way to
-read several packets at once (docs/decisions/0005-newest-telemetry.md).
+This file and ``mqtt_outbox`` alone touch private parts of aiomqtt and paho
+(docs/decisions/0005-past-the-mqtt-library.md).
 """
 
 import asyncio
@@ -14,22 +14,36 @@ import socket
 import ssl
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from typing import Any
 
 import aiomqtt
 from paho.mqtt import client as paho
 
-from iveg.adapters.mqtt_packets import PUBLISH, RETAINED, packet_bounds
+from iveg.adapters.mqtt_packets import (
+    DUPLICATE,
+    PUBACK,
+    PUBLISH,
+    QOS_1,
+    RETAINED,
+    packet_bounds,
+)
 
 READ_AHEAD = 1 << 20
 """Taken from the wire in one call (bytes): more than comes in a long turn of the loop.
 
 What is passed over has to be what is old, and the oldest waits in the socket.
 """
-MOST_WAITING = 2000
-"""Messages at QoS 1 that wait to be handed over; the oldest give way."""
+_TELEMETRY, _CONFIRMED = PUBLISH, PUBLISH | QOS_1
+"""First bytes of a PUBLISH at QoS 0 and at QoS 1, without flags."""
 
-_T = TypeVar("_T")
+
+@dataclass(frozen=True, slots=True)
+class Qos1Message:
+    """A message at QoS 1, and its packet identifier."""
+
+    topic: str
+    payload: bytes
+    packet_id: int
 
 
 @dataclass(slots=True)
@@ -39,58 +53,53 @@ class Arrived:
     Attributes:
         telemetry: The newest payload at QoS 0 by topic.
         passed_over: How many older ones of a topic there were.
+        qos1: Everything that was sent at QoS 1, in order.
+        pubacks: Packet identifiers of our own messages that the broker has.
         others: Packets that are the library's to read.
     """
 
     telemetry: dict[str, bytes] = field(default_factory=dict)
     passed_over: dict[str, int] = field(default_factory=dict)
+    qos1: list[Qos1Message] = field(default_factory=list)
+    pubacks: list[int] = field(default_factory=list)
     others: bytes = b""
 
 
 Take = Callable[[Arrived], None]
 
 
-class _NewestQueue(asyncio.Queue[_T]):
-    """A queue that makes room."""
-
-    def put_nowait(self, item: _T) -> None:
-        """Put one in; the oldest gives way where there is no room."""
-        if self.full():
-            self.get_nowait()
-        super().put_nowait(item)
-
-
-class TelemetryClient(aiomqtt.Client):
-    """A client that reads all telemetry that has arrived, and then rests.
+class InboxClient(aiomqtt.Client):
+    """A client that reads all that has arrived, and then rests.
 
     A fleet sends hundreds of messages in a second, and each event costs as much as
     reading one of them: what comes within ``apart_s`` is read together.
 
-    Messages at QoS 1 come by ``messages``, in their order.  It speaks MQTT 3.1.1.
-
     Args:
-        on_telemetry: Called with what has come at QoS 0.
+        take: Told what has come.  It speaks MQTT 3.1.1.
         apart_s: Least time between two readings (s); 0: whenever something comes.
     """
 
     def __init__(
-        self, *args: Any, on_telemetry: Take, apart_s: float = 0.0, **kwargs: Any
+        self, *args: Any, take: Take, apart_s: float = 0.0, **kwargs: Any
     ) -> None:
-        super().__init__(
-            *args,
-            protocol=aiomqtt.ProtocolVersion.V311,
-            queue_type=_NewestQueue,
-            max_queued_incoming_messages=MOST_WAITING,
-            **kwargs,
-        )
-        self._on_telemetry = on_telemetry
+        super().__init__(*args, protocol=aiomqtt.ProtocolVersion.V311, **kwargs)
+        self._take = take
         self._apart_s = apart_s
         # Who waits for the end hears why; where nobody does, nobody is missing it.
         self._disconnected.add_done_callback(_retrieve)
 
+    async def lost(self) -> None:
+        """Wait for the end of the connection.
+
+        Raises:
+            MqttError: it has ended.
+        """
+        async for _ in self.messages:
+            """Nothing that anybody subscribes to comes this way."""
+
     def _on_socket_open(self, client: paho.Client, userdata: Any, sock: Any) -> None:
         # Paho reads from this; it has no public way to say which socket.
-        line = client._sock = ReadAhead(sock, self._on_telemetry)
+        line = client._sock = ReadAhead(sock, self._take)
         super()._on_socket_open(client, userdata, line)
         # In place of the reader that has just been asked for, from the same thread.
         self._loop.call_soon_threadsafe(self._listen, line)
@@ -102,7 +111,7 @@ class TelemetryClient(aiomqtt.Client):
     def _read(self, line: "ReadAhead") -> None:
         """Read what is there; then rest, or wait for an event if there was nothing."""
         try:
-            has_come = line.read()
+            has_come = line.take()
             while line is self._client._sock and line.pending():
                 self._client.loop_read()
         except Exception as error:  # as aiomqtt: the connection broke
@@ -135,9 +144,9 @@ class ReadAhead:
     One only, so that a flood from the broker leaves the loop its other work.
     """
 
-    def __init__(self, inner: socket.socket, on_telemetry: Take) -> None:
+    def __init__(self, inner: socket.socket, take: Take) -> None:
         self._inner = inner
-        self._on_telemetry = on_telemetry
+        self._tell = take
         self._begun = b""
         """Of a packet that is not whole yet."""
         self._held = memoryview(b"")
@@ -151,16 +160,15 @@ class ReadAhead:
         """Whether the library has something to read: its packets, or the end."""
         return self._has_ended or bool(self._held)
 
-    def read(self) -> bool:
-        """Read what has come from the wire; whether anything had, or it has ended."""
+    def take(self) -> bool:
+        """Take what has come from the wire; whether anything had, or it has ended."""
         came = self._came()
         if came is None:
             return False
         self._has_ended = not came
         arrived, self._begun = sort_packets(self._begun + came)
         self._held = memoryview(arrived.others)
-        if arrived.telemetry:
-            self._on_telemetry(arrived)
+        self._tell(arrived)
         return True
 
     def recv(self, size: int) -> bytes:
@@ -190,10 +198,11 @@ class ReadAhead:
 
 
 def sort_packets(read: bytes) -> tuple[Arrived, bytes]:
-    """Tell telemetry from other packets.
+    """Tell messages and PUBACKs from other packets.
 
     A reader that falls behind must not read ever older news: of a topic's telemetry
-    (QoS 0) the newest is kept.
+    (QoS 0) the newest is kept.  Of what was sent at QoS 1 (orders, answers, safety
+    reports) all is.
 
     Returns:
         What has come, and what was read of a packet that is not whole yet.
@@ -202,17 +211,32 @@ def sort_packets(read: bytes) -> tuple[Arrived, bytes]:
     place = 0
     while (found := _packet_at(read, place)) is not None:
         body, end = found
-        name = body + 2 + int.from_bytes(read[body : body + 2], "big")
-        if read[place] & ~RETAINED == PUBLISH and name <= end:
-            topic = read[body + 2 : name].decode(errors="replace")
-            if topic in arrived.telemetry:
-                arrived.passed_over[topic] = arrived.passed_over.get(topic, 0) + 1
-            arrived.telemetry[topic] = read[name:end]
-        else:
+        if not _is_ours(arrived, read, place, body, end):
             others.append(read[place:end])
         place = end
     arrived.others = b"".join(others)
     return arrived, read[place:]
+
+
+def _is_ours(arrived: Arrived, read: bytes, place: int, body: int, end: int) -> bool:
+    kind, head = read[place], int.from_bytes(read[body : body + 2], "big")
+    if kind == PUBACK and end == body + 2:
+        arrived.pubacks.append(head)
+        return True
+    name = body + 2 + head
+    if kind & ~RETAINED == _TELEMETRY and name <= end:
+        topic = read[body + 2 : name].decode(errors="replace")
+        if topic in arrived.telemetry:
+            older = arrived.passed_over.get(topic, 0)
+            arrived.passed_over[topic] = older + 1
+        arrived.telemetry[topic] = read[name:end]
+        return True
+    if kind & ~(RETAINED | DUPLICATE) == _CONFIRMED and name + 2 <= end:
+        topic = read[body + 2 : name].decode(errors="replace")
+        number = int.from_bytes(read[name : name + 2], "big")
+        arrived.qos1.append(Qos1Message(topic, read[name + 2 : end], number))
+        return True
+    return False
 
 
 def _packet_at(read: bytes, place: int) -> tuple[int, int] | None:

@@ -16,12 +16,12 @@ from hypothesis import strategies as st
 from paho.mqtt import client as paho
 from paho.mqtt.enums import CallbackAPIVersion
 
-from iveg.adapters.mqtt import BrokerAddress, MqttLink
+from iveg.adapters.mqtt import MOST_EARLY, BrokerAddress, MqttLink
 from iveg.adapters.mqtt_inbox import (
-    MOST_WAITING,
     Arrived,
+    InboxClient,
+    Qos1Message,
     ReadAhead,
-    TelemetryClient,
     sort_packets,
 )
 from iveg.adapters.mqtt_packets import publish_packet
@@ -44,7 +44,7 @@ def test_an_event_takes_from_the_wire_once_however_much_there_is(
 ) -> None:
     far, near = line
     far.sendall(2 * PONG)
-    assert near.read()
+    assert near.take()
     assert near.recv(1) == PONG[:1]
     far.sendall(PONG)
     assert near.pending()
@@ -52,19 +52,19 @@ def test_an_event_takes_from_the_wire_once_however_much_there_is(
     assert not near.pending()
     with pytest.raises(BlockingIOError):
         near.recv(1)
-    assert near.read()
+    assert near.take()
     assert near.recv(9) == PONG
-    assert not near.read()
+    assert not near.take()
 
 
 def test_an_end_of_the_line_is_an_end(line: tuple[socket.socket, ReadAhead]) -> None:
     far, near = line
     far.sendall(PONG)
     far.close()
-    assert near.read()
+    assert near.take()
     assert near.recv(9) == PONG
     assert not near.pending()
-    assert near.read()
+    assert near.take()
     assert near.pending()
     assert near.recv(9) == b""
 
@@ -77,7 +77,7 @@ def test_a_line_that_was_reset_has_ended() -> None:
     there.close()
     with here:
         near = ReadAhead(here, lambda *_: None)
-        assert near.read()
+        assert near.take()
         assert near.recv(9) == b""
 
 
@@ -132,7 +132,7 @@ async def test_of_what_came_before_the_subscriptions_stood_the_newest_are_kept()
     None
 ):
     heard: list[int] = []
-    early = (confirmed_packet("t", b"%d" % n) for n in range(MOST_WAITING + 500))
+    early = (confirmed_packet("t", b"%d" % n) for n in range(MOST_EARLY + 500))
     with talking(b"", b"".join(early)) as port:
         link = MqttLink(
             BrokerAddress("127.0.0.1", port),
@@ -142,12 +142,12 @@ async def test_of_what_came_before_the_subscriptions_stood_the_newest_are_kept()
         )
         reading = asyncio.create_task(link.run())
         async with asyncio.timeout(20.0):
-            while len(heard) < MOST_WAITING:  # noqa: ASYNC110 - no event
+            while not heard:  # noqa: ASYNC110 - no event
                 await asyncio.sleep(0.005)
         reading.cancel()
         await asyncio.gather(reading, return_exceptions=True)
 
-    assert heard == [*range(500, MOST_WAITING + 500)]
+    assert heard == [*range(500, MOST_EARLY + 500)]
 
 
 REST_S = 0.1
@@ -164,7 +164,7 @@ async def test_what_comes_during_a_rest_is_read_together_after_it() -> None:
     here, there = socket.socketpair()
     with here, there:
         here.setblocking(False)
-        client = TelemetryClient("nowhere", on_telemetry=note, apart_s=REST_S)
+        client = InboxClient("nowhere", take=note, apart_s=REST_S)
         line = client._client._sock = ReadAhead(here, note)
         client._listen(line)
         async with asyncio.timeout(20.0):
@@ -250,7 +250,7 @@ def test_of_telemetry_that_has_come_the_newest_of_each_topic_is_read() -> None:
     assert sort_packets(came) == (Arrived(newest, passed_over), b"")
 
 
-def test_what_was_sent_at_qos_1_is_left_to_the_library_in_its_order() -> None:
+def test_what_was_sent_at_qos_1_is_all_read_in_its_order() -> None:
     messages = [confirmed_packet("t", b"answer %d" % n) for n in range(3)]
     looks = [publish_packet("t", b"look %d" % n) for n in range(3)]
     came = b"".join(itertools.chain(*zip(looks, messages, strict=True)))
@@ -258,48 +258,32 @@ def test_what_was_sent_at_qos_1_is_left_to_the_library_in_its_order() -> None:
     arrived, _ = sort_packets(came)
 
     assert arrived.telemetry == {"t": b"look 2"}
-    assert arrived.others == b"".join(messages)
+    assert arrived.qos1 == [Qos1Message("t", b"answer %d" % n, 7) for n in range(3)]
 
 
-async def test_what_is_sent_at_qos_1_is_all_handed_over_in_its_order() -> None:
-    heard: list[bytes] = []
-    packets = (confirmed_packet("t", b"%d" % n) for n in range(MANY))
-    with talking(b"".join(packets)) as port:
-        link = MqttLink(
-            BrokerAddress("127.0.0.1", port),
-            "test",
-            {"t": 1},
-            lambda _, payload: heard.append(payload),
-        )
-        reading = asyncio.create_task(link.run())
-        async with asyncio.timeout(20.0):
-            while len(heard) < MANY:  # noqa: ASYNC110 - no event
-                await asyncio.sleep(0.005)
-        reading.cancel()
-        await asyncio.gather(reading, return_exceptions=True)
-
-    assert heard == [b"%d" % n for n in range(MANY)]
-
-
-def test_what_is_no_telemetry_is_left_to_the_library() -> None:
+def test_a_puback_is_read_and_what_is_no_message_is_left_to_the_library() -> None:
     arrived, begun = sort_packets(b"\x40\x02\x01\x07" + PONG + b"\x40\x02")
 
-    assert arrived == Arrived(others=b"\x40\x02\x01\x07" + PONG)
+    assert arrived == Arrived(pubacks=[0x107], others=PONG)
     assert begun == b"\x40\x02"
 
 
-MOVED = "docs/decisions/0005-newest-telemetry.md: a private part has moved: "
+MOVED = "docs/decisions/0005-past-the-mqtt-library.md: a private part has moved: "
 
 
 async def test_the_private_parts_of_the_libraries_are_those_that_are_known() -> None:
-    client = TelemetryClient("nowhere", on_telemetry=lambda _: None)
+    client = InboxClient("nowhere", take=lambda _: None)
     opened = list(inspect.signature(aiomqtt.Client._on_socket_open).parameters)
+    queued = list(inspect.signature(paho.Client._packet_queue).parameters)
 
     assert isinstance(client._client, paho.Client), MOVED + "Client._client"
     assert client._client._sock is None, MOVED + "paho's _sock"
     assert isinstance(client._disconnected, asyncio.Future), MOVED + "_disconnected"
     assert client._loop is asyncio.get_running_loop(), MOVED + "_loop"
     assert opened == ["self", "client", "userdata", "sock"], MOVED + "_on_socket_open"
+    assert queued[:5] == ["self", "command", "packet", "mid", "qos"], (
+        MOVED + "paho's _packet_queue"
+    )
 
 
 def test_paho_reads_from_the_socket_that_it_was_given() -> None:
@@ -309,7 +293,7 @@ def test_paho_reads_from_the_socket_that_it_was_given() -> None:
         near.setblocking(False)
         read = client._sock = ReadAhead(near, lambda _: None)
         far.sendall(b"\xe0\x00")
-        assert read.read()
+        assert read.take()
 
         client.loop_read()
 
@@ -343,15 +327,17 @@ def test_packets_may_come_in_any_pieces(data: st.DataObject) -> None:
     whole = b"".join(sent)
     cuts = sorted(data.draw(st.sets(st.integers(1, len(whole) - 1), max_size=6)))
     telemetry: dict[str, bytes] = {}
+    messages: list[Qos1Message] = []
     others = begun = b""
     for start, end in itertools.pairwise([0, *cuts, len(whole)]):
         arrived, begun = sort_packets(begun + whole[start:end])
         telemetry |= arrived.telemetry
+        messages += arrived.qos1
         others += arrived.others
 
     assert telemetry == {"scan": b"x" * 300, "odom": b"", "ü": b"y" * 20_000}
-    assert others == CONNACK + confirmed_packet("answer", b"LATCHED")
-    assert begun == b""
+    assert messages == [Qos1Message("answer", b"LATCHED", 7)]
+    assert (others, begun) == (CONNACK, b"")
 
 
 def test_a_packet_of_no_proper_length_is_left_to_the_library() -> None:
