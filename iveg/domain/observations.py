@@ -268,10 +268,18 @@ def quantity(
     )
 
 
+_QUANTITIES: dict[type[Observation], dict[str, Quantity]] = {}
+
+
 def quantities_of(of: type[Observation]) -> dict[str, Quantity]:
-    """The members of a small sensor's value, by name."""
-    found = {one.name: one.metadata.get("quantity") for one in fields(of)}
-    return {name: one for name, one in found.items() if one is not None}
+    """The members of a small sensor's value, by name.
+
+    Asked for each robot in each frame of a page, so it is looked up once.
+    """
+    if of not in _QUANTITIES:
+        found = {one.name: one.metadata.get("quantity") for one in fields(of)}
+        _QUANTITIES[of] = {n: one for n, one in found.items() if one is not None}
+    return _QUANTITIES[of]
 
 
 def flags_of(of: type[Observation]) -> list[str]:
