@@ -8,7 +8,8 @@ from iveg.domain import feedback, observations
 from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.kinds import SENSED, Kind
-from iveg.domain.observations import Instant, quantities_of, value_of
+from iveg.domain.observations import Instant
+from iveg.domain.quantities import quantities_of, value_of
 from iveg.domain.robot_state import Link, RobotState
 from iveg.domain.stamps import format_stamp
 from iveg.domain.transports import TransportId

@@ -14,7 +14,7 @@ from typing import Any
 from pydantic.json_schema import models_json_schema
 
 from iveg.domain.kinds import SENSED, Kind, Sensor
-from iveg.domain.observations import flags_of, quantities_of
+from iveg.domain.quantities import flags_of, quantities_of
 from iveg.models.alert import AlertListing
 from iveg.models.base import Model
 from iveg.models.climate import ClimateReading

@@ -15,13 +15,8 @@ from iveg.domain.alerts.stored import write_occurrence
 from iveg.domain.decisions import SlowdownDecision
 from iveg.domain.events import LogEvent
 from iveg.domain.kinds import Kind
-from iveg.domain.observations import (
-    Climate,
-    Instant,
-    Observation,
-    Odometry,
-    value_of,
-)
+from iveg.domain.observations import Climate, Instant, Observation, Odometry
+from iveg.domain.quantities import value_of
 from iveg.domain.records import (
     AlertRecord,
     ClimateRecord,

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from typing import get_type_hints
 
 from iveg.domain.kinds import SENSED, Kind
-from iveg.domain.observations import quantities_of
+from iveg.domain.quantities import quantities_of
 from iveg.robot.ros2.sensors import ROS_SENSORS
 from tests.architecture.documents import INTERFACES
 

@@ -6,7 +6,8 @@ import pytest
 
 from iveg.domain import observations
 from iveg.domain.kinds import KINDS, SENSED, Kind
-from iveg.domain.observations import Observation, flags_of
+from iveg.domain.observations import Observation
+from iveg.domain.quantities import flags_of
 from iveg.lab.emulator.sensors import EMULATED
 from iveg.robot.ros2.sensors import ROS_SENSORS
 from tests.processes import ROOT

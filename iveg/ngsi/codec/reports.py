@@ -17,8 +17,8 @@ from iveg.domain.observations import (
     Origin,
     SafetyReport,
     Unplaced,
-    value_of,
 )
+from iveg.domain.quantities import value_of
 from iveg.ngsi import names
 from iveg.ngsi.codec.fields import (
     rounded,

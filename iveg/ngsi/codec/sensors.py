@@ -6,7 +6,8 @@ from typing import Annotated, Any, get_type_hints
 from pydantic import Field, create_model
 
 from iveg.domain.kinds import SENSED, Kind
-from iveg.domain.observations import Observation, Quantity, quantities_of
+from iveg.domain.observations import Observation
+from iveg.domain.quantities import Quantity, quantities_of
 from iveg.ngsi.codec.fields import read_origin
 from iveg.ngsi.payloads import OriginFields
 
