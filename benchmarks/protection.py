@@ -16,6 +16,7 @@ from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.app.virtual import VirtualPipeline
 from iveg.domain.detection_rule import DetectionRule
+from iveg.domain.witness import Plan
 from iveg.lab.emulator.camera import DETECTORS, PERSON
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.scenarios import scenario_named
@@ -33,7 +34,7 @@ ROBOTS = ("AGI", "AGII")
 
 
 def run(
-    profile: str, seed: int, seconds: float, rule: DetectionRule
+    profile: str, seed: int, seconds: float, rule: DetectionRule, laser: bool = True
 ) -> ProtectionScore:
     """One run of the demo's greenhouse."""
     scenario = scenario_named("demo")
@@ -43,7 +44,15 @@ def run(
     world = SimulatedWorld(greenhouse, layout, DETECTORS[profile], seed)
     parts = iveg.parts
     stage = Stage(
-        world, (), parts.ingest, parts.loop, iveg.feedback, iveg.move, iveg.hear
+        world,
+        (),
+        parts.ingest,
+        parts.loop,
+        iveg.feedback,
+        iveg.move,
+        iveg.hear,
+        scan_every=2 if laser else 0,
+        plan=Plan.of(greenhouse),
     )
     score = ProtectionScore(STEP_S)
     for _ in range(round(seconds / STEP_S)):
@@ -81,12 +90,15 @@ def main() -> None:
     options.add_argument("--seeds", default="11,12,13")
     options.add_argument("--seconds", type=float, default=600.0)
     options.add_argument("--single-boxes", action="store_true")
+    options.add_argument("--no-laser", action="store_true")
     asked = options.parse_args()
     rule = DetectionRule(possible_people=not asked.single_boxes)
     rows = []
     for profile in asked.profiles.split(","):
         seeds = [int(one) for one in asked.seeds.split(",")]
-        row = whole(run(profile, one, asked.seconds, rule) for one in seeds).row()
+        row = whole(
+            run(profile, one, asked.seconds, rule, not asked.no_laser) for one in seeds
+        ).row()
         rows.append(
             [profile, *("–" if one is None else f"{one:g}" for one in row.values())]
         )

@@ -93,9 +93,21 @@ MUTANTS = (
     ),
     Mutant(
         "STOP: the second copy of a refused release is judged anew",
-        "verdict = self._verdicts.get(order.attempt)",
+        "verdict = self._verdicts.on(order.attempt)",
         "verdict = None",
         ("unit/robot/test_safety.py",),
+    ),
+    Mutant(
+        "rule: what the laser sees near a robot slows nobody",
+        "fits = self.size_m <= _LARGEST_M or self.has_moved",
+        "fits = False",
+        ("unit/domain/test_witness.py", "unit/robot/test_safety.py"),
+    ),
+    Mutant(
+        "rule: leaves, and a plan that is off, are people for the laser",
+        "_PLAN_M = 0.4",
+        "_PLAN_M = 0.1",
+        ("unit/domain/test_witness.py",),
     ),
     Mutant(
         "STOP: an old refusal ends the release that is under way",

@@ -121,6 +121,11 @@ def add_robot(robot: argparse.ArgumentParser) -> None:
     robot.add_argument("action", nargs="?", choices=("run", "check"), default="run")
     robot.add_argument("--id", required=True, metavar="ROBOT", help="as iVeg knows it")
     robot.add_argument("--config", type=Path, metavar="robot.toml")
+    robot.add_argument(
+        "--greenhouse",
+        metavar="NAME|FILE",
+        help="what stands around it, for its laser; else only its own path counts",
+    )
     robot.add_argument("--namespace", metavar="/NAME", help="of its relative topics")
     robot.add_argument("--cmd-vel-in", metavar="TOPIC", help="what navigation wishes")
     robot.add_argument("--cmd-vel-out", metavar="TOPIC", help="what the base obeys")

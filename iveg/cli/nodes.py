@@ -3,12 +3,18 @@
 from pathlib import Path
 
 from iveg.adapters.mqtt import BrokerAddress
+from iveg.domain.witness import Plan
 from iveg.robot.node import NodeSettings
 from iveg.settings import Settings
 
 
-def node_settings(settings: Settings, directory: Path) -> NodeSettings:
-    """As an operator chose; hold files below ``directory``."""
+def node_settings(
+    settings: Settings, directory: Path, plan: Plan | None = None
+) -> NodeSettings:
+    """As an operator chose; hold files below ``directory``.
+
+    ``plan``: what stands in the greenhouse; None: nobody drew it.
+    """
     return NodeSettings(
         address=broker_of(settings),
         apikey=settings.apikey,
@@ -17,6 +23,7 @@ def node_settings(settings: Settings, directory: Path) -> NodeSettings:
         stand_s=settings.feedback_stand_s,
         on_link_loss=settings.on_link_loss,
         uplink=settings.uplink,
+        plan=plan,
     )
 
 

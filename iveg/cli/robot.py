@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from iveg.adapters import clock
 from iveg.adapters.extras import require_extra
 from iveg.adapters.fleet_files import load_fleet
+from iveg.adapters.greenhouses import load_greenhouse
 from iveg.adapters.mqtt import MqttLink
 from iveg.cli.nodes import broker_of, node_settings
 from iveg.cli.running import (
@@ -33,8 +34,9 @@ from iveg.domain.fleet import (
     RobotProfile,
 )
 from iveg.domain.geometry import Twist2D
+from iveg.domain.witness import Plan
 from iveg.ngsi import names
-from iveg.robot.node import RobotNode
+from iveg.robot.node import NodeSettings, RobotNode
 from iveg.robot.ros2.checking import Heard, judge, lines
 from iveg.robot.ros2.config import RobotConfig, read_classes, read_config
 from iveg.robot.ros2.inputs import PICTURES, TOPICS, listened
@@ -88,7 +90,8 @@ async def _ride(
 
     with Dds(network) as dds:
         await refuse_second_gate(dds, config.full_topics.cmd_vel_out)
-        node = partial(_node, options.id, settings, data, config)
+        safety = node_settings(settings, data / "robots", _plan(options.greenhouse))
+        node = partial(_node, options.id, settings, safety, config)
         robot = Ros2Robot(
             options.id, config, dds, node, classes=classes, sim_time=options.sim_time
         )
@@ -102,18 +105,23 @@ async def _ride(
 def _node(
     robot_id: str,
     settings: Settings,
-    data: Path,
+    safety: NodeSettings,
     config: RobotConfig,
     drive: Callable[[Twist2D], None],
     on_feedback: Callable[[str, Feedback], None],
 ) -> RobotNode:
     return RobotNode(
         robot_id,
-        node_settings(settings, data / "robots"),
+        safety,
         profile=_profile(_fleet(settings).of_robot(robot_id), config),
         drive=drive,
         on_feedback=on_feedback,
     )
+
+
+def _plan(greenhouse: str | None) -> Plan | None:
+    """What the laser need not report."""
+    return None if greenhouse is None else Plan.of(load_greenhouse(greenhouse))
 
 
 def _fleet(settings: Settings) -> FleetDescription:

@@ -152,6 +152,7 @@ class SafetyValue(OriginFields):
         "unsupervised",
         "hold",
         "watchdog",
+        "obstacle",
     ]
     cause: Text | None = None
     decision_id: Text | None = None

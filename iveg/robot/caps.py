@@ -11,7 +11,10 @@ from dataclasses import dataclass
 from iveg.domain.feedback import FULL_SPEED, HALF_SPEED
 from iveg.domain.limits import LIMITS
 
-_REASONS = ("clear", "unsupervised", "stale", "doubt", "watchdog", "robot", "person")
+_REASONS = (
+    *("clear", "unsupervised", "stale", "doubt", "watchdog"),
+    *("obstacle", "robot", "person"),
+)
 """Reasons of a cap in a report; at equal factors the later one is reported."""
 
 

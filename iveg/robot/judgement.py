@@ -11,11 +11,15 @@ from typing import Literal
 from iveg.domain.feedback import HALF_SPEED, Feedback
 from iveg.domain.geometry import REST, Pose2D, Twist2D
 from iveg.domain.limits import LIMITS
+from iveg.domain.observations import LaserScan
+from iveg.domain.witness import Outline, Plan, Witness
 from iveg.robot.caps import FREE, AppliedCap, Cap, lowest
 from iveg.robot.peer_feedback import PeerFeedback
 from iveg.robot.watchdog import Watchdog
 
 OnLinkLoss = Literal["stop", "slow"]
+
+_UNDESCRIBED = Outline()
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +31,8 @@ class Limits:
         slow_s: Feedback older than this halves the speed (s).
         stand_s: Feedback older than this holds the robot (s).
         on_link_loss: ``slow`` stays at half speed however long the silence is.
+        outline: The robot's body.
+        plan: What stands in the greenhouse; None: nobody drew it.
     """
 
     max_speed: float = 1.0
@@ -34,6 +40,8 @@ class Limits:
     slow_s: float = LIMITS.feedback_slow_s
     stand_s: float = LIMITS.feedback_stand_s
     on_link_loss: OnLinkLoss = "stop"
+    outline: Outline = _UNDESCRIBED
+    plan: Plan | None = None
 
 
 DEFAULT_LIMITS = Limits()
@@ -62,6 +70,7 @@ class Judgement:
         self._limits = limits
         self._peer_feedback = PeerFeedback(robot_id)
         self._motion: Motion | None = None
+        self._witness = Witness(limits.outline, limits.plan)
         self._applied = AppliedCap(Cap(0.0, "watchdog"))
         self.watchdog = Watchdog(boot_at, limits.slow_s)
         self.local = FREE
@@ -109,6 +118,13 @@ class Judgement:
         if self._peer_feedback.apply(topic, feedback, self._own(now), now):
             self.watchdog.heard(feedback.seen.get(self._id), now)
 
+    def note_scan(self, scan: LaserScan, now: float) -> None:
+        """Note what the laser sees; nothing of it without a young pose."""
+        motion = self.motion(now)
+        if motion is not None and motion.pose is not None:
+            peers = self._peer_feedback.peers(now)
+            self._witness.look(scan, motion.pose, motion.twist, peers, now)
+
     def settle(self, now: float) -> None:
         """Evaluate this moment."""
         self.watchdog.tick(now)
@@ -118,6 +134,7 @@ class Judgement:
                 self.local,
                 self._pose_cap(now),
                 self._silence_cap(now),
+                self._obstacle_cap(now),
                 *self._peer_feedback.caps(self._own(now), slowed, now),
             )
         )
@@ -139,6 +156,10 @@ class Judgement:
         return (
             Cap(HALF_SPEED, "stale") if now - motion.at > LIMITS.pose_slow_s else FREE
         )
+
+    def _obstacle_cap(self, now: float) -> Cap:
+        seen = self._witness.obstacle(now)
+        return FREE if seen is None else Cap(HALF_SPEED, "obstacle")
 
     def _silence_cap(self, now: float) -> Cap:
         age = self.watchdog.age(now)

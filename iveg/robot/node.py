@@ -24,12 +24,14 @@ from iveg.domain.observations import (
     CommandAnswer,
     Hold,
     Instant,
+    LaserScan,
     Observation,
     Odometry,
     RobotFault,
     SafetyReport,
     Unplaced,
 )
+from iveg.domain.witness import Outline, Plan
 from iveg.ngsi import names
 from iveg.ngsi.codec import read_feedback
 from iveg.robot.caps import FREE, Cap
@@ -60,6 +62,7 @@ class NodeSettings:
         stand_s: Feedback older than this stops the robot (s).
         on_link_loss: ``slow``: it goes on at half speed instead.
         uplink: One message a topic, or Algorithm 1's single payload.
+        plan: What stands in the greenhouse; None: nobody drew it.
     """
 
     address: BrokerAddress
@@ -69,6 +72,7 @@ class NodeSettings:
     stand_s: float = LIMITS.feedback_stand_s
     on_link_loss: OnLinkLoss = "stop"
     uplink: Form = "per-topic"
+    plan: Plan | None = None
 
 
 class RobotNode:
@@ -107,6 +111,7 @@ class RobotNode:
         self._echo = Echo()
         self._on_feedback_read = on_feedback
         self._faults: tuple[RobotFault, ...] = ()
+        self._is_replay = replay is not None
         self._nobody_there = held
         self._loop: asyncio.AbstractEventLoop | None = None
         self._commanded: tuple[Twist2D, float] = REST, 0.0
@@ -140,6 +145,8 @@ class RobotNode:
             settings.slow_s,
             settings.stand_s,
             settings.on_link_loss,
+            Outline(profile.length, profile.width),
+            settings.plan,
         )
         self._machine = self._new_machine(hold_file, limits)
 
@@ -214,6 +221,8 @@ class RobotNode:
         for one in observations:
             if isinstance(one, Odometry):
                 self._perform(self._machine.odometry(one.pose, one.twist, mono), mono)
+            elif isinstance(one, LaserScan) and not self._is_replay:
+                self._perform(self._machine.scan(one, mono), mono)
             elif isinstance(one, Unplaced) and one.twist is not None:
                 self._perform(self._machine.odometry(None, one.twist, mono), mono)
         if self._link.connected:

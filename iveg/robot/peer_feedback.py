@@ -113,6 +113,12 @@ class PeerFeedback:
         self._remember(memory, feedback, own, now)
         return True
 
+    def peers(self, now: float) -> Iterator[Pose2D]:
+        """Where every peer is that was heard of within a second."""
+        for topic in self._topics.values():
+            if topic.peer is not None and now - topic.peer.at <= LIMITS.silence_s:
+                yield topic.peer.pose
+
     def caps(self, own: Pose2D | None, slowed: bool, now: float) -> Iterator[Cap]:
         """All caps on this robot at pose ``own`` in ``map``.
 

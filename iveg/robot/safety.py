@@ -22,7 +22,13 @@ from typing import Literal
 
 from iveg.domain.feedback import Feedback
 from iveg.domain.geometry import Pose2D, Twist2D
-from iveg.domain.observations import CommandAnswer, Hold, Origin, SafetyReport
+from iveg.domain.observations import (
+    CommandAnswer,
+    Hold,
+    LaserScan,
+    Origin,
+    SafetyReport,
+)
 from iveg.robot.caps import Cap
 from iveg.robot.effects import Answer, AnswerCode, Drive, Effect, Persist, Report
 from iveg.robot.gate import Gate
@@ -35,6 +41,7 @@ from iveg.robot.orders import (
     read_desired_state,
     read_order,
 )
+from iveg.robot.verdicts import Verdict, Verdicts
 
 State = Literal["HELD", "BRAKING", "STANDING", "READY", "RUNNING"]
 
@@ -42,10 +49,6 @@ CHALLENGE_LIVES_S = 5.0
 REPORT_EVERY_S, REPORT_HELD_EVERY_S = 0.4, 0.075
 """Below the contract's 0.5 s and 0.1 s, so that a late timer still keeps them.  The
 second is for iVeg alone: ten a second would be most of what one agent can carry."""
-
-ATTEMPTS_KEPT = 64
-_Verdict = tuple[str | None, AnswerCode, str | None]
-"""On a release or resume: the hold that the answer names, and why it was refused."""
 
 
 class SafetyMachine:
@@ -81,8 +84,7 @@ class SafetyMachine:
         self._resumed = False
         self._resumed_by: str | None = None
         self._challenge, self._challenge_at = fresh(), now
-        self._verdicts: dict[str, _Verdict] = {}
-        """By attempt, oldest first; the challenge of one that is forgotten is spent."""
+        self._verdicts = Verdicts()
         self._holds = (stored or HoldSet()).after_reboot()
         self._persisted: HoldSet | None = None
         self._said: tuple[Cap, HoldSet, str] | None = None
@@ -139,6 +141,11 @@ class SafetyMachine:
     ) -> tuple[Effect, ...]:
         """Take measured pose (None: not in ``map``) and speed."""
         self._judgement.note_odometry(pose, twist, now)
+        return self.tick(now)
+
+    def scan(self, scan: LaserScan, now: float) -> tuple[Effect, ...]:
+        """Take a sweep of the robot's own laser, the second witness of people."""
+        self._judgement.note_scan(scan, now)
         return self.tick(now)
 
     def limit(self, cap: Cap) -> None:
@@ -224,26 +231,17 @@ class SafetyMachine:
         return Hold(f"local-{self._fresh()}", "iveg", "remote")
 
     def _attempt(self, order: ReleaseOrder | ResumeOrder, now: float) -> CommandAnswer:
-        """Judge the first copy of an order; give every other the same answer.
-
-        That holds even when the robot's state has changed: a refused order stays
-        refused.
-        """
-        verdict = self._verdicts.get(order.attempt)
+        """Judge the first copy of an order; give every other the same answer."""
+        verdict = self._verdicts.on(order.attempt)
         if verdict is None:
             if isinstance(order, ReleaseOrder):
                 verdict = self._release(order, now)
             else:
                 verdict = self._resume(order, now)
-            self._remember(order.attempt, verdict)
+            self._verdicts.keep(order.attempt, verdict)
         return self._answer(*verdict, attempt=order.attempt)
 
-    def _remember(self, attempt: str, verdict: _Verdict) -> None:
-        self._verdicts[attempt] = verdict
-        if len(self._verdicts) > ATTEMPTS_KEPT:
-            del self._verdicts[next(iter(self._verdicts))]
-
-    def _release(self, order: ReleaseOrder, now: float) -> _Verdict:
+    def _release(self, order: ReleaseOrder, now: float) -> Verdict:
         first = order.ids[0]
         if set(order.ids) <= set(self._holds.released):
             # The same release again: no hold is left to lift; the answer is the same.
@@ -266,7 +264,7 @@ class SafetyMachine:
             return "challenge"
         return None if self._judgement.stands(now) else "not_standing"
 
-    def _resume(self, order: ResumeOrder, now: float) -> _Verdict:
+    def _resume(self, order: ResumeOrder, now: float) -> Verdict:
         if self._resumed and order.challenge == self._resumed_by:
             return None, "RESUMED", None
         why = self._why_not_resume(order)
@@ -286,7 +284,7 @@ class SafetyMachine:
 
     def _refuse(
         self, answered: str | None, challenge: str, why: str, now: float
-    ) -> _Verdict:
+    ) -> Verdict:
         """Refuse an order; its challenge is spent, so a later copy cannot succeed."""
         if challenge == self._challenge:
             self._renew_challenge(now)

@@ -11,6 +11,7 @@ from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.cli.nodes import node_settings
 from iveg.cli.running import report_ready, tune_garbage_collection
+from iveg.domain.witness import Plan
 from iveg.lab.emulator.emulated_robot import FleetSettings
 from iveg.lab.emulator.fleet import run_emulator
 from iveg.lab.emulator.orders import read_fault_arguments
@@ -34,11 +35,13 @@ async def emulator(options: argparse.Namespace, settings: Settings) -> None:
         _network(options) as network,
         _truth(options.truth) as truth,
     ):
+        greenhouse = load_greenhouse(settings.greenhouse)
+        plan = Plan.of(greenhouse)
         work = run_emulator(
             robots,
-            load_greenhouse(settings.greenhouse),
+            greenhouse,
             FleetSettings(
-                node_settings(settings, Path(directory)),
+                node_settings(settings, Path(directory), plan),
                 options.held,
                 options.hz,
                 truth,

@@ -5,6 +5,7 @@ The domain's ``Greenhouse`` names objects; this module only has rectangles and d
 """
 
 import math
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,8 @@ from iveg.domain.greenhouse import Greenhouse
 Floats = NDArray[np.float64]
 Span = tuple[Floats, Floats]
 """Where rays enter and leave (m); a ray that leaves before it enters misses."""
+_LEANS_M, _TUFT_M = 0.2, 0.15
+"""How far a plant leans out at most, and the radius of its tuft (m)."""
 _LEAST_SLOPE = 1e-9
 """Stands for zero in a direction, so that no division is by zero."""
 
@@ -92,17 +95,22 @@ class Scenery:
         bounds: The outer wall.
         rectangles: Shape (n, 4): xmin, ymin, xmax, ymax of crop, crates, trolleys.
         posts: Shape (m, 3): x, y, radius.
+        leaves: Shape (k, 3), likewise: plants that lean out of their row, which lasers
+            see and no plan draws.
         screens: Objects that occlude cameras: crop, crates, trolleys.
     """
 
     bounds: Rectangle
     rectangles: Floats
     posts: Floats
+    leaves: Floats
     screens: tuple[Rectangle, ...]
 
     @classmethod
-    def of(cls, greenhouse: Greenhouse) -> "Scenery":
-        """Arrays of a greenhouse."""
+    def of(
+        cls, greenhouse: Greenhouse, rng: np.random.Generator | None = None
+    ) -> "Scenery":
+        """Arrays of a greenhouse; ``rng`` lets its plants lean."""
         screens = greenhouse.rows + tuple(thing.area for thing in greenhouse.obstacles)
         sides = [sides_of(area) for area in screens]
         posts = [(post.x, post.y, post.radius) for post in greenhouse.posts]
@@ -110,6 +118,7 @@ class Scenery:
             greenhouse.bounds,
             np.array(sides, float).reshape(-1, 4),
             np.array(posts, float).reshape(-1, 3),
+            np.empty((0, 3)) if rng is None else _leaves(greenhouse.rows, rng),
             screens,
         )
 
@@ -121,6 +130,27 @@ class Scenery:
         """Whether a disc fits at a position."""
         inside = self.bounds.contains(x, y, -radius)
         return inside and not any(s.contains(x, y, radius) for s in self.screens)
+
+
+def _leaves(rows: Iterable[Rectangle], rng: np.random.Generator) -> Floats:
+    """A tuft a metre along both sides of each row, up to 0.2 m outside of it."""
+    tufts = [tuft for row in rows for tuft in _tufts(row, rng)]
+    return np.array(tufts, float).reshape(-1, 3)
+
+
+def _tufts(
+    row: Rectangle, rng: np.random.Generator
+) -> Iterator[tuple[float, float, float]]:
+    along_x = row.xmax - row.xmin >= row.ymax - row.ymin
+    first, last, *edges = (
+        (row.xmin, row.xmax, row.ymin, row.ymax)
+        if along_x
+        else (row.ymin, row.ymax, row.xmin, row.xmax)
+    )
+    for edge, out in zip(edges, (-1.0, 1.0), strict=True):
+        for along in np.arange(first + rng.uniform(0.2, 0.8), last, 1.0):
+            across = edge + out * (rng.uniform(0.0, _LEANS_M) - _TUFT_M)
+            yield (*((along, across) if along_x else (across, along)), _TUFT_M)
 
 
 def slab_span(slope: Floats, low: Floats | float, high: Floats | float) -> Span:

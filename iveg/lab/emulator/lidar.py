@@ -2,7 +2,7 @@
 
 Ray casting by the slab method for rectangles and by the quadratic for discs, all rays
 of a sweep in a few NumPy calls (``benchmarks/lidar_cost.py`` says what it costs).
-Left out: intensity, motion during the sweep, leaves that let a ray through.
+Left out: intensity, motion during the sweep, leaves that move.
 """
 
 import math
@@ -66,7 +66,9 @@ def sweep(
         hit = np.where((enter <= leave) & (enter >= 0.0), enter, np.inf)
         ranges = np.minimum(ranges, hit.reshape(-1, model.beams).min(0, initial=np.inf))
     discs = [(disc.x, disc.y, disc.radius) for disc in people]
-    round_things = np.concatenate((scenery.posts, np.reshape(discs, (-1, 3))))
+    round_things = np.concatenate(
+        (scenery.posts, scenery.leaves, np.reshape(discs, (-1, 3)))
+    )
     _discs(sensor, model, round_things, ranges)
     ranges += rng.normal(0.0, model.noise, model.beams)
     ranges[(ranges > model.range_max) | (ranges < model.range_min)] = np.inf

@@ -175,10 +175,10 @@ class SimulatedWorld:
         camera: Camera = "boxes",
     ) -> None:
         streams = np.random.SeedSequence(seed).spawn(
-            len(layout.robots) + len(layout.people)
+            len(layout.robots) + len(layout.people) + 1
         )
         generators = [np.random.default_rng(stream) for stream in streams]
-        self.scenery = Scenery.of(greenhouse)
+        self.scenery = Scenery.of(greenhouse, generators.pop())
         self.rigs: Mapping[str, RobotHardware] = {
             robot_id: RobotHardware(
                 robot_id, layout.profiles[robot_id], script, detector, rng, camera

@@ -12,6 +12,7 @@ from typing import Final
 from iveg.domain.feedback import Feedback
 from iveg.domain.geometry import REST
 from iveg.domain.observations import Instant
+from iveg.domain.witness import Outline, Plan
 from iveg.lab.emulator.orders import FaultOrder
 from iveg.lab.emulator.scripts import Incident
 from iveg.lab.emulator.world import RobotHardware, SimulatedWorld
@@ -39,6 +40,7 @@ class StagedRobot:
         hear: Called with the topic and payload of its messages.
         looked: Called when its camera has taken a picture.
         scan_every: Steps between two sweeps of its laser; 0: none.
+        plan: What stands in the greenhouse.
     """
 
     def __init__(
@@ -48,6 +50,7 @@ class StagedRobot:
         hear: Callable[[str, bytes], None],
         looked: Looked = lambda _: None,
         scan_every: int = 0,
+        plan: Plan | None = None,
     ) -> None:
         texts = count(1)
         self._faults = FaultOrder(robot=rig.robot_id)
@@ -63,7 +66,12 @@ class StagedRobot:
             now.mono,
             stored=HoldSet(),
             fresh=lambda: f"{rig.robot_id}-{next(texts)}",
-            limits=Limits(rig.profile.max_speed, rig.profile.max_turn),
+            limits=Limits(
+                rig.profile.max_speed,
+                rig.profile.max_turn,
+                outline=Outline(rig.profile.length, rig.profile.width),
+                plan=plan,
+            ),
         )
         self._perform(self._machine.release_locally(now.mono), now)
 
@@ -81,7 +89,9 @@ class StagedRobot:
         now = self._dated(now)
         self._uplink.send(moved, now)
         if self._scan_every and number % self._scan_every == 0:
-            self._uplink.send(self._rig.scan(world), now)
+            scan = self._rig.scan(world)
+            self._perform(self._machine.scan(scan, now.mono), now)
+            self._uplink.send(scan, now)
         if number % _LOOK_EVERY == 1:
             self._uplink.send(self._rig.detect(into_run, world), now)
             self._looked(self._rig)
@@ -146,7 +156,7 @@ class Stage:
         feedback: Feedback that iVeg has published; it grows.
         move_clock: Advances the clock by seconds; returns the time.
         hear: Called with each message of a robot, from its creation on.
-        looked, scan_every: As for ``StagedRobot``.
+        looked, scan_every, plan: As for ``StagedRobot``.
 
     Attributes:
         robots: Its robots, by id.
@@ -164,6 +174,7 @@ class Stage:
         *,
         looked: Looked = lambda _: None,
         scan_every: int = 0,
+        plan: Plan | None = None,
     ) -> None:
         self._world = world
         self._incidents = [(one.at_s, one.order) for one in incidents]
@@ -171,7 +182,7 @@ class Stage:
         self._move_clock = move_clock
         self.now = move_clock(0.0)
         self.robots = {
-            robot_id: StagedRobot(rig, self.now, hear, looked, scan_every)
+            robot_id: StagedRobot(rig, self.now, hear, looked, scan_every, plan)
             for robot_id, rig in world.rigs.items()
         }
         self._delivered = 0

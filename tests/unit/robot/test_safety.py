@@ -1,16 +1,18 @@
 """The safety machine, sentence by sentence (docs/safety.md)."""
 
+import math
 from itertools import pairwise
 
+import numpy as np
 import pytest
 
 from iveg.domain.feedback import CLEAR, SpeedLimit
 from iveg.domain.geometry import Pose2D, Twist2D
-from iveg.domain.observations import Hold
+from iveg.domain.observations import Hold, LaserScan, Origin
 from iveg.robot.effects import Answer, Drive, Persist, Report
 from iveg.robot.holds import HoldSet
 from iveg.robot.judgement import Limits
-from iveg.robot.safety import ATTEMPTS_KEPT
+from iveg.robot.verdicts import ATTEMPTS_KEPT
 from tests.unit.robot.rig import (
     AHEAD,
     REST,
@@ -821,3 +823,47 @@ def test_a_robot_that_drives_sends_every_report_through_the_agent() -> None:
     rig = moving().run(3.0)
     said = [one for _, one in rig.log if isinstance(one, Report)]
     assert all(one.is_measure for one in said[-5:])
+
+
+# --- the laser ----------------------------------------------------------------------
+
+
+def _sweep(*seen_at: float) -> LaserScan:
+    """A full turn in the open in which somebody 0.5 m wide is ahead (m)."""
+    ranges = np.full(360, np.inf, np.float32)
+    for away in seen_at:
+        half = math.degrees(math.atan2(0.25, away))
+        ranges[round(180 - half) : round(180 + half)] = away
+    step = math.tau / 360
+    return LaserScan(
+        "AGI", Origin(), -math.pi, step, 0.1, 30.0, Pose2D(0, 0, 0), ranges
+    )
+
+
+def _scanned(rig: Rig, seconds: float, *seen_at: float) -> Rig:
+    for _ in range(round(seconds / 0.1)):
+        rig.perform(rig.machine.scan(_sweep(*seen_at), rig.now))
+        rig.run(0.1)
+    return rig
+
+
+def test_what_the_laser_sees_near_halves_the_speed_and_the_report_says_so() -> None:
+    rig = _scanned(moving(), 0.4, 2.0)
+    assert rig.twist.linear_x == pytest.approx(0.5)
+    assert (rig.machine.cap.factor, rig.machine.cap.reason) == (0.5, "obstacle")
+    assert rig.reports[-1].reason == "obstacle"
+    _scanned(rig, 1.2)
+    assert rig.machine.cap.factor == 0.5, "half a second gone, not yet one more"
+    _scanned(rig, 1.0)
+    assert rig.machine.cap.factor == 1.0
+
+
+def test_a_known_person_is_the_reason_before_what_the_laser_sees() -> None:
+    rig = moving()
+    rig.alerts = (person(1.0),)
+    _scanned(rig, 0.6, 2.0)
+    assert rig.machine.cap.reason == "person"
+
+
+def test_a_laser_far_from_everybody_slows_nothing() -> None:
+    assert _scanned(moving(), 1.0, 3.5).machine.cap.factor == 1.0

@@ -19,7 +19,7 @@ const NAMES = /** @type {const} */ ({
   kind: ["detection", "speed", "command", "link", "alert", "system"],
   robot: [],
   class: ["person", "robot"],
-  rule: ["person", "robot", "stale", "doubt", "unsupervised", "watchdog"],
+  rule: ["person", "robot", "stale", "doubt", "unsupervised", "watchdog", "obstacle"],
   priority: ["P1", "P2", "P3"],
 });
 const GROUPS = /** @type {Group[]} */ (Object.keys(NAMES));

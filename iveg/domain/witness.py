@@ -1,0 +1,229 @@
+"""The laser as a second witness: what stands near a robot and nobody has explained.
+
+A camera sees less than half of the people beside a robot; its laser sees most of the
+others.  Of a scan those returns count that are within two metres of the robot's outline
+and that neither the plan of the greenhouse nor a peer explains.  Together they must be
+of a person's size, or have moved, and last for 0.2 s.  Without a plan only the robot's
+own path counts, or every row would slow it.
+
+A witness only adds: it lifts no limit, and finds no spot empty.
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iveg.domain.fleet import CAUTIOUS
+from iveg.domain.geometry import Pose2D, Rectangle, Twist2D
+from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.limits import LIMITS
+from iveg.domain.observations import LaserScan
+
+_Floats = NDArray[np.float64]
+LASTS_S = 0.2
+"""What is shorter is noise, or an insect."""
+_GONE_S = 0.5
+"""Without a return for so long it is gone."""
+_PLAN_M = 0.4
+"""The plan is off by 0.2 m, or plants lean out so far; a pose is off by the rest."""
+_TURN_S = 0.05
+"""A scan and the pose that it is placed by are so far apart."""
+_PEER_M = 1.0
+"""About a peer's ``base_link``: half of its body, and how far it went since it told."""
+_APART_M = 0.3
+"""Returns of one body are not farther apart."""
+_LARGEST_M = 1.0
+"""Two people side by side; what is larger is counted once it moves."""
+_LEAST_RETURNS = 2
+_MOVED_M = 0.4
+_BESIDE_M = 0.2
+"""Of the robot's own path, where there is no plan."""
+_EVERY_S = 0.09
+"""Ten sweeps a second are enough, and leave the robot's processor alone."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Plan:
+    """What stands in the greenhouse, in ``map`` (m).
+
+    Attributes:
+        bounds: The outer wall.
+        rectangles: Shape (n, 4): xmin, ymin, xmax, ymax of rows, crates, trolleys.
+        posts: Shape (n, 3): x, y, radius.
+    """
+
+    bounds: Rectangle
+    rectangles: _Floats
+    posts: _Floats
+
+    @classmethod
+    def of(cls, greenhouse: Greenhouse) -> "Plan":
+        """The plan of a greenhouse."""
+        areas = (*greenhouse.rows, *(one.area for one in greenhouse.obstacles))
+        sides = [(one.xmin, one.ymin, one.xmax, one.ymax) for one in areas]
+        posts = [(one.x, one.y, one.radius) for one in greenhouse.posts]
+        return cls(
+            greenhouse.bounds,
+            np.array(sides, np.float64).reshape(-1, 4),
+            np.array(posts, np.float64).reshape(-1, 3),
+        )
+
+    def distance_to(self, x: _Floats, y: _Floats) -> _Floats:
+        """How far points, shape (n,), are from the nearest thing drawn (m)."""
+        area = self.bounds
+        inside = np.minimum.reduce(
+            (x - area.xmin, area.xmax - x, y - area.ymin, area.ymax - y)
+        )
+        nearest: _Floats = np.maximum(inside, 0.0)
+        if len(self.rectangles):
+            xmin, ymin, xmax, ymax = self.rectangles.T[..., None]
+            aside = np.maximum(np.maximum(xmin - x, x - xmax), 0.0)
+            along = np.maximum(np.maximum(ymin - y, y - ymax), 0.0)
+            nearest = np.minimum(nearest, np.hypot(aside, along).min(0))
+        if len(self.posts):
+            post_x, post_y, radius = self.posts.T[..., None]
+            away = np.hypot(x - post_x, y - post_y) - radius
+            nearest = np.minimum(nearest, away.min(0))
+        return nearest
+
+
+@dataclass(frozen=True, slots=True)
+class Outline:
+    """A robot seen from above, centred on ``base_link``: length and width (m)."""
+
+    length: float = CAUTIOUS.length
+    width: float = CAUTIOUS.width
+
+    def gap_to(self, x: _Floats, y: _Floats) -> _Floats:
+        """How far points in ``base_link``, shape (n,), are from it (m)."""
+        ahead = np.maximum(np.abs(x) - self.length / 2, 0.0)
+        aside = np.maximum(np.abs(y) - self.width / 2, 0.0)
+        gap: _Floats = np.hypot(ahead, aside)
+        return gap
+
+
+@dataclass(frozen=True, slots=True)
+class Obstacle:
+    """Something of a person's size near a robot that nobody explained.
+
+    Attributes:
+        x: Its middle in ``map`` (m); ``y`` likewise.
+        first_x: Where it was when it was seen first; ``first_y`` likewise.
+        size_m: From its first return to its last.
+        since: When it was seen first; ``at`` newest (monotonic, s).
+    """
+
+    x: float
+    y: float
+    first_x: float
+    first_y: float
+    size_m: float
+    since: float
+    at: float
+
+    @property
+    def has_moved(self) -> bool:
+        """Whether it went farther than noise does."""
+        way = math.hypot(self.x - self.first_x, self.y - self.first_y)
+        return way > _MOVED_M
+
+    @property
+    def counts(self) -> bool:
+        """Whether it is there for long enough, and is or moves like somebody."""
+        fits = self.size_m <= _LARGEST_M or self.has_moved
+        return fits and self.at - self.since >= LASTS_S
+
+
+class Witness:
+    """What one robot's laser sees beside it.
+
+    Args:
+        outline: The robot's body.
+        plan: None: nobody drew the place.
+    """
+
+    def __init__(self, outline: Outline, plan: Plan | None) -> None:
+        self._outline = outline
+        self._plan = plan
+        self._known: tuple[Obstacle, ...] = ()
+        self._looked_at = -math.inf
+
+    def look(
+        self,
+        scan: LaserScan,
+        pose: Pose2D,
+        twist: Twist2D,
+        peers: Iterable[Pose2D],
+        now: float,
+    ) -> None:
+        """Take a scan, made at ``pose`` in ``map`` (monotonic, s)."""
+        if now - self._looked_at < _EVERY_S:
+            return
+        self._looked_at = now
+        bodies = _bodies(self._unexplained(scan, pose, twist, peers))
+        if self._plan is None:
+            bodies = [one for one in bodies if self._is_ahead(one, pose, twist)]
+        known = [one for one in self._known if now - one.at <= _GONE_S]
+        seen = [_joined(body, known, now) for body in bodies]
+        self._known = (*seen, *known)
+
+    def obstacle(self, now: float) -> Obstacle | None:
+        """What counts and was there within the last half second; the oldest."""
+        present = [one for one in self._known if one.counts and now - one.at <= _GONE_S]
+        return min(present, key=lambda one: one.since, default=None)
+
+    def _unexplained(
+        self, scan: LaserScan, pose: Pose2D, twist: Twist2D, peers: Iterable[Pose2D]
+    ) -> _Floats:
+        """Returns near the robot that nothing explains; shape (n, 2), in ``map``."""
+        x, y = scan.points(Pose2D(0.0, 0.0, 0.0)).astype(np.float64).T
+        gap = self._outline.gap_to(x, y)
+        near = (gap > 0.0) & (gap <= LIMITS.ring_default_m)
+        away = np.hypot(x, y)[near]
+        x, y = _moved(x[near], y[near], pose)
+        left = np.ones(x.shape, np.bool_)
+        if self._plan is not None:
+            blurred = _PLAN_M + abs(twist.angular_z) * _TURN_S * away
+            left = self._plan.distance_to(x, y) > blurred
+        for peer in peers:
+            left &= np.hypot(x - peer.x, y - peer.y) > _PEER_M
+        return np.column_stack((x[left], y[left]))
+
+    def _is_ahead(self, body: _Floats, pose: Pose2D, twist: Twist2D) -> bool:
+        """Whether a part of a body lies where the robot is driving."""
+        c, s = math.cos(pose.yaw), math.sin(pose.yaw)
+        x, y = body[:, 0] - pose.x, body[:, 1] - pose.y
+        x, y = c * x + s * y, c * y - s * x
+        ahead = (x > 0.0) == (twist.linear_x >= 0.0)
+        return bool(np.any(ahead & (np.abs(y) <= self._outline.width / 2 + _BESIDE_M)))
+
+
+def _moved(x: _Floats, y: _Floats, frame: Pose2D) -> tuple[_Floats, _Floats]:
+    """Points of a frame with this pose, in ``map``."""
+    c, s = math.cos(frame.yaw), math.sin(frame.yaw)
+    return frame.x + c * x - s * y, frame.y + s * x + c * y
+
+
+def _bodies(points: _Floats) -> Sequence[_Floats]:
+    """Neighbouring returns, in the order of the beams, as one body each."""
+    if not len(points):
+        return ()
+    steps = np.hypot(*np.diff(points, axis=0).T)
+    parts = np.split(points, np.flatnonzero(steps > _APART_M) + 1)
+    return [one for one in parts if len(one) >= _LEAST_RETURNS]
+
+
+def _joined(body: _Floats, known: list[Obstacle], now: float) -> Obstacle:
+    """A body as the nearest known obstacle that it may be, taken out, or a new one."""
+    x, y = (float(one) for one in body.mean(0))
+    size = float(np.hypot(*np.ptp(body, axis=0)))
+    near = min(known, key=lambda one: math.hypot(one.x - x, one.y - y), default=None)
+    if near is not None:
+        reach = _APART_M + LIMITS.walking_m_s * (now - near.at)
+        if math.hypot(near.x - x, near.y - y) <= reach:
+            known.remove(near)
+            return Obstacle(x, y, near.first_x, near.first_y, size, near.since, now)
+    return Obstacle(x, y, x, y, size, now, now)
