@@ -79,15 +79,35 @@ class Plan:
         )
         nearest: _Floats = np.maximum(inside, 0.0)
         if len(self.rectangles):
-            xmin, ymin, xmax, ymax = self.rectangles.T[..., None]
-            aside = np.maximum(np.maximum(xmin - x, x - xmax), 0.0)
-            along = np.maximum(np.maximum(ymin - y, y - ymax), 0.0)
-            nearest = np.minimum(nearest, np.hypot(aside, along).min(0))
+            nearest = np.minimum(nearest, _from_areas(self.rectangles, x, y).min(0))
         if len(self.posts):
-            post_x, post_y, radius = self.posts.T[..., None]
-            away = np.hypot(x - post_x, y - post_y) - radius
-            nearest = np.minimum(nearest, away.min(0))
+            nearest = np.minimum(nearest, _from_posts(self.posts, x, y).min(0))
         return nearest
+
+    def about(self, pose: Pose2D, reach_m: float) -> "Plan":
+        """The part of it that is within reach of a place."""
+        x, y = np.array([pose.x]), np.array([pose.y])
+        return Plan(
+            self.bounds,
+            self.rectangles[_from_areas(self.rectangles, x, y)[:, 0] <= reach_m],
+            self.posts[_from_posts(self.posts, x, y)[:, 0] <= reach_m],
+        )
+
+
+def _from_areas(areas: _Floats, x: _Floats, y: _Floats) -> _Floats:
+    """How far points are from rectangles (m); shape (rectangles, points)."""
+    xmin, ymin, xmax, ymax = areas.T[..., None]
+    aside = np.maximum(np.maximum(xmin - x, x - xmax), 0.0)
+    along = np.maximum(np.maximum(ymin - y, y - ymax), 0.0)
+    away: _Floats = np.hypot(aside, along)
+    return away
+
+
+def _from_posts(posts: _Floats, x: _Floats, y: _Floats) -> _Floats:
+    """How far points are from posts (m); shape (posts, points)."""
+    post_x, post_y, radius = posts.T[..., None]
+    away: _Floats = np.hypot(x - post_x, y - post_y) - radius
+    return away
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,7 +207,8 @@ class Witness:
         left = np.ones(x.shape, np.bool_)
         if self._plan is not None:
             blurred = _PLAN_M + abs(twist.angular_z) * _TURN_S * away
-            left = self._plan.distance_to(x, y) > blurred
+            plan = self._plan.about(pose, float(away.max(initial=0.0)) + 2 * _PLAN_M)
+            left = plan.distance_to(x, y) > blurred
         for peer in peers:
             left &= np.hypot(x - peer.x, y - peer.y) > _PEER_M
         return np.column_stack((x[left], y[left]))
