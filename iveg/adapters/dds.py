@@ -39,7 +39,7 @@ from cyclonedds.topic import Topic
 from cyclonedds.util import duration
 
 from iveg.domain.errors import HopError
-from iveg.ros2.names import Qos, dds_topic, dds_type, ros_topic, ros_type
+from iveg.ros2.names import Endpoint, Qos, dds_topic, dds_type, ros_topic, ros_type
 from iveg.ros2.schema import Many, Message, One, Structure, Text, fields_of
 
 _LEASE = "3 s"
@@ -91,25 +91,6 @@ class DdsNetwork:
             f'<CycloneDDS><Domain Id="any"><General>{general}</General>'
             f"<Discovery>{discovery}</Discovery></Domain></CycloneDDS>"
         )
-
-
-@dataclass(frozen=True, slots=True)
-class Endpoint:
-    """A writer or reader that somebody has on the domain.
-
-    Attributes:
-        topic: ROS name.
-        type: ROS name, such as ``nav_msgs/msg/Odometry``.
-        key: Names it for ever.
-        own: It is this participant's.
-    """
-
-    topic: str
-    type: str
-    qos: Qos
-    writes: bool
-    key: str
-    own: bool
 
 
 class Dds(AbstractContextManager["Dds"]):
@@ -215,9 +196,8 @@ class Dds(AbstractContextManager["Dds"]):
         self._endpoints[key] = Endpoint(
             topic,
             ros_type(sample.type_name),
-            _read_qos(sample.qos),
             writes,
-            key,
+            _read_qos(sample.qos),
             str(sample.participant_key) == self._guid,
         )
 

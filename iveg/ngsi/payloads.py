@@ -11,6 +11,8 @@ MAX_BOXES = 256
 MAX_ROBOTS = 256
 MAX_PATH = 1024
 MAX_TEXT = 64
+FORBIDDEN = frozenset("<>\"'=;()")
+"""Characters that Orion refuses, with the whole update they stand in."""
 
 
 def clean_text(text: str) -> str:

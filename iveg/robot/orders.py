@@ -14,7 +14,6 @@ _STOP = "stop"
 _MAX_NAMED = 128
 _KEYS = {"release": {"ids", "ch", "attempt"}, "resume": {"ch", "attempt"}}
 """Orders that must be perfect, and exactly the keys that each has."""
-_FORBIDDEN = frozenset("<>\"'=;()")  # Orion refuses values with any of these
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +105,7 @@ def _member(value: object, name: str) -> object:
 
 
 def _usable_id(value: object) -> str | None:
-    if not isinstance(value, str) or not value or _FORBIDDEN & set(value):
+    if not isinstance(value, str) or not value or payloads.FORBIDDEN & set(value):
         return None
     return value if payloads.clean_text(value) == value else None
 

@@ -38,6 +38,25 @@ class Qos:
         return replace(self, depth=depth)
 
 
+@dataclass(frozen=True, slots=True)
+class Endpoint:
+    """A writer or reader that somebody has on the domain.
+
+    Attributes:
+        topic: Full ROS name.
+        type: ROS name, such as ``nav_msgs/msg/Odometry``.
+        writes: It is a writer, else a reader.
+        qos: Quality of service that it offers or requests.
+        own: It is of this process.
+    """
+
+    topic: str
+    type: str
+    writes: bool
+    qos: Qos
+    own: bool
+
+
 DEFAULT = Qos()
 SENSOR_DATA = Qos(reliable=False, depth=5)
 TF = Qos(depth=100)

@@ -6,19 +6,20 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from iveg.ros2 import cdr
-from iveg.ros2.names import DEFAULT, Qos
+from iveg.ros2.names import DEFAULT, Endpoint, Qos
 from iveg.ros2.schema import Message
 
 
-@dataclass(frozen=True, slots=True)
-class Endpoint:
+def endpoint(
+    topic: str,
+    kind: type[Message],
+    *,
+    writes: bool = True,
+    qos: Qos = DEFAULT,
+    own: bool = False,
+) -> Endpoint:
     """Somebody else's writer, unless ``own``."""
-
-    topic: str
-    type: str
-    writes: bool = True
-    qos: Qos = DEFAULT
-    own: bool = False
+    return Endpoint(topic, kind.ROS, writes, qos, own)
 
 
 @dataclass

@@ -11,9 +11,8 @@ from dataclasses import dataclass
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.drive import message_of
 from iveg.robot.ros2.inputs import listened
-from iveg.robot.ros2.rig import Known
 from iveg.robot.ros2.transforms import NoTransformError, TransformBuffer
-from iveg.ros2.names import Qos
+from iveg.ros2.names import Endpoint, Qos
 from iveg.ros2.schema import Message
 
 _NEEDED = ("odometry", "tf")
@@ -61,7 +60,7 @@ class CheckVerdict:
 
 def judge(
     config: RobotConfig,
-    endpoints: Sequence[Known],
+    endpoints: Sequence[Endpoint],
     heard: Mapping[str, Heard],
     transforms: TransformBuffer,
     *,
@@ -103,7 +102,7 @@ def _row(
     name: str,
     message: type[Message],
     config: RobotConfig,
-    others: Sequence[Known],
+    others: Sequence[Endpoint],
     heard: Mapping[str, Heard],
     seconds: float,
 ) -> tuple[CheckRow, list[str]]:
@@ -132,8 +131,8 @@ def _complaints(
     topic: str,
     name: str,
     kind: str,
-    writers: Sequence[Known],
-    fitting: Sequence[Known],
+    writers: Sequence[Endpoint],
+    fitting: Sequence[Endpoint],
 ) -> list[str]:
     if writers and not fitting:
         return [f"{name} is {writers[0].type}, not {kind}."]
@@ -170,10 +169,10 @@ def _chain(
     return names, list(missing)
 
 
-def _drive(config: RobotConfig, others: Iterable[Known]) -> list[str]:
+def _drive(config: RobotConfig, others: Iterable[Endpoint]) -> list[str]:
     names, drive = config.full_topics, config.drive
     found: list[str] = []
-    by: dict[tuple[str, bool], list[Known]] = {}
+    by: dict[tuple[str, bool], list[Endpoint]] = {}
     for one in others:
         by.setdefault((one.topic, one.writes), []).append(one)
     if by.get((names.cmd_vel_out, True)):

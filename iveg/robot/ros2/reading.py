@@ -18,7 +18,7 @@ from iveg.domain.observations import (
     LaserScan,
     Navigation,
 )
-from iveg.ngsi.payloads import MAX_BEAMS, MAX_PATH, clean_text
+from iveg.ngsi.payloads import FORBIDDEN, MAX_BEAMS, MAX_PATH, clean_text
 from iveg.robot.ros2.rigid import RigidTransform, rigid_of
 from iveg.ros2 import messages as m
 
@@ -31,7 +31,7 @@ number is above, and one comparison finds it."""
 _NOTHING = np.float32(np.inf)
 _TILT = math.radians(10.0)
 _LONGEST_RANGE_M = 1e4
-_FORBIDDEN = str.maketrans(dict.fromkeys("<>\"'=;()"))
+_FORBIDDEN = str.maketrans(dict.fromkeys(FORBIDDEN))
 
 
 def read_pose(odometry: m.Odometry) -> RigidTransform:

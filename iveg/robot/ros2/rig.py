@@ -18,6 +18,7 @@ from iveg.domain.feedback import Feedback
 from iveg.domain.geometry import Twist2D
 from iveg.domain.observations import RobotFault
 from iveg.robot.node import RobotNode
+from iveg.robot.pacing import every
 from iveg.robot.ros2 import neighbours
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.drive import DriveTopics, message_of
@@ -25,7 +26,7 @@ from iveg.robot.ros2.input_faults import speed_of
 from iveg.robot.ros2.inputs import PICTURES, SensorInputs, listened
 from iveg.ros2 import cdr
 from iveg.ros2 import messages as m
-from iveg.ros2.names import Qos
+from iveg.ros2.names import Endpoint, Qos
 from iveg.ros2.schema import Message
 
 _log = logging.getLogger(__name__)
@@ -57,30 +58,6 @@ class Writer(Protocol):
         """Number of subscribers."""
 
 
-class Known(Protocol):
-    """A writer or reader on the network."""
-
-    @property
-    def topic(self) -> str:
-        """Full ROS name."""
-
-    @property
-    def type(self) -> str:
-        """ROS name."""
-
-    @property
-    def qos(self) -> Qos:
-        """Quality of service that it offers or requests."""
-
-    @property
-    def writes(self) -> bool:
-        """Whether it is a writer, else a reader."""
-
-    @property
-    def own(self) -> bool:
-        """Whether it belongs to this process."""
-
-
 class Network(Protocol):
     """The DDS network, as far as a robot needs it."""
 
@@ -90,7 +67,7 @@ class Network(Protocol):
     def writer(self, name: str, message: type[Message], qos: Qos) -> Writer:
         """Publish."""
 
-    def endpoints(self) -> Sequence[Known]:
+    def endpoints(self) -> Sequence[Endpoint]:
         """All writers and readers on the network."""
 
     def watch(self, readers: list[Any], on_data: Callable[[], None]) -> None:
@@ -149,6 +126,7 @@ class Ros2Robot:
         self._first_feedback: float | None = None
         self._known = False
         self._alone_since = clock.mono()
+        self._ticks = itertools.count()
         self._open(network)
         self.node = make_node(self._drive, self._on_feedback)
 
@@ -190,35 +168,12 @@ class Ros2Robot:
         async with asyncio.TaskGroup() as tasks:
             for name, work in (
                 ("node", self.node.run()),
-                ("senses", self._sense_forever()),
+                ("senses", every(1 / RATE_HZ, self._tick)),
             ):
                 tasks.create_task(work, name=f"{self._id}-{name}")
 
-    async def _sense_forever(self) -> None:
-        """Read all sensors on one timer: each wake-up costs as much as its work."""
-        loop, ticks = asyncio.get_running_loop(), itertools.count()
-        broken: asyncio.Future[None] = loop.create_future()
-        due, timer = clock.mono(), None
-
-        def tick() -> None:
-            nonlocal due, timer
-            try:
-                self._tick(next(ticks))
-            except Exception as error:  # ends ``run``
-                broken.set_exception(error)
-                return
-            now = clock.mono()
-            due = max(due + 1 / RATE_HZ, now)
-            timer = loop.call_later(due - now, tick)
-
-        tick()
-        try:
-            await broken
-        finally:
-            if timer is not None:
-                timer.cancel()
-
-    def _tick(self, number: int) -> None:
+    def _tick(self, _: float) -> None:
+        number = next(self._ticks)
         self._sense()
         if number % _LOOK_ROUND_TICKS == 0:
             self._look_round()

@@ -1,42 +1,22 @@
 """``iveg robot check`` says in one sentence each what is missing."""
 
-from dataclasses import dataclass
-
 import pytest
 
 from iveg.robot.ros2.checking import CheckVerdict, Heard, judge, lines
 from iveg.robot.ros2.config import DriveConfig, RobotConfig
 from iveg.robot.ros2.transforms import TransformBuffer
 from iveg.ros2 import messages as m
-from iveg.ros2.names import DEFAULT, SENSOR_DATA, TF, TF_STATIC, Qos
-from iveg.ros2.schema import Message
+from iveg.ros2.names import SENSOR_DATA, TF, TF_STATIC, Endpoint
+from tests.fakes.ros2_network import endpoint
 from tests.unit.robot.ros2.said import WALL, link, tf
 
-
-@dataclass(frozen=True, slots=True)
-class There:
-    """A writer or reader on DDS."""
-
-    topic: str
-    type: str
-    writes: bool = True
-    qos: Qos = DEFAULT
-    own: bool = False
-
-
-def there(
-    topic: str, message: type[Message], qos: Qos = DEFAULT, *, writes: bool = True
-) -> There:
-    return There(topic, message.ROS, writes, qos)
-
-
 WHOLE = {
-    "odometry": there("/odom", m.Odometry),
-    "scan": there("/scan", m.LaserScan, SENSOR_DATA),
-    "tf": there("/tf", m.TFMessage, TF),
-    "tf_static": there("/tf_static", m.TFMessage, TF_STATIC),
-    "wishes": there("/cmd_vel_nav", m.Twist),
-    "base": there("/cmd_vel", m.Twist, writes=False),
+    "odometry": endpoint("/odom", m.Odometry),
+    "scan": endpoint("/scan", m.LaserScan, qos=SENSOR_DATA),
+    "tf": endpoint("/tf", m.TFMessage, qos=TF),
+    "tf_static": endpoint("/tf_static", m.TFMessage, qos=TF_STATIC),
+    "wishes": endpoint("/cmd_vel_nav", m.Twist),
+    "base": endpoint("/cmd_vel", m.Twist, writes=False),
 }
 
 
@@ -58,7 +38,7 @@ def heard(**differs: int) -> dict[str, Heard]:
 
 
 def verdict(
-    *more: There,
+    *more: Endpoint,
     without: str = "",
     config: RobotConfig | None = None,
     said: dict[str, Heard] | None = None,
@@ -104,25 +84,25 @@ def test_a_robot_that_has_everything_misses_nothing() -> None:
             "Nobody publishes /cmd_vel_nav: is navigation running?",
         ),
         (
-            verdict(there("/cmd_vel", m.Twist)),
+            verdict(endpoint("/cmd_vel", m.Twist)),
             "Somebody else publishes /cmd_vel: only the gate may, remap it to "
             "/cmd_vel_nav.",
         ),
         (
-            verdict(there("/cmd_vel_nav", m.Twist, writes=False)),
+            verdict(endpoint("/cmd_vel_nav", m.Twist, writes=False)),
             "Somebody listens on /cmd_vel_nav beside the gate: a base that does goes "
             "round it.",
         ),
         (
-            verdict(there("/scan", m.PointCloud2), without="scan"),
+            verdict(endpoint("/scan", m.PointCloud2), without="scan"),
             "/scan is sensor_msgs/msg/PointCloud2, not sensor_msgs/msg/LaserScan.",
         ),
         (
-            verdict(there("/tf", m.TFMessage, SENSOR_DATA), without="tf"),
+            verdict(endpoint("/tf", m.TFMessage, qos=SENSOR_DATA), without="tf"),
             "/tf: asked for reliably, published best effort; say so in [qos].",
         ),
         (
-            verdict(there("/tf_static", m.TFMessage, DEFAULT), without="tf_static"),
+            verdict(endpoint("/tf_static", m.TFMessage), without="tf_static"),
             "/tf_static: asked for transient local, published volatile; say so in "
             "[qos].",
         ),
@@ -155,7 +135,7 @@ def test_what_is_missing_is_said_in_one_sentence(
 def test_a_domain_where_nobody_is_says_so_once() -> None:
     found = judge(
         RobotConfig(domain=7),
-        [There("/cmd_vel", m.Twist.ROS, own=True)],
+        [endpoint("/cmd_vel", m.Twist, own=True)],
         {},
         TransformBuffer(),
         seconds=3.0,

@@ -19,7 +19,7 @@ from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.rig import Ros2Robot
 from iveg.ros2 import messages as m
 from tests.builders import AGI
-from tests.fakes.ros2_network import Endpoint, FakeNetwork
+from tests.fakes.ros2_network import FakeNetwork, endpoint
 from tests.ports import free_ports
 
 
@@ -111,15 +111,15 @@ async def test_a_second_publisher_of_the_drives_topic_makes_it_stand(
     site: Site,
 ) -> None:
     placed(site.network)
-    site.network.others.append(Endpoint("/agi/cmd_vel", m.Twist.ROS))
+    site.network.others.append(endpoint("/agi/cmd_vel", m.Twist))
 
     await until(lambda: "second_publisher" in site.faults())
     await until(lambda: site.robot.node.speed_factor == 0.0)
 
 
 async def test_our_own_writer_is_no_second_publisher(site: Site) -> None:
-    site.network.others.append(Endpoint("/agi/cmd_vel", m.Twist.ROS, own=True))
-    site.network.others.append(Endpoint("/agii/cmd_vel", m.Twist.ROS))
+    site.network.others.append(endpoint("/agi/cmd_vel", m.Twist, own=True))
+    site.network.others.append(endpoint("/agii/cmd_vel", m.Twist))
 
     await until(lambda: len(site.driven) >= 20)
 
