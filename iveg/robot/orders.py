@@ -5,6 +5,9 @@ exactly, or it is refused with a reason (docs/safety.md).
 """
 
 from dataclasses import dataclass
+from typing import Annotated
+
+from pydantic import AfterValidator, Field, ValidationError
 
 from iveg.domain.errors import UnreadableError
 from iveg.ngsi import names, payloads
@@ -12,8 +15,6 @@ from iveg.ngsi.codec import load_json
 
 _STOP = "stop"
 _MAX_NAMED = 128
-_KEYS = {"release": {"ids", "ch", "attempt"}, "resume": {"ch", "attempt"}}
-"""Orders that must be perfect, and exactly the keys that each has."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,25 +24,41 @@ class StopOrder:
     id: str | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class ReleaseOrder:
-    """Lift exactly these holds.
+def _refuse_unusable(text: str) -> str:
+    """The id of an order, or its answer could not be sent."""
+    if _usable_id(text) is None:
+        raise ValueError("not an id")
+    return text
+
+
+_Name = Annotated[str, Field(min_length=1)]
+
+
+class ResumeOrder(payloads.Wire, extra="forbid"):
+    """Drive again after a release.
 
     Attributes:
+        challenge: Text of the robot's newest report.
         attempt: Id of the order, shared by its copies.
     """
 
-    ids: tuple[str, ...]
-    challenge: str
-    attempt: str
+    challenge: _Name = Field(alias="ch")
+    attempt: Annotated[str, AfterValidator(_refuse_unusable)]
 
 
-@dataclass(frozen=True, slots=True)
-class ResumeOrder:
-    """Drive again after a release; ``attempt`` as in ``ReleaseOrder``."""
+class ReleaseOrder(ResumeOrder):
+    """Lift exactly these holds."""
 
-    challenge: str
-    attempt: str
+    ids: Annotated[
+        tuple[_Name, ...], Field(strict=False, min_length=1, max_length=_MAX_NAMED)
+    ]
+
+
+_STRICT: dict[object, type[ReleaseOrder | ResumeOrder]] = {
+    "release": ReleaseOrder,
+    "resume": ResumeOrder,
+}
+"""Orders that must be perfect."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,26 +131,8 @@ def _release_or_resume(message: object) -> Order:
     command = _member(message, names.COMMAND)
     if not isinstance(command, dict) or len(command) != 1:
         return Unusable("malformed")
-    for name, keys in _KEYS.items():
-        asked = command.get(name)
-        if isinstance(asked, dict) and asked.keys() == keys:
-            return _attempt(asked)
-    return Unusable("malformed")
-
-
-def _attempt(asked: dict[str, object]) -> Order:
-    """A release, or a resume, which names no holds."""
-    challenge, attempt = asked["ch"], _usable_id(asked["attempt"])
-    if not isinstance(challenge, str) or not challenge:
+    ((name, asked),) = command.items()
+    try:
+        return _STRICT[name].model_validate(asked)
+    except (KeyError, ValidationError):
         return Unusable("malformed")
-    if attempt is None:
-        return Unusable("malformed")  # It could not be answered.
-    if "ids" not in asked:
-        return ResumeOrder(challenge, attempt)
-    ids = asked["ids"]
-    if not isinstance(ids, list) or not 0 < len(ids) <= _MAX_NAMED:
-        return Unusable("malformed")
-    named = tuple(one for one in ids if isinstance(one, str) and one)
-    if len(named) != len(ids):
-        return Unusable("malformed")
-    return ReleaseOrder(named, challenge, attempt)
