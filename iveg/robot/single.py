@@ -15,7 +15,12 @@ from iveg.domain.observations import (
     Odometry,
 )
 from iveg.ngsi import names
-from iveg.ngsi.codec.fields import write_origin, write_ranges
+from iveg.ngsi.codec.fields import (
+    write_lidar_header,
+    write_motion,
+    write_origin,
+    write_ranges,
+)
 from iveg.ngsi.codec.reports import write_unread
 
 
@@ -44,14 +49,7 @@ class SinglePayload:
         """Payload of ``/{apikey}/{robot}/attrs`` for this odometry tick."""
         origin = write_origin(odometry.origin)
         payload: dict[str, object] = {
-            "pose": {
-                "x": round(odometry.pose.x, 4),
-                "y": round(odometry.pose.y, 4),
-                "yaw": round(odometry.pose.yaw, 5),
-                "linear_velocity": round(odometry.twist.linear_x, 4),
-                "angular_velocity": round(odometry.twist.angular_z, 4),
-                **origin,
-            },
+            "pose": {**write_motion(odometry.pose, odometry.twist), **origin},
             "timestamp": odometry.origin.stamp,
             "TimeInstant": odometry.origin.stamp,
         }
@@ -64,7 +62,8 @@ class SinglePayload:
             self._saw_nothing = False
             payload |= {names.BOXES: [], names.BOXES_HEADER: origin}
         if self.scan is not None:
-            payload |= _swept(self.scan, origin)
+            payload["laser_scan"] = write_ranges(self.scan.ranges)
+            payload[names.LIDAR_HEADER] = write_lidar_header(self.scan, origin)
             self.scan = None
         return orjson.dumps(payload, option=orjson.OPT_SERIALIZE_NUMPY)
 
@@ -77,20 +76,4 @@ def _detected(detection: Detection, pose: Pose2D) -> dict[str, object]:
         "class": detection.class_id,
         "conf": round(detection.probability, 4),
         "position_3D": {"x": round(x, 4), "y": round(y, 4), "z": round(z, 4)},
-    }
-
-
-def _swept(scan: LaserScan, origin: dict[str, object]) -> dict[str, object]:
-    return {
-        "laser_scan": write_ranges(scan.ranges),
-        names.LIDAR_HEADER: {
-            "angle_min": scan.angle_min,
-            "angle_increment": scan.angle_increment,
-            "range_min": scan.range_min,
-            "range_max": scan.range_max,
-            "x": scan.mount.x,
-            "y": scan.mount.y,
-            "yaw": scan.mount.yaw,
-            **origin,
-        },
     }

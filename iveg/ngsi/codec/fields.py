@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iveg.domain.errors import UnreadableError
-from iveg.domain.observations import FeedbackRef, Hold, Origin
+from iveg.domain.geometry import Pose2D, Twist2D
+from iveg.domain.observations import FeedbackRef, Hold, LaserScan, Origin
 from iveg.domain.stamps import parse_stamp
 from iveg.ngsi import names, payloads
 
@@ -84,6 +85,31 @@ def write_ranges(ranges: NDArray[np.float32]) -> NDArray[np.float64]:
     nine, which is as good from a decimetre on.
     """
     return ranges.astype(np.float64).round(11)
+
+
+def write_motion(pose: Pose2D, twist: Twist2D) -> dict[str, Any]:
+    """Pose and twist of an odometry."""
+    return {
+        "x": round(pose.x, 4),
+        "y": round(pose.y, 4),
+        "yaw": round(pose.yaw, 5),
+        "linear_velocity": round(twist.linear_x, 4),
+        "angular_velocity": round(twist.angular_z, 4),
+    }
+
+
+def write_lidar_header(scan: LaserScan, origin: dict[str, Any]) -> dict[str, Any]:
+    """``lidar_header``, with the origin of its message."""
+    return {
+        "angle_min": scan.angle_min,
+        "angle_increment": scan.angle_increment,
+        "range_min": scan.range_min,
+        "range_max": scan.range_max,
+        "x": scan.mount.x,
+        "y": scan.mount.y,
+        "yaw": scan.mount.yaw,
+        **origin,
+    }
 
 
 def rounded(value: float | None) -> float | None:

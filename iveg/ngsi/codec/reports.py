@@ -24,6 +24,8 @@ from iveg.ngsi.codec.fields import (
     rounded,
     without_none,
     write_hold,
+    write_lidar_header,
+    write_motion,
     write_origin,
     write_ranges,
 )
@@ -35,11 +37,7 @@ def write_odometry(value: Odometry) -> bytes:
         value.origin,
         {
             names.ODOMETRY: {
-                "x": round(value.pose.x, 4),
-                "y": round(value.pose.y, 4),
-                "yaw": round(value.pose.yaw, 5),
-                "linear_velocity": round(value.twist.linear_x, 4),
-                "angular_velocity": round(value.twist.angular_z, 4),
+                **write_motion(value.pose, value.twist),
                 **write_origin(value.origin),
             }
         },
@@ -52,16 +50,7 @@ def write_scan(value: LaserScan) -> bytes:
         value.origin,
         {
             names.LIDAR: write_ranges(value.ranges),
-            names.LIDAR_HEADER: {
-                "angle_min": value.angle_min,
-                "angle_increment": value.angle_increment,
-                "range_min": value.range_min,
-                "range_max": value.range_max,
-                "x": value.mount.x,
-                "y": value.mount.y,
-                "yaw": value.mount.yaw,
-                **write_origin(value.origin),
-            },
+            names.LIDAR_HEADER: write_lidar_header(value, write_origin(value.origin)),
         },
     )
 

@@ -8,7 +8,7 @@ mends it where it is known.
 """
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -179,32 +179,40 @@ def ground_frame(
     mount: Mount,
     settings: Grounding = DEFAULT,
 ) -> DetectionFrame:
-    """One frame of the detector as the robot reports it, boxes in ``base_link``.
+    """One frame of the detector as the robot reports it, boxes in ``base_link``."""
+    answers = [
+        (one.class_id, _answer(one, picture, mount, settings)) for one in segments
+    ]
+    return frame_of(robot_id, origin, answers)
+
+
+def _answer(
+    segment: Segment, picture: DepthPicture, mount: Mount, settings: Grounding
+) -> Detection | Ungrounded:
+    try:
+        found = ground(segment, picture, settings)
+    except UnreadableError:
+        return "unreadable"
+    return to_detection(found, mount) if isinstance(found, Grounded) else found
+
+
+def frame_of(
+    robot_id: str,
+    origin: Origin,
+    answers: Sequence[tuple[str | None, Detection | Ungrounded]],
+) -> DetectionFrame:
+    """The detection frame of all targets of a picture, each with its class.
 
     A target that is sure enough and still has no place counts as unread: that
     somebody is there and nobody knows where must not look like an empty frame.
     """
-    answers = [(one.class_id, _answer(one, picture, settings)) for one in segments]
-    found = tuple(
-        to_detection(answer, mount)
-        for _, answer in answers
-        if isinstance(answer, Grounded)
-    )
+    found = tuple(one for _, one in answers if isinstance(one, Detection))
     lost = tuple(
         class_id
-        for class_id, answer in answers
-        if answer != "unsure" and not isinstance(answer, Grounded)
+        for class_id, one in answers
+        if one != "unsure" and not isinstance(one, Detection)
     )
     return DetectionFrame(robot_id, origin, found, lost)
-
-
-def _answer(
-    segment: Segment, picture: DepthPicture, settings: Grounding
-) -> Grounded | Ungrounded:
-    try:
-        return ground(segment, picture, settings)
-    except UnreadableError:
-        return "unreadable"
 
 
 def _examine(segment: Segment) -> None:

@@ -42,12 +42,12 @@ class Playback:
         self._ahead: deque[RecordingEntry] = deque()
         self._poses_ahead: deque[tuple[float, Odometry]] = deque()
         self._picture: tuple[Detection, ...] = ()
-        self._taken_at = 0.0
+        self._seen_at = 0.0
         self._scan: LaserScan | None = None
         self._read_ahead()
         self._at = self._ahead[0].at if self._ahead else 0.0
         while not self._poses_ahead and self._ahead:
-            self._take(self._ahead.popleft())
+            self._apply(self._ahead.popleft())
             self._read_ahead()
         self._last = self._poses_ahead[0]
 
@@ -55,9 +55,9 @@ class Playback:
         """Advance by ``seconds`` of the recording."""
         self._at += seconds
         while self._ahead and self._ahead[0].at <= self._at:
-            self._take(self._ahead.popleft())
+            self._apply(self._ahead.popleft())
             self._read_ahead()
-        if self._at - self._taken_at >= _SEEN_FOR_S:
+        if self._at - self._seen_at >= _SEEN_FOR_S:
             self._picture = ()
         if not self._ahead and self._loop:
             self._start_over()
@@ -72,7 +72,7 @@ class Playback:
             if isinstance(entry.observation, Odometry):
                 self._poses_ahead.append((entry.at, entry.observation))
 
-    def _take(self, entry: RecordingEntry) -> None:
+    def _apply(self, entry: RecordingEntry) -> None:
         match entry.observation:
             case Odometry():
                 self._last = self._poses_ahead.popleft()
@@ -84,8 +84,8 @@ class Playback:
 
     def _see(self, detection: Detection, at: float) -> None:
         """The newest frame replaces the one before: a walking person counts once."""
-        if not self._picture or abs(at - self._taken_at) > _ONE_PICTURE_S:
-            self._picture, self._taken_at = (), at
+        if not self._picture or abs(at - self._seen_at) > _ONE_PICTURE_S:
+            self._picture, self._seen_at = (), at
         self._picture = (*self._picture, detection)
 
     # --- sensor values at this moment ---------------------------------------------

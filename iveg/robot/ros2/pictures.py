@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iveg.domain.errors import UnreadableError
-from iveg.domain.observations import Detection, DetectionFrame, Origin
+from iveg.domain.observations import UNKNOWN_ORIGIN, Detection, DetectionFrame
 from iveg.robot.grounding.cloud import DepthPicture, Pinhole, top_left
 from iveg.robot.grounding.locate import (
     Grounded,
@@ -22,6 +22,7 @@ from iveg.robot.grounding.locate import (
     Segment,
     Ungrounded,
     corners_of,
+    frame_of,
     ground,
     hull_of,
 )
@@ -112,22 +113,16 @@ def grounded(
         place: Pose of the camera's optical frame in ``map``.
         classes: Names by number.
         settings: Parameters that the paper leaves open.
-
-    Returns:
-        A probable target without a position counts as unreadable.
     """
     owners = None if mask is None else _pixels(mask, _MASKS.get(mask.encoding, "u1"))
     answers = [
-        _place(number, one, picture, owners, place, classes, settings)
+        (
+            class_id_of(one.results, classes),
+            _place(number, one, picture, owners, place, classes, settings),
+        )
         for number, one in enumerate(look.detections, 1)
     ]
-    found = tuple(one for one in answers if isinstance(one, Detection))
-    lost = tuple(
-        class_id_of(one.results, classes)
-        for one, answer in zip(look.detections, answers, strict=True)
-        if answer != "unsure" and not isinstance(answer, Detection)
-    )
-    return DetectionFrame("", Origin(), found, lost)
+    return frame_of("", UNKNOWN_ORIGIN, answers)
 
 
 def _place(
