@@ -84,6 +84,10 @@ ROBOT_DEVICES = (
 """The command device sorts before its sensors, and is provisioned last where the agent
 keeps its registry in memory, so that either registry picks it (docs/fiware.md)."""
 
+DIRECT_SUFFIXES = tuple(
+    one.suffix for one in MEASURED if one.suffix and one.speaks_alone
+)
+
 
 @lru_cache(maxsize=1024)
 def is_robot_id(text: str) -> bool:

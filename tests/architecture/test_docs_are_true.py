@@ -8,7 +8,6 @@ from dataclasses import fields
 import pytest
 
 from iveg import settings
-from iveg.domain.kinds import MEASURED
 from iveg.ngsi import names
 from tests.architecture import documents, sensor_pages
 from tests.processes import ROOT
@@ -46,11 +45,7 @@ def test_every_measure_topic_has_its_heading(device: names.Device) -> None:
         names.answer_topic("{apikey}", "{robot}"),
         names.FEEDBACK_TOPIC.format(robot_id="{robot}"),
         names.DESIRED_TOPIC.format(robot_id="{robot}"),
-        *(
-            names.direct_topic("{robot}", one.suffix)
-            for one in MEASURED
-            if one.suffix and one.speaks_alone
-        ),
+        *(names.direct_topic("{robot}", suffix) for suffix in names.DIRECT_SUFFIXES),
     ],
 )
 def test_every_other_topic_has_its_heading(topic: str) -> None:
