@@ -39,8 +39,8 @@ from iveg.ngsi import names
 from iveg.robot.node import NodeSettings, RobotNode
 from iveg.robot.ros2.checking import Heard, judge, lines
 from iveg.robot.ros2.config import RobotConfig, read_classes, read_config
-from iveg.robot.ros2.inputs import PICTURES, TOPICS, listened
 from iveg.robot.ros2.rig import Network, Ros2Robot
+from iveg.robot.ros2.topics import TOPICS, sensed_topics
 from iveg.robot.ros2.transforms import TransformBuffer
 from iveg.ros2 import cdr
 from iveg.ros2 import messages as m
@@ -89,7 +89,7 @@ async def _ride(
     from iveg.adapters.dds import Dds
 
     with Dds(network) as dds:
-        await refuse_second_gate(dds, config.full_topics.cmd_vel_out)
+        await refuse_second_gate(dds, config.full_topics["cmd_vel_out"])
         safety = node_settings(settings, data / "robots", _plan(options.greenhouse))
         node = partial(_node, options.id, settings, safety, config)
         robot = Ros2Robot(
@@ -219,7 +219,7 @@ def _with_words(config: RobotConfig, options: argparse.Namespace) -> RobotConfig
     topics = {key: getattr(options, key, None) for key in ("cmd_vel_in", "cmd_vel_out")}
     return replace(
         config,
-        topics=replace(config.topics, **_without_none(topics)),
+        topics={**config.topics, **_without_none(topics)},
         **_without_none(said),
     )
 
@@ -266,10 +266,12 @@ async def _check(
         readers = {
             topic: dds.reader(
                 name,
-                message,
-                config.qualities[topic].newest(2 if topic in PICTURES else 200),
+                TOPICS[topic].message,
+                config.qualities[topic].newest(
+                    2 if TOPICS[topic].role == "picture" else 200
+                ),
             )
-            for topic, (name, message) in listened(config.full_topics).items()
+            for topic, name in sensed_topics(config.full_topics).items()
         }
         link = MqttLink(broker_of(settings), f"check of {robot_id}")
         task = asyncio.create_task(link.run(), name="broker")
@@ -312,14 +314,16 @@ def _hear(
     one = heard.setdefault(topic, Heard())
     one.count += 1
     try:
-        message = cdr.read(TOPICS[topic], payload)
+        message = cdr.read(TOPICS[topic].message, payload)
     except UnreadableError:
         one.unreadable += 1
         return 0.0
     if isinstance(message, m.TFMessage):
         transforms.add(message, static=topic == "tf_static")
         return 0.0
-    header: m.Header = message.header  # type: ignore[attr-defined]
+    if not isinstance(message, m.Stamped):
+        return 0.0
+    header = message.header
     one.frame = header.frame_id
     one.age_s = clock.wall() - header.stamp.seconds
     return header.stamp.seconds if topic == "odometry" else 0.0

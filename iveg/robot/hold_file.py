@@ -7,36 +7,33 @@ the old set or the new one.  An unreadable file is not treated as an empty set.
 from pathlib import Path
 
 import orjson
-from pydantic import TypeAdapter, ValidationError
+from pydantic import Field, ValidationError
 
 from iveg.adapters.files import write_bytes
 from iveg.domain.errors import UnreadableError
-from iveg.domain.observations import Hold
-from iveg.ngsi.codec import load_json
-from iveg.ngsi.payloads import HoldValue
+from iveg.ngsi.codec import fields, load_json
+from iveg.ngsi.payloads import HoldValue, Wire
 from iveg.robot.holds import HoldSet
 
-_HOLDS = TypeAdapter(list[HoldValue])
-_NAMES = TypeAdapter(list[str])
+
+class _StoredHolds(Wire):
+    """The file; those of older versions lack ``joined``."""
+
+    holds: list[HoldValue]
+    released: list[str]
+    joined: list[str] = Field(default_factory=list)
 
 
 def read_holds(file: Path) -> HoldSet | None:
     """The stored set; an empty one before the first start; None when unreadable."""
     try:
-        stored = load_json(file.read_bytes())
-        holds = _HOLDS.validate_python(stored["holds"])
-        released = _NAMES.validate_python(stored["released"])
-        # Files of older versions lack the key.
-        joined = _NAMES.validate_python(stored.get("joined", []))
+        stored = _StoredHolds.model_validate(load_json(file.read_bytes()))
     except FileNotFoundError:
         return HoldSet()
-    except (OSError, UnreadableError, ValidationError, KeyError, TypeError):
+    except (OSError, UnreadableError, ValidationError):
         return None
-    return HoldSet(
-        tuple(Hold(hold.id, hold.source, hold.ack) for hold in holds),
-        tuple(released),
-        tuple(joined),
-    )
+    holds = fields.read_holds(stored.holds)
+    return HoldSet(holds, tuple(stored.released), tuple(stored.joined))
 
 
 def write_holds(file: Path, holds: HoldSet) -> None:

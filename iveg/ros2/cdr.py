@@ -17,7 +17,7 @@ import struct
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cache
-from typing import Any, Literal, Protocol, TypeVar
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 
@@ -125,16 +125,6 @@ class _Out:
 # --- a message ---------------------------------------------------------------------
 
 
-class _Step(Protocol):
-    """The next one or more values of a message."""
-
-    def read(self, source: _In) -> Iterable[object]:
-        """Read them."""
-
-    def write(self, out: _Out, values: Iterator[Any]) -> None:
-        """Write them, taken from all that are left."""
-
-
 class _Codec:
     """One type of message: its steps, and how a message is made of their values."""
 
@@ -182,7 +172,7 @@ def _maker(message: type[Message]) -> Callable[[Iterator[object]], object]:
     return make
 
 
-def _steps(kinds: Iterable[Kind]) -> Iterator[_Step]:
+def _steps(kinds: Iterable[Kind]) -> "Iterator[_Step]":
     """Steps over the values, as many primitives together as follow each other."""
     for is_one, group in itertools.groupby(kinds, lambda kind: isinstance(kind, One)):
         if is_one:
@@ -300,3 +290,7 @@ class _Messages:
         out.count(len(items))
         for item in items:
             self._codec.write(out, item)
+
+
+_Step = _Run | _String | _Numbers | _Messages
+"""The next one or more values of a message."""

@@ -110,11 +110,10 @@ class Ros2Base:
         names = config.full_topics
 
         def writer(topic: str, message: type[Message]) -> Writer:
-            name = names.names()[topic]
-            return network.writer(name, message, config.qualities[topic])
+            return network.writer(names[topic], message, config.qualities[topic])
 
         self._commands = network.reader(
-            names.cmd_vel_out, m.Twist, config.qualities["cmd_vel_out"].newest(50)
+            names["cmd_vel_out"], m.Twist, config.qualities["cmd_vel_out"].newest(50)
         )
         self._wishes = writer("cmd_vel_in", m.Twist)
         self._tf, self._tf_static = (

@@ -10,10 +10,9 @@ from dataclasses import dataclass
 
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.drive import message_of
-from iveg.robot.ros2.inputs import listened
+from iveg.robot.ros2.topics import TOPICS, sensed_topics
 from iveg.robot.ros2.transforms import NoTransformError, TransformBuffer
 from iveg.ros2.names import Endpoint, Qos
-from iveg.ros2.schema import Message
 
 _NEEDED = ("odometry", "tf")
 _WANTED = ("scan",)
@@ -87,8 +86,8 @@ def judge(
             f"Nobody speaks ROS 2 on DDS domain {config.domain}: is ROS_DOMAIN_ID "
             "right, and does multicast pass (else name peers)?"
         )
-    for topic, (name, message) in listened(names).items():
-        row, faults = _row(topic, name, message, config, others, heard, seconds)
+    for topic, name in sensed_topics(names).items():
+        row, faults = _row(topic, name, config, others, heard, seconds)
         rows.append(row)
         missing += faults if others else []
     chain, broken = _chain(config, heard, transforms, stamp)
@@ -100,19 +99,19 @@ def judge(
 def _row(
     topic: str,
     name: str,
-    message: type[Message],
     config: RobotConfig,
     others: Sequence[Endpoint],
     heard: Mapping[str, Heard],
     seconds: float,
 ) -> tuple[CheckRow, list[str]]:
     writers = [one for one in others if one.topic == name and one.writes]
-    fitting = [one for one in writers if one.type == message.ROS]
+    message = TOPICS[topic].message.ROS
+    fitting = [one for one in writers if one.type == message]
     one = heard.get(topic, Heard())
     rate = one.count / seconds
     asked = config.qualities[topic]
     deaf = [writer for writer in fitting if not asked.hears(writer.qos)]
-    missing = _complaints(topic, name, message.ROS, writers, fitting)
+    missing = _complaints(topic, name, message, writers, fitting)
     remark = ""
     if deaf:
         remark = "QoS mismatch"
@@ -123,7 +122,7 @@ def _row(
     elif fitting and rate < _LEAST_HZ.get(topic, 0.0):
         remark = "slow"
         missing.append(f"{name} has a publisher and comes {rate:.1f} times a second.")
-    kind = writers[0].type if writers else message.ROS
+    kind = writers[0].type if writers else message
     return CheckRow(name, kind, len(writers), rate, one.age_s, remark), missing
 
 
@@ -171,32 +170,33 @@ def _chain(
 
 def _drive(config: RobotConfig, others: Iterable[Endpoint]) -> list[str]:
     names, drive = config.full_topics, config.drive
+    cmd_vel_in, cmd_vel_out = names["cmd_vel_in"], names["cmd_vel_out"]
     found: list[str] = []
     by: dict[tuple[str, bool], list[Endpoint]] = {}
     for one in others:
         by.setdefault((one.topic, one.writes), []).append(one)
-    if by.get((names.cmd_vel_out, True)):
+    if by.get((cmd_vel_out, True)):
         found.append(
-            f"Somebody else publishes {names.cmd_vel_out}: only the gate may, remap it "
-            f"to {names.cmd_vel_in}."
+            f"Somebody else publishes {cmd_vel_out}: only the gate may, remap it "
+            f"to {cmd_vel_in}."
         )
-    base = by.get((names.cmd_vel_out, False), [])
+    base = by.get((cmd_vel_out, False), [])
     if not base:
-        found.append(f"Nobody listens on {names.cmd_vel_out}: is the base running?")
-    if by.get((names.cmd_vel_in, False)):
+        found.append(f"Nobody listens on {cmd_vel_out}: is the base running?")
+    if by.get((cmd_vel_in, False)):
         found.append(
-            f"Somebody listens on {names.cmd_vel_in} beside the gate: a base that does "
+            f"Somebody listens on {cmd_vel_in} beside the gate: a base that does "
             "goes round it."
         )
-    wishes = by.get((names.cmd_vel_in, True), [])
+    wishes = by.get((cmd_vel_in, True), [])
     if not wishes:
-        found.append(f"Nobody publishes {names.cmd_vel_in}: is navigation running?")
+        found.append(f"Nobody publishes {cmd_vel_in}: is navigation running?")
     wanted = message_of(stamped=drive.stamped_out).ROS
     if base and all(one.type != wanted for one in base):
-        found.append(f"{names.cmd_vel_out} is {base[0].type} there: drive.stamped_out.")
+        found.append(f"{cmd_vel_out} is {base[0].type} there: drive.stamped_out.")
     given = message_of(stamped=drive.stamped_in).ROS
     if wishes and all(one.type != given for one in wishes):
-        found.append(f"{names.cmd_vel_in} is {wishes[0].type} there: drive.stamped_in.")
+        found.append(f"{cmd_vel_in} is {wishes[0].type} there: drive.stamped_in.")
     return found
 
 

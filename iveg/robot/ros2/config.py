@@ -12,7 +12,7 @@ from typing import Any
 
 from iveg.adapters.toml_positions import place_of, syntax_error
 from iveg.domain.errors import DataFileError, UnreadableError
-from iveg.robot.ros2.sensors import ROS_SENSORS
+from iveg.robot.ros2.topics import TOPICS
 from iveg.ros2 import names
 from iveg.ros2.names import Qos
 
@@ -20,52 +20,6 @@ _MOST_PEERS = 64
 _LONGEST = 256
 _LAST_DOMAIN = 232
 _FRAME = re.compile(r"/?[A-Za-z0-9_][A-Za-z0-9_/.-]{0,127}")
-
-
-@dataclass(frozen=True, slots=True)
-class Topics:
-    """Names of topics as in ROS nodes: relative ones are below the namespace.
-
-    Attributes:
-        detections_2d: With ``depth`` and ``camera_info`` an alternative to
-            ``detections_3d``; empty: none.
-        mask: A mono picture in which value n marks the n-th detection; empty: the
-            whole box is used.
-        obstacles: Output of people and peers for Nav2's obstacle layer.
-        markers: Output of the same for RViz.
-        sensors: Of the small sensors, by name.
-    """
-
-    odometry: str = "odom"
-    scan: str = "scan"
-    tf: str = "tf"
-    tf_static: str = "tf_static"
-    detections_3d: str = "detections_3d"
-    detections_2d: str = ""
-    depth: str = "camera/aligned_depth_to_color/image_raw"
-    camera_info: str = "camera/color/camera_info"
-    mask: str = ""
-    path: str = "plan"
-    cmd_vel_in: str = "cmd_vel_nav"
-    cmd_vel_out: str = "cmd_vel"
-    obstacles: str = "iveg/obstacles"
-    markers: str = "iveg/markers"
-    sensors: Mapping[str, str] = field(
-        default_factory=lambda: {name: one.topic for name, one in ROS_SENSORS.items()}
-    )
-
-    @classmethod
-    def of(cls, names: Mapping[str, str]) -> "Topics":
-        """Topics of which some have another name than the usual one; empty: none."""
-        own = {key: name for key, name in names.items() if key not in ROS_SENSORS}
-        usual = cls()
-        told = {key: names[key] for key in ROS_SENSORS if key in names}
-        return replace(usual, sensors={**usual.sensors, **told}, **own)
-
-    def names(self) -> dict[str, str]:
-        """All of them, by key."""
-        own = {one.name: getattr(self, one.name) for one in fields(self)}
-        return {**own.pop("sensors"), **own}
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,24 +47,8 @@ class DriveConfig:
     max_turn: float | None = None
 
 
-_QUALITIES: dict[str, Qos] = {
-    "odometry": names.SENSOR_DATA,
-    "scan": names.SENSOR_DATA,
-    "tf": names.TF,
-    "tf_static": names.TF_STATIC,
-    "detections_3d": names.SENSOR_DATA,
-    "detections_2d": names.SENSOR_DATA,
-    "depth": names.SENSOR_DATA,
-    "camera_info": names.SENSOR_DATA,
-    "mask": names.SENSOR_DATA,
-    **dict.fromkeys(ROS_SENSORS, names.SENSOR_DATA),
-    "path": names.SENSOR_DATA,
-    "cmd_vel_in": names.SENSOR_DATA,
-    "cmd_vel_out": names.DEFAULT,
-    "obstacles": names.DEFAULT,
-    "markers": names.DEFAULT,
-}
-"""A best-effort reader matches every writer; only commands are read reliably."""
+_NAMES = {key: topic.name for key, topic in TOPICS.items()}
+_QUALITIES = {key: topic.qos for key, topic in TOPICS.items()}
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,14 +62,15 @@ class RobotConfig:
         tf_max_age_s: Greatest age of a transform (s).
         class_list: File with a detector's class names, one a line; empty: as sent.
         p_min: Least probability of a detection that is located by depth.
-        qualities: Quality of service by topic.
+        topics: Names by key of ``TOPICS``, as in ROS nodes; empty: none.
+        qualities: Quality of service by the same.
     """
 
     domain: int = 0
     namespace: str = ""
     interface: str = ""
     peers: tuple[str, ...] = ()
-    topics: Topics = field(default_factory=Topics)
+    topics: Mapping[str, str] = field(default_factory=lambda: dict(_NAMES))
     frames: Frames = Frames()
     drive: DriveConfig = DriveConfig()
     tf_max_age_s: float = 0.5
@@ -140,18 +79,16 @@ class RobotConfig:
     qualities: Mapping[str, Qos] = field(default_factory=lambda: dict(_QUALITIES))
 
     @property
-    def full_topics(self) -> Topics:
+    def full_topics(self) -> dict[str, str]:
         """The topics by their full names.
 
         Raises:
             UnreadableError: a name is not a ROS topic.
         """
-        return Topics.of(
-            {
-                topic: names.full_name(name, self.namespace) if name else ""
-                for topic, name in self.topics.names().items()
-            }
-        )
+        return {
+            topic: names.full_name(name, self.namespace) if name else ""
+            for topic, name in self.topics.items()
+        }
 
 
 # --- values -------------------------------------------------------------------------
@@ -239,7 +176,7 @@ _KEYS: dict[str, dict[str, _Reader]] = {
         "interface": _maybe_text,
         "peers": _peers,
     },
-    "topics": dict.fromkeys(Topics().names(), _topic),
+    "topics": dict.fromkeys(TOPICS, _topic),
     "frames": {one.name: _frame for one in fields(Frames)},
     "drive": {
         "stamped_in": _flag,
@@ -249,7 +186,7 @@ _KEYS: dict[str, dict[str, _Reader]] = {
     },
     "transforms": {"max_age_s": _number(0.05, 5.0)},
     "detector": {"classes": _maybe_text, "p_min": _number(0.0, 1.0)},
-    "qos": dict.fromkeys(_QUALITIES, _quality),
+    "qos": dict.fromkeys(TOPICS, _quality),
 }
 """Tables of the file, with their keys."""
 
@@ -275,7 +212,7 @@ def read_config(text: str, file: str) -> RobotConfig:
     }
     return RobotConfig(
         **said["ros"],
-        topics=Topics.of(said["topics"]),
+        topics=_NAMES | said["topics"],
         frames=Frames(**said["frames"]),
         drive=DriveConfig(**said["drive"]),
         tf_max_age_s=said["transforms"].get("max_age_s", 0.5),

@@ -23,7 +23,8 @@ from iveg.robot.ros2 import neighbours
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.drive import DriveTopics, message_of
 from iveg.robot.ros2.input_faults import speed_of
-from iveg.robot.ros2.inputs import PICTURES, SensorInputs, listened
+from iveg.robot.ros2.inputs import SensorInputs
+from iveg.robot.ros2.topics import TOPICS, sensed_topics
 from iveg.ros2 import cdr
 from iveg.ros2 import messages as m
 from iveg.ros2.names import Endpoint, Qos
@@ -117,7 +118,7 @@ class Ros2Robot:
         self._input_faults = self.inputs.input_faults
         self._topics = DriveTopics(
             config.drive,
-            self._names.cmd_vel_in,
+            self._names["cmd_vel_in"],
             config.frames.base_link,
             self._input_faults,
         )
@@ -133,33 +134,30 @@ class Ros2Robot:
     def _open(self, network: Network) -> None:
         qualities, drive = self._config.qualities, self._config.drive
         self._ins: dict[str, _In] = {}
-        for topic, (name, message) in listened(self._names).items():
-            is_picture = topic in PICTURES
+        for topic, name in sensed_topics(self._names).items():
+            is_picture = TOPICS[topic].role == "picture"
             usual = max(_DEPTH, qualities[topic].depth)
             qos = qualities[topic].newest(_PICTURE_DEPTH if is_picture else usual)
-            reader = network.reader(name, message, qos)
+            reader = network.reader(name, TOPICS[topic].message, qos)
             self._ins[topic] = _In(reader, 0 if is_picture else usual)
         self._wishes = _In(
             network.reader(
-                self._names.cmd_vel_in,
+                self._names["cmd_vel_in"],
                 message_of(stamped=drive.stamped_in),
                 qualities["cmd_vel_in"].newest(_DEPTH),
             ),
             _DEPTH,
         )
         self._out = network.writer(
-            self._names.cmd_vel_out,
+            self._names["cmd_vel_out"],
             message_of(stamped=drive.stamped_out),
             qualities["cmd_vel_out"].newest(),
         )
         self._cloud, self._markers = (
-            network.writer(name, message, qualities[topic].newest())
-            if (name := getattr(self._names, topic))
+            network.writer(name, TOPICS[topic].message, qualities[topic].newest())
+            if (name := self._names[topic])
             else None
-            for topic, message in (
-                ("obstacles", m.PointCloud2),
-                ("markers", m.MarkerArray),
-            )
+            for topic in ("obstacles", "markers")
         )
 
     async def run(self) -> None:
@@ -211,7 +209,7 @@ class Ros2Robot:
         now = clock.mono()
         waited = self._wishes.reader.take()
         if len(waited) >= self._wishes.most:
-            self._input_faults.note("flood", self._names.cmd_vel_in, now)
+            self._input_faults.note("flood", self._names["cmd_vel_in"], now)
         if not waited:
             return
         wish = self._topics.read(waited[-1], now)
@@ -220,7 +218,7 @@ class Ros2Robot:
 
     def _look_round(self) -> None:
         """Check for other publishers on the drive, and for iVeg's knowledge of us."""
-        now, out = clock.mono(), self._names.cmd_vel_out
+        now, out = clock.mono(), self._names["cmd_vel_out"]
         others = [one for one in self._network.endpoints() if not one.own]
         if any(one.writes and one.topic == out for one in others):
             self._input_faults.note("second_publisher", out, now)
@@ -247,7 +245,7 @@ class Ros2Robot:
         except HopError as error:
             # No command arrives, so the base halts by its own time-out.
             _log.debug("%s: %s", self._id, error)
-            out = self._names.cmd_vel_out
+            out = self._names["cmd_vel_out"]
             self._input_faults.note("drive_refused", out, clock.mono())
 
     def _tell_neighbours(self) -> None:

@@ -56,7 +56,7 @@ def test_words_count_before_the_file_and_the_file_before_the_environment(
 
     assert (config.domain, bare.domain, worded.domain) == (7, 9, 3)
     topics = config.full_topics
-    assert (topics.odometry, topics.cmd_vel_in) == ("/b/odom", "/go")
+    assert (topics["odometry"], topics["cmd_vel_in"]) == ("/b/odom", "/go")
     assert classes == ("tomato", "farmer")
 
 

@@ -23,7 +23,8 @@ from iveg.lab.emulator.ros2_base import SimulatedNavigation as Nav
 from iveg.lab.emulator.scenarios import scenario_named
 from iveg.lab.emulator.world import SimulatedWorld
 from iveg.robot.ros2.config import RobotConfig
-from iveg.robot.ros2.inputs import TOPICS, SensorInputs
+from iveg.robot.ros2.inputs import SensorInputs
+from iveg.robot.ros2.topics import sensed_topics
 from iveg.ros2 import messages as m
 from tests.fakes.ros2_network import FakeNetwork
 
@@ -81,8 +82,8 @@ class Emulated:
         """What Algorithm 1 makes of everything that was published."""
         senses = SensorInputs(self.config)
         now = clock.now()
-        for topic in TOPICS:
-            writer = self.network.writers.get(self.config.full_topics.names()[topic])
+        for topic, name in sensed_topics(self.config.full_topics).items():
+            writer = self.network.writers.get(name)
             if writer is not None:
                 senses.hear(topic, writer.sent, now.mono)
         return senses.tick(now)

@@ -44,12 +44,12 @@ def test_without_a_word_everything_is_as_ros_does_it() -> None:
 
     assert config == RobotConfig()
     topics = config.full_topics
-    assert (topics.odometry, topics.scan, topics.tf, topics.cmd_vel_out) == (
+    assert [topics[key] for key in ("odometry", "scan", "tf", "cmd_vel_out")] == [
         "/odom",
         "/scan",
         "/tf",
         "/cmd_vel",
-    )
+    ]
     assert config.qualities["scan"] == Qos(reliable=False, depth=5)
     assert config.qualities["tf_static"].transient_local
     assert config.qualities["tf"].reliable
@@ -64,8 +64,11 @@ def test_what_is_said_counts_and_the_rest_stays() -> None:
         "eth0",
         ("10.0.0.5",),
     )
-    assert (topics.odometry, topics.scan) == ("/agi/odometry/filtered", "/agi/scan")
-    assert (topics.tf, topics.sensors["battery"]) == ("/tf", "")
+    assert (topics["odometry"], topics["scan"]) == (
+        "/agi/odometry/filtered",
+        "/agi/scan",
+    )
+    assert (topics["tf"], topics["battery"]) == ("/tf", "")
     assert (config.frames.map, config.frames.odom) == ("world", "odom")
     assert (config.drive.stamped_in, config.drive.max_speed) == (True, 0.6)
     assert (config.tf_max_age_s, config.p_min) == (0.3, 0.5)

@@ -14,8 +14,9 @@ from iveg.domain.observations import (
     Odometry,
     Unplaced,
 )
+from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.input_faults import speed_of
-from iveg.robot.ros2.inputs import TOPICS
+from iveg.robot.ros2.topics import sensed_topics
 from iveg.ros2 import cdr
 from iveg.ros2 import messages as m
 from tests.unit.robot.ros2 import said
@@ -394,4 +395,6 @@ def test_a_foreign_frame_cannot_say_what_orion_refuses() -> None:
 
 
 def test_transforms_are_read_after_the_data_that_need_them() -> None:
-    assert list(TOPICS)[-2:] == ["tf_static", "tf"]
+    topics = sensed_topics(RobotConfig().full_topics)
+
+    assert list(topics)[-2:] == ["tf_static", "tf"]

@@ -8,14 +8,19 @@ import pytest
 from iveg.domain.errors import UnreadableError
 from iveg.domain.observations import DetectionFrame
 from iveg.robot.ros2 import pictures
-from iveg.robot.ros2.config import RobotConfig, Topics
+from iveg.robot.ros2.config import RobotConfig
 from iveg.ros2 import messages as m
 from tests.unit.robot.ros2 import said
 from tests.unit.robot.ros2.said import Bench, tf
 
 WIDTH, HEIGHT, FOCAL = 64, 48, 60.0
 PERSON, WALL = 3.0, 6.0
-TOPICS = Topics(detections_2d="boxes", depth="depth", camera_info="info", mask="mask")
+TOPICS = RobotConfig().topics | {
+    "detections_2d": "boxes",
+    "depth": "depth",
+    "camera_info": "info",
+    "mask": "mask",
+}
 
 
 def info(**differs: float) -> m.CameraInfo:

@@ -1,0 +1,72 @@
+"""Topics of a ROS 2 robot: one row each, in the order in which they are read."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+from iveg.robot.ros2.sensors import ROS_SENSORS
+from iveg.ros2 import messages as m
+from iveg.ros2.names import DEFAULT, SENSOR_DATA, TF, TF_STATIC, Qos
+from iveg.ros2.schema import Message
+
+Role = Literal["stream", "state", "picture", "transforms", "drive", "output"]
+"""``stream``: old messages do not count; ``state``: the newest counts; ``picture``: one
+of which few may be pending; ``transforms``: every message counts; ``drive``: on either
+side of the gate, stamped or not; ``output``: what neighbours are published on."""
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """One row.
+
+    Attributes:
+        name: As in ROS nodes, by default: relative ones are below the namespace;
+            empty: none.
+        message: Its type.
+        qos: A best-effort reader matches every writer; only commands are read reliably.
+    """
+
+    name: str
+    message: type[Message]
+    role: Role = "state"
+    qos: Qos = SENSOR_DATA
+
+
+TOPICS: Mapping[str, Topic] = {
+    "odometry": Topic("odom", m.Odometry, "stream"),
+    "scan": Topic("scan", m.LaserScan, "stream"),
+    "detections_3d": Topic("detections_3d", m.Detection3DArray, "stream"),
+    # With depth and camera_info an alternative to detections_3d.
+    "detections_2d": Topic("", m.Detection2DArray, "stream"),
+    "depth": Topic("camera/aligned_depth_to_color/image_raw", m.Image, "picture"),
+    "camera_info": Topic("camera/color/camera_info", m.CameraInfo),
+    # In a mono picture value n marks the n-th detection; without, the whole box counts.
+    "mask": Topic("", m.Image, "picture"),
+    **{name: Topic(one.topic, one.message) for name, one in ROS_SENSORS.items()},
+    "path": Topic("plan", m.Path),
+    # After a pause each datum finds the transform that was published before it, though
+    # both arrive while the topics are being read.
+    "tf_static": Topic("tf_static", m.TFMessage, "transforms", TF_STATIC),
+    "tf": Topic("tf", m.TFMessage, "transforms", TF),
+    "cmd_vel_in": Topic("cmd_vel_nav", m.Twist, "drive"),
+    "cmd_vel_out": Topic("cmd_vel", m.Twist, "drive", DEFAULT),
+    # People and peers, for Nav2's obstacle layer and for RViz.
+    "obstacles": Topic("iveg/obstacles", m.PointCloud2, "output", DEFAULT),
+    "markers": Topic("iveg/markers", m.MarkerArray, "output", DEFAULT),
+}
+"""By key in ``robot.toml``."""
+
+_CAMERA = frozenset({"depth", "camera_info", "mask"})
+
+
+def sensed_topics(names: Mapping[str, str]) -> dict[str, str]:
+    """Topics that a robot's sensors publish on: key → full name.
+
+    A camera is read only where detections have no depth.
+    """
+    unread = frozenset() if names["detections_2d"] else _CAMERA
+    return {
+        key: names[key]
+        for key, topic in TOPICS.items()
+        if topic.role not in ("drive", "output") and names[key] and key not in unread
+    }
