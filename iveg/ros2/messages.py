@@ -76,6 +76,13 @@ class Header(Message, package="std_msgs"):
     frame_id: str = ""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Stamped(Message):
+    """What messages with a header have in common: it is their first field."""
+
+    header: Header = Header()
+
+
 @dataclass(frozen=True, slots=True)
 class ColorRGBA(Message, package="std_msgs"):
     """Each 0 to 1."""
@@ -126,10 +133,9 @@ class Pose(Message, package="geometry_msgs"):
 
 
 @dataclass(frozen=True, slots=True)
-class PoseStamped(Message, package="geometry_msgs"):
+class PoseStamped(Stamped, package="geometry_msgs"):
     """A pose in the header's frame."""
 
-    header: Header = Header()
     pose: Pose = Pose()
 
 
@@ -150,10 +156,9 @@ class Twist(Message, package="geometry_msgs"):
 
 
 @dataclass(frozen=True, slots=True)
-class TwistStamped(Message, package="geometry_msgs"):
+class TwistStamped(Stamped, package="geometry_msgs"):
     """A twist in the header's frame."""
 
-    header: Header = Header()
     twist: Twist = Twist()
 
 
@@ -174,10 +179,9 @@ class Transform(Message, package="geometry_msgs"):
 
 
 @dataclass(frozen=True, slots=True)
-class TransformStamped(Message, package="geometry_msgs"):
+class TransformStamped(Stamped, package="geometry_msgs"):
     """Pose of ``child_frame_id`` in the header's frame."""
 
-    header: Header = Header()
     child_frame_id: str = ""
     transform: Transform = Transform()
 
@@ -193,20 +197,18 @@ class TFMessage(Message, package="tf2_msgs"):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Odometry(Message, package="nav_msgs"):
+class Odometry(Stamped, package="nav_msgs"):
     """Pose of ``child_frame_id`` in the header's frame; the twist in the child's."""
 
-    header: Header = Header()
     child_frame_id: str = ""
     pose: PoseWithCovariance = field(default_factory=PoseWithCovariance)
     twist: TwistWithCovariance = field(default_factory=TwistWithCovariance)
 
 
 @dataclass(frozen=True, slots=True)
-class Path(Message, package="nav_msgs"):
+class Path(Stamped, package="nav_msgs"):
     """Planned path of navigation."""
 
-    header: Header = Header()
     poses: tuple[PoseStamped, ...] = ()
 
 
@@ -214,10 +216,9 @@ class Path(Message, package="nav_msgs"):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class LaserScan(Message, package="sensor_msgs"):
+class LaserScan(Stamped, package="sensor_msgs"):
     """One sweep; ``ranges`` of shape (n,), (m)."""
 
-    header: Header = Header()
     angle_min: Float32 = 0.0
     angle_max: Float32 = 0.0
     angle_increment: Float32 = 0.0
@@ -230,10 +231,9 @@ class LaserScan(Message, package="sensor_msgs"):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class BatteryState(Message, package="sensor_msgs"):
+class BatteryState(Stamped, package="sensor_msgs"):
     """Volts, °C, amperes, ampere hours; ``percentage`` 0 to 1, NaN when unknown."""
 
-    header: Header = Header()
     voltage: Float32 = 0.0
     temperature: Float32 = 0.0
     current: Float32 = 0.0
@@ -252,10 +252,9 @@ class BatteryState(Message, package="sensor_msgs"):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Image(Message, package="sensor_msgs"):
+class Image(Stamped, package="sensor_msgs"):
     """Rows of ``step`` bytes each; depth pictures are ``16UC1`` (mm), ``32FC1`` (m)."""
 
-    header: Header = Header()
     height: Uint32 = 0
     width: Uint32 = 0
     encoding: str = ""
@@ -276,10 +275,9 @@ class RegionOfInterest(Message, package="sensor_msgs"):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class CameraInfo(Message, package="sensor_msgs"):
+class CameraInfo(Stamped, package="sensor_msgs"):
     """Calibration of a camera; ``p`` is the projection of the rectified picture."""
 
-    header: Header = Header()
     height: Uint32 = 0
     width: Uint32 = 0
     distortion_model: str = ""
@@ -303,10 +301,9 @@ class PointField(Message, package="sensor_msgs"):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PointCloud2(Message, package="sensor_msgs"):
+class PointCloud2(Stamped, package="sensor_msgs"):
     """``width`` × ``height`` points of ``point_step`` bytes each."""
 
-    header: Header = Header()
     height: Uint32 = 1
     width: Uint32 = 0
     fields: tuple[PointField, ...] = ()
@@ -318,10 +315,9 @@ class PointCloud2(Message, package="sensor_msgs"):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class CompressedImage(Message, package="sensor_msgs"):
+class CompressedImage(Stamped, package="sensor_msgs"):
     """A part of ``Marker`` that iVeg leaves empty."""
 
-    header: Header = Header()
     format: str = ""
     data: Octets = field(default_factory=lambda: np.zeros(0, np.uint8))
 
@@ -354,20 +350,18 @@ class BoundingBox3D(Message, package="vision_msgs"):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Detection3D(Message, package="vision_msgs"):
+class Detection3D(Stamped, package="vision_msgs"):
     """One detected object."""
 
-    header: Header = Header()
     results: tuple[ObjectHypothesisWithPose, ...] = ()
     bbox: BoundingBox3D = BoundingBox3D()
     id: str = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Detection3DArray(Message, package="vision_msgs"):
+class Detection3DArray(Stamped, package="vision_msgs"):
     """Detections of one picture, with depth."""
 
-    header: Header = Header()
     detections: tuple[Detection3D, ...] = ()
 
 
@@ -398,20 +392,18 @@ class BoundingBox2D(Message, package="vision_msgs"):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Detection2D(Message, package="vision_msgs"):
+class Detection2D(Stamped, package="vision_msgs"):
     """One object detected in a picture."""
 
-    header: Header = Header()
     results: tuple[ObjectHypothesisWithPose, ...] = ()
     bbox: BoundingBox2D = BoundingBox2D()
     id: str = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Detection2DArray(Message, package="vision_msgs"):
+class Detection2DArray(Stamped, package="vision_msgs"):
     """Detections of one picture, without depth."""
 
-    header: Header = Header()
     detections: tuple[Detection2D, ...] = ()
 
 
@@ -435,10 +427,9 @@ class MeshFile(Message, package="visualization_msgs"):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Marker(Message, package="visualization_msgs"):
+class Marker(Stamped, package="visualization_msgs"):
     """A shape in RViz; ``type`` 3 is a cylinder, 9 a text."""
 
-    header: Header = Header()
     ns: str = ""
     id: Int32 = 0
     type: Int32 = 0
