@@ -15,7 +15,13 @@ from iveg.adapters.fleet_files import built_in
 from iveg.domain.geometry import Rectangle
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import Origin
-from iveg.lab.emulator.depth import DepthCamera, DepthView, Foliage, person_shape, take
+from iveg.lab.emulator.depth import (
+    DepthCamera,
+    DepthView,
+    Foliage,
+    person_shape,
+    take_picture,
+)
 from iveg.lab.emulator.greenhouse import Disc, Scenery
 from iveg.robot.grounding.locate import Mount, body_of, ground_frame
 
@@ -46,7 +52,9 @@ def cost(work: Callable[[], object]) -> float:
 def picture(ahead: float) -> DepthView:
     person = person_shape(Disc(AGI.camera.x + ahead, 0.0, 0.25))
     rng = np.random.default_rng(1)
-    return take(DepthCamera.of(AGI), AGI.camera, [person], AISLE, Foliage(), rng)
+    return take_picture(
+        DepthCamera.of(AGI), AGI.camera, [person], AISLE, Foliage(), rng
+    )
 
 
 def main() -> None:

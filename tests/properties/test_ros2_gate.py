@@ -170,7 +170,7 @@ class Gate:
             abs(twist.angular_z) <= abs(self.last.angular_z) + RAMP_RAD_S2 * step + 1e-9
         )
         self.last, self.last_at = twist, at
-        self.base.take(twist, at)
+        self.base.replace_command(twist, at)
 
 
 @given(st.lists(event, min_size=5, max_size=60))

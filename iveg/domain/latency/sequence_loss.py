@@ -43,7 +43,7 @@ class SequenceLoss:
         """A new boot counts from its own beginning."""
         self.newest = None
 
-    def take(self, seq: int) -> None:
+    def count(self, seq: int) -> None:
         """Count a message of a sender that leaves no number out."""
         newest = self.newest
         skipped = 0 if newest is None else seq - newest - 1

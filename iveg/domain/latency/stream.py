@@ -86,7 +86,7 @@ class Stream:
         if self._seqs[place] == seq and self._state[place] != _ORION_FIRST:
             self.up.repeated += 1
             return
-        self.up.take(seq)
+        self.up.count(seq)
         if self._seqs[place] == seq:
             self._overtaken(place, at.mono)
             return

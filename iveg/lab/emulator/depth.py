@@ -142,7 +142,7 @@ def robot_shape(body: Body) -> tuple[Upright, ...]:
     return (Upright(body, 0.0, ROBOT_HEIGHT_M),)
 
 
-def take(
+def take_picture(
     camera: DepthCamera,
     sensor: Pose2D,
     targets: Sequence[tuple[Upright, ...]],

@@ -21,7 +21,7 @@ from iveg.lab.emulator.depth import (
     Upright,
     person_shape,
     robot_shape,
-    take,
+    take_picture,
 )
 from iveg.lab.emulator.greenhouse import Disc, Scenery, into
 from iveg.robot.grounding.cloud import Pinhole
@@ -87,7 +87,7 @@ class GroundedCamera:
         shapes = [_shape(one.target), *(_shape(other) for other in others)]
         foliage = Foliage() if scenery.rectangles.size else None
         camera = replace(self._camera, lens=lens)
-        view = take(camera, sensor, shapes, scenery, foliage, self._rng)
+        view = take_picture(camera, sensor, shapes, scenery, foliage, self._rng)
         segment = view.segment(1, one.target.class_id, one.probability)
         if segment is None:
             return (), ()

@@ -97,7 +97,7 @@ class Relay:
             asyncio.create_task(way, name=f"relay-{name}")
             for name, way in (
                 ("down", _copy(down, writer)),
-                ("up", self._take(reader, writer, up, waiting)),
+                ("up", self._pass_up(reader, writer, up, waiting)),
                 ("late", _send_when_due(waiting, up)),
             )
         ]
@@ -108,7 +108,7 @@ class Relay:
                 way.cancel()
             await asyncio.gather(*ways, return_exceptions=True)
 
-    async def _take(
+    async def _pass_up(
         self,
         reader: asyncio.StreamReader,
         writer: asyncio.StreamWriter,

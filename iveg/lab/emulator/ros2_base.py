@@ -67,8 +67,8 @@ class DriveWatchdog:
     def __init__(self) -> None:
         self._command, self._at = REST, -math.inf
 
-    def take(self, command: Twist2D, now: float) -> None:
-        """Take a command."""
+    def replace_command(self, command: Twist2D, now: float) -> None:
+        """Note the newest command."""
         self._command, self._at = command, now
 
     def command(self, now: float) -> Twist2D:
@@ -151,7 +151,7 @@ class Ros2Base:
 
     def _drive(self, dt: float) -> None:
         now = clock.now()
-        self._take_commands(now.mono)
+        self._read_commands(now.mono)
         command = self._base.command(now.mono)
         self._rig.drive(command)
         requested = self._rig.requested_twist(now.mono - self._run_began, self._world)
@@ -161,7 +161,7 @@ class Ros2Base:
         if not self._is_odometry_frozen:
             self._tell_place(m.Time.of(now.wall))
 
-    def _take_commands(self, now: float) -> None:
+    def _read_commands(self, now: float) -> None:
         waited = self._commands.take()
         if not waited:
             return
@@ -170,7 +170,7 @@ class Ros2Base:
         except UnreadableError as error:
             _log.warning("%s: unusable command: %s", self.robot_id, error)
             return
-        self._base.take(twist, now)
+        self._base.replace_command(twist, now)
 
     def _tell_place(self, stamp: m.Time) -> None:
         measured = self._rig.odometry()

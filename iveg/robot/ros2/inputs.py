@@ -152,7 +152,8 @@ class SensorInputs:
         message = self._read(topic, payload, now.mono)
         if message is None:
             return None
-        if TOPICS[topic].role == "stream" and not self._is_new(topic, message, now):
+        is_stream = TOPICS[topic].role == "stream"
+        if is_stream and not self._is_new(topic, message.header.stamp.seconds, now):
             return None
         try:
             return work(message, now)
@@ -168,9 +169,8 @@ class SensorInputs:
             self._note("unreadable", topic, now)
             return None
 
-    def _is_new(self, topic: str, message: Any, now: Instant) -> bool:
+    def _is_new(self, topic: str, stamp: float, now: Instant) -> bool:
         """Whether a message counts by its stamp."""
-        stamp: float = message.header.stamp.seconds
         verdict = self._stamps[topic].verdict(stamp)
         if verdict in ("back", "reset"):
             self._note("time_back", topic, now.mono)

@@ -135,7 +135,7 @@ class TelemetryFeed:
             part = self._part(topic, version, now)
             if part is None or part.version == version:
                 del waiting[topic]
-            elif frame.take(part):
+            elif frame.add(part):
                 del waiting[topic]
                 self._told[topic] = part.version, now.mono
                 self._painting.adds(topic, now.mono)
@@ -169,7 +169,7 @@ class _Frame:
         """Whether the frame has no content."""
         return not (self.moves or self._parts or self._scans)
 
-    def take(self, part: Part) -> bool:
+    def add(self, part: Part) -> bool:
         """Add a part; False where too much would be on its way at once."""
         # One that is larger than all room goes when nothing heavy is on its way.
         is_first = self._room == BYTES and self.heavy == 0

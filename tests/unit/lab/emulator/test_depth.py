@@ -14,7 +14,7 @@ from iveg.lab.emulator.depth import (
     Upright,
     person_shape,
     robot_shape,
-    take,
+    take_picture,
 )
 from iveg.lab.emulator.greenhouse import Body, Disc, Scenery
 from iveg.robot.grounding.cloud import DepthPicture, Pinhole
@@ -70,7 +70,7 @@ def view(
     seed: int = 1,
 ) -> DepthView:
     rng = np.random.default_rng(seed)
-    return take(camera, sensor, targets, scenery, foliage, rng)
+    return take_picture(camera, sensor, targets, scenery, foliage, rng)
 
 
 def segment(picture: DepthView, number: int = 1, class_id: str = "farmer") -> Segment:

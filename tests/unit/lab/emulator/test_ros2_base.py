@@ -37,7 +37,7 @@ AHEAD = Twist2D(0.5, 0.1)
 def test_a_base_does_what_it_was_told_last_for_half_a_second() -> None:
     base = DriveWatchdog()
     before = base.command(0.0)
-    base.take(AHEAD, 10.0)
+    base.replace_command(AHEAD, 10.0)
 
     assert (before, base.command(10.0 + TIMEOUT_S)) == (REST, AHEAD)
     assert base.command(10.0 + TIMEOUT_S + 0.001) == REST
