@@ -10,7 +10,7 @@ from iveg.cli.nodes import broker_of, node_settings
 from iveg.cli.running import LOOPBACK
 from iveg.domain.errors import DataFileError
 from iveg.domain.fleet import FleetDescription
-from iveg.robot.replay.bags import BagTopics
+from iveg.robot.replay.bags import BagOptions
 from iveg.robot.replay.replay import ReplaySettings, run_replay
 from iveg.settings import Settings
 
@@ -30,8 +30,7 @@ async def replay(options: argparse.Namespace, settings: Settings) -> None:
                 options.frame,
             ),
             fleet=fleet,
-            topics=BagTopics(options.odom_topic, options.scan_topic),
-            bag_time=options.bag_time,
+            bag=BagOptions(options.odom_topic, options.scan_topic, options.bag_time),
             poses=dict(options.pose),
         )
 

@@ -17,6 +17,7 @@ from iveg.adapters.extras import require_extra
 from iveg.domain.errors import DataFileError
 from iveg.domain.geometry import Pose2D
 from iveg.domain.observations import UNKNOWN_ORIGIN, LaserScan, Odometry
+from iveg.robot.replay.logs import RecordingEntry
 from iveg.robot.ros2.reading import read_pose, read_scan, read_twist
 from iveg.robot.ros2.rigid import IDENTITY
 from iveg.ros2 import messages as m
@@ -27,29 +28,31 @@ if TYPE_CHECKING:  # an extra: iveg[bags]
     from rosbags.rosbag2 import Reader as Ros2Reader
 
 _log = logging.getLogger(__name__)
+_LONGEST_S = 1e7
 ODOMETRY, SCAN = "nav_msgs/msg/Odometry", "sensor_msgs/msg/LaserScan"
 
 
+_Message = tuple[float, float, Odometry | LaserScan]
+"""When the recorder wrote it, and what its header says (s); 0 where the sender filled
+nothing in."""
+
+
 @dataclass(frozen=True, slots=True)
-class BagTopics:
-    """Topics to read; None takes the only one of its type."""
+class BagOptions:
+    """How a bag is read.
+
+    Attributes:
+        odometry: Topic to read; None takes the only one of its type; ``scan`` likewise.
+        bag_time: A bag is timed by its recording times, not by sensor stamps.
+    """
 
     odometry: str | None = None
     scan: str | None = None
+    bag_time: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class BagMessage:
-    """One message of a bag.
-
-    Attributes:
-        logged_s: When the recorder wrote it (s).
-        stamp_s: What its header says (s); 0 where the sender filled nothing in.
-    """
-
-    logged_s: float
-    stamp_s: float
-    observation: Odometry | LaserScan
+AS_RECORDED = BagOptions()
+"""The only topic of each type, by sensor stamps."""
 
 
 class Bag:
@@ -57,7 +60,7 @@ class Bag:
 
     Args:
         path: A file ``.db3``, ``.mcap`` or ``.bag``, or a directory of ROS 2.
-        topics: Which to read.
+        options: Topics and clock.
         mount: The laser's pose in ``base_link``.
         needs_odometry: Whether a bag without it is refused.
 
@@ -69,7 +72,7 @@ class Bag:
     def __init__(
         self,
         path: Path,
-        topics: BagTopics,
+        options: BagOptions,
         mount: Pose2D,
         *,
         needs_odometry: bool = True,
@@ -86,21 +89,34 @@ class Bag:
         self._reported: set[str] = set()
         with self._open() as reader:
             found = reader.connections
-            odometry = self._choose(found, ODOMETRY, topics.odometry, "--odom-topic")
-            scan = self._choose(found, SCAN, topics.scan, "--scan-topic")
+            odometry = self._choose(found, ODOMETRY, options.odometry, "--odom-topic")
+            scan = self._choose(found, SCAN, options.scan, "--scan-topic")
         if odometry is None and (needs_odometry or scan is None):
             raise self._unusable(f"holds no topic of type {ODOMETRY}")
         self._topics = {odometry: ODOMETRY} if odometry else {}
         self._topics |= {scan: SCAN} if scan else {}
+        # Stamps count unless the first message has none: a bag uses one of the two
+        # clocks throughout, since they may differ by years.
+        _, stamp_s, _ = next(self._messages(), (0.0, 1.0, None))
+        self._bag_time = options.bag_time or stamp_s <= 0.0
 
-    def messages(self) -> Iterator[BagMessage]:
-        """All messages of both topics, in the order in which they were recorded.
+    def entries(self) -> Iterator[RecordingEntry]:
+        """All entries of both topics, in the order in which they were recorded.
 
-        A message that cannot be used is skipped and reported once a topic.
+        A message that cannot be used is skipped and reported once a topic; one with an
+        absurd stamp is omitted.
 
         Raises:
             DataFileError: the recording breaks off.
         """
+        start: float | None = None
+        for logged_s, stamp_s, observation in self._messages():
+            at = logged_s if self._bag_time else stamp_s
+            start = at if start is None else start
+            if abs(at - start) <= _LONGEST_S:
+                yield RecordingEntry(at - start, observation)
+
+    def _messages(self) -> Iterator[_Message]:
         with self._open() as reader:
             wanted = [
                 one
@@ -162,7 +178,7 @@ class Bag:
 
     def _message(
         self, connection: "Connection", logged: int, data: bytes
-    ) -> BagMessage | None:
+    ) -> _Message | None:
         try:
             stamp_s, observation = self._read(connection.msgtype, data)
         except Exception as error:  # whatever foreign bytes provoke
@@ -176,7 +192,7 @@ class Bag:
                     str(error) or type(error).__name__,
                 )
             return None
-        return BagMessage(logged / 1e9, stamp_s, observation)
+        return logged / 1e9, stamp_s, observation
 
     def _read(self, kind: str, data: bytes) -> tuple[float, Odometry | LaserScan]:
         store = self._store

@@ -25,7 +25,7 @@ from iveg.domain.observations import (
 )
 from iveg.robot.node import NodeSettings, RobotNode
 from iveg.robot.pacing import every
-from iveg.robot.replay.bags import BagTopics
+from iveg.robot.replay.bags import AS_RECORDED, BagOptions
 from iveg.robot.replay.playback import Playback
 from iveg.robot.replay.recordings import open_recording
 
@@ -63,8 +63,7 @@ async def run_replay(
     robots: Sequence[str],
     settings: ReplaySettings,
     *,
-    topics: BagTopics | None = None,
-    bag_time: bool = False,
+    bag: BagOptions = AS_RECORDED,
     fleet: FleetDescription | None = None,
     poses: Mapping[str, Pose2D] | None = None,
 ) -> None:
@@ -75,8 +74,7 @@ async def run_replay(
         robots: Their ids, in the order of the files.
         settings: Those of all robots; the directory of the hold files is made if
             missing.
-        topics: Topics of a ROS bag; see ``open_recording``.
-        bag_time: Bags use recording times; see ``open_recording``.
+        bag: Topics and clock of a ROS bag.
         fleet: Fleet description; None: no description.
         poses: By robot, the fixed pose of a recording without odometry.
 
@@ -87,9 +85,7 @@ async def run_replay(
     known, stands = fleet or NOBODY, poses or {}
     profiles = [known.of_robot(robot_id).profile for robot_id in robots]
     recordings = [
-        open_recording(
-            file, profile.laser, topics, bag_time=bag_time, pose=stands.get(robot_id)
-        )
+        open_recording(file, profile.laser, bag, pose=stands.get(robot_id))
         for file, robot_id, profile in zip(files, robots, profiles, strict=True)
     ]
     playbacks = [Playback(one, loop=settings.loop) for one in recordings]

@@ -9,7 +9,7 @@ import pytest
 from iveg.domain.errors import DataFileError
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import LaserScan, Odometry
-from iveg.robot.replay.bags import BagTopics
+from iveg.robot.replay.bags import AS_RECORDED, BagOptions
 from iveg.robot.replay.logs import RecordingEntry
 from iveg.robot.replay.recordings import open_recording
 from tests.data.bags import (
@@ -34,10 +34,8 @@ KINDS = [
 ]
 
 
-def entries(
-    path: Path, topics: BagTopics | None = None, *, bag_time: bool = False
-) -> list[RecordingEntry]:
-    return list(open_recording(path, MOUNT, topics, bag_time=bag_time)())
+def entries(path: Path, options: BagOptions = AS_RECORDED) -> list[RecordingEntry]:
+    return list(open_recording(path, MOUNT, options)())
 
 
 def poses(found: Sequence[RecordingEntry]) -> list[Pose2D]:
@@ -89,7 +87,9 @@ def test_the_stamps_of_the_sensors_are_the_time(tmp_path: Path) -> None:
 
 
 def test_bag_time_is_the_time_where_it_is_asked_for(tmp_path: Path) -> None:
-    found = entries(ros1_bag(tmp_path / "log.bag", drive(1.0)), bag_time=True)
+    found = entries(
+        ros1_bag(tmp_path / "log.bag", drive(1.0)), BagOptions(bag_time=True)
+    )
 
     assert [e.at for e in found] == pytest.approx([n / 20 for n in range(20)])
 
@@ -117,20 +117,23 @@ def test_a_named_topic_is_the_one_that_is_read(tmp_path: Path) -> None:
     said = [Said("/raw", ODOMETRY, 1.0, x=7.0), *drive(1.0)]
     bag = db3_bag(tmp_path / "run", said)
 
-    assert [p.x for p in poses(entries(bag, BagTopics("/raw")))] == [7.0]
+    assert [p.x for p in poses(entries(bag, BagOptions("/raw")))] == [7.0]
 
 
 @pytest.mark.parametrize(
     ("topics", "why"),
     [
-        (None, r"--odom-topic must name one of those of nav_msgs\S+: /odom, /raw\.$"),
-        (BagTopics("/gone"), r"--odom-topic /gone is not among .*: /odom, /raw\.$"),
-        (BagTopics("/raw", "/gone"), r"--scan-topic /gone is not .*: /scan\.$"),
-        (BagTopics("/scan"), r"--odom-topic /scan is not among"),
+        (
+            AS_RECORDED,
+            r"--odom-topic must name one of those of nav_msgs\S+: /odom, /raw\.$",
+        ),
+        (BagOptions("/gone"), r"--odom-topic /gone is not among .*: /odom, /raw\.$"),
+        (BagOptions("/raw", "/gone"), r"--scan-topic /gone is not .*: /scan\.$"),
+        (BagOptions("/scan"), r"--odom-topic /scan is not among"),
     ],
 )
 def test_topics_that_leave_open_what_is_meant_are_listed(
-    topics: BagTopics | None, why: str, tmp_path: Path
+    topics: BagOptions, why: str, tmp_path: Path
 ) -> None:
     said = [Said("/raw", ODOMETRY, 1.0), *drive(0.2)]
 
