@@ -39,7 +39,8 @@ from iveg.ngsi import names
 from iveg.robot.node import NodeSettings, RobotNode
 from iveg.robot.ros2.checking import Heard, judge, lines
 from iveg.robot.ros2.config import RobotConfig, read_classes, read_config
-from iveg.robot.ros2.rig import Network, Ros2Robot
+from iveg.robot.ros2.network import Network
+from iveg.robot.ros2.rig import Ros2Robot
 from iveg.robot.ros2.topics import TOPICS, sensed_topics
 from iveg.robot.ros2.transforms import TransformBuffer
 from iveg.ros2 import cdr

@@ -31,7 +31,7 @@ from iveg.ngsi import names
 from iveg.ngsi.codec import write_climate
 from iveg.robot.pacing import LONGEST_STEP_S, SLOTS, every
 from iveg.robot.ros2.config import RobotConfig
-from iveg.robot.ros2.rig import Network
+from iveg.robot.ros2.network import Network
 from iveg.ros2.names import namespace_of
 
 _log = logging.getLogger(__name__)

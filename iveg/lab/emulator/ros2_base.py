@@ -19,8 +19,8 @@ from iveg.lab.emulator.sensors import EmulatedSensors
 from iveg.lab.emulator.world import RobotHardware, SimulatedWorld
 from iveg.robot.pacing import LONGEST_STEP_S, SLOTS, every, in_slots
 from iveg.robot.ros2.config import RobotConfig
+from iveg.robot.ros2.network import Network, Writer
 from iveg.robot.ros2.reading import read_twist, write_twist
-from iveg.robot.ros2.rig import Network, Writer
 from iveg.robot.ros2.sensors import ROS_SENSORS
 from iveg.ros2 import cdr
 from iveg.ros2 import messages as m

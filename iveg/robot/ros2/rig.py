@@ -8,9 +8,8 @@ drive's topic, repeatedly while it is zero; when this process ends, so does publ
 import asyncio
 import itertools
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
 
 from iveg.adapters import clock
 from iveg.domain.errors import HopError
@@ -24,11 +23,10 @@ from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.drive import DriveTopics, message_of
 from iveg.robot.ros2.input_faults import speed_of
 from iveg.robot.ros2.inputs import SensorInputs
+from iveg.robot.ros2.network import Network, Reader, Writer
 from iveg.robot.ros2.topics import TOPICS, sensed_topics
 from iveg.ros2 import cdr
 from iveg.ros2 import messages as m
-from iveg.ros2.names import Endpoint, Qos
-from iveg.ros2.schema import Message
 
 _log = logging.getLogger(__name__)
 RATE_HZ = 30.0
@@ -39,40 +37,6 @@ _LOOK_ROUND_TICKS, _TELL_TICKS = 15, 6
 """Ticks between two checks of endpoints, and between two outputs of neighbours."""
 _KNOWN_WITHIN_S = 8.0
 _MET_WITHIN_S = 5.0
-
-
-class Reader(Protocol):
-    """A subscription."""
-
-    def take(self) -> Sequence[bytes]:
-        """All pending messages, oldest first."""
-
-
-class Writer(Protocol):
-    """A publication."""
-
-    def write(self, payload: bytes) -> None:
-        """Publish a message."""
-
-    @property
-    def readers(self) -> int:
-        """Number of subscribers."""
-
-
-class Network(Protocol):
-    """The DDS network, as far as a robot needs it."""
-
-    def reader(self, name: str, message: type[Message], qos: Qos) -> Reader:
-        """Subscribe."""
-
-    def writer(self, name: str, message: type[Message], qos: Qos) -> Writer:
-        """Publish."""
-
-    def endpoints(self) -> Sequence[Endpoint]:
-        """All writers and readers on the network."""
-
-    def watch(self, readers: list[Any], on_data: Callable[[], None]) -> None:
-        """Call ``on_data`` soon after new data."""
 
 
 NodeMaker = Callable[
