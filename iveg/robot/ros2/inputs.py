@@ -210,24 +210,23 @@ class SensorInputs:
             frame: self._places.in_map(frame, stamp, now.mono) for frame in frames
         }
         answers = [
-            (
-                reading.class_id_of(one.results, self._classes),
-                self._detection(one, places[one.header.frame_id or usual], now.mono),
-            )
+            self._detection(one, places[one.header.frame_id or usual], now.mono)
             for one in message.detections
         ]
         return frame_of("", UNKNOWN_ORIGIN, answers)
 
     def _detection(
         self, one: m.Detection3D, place: RigidTransform | None, now: float
-    ) -> Detection | Ungrounded:
-        if place is None:
-            return "unreadable"
-        try:
-            return reading.read_detection(one, place, self._classes)
-        except UnreadableError as error:
-            self._note(error.reason, "detections_3d", now)
-            return "unreadable"
+    ) -> tuple[str | None, Detection | Ungrounded]:
+        """A detection, or that it has no place, and the class that it is of."""
+        if place is not None:
+            try:
+                found = reading.read_detection(one, place, self._classes)
+            except UnreadableError as error:
+                self._note(error.reason, "detections_3d", now)
+            else:
+                return found.class_id, found
+        return reading.class_id_of(one.results, self._classes), "unreadable"
 
     def _path(self, message: m.Path, now: Instant) -> Navigation | None:
         frame, here = message.header.frame_id or self._map, self._places.here
