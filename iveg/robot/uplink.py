@@ -7,10 +7,10 @@ then.  While Orion is behind, measures withheld from the agent go to iVeg direct
 (``rates``).
 """
 
-import math
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import fields, replace
+from functools import lru_cache
 from operator import attrgetter
 from typing import Any, Literal
 
@@ -93,7 +93,6 @@ class Uplink:
         self._single = SinglePayload(robot_id) if form == "single" else None
         self._next: Counter[str] = Counter({_SAFETY: first_report - 1})
         self._looked: tuple[tuple[str, int], ...] = ()
-        self._stamp = math.nan, ""
         self.rates = UplinkRates()
 
     def send(self, observation: Observation, at: Instant) -> None:
@@ -157,12 +156,6 @@ class Uplink:
         else:
             self._enqueue(names.direct_topic(self._id, suffix), payload)
 
-    def _stamp_of(self, wall: float) -> str:
-        """Text of a wall-clock time, written once for simultaneous observations."""
-        if self._stamp[0] != wall:
-            self._stamp = wall, codec.format_stamp(wall)
-        return self._stamp[1]
-
     def _topic(self, suffix: str) -> str:
         return names.measure_topic(self._apikey, self._id + suffix)
 
@@ -172,13 +165,17 @@ class Uplink:
         return Origin(
             self._boot,
             self._next[suffix],
-            self._stamp_of(at.wall),
+            _stamp_of(at.wall),
             at.wall,
             at.mono,
             acknowledgements=echo is not None,
             heard=None if echo is None else echo.heard,
             replay=self._replay,
         )
+
+
+_stamp_of = lru_cache(maxsize=1)(codec.format_stamp)
+"""Text of a wall-clock time, written once for simultaneous observations."""
 
 
 def _seen(frame: DetectionFrame) -> tuple[tuple[str, int], ...]:

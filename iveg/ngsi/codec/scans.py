@@ -66,7 +66,12 @@ def _ranges(points: Any) -> NDArray[np.float32]:
     buffer = compact(points)
     if isinstance(buffer, np.ndarray):
         return buffer
-    ranges = np.array(_LIDAR_POINTS.validate_python(points), np.float32)
+    return ranges_of(_LIDAR_POINTS.validate_python(points))
+
+
+def ranges_of(points: list[float | None]) -> NDArray[np.float32]:
+    """Numbers of a scan (m); inf where nothing came back."""
+    ranges = np.array(points, np.float32)
     ranges[np.isnan(ranges)] = np.inf
     return ranges
 

@@ -13,13 +13,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Annotated, Literal
 
-import numpy as np
 from pydantic import Field, TypeAdapter, ValidationError
 
 from iveg.domain.errors import DataFileError, UnreadableError
 from iveg.domain.geometry import Pose2D, Twist2D, box_of_a_person
 from iveg.domain.observations import Detection, LaserScan, Odometry, Origin
 from iveg.ngsi.codec import load_json
+from iveg.ngsi.codec.scans import ranges_of
 from iveg.ngsi.payloads import (
     FORBIDDEN,
     LidarPoints,
@@ -133,8 +133,6 @@ class _ScanLine(_Line):
     ranges: LidarPoints
 
     def observation(self) -> LaserScan:
-        ranges = np.array(self.ranges, np.float32)
-        ranges[np.isnan(ranges)] = np.inf
         return LaserScan(
             "",
             Origin(),
@@ -143,7 +141,7 @@ class _ScanLine(_Line):
             self.range_min,
             self.range_max,
             Pose2D(self.ox, self.oy, 0.0),
-            ranges,
+            ranges_of(self.ranges),
         )
 
 

@@ -4,6 +4,8 @@ A twist that cannot be read counts as zero.  The speed limit is decided by the g
 the safety node; this module only converts messages.
 """
 
+from functools import lru_cache
+
 from iveg.domain.errors import UnreadableError
 from iveg.domain.geometry import REST, Twist2D
 from iveg.robot.ros2.config import DriveConfig
@@ -37,7 +39,6 @@ class DriveTopics:
         self._base_link = base_link
         self._input_faults = input_faults
         self._newest = 0.0
-        self._written: tuple[Twist2D, bytes] = REST, cdr.write(write_twist(REST))
 
     def read(self, payload: bytes, now: float) -> Twist2D | None:
         """The twist that upstream requests; None if older than the one before."""
@@ -66,6 +67,10 @@ class DriveTopics:
         if self._drive.stamped_out:
             header = m.Header(m.Time.of(wall), self._base_link)
             return cdr.write(m.TwistStamped(header, write_twist(twist)))
-        if self._written[0] != twist:
-            self._written = twist, cdr.write(write_twist(twist))
-        return self._written[1]
+        return _unstamped(twist)
+
+
+@lru_cache(maxsize=1)
+def _unstamped(twist: Twist2D) -> bytes:
+    """Bytes of a twist, which stays the same for long."""
+    return cdr.write(write_twist(twist))
