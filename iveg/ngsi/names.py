@@ -4,7 +4,6 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 from iveg.domain.errors import UnreadableError
 from iveg.domain.kinds import KIND_OF, MEASURED
@@ -133,7 +132,7 @@ _HEADERS = {LIDAR: LIDAR_HEADER, BOXES: BOXES_HEADER}
 
 
 def refuse_another_robot(
-    robot_id: str, attributes: Mapping[str, Any], name: str
+    robot_id: str, attributes: Mapping[str, object], name: str
 ) -> None:
     """Refuse what says that another robot sent it than its topic or entity does.
 

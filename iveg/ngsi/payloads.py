@@ -1,7 +1,7 @@
 """The shapes on the wire, strict: no coercion, no NaN, all bounded."""
 
 import unicodedata
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
@@ -248,11 +248,11 @@ class FeedbackValue(OriginFields):
     speed_limits: SpeedLimitsValue = {}
     clear: Annotated[list[Text], Field(max_length=MAX_ROBOTS)] = []
     seen: Annotated[dict[str, int], Field(max_length=MAX_ROBOTS)] = {}
-    backlog: Any = None
+    backlog: object = None
 
 
 class NotificationValue(Wire):
     """A notification of Orion; entities are read attribute by attribute."""
 
     subscriptionId: Text  # noqa: N815 - NGSI name
-    data: Annotated[list[dict[str, Any]], Field(max_length=1000)]
+    data: Annotated[list[dict[str, object]], Field(max_length=1000)]

@@ -4,7 +4,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from types import MappingProxyType
-from typing import Any
 
 from pydantic import ValidationError
 
@@ -38,14 +37,14 @@ from iveg.ngsi.codec.scans import read_scan, read_single_scan
 from iveg.ngsi.codec.sensors import read_sensed
 from iveg.ngsi.codec.untrusted import ReadResult, first_complaint, merge, unread
 
-Reader = Callable[[str, Any], Observation]
+Reader = Callable[[str, Mapping[str, object]], Observation]
 IsPast = Callable[[str, type[Observation], str, int], bool]
 """Whether robot, kind, boot and seq tell that a message cannot be news."""
 
 
 def read_attributes(
     robot_id: str,
-    attributes: Mapping[str, Any],
+    attributes: Mapping[str, object],
     is_past: IsPast | None = None,
     instead: Mapping[str, Reader] = MappingProxyType({}),
 ) -> ReadResult:
@@ -72,7 +71,7 @@ def read_attributes(
 
 
 def _overtaken(
-    robot_id: str, name: str, attributes: Mapping[str, Any], is_past: IsPast
+    robot_id: str, name: str, attributes: Mapping[str, object], is_past: IsPast
 ) -> ReadResult | None:
     """Remains of a message that is older than its stream; None where it may be new."""
     if name not in _IDENTITY:
@@ -94,7 +93,7 @@ def _overtaken(
 
 
 def read_one(
-    source: str, reader: Reader, attributes: Mapping[str, Any], name: str = ""
+    source: str, reader: Reader, attributes: Mapping[str, object], name: str = ""
 ) -> ReadResult:
     """Result of one reader on an entity, or the reason of its failure."""
     try:
@@ -115,7 +114,7 @@ def refused_frame(robot_id: str, read: ReadResult) -> ReadResult:
     return replace(read, observations=(RefusedFrame(robot_id),))
 
 
-def _odometry(robot_id: str, attributes: Mapping[str, Any]) -> Odometry:
+def _odometry(robot_id: str, attributes: Mapping[str, object]) -> Odometry:
     refuse_unplaced(attributes[names.ODOMETRY])
     return _odometry_of(
         robot_id, payloads.OdometryValue.model_validate(attributes[names.ODOMETRY])
@@ -131,7 +130,7 @@ def _odometry_of(robot_id: str, value: payloads.OdometryValue) -> Odometry:
     )
 
 
-def _safety(robot_id: str, attributes: Mapping[str, Any]) -> SafetyReport:
+def _safety(robot_id: str, attributes: Mapping[str, object]) -> SafetyReport:
     value = payloads.SafetyValue.model_validate(attributes[names.SAFETY])
     return SafetyReport(
         robot_id,
@@ -150,7 +149,7 @@ def _safety(robot_id: str, attributes: Mapping[str, Any]) -> SafetyReport:
     )
 
 
-def _navigation(robot_id: str, attributes: Mapping[str, Any]) -> Navigation:
+def _navigation(robot_id: str, attributes: Mapping[str, object]) -> Navigation:
     value = payloads.NavigationValue.model_validate(attributes[names.NAVIGATION])
     return Navigation(
         robot_id,
@@ -161,17 +160,17 @@ def _navigation(robot_id: str, attributes: Mapping[str, Any]) -> Navigation:
     )
 
 
-def _command_status(robot_id: str, attributes: Mapping[str, Any]) -> CommandStatus:
+def _command_status(robot_id: str, attributes: Mapping[str, object]) -> CommandStatus:
     return CommandStatus(
         robot_id, payloads.clean_text(str(attributes[names.COMMAND_STATUS]))
     )
 
 
-def _command_info(robot_id: str, attributes: Mapping[str, Any]) -> CommandAnswer:
+def _command_info(robot_id: str, attributes: Mapping[str, object]) -> CommandAnswer:
     return command_answer(robot_id, {names.COMMAND: attributes[names.COMMAND_INFO]})
 
 
-def command_answer(robot_id: str, attributes: Mapping[str, Any]) -> CommandAnswer:
+def command_answer(robot_id: str, attributes: Mapping[str, object]) -> CommandAnswer:
     """A robot's own answer to a command (docs/interfaces/commands.md)."""
     value = payloads.AnswerValue.model_validate(attributes.get(names.COMMAND))
     return CommandAnswer(
@@ -187,7 +186,7 @@ def command_answer(robot_id: str, attributes: Mapping[str, Any]) -> CommandAnswe
     )
 
 
-def _single_pose(robot_id: str, attributes: Mapping[str, Any]) -> Odometry:
+def _single_pose(robot_id: str, attributes: Mapping[str, object]) -> Odometry:
     value = payloads.OdometryValue.model_validate(attributes["pose"])
     odometry = _odometry_of(robot_id, value)
     if odometry.origin.stamp is None:
@@ -222,13 +221,13 @@ _IDENTITY: Mapping[str, tuple[type[Odometry | LaserScan | DetectionFrame], str]]
 """Headers that carry the origin (boot, seq) of telemetry."""
 
 
-def climate(_: str, attributes: Mapping[str, Any]) -> Climate:
+def climate(_: str, attributes: Mapping[str, object]) -> Climate:
     """Climate of the greenhouse."""
     value = payloads.ClimateValue.model_validate(dict(attributes))
     return Climate(value.temperature, value.relativeHumidity, value.co2)
 
 
-def heartbeat(_: str, attributes: Mapping[str, Any]) -> HeartbeatProbe:
+def heartbeat(_: str, attributes: Mapping[str, object]) -> HeartbeatProbe:
     """The probe that iVeg sends through the whole chain."""
     return HeartbeatProbe(
         read_origin(payloads.OriginFields.model_validate(attributes["probe"]))

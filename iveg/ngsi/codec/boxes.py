@@ -1,7 +1,6 @@
 """Detection frames: boxes of one picture, and the classes of those nobody can use."""
 
 from collections.abc import Mapping
-from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
@@ -14,7 +13,7 @@ from iveg.ngsi.codec.fields import read_origin, read_stamped
 _BOXES: TypeAdapter[list[payloads.BoxValue]] = TypeAdapter(list[payloads.BoxValue])
 
 
-def read_frame(robot_id: str, attributes: Mapping[str, Any]) -> DetectionFrame:
+def read_frame(robot_id: str, attributes: Mapping[str, object]) -> DetectionFrame:
     """Read ``bounding_boxes`` and its header."""
     boxes = attributes[names.BOXES]
     if isinstance(boxes, dict):
@@ -34,7 +33,7 @@ def read_frame(robot_id: str, attributes: Mapping[str, Any]) -> DetectionFrame:
 
 
 def _frame(
-    robot_id: str, origin: Origin, boxes: list[Any], read: list[Detection | None]
+    robot_id: str, origin: Origin, boxes: list[object], read: list[Detection | None]
 ) -> DetectionFrame:
     """What could be read of a frame, and the classes of the boxes that could not."""
     found = tuple(one for one in read if one is not None)
@@ -45,12 +44,12 @@ def _frame(
     return DetectionFrame(robot_id, origin, found, unread)
 
 
-def _class_of(box: Any) -> str | None:
+def _class_of(box: object) -> str | None:
     class_id = box.get("class_id") if isinstance(box, dict) else None
     return payloads.clean_text(class_id) if isinstance(class_id, str) else None
 
 
-def _detection(raw: Any) -> Detection | None:
+def _detection(raw: object) -> Detection | None:
     try:
         return _detection_of(payloads.BoxValue.model_validate(raw))
     except ValidationError:
@@ -73,7 +72,7 @@ _HALF_M = 0.25
 
 
 def read_single_detection(
-    robot_id: str, attributes: Mapping[str, Any]
+    robot_id: str, attributes: Mapping[str, object]
 ) -> DetectionFrame:
     """Read the one detection of Algorithm 1's payload."""
     box = {
@@ -85,7 +84,7 @@ def read_single_detection(
     return _frame(robot_id, read_stamped(attributes), [box], [_detection(box)])
 
 
-def _sides_about(raw: Any) -> dict[str, float] | None:
+def _sides_about(raw: object) -> dict[str, float] | None:
     """Sides of the box about a point; None where it is none."""
     try:
         point = payloads.PointValue.model_validate(raw)

@@ -1,21 +1,21 @@
 """Orders to one robot: a command, or the retained desired state."""
 
 from collections.abc import Iterable, Mapping
-from typing import Any, Literal
+from typing import Literal
 
 import orjson
 
 from iveg.ngsi import names
 
 
-def write_stop(hold_id: str, by: str) -> dict[str, Any]:
+def write_stop(hold_id: str, by: str) -> dict[str, object]:
     """The value of ``cmd`` that stops a robot."""
     return {"stop": {"id": hold_id, "by": by}}
 
 
 def write_release(
     hold_ids: Iterable[str], challenge: str, attempt: str
-) -> dict[str, Any]:
+) -> dict[str, object]:
     """The value of ``cmd`` that lifts exactly these holds.
 
     Args:
@@ -26,12 +26,12 @@ def write_release(
     return {"release": {"ids": list(hold_ids), "ch": challenge, "attempt": attempt}}
 
 
-def write_resume(challenge: str, attempt: str) -> dict[str, Any]:
+def write_resume(challenge: str, attempt: str) -> dict[str, object]:
     """The value of ``cmd`` that lets a released robot drive; as ``write_release``."""
     return {"resume": {"ch": challenge, "attempt": attempt}}
 
 
-def write_command(value: Mapping[str, Any]) -> bytes:
+def write_command(value: Mapping[str, object]) -> bytes:
     """A command as the IoT Agent puts it on the robot's topic."""
     return orjson.dumps({names.COMMAND: value})
 

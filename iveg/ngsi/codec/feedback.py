@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from operator import is_
-from typing import Any
 
 import orjson
 from pydantic import ValidationError
@@ -102,7 +101,7 @@ def write_feedback(feedback: Feedback) -> bytes:
     return _write(feedback, _write_shared(feedback))
 
 
-def _write(feedback: Feedback, shared: Mapping[str, Any]) -> bytes:
+def _write(feedback: Feedback, shared: Mapping[str, object]) -> bytes:
     alert = feedback.alert
     return orjson.dumps(
         {
@@ -116,13 +115,13 @@ def _write(feedback: Feedback, shared: Mapping[str, Any]) -> bytes:
     )
 
 
-def _write_backlog(backlog_s: float | None) -> dict[str, Any]:
+def _write_backlog(backlog_s: float | None) -> dict[str, object]:
     if backlog_s is None:
         return {}
     return {"backlog": {"fiware_s": round(min(backlog_s, LONGEST_BACKLOG_S), 1)}}
 
 
-def _write_shared(feedback: Feedback) -> dict[str, Any]:
+def _write_shared(feedback: Feedback) -> dict[str, object]:
     """Part of the feedback that is the same for all robots.
 
     Of a robot that is clear the id alone is written, or the fleet's limits would be
@@ -144,7 +143,7 @@ def _write_shared(feedback: Feedback) -> dict[str, Any]:
     }
 
 
-def _write_speed_limit(speed_limit: SpeedLimit) -> dict[str, Any]:
+def _write_speed_limit(speed_limit: SpeedLimit) -> dict[str, object]:
     return without_none(
         {
             "speed_factor": speed_limit.speed_factor,
@@ -156,7 +155,7 @@ def _write_speed_limit(speed_limit: SpeedLimit) -> dict[str, Any]:
     )
 
 
-def _write_alert(alert: FeedbackAlert) -> dict[str, Any]:
+def _write_alert(alert: FeedbackAlert) -> dict[str, object]:
     position = alert.position
     return without_none(
         {
@@ -174,7 +173,7 @@ def _write_alert(alert: FeedbackAlert) -> dict[str, Any]:
     )
 
 
-def _write_feedback_pose(feedback: Feedback) -> dict[str, Any] | None:
+def _write_feedback_pose(feedback: Feedback) -> dict[str, object] | None:
     if feedback.pose is None:
         return None
     twist = feedback.twist or Twist2D(0.0, 0.0)

@@ -1,7 +1,6 @@
 """Fields that several messages share: who said it and when, holds, round numbers."""
 
 from collections.abc import Iterable, Mapping
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +32,7 @@ def read_origin(value: payloads.OriginFields) -> Origin:
 _PROOF = ("mono", "heard", "replay")
 
 
-def read_stamped(attributes: Mapping[str, Any]) -> Origin:
+def read_stamped(attributes: Mapping[str, object]) -> Origin:
     """The message's own stamp, and what proves its age, which stands at the pose."""
     pose = attributes.get("pose")
     if not isinstance(pose, dict):
@@ -43,15 +42,15 @@ def read_stamped(attributes: Mapping[str, Any]) -> Origin:
     return read_origin(payloads.OriginFields.model_validate(fields))
 
 
-def refuse_unplaced(value: Any) -> None:
+def refuse_unplaced(value: object) -> None:
     """Refuse data without a position: it is counted and never drawn."""
     if isinstance(value, dict) and value.get("frame_id") == names.UNPLACED:
         raise UnreadableError(names.UNPLACED, "the robot knows no place for it")
 
 
-def write_origin(origin: Origin) -> dict[str, Any]:
+def write_origin(origin: Origin) -> dict[str, object]:
     """The inverse of :func:`read_origin`."""
-    fields: dict[str, Any] = {
+    fields: dict[str, object] = {
         "boot": origin.boot,
         "seq": origin.seq,
         "stamp": origin.stamp,
@@ -87,7 +86,7 @@ def write_ranges(ranges: NDArray[np.float32]) -> NDArray[np.float64]:
     return ranges.astype(np.float64).round(11)
 
 
-def write_motion(pose: Pose2D, twist: Twist2D) -> dict[str, Any]:
+def write_motion(pose: Pose2D, twist: Twist2D) -> dict[str, object]:
     """Pose and twist of an odometry."""
     return {
         "x": round(pose.x, 4),
@@ -98,7 +97,7 @@ def write_motion(pose: Pose2D, twist: Twist2D) -> dict[str, Any]:
     }
 
 
-def write_lidar_header(scan: LaserScan, origin: dict[str, Any]) -> dict[str, Any]:
+def write_lidar_header(scan: LaserScan, origin: dict[str, object]) -> dict[str, object]:
     """``lidar_header``, with the origin of its message."""
     return {
         "angle_min": scan.angle_min,
@@ -117,6 +116,6 @@ def rounded(value: float | None) -> float | None:
     return None if value is None else round(value, 4)
 
 
-def without_none(fields: dict[str, Any]) -> dict[str, Any]:
+def without_none(fields: dict[str, object]) -> dict[str, object]:
     """Only what is known: absent, never ``null``."""
     return {name: value for name, value in fields.items() if value is not None}

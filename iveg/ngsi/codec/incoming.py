@@ -5,7 +5,6 @@ them.
 """
 
 from collections.abc import Mapping
-from typing import Any
 
 from pydantic import ValidationError
 
@@ -64,7 +63,7 @@ def read_notification(
 
 
 def read_entity(
-    entity: Mapping[str, Any], is_past: IsPast | None = None, *, later: bool = False
+    entity: Mapping[str, object], is_past: IsPast | None = None, *, later: bool = False
 ) -> ReadResult:
     """Read one NGSI-v2 entity in either representation."""
     entity_id, entity_type = entity.get("id"), entity.get("type")
@@ -90,7 +89,7 @@ def read_entity(
     )
 
 
-def _attribute_value(attribute: Any) -> Any:
+def _attribute_value(attribute: object) -> object:
     if isinstance(attribute, dict) and "value" in attribute and "type" in attribute:
         return attribute["value"]
     return attribute

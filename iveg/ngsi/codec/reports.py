@@ -1,7 +1,6 @@
 """Messages of robots and sensors; the inverse of the readers."""
 
 from collections.abc import Iterable
-from typing import Any
 
 import orjson
 
@@ -57,7 +56,7 @@ def write_scan(value: LaserScan) -> bytes:
 
 def write_detections(value: DetectionFrame) -> bytes:
     """The bytes of ``/{apikey}/{robot}_yolox_bounding_boxes/attrs``."""
-    boxes: list[dict[str, Any]] = [
+    boxes: list[dict[str, object]] = [
         without_none(
             {
                 "class_id": detection.class_id,
@@ -84,7 +83,7 @@ def write_detections(value: DetectionFrame) -> bytes:
     )
 
 
-def write_unread(unread: Iterable[str | None]) -> list[dict[str, Any]]:
+def write_unread(unread: Iterable[str | None]) -> list[dict[str, object]]:
     """Boxes of somebody or something whose place is not known."""
     return [
         without_none({"class_id": class_id, "frame_id": names.UNPLACED})
@@ -115,7 +114,7 @@ def write_safety(value: SafetyReport) -> bytes:
     )
 
 
-def _faults(value: SafetyReport) -> dict[str, Any]:
+def _faults(value: SafetyReport) -> dict[str, object]:
     found = [
         {"code": one.code, "about": one.about, "for_s": rounded(one.for_s)}
         for one in value.faults
@@ -208,7 +207,7 @@ def write_heartbeat(origin: Origin) -> bytes:
     return _measure(origin, {"probe": write_origin(origin)})
 
 
-def _measure(origin: Origin, attributes: dict[str, Any]) -> bytes:
+def _measure(origin: Origin, attributes: dict[str, object]) -> bytes:
     if origin.stamp is not None:
         attributes["TimeInstant"] = origin.stamp
     return orjson.dumps(attributes, option=orjson.OPT_SERIALIZE_NUMPY)

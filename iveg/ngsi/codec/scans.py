@@ -3,7 +3,6 @@
 import math
 from array import array
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,13 +22,13 @@ _FINEST = 1e-4
 """No laser is finer (rad); whoever draws a turn of beams needs room for each."""
 
 
-def read_scan(robot_id: str, attributes: Mapping[str, Any]) -> LaserScan:
+def read_scan(robot_id: str, attributes: Mapping[str, object]) -> LaserScan:
     """Read ``lidar_points`` and its header."""
     refuse_unplaced(attributes.get(names.LIDAR_HEADER))
     return _scan_of(robot_id, attributes[names.LIDAR], attributes.get("lidar_header"))
 
 
-def _scan_of(robot_id: str, points: Any, raw_header: Any) -> LaserScan:
+def _scan_of(robot_id: str, points: object, raw_header: object) -> LaserScan:
     ranges = _ranges(points)
     if raw_header is None:
         return LaserScan(
@@ -57,7 +56,7 @@ def _scan_of(robot_id: str, points: Any, raw_header: Any) -> LaserScan:
     )
 
 
-def _ranges(points: Any) -> NDArray[np.float32]:
+def _ranges(points: object) -> NDArray[np.float32]:
     """A scan's numbers as one buffer; inf where nothing came back.
 
     Raises:
@@ -111,6 +110,6 @@ def _refuse_impossible(header: payloads.LidarHeaderValue, beams: int) -> None:
         raise UnreadableError("bad_lidar_header", "range_min is not below range_max")
 
 
-def read_single_scan(robot_id: str, attributes: Mapping[str, Any]) -> LaserScan:
+def read_single_scan(robot_id: str, attributes: Mapping[str, object]) -> LaserScan:
     """Read the sweep of Algorithm 1's payload."""
     return _scan_of(robot_id, attributes["laser_scan"], attributes.get("lidar_header"))

@@ -22,7 +22,7 @@ def _value_of(of: type[Observation]) -> type[OriginFields]:
     return create_model(f"{of.__name__}Value", __base__=OriginFields, **members)
 
 
-def _bounds(quantity: Quantity) -> Any:
+def _bounds(quantity: Quantity) -> object:
     return Field(ge=quantity.least, le=quantity.most)
 
 
@@ -30,7 +30,7 @@ _VALUES = {kind.of: _value_of(kind.of) for kind in SENSED}
 
 
 def read_sensed(
-    kind: Kind, robot_id: str, attributes: Mapping[str, Any]
+    kind: Kind, robot_id: str, attributes: Mapping[str, object]
 ) -> Observation:
     """Read a small sensor's attribute, which has its name."""
     value = _VALUES[kind.of].model_validate(attributes[kind.name])

@@ -2,29 +2,29 @@
 
 from collections.abc import Mapping
 from functools import partial
-from typing import Any
 
 from iveg.domain.errors import UnreadableError
 from iveg.domain.observations import LaserScan, Origin, UnreadScan
 from iveg.ngsi import names, payloads
 from iveg.ngsi.codec.attributes import Reader, read_attributes
-from iveg.ngsi.codec.fields import read_origin
+from iveg.ngsi.codec.fields import read_origin, refuse_unplaced
 from iveg.ngsi.codec.scans import compact
 
 
-def _unread_scan(name: str, robot_id: str, attributes: Mapping[str, Any]) -> UnreadScan:
+def _unread_scan(
+    name: str, robot_id: str, attributes: Mapping[str, object]
+) -> UnreadScan:
     """A scan by its identity alone."""
     header = attributes.get(names.LIDAR_HEADER)
     origin = Origin()
     if header is not None:
         origin = read_origin(payloads.OriginFields.model_validate(header))
-        if header.get("frame_id") == names.UNPLACED:
-            raise UnreadableError(names.UNPLACED, "the robot knows no place for it")
+        refuse_unplaced(header)
     kept = {name: compact(attributes[name]), names.LIDAR_HEADER: header}
     return UnreadScan(robot_id, origin, partial(_read, robot_id, kept))
 
 
-def _read(robot_id: str, attributes: Mapping[str, Any]) -> LaserScan:
+def _read(robot_id: str, attributes: Mapping[str, object]) -> LaserScan:
     """The scan.
 
     Raises:

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
 
 import orjson
 from pydantic import ValidationError
@@ -38,7 +37,7 @@ class ReadResult:
     problems: tuple[UnreadPart, ...] = ()
 
 
-def load_json(body: bytes | str) -> Any:
+def load_json(body: bytes | str) -> object:
     """Parse JSON that may be hostile.
 
     Raises:
@@ -59,7 +58,7 @@ def _brackets(body: bytes | str) -> int:
     return text.count(b"[") + text.count(b"{")
 
 
-def _deeper_than(value: Any, limit: int) -> bool:
+def _deeper_than(value: object, limit: int) -> bool:
     if isinstance(value, dict):
         value = value.values()
     elif not isinstance(value, list):

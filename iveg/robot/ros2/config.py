@@ -93,11 +93,11 @@ class RobotConfig:
 
 # --- values -------------------------------------------------------------------------
 
-_Reader = Callable[[Any], Any]
+_Reader = Callable[[object], Any]
 """Checks and converts a value; raises ValueError with what it must be."""
 
 
-def _table(value: Any) -> dict[str, Any]:
+def _table(value: object) -> dict[str, Any]:
     if not isinstance(value, dict):
         raise ValueError("must be a table")
     return value
@@ -105,31 +105,31 @@ def _table(value: Any) -> dict[str, Any]:
 
 def _number(least: float, most: float) -> _Reader:
     def read(value: Any) -> float:
-        good = isinstance(value, int | float) and not isinstance(value, bool)
-        if not good or not least <= value <= most:
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        if not is_number or not least <= value <= most:
             raise ValueError(f"must be a number from {least:g} to {most:g}")
         return float(value)
 
     return read
 
 
-def _domain(value: Any) -> int:
+def _domain(value: object) -> int:
     if type(value) is not int or not 0 <= value <= _LAST_DOMAIN:
         raise ValueError(f"must be a whole number from 0 to {_LAST_DOMAIN}")
     return value
 
 
-def _text(value: Any) -> str:
+def _text(value: object) -> str:
     if not isinstance(value, str) or not 0 < len(value) <= _LONGEST:
         raise ValueError(f"must be a text of 1 to {_LONGEST} characters")
     return value
 
 
-def _maybe_text(value: Any) -> str:
+def _maybe_text(value: object) -> str:
     return "" if value == "" else _text(value)
 
 
-def _topic(value: Any) -> str:
+def _topic(value: object) -> str:
     if value == "":
         return ""
     try:
@@ -139,25 +139,25 @@ def _topic(value: Any) -> str:
     return str(value)
 
 
-def _frame(value: Any) -> str:
+def _frame(value: object) -> str:
     if _FRAME.fullmatch(_text(value)) is None:
         raise ValueError("must name a frame")
     return str(value).lstrip("/")
 
 
-def _flag(value: Any) -> bool:
+def _flag(value: object) -> bool:
     if not isinstance(value, bool):
         raise ValueError("must be true or false")
     return value
 
 
-def _peers(value: Any) -> tuple[str, ...]:
+def _peers(value: object) -> tuple[str, ...]:
     if not isinstance(value, list) or len(value) > _MOST_PEERS:
         raise ValueError(f"must be a list of at most {_MOST_PEERS} addresses")
     return tuple(_text(one) for one in value)
 
 
-def _quality(value: Any) -> dict[str, object]:
+def _quality(value: object) -> dict[str, object]:
     kinds: dict[str, type] = {"reliable": bool, "transient_local": bool, "depth": int}
     if not isinstance(value, dict) or not value.keys() <= kinds.keys():
         raise ValueError(f"must be a table of {', '.join(kinds)}")
@@ -235,7 +235,7 @@ class _Page:
     def values(
         self,
         path: tuple[str, ...],
-        table: Mapping[str, Any],
+        table: Mapping[str, object],
         readers: Mapping[str, _Reader],
     ) -> dict[str, Any]:
         """Values of the table at ``path``, each by the reader of its key."""
