@@ -88,19 +88,21 @@ class DirectReader:
         self, apikey: str, robot_id: str, kinds: Iterable[Kind]
     ) -> Iterator[tuple[str, _Source]]:
         """Topics of one robot."""
-        past = self._is_past
+        measure = partial(
+            codec.read_measure, is_past=self._is_past, instead=codec.UNREAD
+        )
         for kind in kinds:
             if kind.suffix is None:
                 continue
             name = robot_id + kind.suffix
-            read = partial(codec.read_measure, name, is_past=past, later=True)
+            read = partial(measure, name)
             source = _Source(robot_id, kind.qos, read, kind.of, kind.apart_s)
             yield names.measure_topic(apikey, name), source
             if kind.speaks_alone:
                 alone = names.direct_topic(robot_id, kind.suffix)
                 yield alone, replace(source, sparse=False)
         if kinds:
-            whole = partial(codec.read_measure, robot_id, is_past=past, later=True)
+            whole = partial(measure, robot_id)
             yield names.measure_topic(apikey, robot_id), _Source(robot_id, 1, whole)
             answer = partial(codec.read_answer, robot_id)
             yield names.answer_topic(apikey, robot_id), _Source(robot_id, 1, answer)

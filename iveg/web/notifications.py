@@ -13,7 +13,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from iveg.domain.errors import UnreadableError
 from iveg.domain.observations import Instant, Received
 from iveg.domain.transports import FIWARE
-from iveg.ngsi.codec import read_notification
+from iveg.ngsi.codec import UNREAD, read_notification
 from iveg.pipeline.ingest import Ingest
 from iveg.pipeline.ports import Clock
 from iveg.web.problems import Problem, problem_of
@@ -131,7 +131,7 @@ class NotificationEndpoint:
     def _receive(self, body: bytes, at: Instant) -> Problem | None:
         try:
             subscription_id, reading = read_notification(
-                body, self._ingest.is_past, later=True
+                body, self._ingest.is_past, UNREAD
             )
         except UnreadableError as error:
             return problem_of(error)

@@ -31,10 +31,12 @@ from iveg.ngsi.codec.reports import (
     write_sensed,
     write_unplaced,
 )
+from iveg.ngsi.codec.unread import UNREAD
 from iveg.ngsi.codec.untrusted import MAX_DEPTH, ReadResult, UnreadPart, load_json
 
 __all__ = [
     "MAX_DEPTH",
+    "UNREAD",
     "FeedbackWriter",
     "IsPast",
     "ReadResult",

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
-from types import MappingProxyType
 
 from pydantic import ValidationError
 
@@ -38,6 +37,8 @@ from iveg.ngsi.codec.sensors import read_sensed
 from iveg.ngsi.codec.untrusted import ReadResult, first_complaint, merge, unread
 
 Reader = Callable[[str, Mapping[str, object]], Observation]
+Readers = Mapping[str, Reader]
+NO_OTHERS: Readers = {}
 IsPast = Callable[[str, type[Observation], str, int], bool]
 """Whether robot, kind, boot and seq tell that a message cannot be news."""
 
@@ -46,7 +47,7 @@ def read_attributes(
     robot_id: str,
     attributes: Mapping[str, object],
     is_past: IsPast | None = None,
-    instead: Mapping[str, Reader] = MappingProxyType({}),
+    instead: Readers = NO_OTHERS,
 ) -> ReadResult:
     """Read every attribute of a robot that the contract knows; skip the others.
 

@@ -13,8 +13,9 @@ from iveg.domain.kinds import KIND_OF
 from iveg.domain.observations import DetectionFrame
 from iveg.ngsi import names, payloads
 from iveg.ngsi.codec.attributes import (
+    NO_OTHERS,
     IsPast,
-    Reader,
+    Readers,
     climate,
     command_answer,
     heartbeat,
@@ -22,7 +23,6 @@ from iveg.ngsi.codec.attributes import (
     read_one,
     refused_frame,
 )
-from iveg.ngsi.codec.unread import UNREAD
 from iveg.ngsi.codec.untrusted import (
     ReadResult,
     first_complaint,
@@ -32,18 +32,17 @@ from iveg.ngsi.codec.untrusted import (
 )
 
 _FRAME_SUFFIX = KIND_OF[DetectionFrame].suffix or ""
-_NO_OTHERS: Mapping[str, Reader] = {}
 
 
 def read_notification(
-    body: bytes, is_past: IsPast | None = None, *, later: bool = False
+    body: bytes, is_past: IsPast | None = None, instead: Readers = NO_OTHERS
 ) -> tuple[str, ReadResult]:
     """Read a notification, normalized or keyValues.
 
     Args:
         body: JSON.
         is_past: Tells by its identity what need not be read; None reads all.
-        later: Leave scans unread, for those who draw them.
+        instead: Other readers of some attributes, such as ``UNREAD``.
 
     Returns:
         The subscription's id and what its entities hold.
@@ -55,15 +54,15 @@ def read_notification(
         notification = payloads.NotificationValue.model_validate(load_json(body))
     except ValidationError as error:
         raise UnreadableError("not_a_notification", first_complaint(error)) from error
-    entities = [
-        read_entity(entity, is_past, later=later) for entity in notification.data
-    ]
+    entities = [read_entity(entity, is_past, instead) for entity in notification.data]
     read = entities[0] if len(entities) == 1 else merge(entities)
     return notification.subscriptionId, read
 
 
 def read_entity(
-    entity: Mapping[str, object], is_past: IsPast | None = None, *, later: bool = False
+    entity: Mapping[str, object],
+    is_past: IsPast | None = None,
+    instead: Readers = NO_OTHERS,
 ) -> ReadResult:
     """Read one NGSI-v2 entity in either representation."""
     entity_id, entity_type = entity.get("id"), entity.get("type")
@@ -77,7 +76,7 @@ def read_entity(
     if entity_type == names.ROBOT_TYPE:
         if not names.is_robot_id(entity_id):
             return unread(payloads.clean_text(entity_id), "bad_robot_id")
-        return read_attributes(entity_id, attributes, is_past, _readers(later=later))
+        return read_attributes(entity_id, attributes, is_past, instead)
     if (entity_id, entity_type) == (names.CLIMATE_ID, names.CLIMATE_TYPE):
         return read_one(entity_id, climate, attributes)
     if (entity_id, entity_type) == (names.HEARTBEAT_ID, names.HEARTBEAT_TYPE):
@@ -99,13 +98,9 @@ def read_measure(
     device_id: str,
     payload: bytes,
     is_past: IsPast | None = None,
-    *,
-    later: bool = False,
+    instead: Readers = NO_OTHERS,
 ) -> ReadResult:
-    """Read what a robot's device published on its ``attrs`` topic.
-
-    ``later``: leave scans unread, for those who draw them.
-    """
+    """Read what a robot's device published on its ``attrs`` topic."""
     robot_id = names.robot_of_device(device_id)
     if not names.is_robot_id(robot_id):
         return unread(payloads.clean_text(device_id), "bad_robot_id")
@@ -115,15 +110,10 @@ def read_measure(
         read = unread(device_id, error.reason, error.detail)
     else:
         if isinstance(attributes, dict):
-            readers = _readers(later=later)
-            return read_attributes(robot_id, attributes, is_past, readers)
+            return read_attributes(robot_id, attributes, is_past, instead)
         read = unread(device_id, "not_an_object")
     is_frame = device_id == robot_id + _FRAME_SUFFIX
     return refused_frame(robot_id, read) if is_frame else read
-
-
-def _readers(*, later: bool) -> Mapping[str, Reader]:
-    return UNREAD if later else _NO_OTHERS
 
 
 def read_answer(robot_id: str, payload: bytes) -> ReadResult:

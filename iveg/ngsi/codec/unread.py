@@ -6,7 +6,7 @@ from functools import partial
 from iveg.domain.errors import UnreadableError
 from iveg.domain.observations import LaserScan, Origin, UnreadScan
 from iveg.ngsi import names, payloads
-from iveg.ngsi.codec.attributes import Reader, read_attributes
+from iveg.ngsi.codec.attributes import Readers, read_attributes
 from iveg.ngsi.codec.fields import read_origin, refuse_unplaced
 from iveg.ngsi.codec.scans import compact
 
@@ -38,7 +38,7 @@ def _read(robot_id: str, attributes: Mapping[str, object]) -> LaserScan:
     raise UnreadableError(problem.reason, problem.detail)
 
 
-UNREAD: Mapping[str, Reader] = {
+UNREAD: Readers = {
     name: partial(_unread_scan, name) for name in (names.LIDAR, "laser_scan")
 }
 """Readers that leave scans to those who draw them."""

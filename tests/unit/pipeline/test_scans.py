@@ -17,7 +17,7 @@ def measure(**changes: Any) -> bytes:
 
 def hear(desk: Desk, payload: bytes) -> list[str]:
     """A scan of AGI as it comes from MQTT; reasons of what is refused at once."""
-    reading = codec.read_measure("AGI_lidar2D", payload, later=True)
+    reading = codec.read_measure("AGI_lidar2D", payload, instead=codec.UNREAD)
     received = [Received(one, desk.clock()) for one in reading.observations]
     desk.loop.step(received, desk.clock())
     return [one.reason for one in reading.problems]
@@ -78,7 +78,7 @@ def test_a_twin_of_a_scan_is_not_read() -> None:
 def test_only_scans_wait_to_be_read() -> None:
     pose = codec.write_odometry(odometry())
     now, later = (
-        codec.read_measure("AGI_odom", pose, later=one) for one in (False, True)
+        codec.read_measure("AGI_odom", pose, instead=one) for one in ({}, codec.UNREAD)
     )
 
     assert now == later
