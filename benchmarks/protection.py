@@ -91,8 +91,11 @@ def main() -> None:
     options.add_argument("--seconds", type=float, default=600.0)
     options.add_argument("--single-boxes", action="store_true")
     options.add_argument("--no-laser", action="store_true")
+    options.add_argument("--no-foresight", action="store_true")
     asked = options.parse_args()
-    rule = DetectionRule(possible_people=not asked.single_boxes)
+    rule = DetectionRule(
+        possible_people=not asked.single_boxes, foresight=not asked.no_foresight
+    )
     rows = []
     for profile in asked.profiles.split(","):
         seeds = [int(one) for one in asked.seeds.split(",")]

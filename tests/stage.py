@@ -1,6 +1,7 @@
 """A scenario on the experiment's virtual clock, and what iVeg says of it."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any, TypeVar
 
 from iveg.adapters.greenhouses import load_greenhouse
@@ -27,6 +28,7 @@ class Stage:
         scenario: Its name.
         robots: Of the fleet.
         profile: Of the detector; ``seed`` of people and noise.
+        foresight: Robots slow before they reach a ring.
     """
 
     def __init__(
@@ -35,6 +37,8 @@ class Stage:
         robots: tuple[str, ...] = ("AGI", "AGII"),
         profile: str = "perfect",
         seed: int = 3,
+        *,
+        foresight: bool = True,
     ) -> None:
         greenhouse = load_greenhouse(scenario_named(scenario).greenhouse)
         layout = lay_out(scenario_named(scenario), robots, greenhouse)
@@ -42,6 +46,7 @@ class Stage:
             greenhouse, layout, DETECTORS[layout.detector or profile], seed
         )
         self._desk = desk = Desk(robots, greenhouse)
+        desk.evaluator.rule = replace(desk.evaluator.rule, foresight=foresight)
         self._views = Views(desk.parts)
         self._stage = staging.Stage(
             world,

@@ -129,6 +129,7 @@ class _StoredRule(BaseModel):
     )
     aliases: dict[str, Class] = Field(default_factory=lambda: dict(ALIASES))
     possible_people: bool = False
+    foresight: bool = True
     author: str = _SETTINGS
     since: float | None = None
 

@@ -51,6 +51,7 @@ class DetectionRule:
         radius_m: Ring of a fresh sighting, inclusive (m).
         aliases: Class as a detector names it, in lower case → canonical class.
         possible_people: Whether a faint person who is seen again and again counts.
+        foresight: Whether a robot slows before it reaches a ring, to be slow there.
         author: Who made this version; ``since`` when (Unix s), None for the first.
     """
 
@@ -61,6 +62,7 @@ class DetectionRule:
     radius_m: float = LIMITS.ring_default_m
     aliases: Mapping[str, Class] = field(default_factory=lambda: ALIASES)
     possible_people: bool = True
+    foresight: bool = True
     author: str = "settings"
     since: float | None = None
 
@@ -111,6 +113,7 @@ def strictest(rules: Iterable[DetectionRule], since: float) -> DetectionRule:
         radius_m=max(rule.radius_m for rule in every),
         aliases=aliases,
         possible_people=any(rule.possible_people for rule in every),
+        foresight=any(rule.foresight for rule in every),
         author=RECOVERED,
         since=since,
     )

@@ -46,6 +46,7 @@ class SpeedLimit:
             ``unsupervised``.
         cause: The person or robot that it is for.
         distance_m: From ``base_link`` to the centre of the cause (m).
+        foretold_s: When it will reach the ring of the cause (s); None: it is inside.
     """
 
     speed_factor: float = FULL_SPEED
@@ -53,6 +54,7 @@ class SpeedLimit:
     cause: str | None = None
     distance_m: float | None = None
     decision_id: str | None = None
+    foretold_s: float | None = None
 
 
 CLEAR = SpeedLimit()

@@ -102,6 +102,9 @@ class SpeedLimit(Model):
     cause: str | None
     distance_m: float | None
     decision_id: str | None
+    foretold_s: float | None = Field(
+        description="Until it reaches the ring of the cause; null: it is inside."
+    )
 
     @classmethod
     def of(cls, limit: feedback.SpeedLimit) -> "SpeedLimit":
@@ -112,6 +115,7 @@ class SpeedLimit(Model):
             cause=limit.cause,
             distance_m=rounded(limit.distance_m),
             decision_id=limit.decision_id,
+            foretold_s=rounded(limit.foretold_s),
         )
 
 

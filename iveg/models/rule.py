@@ -23,6 +23,7 @@ class Rule(Model):
         description="A detector's word → the class that it stands for."
     )
     possible_people: bool
+    foresight: bool
     author: str
     since: str | None
 
@@ -38,6 +39,7 @@ class Rule(Model):
             factor=HALF_SPEED,
             aliases=dict(rule.aliases),
             possible_people=rule.possible_people,
+            foresight=rule.foresight,
             author=rule.author,
             since=stamp(rule.since),
         )

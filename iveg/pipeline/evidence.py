@@ -38,6 +38,7 @@ def record_of(decision: SlowdownDecision) -> DecisionRecord:
         rule_version=str(decision.rule.version),
         rule_parameters={
             **_parameters(decision.rule, zone),
+            "foretold_s": crossing.foretold_s,
             "places": [asdict(one) for one in decision.places],
         },
         in_sight=crossing.in_sight,

@@ -183,6 +183,16 @@ test("near a person that is the reason, whatever else is missing", () => {
   equal(whySaid(near, words), "robot.why.person 1.4");
 });
 
+test("a person whose zone lies ahead is said with the seconds until it", () => {
+  const ahead = robot({
+    speed_limit: {
+      ...{ speed_factor: 0.5, reason: "person", distance_m: 3.1 },
+      foretold_s: 1.2,
+    },
+  });
+  equal(whySaid(ahead, words), "robot.why.person_ahead 3.1 1.2");
+});
+
 test("a camera is read, not read, out of service or not there", () => {
   const said = (/** @type {object} */ detector) =>
     detectorSaid(robot({ detector }), words);

@@ -15,6 +15,13 @@ from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
 from iveg.domain.robot_state import RobotState
+from iveg.domain.rule.foresight import (
+    HOLDS_S,
+    Encounter,
+    Foresight,
+    Foretold,
+    slows_within_s,
+)
 from iveg.domain.rule.premises import Missing, missing_premises
 from iveg.domain.rule.zones import NOT_FAR_M, Zone, ZoneFinder
 from iveg.domain.tracking.people import People
@@ -34,6 +41,8 @@ class Crossing:
         outside_since: When it was first found outside (monotonic, s).
         already_slow: It was slowed for something else: no slow-down will be seen.
         ahead: It had judged this very zone itself and said so before.
+        foretold_s: When it would reach the ring, at the trigger (s); None: it was
+            inside.
         speeding_up: It had not reached the speed that it wanted, so half of that may
             be more than half of what it drove.
         in_sight: Whether the robot saw it itself, or had a line of sight to the centre
@@ -52,6 +61,7 @@ class Crossing:
     ahead: bool = False
     speeding_up: bool = False
     outside_since: float | None = None
+    foretold_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +87,8 @@ class SpeedLimits:
         self.missing: Mapping[str, tuple[Missing, ...]] = {}
         self.limited_since: dict[str, float] = {}
         self._zones = ZoneFinder()
+        self._foresight = Foresight()
+        self._foretold: Foretold = {}
 
     @property
     def crossings(self) -> Iterable[Crossing]:
@@ -93,12 +105,16 @@ class SpeedLimits:
     ) -> tuple[dict[str, SpeedLimit], list[LimitChange]]:
         """Judge the whole fleet; ``new_id`` begins the ids of new decisions."""
         near = self._zones.near(world, people, rule, now, self._open)
+        self._foretold = (
+            self._foresight.look(world, people, rule, now) if rule.foresight else {}
+        )
         changes: list[LimitChange] = []
         for robot in world.robots.values():
             zones = list(near(robot))
-            if zones or self._open.get(robot.robot_id):
+            ahead = self._foretold.get(robot.robot_id, {})
+            if zones or ahead or self._open.get(robot.robot_id):
                 name = f"{new_id}-{len(changes)}"
-                changes += self._cross(robot, zones, now, name)
+                changes += self._cross(robot, zones, ahead, now, name)
         self.missing = missing_premises(world, now)
         limits = {name: self._speed_limit(name) for name in world.robots}
         for name, limit in limits.items():
@@ -109,10 +125,15 @@ class SpeedLimits:
         return limits, changes
 
     def _cross(
-        self, robot: RobotState, zones: Iterable[Zone], now: Instant, new_id: str
+        self,
+        robot: RobotState,
+        zones: Iterable[Zone],
+        ahead: Mapping[str, Encounter],
+        now: Instant,
+        new_id: str,
     ) -> Iterator[LimitChange]:
         mine = self._open.setdefault(robot.robot_id, {})
-        nearest = _nearest(robot, zones, mine)
+        nearest = _nearest(robot, zones, mine) | _foreseen(robot, ahead, mine)
         for number, (cause, (depth, distance, zone)) in enumerate(nearest.items()):
             crossing = mine.get(cause)
             if crossing is not None:
@@ -149,7 +170,14 @@ class SpeedLimits:
             already_slow=_is_slow_already(robot, zone, speed),
             ahead=_is_ahead(robot, zone),
             speeding_up=robot.speed_gained() > SPEEDING_UP,
+            foretold_s=self._foretold_s(robot.robot_id, zone, distance),
         )
+
+    def _foretold_s(self, robot_id: str, zone: Zone, distance_m: float) -> float | None:
+        """When a robot will reach a cause's ring (s); None: it is inside, or leaves."""
+        encounter = self._foretold.get(robot_id, {}).get(zone.cause)
+        is_inside = distance_m <= zone.radius_m
+        return None if encounter is None or is_inside else encounter.in_s
 
     def _speed_limit(self, robot_id: str) -> SpeedLimit:
         """The most specific reason wins: a person, a peer, then what is missing."""
@@ -165,6 +193,7 @@ class SpeedLimits:
                 worst.zone.cause,
                 worst.distance_m,
                 worst.decision_id,
+                self._foretold_s(robot_id, worst.zone, worst.distance_m),
             )
         for first in self.missing[robot_id]:
             return SpeedLimit(HALF_SPEED, first.reason, first.robot_id)
@@ -194,6 +223,24 @@ def _nearest(
         if cause not in nearest or depth < nearest[cause][0]:
             nearest[cause] = depth, distance, zone
     return nearest
+
+
+def _foreseen(
+    robot: RobotState, ahead: Mapping[str, Encounter], mine: Mapping[str, Crossing]
+) -> dict[str, tuple[float, float, Zone]]:
+    """Rings that a robot will reach, as if it were at their border now.
+
+    In time to be slow there; who is slow for one already stays so while it lies ahead.
+    """
+    if robot.odometry is None:
+        return {}
+    pose, speed = robot.odometry.pose, robot.odometry.twist.linear_x
+    soon_s = slows_within_s(robot.profile, speed)
+    return {
+        cause: (0.0, pose.distance_to(one.zone.x, one.zone.y), one.zone)
+        for cause, one in ahead.items()
+        if one.in_s > 0.0 and one.in_s <= (HOLDS_S if cause in mine else soon_s)
+    }
 
 
 def _leave(

@@ -6,6 +6,7 @@
       ^________________________|                                 └──> gone
 """
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
@@ -15,6 +16,7 @@ from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
 from iveg.domain.tracking.looks import Looks
 
+_SMOOTHED_S = 0.4
 Stage = Literal["seen", "remembered", "last_seen", "gone"]
 
 
@@ -30,6 +32,7 @@ class Sighting:
         chain: Number of the chain of sightings whose newest this is; negative: of the
             second place of a box that may be in two (``iveg.domain.frames``).
         recording: The map frame of the recording that saw it; None: a robot of today.
+        vx: How its chain goes in ``map`` (m/s); ``vy`` likewise.
     """
 
     observer: str
@@ -43,13 +46,16 @@ class Sighting:
     reach_m: float = 0.0
     chain: int = 0
     recording: str | None = None
+    vx: float = 0.0
+    vy: float = 0.0
 
     def age_s(self, now: Instant) -> float:
         """Seconds since the sighting."""
         return max(0.0, now.mono - self.at.mono)
 
-    def in_chain(self, chain: int) -> "Sighting":
-        """The same sighting as the newest of a chain."""
+    def in_chain(self, chain: int, before: "Sighting | None" = None) -> "Sighting":
+        """The same sighting as the newest of a chain, after the one ``before``."""
+        vx, vy = (0.0, 0.0) if before is None else self._going_on(before)
         # Made for each box of each picture: ``replace`` takes three times as long.
         return Sighting(
             self.observer,
@@ -63,7 +69,20 @@ class Sighting:
             self.reach_m,
             chain,
             self.recording,
+            vx,
+            vy,
         )
+
+    def _going_on(self, before: "Sighting") -> tuple[float, float]:
+        """The velocity of the chain (m/s), smoothed over 0.4 s, of a walker at most."""
+        after_s = self.at.mono - before.at.mono
+        if not 0.0 < after_s <= LIMITS.seen_s or self.reach_m or before.reach_m:
+            return 0.0, 0.0
+        gain = after_s / (_SMOOTHED_S + after_s)
+        vx = before.vx + gain * ((self.x - before.x) / after_s - before.vx)
+        vy = before.vy + gain * ((self.y - before.y) / after_s - before.vy)
+        least = min(1.0, LIMITS.walking_m_s / max(math.hypot(vx, vy), 1e-9))
+        return vx * least, vy * least
 
 
 @dataclass(frozen=True, slots=True)

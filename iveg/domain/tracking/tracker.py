@@ -203,7 +203,7 @@ class Tracker:
         at: Instant,
     ) -> str | None:
         """Keep a sighting in its track; its chain's earlier one is removed."""
-        sighting = one.sighting.in_chain(chain)
+        sighting = one.sighting.in_chain(chain, None if old is None else old[1])
         if old is not None:
             if old[1].at.mono > sighting.at.mono:
                 return old[0]

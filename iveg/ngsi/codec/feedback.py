@@ -49,7 +49,12 @@ def _speed_limits(value: payloads.FeedbackValue) -> dict[str, SpeedLimit]:
     """Of every robot that is named."""
     return dict.fromkeys(value.clear, CLEAR) | {
         robot_id: SpeedLimit(
-            one.speed_factor, one.reason, one.cause, one.distance_m, one.decision_id
+            one.speed_factor,
+            one.reason,
+            one.cause,
+            one.distance_m,
+            one.decision_id,
+            one.foretold_s,
         )
         for robot_id, one in value.speed_limits.items()
     }
@@ -151,6 +156,7 @@ def _write_speed_limit(speed_limit: SpeedLimit) -> dict[str, object]:
             "cause": speed_limit.cause,
             "distance_m": rounded(speed_limit.distance_m),
             "decision_id": speed_limit.decision_id,
+            "foretold_s": rounded(speed_limit.foretold_s),
         }
     )
 

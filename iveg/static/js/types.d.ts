@@ -767,6 +767,7 @@ export type Rule = {
   /** A detector's word → the class that it stands for. */
   aliases: Record<string, "person" | "robot">;
   possible_people: boolean;
+  foresight: boolean;
   author: string;
   since: string | null;
 };
@@ -881,6 +882,8 @@ export type SpeedLimit = {
   cause: string | null;
   distance_m: number | null;
   decision_id: string | null;
+  /** Until it reaches the ring of the cause; null: it is inside. */
+  foretold_s: number | null;
 };
 
 /** A recipient of an alert outside iVeg; ``failed`` is the reason of a failure. */

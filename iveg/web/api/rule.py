@@ -43,6 +43,7 @@ class RuleChange(BaseModel):
         | None
     ) = None
     possible_people: bool | None = None
+    foresight: bool | None = None
 
     @field_validator("aliases")
     @classmethod
@@ -65,6 +66,7 @@ class RuleChange(BaseModel):
             _new(self.radius_m, rule.radius_m),
             _new(self.aliases, dict(rule.aliases)),
             _new(self.possible_people, rule.possible_people),
+            _new(self.foresight, rule.foresight),
         )
 
 

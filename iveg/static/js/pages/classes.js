@@ -25,6 +25,7 @@ export function createClassForm(store, i18n, guard) {
   const word = /** @type {HTMLInputElement} */ (need("#alias-word"));
   const meaning = /** @type {HTMLSelectElement} */ (need("#alias-class"));
   const possible = /** @type {HTMLInputElement} */ (need("#class-possible"));
+  const foresight = /** @type {HTMLInputElement} */ (need("#class-foresight"));
   /** @type {Rule | null} the version that the person at the form has seen */
   let seen = null;
   /** @type {Map<string, Class>} */
@@ -50,6 +51,7 @@ export function createClassForm(store, i18n, guard) {
         share === undefined ? "" : String(Math.round(share * 100));
     }
     possible.checked = rule.possible_people === true;
+    foresight.checked = rule.foresight === true;
     draw();
   }
 
@@ -69,6 +71,7 @@ export function createClassForm(store, i18n, guard) {
       class_thresholds: Object.fromEntries(thresholds),
       aliases: Object.fromEntries([...aliases].sort()),
       possible_people: possible.checked,
+      foresight: foresight.checked,
     };
   }
 
@@ -159,7 +162,8 @@ function thresholdOf(name) {
  *
  * @param {Rule} rule
  */
-export function writtenOf({ aliases = {}, class_thresholds = {}, possible_people }) {
+export function writtenOf(rule) {
+  const { aliases = {}, class_thresholds = {}, possible_people, foresight } = rule;
   const given = Object.entries(aliases).filter(
     ([name]) => !CLASSES.some((own) => own === name),
   );
@@ -171,5 +175,6 @@ export function writtenOf({ aliases = {}, class_thresholds = {}, possible_people
     class_thresholds: Object.fromEntries(shares),
     aliases: /** @type {Record<string, Class>} */ (Object.fromEntries(given.sort())),
     possible_people: possible_people === true,
+    foresight: foresight === true,
   };
 }

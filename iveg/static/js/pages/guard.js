@@ -86,6 +86,7 @@ export function createGuard(store, i18n) {
     const { status } = await sendApi("PUT", "rule", {
       ...{ confidence_threshold, radius_m, class_thresholds, aliases },
       possible_people: kept.before.possible_people === true,
+      foresight: kept.before.foresight === true,
       version: store.get("rule")?.version,
     });
     if (status === 200) keep(null);

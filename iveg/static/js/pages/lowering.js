@@ -3,7 +3,7 @@
  *
  * @typedef {import("../core/protocol.js").Rule} Rule
  * @typedef {Partial<Pick<Rule, "confidence_threshold" | "radius_m" | "class_thresholds" |
- *   "aliases" | "possible_people">>} Change
+ *   "aliases" | "possible_people" | "foresight">>} Change
  * @typedef {{key: string, slots: Record<string, string | number>}} Lowering
  */
 
@@ -28,6 +28,7 @@ export function loweringsOf(before, change) {
       "lowering.possible",
       {},
     ),
+    ...when(before.foresight === true && !after.foresight, "lowering.foresight", {}),
   ];
 }
 

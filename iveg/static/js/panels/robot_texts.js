@@ -64,6 +64,10 @@ export function whySaid(robot, i18n) {
   }
   const isHollow = isWaiting(robot) || isSilent(linkOfRobot(robot));
   if (!reason || (reason === "clear" && isHollow)) return "";
+  const seconds = robot.speed_limit?.foretold_s ?? null;
+  if (isLimited && seconds !== null) {
+    return i18n.t(`robot.why.${reason}_ahead`, { distance, seconds });
+  }
   return i18n.t(`robot.why.${reason}`, { distance });
 }
 

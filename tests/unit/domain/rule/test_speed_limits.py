@@ -2,8 +2,12 @@
 
 import pytest
 
+from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import CLEAR
 from tests.unit.domain.scene import HEDGE, Scene, machine, person
+
+RINGS = DetectionRule(foresight=False)
+"""Nothing but the rings themselves counts."""
 
 
 def watching(scene: Scene) -> Scene:
@@ -36,7 +40,7 @@ def test_a_robot_far_from_everybody_is_free() -> None:
     ("distance", "factor"), [(0.0, 0.5), (1.999, 0.5), (2.0, 0.5), (2.0001, 1.0)]
 )
 def test_f47_the_ring_is_two_metres_inclusive(distance: float, factor: float) -> None:
-    assert step(Scene(), distance)[0] == factor
+    assert step(Scene(rule=RINGS), distance)[0] == factor
 
 
 def test_distance_is_horizontal_from_base_link_to_the_centre() -> None:
@@ -131,7 +135,7 @@ def leave(scene: Scene, x: float, seconds: float) -> list[float]:
 
 
 def test_the_release_comes_a_second_after_the_robot_is_030_m_outside() -> None:
-    scene = Scene()
+    scene = Scene(rule=RINGS)
     step(scene, 1.9)
 
     factors = leave(scene, 2.35, 1.2)
