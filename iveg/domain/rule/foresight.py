@@ -40,8 +40,6 @@ _COMFORT = 0.5
 _PLAN_WITHIN_M, _PLAN_LASTS_S = 0.5, 2.5
 """A plan farther from the robot than this, or older, is not what it drives."""
 _PLAN_POINTS = 200
-_ERROR_M, _ERROR_M_S = 0.2, 0.3
-"""Deviation of a distance now, and what each second ahead adds to it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,15 +48,10 @@ class Encounter:
 
     Attributes:
         in_s: How soon (s).
-        x: Where the robot will be then, in ``map`` (m); ``y`` likewise.
-        sure: Probability that it will come inside within three seconds (0 to 1).
     """
 
     zone: Zone
     in_s: float
-    x: float
-    y: float
-    sure: float
 
 
 Foretold = Mapping[str, Mapping[str, Encounter]]
@@ -142,37 +135,27 @@ def _motion(
 def _first(
     robot: RobotState, zones: Sequence[Zone], places: _Places, now: Instant
 ) -> Mapping[str, Encounter]:
-    """The first encounter of a robot with each cause that it is not with yet."""
+    """The first encounter of a robot with each cause in whose rings it is not yet."""
     x, y = path_of(robot, now)
     apart = np.hypot(places.x - x[:, None], places.y - y[:, None]) - places.radius
     inside = apart <= 0.0
+    with_it = {zones[one].cause for one in np.flatnonzero(inside[0]).tolist()}
     found: dict[str, Encounter] = {}
     for column in np.flatnonzero(inside.any(0)).tolist():
         zone = zones[column]
-        if zone.cause == robot.robot_id or zone.recording is not None:
+        if zone.cause in with_it or zone.recording is not None:
             continue
-        step = int(inside[:, column].argmax())
-        in_s = _crossed_at(apart[:, column], step)
+        in_s = _crossed_at(apart[:, column], int(inside[:, column].argmax()))
         earlier = found.get(zone.cause)
         if earlier is None or in_s < earlier.in_s:
-            sure = _sureness(apart[:, column])
-            found[zone.cause] = Encounter(
-                zone, in_s, float(x[step]), float(y[step]), sure
-            )
+            found[zone.cause] = Encounter(zone, in_s)
     return found
 
 
 def _crossed_at(apart: _Floats, step: int) -> float:
-    """When a distance that is at most 0 from a step on became so (s)."""
-    if step == 0:
-        return 0.0
+    """When a distance that is at most 0 from a step on becomes so (s)."""
     before, after = float(apart[step - 1]), float(apart[step])
     return float(_AHEAD_S[step - 1]) + _STEP_S * before / (before - after)
-
-
-def _sureness(apart: _Floats) -> float:
-    deviations = -apart / (_ERROR_M + _ERROR_M_S * _AHEAD_S)
-    return round(0.5 * (1.0 + math.erf(float(deviations.max()) / math.sqrt(2.0))), 3)
 
 
 def path_of(robot: RobotState, now: Instant) -> tuple[_Floats, _Floats]:

@@ -239,7 +239,7 @@ def _foreseen(
     return {
         cause: (0.0, pose.distance_to(one.zone.x, one.zone.y), one.zone)
         for cause, one in ahead.items()
-        if one.in_s > 0.0 and one.in_s <= (HOLDS_S if cause in mine else soon_s)
+        if one.in_s <= (HOLDS_S if cause in mine else soon_s)
     }
 
 
