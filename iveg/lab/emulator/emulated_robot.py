@@ -11,7 +11,6 @@ from iveg.adapters import clock
 from iveg.domain.geometry import REST, Twist2D
 from iveg.domain.observations import Instant
 from iveg.lab.emulator.orders import FaultOrder
-from iveg.lab.emulator.radio import LinkFaults
 from iveg.lab.emulator.relay import Relay
 from iveg.lab.emulator.sensors import EmulatedSensors
 from iveg.lab.emulator.truth import TruthLog
@@ -20,15 +19,6 @@ from iveg.robot.node import NodeSettings, RobotNode
 from iveg.robot.pacing import LONGEST_STEP_S, SLOTS, in_slots
 
 _NAVIGATION_EVERY_S = 1.0
-LINK_FIELDS = {
-    "drop_percent",
-    "duplicate_percent",
-    "reorder_percent",
-    "delay_ms",
-    "jitter_ms",
-    "mute",
-}
-"""Fields of a fault order that apply to its radio."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,9 +154,7 @@ class EmulatedRobot:
         node = self._node
         self._faults = self._faults.changed_by(order)
         if self._relay is not None:
-            link = self._faults.model_dump(include=LINK_FIELDS, exclude_none=True)
-            repeats = self._faults.freeze_odometry == "repeat"
-            self._relay.radio.faults = LinkFaults(**link, repeats_odometry=repeats)
+            self._relay.radio.faults = self._faults
         self._rig.blind(order)
         if order.local_hold is not None:
             node.add_local_hold(order.local_hold)

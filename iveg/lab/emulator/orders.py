@@ -35,19 +35,35 @@ class OrderPlace(_Order):
     y: Metres
 
 
-class FaultOrder(_Order):
+class LinkFaults(_Order):
+    """Faults of a robot's link; percentages of telemetry, drawn independently.
+
+    Attributes:
+        mute: Nothing that the robot publishes arrives, without an error.
+        freeze_odometry: ``silent`` (or true): odometry stops; ``repeat``: its last
+            message, stamp and count included, is sent repeatedly.
+        drop_percent: Lost.
+        duplicate_percent: Delivered twice.
+        reorder_percent: Delivered after the next of the same topic.
+        delay_ms: Delay of everything that it publishes.
+        jitter_ms: Random addition to the delay, from 0 to this; order is kept.
+    """
+
+    mute: bool | None = None
+    freeze_odometry: Literal["silent", "repeat", True, False] | None = None
+    drop_percent: Percent | None = None
+    duplicate_percent: Percent | None = None
+    reorder_percent: Percent | None = None
+    delay_ms: Milliseconds | None = None
+    jitter_ms: Milliseconds | None = None
+
+
+class FaultOrder(LinkFaults):
     """Faults of one robot; an absent field changes nothing.
 
     Attributes:
-        mute: Publishes nothing; ``deaf``: ignores iVeg's speed limits.
-        freeze_odometry: ``silent`` (or true): odometry stops; ``repeat``: its last
-            message, stamp and count included, is sent repeatedly.
+        deaf: Ignores iVeg's speed limits.
         clock_offset_s: Its wall clock is this far ahead (s).
-        drop_percent: Share of its telemetry that is lost.
-        duplicate_percent: Share of its telemetry that is delivered twice.
-        reorder_percent: Share of its telemetry delivered after the next of the topic.
-        delay_ms: Delay of everything that it publishes.
-        jitter_ms: Random addition to the delay, from 0 to this.
         local_hold: Its red button or bumper is pressed.
         release_locally: The crew lifts local holds and the boot hold.
         kill: Its software ends; ``revive`` starts it again, held.
@@ -56,15 +72,8 @@ class FaultOrder(_Order):
     """
 
     robot: str
-    mute: bool | None = None
     deaf: bool | None = None
-    freeze_odometry: Literal["silent", "repeat", True, False] | None = None
     clock_offset_s: Annotated[float, Field(ge=-1e9, le=1e9)] | None = None
-    drop_percent: Percent | None = None
-    duplicate_percent: Percent | None = None
-    reorder_percent: Percent | None = None
-    delay_ms: Milliseconds | None = None
-    jitter_ms: Milliseconds | None = None
     local_hold: Literal["hw", "bumper"] | None = None
     release_locally: bool = False
     kill: bool = False

@@ -9,27 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-
-@dataclass(frozen=True, slots=True)
-class LinkFaults:
-    """Faults of a link; percentages of telemetry, drawn independently.
-
-    Attributes:
-        drop_percent: Lost.
-        duplicate_percent: Delivered twice.
-        reorder_percent: Delivered after the next of the same topic.
-        delay_ms: Added to all; up to ``jitter_ms`` more, in order.
-        repeats_odometry: Odometry is replaced by its last message.
-        mute: Nothing that the robot publishes arrives, without an error.
-    """
-
-    drop_percent: float = 0.0
-    duplicate_percent: float = 0.0
-    reorder_percent: float = 0.0
-    delay_ms: float = 0.0
-    jitter_ms: float = 0.0
-    repeats_odometry: bool = False
-    mute: bool = False
+from iveg.lab.emulator.orders import LinkFaults
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +68,7 @@ class Radio:
         """The packet; for frozen odometry the last one that passed before the fault."""
         if topic not in self._odometry:
             return packet
-        if self.faults.repeats_odometry and topic in self._last:
+        if self.faults.freeze_odometry == "repeat" and topic in self._last:
             return self._last[topic]
         self._last[topic] = packet
         return packet
@@ -97,20 +77,20 @@ class Radio:
         faults = self.faults
         dropped, doubled, overtaken = (self._rng.random(3) * 100.0).tolist()
         waiting = self._overtaken.pop(topic, [])
-        if dropped < faults.drop_percent:
+        if dropped < (faults.drop_percent or 0.0):
             return waiting
         out = [packet]
-        if doubled < faults.duplicate_percent:
+        if doubled < (faults.duplicate_percent or 0.0):
             out.append(packet)
-        if overtaken < faults.reorder_percent and not waiting:
+        if overtaken < (faults.reorder_percent or 0.0) and not waiting:
             self._overtaken[topic] = out
             return []
         return out + waiting
 
     def _due(self, now: float) -> float:
         faults = self.faults
-        late_ms = faults.delay_ms
-        if faults.jitter_ms > 0.0:
+        late_ms = faults.delay_ms or 0.0
+        if faults.jitter_ms:
             late_ms += self._rng.uniform(0.0, faults.jitter_ms)
         # One connection keeps its order; reordering is a separate fault.
         self._newest_due = max(self._newest_due, now + late_ms / 1000.0)

@@ -15,7 +15,8 @@ from iveg.domain.latency.segments import Segment
 from iveg.domain.latency.sketch import Sketch, merged
 from iveg.domain.observations import Instant, Received
 from iveg.domain.transports import DIRECT, FIWARE, TransportId
-from iveg.lab.emulator.radio import LinkFaults, Packet, Radio
+from iveg.lab.emulator.orders import LinkFaults
+from iveg.lab.emulator.radio import Packet, Radio
 from iveg.ngsi import codec
 from tests.builders import START
 from tests.stage import Stage

@@ -5,7 +5,8 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from iveg.lab.emulator.radio import LinkFaults, Packet, Radio
+from iveg.lab.emulator.orders import LinkFaults
+from iveg.lab.emulator.radio import Packet, Radio
 from iveg.lab.emulator.relay import read_packet
 
 ODOMETRY, SCAN = "/iveg/AGI_odom/attrs", "/iveg/AGI_lidar2D/attrs"
@@ -110,7 +111,7 @@ def test_frozen_odometry_repeats_its_last_message_and_other_topics_go_on() -> No
     stuck = radio()
     sent(stuck, 3, ODOMETRY)
 
-    stuck.faults = LinkFaults(repeats_odometry=True)
+    stuck.faults = LinkFaults(freeze_odometry="repeat")
     assert numbers(sent(stuck, 4, ODOMETRY, first=3)) == [2, 2, 2, 2]
     assert numbers(sent(stuck, 2, SCAN, first=3)) == [3, 4]
 
