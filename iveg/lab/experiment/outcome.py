@@ -134,12 +134,7 @@ def scored(classes: Sequence[str], runs: Sequence[Outcome]) -> dict[str, Any]:
     precision = thinned(of.tp, of.tp + of.fp, of.claims)
     recall = thinned(of.tp, of.tp + of.fn, of.looks)
     return {
-        "tp": of.tp,
-        "fp": of.fp,
-        "fn": of.fn,
-        "ap": of.ap,
-        "looks": of.looks,
-        "claims": of.claims,
+        **asdict(of),
         "confidence": fmean(sure) if sure else None,
         "precision": None if precision is None else asdict(precision),
         "recall": None if recall is None else asdict(recall),
