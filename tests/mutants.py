@@ -104,6 +104,18 @@ MUTANTS = (
         ("unit/domain/test_witness.py", "unit/robot/test_safety.py"),
     ),
     Mutant(
+        "rule: an encounter that is foretold slows nobody",
+        "if one.in_s <= (HOLDS_S if cause in mine else soon_s)",
+        "if one.in_s < 0.0",
+        ("unit/domain/rule/test_foresight.py",),
+    ),
+    Mutant(
+        "rule: people are foretold to stay where they are",
+        "return zone.x, zone.y, sighting.vx, sighting.vy, sighting.age_s(now)",
+        "return zone.x, zone.y, 0.0, 0.0, sighting.age_s(now)",
+        ("unit/domain/rule/test_foresight.py",),
+    ),
+    Mutant(
         "rule: leaves, and a plan that is off, are people for the laser",
         "_PLAN_M = 0.4",
         "_PLAN_M = 0.1",
