@@ -8,6 +8,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import hypot
+from statistics import fmean
 
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS
@@ -55,6 +56,38 @@ class Passing:
     robot: tuple[float, float]
     person: tuple[float, float]
     lane: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class EncounterCounts:
+    """How often a robot came to the ring of a person.
+
+    Attributes:
+        slowed: Those of which the robot itself said that it was slow.
+        foretold: Those that were known before the robot was inside.
+        foretold_s: How long before, on average (s); None without any.
+    """
+
+    count: int = 0
+    slowed: int = 0
+    foretold: int = 0
+    foretold_s: float | None = None
+
+
+def encounter_counts(decisions: Iterable[DecisionRecord]) -> EncounterCounts:
+    """The encounters with people among these decisions."""
+    met = [one for one in decisions if one.kind == "mandate" and one.reason == "person"]
+    told = [
+        float(ahead_s)
+        for one in met
+        if (ahead_s := one.rule_parameters.get("foretold_s")) is not None
+    ]
+    return EncounterCounts(
+        len(met),
+        sum(one.applied_at is not None for one in met),
+        len(told),
+        fmean(told) if told else None,
+    )
 
 
 def worked_minutes(

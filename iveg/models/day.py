@@ -23,6 +23,15 @@ class Slowed(Model):
     minutes: float
 
 
+class Encounters(Model):
+    """How often a robot came to the ring of a person."""
+
+    count: int
+    slowed: int = Field(description="Of which the robot said that it was slow.")
+    foretold: int = Field(description="Known before the robot was inside.")
+    foretold_s: float | None = Field(description="How long before, on average.")
+
+
 class Pass(Model):
     """A moving robot near a person; positions are means over a second."""
 
@@ -46,6 +55,7 @@ class Day(Model):
     robots: list[str]
     worked: list[Worked]
     slowed: list[Slowed]
+    encounters: Encounters
     passes: list[Pass] = Field(description="The nearest, nearest first.")
     stops: list[Command] = Field(description="STOPs and drills, oldest first.")
     drills_due: list[str] = Field(

@@ -12,6 +12,7 @@ from iveg.domain.alerts.alert_book import MOST_KEPT
 from iveg.domain.day import (
     Passing,
     closest_passes,
+    encounter_counts,
     slowed_minutes,
     worked_minutes,
 )
@@ -19,8 +20,9 @@ from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.records import CommandRecord, DecisionRecord
 from iveg.domain.stamps import format_stamp
 from iveg.domain.stop.drills import due_drills
+from iveg.models.base import rounded
 from iveg.models.command import Command
-from iveg.models.day import Day, Pass, Slowed, Worked
+from iveg.models.day import Day, Encounters, Pass, Slowed, Worked
 from iveg.models.places import GreenhouseMap, Point
 from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Apart, Json
@@ -90,9 +92,9 @@ class _Reading:
         until = max(since, min(end, now))
         poses, seen = await self._queries.day_series(since, until)
         worked = worked_minutes(poses, self._greenhouse)
-        slowed = slowed_minutes(
-            await self._decisions(since, until), self._greenhouse, until
-        )
+        decisions = await self._decisions(since, until)
+        slowed = slowed_minutes(decisions, self._greenhouse, until)
+        met = encounter_counts(decisions)
         last = await self._queries.last_drills()
         by = start_of(day + 2 * _DAY)
         return Day(
@@ -111,6 +113,12 @@ class _Reading:
                     slowed.items(), key=lambda one: -one[1]
                 )
             ],
+            encounters=Encounters(
+                count=met.count,
+                slowed=met.slowed,
+                foretold=met.foretold,
+                foretold_s=rounded(met.foretold_s, 1),
+            ),
             passes=[
                 _pass(one) for one in closest_passes(poses, seen, self._greenhouse)
             ],

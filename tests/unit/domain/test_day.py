@@ -4,13 +4,16 @@ import pytest
 
 from iveg.domain.day import (
     DaySighting,
+    EncounterCounts,
     Pose,
     closest_passes,
+    encounter_counts,
     slowed_minutes,
     worked_minutes,
 )
 from iveg.domain.geometry import Rectangle
 from iveg.domain.greenhouse import DriveLane, Greenhouse
+from iveg.domain.records import DecisionRecord
 from iveg.domain.stop.drills import due_drills
 from tests.fakes.records import NOON, decision_record
 
@@ -57,6 +60,24 @@ def test_a_slow_down_that_goes_on_counts_until_now() -> None:
     open_ = decision_record(x=1.0, y=1.0, reason="person", started_at=NOON)
 
     assert slowed_minutes([open_], GREENHOUSE, NOON + 30.0) == {("person", "1"): 0.5}
+
+
+def test_encounters_are_those_with_people_and_say_how_they_went() -> None:
+    def met(foretold_s: float | None, **more: object) -> DecisionRecord:
+        said = {"reason": "person", "rule_parameters": {"foretold_s": foretold_s}}
+        return decision_record(**said, **more)
+
+    day = [
+        met(1.2, applied_at=NOON + 0.2),
+        met(0.8, applied_at=NOON + 0.2),
+        met(None, applied_at=NOON + 0.2),
+        met(None),
+        decision_record(reason="person", rule_parameters={}),
+        decision_record(reason="robot", rule_parameters={"foretold_s": 9.0}),
+    ]
+
+    assert encounter_counts(day) == EncounterCounts(5, 3, 2, 1.0)
+    assert encounter_counts([]) == EncounterCounts()
 
 
 def test_the_closest_passes_are_of_moving_robots_and_not_one_pass_told_thrice() -> None:
