@@ -41,6 +41,7 @@ from iveg.pipeline.publish import Hub
 from iveg.pipeline.record import RecordSink
 from iveg.pipeline.rules import Rules
 from iveg.pipeline.scans import ScanReader
+from iveg.pipeline.slow_time import SlowTime
 from iveg.pipeline.supervision import Supervision
 
 
@@ -95,6 +96,7 @@ class Pipeline:
     loop: RuleLoop
     supervision: Supervision
     margins: MarginTotals
+    slow_time: SlowTime
     scans: ScanReader
 
     def counters(self) -> Counter[str]:
@@ -105,6 +107,7 @@ class Pipeline:
         total.update(self.supervision.counters)
         total["live.browsers"] = self.hub.watchers
         total["nlos.protected"] = self.evaluator.protected_unseen
+        total.update({f"slow_s.{why}": n for why, n in self.slow_time.seconds.items()})
         return total
 
 
@@ -172,6 +175,7 @@ def build(
         is_cut=lambda way, at: way == FIWARE.id and health_monitor.is_cut(at),
     )
     margins = MarginTotals(world, evaluator.people)
+    slow_time = SlowTime(world, evaluator.people)
     loop = RuleLoop(
         ingest,
         evaluator,
@@ -181,7 +185,11 @@ def build(
         ports.clock,
         supervision,
         guard("latency", watch.decided),
-        (guard("latency", latency.tick), guard("margins", margins.tick)),
+        (
+            guard("latency", latency.tick),
+            guard("margins", margins.tick),
+            guard("slow time", slow_time.tick),
+        ),
     )
     return Pipeline(
         hub,
@@ -195,6 +203,7 @@ def build(
         loop,
         supervision,
         margins,
+        slow_time,
         ScanReader(ingest.reject),
     )
 

@@ -98,13 +98,21 @@ class Scene:
         )
 
     def report(
-        self, robot_id: str, *, factor: float, decision_id: str | None = None
+        self,
+        robot_id: str,
+        *,
+        factor: float,
+        decision_id: str | None = None,
+        reason: str = "clear",
+        cause: str | None = None,
     ) -> None:
         """A robot says what it applies, and for which decision."""
         self._seq += 1
         said = safety_report(
             robot_id,
             speed_factor=factor,
+            reason=reason,
+            cause=cause,
             decision_id=decision_id,
             origin=self._origin(),
         )

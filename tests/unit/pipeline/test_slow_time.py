@@ -1,0 +1,55 @@
+"""Why robots drove slowly (``iveg_events_total``, ``slow_s.*``)."""
+
+import pytest
+
+from iveg.pipeline.slow_time import SlowTime
+from tests.builders import at
+from tests.unit.domain.scene import Scene, person
+
+
+def spent(
+    scene: Scene, factor: float, cause: str | None, linear: float = 0.5
+) -> list[str]:
+    """Four seconds in which AGI drives and reports this; what it was counted as."""
+    counted = SlowTime(scene.world, scene.people)
+    began = scene.now
+    for tenth in range(41):
+        scene.now = round(began + tenth / 10, 1)
+        scene.drive("AGI", 0.0, linear=linear)
+        scene.report("AGI", factor=factor, reason="person", cause=cause)
+        counted.tick(at(scene.now))
+    assert set(counted.seconds.values()) <= {4}
+    return list(counted.seconds)
+
+
+@pytest.fixture
+def scene() -> Scene:
+    scene = Scene()
+    scene.drive("AGI", 0.0)
+    scene.look("AGI", person(1.5))
+    return scene
+
+
+def test_a_person_who_is_seen_and_one_who_is_remembered_are_told_apart(
+    scene: Scene,
+) -> None:
+    (known,) = scene.everyone
+    scene.now = 2.0
+    assert spent(scene, 0.5, known.person_id) == ["memory"]
+    assert spent(scene, 0.5, "somebody else") == ["person"]
+
+
+def test_who_stands_or_is_not_limited_spends_nothing(scene: Scene) -> None:
+    assert spent(scene, 0.5, None, linear=0.0) == []
+    assert spent(scene, 1.0, None) == []
+    assert spent(scene, 0.0, None) == []
+
+
+def test_an_old_report_is_no_reason(scene: Scene) -> None:
+    counted = SlowTime(scene.world, scene.people)
+    scene.report("AGI", factor=0.5, reason="person")
+    for half in range(20):
+        scene.now = half / 2
+        scene.drive("AGI", 0.0)
+        counted.tick(at(scene.now))
+    assert counted.seconds["person"] <= 2
