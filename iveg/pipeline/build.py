@@ -174,8 +174,7 @@ def build(
         agent_lag_s=probe.lag,
         is_cut=lambda way, at: way == FIWARE.id and health_monitor.is_cut(at),
     )
-    margins = MarginTotals(world, evaluator.people)
-    slow_time = SlowTime(world, evaluator.people)
+    totals = MarginTotals(world, evaluator.people), SlowTime(world, evaluator.people)
     loop = RuleLoop(
         ingest,
         evaluator,
@@ -185,11 +184,7 @@ def build(
         ports.clock,
         supervision,
         guard("latency", watch.decided),
-        (
-            guard("latency", latency.tick),
-            guard("margins", margins.tick),
-            guard("slow time", slow_time.tick),
-        ),
+        (guard("latency", latency.tick), *[guard("totals", t.tick) for t in totals]),
     )
     return Pipeline(
         hub,
@@ -202,8 +197,7 @@ def build(
         commander,
         loop,
         supervision,
-        margins,
-        slow_time,
+        *totals,
         ScanReader(ingest.reject),
     )
 

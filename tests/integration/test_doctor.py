@@ -233,7 +233,7 @@ async def test_a_dead_broker_leaves_orion_and_the_page_well(
 ) -> None:
     dead = replace(settings, mqtt_url=f"mqtt://127.0.0.1:{free_ports(1)[0]}")
 
-    states, _ = await examine(dead, tmp_path, SHORT_S)
+    states, _ = await examine(dead, tmp_path)
 
     assert states[Check.BROKER] == "failed"
     assert {check for check, state in states.items() if state == "not tried"} == {
@@ -251,7 +251,7 @@ async def test_a_dead_orion_leaves_the_straight_road_well(
 ) -> None:
     dead = replace(settings, orion_url=f"http://127.0.0.1:{free_ports(1)[0]}")
 
-    states, examination = await examine(dead, tmp_path, SHORT_S)
+    states, examination = await examine(dead, tmp_path)
 
     assert states[Check.ORION] == "failed"
     assert states[Check.BROKER] == states[Check.AGENT] == states[Check.DIRECT] == "ok"
