@@ -26,6 +26,7 @@ const CLEAR = {
   cause: null,
   distance_m: null,
   decision_id: null,
+  foretold_s: null,
 };
 
 /** @param {Partial<Robot>} [changes] @returns {Robot} */
