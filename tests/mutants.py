@@ -299,7 +299,7 @@ MUTANTS = (
         "freshness: a straggler of an earlier boot holds up the present one",
         "if proven_at is not None and proven_at > self._began and not self._is_proven:",
         "if False:",
-        ("unit/pipeline/test_age.py",),
+        ("unit/pipeline/test_earlier_boots.py",),
     ),
     Mutant(
         "STOP: motion from before the rest contradicts it when it comes late",

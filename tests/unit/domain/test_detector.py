@@ -119,3 +119,10 @@ def test_two_hundred_classes_of_a_robot_have_a_name_and_no_more() -> None:
 def test_a_frame_of_known_classes_stays_as_it_is() -> None:
     detector, frame = DetectorEvidence(), seen("tomato", "farmer")
     assert detector.bounded(frame, DetectionRule()) is frame
+
+
+def test_a_frame_with_somebody_whose_place_nobody_knows_is_not_whole() -> None:
+    rule = DetectionRule()
+    assert flaw_of(frame(), rule) is None
+    assert flaw_of(frame(), rule, unplaced=1) == "unreadable"
+    assert flaw_of(frame(), rule, unplaced=1, has_pose=False) == "unplaced"

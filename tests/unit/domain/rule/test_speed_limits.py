@@ -145,14 +145,14 @@ def test_the_release_comes_a_second_after_the_robot_is_030_m_outside() -> None:
 
 
 def test_between_ring_and_release_nothing_ends() -> None:
-    scene = Scene()
+    scene = Scene(rule=RINGS)
     step(scene, 1.9)
 
     assert set(leave(scene, 2.29, 5.0)) == {0.5}
 
 
 def test_coming_back_within_the_second_is_the_same_decision() -> None:
-    scene = Scene()
+    scene = Scene(rule=RINGS)
     step(scene, 1.9)
     leave(scene, 2.4, 0.8)
     leave(scene, 2.1, 0.3)
