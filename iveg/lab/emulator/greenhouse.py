@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.witness import Plan
 
 Floats = NDArray[np.float64]
 Span = tuple[Floats, Floats]
@@ -112,12 +113,11 @@ class Scenery:
     ) -> "Scenery":
         """Arrays of a greenhouse; ``rng`` lets its plants lean."""
         screens = greenhouse.rows + tuple(thing.area for thing in greenhouse.obstacles)
-        sides = [sides_of(area) for area in screens]
-        posts = [(post.x, post.y, post.radius) for post in greenhouse.posts]
+        plan = Plan.of(greenhouse)
         return cls(
-            greenhouse.bounds,
-            np.array(sides, float).reshape(-1, 4),
-            np.array(posts, float).reshape(-1, 3),
+            plan.bounds,
+            plan.rectangles,
+            plan.posts,
             np.empty((0, 3)) if rng is None else _leaves(greenhouse.rows, rng),
             screens,
         )
