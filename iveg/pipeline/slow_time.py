@@ -4,7 +4,7 @@
 grows, and most of the time that robots crawl with nobody near is this.
 """
 
-from collections import Counter
+from collections import defaultdict
 
 from iveg.domain.feedback import HALF_SPEED
 from iveg.domain.limits import LIMITS
@@ -19,18 +19,18 @@ _LONGEST_S = 1.0
 
 
 class SlowTime:
-    """Seconds in which a robot moved and said that it was limited, since the start.
-
-    Attributes:
-        seconds: By cause: ``memory``, or the reason that the robot reported.
-    """
+    """Seconds in which a robot moved and said that it was limited, since the start."""
 
     def __init__(self, world: World, people: People) -> None:
-        self.seconds: Counter[str] = Counter()
         self._world = world
         self._people = people
-        self._spent: dict[str, float] = {}
+        self._spent: defaultdict[str, float] = defaultdict(float)
         self._at: float | None = None
+
+    @property
+    def seconds(self) -> dict[str, int]:
+        """Whole ones, by cause: ``memory``, or the reason that the robot reported."""
+        return {why: int(spent_s) for why, spent_s in self._spent.items()}
 
     def tick(self, now: Instant) -> None:
         """Let time pass; it is counted twice a second."""
@@ -41,8 +41,7 @@ class SlowTime:
         for robot in self._world.live_robots():
             why = self._why(robot, now)
             if why is not None:
-                self._spent[why] = self._spent.get(why, 0.0) + past
-                self.seconds[why] = int(self._spent[why])
+                self._spent[why] += past
 
     def _why(self, robot: RobotState, now: Instant) -> str | None:
         """Why a robot drives slowly now; None where it does not, or nobody knows."""
