@@ -37,6 +37,21 @@ def press_open(page: Page, opener: Locator) -> None:
     until(is_open, 60.0, "a panel opens")
 
 
+def begin_hold(page: Page, button: Locator) -> None:
+    """Put a finger down on a button that has to be held, and leave it there.
+
+    What moves the button away before the finger is down makes a person try again.
+    """
+
+    def is_held() -> bool:
+        page.mouse.up()
+        button.hover()
+        page.mouse.down()
+        return button.get_attribute("data-holding") is not None
+
+    until(is_held, 30.0, "a button is held")
+
+
 def ask(
     who: Page | BrowserContext, stack: Site, path: str, body: object
 ) -> APIResponse:

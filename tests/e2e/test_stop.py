@@ -9,7 +9,7 @@ from playwright.sync_api import Browser, Page, WebSocketRoute, expect
 
 from iveg.ngsi.codec import format_stamp
 from tests.e2e.conftest import OpenPage, live_page
-from tests.e2e.hands import HELD_MS, let_go, open_menu
+from tests.e2e.hands import HELD_MS, begin_hold, let_go, open_menu
 from tests.e2e.reading import card, evaluate, number, strip_stop, wait_for_mode
 from tests.processes import Site, until
 
@@ -160,7 +160,10 @@ def test_only_a_release_that_is_held_and_then_a_resume_drive_again(page: Page) -
     expect(release).to_be_enabled(timeout=WITHIN_MS)
 
     release.click(delay=1000)
-    page.wait_for_timeout(1500)
+    begin_hold(page, release)
+    page.mouse.move(0, 0)
+    page.wait_for_timeout(HELD_MS)
+    page.mouse.up()
     expect(page.locator('[data-resume="AGI"]')).to_be_disabled()
     expect(card(page, "AGI")).to_have_attribute("data-mode", "STOPPED")
 

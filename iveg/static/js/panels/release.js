@@ -18,6 +18,8 @@ import { fill, make, need, needPart, setAttribute, setText } from "./dom.js";
 /** @typedef {import("../core/protocol.js").Hold} Hold */
 
 const HOLD_MS = 2000;
+/** How far a finger that rests may roll: a fingertip is about this wide. */
+const SLIP_PX = 40;
 const RELEASERS = new Set(["operator", "admin"]);
 
 /**
@@ -141,9 +143,15 @@ export function createRelease(app, card, robotId) {
     draw(shown);
   }
 
-  onHold(releaseButton, () => {
-    // Exactly the holds on the screen: a later hold makes the server refuse.
-    send("release", { holds: (shown?.holds ?? []).map(({ id }) => id) });
+  onHold(releaseButton, {
+    // Exactly the holds that stood there when the finger came down: a later hold makes
+    // the server refuse.
+    begin: () => (shown?.holds ?? []).map(({ id }) => id),
+    done: (holds) => send("release", { holds }),
+    refused: () => {
+      [order, outcome] = [undefined, "release.failed.409"];
+      draw(shown);
+    },
   });
   resumeButton.addEventListener("click", () => send("resume", {}));
   store.subscribe("commands/", take);
@@ -227,20 +235,28 @@ function isStanding({ robot, command }) {
 }
 
 /**
- * Calls `fn` when a button was held down for two seconds, by finger, mouse or key.
+ * A button that is held down for two seconds, by finger, mouse or key.
  *
+ * The pointer is captured: a line that comes or goes above the button moves it away from
+ * under a finger that rests, and that must not end the hold.  A finger that moves does.
+ *
+ * @template T
  * @param {HTMLButtonElement} button
- * @param {() => void} fn
+ * @param {{begin: () => T, done: (begun: T) => void, refused: () => void}} calls
+ *   `done` gets what `begin` saw; `refused` when the button is disabled meanwhile
  */
-export function onHold(button, fn) {
+export function onHold(button, { begin, done, refused }) {
   /** @type {ReturnType<typeof setTimeout> | undefined} */
   let timer;
-  function begin() {
+  /** @type {{x: number, y: number} | undefined} where the finger came down */
+  let from;
+  function start() {
     if (timer || button.disabled) return;
+    const begun = begin();
     button.toggleAttribute("data-holding", true);
     timer = setTimeout(() => {
       end();
-      if (!button.disabled) fn();
+      done(begun);
     }, HOLD_MS);
   }
   function end() {
@@ -249,15 +265,27 @@ export function onHold(button, fn) {
     button.removeAttribute("data-holding");
   }
   button.addEventListener("pointerdown", (event) => {
-    if (event.button === 0) begin();
+    if (event.button !== 0) return;
+    from = { x: event.clientX, y: event.clientY };
+    button.setPointerCapture(event.pointerId);
+    start();
   });
-  for (const name of ["pointerup", "pointerleave", "pointercancel", "blur", "keyup"]) {
+  button.addEventListener("pointermove", ({ clientX, clientY }) => {
+    if (from && Math.hypot(clientX - from.x, clientY - from.y) > SLIP_PX) end();
+  });
+  for (const name of ["pointerup", "pointercancel", "blur", "keyup"]) {
     button.addEventListener(name, end);
   }
+  // A disabled button hears no finger go up, so its hold ends here.
+  new MutationObserver(() => {
+    if (!timer || !button.disabled) return;
+    end();
+    refused();
+  }).observe(button, { attributeFilter: ["disabled"] });
   button.addEventListener("contextmenu", (event) => event.preventDefault());
   button.addEventListener("keydown", (event) => {
     if (event.key !== "Enter" && event.key !== " ") return;
     event.preventDefault();
-    begin();
+    start();
   });
 }
