@@ -66,6 +66,8 @@ class RobotState:
         sighted_at: The same of the frame that was taken last, newest or not; where
             nothing is known, the moment that is likely.
         scan_received: Like ``pose_at``, of the newest scan; ``safety_received`` too.
+        freed_at: When a report last said that it keeps to half speed no longer, by its
+            arrival (monotonic, s).
         detector: Whether its pictures are read whole.
         unlabelled: Whether boxes of its newest frame with any came without a frame.
         live_at: When a live safety node last spoke for a robot that the fleet calls a
@@ -100,6 +102,7 @@ class RobotState:
     safety_received: Instant | None = None
     navigation: Navigation | None = None
     navigation_received: Instant | None = None
+    freed_at: float = float("-inf")
     command_status: str | None = None
     heard_at: float | None = None
     heard_since: float = float("-inf")

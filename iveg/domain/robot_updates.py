@@ -1,5 +1,6 @@
 """Updates of one robot's state by the newest observation of each kind."""
 
+from iveg.domain.feedback import HALF_SPEED
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import (
     CommandAnswer,
@@ -75,6 +76,9 @@ def _hear(
     known = robot.safety_received
     before = None if known is None else known.mono
     moment = _not_before(before, robot.safety, report.origin, moment)
+    was_limited = robot.safety and robot.safety.speed_factor <= HALF_SPEED
+    if was_limited and report.speed_factor > HALF_SPEED:
+        robot.freed_at = received.at.mono
     robot.safety, robot.safety_received = report, dated(received.at, moment)
 
 

@@ -29,6 +29,8 @@ from iveg.domain.world import World
 
 SPEEDING_UP = 0.05
 """Faster than in the mean of its last second by more than this (m/s)."""
+_FREED_S = 1.0
+"""So long after it was let go a robot may still be about as slow as before."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,7 +171,7 @@ class SpeedLimits:
             distance_m=distance,
             already_slow=_is_slow_already(robot, zone, speed),
             ahead=_is_ahead(robot, zone),
-            speeding_up=robot.speed_gained() > SPEEDING_UP,
+            speeding_up=_is_speeding_up(robot, now),
             foretold_s=self._foretold_s(robot.robot_id, zone, distance),
         )
 
@@ -264,6 +266,12 @@ def _still(crossing: Crossing, depth: float, distance: float, now: Instant) -> C
     if distance == crossing.distance_m and since == crossing.outside_since:
         return crossing
     return replace(crossing, distance_m=distance, outside_since=since)
+
+
+def _is_speeding_up(robot: RobotState, now: Instant) -> bool:
+    """Whether a robot has not reached the speed that it wants."""
+    was_freed = now.mono - robot.freed_at < _FREED_S
+    return was_freed or robot.speed_gained() > SPEEDING_UP
 
 
 def _is_slow_already(robot: RobotState, zone: Zone, speed: float) -> bool:

@@ -431,3 +431,31 @@ def test_half_of_a_speed_that_still_grows_is_not_what_will_be_seen(
 
     mine, *_ = (one for one in scene.changes if one.crossing.robot_id == "AGI")
     assert mine.crossing.speeding_up is speeding_up
+
+
+@pytest.mark.parametrize(("freed_s", "speeding_up"), [(0.2, True), (1.2, False)])
+def test_a_robot_that_was_just_let_go_has_nothing_to_halve(
+    freed_s: float, speeding_up: bool
+) -> None:
+    """0.45 m/s a moment after 0.40 becomes 0.40 again, which is no halving."""
+    scene = watching(Scene())
+    scene.report("AGI", factor=0.5)
+    scene.report("AGI", factor=1.0)
+    scene.now += freed_s
+    scene.drive("AGI", 0.0, linear=0.45)
+    scene.look("AGII", person(1.5))
+    scene.judge()
+
+    mine, *_ = (one for one in scene.changes if one.crossing.robot_id == "AGI")
+    assert mine.crossing.speeding_up is speeding_up
+
+
+def test_a_robot_that_slows_before_it_is_told_was_not_let_go() -> None:
+    scene = watching(Scene())
+    scene.report("AGI", factor=1.0)
+    scene.report("AGI", factor=0.5)
+    scene.look("AGII", person(1.5))
+    scene.judge()
+
+    mine, *_ = (one for one in scene.changes if one.crossing.robot_id == "AGI")
+    assert not mine.crossing.speeding_up
