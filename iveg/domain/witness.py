@@ -27,7 +27,7 @@ LASTS_S = 0.2
 """What is shorter is noise, or an insect."""
 _GONE_S = 0.5
 """Without a return for so long it is gone."""
-_PLAN_M = 0.4
+PLAN_M = 0.4
 """The plan is off by 0.2 m, or plants lean out so far; a pose is off by the rest."""
 _TURN_S = 0.05
 """A scan and the pose that it is placed by are so far apart."""
@@ -206,8 +206,8 @@ class Witness:
         x, y = _moved(x[near], y[near], pose)
         left = np.ones(x.shape, np.bool_)
         if self._plan is not None:
-            blurred = _PLAN_M + abs(twist.angular_z) * _TURN_S * away
-            plan = self._plan.about(pose, float(away.max(initial=0.0)) + 2 * _PLAN_M)
+            blurred = PLAN_M + abs(twist.angular_z) * _TURN_S * away
+            plan = self._plan.about(pose, float(away.max(initial=0.0)) + 2 * PLAN_M)
             left = plan.distance_to(x, y) > blurred
         for peer in peers:
             left &= np.hypot(x - peer.x, y - peer.y) > _PEER_M

@@ -152,6 +152,7 @@ def build(
     watch = LatencyWatch(world.robots, world.ledger.composed_at)
     latency = LatencyMonitor(watch, ports.sink, event_log)
     ingest = _ingest(world, event_log, ports.clock, guard("latency", watch.arrived))
+    scans = ScanReader(ingest.reject)
     evaluator = Evaluator(
         world,
         greenhouse,
@@ -161,6 +162,7 @@ def build(
         ports.new_id,
         choices.boot,
         probe.lag,
+        scans.newest,
     )
     commander = Commander(
         fleet.ids,
@@ -198,7 +200,7 @@ def build(
         loop,
         supervision,
         *totals,
-        ScanReader(ingest.reject),
+        scans,
     )
 
 

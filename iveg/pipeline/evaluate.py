@@ -29,7 +29,9 @@ from iveg.domain.plausibility import ignores_limit
 from iveg.domain.records import AlertRecord, DecisionRecord
 from iveg.domain.rule.premises import Missing
 from iveg.domain.rule.speed_limits import Crossing, LimitChange, SpeedLimits
+from iveg.domain.tracking.laser_sight import LaserSight, ScanOf
 from iveg.domain.tracking.people import People
+from iveg.domain.witness import Plan
 from iveg.domain.world import World
 from iveg.pipeline import topics
 from iveg.pipeline.alerting import Alerting
@@ -56,6 +58,7 @@ class Evaluator:
 
     Args:
         boot: Random, new at each start: identity of our feedback.
+        newest_scan: Reads a robot's newest scan.
 
     Attributes:
         rule: The version in force; a new one counts from the next judgement on.
@@ -71,6 +74,7 @@ class Evaluator:
         new_id: Ids,
         boot: str,
         backlog: Callable[[Instant], float | None] = lambda _: None,
+        newest_scan: ScanOf = lambda _: None,
     ) -> None:
         self.world = world
         self.greenhouse = greenhouse
@@ -85,7 +89,8 @@ class Evaluator:
         """How often a robot slowed for a person or peer out of its own sight."""
         self._speed_limits = SpeedLimits(greenhouse)
         self.tracking = DetectionTracking(world, self.people, event_log, new_id)
-        self._staleness = Staleness(world, self.people, greenhouse, event_log)
+        swept = LaserSight(Plan.of(greenhouse), newest_scan).swept
+        self._staleness = Staleness(world, self.people, greenhouse, event_log, swept)
         self._feedback_publisher = FeedbackPublisher(
             world, self.people, self.tracking.other, fleet, boot, backlog
         )

@@ -1,7 +1,7 @@
-"""Reads scans for whoever draws them: once each, and not where limits are judged.
+"""Reads scans for whoever needs them: once each, and only when somebody asks.
 
-A scan is a list of numbers that only eyes and the costmap need.  One that cannot be
-read or drawn is refused with its reason, and nothing else notices.
+A scan is a list of numbers that eyes, the costmap and the all-clear need.  One that
+cannot be read or drawn is refused with its reason, and nothing else notices.
 """
 
 from collections.abc import Callable

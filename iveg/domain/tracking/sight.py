@@ -1,10 +1,12 @@
 """Lines of sight: cameras, crop, and the all-clear of an empty spot.
 
 A ring goes by time or because a robot has had its centre in view for a second and found
-nobody, not even faintly; never for one missing frame (docs/safety.md, "Age").
+nobody, not even faintly; never for one missing frame (docs/safety.md, "Age").  What a
+camera does not look at a laser may have swept (``laser_sight``).
 """
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,12 +29,20 @@ _FRESH_LOOK_S = 0.5
 _Look = tuple[int, str]
 _Spots = NDArray[np.float64]
 _NONE = np.empty(0, np.intp)
+Swept = Callable[[RobotState, _Spots, NDArray[np.float64], Instant], NDArray[np.intp]]
+"""Robot, spots, ages of their sightings (s), now → the spots that its newest scan
+shows to be empty."""
 
 
 class AllClear:
-    """Takes old sightings away once their place was seen to be empty."""
+    """Takes old sightings away once their place was seen to be empty.
 
-    def __init__(self) -> None:
+    Args:
+        swept: Asks a robot's laser; nobody's counts if left out.
+    """
+
+    def __init__(self, swept: Swept = lambda *_: _NONE) -> None:
+        self._swept = swept
         self._since: dict[_Look, float] = {}
 
     def sweep(
@@ -48,8 +58,11 @@ class AllClear:
             if _may_go(sighting, world, now)
         ]
         spots = np.array([(ring.x, ring.y) for _, ring in rings]).reshape(-1, 2)
-        for robot in world.live_robots():
-            for index in visible_from(robot, spots, greenhouse, now).tolist():
+        ages = np.array([ring.age_s(now) for _, ring in rings])
+        for robot in world.live_robots() if rings else ():
+            seen = visible_from(robot, spots, greenhouse, now)
+            swept = self._swept(robot, spots, ages, now)
+            for index in np.union1d(seen, swept).tolist():
                 person, sighting = rings[index]
                 if people.is_suspected(person, sighting, robot.robot_id):
                     continue

@@ -1,0 +1,115 @@
+"""Spots that a laser finds empty: every beam towards them ends well behind them.
+
+A camera looks ahead; a laser looks to the sides and behind as well, so a place that was
+left beside a robot need not be remembered as somebody's until time ends it.
+
+A sweep proves nothing where it may be wrong itself.  Beams that do not come back say
+nothing (a covered laser sees "nothing" everywhere), and most of the returns must be
+explained by the plan of the greenhouse: a laser that is frozen, turned on its mount, or
+of a robot at a wrong pose draws walls where none are.  Nor does it where something
+unexplained stands so near that the person may have walked there.
+"""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iveg.domain.geometry import Pose2D
+from iveg.domain.limits import LIMITS
+from iveg.domain.observations import Instant, LaserScan
+from iveg.domain.robot_state import RobotState
+from iveg.domain.witness import PLAN_M, Plan
+
+ScanOf = Callable[[RobotState], LaserScan | None]
+"""Reads a robot's newest scan; None where there is none that can be read."""
+_Floats = NDArray[np.float64]
+_NONE = np.empty(0, np.intp)
+_FRESH_S = 0.5
+_NEAREST_M, _FARTHEST_M = 0.5, 12.0
+"""A spot under the robot is not in view; beyond, beams are too far apart."""
+_BESIDE_M, _BEHIND_M = 0.3, 0.2
+"""Half of a person and the error of a pose: so wide, and so far behind."""
+_LEAST_BEAMS = 3
+_EXPLAINED = 0.7
+"""Share of the returns that a plan explains to a laser that works."""
+_WALKED_MOST_M = 4.0
+
+
+class LaserSight:
+    """What lasers find empty, by the newest scan of a robot that may be believed.
+
+    Args:
+        plan: What stands in the greenhouse.
+        newest: Reads a robot's newest scan.
+    """
+
+    def __init__(self, plan: Plan, newest: ScanOf) -> None:
+        self._plan = plan
+        self._newest = newest
+
+    def swept(
+        self, robot: RobotState, spots: _Floats, ages: _Floats, now: Instant
+    ) -> NDArray[np.intp]:
+        """``sight.Swept``; none by a scan that is old or makes no sense."""
+        pose = robot.scan_pose
+        if pose is None or not _is_believed(robot, now):
+            return _NONE
+        scan = self._newest(robot)
+        return _NONE if scan is None else swept_by(scan, pose, spots, ages, self._plan)
+
+
+def swept_by(
+    scan: LaserScan, pose: Pose2D, spots: _Floats, ages: _Floats, plan: Plan
+) -> NDArray[np.intp]:
+    """The spots that a scan shows to be empty.
+
+    Args:
+        scan: Made at ``pose`` in ``map``.
+        pose: Of the robot's ``base_link``.
+        spots: Shape (n, 2), in ``map`` (m).
+        ages: Shape (n,): how long ago somebody stood there (s).
+        plan: What stands in the greenhouse.
+    """
+    points = scan.points(pose).astype(np.float64)
+    strange = points[plan.distance_to(points[:, 0], points[:, 1]) > PLAN_M]
+    if not len(points) or len(strange) > (1.0 - _EXPLAINED) * len(points):
+        return _NONE
+    walked = np.minimum(_WALKED_MOST_M, _BESIDE_M + LIMITS.walking_m_s * ages)
+    sensor = pose.compose(scan.mount)
+    empty = [
+        index
+        for index, (x, y) in enumerate(spots.tolist())
+        if _passes(scan, sensor, x, y)
+        and np.all(np.hypot(strange[:, 0] - x, strange[:, 1] - y) > walked[index])
+    ]
+    return np.array(empty, np.intp)
+
+
+def _passes(scan: LaserScan, sensor: Pose2D, x: float, y: float) -> bool:
+    """Whether all beams that a person at a spot would stop end behind it."""
+    dx, dy = x - sensor.x, y - sensor.y
+    away = math.hypot(dx, dy)
+    if not _NEAREST_M <= away <= _FARTHEST_M or not scan.angle_increment:
+        return False
+    beams = scan.angle_min + scan.angle_increment * np.arange(scan.ranges.size)
+    off = beams - (math.atan2(dy, dx) - sensor.yaw)
+    off = (off + math.pi) % math.tau - math.pi
+    half = math.atan2(_BESIDE_M, away)
+    towards = np.abs(off) <= half
+    # One on each side is wanted, or the sweep ends where a person may begin.
+    wanted = max(_LEAST_BEAMS, int(2 * half / abs(scan.angle_increment)))
+    if np.count_nonzero(towards) < wanted:
+        return False
+    return bool(
+        np.all(scan.returns()[towards] & (scan.ranges[towards] >= away + _BEHIND_M))
+    )
+
+
+def _is_believed(robot: RobotState, now: Instant) -> bool:
+    """Whether a robot's scan is fresh, and its pose is not in doubt."""
+    scanned, age = robot.scan_received, robot.age_s(now)
+    if scanned is None or age is None or robot.doubts.is_open(now):
+        return False
+    return age <= LIMITS.live_s and now.mono - scanned.mono <= _FRESH_S
