@@ -117,8 +117,8 @@ MUTANTS = (
     ),
     Mutant(
         "rule: leaves, and a plan that is off, are people for the laser",
-        "_PLAN_M = 0.4",
-        "_PLAN_M = 0.1",
+        "PLAN_M = 0.4",
+        "PLAN_M = 0.1",
         ("unit/domain/test_witness.py",),
     ),
     Mutant(
@@ -385,6 +385,24 @@ MUTANTS = (
         "if robot.doubts.is_open(now) or robot.detector.is_flawed(now):",
         "if False:",
         ("unit/domain/tracking/test_sight.py",),
+    ),
+    Mutant(
+        "clear: a beam that did not come back passed everybody",
+        "np.all(scan.returns()[towards] & (scan.ranges[towards] >= away + _BEHIND_M))",
+        "np.all(scan.ranges[towards] >= away + _BEHIND_M)",
+        ("unit/domain/tracking/test_laser_sight.py",),
+    ),
+    Mutant(
+        "clear: a laser whose walls are not the plan's finds a spot empty",
+        "if not len(points) or len(strange) > (1.0 - _EXPLAINED) * len(points):",
+        "if not len(points):",
+        ("unit/domain/tracking/test_laser_sight.py",),
+    ),
+    Mutant(
+        "clear: who may have walked on from a spot does not keep it",
+        "and np.all(np.hypot(strange[:, 0] - x, strange[:, 1] - y) > walked[index])",
+        "",
+        ("unit/pipeline/test_laser_sight.py",),
     ),
     Mutant(
         "clear: a message that names another robot counts for its topic's",
