@@ -164,18 +164,7 @@ def build(
         probe.lag,
         scans.newest,
     )
-    commander = Commander(
-        fleet.ids,
-        ports.transports,
-        ports.fleet,
-        ports.journal,
-        event_log,
-        ports.new_id,
-        ports.clock,
-        drills=choices.drills,
-        agent_lag_s=probe.lag,
-        is_cut=lambda way, at: way == FIWARE.id and health_monitor.is_cut(at),
-    )
+    commander = _commander(fleet.ids, ports, choices, event_log, health_monitor)
     totals = MarginTotals(world, evaluator.people), SlowTime(world, evaluator.people)
     loop = RuleLoop(
         ingest,
@@ -201,6 +190,27 @@ def build(
         supervision,
         *totals,
         scans,
+    )
+
+
+def _commander(
+    robots: Sequence[str],
+    ports: Ports,
+    choices: Choices,
+    event_log: EventLog,
+    health_monitor: HealthMonitor,
+) -> Commander:
+    return Commander(
+        robots,
+        ports.transports,
+        ports.fleet,
+        ports.journal,
+        event_log,
+        ports.new_id,
+        ports.clock,
+        drills=choices.drills,
+        agent_lag_s=health_monitor.probe.lag,
+        is_cut=lambda way, at: way == FIWARE.id and health_monitor.is_cut(at),
     )
 
 
