@@ -80,7 +80,8 @@ def moments_of(stage: Stage, world: SimulatedWorld) -> Iterator[Moment]:
             )
             for number, one in enumerate(world.discs())
         )
-        yield Moment(robot_id, stage.now.mono, robot.speed, robot.factor, people)
+        at = stage.now.mono
+        yield Moment(robot_id, at, robot.speed, robot.wanted, robot.factor, people)
 
 
 def main() -> None:

@@ -6,7 +6,9 @@ or told does not count.
 
 *Near* is within two metres of a robot that moves; an *encounter* is one robot near one
 person in view of some camera, without a pause of a second; its *delay* is the time
-from there until the robot is limited to half speed.
+from there until the robot is limited to half speed.  An *entry* is a ring that a robot
+reaches, or is reached by, around somebody who has been in view for two seconds: whoever
+steps out from behind plants gives nobody the time to slow before.
 """
 
 from collections.abc import Iterable, Mapping
@@ -21,6 +23,9 @@ AWAY_M = (2.3, 4.0)
 """Slowed with nobody so near is needless: at the ring, and far away (m)."""
 MOVES_M_S = 0.05
 _PAUSE_S = 1.0
+_IN_VIEW_S = 2.0
+SLOW_SHARE = 0.55
+"""Of the speed that a robot wants: half, and what noise adds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +49,7 @@ class Moment:
     Attributes:
         at: (s).
         speed: True speed (m/s).
+        wanted: Speed that it would drive if nothing limited it (m/s).
         factor: Greatest speed factor that its own safety machine allows.
         people: Everybody in the greenhouse.
     """
@@ -51,6 +57,7 @@ class Moment:
     robot_id: str
     at: float
     speed: float
+    wanted: float
     factor: float
     people: tuple[NearPerson, ...]
 
@@ -75,6 +82,19 @@ class Encounter:
 
 
 @dataclass(slots=True)
+class _Seen:
+    """One person as one robot had them before.
+
+    Attributes:
+        since: Since when in view without a break (s); None: not in view.
+        outside: Whether the ring lay between them.
+    """
+
+    since: float | None = None
+    outside: bool = False
+
+
+@dataclass(slots=True)
 class ProtectionScore:
     """Sums over the moments of a run, each of ``step_s`` seconds.
 
@@ -85,6 +105,7 @@ class ProtectionScore:
         view_s: Of these the person was in some camera's view; ``view_slowed_s`` too.
         needless_s: A moving robot was limited with nobody within so many metres.
         encounters: All that have begun, in their order.
+        entries: Of each entry the share of its wanted speed that the robot drove.
     """
 
     step_s: float
@@ -98,10 +119,14 @@ class ProtectionScore:
         default_factory=lambda: dict.fromkeys(AWAY_M, 0.0)
     )
     encounters: list[Encounter] = field(default_factory=list)
+    entries: list[float] = field(default_factory=list)
+    _seen: dict[tuple[str, str], _Seen] = field(default_factory=dict)
     _open: dict[tuple[str, str], Encounter] = field(default_factory=dict)
 
     def add(self, moment: Moment) -> None:
         """Count one moment of one robot."""
+        for person in moment.people:
+            self._note_entry(moment, person)
         if moment.speed < MOVES_M_S:
             return
         slowed = moment.factor <= HALF_SPEED
@@ -114,6 +139,18 @@ class ProtectionScore:
         for person in moment.people:
             if person.distance_m <= NEAR_M:
                 self._add_near(moment, person, slowed=slowed)
+
+    def _note_entry(self, moment: Moment, person: NearPerson) -> None:
+        seen = self._seen.setdefault((moment.robot_id, person.name), _Seen())
+        outside = person.distance_m > NEAR_M
+        known = seen.since is not None and moment.at - seen.since >= _IN_VIEW_S - 1e-9
+        if seen.outside and not outside and known and moment.wanted > MOVES_M_S:
+            self.entries.append(moment.speed / moment.wanted)
+        seen.outside = outside
+        if not person.in_view:
+            seen.since = None
+        elif seen.since is None:
+            seen.since = moment.at
 
     def _add_near(self, moment: Moment, person: NearPerson, *, slowed: bool) -> None:
         self.near_s += self.step_s
@@ -156,6 +193,10 @@ class ProtectionScore:
                 for away_m, spent_s in self.needless_s.items()
             },
             "driven m": round(self.driven_m, 1),
+            "entries": len(self.entries),
+            "slow at the ring": _share(
+                sum(one <= SLOW_SHARE for one in self.entries), len(self.entries)
+            ),
         }
 
 
@@ -169,6 +210,7 @@ def whole(scores: Iterable[ProtectionScore]) -> ProtectionScore:
         for away_m, spent_s in one.needless_s.items():
             total.needless_s[away_m] += spent_s
         total.encounters += one.encounters
+        total.entries += one.entries
     return total
 
 

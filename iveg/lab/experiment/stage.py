@@ -41,6 +41,9 @@ class StagedRobot:
         looked: Called when its camera has taken a picture.
         scan_every: Steps between two sweeps of its laser; 0: none.
         plan: What stands in the greenhouse.
+
+    Attributes:
+        wanted: Speed that it would drive if nothing limited it (m/s).
     """
 
     def __init__(
@@ -58,6 +61,7 @@ class StagedRobot:
         self._hear = hear
         self._looked = looked
         self._scan_every = scan_every
+        self.wanted = 0.0
         self._echo = Echo()
         self._uplink = Uplink(rig.robot_id, "iveg", "b1", self._say, echo=self._echo)
         self._machine = SafetyMachine(
@@ -80,6 +84,7 @@ class StagedRobot:
         into_run = number * STEP_S
         free = self._machine.may_drive
         requested = self._rig.requested_twist(into_run, world) if free else REST
+        self.wanted = abs(requested.linear_x)
         self._perform(self._machine.request_twist(requested, now.mono), now)
         if self._faults.deaf and free:
             self._rig.drive(requested)

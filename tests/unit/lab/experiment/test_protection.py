@@ -25,11 +25,12 @@ def moment(
     *,
     factor: float = 1.0,
     speed: float = 0.6,
+    wanted: float = 0.8,
     in_view: bool = True,
     robot_id: str = "AGI",
 ) -> Moment:
     person = NearPerson("p", distance_m, in_view)
-    return Moment(robot_id, step * STEP_S, speed, factor, (person,))
+    return Moment(robot_id, step * STEP_S, speed, wanted, factor, (person,))
 
 
 def test_a_person_in_the_ring_of_a_robot_at_half_speed_is_protected() -> None:
@@ -107,3 +108,32 @@ def test_metres_and_delays_of_several_runs_add_up() -> None:
     assert total["encounters"] == 2
     assert total["slowed, all"] == pytest.approx(2 / 3, 1e-3)
     assert (total["delay P50 s"], total["delay P95 s"]) == (0.25, 0.475)
+
+
+@pytest.mark.parametrize(
+    ("speed", "wanted", "share"), [(0.4, 0.8, 1.0), (0.45, 0.8, 0.0), (0.8, 0.8, 0.0)]
+)
+def test_a_ring_is_entered_slowly_at_half_of_the_wanted_speed(
+    speed: float, wanted: float, share: float
+) -> None:
+    score = score_of(
+        *(moment(step, 3.0) for step in range(4)),
+        moment(4, 1.9, speed=speed, wanted=wanted),
+        moment(5, 1.0),
+    )
+
+    row = score.row()
+    assert (row["entries"], row["slow at the ring"]) == (1, share)
+
+
+def test_who_steps_out_or_was_inside_already_is_no_entry() -> None:
+    hidden = [moment(step, 3.0, in_view=step == 3) for step in range(4)]
+    for before in (hidden, [moment(step, 1.9) for step in range(4)]):
+        assert score_of(*before, moment(4, 1.5)).row()["entries"] == 0
+
+
+def test_a_robot_that_wants_to_stand_enters_nothing() -> None:
+    score = score_of(
+        *(moment(step, 3.0) for step in range(5)), moment(5, 1.5, wanted=0)
+    )
+    assert score.row()["entries"] == 0
