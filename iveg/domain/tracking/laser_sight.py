@@ -56,6 +56,8 @@ class LaserSight:
         pose = robot.scan_pose
         if pose is None or not _is_believed(robot, now):
             return _NONE
+        if not np.any(np.hypot(*(spots - (pose.x, pose.y)).T) <= _FARTHEST_M):
+            return _NONE
         scan = self._newest(robot)
         return _NONE if scan is None else swept_by(scan, pose, spots, ages, self._plan)
 
@@ -72,39 +74,51 @@ def swept_by(
         ages: Shape (n,): how long ago somebody stood there (s).
         plan: What stands in the greenhouse.
     """
-    points = scan.points(pose).astype(np.float64)
-    strange = points[plan.distance_to(points[:, 0], points[:, 1]) > PLAN_M]
-    if not len(points) or len(strange) > (1.0 - _EXPLAINED) * len(points):
-        return _NONE
-    walked = np.minimum(_WALKED_MOST_M, _BESIDE_M + LIMITS.walking_m_s * ages)
     sensor = pose.compose(scan.mount)
-    empty = [
+    passed = [
         index
         for index, (x, y) in enumerate(spots.tolist())
         if _passes(scan, sensor, x, y)
-        and np.all(np.hypot(strange[:, 0] - x, strange[:, 1] - y) > walked[index])
     ]
-    return np.array(empty, np.intp)
+    if not passed:
+        return _NONE
+    points = scan.points(pose).astype(np.float64)
+    strange = points[plan.distance_to(points[:, 0], points[:, 1]) > PLAN_M]
+    if len(strange) > (1.0 - _EXPLAINED) * len(points):
+        return _NONE
+    walked = np.minimum(_WALKED_MOST_M, _BESIDE_M + LIMITS.walking_m_s * ages[passed])
+    apart = np.hypot(*(strange[:, None] - spots[passed]).transpose(2, 0, 1))
+    empty: NDArray[np.intp] = np.array(passed)[np.all(apart > walked, axis=0)]
+    return empty
 
 
 def _passes(scan: LaserScan, sensor: Pose2D, x: float, y: float) -> bool:
     """Whether all beams that a person at a spot would stop end behind it."""
     dx, dy = x - sensor.x, y - sensor.y
-    away = math.hypot(dx, dy)
-    if not _NEAREST_M <= away <= _FARTHEST_M or not scan.angle_increment:
+    away, step = math.hypot(dx, dy), abs(scan.angle_increment)
+    if not _NEAREST_M <= away <= _FARTHEST_M or not step:
         return False
-    beams = scan.angle_min + scan.angle_increment * np.arange(scan.ranges.size)
-    off = beams - (math.atan2(dy, dx) - sensor.yaw)
-    off = (off + math.pi) % math.tau - math.pi
-    half = math.atan2(_BESIDE_M, away)
-    towards = np.abs(off) <= half
-    # One on each side is wanted, or the sweep ends where a person may begin.
-    wanted = max(_LEAST_BEAMS, int(2 * half / abs(scan.angle_increment)))
-    if np.count_nonzero(towards) < wanted:
+    towards = _beams(scan, math.atan2(dy, dx) - sensor.yaw)
+    half = math.atan2(_BESIDE_M, away) / step
+    first, last = math.ceil(towards - half), math.floor(towards + half)
+    count, in_turn = last + 1 - first, scan.ranges.size
+    if not _LEAST_BEAMS <= count <= in_turn:
         return False
-    return bool(
-        np.all(scan.returns()[towards] & (scan.ranges[towards] >= away + _BEHIND_M))
-    )
+    beams = np.arange(first, last + 1)
+    if in_turn > math.tau / step - 0.5:
+        beams %= in_turn
+    # The sweep may end where a person begins.
+    elif first < 0 or last >= in_turn:
+        return False
+    hits = scan.ranges[beams]
+    passes = (hits >= away + _BEHIND_M) & (hits <= scan.range_max)
+    return bool(passes.all())
+
+
+def _beams(scan: LaserScan, bearing: float) -> float:
+    """Which beam goes at a bearing in the sensor's frame, counted from the first."""
+    turn = math.tau / abs(scan.angle_increment)
+    return ((bearing - scan.angle_min) / scan.angle_increment) % turn
 
 
 def _is_believed(robot: RobotState, now: Instant) -> bool:

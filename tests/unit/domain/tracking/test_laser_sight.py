@@ -1,6 +1,7 @@
 """A laser finds a spot empty only where nobody can be (docs/safety.md, "The laser")."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -117,6 +118,14 @@ def test_a_laser_that_says_one_thing_everywhere_proves_nothing(value: float) -> 
     assert not is_swept(read(np.full(MODEL.beams, value, np.float32)))
 
 
+@pytest.mark.parametrize("increment", [0.0, 1e-12, 3.0])
+def test_a_laser_with_too_many_or_too_few_beams_proves_nothing(
+    increment: float,
+) -> None:
+    whole = scan_of()
+    assert not is_swept(replace(whole, angle_increment=increment))
+
+
 def test_a_beam_that_does_not_come_back_says_nothing() -> None:
     ranges = scan_of().ranges.copy()
     towards = math.atan2(SPOT[1], SPOT[0])
@@ -128,17 +137,8 @@ def test_a_sweep_that_ends_at_the_spot_does_not_pass_it() -> None:
     whole = scan_of()
     towards = math.atan2(SPOT[1], SPOT[0])
     first = round((towards + math.pi) / MODEL.angle_increment)
-    part = LaserScan(
-        "AGI",
-        Origin(),
-        -math.pi + first * MODEL.angle_increment,
-        MODEL.angle_increment,
-        MODEL.range_min,
-        MODEL.range_max,
-        HERE,
-        whole.ranges[first:],
-    )
-    assert not is_swept(part)
+    begins = whole.angle_min + first * MODEL.angle_increment
+    assert not is_swept(replace(whole, angle_min=begins, ranges=whole.ranges[first:]))
 
 
 @pytest.mark.parametrize(
