@@ -4,10 +4,10 @@ A camera looks ahead; a laser looks to the sides and behind as well, so a place 
 left beside a robot need not be remembered as somebody's until time ends it.
 
 A sweep proves nothing where it may be wrong itself.  Beams that do not come back say
-nothing (a covered laser sees "nothing" everywhere), and most of the returns must be
-explained by the plan of the greenhouse: a laser that is frozen, turned on its mount, or
-of a robot at a wrong pose draws walls where none are.  Nor does it where something
-unexplained stands so near that the person may have walked there.
+nothing (a covered laser sees "nothing" everywhere), and a laser that repeats itself is
+frozen.  Most of the returns must be explained by the plan of the greenhouse: a laser
+that is turned on its mount, or of a robot at a wrong pose, draws walls where none are.
+Nothing unexplained may stand so near that the person may have walked there.
 """
 
 import math
@@ -48,6 +48,8 @@ class LaserSight:
     def __init__(self, plan: Plan, newest: ScanOf) -> None:
         self._plan = plan
         self._newest = newest
+        self._scans: dict[str, tuple[LaserScan, bool]] = {}
+        """By robot the newest scan that was asked for, and whether it is frozen."""
 
     def swept(
         self, robot: RobotState, spots: _Floats, ages: _Floats, now: Instant
@@ -59,7 +61,17 @@ class LaserSight:
         if not np.any(np.hypot(*(spots - (pose.x, pose.y)).T) <= _FARTHEST_M):
             return _NONE
         scan = self._newest(robot)
-        return _NONE if scan is None else swept_by(scan, pose, spots, ages, self._plan)
+        if scan is None or self._is_frozen(scan):
+            return _NONE
+        return swept_by(scan, pose, spots, ages, self._plan)
+
+    def _is_frozen(self, scan: LaserScan) -> bool:
+        """Whether a scan repeats the one before to the bit: no laser is so exact."""
+        before, frozen = self._scans.get(scan.robot_id, (None, False))
+        if before is not scan:
+            frozen = before is not None and np.array_equal(before.ranges, scan.ranges)
+            self._scans[scan.robot_id] = scan, frozen
+        return frozen
 
 
 def swept_by(

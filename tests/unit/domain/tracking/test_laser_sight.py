@@ -164,8 +164,8 @@ def scene_with_scan() -> Scene:
     return scene
 
 
-def sweeps(scene: Scene) -> bool:
-    sight = LaserSight(PLAN, lambda _: scan_of())
+def sweeps(scene: Scene, sight: LaserSight | None = None) -> bool:
+    sight = sight or LaserSight(PLAN, lambda _: scan_of())
     robot = scene.world.robot("AGI")
     spots, ages = np.array([SPOT]), np.array([1.5])
     return sight.swept(robot, spots, ages, at(scene.now)).size == 1
@@ -173,6 +173,14 @@ def sweeps(scene: Scene) -> bool:
 
 def test_the_newest_scan_of_a_live_robot_counts() -> None:
     assert sweeps(scene_with_scan())
+
+
+def test_a_laser_that_repeats_itself_to_the_bit_finds_nothing_empty() -> None:
+    one, other = scan_of(), scan_of()
+    noisy = replace(one, ranges=one.ranges + np.float32(0.001))
+    given = iter((one, one, other, other, noisy))
+    scene, sight = scene_with_scan(), LaserSight(PLAN, lambda _: next(given))
+    assert [sweeps(scene, sight) for _ in range(5)] == [True, True, False, False, True]
 
 
 def test_an_old_scan_finds_nothing_empty() -> None:
