@@ -32,6 +32,7 @@ from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import Feedback
 from iveg.domain.observations import Instant, Received
 from iveg.domain.records import Record
+from iveg.domain.tracking.people import People
 from iveg.domain.world import World
 from iveg.ngsi import codec
 from iveg.pipeline.evaluate import Evaluator
@@ -100,10 +101,11 @@ class Telling:
 def assessor_of(robots: tuple[str, ...], fleet: Telling) -> Evaluator:
     """The rule with everything round it but the network and the disk."""
     numbers = itertools.count()
-    start = Instant(0.0, WALL)
+    start, greenhouse = Instant(0.0, WALL), load_greenhouse("agroconnect")
     return Evaluator(
         World(load_fleet(words=robots)),
-        load_greenhouse("agroconnect"),
+        greenhouse,
+        People(greenhouse.bounds),
         DetectionRule(),
         fleet,
         EventLog(Hub(), Sink(), start, Supervision(lambda: start)),

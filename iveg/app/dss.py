@@ -94,7 +94,8 @@ class Dss:
                 radius_m=settings.safety_radius_m,
             )
         )
-        choices = Choices(kept.rules[-1], Drills(settings.drill_days), self._boot)
+        drills, era = Drills(settings.drill_days), f"-{self._boot[:8]}"
+        choices = Choices(kept.rules[-1], drills, self._boot, era)
         greenhouse = load_greenhouse(settings.greenhouse)
         self.pipeline = build(fleet, greenhouse, self._ports(), choices)
         self.services = build_services(self.pipeline, kept, self._senders(), clock.now)

@@ -83,6 +83,9 @@ class SafetyLimits:
     last_seen_s: float = _limit(
         600.0, "s", "chosen", "age up to which a mark stays on the map"
     )
+    glimpsed_s: float = _limit(
+        60.0, "s", "chosen", "the same of somebody who was seen for less than 2.5 s"
+    )
 
     round_trip_s: float = _limit(
         0.5, "s", "P95 of both ways", "a contradiction that lasts longer is a doubt"

@@ -13,6 +13,7 @@ from iveg.domain.latency.watch import LatencyWatch
 from iveg.domain.messages import Channel, Contacts
 from iveg.domain.observations import Instant, Received
 from iveg.domain.stop.drills import Drills
+from iveg.domain.tracking.people import People
 from iveg.domain.transports import FIWARE, Transport
 from iveg.domain.world import World
 from iveg.pipeline.command import Commander
@@ -74,11 +75,13 @@ class Choices:
 
     Attributes:
         boot: Random, new at each start; identity of our feedback.
+        era: Ends the ids of people, which are unique across starts by it.
     """
 
     rule: DetectionRule = field(default_factory=DetectionRule)
     drills: Drills = field(default_factory=Drills)
     boot: str = "iveg-boot"
+    era: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,6 +159,7 @@ def build(
     evaluator = Evaluator(
         world,
         greenhouse,
+        People(greenhouse.bounds, choices.era),
         choices.rule,
         ports.fleet,
         event_log,

@@ -68,6 +68,7 @@ class Evaluator:
         self,
         world: World,
         greenhouse: Greenhouse,
+        people: People,
         rule: DetectionRule,
         fleet: FleetPort,
         event_log: EventLog,
@@ -79,7 +80,7 @@ class Evaluator:
         self.world = world
         self.greenhouse = greenhouse
         self.rule = rule
-        self.people = People(greenhouse.bounds)
+        self.people = people
         self.decisions = Decisions()
         self.alerts = Alerting(event_log, new_id)
         self.speed_limits: dict[str, SpeedLimit] = dict.fromkeys(

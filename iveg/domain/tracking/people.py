@@ -65,12 +65,13 @@ class People:
 
     Args:
         bounds: The outer wall; what is seen beyond it is of doubtful position.
+        era: Ends every id.
     """
 
-    def __init__(self, bounds: Rectangle | None = None) -> None:
+    def __init__(self, bounds: Rectangle | None = None, era: str = "") -> None:
         self._bounds = bounds
         self._suspicions = Suspicions()
-        self._tracker = Tracker()
+        self._tracker = Tracker(era=era)
         self._faint: dict[str, list[Placed]] = {}
         self.turned_away = 0
         """Detections of the last frame without room."""

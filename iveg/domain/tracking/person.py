@@ -17,6 +17,8 @@ from iveg.domain.observations import Instant
 from iveg.domain.tracking.looks import Looks
 
 _SMOOTHED_S = 0.4
+_MISTAKEN_S = 2.5
+"""What is seen for longer is no mistake of a detector, of which most last 2 s."""
 Stage = Literal["seen", "remembered", "last_seen", "gone"]
 
 
@@ -107,14 +109,22 @@ class TrackedPerson:
         """Seconds since the newest sighting by any robot."""
         return self.newest.age_s(now)
 
+    @property
+    def is_well_known(self) -> bool:
+        """Whether they were seen for longer than a detector's mistake lasts."""
+        return self.newest.at.mono - self.first_seen.mono >= _MISTAKEN_S
+
     def seen_as(
-        self, newest: Sighting, sightings: tuple[Sighting, ...]
+        self,
+        newest: Sighting,
+        sightings: tuple[Sighting, ...],
+        decision_id: str | None = None,
     ) -> "TrackedPerson":
-        """The same person, seen otherwise."""
+        """The same person, seen otherwise; ``decision_id`` of a new alert, if any."""
         return TrackedPerson(
             self.person_id,
             self.class_,
-            self.decision_id,
+            decision_id or self.decision_id,
             self.first_seen,
             newest,
             sightings,
@@ -128,7 +138,8 @@ class TrackedPerson:
             return "seen"
         if age <= LIMITS.ring_lasts_s:
             return "remembered"
-        return "last_seen" if age <= LIMITS.last_seen_s else "gone"
+        lasts_s = LIMITS.last_seen_s if self.is_well_known else LIMITS.glimpsed_s
+        return "last_seen" if age <= lasts_s else "gone"
 
     def observers(self, now: Instant) -> list[str]:
         """Robots that see this person now, in the order in which they began to."""

@@ -10,9 +10,12 @@ from iveg.domain.observations import Instant
 from iveg.domain.tracking.person import Sighting, TrackedPerson
 
 GATE_M, GATE_CAP_M = 1.0, 2.0
-LOST_SPEED, LOST_CAP_M = 1.0, 6.0
-"""How far from where somebody was lost the same one may appear: more is as often
-another person (``benchmarks/tracking.py``; m/s, m)."""
+LOST_CAP_M = 6.0
+"""So far from where somebody was lost the same one may appear: farther away it is as
+often another person (``benchmarks/tracking.py``)."""
+_LOST_M, _LOST_M_S, _LOST_MOST_M = 0.8, 0.3, 6.0
+"""Spread of where somebody is who was lost, how it grows and how far: people stay at
+their work, so it grows slower than they walk (``benchmarks/tracking.py``; m, m/s)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,13 +85,19 @@ def live_cost(one: PlacedDetection, person: TrackedPerson, at: Instant) -> float
 
 
 def lost_cost(one: PlacedDetection, person: TrackedPerson, at: Instant) -> float:
-    """Distance to the last sighting (m); inf beyond what is likely."""
+    """How unlikely it is that a lost person has come here; inf beyond their walk.
+
+    The negative log-likelihood of the distance under a normal distribution around the
+    last sighting, whose spread grows with its age; 0 for the best there is.
+    """
     last = person.newest
     if not is_alike(person, one) or one.sighting.reach_m or last.reach_m:
         return math.inf
-    distance = distance_between(last, one.sighting)
-    reach = min(LOST_CAP_M, GATE_M + LOST_SPEED * last.age_s(at))
-    return distance if distance <= reach else math.inf
+    distance, age = distance_between(last, one.sighting), last.age_s(at)
+    if distance > min(LOST_CAP_M, GATE_M + LIMITS.walking_m_s * age):
+        return math.inf
+    spread = min(_LOST_MOST_M, _LOST_M + _LOST_M_S * age)
+    return (distance / spread) ** 2 / 2 + 2 * math.log(spread / _LOST_M)
 
 
 def distance_between(one: Sighting, other: Sighting) -> float:

@@ -8,12 +8,11 @@ time or an all-clear ends a chain's ring.  Tracks play no part in it.
 
 *Tracks* (names).  A chain that goes on keeps its track.  One that begins, or comes back
 after a second, joins the nearest live track first (global assignment over the whole
-picture), else a lost track from whose last place a person could have walked there, else
-it begins a track.  Live tracks closer than half a metre become one unless one picture
-ever showed both.
+picture), else the lost track that most likely walked there, for as long as its mark
+stays on the map, else it begins a track.  Live tracks closer than half a metre become
+one unless one picture ever showed both.
 """
 
-import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -26,15 +25,12 @@ from iveg.domain.tracking.picture import (
     chain_cost,
     distance_between,
     first_places,
-    is_alike,
     live_cost,
     lost_cost,
 )
 
 MAX_PEOPLE = 256
 MERGE_M = 0.5
-MARK_M = 6.0
-"""So near to a new track a last-seen mark is taken for the same person's."""
 
 
 @dataclass
@@ -43,9 +39,11 @@ class Tracker:
 
     Attributes:
         merge_m: Live tracks this near become one (m); below zero none do.
+        era: Ends every id, so that no later start of iVeg makes the same one.
     """
 
     merge_m: float = MERGE_M
+    era: str = ""
     known: dict[str, TrackedPerson] = field(default_factory=dict)
     _chains: int = 0
     _tracks: int = 0
@@ -81,7 +79,7 @@ class Tracker:
         return self.known[person_id]
 
     def forget(self, now: Instant) -> list[TrackedPerson]:
-        """Drop persons who have not been seen for ten minutes; returns them."""
+        """Drop persons whose mark has had its time; returns them."""
         gone = [one for one in self.known.values() if one.stage(now) == "gone"]
         for person in gone:
             self._remove(person.person_id)
@@ -187,7 +185,7 @@ class Tracker:
             for person in self.known.values()
             if person.person_id not in taken
             and (person.age_s(at) <= LIMITS.seen_s) is is_live
-            and person.age_s(at) <= LIMITS.ring_lasts_s
+            and person.stage(at) != "gone"
         ]
         cost = live_cost if is_live else lost_cost
         costs = [[cost(picture[i], person, at) for person in offered] for i in wanting]
@@ -218,7 +216,8 @@ class Tracker:
         )
         later = sighting.at.mono > person.newest.at.mono
         newest = sighting if later else person.newest
-        self.known[track] = person.seen_as(newest, (*kept, sighting))
+        decision_id = person.decision_id if kept else one.decision_id
+        self.known[track] = person.seen_as(newest, (*kept, sighting), decision_id)
         return track
 
     def _begin(
@@ -226,9 +225,9 @@ class Tracker:
     ) -> str | None:
         if not self._has_room(at):
             return None
-        self._drop_mark(one, at)
         self._tracks += 1
-        track = f"{'P' if one.class_ == 'person' else 'R'}{self._tracks}"
+        kind = "P" if one.class_ == "person" else "R"
+        track = f"{kind}{self._tracks}{self.era}"
         self.known[track] = TrackedPerson(
             track, one.class_, one.decision_id, at, sighting, (sighting,), self._tracks
         )
@@ -247,17 +246,6 @@ class Tracker:
                 self._remove(person.person_id)
                 return True
         return False
-
-    def _drop_mark(self, one: PlacedDetection, at: Instant) -> None:
-        """Drop the nearest last-seen mark within reach of a new person, its owner."""
-        marks = [
-            (distance_between(person.newest, one.sighting), person.person_id)
-            for person in self.known.values()
-            if is_alike(person, one) and person.stage(at) == "last_seen"
-        ]
-        distance, track = min(marks, default=(math.inf, ""))
-        if distance <= MARK_M:
-            self._remove(track)
 
     def _remove(self, track: str) -> None:
         del self.known[track]

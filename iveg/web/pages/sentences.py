@@ -11,7 +11,7 @@ from typing import Final
 from iveg.web.pages.local_time import in_madrid
 from iveg.web.pages.translations import HOLE, Translations
 
-_TRACK = re.compile(r"([PR])(\d+)")
+_TRACK = re.compile(r"([PR])(\d+)(?:-[0-9a-f]+)?")
 _NOTHING: Final = "—"
 _NAMED: Final = {
     "class": "class",

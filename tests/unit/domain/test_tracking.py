@@ -152,14 +152,61 @@ def test_a_live_track_is_joined_before_a_lost_one_is_revived() -> None:
     assert placed.person.person_id == "P2"
 
 
-def test_a_new_person_takes_the_mark_of_who_was_last_seen_there() -> None:
+def test_who_comes_back_from_where_somebody_was_last_seen_is_the_same() -> None:
     scene = Scene()
     scene.look("AGI", person(3.0))
-    scene.now = 60.0
+    first = scene.everyone[0]
+    scene.now = 50.0
 
-    scene.look("AGI", person(4.0))
+    scene.look("AGI", person(7.0))
 
-    assert [one.person_id for one in scene.everyone] == ["P2"]
+    (back,) = scene.everyone
+    assert back.person_id == first.person_id
+    assert back.decision_id != first.decision_id, "the alert is a new one"
+
+
+def test_no_start_of_iveg_repeats_an_id() -> None:
+    before, after = Tracker(era="-5f0c"), Tracker(era="-a31b")
+    seen = Sighting("AGI", 3.0, 0.0, 0.9, at(0), "farmer", 0.94)
+    one = PlacedDetection("person", seen, "d1")
+
+    ids = {*before.track_picture([one], at(0)), *after.track_picture([one], at(0))}
+
+    assert ids == {"P1-5f0c", "P1-a31b"}
+
+
+def test_whoever_appears_far_from_every_mark_is_somebody_else() -> None:
+    scene = Scene()
+    scene.look("AGI", person(3.0))
+    scene.now = 50.0
+
+    scene.look("AGI", person(9.1))
+
+    assert len(scene.everyone) == 2
+
+
+def test_of_two_who_are_lost_the_likelier_one_comes_back() -> None:
+    scene = Scene()
+    scene.look("AGI", person(3.0), person(8.0))
+    scene.now = 40.0
+    scene.look("AGI", person(8.0))
+    scene.now = 55.0
+
+    scene.look("AGI", person(6.0))
+
+    # P1 was lost 55 s ago and 3 m away, P2 15 s ago and 2 m away.
+    assert [one.person_id for one in scene.everyone if one.newest.x == 6.0] == ["P2"]
+
+
+def test_the_mark_of_who_was_seen_shortly_goes_sooner() -> None:
+    scene = Scene()
+    scene.look("AGI", person(3.0), person(8.0))
+    scene.now = 3.0
+    scene.look("AGI", person(8.0))
+
+    stages = [one.stage(at(scene.now + 62.0)) for one in scene.everyone]
+
+    assert stages == ["gone", "last_seen"]
 
 
 # --- a name protects nobody -------------------------------------------------------

@@ -128,10 +128,10 @@ export class Messages {
   }
 }
 
-/** `P3` is a person's number in the greenhouse; on a page it would read as a priority.
+/** `P3-5f0c…` is a person's number in the greenhouse; on a page it would read as a priority.
  * @param {unknown} value @param {Messages} messages */
 function trackOf(value, messages) {
-  const [, kind, n] = /^([PR])(\d+)$/.exec(String(value)) ?? [];
+  const [, kind, n] = /^([PR])(\d+)(?:-[0-9a-f]+)?$/.exec(String(value)) ?? [];
   return kind
     ? messages.say(`class.track.${kind}`, { n })
     : messages.named("class", value);

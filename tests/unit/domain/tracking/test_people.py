@@ -255,6 +255,9 @@ def test_a_person_is_seen_then_remembered_then_last_seen_then_gone(
     age: float, stage: str
 ) -> None:
     scene = Scene()
+    scene.now = -3.0
+    scene.look("AGI", person(3.0))
+    scene.now = 0.0
     scene.look("AGI", person(3.0))
 
     assert scene.everyone[0].stage(at(age)) == stage
@@ -283,8 +286,8 @@ def test_who_is_gone_is_forgotten() -> None:
     scene = Scene()
     scene.look("AGI", person(3.0))
 
-    assert scene.people.forget(at(599.0)) == []
-    assert [one.person_id for one in scene.people.forget(at(601.0))] == ["P1"]
+    assert scene.people.forget(at(59.0)) == []
+    assert [one.person_id for one in scene.people.forget(at(61.0))] == ["P1"]
     assert scene.everyone == []
 
 
