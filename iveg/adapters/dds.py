@@ -41,6 +41,7 @@ from cyclonedds.util import duration
 from iveg.domain.errors import HopError
 from iveg.ros2.names import Endpoint, Qos, dds_topic, dds_type, ros_topic, ros_type
 from iveg.ros2.schema import Many, Message, One, Structure, Text, fields_of
+from iveg.ros2.type_hash import read_user_data, user_data
 
 _LEASE = "3 s"
 """How long others remember a participant that died without a word."""
@@ -98,12 +99,14 @@ class Dds(AbstractContextManager["Dds"]):
 
     Args:
         network: Where.
+        gate: Id of the robot whose gate it is, told with every endpoint.
 
     Raises:
         HopError: no participant can be made there.
     """
 
-    def __init__(self, network: DdsNetwork) -> None:
+    def __init__(self, network: DdsNetwork, gate: str = "") -> None:
+        self._gate = gate
         self._watches: list[_Watch] = []
         self._topics: dict[tuple[str, str], Topic] = {}
         self._own: list[DdsReader | DdsWriter] = []
@@ -145,9 +148,8 @@ class Dds(AbstractContextManager["Dds"]):
 
     def reader(self, name: str, message: type[Message], qos: Qos) -> "DdsReader":
         """Subscribe to a topic by its full ROS name."""
-        reader = DataReader(
-            self._participant, self._topic(name, message), write_qos(qos)
-        )
+        told = self._told(message, qos)
+        reader = DataReader(self._participant, self._topic(name, message), told)
         made = DdsReader(reader)
         self._own.append(made)
         return made
@@ -155,9 +157,14 @@ class Dds(AbstractContextManager["Dds"]):
     def writer(self, name: str, message: type[Message], qos: Qos) -> "DdsWriter":
         """Publish on a topic by its full ROS name."""
         topic = self._topic(name, message)
-        made = DdsWriter(DataWriter(self._participant, topic, write_qos(qos)), topic)
+        told = self._told(message, qos)
+        made = DdsWriter(DataWriter(self._participant, topic, told), topic)
         self._own.append(made)
         return made
+
+    def _told(self, message: type[Message], qos: Qos) -> DdsQos:
+        data = Policy.Userdata(user_data(message, self._gate))
+        return DdsQos(data, base=write_qos(qos))
 
     def _topic(self, name: str, message: type[Message]) -> Topic:
         key = name, message.ROS
@@ -199,6 +206,7 @@ class Dds(AbstractContextManager["Dds"]):
             writes,
             _read_qos(sample.qos),
             str(sample.participant_key) == self._guid,
+            *_read_user_data(sample.qos),
         )
 
 
@@ -381,6 +389,11 @@ def _read_qos(qos: DdsQos) -> Qos:
         qos[Policy.Durability] != Policy.Durability.Volatile,
         getattr(history, "depth", 0),
     )
+
+
+def _read_user_data(qos: DdsQos) -> tuple[str, str]:
+    told = qos[Policy.Userdata]
+    return read_user_data(b"" if told is None else bytes(told.data))
 
 
 class _Watch:

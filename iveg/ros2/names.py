@@ -48,6 +48,8 @@ class Endpoint:
         writes: It is a writer, else a reader.
         qos: Quality of service that it offers or requests.
         own: It is of this process.
+        type_hash: As announced, ``RIHS01_…``; empty before ROS 2 Iron.
+        gate: Id of the robot whose gate has it; empty: no gate of iVeg.
     """
 
     topic: str
@@ -55,6 +57,8 @@ class Endpoint:
     writes: bool
     qos: Qos
     own: bool
+    type_hash: str = ""
+    gate: str = ""
 
 
 DEFAULT = Qos()

@@ -90,6 +90,7 @@ Kind = One | Many | Text | Structure
 
 Boolean = Annotated[bool, One("boolean")]
 Uint8 = Annotated[int, One("uint8")]
+Uint16 = Annotated[int, One("uint16")]
 Uint32 = Annotated[int, One("uint32")]
 Int32 = Annotated[int, One("int32")]
 Float32 = Annotated[float, One("float32")]

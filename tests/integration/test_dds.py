@@ -10,8 +10,11 @@ import pytest
 
 from iveg.domain.errors import HopError
 from iveg.ros2 import cdr, names
+from iveg.ros2 import detector_messages as d
 from iveg.ros2 import messages as m
 from iveg.ros2.names import Qos
+from iveg.ros2.schema import Message
+from iveg.ros2.type_hash import type_hash
 from tests.bonds import bound
 from tests.dds import Dds, DdsReader, free_domain, loopback
 from tests.processes import ROOT, until
@@ -123,6 +126,30 @@ def test_a_message_of_another_layout_never_arrives(dds: Dds, domain: int) -> Non
             writer.write(cdr.write(m.Vector3()))
 
         assert reader.take() == []
+
+
+@pytest.mark.parametrize(
+    "message", [d.BoundingBoxes, d.BoundingBoxes3d, d.DetectionArray]
+)
+def test_a_detector_is_met_in_its_type_and_tells_its_hash(
+    dds: Dds, domain: int, message: type[Message]
+) -> None:
+    said = cdr.write(message())
+    with Dds(loopback(domain), gate="AGI") as other:
+        writer = other.writer("/boxes", message, RELIABLE)
+        # Tools of ROS may have readers of other types there.
+        dds.reader("/boxes", m.Detection3DArray, RELIABLE)
+        reader = dds.reader("/boxes", message, RELIABLE)
+        until(lambda: writer.readers == 1 and reader.writers == 1, 30.0, "both met")
+
+        writer.write(said)
+
+        assert until(reader.take, 10.0, "boxes") == [said]
+        met = [one for one in dds.endpoints() if one.writes and one.topic == "/boxes"]
+        assert [(one.type, one.type_hash, one.gate) for one in met] == [
+            (message.ROS, type_hash(message), "AGI")
+        ]
+    until(lambda: "/boxes" not in _topics(dds), 30.0, "it has gone")
 
 
 def test_a_domain_that_was_opened_otherwise_is_refused(domain: int) -> None:
