@@ -39,16 +39,18 @@ from iveg.ngsi import names
 from iveg.robot.node import NodeSettings, RobotNode
 from iveg.robot.ros2.checking import Heard, judge, lines
 from iveg.robot.ros2.config import RobotConfig, read_classes, read_config
+from iveg.robot.ros2.lookout import forms_published
 from iveg.robot.ros2.network import Network
 from iveg.robot.ros2.rig import Ros2Robot
 from iveg.robot.ros2.topics import TOPICS, sensed_topics
 from iveg.robot.ros2.transforms import TransformBuffer
 from iveg.ros2 import cdr
 from iveg.ros2 import messages as m
+from iveg.ros2.schema import Message
 from iveg.settings import Settings
 
 if TYPE_CHECKING:
-    from iveg.adapters.dds import DdsNetwork
+    from iveg.adapters.dds import Dds, DdsNetwork, DdsReader
 
 _CHECK_S = 3.0
 _DOMAINS = "a whole number from 0 to 232"
@@ -89,7 +91,7 @@ async def _ride(
 ) -> None:
     from iveg.adapters.dds import Dds
 
-    with Dds(network) as dds:
+    with Dds(network, gate=options.id) as dds:
         await refuse_second_gate(dds, config.full_topics["cmd_vel_out"])
         safety = node_settings(settings, data / "robots", _plan(options.greenhouse))
         node = partial(_node, options.id, settings, safety, config)
@@ -264,24 +266,16 @@ async def _check(
     transforms = TransformBuffer(config.tf_max_age_s)
     newest = 0.0
     with Dds(network) as dds:
-        readers = {
-            topic: dds.reader(
-                name,
-                TOPICS[topic].message,
-                config.qualities[topic].newest(
-                    2 if TOPICS[topic].role == "picture" else 200
-                ),
-            )
-            for topic, name in sensed_topics(config.full_topics).items()
-        }
+        readers: dict[tuple[str, type[Message]], DdsReader] = {}
         link = MqttLink(broker_of(settings), f"check of {robot_id}")
         task = asyncio.create_task(link.run(), name="broker")
         began = clock.mono()
         while clock.mono() - began < _CHECK_S:
+            _listen(dds, config, readers)
             await asyncio.sleep(0.05)
-            for topic, reader in readers.items():
+            for (topic, form), reader in readers.items():
                 for one in reader.take():
-                    newest = max(newest, _hear(topic, one, heard, transforms))
+                    newest = max(newest, _hear(topic, form, one, heard, transforms))
         broker = None if link.connected else _no_broker(settings)
         task.cancel()
         await asyncio.gather(task, return_exceptions=True)
@@ -293,6 +287,7 @@ async def _check(
             seconds=_CHECK_S,
             stamp=newest,
             broker=broker,
+            robot_id=robot_id,
         )
     known = _fleet(settings).ids
     missing = verdict.missing
@@ -308,14 +303,33 @@ def _no_broker(settings: Settings) -> str:
     return f"No MQTT broker answers at {address.host}:{address.port} (IVEG_MQTT_URL)."
 
 
+def _listen(
+    dds: "Dds",
+    config: RobotConfig,
+    readers: "dict[tuple[str, type[Message]], DdsReader]",
+) -> None:
+    """Read each topic that is published, in its type."""
+    endpoints = dds.endpoints()
+    for topic, name in sensed_topics(config.full_topics).items():
+        depth = 2 if TOPICS[topic].role == "picture" else 200
+        qos = config.qualities[topic].newest(depth)
+        for form in forms_published(topic, name, endpoints):
+            if (topic, form) not in readers:
+                readers[topic, form] = dds.reader(name, form, qos)
+
+
 def _hear(
-    topic: str, payload: bytes, heard: dict[str, Heard], transforms: TransformBuffer
+    topic: str,
+    form: type[Message],
+    payload: bytes,
+    heard: dict[str, Heard],
+    transforms: TransformBuffer,
 ) -> float:
     """Count a message; returns its stamp (s) for odometry."""
     one = heard.setdefault(topic, Heard())
     one.count += 1
     try:
-        message = cdr.read(TOPICS[topic].message, payload)
+        message = cdr.read(form, payload)
     except UnreadableError:
         one.unreadable += 1
         return 0.0

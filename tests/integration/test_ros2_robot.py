@@ -89,11 +89,12 @@ class Iveg:
 
 
 class Sensors:
-    """A base's odometry, on DDS."""
+    """A base's odometry, on DDS, and its ear."""
 
     def __init__(self, dds: Dds) -> None:
         self._odometry = dds.writer("/odom", m.Odometry, names.DEFAULT.newest(_BURST))
         self._tf = dds.writer("/tf", m.TFMessage, names.DEFAULT)
+        self.drive = dds.reader("/cmd_vel", m.Twist, names.DEFAULT)
         self.burst = 1
 
     async def talk(self) -> None:
@@ -167,7 +168,9 @@ async def test_a_check_tells_a_robot_that_talks_what_it_lacks(riding: Riding) ->
     assert re.search(r"^/odom +nav_msgs/msg/Odometry +1 +\d", said, re.MULTILINE)
     assert "TF: map → odom → base_link" in said
     assert "Nobody publishes /scan (sensor_msgs/msg/LaserScan): if it has one." in said
-    assert "Somebody else publishes /cmd_vel: only the gate may" in said
+    assert "The gate of AGI is running." in said
+    assert "publishes /cmd_vel:" not in said
+    assert "Nobody listens on /cmd_vel:" not in said
     assert "broker" not in said
 
 

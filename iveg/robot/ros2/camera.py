@@ -2,11 +2,13 @@
 
 from collections import deque
 from collections.abc import Mapping
+from typing import Any
 
 from iveg.domain.errors import UnreadableError
 from iveg.domain.observations import UNKNOWN_ORIGIN, DetectionFrame, Instant
 from iveg.robot.grounding.locate import Grounding
 from iveg.robot.ros2 import pictures
+from iveg.robot.ros2.detectors import LOOKS, Look
 from iveg.robot.ros2.input_faults import InputFaults
 from iveg.robot.ros2.places import Places
 from iveg.robot.ros2.reading import class_id_of
@@ -44,7 +46,7 @@ class Camera:
         self._depths: deque[m.Image] = deque(maxlen=_PICTURES)
         self._masks: deque[m.Image] = deque(maxlen=_PICTURES)
         self._info: m.CameraInfo | None = None
-        self._look: tuple[m.Detection2DArray, float] | None = None
+        self._look: tuple[Look, float] | None = None
 
     def add_depth(self, picture: m.Image, _: Instant) -> None:
         """Keep a depth picture."""
@@ -58,9 +60,9 @@ class Camera:
         """Note the calibration."""
         self._info = info
 
-    def replace_look(self, look: m.Detection2DArray, now: Instant) -> None:
-        """Note a detection frame; it replaces one that still waits."""
-        self._look = look, now.mono
+    def replace_look(self, look: Any, now: Instant) -> None:
+        """Note a detection frame of one of ``LOOKS``; one that waits is replaced."""
+        self._look = LOOKS[type(look)](look), now.mono
 
     def locate(self, now: float) -> DetectionFrame | None:
         """The detection frame once its depth picture arrived, or is overdue."""
@@ -81,9 +83,7 @@ class Camera:
         lost = (class_id_of(one.results, self._classes) for one in look.detections)
         return frame or DetectionFrame("", UNKNOWN_ORIGIN, (), tuple(lost))
 
-    def _located(
-        self, look: m.Detection2DArray, depth: m.Image, now: float
-    ) -> DetectionFrame | None:
+    def _located(self, look: Look, depth: m.Image, now: float) -> DetectionFrame | None:
         """Boxes of a detection frame; None where nothing of it can be located."""
         stamp = look.header.stamp.seconds
         place = self._places.in_map(depth.header.frame_id, stamp, now)

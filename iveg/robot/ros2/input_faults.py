@@ -16,8 +16,9 @@ _MOST = 16
 
 STANDS = frozenset({"second_publisher"})
 """Faults that hold the robot: another publisher on the drive bypasses the gate."""
-HARMLESS = frozenset({"unknown_to_iveg", "nobody_there"})
-"""Faults without effect: watchdog and age of odometry handle silence."""
+HARMLESS = frozenset({"unknown_to_iveg", "nobody_there", "drive_unheard"})
+"""Faults without effect: watchdog and age of odometry handle silence, and a factor
+changes nothing for a base that hears none."""
 
 
 @dataclass(frozen=True, slots=True)

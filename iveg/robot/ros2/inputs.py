@@ -14,8 +14,6 @@ from typing import Any
 from iveg.domain.errors import UnreadableError
 from iveg.domain.observations import (
     UNKNOWN_ORIGIN,
-    Detection,
-    DetectionFrame,
     Instant,
     LaserScan,
     Navigation,
@@ -23,8 +21,9 @@ from iveg.domain.observations import (
     Odometry,
     Unplaced,
 )
-from iveg.robot.grounding.locate import Grounding, Ungrounded, frame_of
+from iveg.robot.grounding.locate import Grounding
 from iveg.robot.ros2 import reading
+from iveg.robot.ros2.boxes import Boxes
 from iveg.robot.ros2.camera import Camera
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.input_faults import InputFaults
@@ -35,6 +34,7 @@ from iveg.robot.ros2.stamps import Stamps
 from iveg.robot.ros2.topics import TOPICS
 from iveg.ros2 import cdr
 from iveg.ros2 import messages as m
+from iveg.ros2.schema import Message
 
 SILENT_S = 1.0
 _CLOCK_OFF_S = 10.0
@@ -63,14 +63,15 @@ class SensorInputs:
         self.input_faults = faults = InputFaults()
         self._names = config.full_topics
         self._map = config.frames.map
-        self._classes = classes
         self._sim_time = sim_time
         self._tf_max_age_s = config.tf_max_age_s
         self._places = Places(config.frames, config.tf_max_age_s, faults)
         grounding = Grounding(p_min=config.p_min)
         self._camera = Camera(self._names, classes, grounding, self._places, faults)
+        boxes = self._names["detections_3d"]
+        self._boxes = Boxes(boxes, classes, self._places, faults)
         self._stamps: defaultdict[str, Stamps] = defaultdict(Stamps)
-        self._newest: dict[str, bytes] = {}
+        self._newest: dict[str, tuple[type[Message], bytes]] = {}
         self._heard_at: dict[str, float] = {}
         self._first_heard = math.inf
         self._began: float | None = None
@@ -78,7 +79,7 @@ class SensorInputs:
         self._works: dict[str, _Work] = {
             "odometry": self._odometry,
             "scan": self._scan,
-            "detections_3d": self._detections,
+            "detections_3d": lambda one, now: self._boxes.locate(one, now.mono),
             "depth": self._camera.add_depth,
             "mask": self._camera.add_mask,
             "camera_info": self._camera.set_info,
@@ -99,20 +100,34 @@ class SensorInputs:
     # --- messages -----------------------------------------------------------------
 
     def hear(
-        self, topic: str, arrived: Sequence[bytes], now: float, most: int = 0
+        self,
+        topic: str,
+        arrived: Sequence[bytes],
+        now: float,
+        most: int = 0,
+        form: type[Message] | None = None,
     ) -> None:
-        """Note pending messages of a topic that is read; ``most``: its queue depth."""
+        """Note pending messages of a topic that is read.
+
+        Args:
+            topic: Its key.
+            arrived: At least one, oldest first.
+            now: Monotonic (s).
+            most: Depth of its queue; 0: any number is normal.
+            form: Their type, where the topic may have several.
+        """
+        message = form or TOPICS[topic].message
         self._heard_at[topic] = now
         self._first_heard = min(self._first_heard, now)
         if most and len(arrived) >= most:
             self._note("flood", topic, now)
         if topic not in _TREE:
-            self._newest[topic] = arrived[-1]
+            self._newest[topic] = message, arrived[-1]
             return
         for one in arrived:
-            message = self._read(topic, one, now)
-            if message is not None:
-                self._places.add(message, static=topic == "tf_static")
+            links = self._read(topic, message, one, now)
+            if links is not None:
+                self._places.add(links, static=topic == "tf_static")
 
     def tick(self, now: Instant) -> list[Observation]:
         """New observations, odometry first."""
@@ -122,9 +137,9 @@ class SensorInputs:
         if self._awaits_transforms(now.mono):
             return []
         found = [
-            self._attempt(topic, work, payload, now)
+            self._attempt(topic, work, *newest, now)
             for topic, work in self._works.items()
-            if (payload := self._newest.pop(topic, None)) is not None
+            if (newest := self._newest.pop(topic, None)) is not None
         ]
         found.append(self._camera.locate(now.mono))
         return [one for one in found if one is not None]
@@ -146,10 +161,15 @@ class SensorInputs:
         return now - self._first_heard <= self._tf_max_age_s
 
     def _attempt(
-        self, topic: str, work: _Work, payload: bytes, now: Instant
+        self,
+        topic: str,
+        work: _Work,
+        form: type[Message],
+        payload: bytes,
+        now: Instant,
     ) -> Observation | None:
         """What follows from a message of a topic, unless it is unusable or old."""
-        message = self._read(topic, payload, now.mono)
+        message = self._read(topic, form, payload, now.mono)
         if message is None:
             return None
         is_stream = TOPICS[topic].role == "stream"
@@ -161,10 +181,10 @@ class SensorInputs:
             self._note(error.reason, topic, now.mono)
             return None
 
-    def _read(self, topic: str, payload: bytes, now: float) -> Any:
+    def _read(self, topic: str, form: type[Message], payload: bytes, now: float) -> Any:
         """A message of a topic; None for one that cannot be read."""
         try:
-            return cdr.read(TOPICS[topic].message, payload)
+            return cdr.read(form, payload)
         except UnreadableError:
             self._note("unreadable", topic, now)
             return None
@@ -200,33 +220,6 @@ class SensorInputs:
         if laser is None:
             return Unplaced("", UNKNOWN_ORIGIN, "scan")
         return reading.read_scan(message, laser)
-
-    def _detections(self, message: m.Detection3DArray, now: Instant) -> DetectionFrame:
-        usual, stamp = message.header.frame_id, message.header.stamp.seconds
-        frames = dict.fromkeys(
-            one.header.frame_id or usual for one in message.detections
-        )
-        places = {
-            frame: self._places.in_map(frame, stamp, now.mono) for frame in frames
-        }
-        answers = [
-            self._detection(one, places[one.header.frame_id or usual], now.mono)
-            for one in message.detections
-        ]
-        return frame_of("", UNKNOWN_ORIGIN, answers)
-
-    def _detection(
-        self, one: m.Detection3D, place: RigidTransform | None, now: float
-    ) -> tuple[str | None, Detection | Ungrounded]:
-        """A detection, or that it has no place, and the class that it is of."""
-        if place is not None:
-            try:
-                found = reading.read_detection(one, place, self._classes)
-            except UnreadableError as error:
-                self._note(error.reason, "detections_3d", now)
-            else:
-                return found.class_id, found
-        return reading.class_id_of(one.results, self._classes), "unreadable"
 
     def _path(self, message: m.Path, now: Instant) -> Navigation | None:
         frame, here = message.header.frame_id or self._map, self._places.here

@@ -1,8 +1,8 @@
 """Detections without depth: boxes in a picture, located by a depth picture.
 
-The paper's grounding (``iveg.robot.grounding``) on ``vision_msgs/Detection2DArray``,
-a depth ``Image`` registered to the detector's camera, and its ``CameraInfo``.  In a
-mask picture value n marks the n-th detection, counted from 1, and 255 marks any.
+The paper's grounding (``iveg.robot.grounding``) on the boxes of a picture, a depth
+``Image`` registered to the detector's camera, and its ``CameraInfo``.  In a mask
+picture value n marks the n-th detection, counted from 1, and 255 marks any.
 Without a mask the target is the part of the box at about the depth of its middle: the
 whole box would include the wall behind a person.
 """
@@ -27,6 +27,7 @@ from iveg.robot.grounding.locate import (
     hull_of,
 )
 from iveg.robot.grounding.mask import EDGE_LIMIT, write_mask
+from iveg.robot.ros2.detectors import Look
 from iveg.robot.ros2.reading import class_id_of, read_hypothesis, within_world
 from iveg.robot.ros2.rigid import RigidTransform
 from iveg.ros2 import messages as m
@@ -97,7 +98,7 @@ def _pixels(image: m.Image, kind: str) -> NDArray[Any]:
 
 
 def grounded(
-    look: m.Detection2DArray,
+    look: Look,
     picture: DepthPicture,
     mask: m.Image | None,
     place: RigidTransform,
@@ -113,7 +114,14 @@ def grounded(
         place: Pose of the camera's optical frame in ``map``.
         classes: Names by number.
         settings: Parameters that the paper leaves open.
+
+    Raises:
+        UnreadableError: ``bad_picture``: the detector's picture has another size.
     """
+    camera = picture.camera
+    if look.width and (look.width, look.height) != (camera.width, camera.height):
+        detail = f"boxes in {look.width} × {look.height}"
+        raise UnreadableError("bad_picture", detail)
     owners = None if mask is None else _pixels(mask, _MASKS.get(mask.encoding, "u1"))
     answers = [
         (

@@ -8,7 +8,7 @@ drive's topic, repeatedly while it is zero; when this process ends, so does publ
 import asyncio
 import itertools
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from iveg.adapters import clock
@@ -23,10 +23,13 @@ from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.drive import DriveTopics, message_of
 from iveg.robot.ros2.input_faults import speed_of
 from iveg.robot.ros2.inputs import SensorInputs
+from iveg.robot.ros2.lookout import Lookout, forms_published
 from iveg.robot.ros2.network import Network, Reader, Writer
 from iveg.robot.ros2.topics import TOPICS, sensed_topics
 from iveg.ros2 import cdr
 from iveg.ros2 import messages as m
+from iveg.ros2.names import Endpoint
+from iveg.ros2.schema import Message
 
 _log = logging.getLogger(__name__)
 RATE_HZ = 30.0
@@ -36,7 +39,7 @@ _PICTURE_DEPTH = 2
 _LOOK_ROUND_TICKS, _TELL_TICKS = 15, 6
 """Ticks between two checks of endpoints, and between two outputs of neighbours."""
 _KNOWN_WITHIN_S = 8.0
-_MET_WITHIN_S = 5.0
+_ORDER = list(TOPICS)
 
 
 NodeMaker = Callable[
@@ -47,8 +50,16 @@ NodeMaker = Callable[
 
 @dataclass(frozen=True, slots=True)
 class _In:
-    """A topic that is read; ``most`` is the depth of its queue."""
+    """A topic that is read.
 
+    Attributes:
+        topic: Its key.
+        form: The type that is read.
+        most: Depth of its queue; 0: any number is normal.
+    """
+
+    topic: str
+    form: type[Message]
     reader: Reader
     most: int
 
@@ -90,27 +101,21 @@ class Ros2Robot:
         self._said: frozenset[tuple[str, str]] = frozenset()
         self._first_feedback: float | None = None
         self._known = False
-        self._alone_since = clock.mono()
+        self._lookout = Lookout(config, self._input_faults, clock.mono())
         self._ticks = itertools.count()
         self._open(network)
         self.node = make_node(self._drive, self._on_feedback)
 
     def _open(self, network: Network) -> None:
         qualities, drive = self._config.qualities, self._config.drive
-        self._ins: dict[str, _In] = {}
-        for topic, name in sensed_topics(self._names).items():
-            is_picture = TOPICS[topic].role == "picture"
-            usual = max(_DEPTH, qualities[topic].depth)
-            qos = qualities[topic].newest(_PICTURE_DEPTH if is_picture else usual)
-            reader = network.reader(name, TOPICS[topic].message, qos)
-            self._ins[topic] = _In(reader, 0 if is_picture else usual)
-        self._wishes = _In(
-            network.reader(
-                self._names["cmd_vel_in"],
-                message_of(stamped=drive.stamped_in),
-                qualities["cmd_vel_in"].newest(_DEPTH),
-            ),
-            _DEPTH,
+        self._ins: list[_In] = []
+        for topic in sensed_topics(self._names):
+            if len(TOPICS[topic].forms) == 1:
+                self._listen(topic, TOPICS[topic].message)
+        self._wishes = network.reader(
+            self._names["cmd_vel_in"],
+            message_of(stamped=drive.stamped_in),
+            qualities["cmd_vel_in"].newest(_DEPTH),
         )
         self._out = network.writer(
             self._names["cmd_vel_out"],
@@ -124,9 +129,18 @@ class Ros2Robot:
             for topic in ("obstacles", "markers")
         )
 
+    def _listen(self, topic: str, form: type[Message]) -> None:
+        quality = self._config.qualities[topic]
+        is_picture = TOPICS[topic].role == "picture"
+        usual = max(_DEPTH, quality.depth)
+        qos = quality.newest(_PICTURE_DEPTH if is_picture else usual)
+        reader = self._network.reader(self._names[topic], form, qos)
+        self._ins.append(_In(topic, form, reader, 0 if is_picture else usual))
+        self._ins.sort(key=lambda one: _ORDER.index(one.topic))
+
     async def run(self) -> None:
         """Run until cancelled; the drive is left at rest."""
-        self._network.watch([self._wishes.reader], self._on_wish)
+        self._network.watch([self._wishes], self._on_wish)
         async with asyncio.TaskGroup() as tasks:
             for name, work in (
                 ("node", self.node.run()),
@@ -146,10 +160,10 @@ class Ros2Robot:
 
     def _sense(self) -> None:
         now = clock.now()
-        for topic, one in self._ins.items():
+        for one in self._ins:
             waited = one.reader.take()
             if waited:
-                self.inputs.hear(topic, waited, now.mono, one.most)
+                self.inputs.hear(one.topic, waited, now.mono, one.most, one.form)
         self.node.sense(*self.inputs.tick(now))
         self._judge(now.mono)
 
@@ -171,8 +185,8 @@ class Ros2Robot:
 
     def _on_wish(self) -> None:
         now = clock.mono()
-        waited = self._wishes.reader.take()
-        if len(waited) >= self._wishes.most:
+        waited = self._wishes.take()
+        if len(waited) >= _DEPTH:
             self._input_faults.note("flood", self._names["cmd_vel_in"], now)
         if not waited:
             return
@@ -181,18 +195,28 @@ class Ros2Robot:
             self.node.request_twist(wish)
 
     def _look_round(self) -> None:
-        """Check for other publishers on the drive, and for iVeg's knowledge of us."""
-        now, out = clock.mono(), self._names["cmd_vel_out"]
-        others = [one for one in self._network.endpoints() if not one.own]
-        if any(one.writes and one.topic == out for one in others):
-            self._input_faults.note("second_publisher", out, now)
-        if others:
-            self._alone_since = now
-        elif now - self._alone_since > _MET_WITHIN_S:
-            self._input_faults.note("nobody_there", f"DDS {self._config.domain}", now)
+        """Check the endpoints of others, and iVeg's knowledge of us."""
+        now, endpoints = clock.mono(), self._network.endpoints()
+        self._lookout.look(endpoints, now)
+        self._meet_detectors(endpoints)
         first = self._first_feedback
         if not self._known and first is not None and now - first > _KNOWN_WITHIN_S:
             self._input_faults.note("unknown_to_iveg", self._id, now)
+
+    def _meet_detectors(self, endpoints: Sequence[Endpoint]) -> None:
+        """Listen to a detector in the type in which it publishes.
+
+        A reader of each type from the start would be announced, and tools of ROS refuse
+        a topic of several types.
+        """
+        known = {(one.topic, one.form) for one in self._ins}
+        for topic, name in sensed_topics(self._names).items():
+            for form in forms_published(topic, name, endpoints):
+                if (topic, form) in known:
+                    continue
+                if any(topic == other for other, _ in known):
+                    _log.warning("%s: %s comes as %s now", self._id, name, form.ROS)
+                self._listen(topic, form)
 
     def _on_feedback(self, peer: str, feedback: Feedback) -> None:
         now = clock.mono()

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from iveg.robot.ros2.detectors import BOXES, LOOKS
 from iveg.robot.ros2.sensors import ROS_SENSORS
 from iveg.ros2 import messages as m
 from iveg.ros2.names import DEFAULT, SENSOR_DATA, TF, TF_STATIC, Qos
@@ -24,20 +25,32 @@ class Topic:
             empty: none.
         message: Its type.
         qos: A best-effort reader matches every writer; only commands are read reliably.
+        forms: All types that are read; a detector publishes one of several.
     """
 
     name: str
     message: type[Message]
     role: Role = "state"
     qos: Qos = SENSOR_DATA
+    forms: tuple[type[Message], ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.forms:
+            object.__setattr__(self, "forms", (self.message,))
+
+    def form(self, ros_type: str) -> type[Message] | None:
+        """The type of this ROS name; None for one that is not read."""
+        return next((one for one in self.forms if ros_type == one.ROS), None)
 
 
 TOPICS: Mapping[str, Topic] = {
     "odometry": Topic("odom", m.Odometry, "stream"),
     "scan": Topic("scan", m.LaserScan, "stream"),
-    "detections_3d": Topic("detections_3d", m.Detection3DArray, "stream"),
+    "detections_3d": Topic(
+        "detections_3d", m.Detection3DArray, "stream", forms=tuple(BOXES)
+    ),
     # With depth and camera_info an alternative to detections_3d.
-    "detections_2d": Topic("", m.Detection2DArray, "stream"),
+    "detections_2d": Topic("", m.Detection2DArray, "stream", forms=tuple(LOOKS)),
     "depth": Topic("camera/aligned_depth_to_color/image_raw", m.Image, "picture"),
     "camera_info": Topic("camera/color/camera_info", m.CameraInfo),
     # In a mono picture value n marks the n-th detection; without, the whole box counts.

@@ -95,6 +95,14 @@ class TransformBuffer:
             link = self._links[child] = _Link(parent, static=static)
         return link.add(_At(one.header.stamp.seconds, rigid))
 
+    @property
+    def newest(self) -> float:
+        """Newest stamp of a transform that is not static (s); 0 without one."""
+        links = self._links.values()
+        return max(
+            (one.known[-1].stamp for one in links if not one.static), default=0.0
+        )
+
     def clear(self) -> None:
         """Delete dynamic transforms, since the clock was reset."""
         self._links = {c: one for c, one in self._links.items() if one.static}

@@ -1,12 +1,16 @@
 """``iveg robot check`` says in one sentence each what is missing."""
 
+from dataclasses import replace
+
 import pytest
 
 from iveg.robot.ros2.checking import CheckVerdict, Heard, judge, lines
 from iveg.robot.ros2.config import DriveConfig, RobotConfig
 from iveg.robot.ros2.transforms import TransformBuffer
+from iveg.ros2 import detector_messages as d
 from iveg.ros2 import messages as m
-from iveg.ros2.names import SENSOR_DATA, TF, TF_STATIC, Endpoint
+from iveg.ros2.names import DEFAULT, SENSOR_DATA, TF, TF_STATIC, Endpoint
+from iveg.ros2.type_hash import type_hash
 from tests.fakes.ros2_network import endpoint
 from tests.unit.robot.ros2.said import WALL, link, tf
 
@@ -18,6 +22,7 @@ WHOLE = {
     "wishes": endpoint("/cmd_vel_nav", m.Twist),
     "base": endpoint("/cmd_vel", m.Twist, writes=False),
 }
+FOREIGN = Endpoint("/detections_3d", "darknet_msgs/msg/Boxes", True, DEFAULT, False)
 
 
 def tree(*, localised: bool = True) -> TransformBuffer:
@@ -44,6 +49,7 @@ def verdict(
     said: dict[str, Heard] | None = None,
     buffer: TransformBuffer | None = None,
     broker: str | None = None,
+    stamp: float = WALL,
 ) -> CheckVerdict:
     endpoints = [one for name, one in WHOLE.items() if name != without]
     return judge(
@@ -52,8 +58,9 @@ def verdict(
         said or heard(),
         buffer or tree(),
         seconds=3.0,
-        stamp=WALL,
+        stamp=stamp,
         broker=broker,
+        robot_id="AGI",
     )
 
 
@@ -99,12 +106,12 @@ def test_a_robot_that_has_everything_misses_nothing() -> None:
         ),
         (
             verdict(endpoint("/tf", m.TFMessage, qos=SENSOR_DATA), without="tf"),
-            "/tf: asked for reliably, published best effort; say so in [qos].",
+            "/tf: asked for reliably, published best effort; qos.tf.reliable = false.",
         ),
         (
             verdict(endpoint("/tf_static", m.TFMessage), without="tf_static"),
-            "/tf_static: asked for transient local, published volatile; say so in "
-            "[qos].",
+            "/tf_static: asked for transient local, published volatile; "
+            "qos.tf_static.transient_local = false.",
         ),
         (
             verdict(said=heard(odometry=3)),
@@ -123,6 +130,55 @@ def test_a_robot_that_has_everything_misses_nothing() -> None:
             "/cmd_vel_nav is geometry_msgs/msg/Twist there: drive.stamped_in.",
         ),
         (verdict(broker="No MQTT broker answers."), "No MQTT broker answers."),
+        (
+            verdict(endpoint("/odom", m.PointCloud2)),
+            "/odom is published as nav_msgs/msg/Odometry and as "
+            "sensor_msgs/msg/PointCloud2: one may be right.",
+        ),
+        (
+            verdict(replace(endpoint("/cmd_vel", m.Twist), gate="AGII")),
+            "The gate of AGII publishes /cmd_vel: only the gate may, remap it to "
+            "/cmd_vel_nav.",
+        ),
+        (
+            verdict(
+                endpoint("/cmd_vel", m.Twist, writes=False, qos=TF_STATIC),
+                without="base",
+            ),
+            "/cmd_vel, offered → asked: volatile → transient local; qos.cmd_vel_out.",
+        ),
+        (
+            verdict(endpoint("/yolact_coordinate", d.BoundingBoxes3d)),
+            "/yolact_coordinate is a detector's "
+            "(gb_visual_detection_3d_msgs/msg/BoundingBoxes3d): topics.detections_3d.",
+        ),
+        (
+            verdict(endpoint("/yolox/bounding_box", d.BoundingBoxes)),
+            "/yolox/bounding_box is a detector's (bboxes_ex_msgs/msg/BoundingBoxes): "
+            "topics.detections_2d.",
+        ),
+        (
+            verdict(endpoint("/yolo/tracking", d.DetectionArray)),
+            "/yolo/tracking is a detector's (yolo_msgs/msg/DetectionArray): "
+            "topics.detections_3d or topics.detections_2d.",
+        ),
+        (
+            verdict(replace(FOREIGN, type_hash="RIHS01_12")),
+            "/detections_3d is darknet_msgs/msg/Boxes (RIHS01_12), not "
+            "vision_msgs/msg/Detection3DArray or "
+            "gb_visual_detection_3d_msgs/msg/BoundingBoxes3d or "
+            "yolo_msgs/msg/DetectionArray.",
+        ),
+        (
+            verdict(
+                replace(
+                    endpoint("/detections_3d", d.BoundingBoxes3d), type_hash="RIHS01_12"
+                )
+            ),
+            "/detections_3d is another gb_visual_detection_3d_msgs/msg/BoundingBoxes3d:"
+            f" RIHS01_12 there, {type_hash(d.BoundingBoxes3d)} here (std_msgs/Header "
+            "header, gb_visual_detection_3d_msgs/BoundingBox3d[] bounding_boxes).",
+        ),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )
@@ -145,3 +201,48 @@ def test_a_domain_where_nobody_is_says_so_once() -> None:
 
     (sentence,) = found.missing
     assert "DDS domain 7" in sentence
+
+
+def test_without_odometry_transforms_are_not_called_missing() -> None:
+    counts = heard()
+    del counts["odometry"]
+
+    found = verdict(without="odometry", said=counts, stamp=0.0)
+
+    assert [one for one in found.missing if one.startswith("TF")] == []
+    assert len(found.missing) == 1
+
+
+def test_without_odometry_a_broken_chain_is_still_told() -> None:
+    found = verdict(buffer=tree(localised=False), stamp=0.0)
+
+    assert found.missing == ("TF: no map → odom.",)
+
+
+def test_beside_the_running_gate_the_check_knows_it() -> None:
+    gate = [
+        replace(endpoint("/cmd_vel", m.Twist), gate="AGI"),
+        replace(endpoint("/cmd_vel_nav", m.Twist, writes=False), gate="AGI"),
+        replace(endpoint("/iveg/obstacles", m.PointCloud2), gate="AGI"),
+    ]
+
+    found = verdict(*gate)
+
+    assert (found.missing, found.gate) == ((), "AGI")
+    assert "The gate of AGI is running." in lines(found)
+
+
+def test_a_second_publisher_beside_the_running_gate_is_still_told() -> None:
+    gate = replace(endpoint("/cmd_vel", m.Twist), gate="AGI")
+
+    (sentence,) = verdict(gate, endpoint("/cmd_vel", m.Twist)).missing
+
+    assert sentence.startswith("Somebody else publishes /cmd_vel")
+
+
+def test_a_detector_that_the_file_names_makes_others_none_of_its_business() -> None:
+    named = endpoint("/detections_3d", d.BoundingBoxes3d)
+
+    assert verdict(named, endpoint("/yolox/bounding_box", d.BoundingBoxes)) == (
+        verdict(named)
+    )

@@ -17,6 +17,7 @@ from iveg.domain.observations import Origin
 from iveg.robot.node import NodeSettings, RobotNode
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.rig import Ros2Robot
+from iveg.ros2 import detector_messages as d
 from iveg.ros2 import messages as m
 from tests.builders import AGI
 from tests.fakes.ros2_network import FakeNetwork, endpoint
@@ -159,3 +160,43 @@ async def test_when_it_ends_the_base_is_told_to_rest(tmp_path: Path) -> None:
 
     assert len(site.driven) > before
     assert site.driven[-1] == m.Twist()
+
+
+async def test_a_detector_is_read_in_the_type_in_which_it_publishes(
+    site: Site, caplog: pytest.LogCaptureFixture
+) -> None:
+    topic = "/agi/detections_3d"
+    site.network.others.append(endpoint(topic, d.BoundingBoxes3d))
+    await until(lambda: topic in site.network.asked)
+    placed(site.network)
+    bad = d.BoundingBox3d("farmer", 2.0)
+
+    site.network.publish(topic, d.BoundingBoxes3d(bounding_boxes=(bad,)))
+
+    await until(lambda: site.faults() & {"bad_probability", "no_transform"})
+    assert "unreadable" not in site.faults()
+    assert not [one for one in caplog.messages if "comes as" in one]
+
+
+async def test_a_detector_that_changes_its_type_is_told_in_one_sentence(
+    site: Site, caplog: pytest.LogCaptureFixture
+) -> None:
+    topic = "/agi/detections_3d"
+    site.network.others.append(endpoint(topic, d.BoundingBoxes3d))
+    await until(lambda: topic in site.network.asked)
+
+    site.network.others[:] = [endpoint(topic, d.DetectionArray)]
+
+    await until(lambda: site.network.asked[topic][0] is d.DetectionArray)
+    assert [one for one in caplog.messages if "comes as" in one] == [
+        f"AGI: {topic} comes as yolo_msgs/msg/DetectionArray now"
+    ]
+
+
+async def test_a_base_that_wants_another_type_is_a_fault_of_the_running_gate(
+    site: Site,
+) -> None:
+    base = endpoint("/agi/cmd_vel", m.TwistStamped, writes=False)
+    site.network.others.append(base)
+
+    await until(lambda: "drive_unheard" in site.faults())
