@@ -39,6 +39,8 @@ from iveg.ros2.schema import Message
 SILENT_S = 1.0
 _CLOCK_OFF_S = 10.0
 _TREE = frozenset({"tf_static", "tf"})
+_PLACED = "odometry", "scan", "detections_3d"
+"""Topics whose data have a frame."""
 
 _Work = Callable[[Any, Instant], Observation | None]
 """What follows from a message of a topic."""
@@ -74,6 +76,7 @@ class SensorInputs:
         self._newest: dict[str, tuple[type[Message], bytes]] = {}
         self._heard_at: dict[str, float] = {}
         self._first_heard = math.inf
+        self._is_placed = False
         self._began: float | None = None
         self._sent_at: dict[str, float] = {}
         self._works: dict[str, _Work] = {
@@ -154,11 +157,28 @@ class SensorInputs:
     def _awaits_transforms(self, now: float) -> bool:
         """Whether the first data stay pending, since transforms may follow at once.
 
-        DDS matches the topics of a base one after the other.
+        DDS matches the topics of a base one after the other, and each node publishes
+        its own link of the chain.
         """
-        if self._heard_at.keys() >= _TREE:
-            return False
-        return now - self._first_heard <= self._tf_max_age_s
+        if not self._is_placed:
+            overdue = now - self._first_heard > self._tf_max_age_s
+            whole = self._heard_at.keys() >= _TREE and self._knows_frames()
+            self._is_placed = overdue or whole
+        return not self._is_placed
+
+    def _knows_frames(self) -> bool:
+        """Whether the tree leads from the frame of each pending datum to ``map``."""
+        for topic in _PLACED:
+            if topic not in self._newest:
+                continue
+            try:
+                message: Any = cdr.read(*self._newest[topic])
+            except UnreadableError:
+                continue
+            frame = message.header.frame_id
+            if not self._places.knows(frame, on_robot=topic == "scan"):
+                return False
+        return True
 
     def _attempt(
         self,

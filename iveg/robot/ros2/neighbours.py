@@ -49,6 +49,20 @@ class Neighbour:
     ring: float
 
 
+@dataclass(frozen=True, slots=True)
+class _Told:
+    """Newest feedback of a topic.
+
+    Attributes:
+        at: When it came (monotonic, s).
+        posed: When its pose was news: a peer that is gone keeps the stamp of its last.
+    """
+
+    feedback: Feedback
+    at: float
+    posed: float
+
+
 class Neighbours:
     """Newest feedback of each topic; times are monotonic seconds.
 
@@ -58,22 +72,30 @@ class Neighbours:
 
     def __init__(self, robot_id: str) -> None:
         self._me = robot_id
-        self._told: dict[str, tuple[Feedback, float]] = {}
+        self._told: dict[str, _Told] = {}
 
     def note(self, peer: str, feedback: Feedback, now: float) -> None:
         """Store the content of ``/{peer}/mqtt_feedback``."""
-        self._told[peer] = feedback, now
+        before, stamp = self._told.get(peer), feedback.pose_stamp
+        is_old = before is not None and stamp and before.feedback.pose_stamp == stamp
+        posed = before.posed if before is not None and is_old else now
+        self._told[peer] = _Told(feedback, now, posed)
         while len(self._told) > _MOST:
             del self._told[next(iter(self._told))]
 
     def present(self, own: Pose2D | None, now: float) -> list[Neighbour]:
-        """All but this robot; one reported on two topics is listed once."""
-        live = [fb for fb, at in self._told.values() if now - at <= SILENT_S]
+        """All but this robot; one reported on two topics is listed once.
+
+        A peer whose pose stays the same message for ``ring_lasts_s`` is left out:
+        nobody knows any more where it is, or that it is there at all.
+        """
+        live = [one for one in self._told.values() if now - one.at <= SILENT_S]
         found: dict[object, Neighbour] = {}
-        for feedback in live:
+        for told in live:
+            feedback = told.feedback
             for one in self._people(feedback, own):
                 found[one.kind, round(one.x, 1), round(one.y, 1)] = one
-            peer = feedback.pose
+            peer = feedback.pose if now - told.posed <= LIMITS.ring_lasts_s else None
             if feedback.robot_id != self._me and peer is not None:
                 name = feedback.robot_id
                 found[name] = Neighbour("robot", name, peer.x, peer.y, PEER_M, 2.0)

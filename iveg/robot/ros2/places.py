@@ -98,6 +98,16 @@ class Places:
         """Pose of a frame in ``map``; None for a missing one."""
         return self._lookup(self._frames.map, frame, stamp, now)
 
+    def knows(self, frame: str, *, on_robot: bool = False) -> bool:
+        """Whether the tree leads from a frame to ``map``, however old its links are.
+
+        Args:
+            frame: As in a header.
+            on_robot: The way to ``base_link`` is enough, as for a laser.
+        """
+        up = self._transforms.chain(frame.lstrip("/"))
+        return self._frames.map in up or (on_robot and self._frames.base_link in up)
+
     def _lookup(
         self, outer: str, inner: str, stamp: float, now: float
     ) -> RigidTransform | None:

@@ -211,7 +211,7 @@ def read_path(
         UnreadableError: ``not_a_number``.
     """
     step = max(1, math.ceil(len(path.poses) / (MAX_PATH - 1)))
-    poses = [*path.poses[::step], *path.poses[-1:]]
+    poses = [*path.poses[:-1:step], *path.poses[-1:]]
     points = np.array([(p.pose.position.x, p.pose.position.y, 0.0) for p in poses])
     if not points.size:
         return Navigation("", UNKNOWN_ORIGIN, "idle")

@@ -77,6 +77,53 @@ def test_the_first_data_wait_for_the_transforms_that_follow_them() -> None:
     assert bench.faults(0.1) == {}
 
 
+@pytest.mark.parametrize(
+    "links",
+    [
+        [tf(link("odom", "base_link"))],
+        [tf(link("odom", "base_link")), tf(link("camera", "lens"))],
+    ],
+)
+def test_the_first_data_wait_for_the_whole_chain_not_for_its_first_link(
+    links: list[m.TFMessage],
+) -> None:
+    """Localisation publishes map → odom later than the base publishes its own."""
+    bench = Bench(tree=False, heard_for=0.0).hear("odometry", said.odometry(2.0))
+    bench.hear("tf_static", tf())
+    for one in links:
+        bench.hear("tf", one)
+    early = bench.tick()
+
+    (found,) = bench.hear("tf", tf(link("map", "odom", 10.0)), 0.3).tick(0.3)
+
+    assert early == []
+    assert isinstance(found, Odometry)
+    assert bench.faults(0.3) == {}
+
+
+def test_the_first_scan_waits_for_the_frame_of_its_laser() -> None:
+    bench = Bench(tree=False, heard_for=0.0).hear("tf", tf(link("map", "odom", 10.0)))
+    bench.hear("tf_static", tf())
+    bench.hear("odometry", said.odometry(2.0)).hear("scan", said.scan())
+    early = bench.tick()
+
+    bench.hear("tf_static", tf(link("base_link", "laser", 0.3)), 0.2)
+    _, found = bench.tick(0.2)
+
+    assert early == []
+    assert isinstance(found, LaserScan)
+    assert bench.faults(0.2) == {}
+
+
+def test_data_wait_for_the_chain_at_the_start_alone() -> None:
+    bench = Bench().hear("odometry", said.odometry(2.0))
+    bench.tick()
+
+    (found,) = bench.hear("scan", said.scan(frame="new"), 0.1).tick(0.1)
+
+    assert isinstance(found, Unplaced)
+
+
 def test_the_first_data_wait_no_longer_than_a_transform_may_be_old() -> None:
     bench = Bench(tree=False, heard_for=0.0).hear("odometry", said.odometry())
 
@@ -362,6 +409,21 @@ def test_a_plan_is_moved_into_map() -> None:
     assert isinstance(found, Navigation)
     assert (found.path[0], found.goal) == ((10.0, 0.0), (3009.0, 0.0))
     assert len(found.path) <= 1024
+
+
+@pytest.mark.parametrize("count", [1, 2, 5, 1023, 1024, 2045, 3069])
+def test_no_pose_of_a_path_is_told_twice(count: int) -> None:
+    header = m.Header(said.stamp(), "map")
+    poses = tuple(
+        m.PoseStamped(header, m.Pose(m.Point(float(x)))) for x in range(count)
+    )
+
+    (found,) = Bench().hear("path", m.Path(header, poses)).tick()
+
+    assert isinstance(found, Navigation)
+    assert len(set(found.path)) == len(found.path) <= 1024
+    assert found.path[0] == (0.0, 0.0)
+    assert found.path[-1] == found.goal == (count - 1.0, 0.0)
 
 
 def test_an_empty_plan_is_an_idle_robot() -> None:

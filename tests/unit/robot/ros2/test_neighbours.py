@@ -1,6 +1,7 @@
 """Costmap injection: who is near, for Nav2's obstacle layer and for RViz."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -68,6 +69,21 @@ def test_a_person_within_reach_of_the_hand_is_not_taken_for_oneself() -> None:
 
 def test_who_is_told_of_no_more_is_gone() -> None:
     assert present(told(alert(3.0, 2.0)), age=3.1) == []
+
+
+def test_a_peer_that_was_taken_away_leaves_although_its_last_pose_is_still_told() -> (
+    None
+):
+    known, moved = Neighbours("AGI"), "2026-11-24T08:00:00Z"
+    left = replace(told(), pose_stamp="2026-11-24T07:59:59Z")
+    known.note("AGII", left, 10.0)
+    for second in range(11, 22):
+        known.note("AGII", left, float(second))
+        assert bool(known.present(HERE, float(second))) == (second <= 20)
+
+    known.note("AGII", replace(left, pose_stamp=moved), 22.0)
+
+    assert [one.name for one in known.present(HERE, 22.0)] == ["AGII"]
 
 
 def test_a_person_becomes_a_disc_in_the_robots_own_frame() -> None:
