@@ -88,8 +88,8 @@ def add_replay(replay: argparse.ArgumentParser) -> None:
     )
     replay.add_argument("--speed", type=_speed, default=1.0, metavar="FACTOR")
     replay.add_argument("--loop", action="store_true", help="start over at the end")
-    replay.add_argument("--odom-topic", metavar="TOPIC", help="of a ROS bag")
-    replay.add_argument("--scan-topic", metavar="TOPIC", help="of a ROS bag")
+    for what in ("odom", "scan", "detections", "depth", "camera-info"):
+        replay.add_argument(f"--{what}-topic", metavar="TOPIC", help="of a ROS bag")
     replay.add_argument(
         "--bag-time",
         action="store_true",

@@ -1,6 +1,7 @@
 """Recorded logs as robots, as a process."""
 
 import argparse
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -30,8 +31,16 @@ async def replay(options: argparse.Namespace, settings: Settings) -> None:
                 options.frame,
             ),
             fleet=fleet,
-            bag=BagOptions(options.odom_topic, options.scan_topic, options.bag_time),
+            bag=BagOptions(
+                options.odom_topic,
+                options.scan_topic,
+                options.bag_time,
+                options.detections_topic,
+                options.depth_topic,
+                options.camera_info_topic,
+            ),
             poses=dict(options.pose),
+            tell=partial(print, flush=True),
         )
 
 

@@ -4,6 +4,8 @@ import asyncio
 import gzip
 import itertools
 import logging
+import math
+import re
 from collections.abc import AsyncIterator, Callable, Sequence
 from pathlib import Path
 
@@ -22,8 +24,12 @@ from iveg.domain.observations import (
 from iveg.ngsi import codec
 from iveg.robot.node import NodeSettings
 from iveg.robot.replay.replay import ReplaySettings, run_replay
-from tests import data
+from iveg.ros2 import detector_messages as d
+from iveg.ros2 import messages as m
+from tests import data, processes
 from tests.data.bags import Said, bag_directory, db3_bag, drive, mcap_bag, ros1_bag
+from tests.data.message_bags import Said as MessageSaid
+from tests.data.message_bags import message_bag
 from tests.data.recorded import emulated_logs, real_log
 from tests.integration.emulator_cloud import Cloud, broker, running, until
 from tests.processes import Site
@@ -254,6 +260,48 @@ async def test_a_bag_of_ros_is_played_like_any_recording(
     assert scan.ranges.tolist() == [1.0, float("inf"), float("inf"), 2.5]
     assert cloud.problems == []
     assert caplog.records == []
+
+
+def detected(stamp: float) -> d.BoundingBoxes3d:
+    """A person 3 m before the robot, in its own frame, as YOLACT tells it."""
+    header = m.Header(m.Time.of(stamp), "base_link")
+    box = d.BoundingBox3d("farmer", 0.9, 2.8, -0.3, 3.2, 0.3, 0.0, 1.8)
+    return d.BoundingBoxes3d(header, (box,))
+
+
+def yolact_bag(path: Path) -> Path:
+    """A robot that stands at (2, 1) for two seconds and sees a person."""
+    said: list[MessageSaid] = []
+    for tick in range(20):
+        at = 1000.0 + tick / 10
+        place = m.PoseWithCovariance(m.Pose(m.Point(2.0, 1.0)))
+        header = m.Header(m.Time.of(at), "odom")
+        said.append(("/odom", m.Odometry(header, "base_link", place), at))
+        said.append(("/yolact_coordinate", detected(at), at))
+    return message_bag(path, said)
+
+
+async def test_a_detector_in_a_bag_sees_its_person_on_the_map(
+    address: BrokerAddress, cloud: Cloud, tmp_path: Path
+) -> None:
+    bag = yolact_bag(tmp_path / "run")
+
+    await asyncio.wait_for(replay(address, tmp_path, bag), 30.0)
+
+    frame = next(one for one in cloud.of("AGI", DetectionFrame) if one.detections)
+    (seen,) = frame.detections
+    assert math.dist(seen.box.centre[:2], (5.0, 1.0)) <= 0.1
+    assert cloud.problems == []
+
+
+def test_the_command_tells_of_each_topic_what_becomes_of_it(place: Site) -> None:
+    bag = yolact_bag(place.directory / "run")
+
+    place.settings["IVEG_ROBOTS"] = "D1:recording"
+    replaying = place.start("replay", str(bag), "--robot", "D1", "--force")
+
+    row = re.compile(r"^/yolact_coordinate +gb_\S+ +20 +detections$", re.MULTILINE)
+    processes.until(lambda: row.search(replaying.text()), 30.0, "the table")
 
 
 def test_a_broken_bag_ends_the_command_with_one_sentence_and_status_two(

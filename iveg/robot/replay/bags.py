@@ -1,58 +1,31 @@
-"""ROS bags: odometry and laser scans from recordings of ROS 1 and ROS 2.
-
-Reads ``.db3`` and ``.mcap`` files, directories of ROS 2 and ``.bag`` files through
-rosbags.  The two messages are alike in all releases of ROS, so their usual definitions
-serve and no other definition of a bag is used.  Left out: transforms; the odometry
-frame is taken for ``map``, and the laser sits where the robot's profile says.
-"""
+"""ROS bags: odometry, scans and detections of recordings, placed by their TF."""
 
 import logging
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from datetime import UTC, datetime
+from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import Any
 
-from iveg.adapters.extras import require_extra
-from iveg.domain.errors import DataFileError
+from iveg.adapters import clock
+from iveg.domain.errors import UnreadableError
 from iveg.domain.geometry import Pose2D
-from iveg.domain.observations import UNKNOWN_ORIGIN, LaserScan, Odometry
+from iveg.robot.replay.bag_files import BagFile, Recorded
+from iveg.robot.replay.bag_pass import BagPass, BagTree
+from iveg.robot.replay.bag_plan import AS_RECORDED, BagOptions, BagPlan, Use
 from iveg.robot.replay.logs import RecordingEntry
-from iveg.robot.ros2.reading import read_pose, read_scan, read_twist
-from iveg.robot.ros2.rigid import IDENTITY
+from iveg.ros2 import cdr
 from iveg.ros2 import messages as m
 
-if TYPE_CHECKING:  # an extra: iveg[bags]
-    from rosbags.interfaces import Connection
-    from rosbags.rosbag1 import Reader as Ros1Reader
-    from rosbags.rosbag2 import Reader as Ros2Reader
+__all__ = ["AS_RECORDED", "Bag", "BagOptions"]
 
 _log = logging.getLogger(__name__)
 _LONGEST_S = 1e7
-ODOMETRY, SCAN = "nav_msgs/msg/Odometry", "sensor_msgs/msg/LaserScan"
-
-
-_Message = tuple[float, float, Odometry | LaserScan]
-"""When the recorder wrote it, and what its header says (s); 0 where the sender filled
-nothing in."""
-
-
-@dataclass(frozen=True, slots=True)
-class BagOptions:
-    """How a bag is read.
-
-    Attributes:
-        odometry: Topic to read; None takes the only one of its type; ``scan`` likewise.
-        bag_time: A bag is timed by its recording times, not by sensor stamps.
-    """
-
-    odometry: str | None = None
-    scan: str | None = None
-    bag_time: bool = False
-
-
-AS_RECORDED = BagOptions()
-"""The only topic of each type, by sensor stamps."""
+_FUTURE_S = 86_400.0
+_LINKS_AHEAD = 2000
+"""Messages of TF that tell, before the first pass, which frames there are."""
+_STAMPED = "odometry", "scan", "detections"
 
 
 class Bag:
@@ -61,7 +34,7 @@ class Bag:
     Args:
         path: A file ``.db3``, ``.mcap`` or ``.bag``, or a directory of ROS 2.
         options: Topics and clock.
-        mount: The laser's pose in ``base_link``.
+        mount: The laser's pose in ``base_link``, unless the bag has it.
         needs_odometry: Whether a bag without it is refused.
 
     Raises:
@@ -77,142 +50,120 @@ class Bag:
         *,
         needs_odometry: bool = True,
     ) -> None:
-        require_extra("bags", str(path))
-        from rosbags.typesys import Stores, get_typestore
-
-        self._path = path
+        self._file = BagFile(path)
+        self.plan = plan = BagPlan(self._file, options)
+        if not plan.has("odometry") and (
+            needs_odometry or not plan.has("scan", "detections")
+        ):
+            raise self._file.unusable(f"holds no topic of type {m.Odometry.ROS}")
         self._mount = mount
-        self._is_ros1 = path.suffix == ".bag" and not path.is_dir()
-        self._store = get_typestore(
-            Stores.ROS1_NOETIC if self._is_ros1 else Stores.ROS2_HUMBLE
-        )
         self._reported: set[str] = set()
-        with self._open() as reader:
-            found = reader.connections
-            odometry = self._choose(found, ODOMETRY, options.odometry, "--odom-topic")
-            scan = self._choose(found, SCAN, options.scan, "--scan-topic")
-        if odometry is None and (needs_odometry or scan is None):
-            raise self._unusable(f"holds no topic of type {ODOMETRY}")
-        self._topics = {odometry: ODOMETRY} if odometry else {}
-        self._topics |= {scan: SCAN} if scan else {}
+        self._tree = self._look_ahead()
         # Stamps count unless the first message has none: a bag uses one of the two
         # clocks throughout, since they may differ by years.
-        _, stamp_s, _ = next(self._messages(), (0.0, 1.0, None))
-        self._bag_time = options.bag_time or stamp_s <= 0.0
+        first = next(self._messages(*_STAMPED), None)
+        stamp = 0.0 if first is None else first[1].header.stamp.seconds
+        self._bag_time = options.bag_time or (first is not None and stamp <= 0.0)
+        if first is not None:
+            self._tell_future(first[0].logged_s if self._bag_time else stamp)
 
     def entries(self) -> Iterator[RecordingEntry]:
-        """All entries of both topics, in the order in which they were recorded.
+        """All entries, in the order in which they were recorded.
 
-        A message that cannot be used is skipped and reported once a topic; one with an
-        absurd stamp is omitted.
+        A message that cannot be used is skipped and counted; the first of a topic is
+        reported, and one with an absurd stamp is omitted.
 
         Raises:
             DataFileError: the recording breaks off.
         """
+        this = BagPass(self.plan.read, self._tree, self._mount)
         start: float | None = None
-        for logged_s, stamp_s, observation in self._messages():
-            at = logged_s if self._bag_time else stamp_s
-            start = at if start is None else start
-            if abs(at - start) <= _LONGEST_S:
-                yield RecordingEntry(at - start, observation)
-
-    def _messages(self) -> Iterator[_Message]:
-        with self._open() as reader:
-            wanted = [
-                one
-                for one in reader.connections
-                if self._topics.get(one.topic) == one.msgtype
-            ]
-            records = reader.messages(connections=wanted)
-            while True:
-                try:
-                    connection, logged, data = next(records)
-                except StopIteration:
-                    return
-                except Exception as error:  # whatever a damaged file provokes
-                    raise self._unreadable(error) from error
-                message = self._message(connection, logged, bytes(data))
-                if message is not None:
-                    yield message
-
-    # --- the file -----------------------------------------------------------------
-
-    @contextmanager
-    def _open(self) -> "Iterator[Ros1Reader | Ros2Reader]":
-        from rosbags.rosbag1 import Reader as Ros1Reader
-        from rosbags.rosbag2 import Reader as Ros2Reader
-
-        reader: Ros1Reader | Ros2Reader
-        with ExitStack() as stack:
+        look_at = 0.0
+        for recorded, use in self._records():
             try:
-                reader = (
-                    Ros1Reader(self._path) if self._is_ros1 else Ros2Reader(self._path)
-                )
-                stack.enter_context(reader)
-            except Exception as error:  # whatever a foreign file provokes
-                raise self._unreadable(error) from error
-            yield reader
+                message = self._read(recorded, use)
+                found = this.observe(use, message, recorded.logged_s)
+            except UnreadableError as error:
+                this.losses[recorded.topic, error.reason] += 1
+                self._report(recorded, str(error))
+                continue
+            at = self._time(recorded, message)
+            if use.role in _STAMPED:
+                start = at if start is None else start
+            if use.role == "detections":
+                look_at = at
+            if found is None:
+                found, at = this.late_frame(recorded.logged_s), look_at
+            if (
+                found is not None
+                and start is not None
+                and abs(at - start) <= _LONGEST_S
+            ):
+                yield RecordingEntry(at - start, found)
+        self._tell_counts(this)
 
-    def _choose(
-        self, found: "list[Connection]", kind: str, wanted: str | None, option: str
-    ) -> str | None:
-        """The topic to read; None when there is none of its type."""
-        topics = sorted({one.topic for one in found if one.msgtype == kind})
-        there = f"{kind}: {', '.join(topics) or 'none'}"
-        if wanted is not None:
-            if wanted not in topics:
-                raise self._unusable(f"{option} {wanted} is not among those of {there}")
-            return wanted
-        if len(topics) > 1:
-            raise self._unusable(f"{option} must name one of those of {there}")
-        return topics[0] if topics else None
-
-    def _unusable(self, reason: str) -> DataFileError:
-        return DataFileError(str(self._path), "", f"{reason}.")
-
-    def _unreadable(self, error: Exception) -> DataFileError:
-        said = " ".join(str(error).split()) or type(error).__name__
-        return self._unusable(f"cannot be read: {said.rstrip('.')}")
+    def _time(self, recorded: Recorded, message: Any) -> float:
+        header = getattr(message, "header", None)
+        if self._bag_time or header is None:
+            return recorded.logged_s
+        return float(header.stamp.seconds)
 
     # --- its messages -------------------------------------------------------------
 
-    def _message(
-        self, connection: "Connection", logged: int, data: bytes
-    ) -> _Message | None:
-        try:
-            stamp_s, observation = self._read(connection.msgtype, data)
-        except Exception as error:  # whatever foreign bytes provoke
-            if connection.topic not in self._reported:
-                self._reported.add(connection.topic)
-                _log.warning(
-                    "%s, %s: unusable messages are skipped, such as at %d ns: %s",
-                    self._path,
-                    connection.topic,
-                    logged,
-                    str(error) or type(error).__name__,
-                )
-            return None
-        return logged / 1e9, stamp_s, observation
+    def _records(self, *roles: str) -> Iterator[tuple[Recorded, Use]]:
+        """Messages of topics with these roles; without, of all that are read."""
+        uses = {
+            name: use
+            for name, use in self.plan.read.items()
+            if not roles or use.role in roles
+        }
+        for recorded in self._file.messages([one.topic for one in uses.values()]):
+            yield recorded, uses[recorded.topic]
 
-    def _read(self, kind: str, data: bytes) -> tuple[float, Odometry | LaserScan]:
-        store = self._store
-        read = store.deserialize_ros1 if self._is_ros1 else store.deserialize_cdr
-        message = read(data, kind)
-        # The fields of its messages have the names that they have in ROS, as ours do.
-        if kind == ODOMETRY:
-            odometry = cast("m.Odometry", message)
-            return _stamp_of(odometry), _odometry(odometry)
-        scan = cast("m.LaserScan", message)
-        return _stamp_of(scan), replace(read_scan(scan, IDENTITY), mount=self._mount)
+    def _messages(self, *roles: str) -> Iterator[tuple[Recorded, Any]]:
+        """Those of them that can be read."""
+        for recorded, use in self._records(*roles):
+            with suppress(UnreadableError):
+                yield recorded, self._read(recorded, use)
 
+    def _read(self, recorded: Recorded, use: Use) -> Any:
+        return cdr.read(use.form, recorded.payload)
 
-def _stamp_of(message: "m.Odometry | m.LaserScan") -> float:
-    # A time of rosbags has the fields of ours and none of its properties.
-    stamp = message.header.stamp
-    return float(stamp.sec + stamp.nanosec / 1e9)
+    def _look_ahead(self) -> BagTree:
+        """Which frames the bag has."""
+        static = [one for _, one in self._messages("tf_static")]
+        moving = [one for _, one in islice(self._messages("tf"), _LINKS_AHEAD)]
+        _, odometry = next(self._messages("odometry"), (None, None))
+        return BagTree(static, moving, odometry)
 
+    # --- what is told -------------------------------------------------------------
 
-def _odometry(message: m.Odometry) -> Odometry:
-    """Seen from above: pose in the odometry frame, twist in the robot's own."""
-    pose, twist = read_pose(message), read_twist(message.twist.twist)
-    return Odometry("", UNKNOWN_ORIGIN, pose.flat(), twist)
+    def _report(self, recorded: Recorded, why: str) -> None:
+        if recorded.topic in self._reported:
+            return
+        self._reported.add(recorded.topic)
+        _log.warning(
+            "%s, %s: unusable messages are skipped, such as at %d ns: %s",
+            self._file.path,
+            recorded.topic,
+            round(recorded.logged_s * 1e9),
+            why,
+        )
+
+    def _tell_future(self, start: float) -> None:
+        if start > clock.wall() + _FUTURE_S:
+            day = datetime.fromtimestamp(min(start, 2.5e11), UTC).date()
+            _log.warning(
+                "%s is of %s, which is still to come: it plays by the differences.",
+                self._file.path,
+                day,
+            )
+
+    def _tell_counts(self, this: BagPass) -> None:
+        """What became of each topic's messages; one that gave nothing is no detail."""
+        for topic, count in sorted(this.used.items()):
+            _log.info("%s, %s: %d used", self._file.path, topic, count)
+        for (topic, why), count in sorted(this.losses.items()):
+            level = logging.INFO if this.used[topic] else logging.WARNING
+            told = self._file.path, topic, count, why
+            _log.log(level, "%s, %s: %d not used: %s", *told)

@@ -17,7 +17,13 @@ from pydantic import Field, TypeAdapter, ValidationError
 
 from iveg.domain.errors import DataFileError, UnreadableError
 from iveg.domain.geometry import Pose2D, Twist2D, box_of_a_person
-from iveg.domain.observations import Detection, LaserScan, Odometry, Origin
+from iveg.domain.observations import (
+    Detection,
+    DetectionFrame,
+    LaserScan,
+    Odometry,
+    Origin,
+)
 from iveg.ngsi.codec import load_json
 from iveg.ngsi.codec.scans import ranges_of
 from iveg.ngsi.payloads import (
@@ -36,14 +42,14 @@ _LONGEST_LINE = 1 << 20
 
 @dataclass(frozen=True, slots=True)
 class RecordingEntry:
-    """One line of a log.
+    """One line of a log, or one message of a bag.
 
     Attributes:
         at: Seconds from the start of the recording.
     """
 
     at: float
-    observation: Odometry | LaserScan | Detection
+    observation: Odometry | LaserScan | Detection | DetectionFrame
 
 
 class LogReader:

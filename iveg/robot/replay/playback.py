@@ -4,14 +4,21 @@ from collections import deque
 from collections.abc import Callable, Iterator
 
 from iveg.domain.geometry import Pose2D, Twist2D
-from iveg.domain.observations import Detection, LaserScan, Odometry
+from iveg.domain.observations import (
+    Detection,
+    DetectionFrame,
+    LaserScan,
+    Odometry,
+)
 from iveg.robot.replay.logs import RecordingEntry
 
 _READ_AHEAD = 256
 """Entries searched for the next pose; beyond, the last pose is kept."""
 
 _SEEN_FOR_S = 0.4
-"""How long (s of the recording) a detection frame counts, unless another follows."""
+"""How long (s of the recording) detections count, unless others follow."""
+_SILENT_S = 1.0
+"""How long a whole frame counts: a detector that then tells none has fallen silent."""
 _ONE_PICTURE_S = 0.02
 """Detections within this time (s) are one frame; frames come 30 times a second."""
 
@@ -25,7 +32,9 @@ class Playback:
 
     Attributes:
         ended: Whether the last entry was played; never with ``loop``.
-        has_detector: Whether a detection was read: then none means an empty frame.
+        has_detector: Whether a detection was read: then none means an empty frame; of
+            whole frames, empty ones too, whether one is at most a second old.
+        unread: Class of each box of the newest frame that has no place.
     """
 
     def __init__(
@@ -34,7 +43,7 @@ class Playback:
         self._open = open_
         self._loop = loop
         self.ended = False
-        self.has_detector = False
+        self.has_detector = self._is_frame = False
         self._start_over()
 
     def _start_over(self) -> None:
@@ -42,6 +51,8 @@ class Playback:
         self._ahead: deque[RecordingEntry] = deque()
         self._poses_ahead: deque[tuple[float, Odometry]] = deque()
         self._picture: tuple[Detection, ...] = ()
+        self.unread: tuple[str | None, ...] = ()
+        self.has_detector = self.has_detector and not self._is_frame
         self._seen_at = 0.0
         self._scan: LaserScan | None = None
         self._read_ahead()
@@ -57,8 +68,10 @@ class Playback:
         while self._ahead and self._ahead[0].at <= self._at:
             self._apply(self._ahead.popleft())
             self._read_ahead()
-        if self._at - self._seen_at >= _SEEN_FOR_S:
-            self._picture = ()
+        age = self._at - self._seen_at
+        if age >= (_SILENT_S if self._is_frame else _SEEN_FOR_S):
+            self._picture, self.unread = (), ()
+            self.has_detector = self.has_detector and not self._is_frame
         if not self._ahead and self._loop:
             self._start_over()
         self.ended = not self._ahead and not self._loop
@@ -81,6 +94,9 @@ class Playback:
             case Detection() as detection:
                 self.has_detector = True
                 self._see(detection, entry.at)
+            case DetectionFrame(detections=seen, unread=unread):
+                self.has_detector = self._is_frame = True
+                self._picture, self.unread, self._seen_at = seen, unread, entry.at
 
     def _see(self, detection: Detection, at: float) -> None:
         """The newest frame replaces the one before: a walking person counts once."""

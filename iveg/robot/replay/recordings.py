@@ -24,6 +24,7 @@ def open_recording(
     bag: BagOptions = AS_RECORDED,
     *,
     pose: Pose2D | None = None,
+    tell: Callable[[str], None] = lambda _: None,
 ) -> Recording:
     """Open a recording by its file name.
 
@@ -32,12 +33,13 @@ def open_recording(
         mount: Pose of a bag's laser in ``base_link``; logs contain it.
         bag: Topics and clock of a bag.
         pose: Fixed pose of a recording without odometry, such as a camera's.
+        tell: Takes a line for each topic of a bag: what becomes of it.
 
     Raises:
         DataFileError: unknown format, unreadable file, or neither odometry nor a fixed
             pose.
     """
-    recording = _opened(path, mount, bag, fixed=pose is not None)
+    recording = _opened(path, mount, bag, tell, fixed=pose is not None)
     if any(isinstance(one.observation, Odometry) for one in recording()):
         return recording
     if pose is None:
@@ -48,9 +50,19 @@ def open_recording(
     return partial(_fixed, recording, pose)
 
 
-def _opened(path: Path, mount: Pose2D, bag: BagOptions, *, fixed: bool) -> Recording:
+def _opened(
+    path: Path,
+    mount: Pose2D,
+    bag: BagOptions,
+    tell: Callable[[str], None],
+    *,
+    fixed: bool,
+) -> Recording:
     if path.is_dir() or path.suffix in _BAGS:
-        return Bag(path, bag, mount, needs_odometry=not fixed).entries
+        opened = Bag(path, bag, mount, needs_odometry=not fixed)
+        for line in (f"{path}:", *opened.plan.table()):
+            tell(line)
+        return opened.entries
     if path.suffix in _LOGS:
         return LogReader(path).entries
     known = ", ".join((*_LOGS[:1], ".jsonl.gz", *_BAGS))

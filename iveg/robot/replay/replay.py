@@ -8,7 +8,7 @@ and detections are repeated, as the sensors of a robot at rest do.
 """
 
 import asyncio
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -66,6 +66,7 @@ async def run_replay(
     bag: BagOptions = AS_RECORDED,
     fleet: FleetDescription | None = None,
     poses: Mapping[str, Pose2D] | None = None,
+    tell: Callable[[str], None] = lambda _: None,
 ) -> None:
     """Play recordings; returns when all have ended, never with ``loop``.
 
@@ -77,6 +78,7 @@ async def run_replay(
         bag: Topics and clock of a ROS bag.
         fleet: Fleet description; None: no description.
         poses: By robot, the fixed pose of a recording without odometry.
+        tell: Takes a line for each topic of a bag: what becomes of it.
 
     Raises:
         DataFileError: files and robots do not match, or a file cannot be used.
@@ -85,7 +87,7 @@ async def run_replay(
     known, stands = fleet or NOBODY, poses or {}
     profiles = [known.of_robot(robot_id).profile for robot_id in robots]
     recordings = [
-        open_recording(file, profile.laser, bag, pose=stands.get(robot_id))
+        open_recording(file, profile.laser, bag, pose=stands.get(robot_id), tell=tell)
         for file, robot_id, profile in zip(files, robots, profiles, strict=True)
     ]
     playbacks = [Playback(one, loop=settings.loop) for one in recordings]
@@ -210,8 +212,8 @@ class ReplayedRobot:
             self._node.sense(scan)
         looks = self._playback.has_detector
         if looks and self._is_due(DetectionFrame, _LOOK_EVERY_S, now):
-            seen = self._playback.detections
-            self._node.sense(DetectionFrame(self.robot_id, Origin(), seen))
+            seen, unread = self._playback.detections, self._playback.unread
+            self._node.sense(DetectionFrame(self.robot_id, Origin(), seen, unread))
 
     def _is_due(self, kind: type, period: float, now: float) -> bool:
         if now - self._sent_at[kind] < period:

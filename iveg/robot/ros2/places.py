@@ -84,6 +84,10 @@ class Places:
         late = here is None or abs(stamp - here.stamp) > self._max_age_s
         return None if late else laser
 
+    def on_robot(self, frame: str, stamp: float, now: float) -> RigidTransform | None:
+        """Pose of a frame in ``base_link``; None where one is missing."""
+        return self._lookup(self._frames.base_link, frame, stamp, now)
+
     def _laser(self, frame: str, stamp: float, now: float) -> RigidTransform | None:
         here = self.here
         if here is not None:
@@ -92,7 +96,7 @@ class Places:
                 return here.in_odom.inverse().compose(in_odom)
             except NoTransformError:
                 pass  # odometry may be missing in the tree; the mount must be there
-        return self._lookup(self._frames.base_link, frame, stamp, now)
+        return self.on_robot(frame, stamp, now)
 
     def in_map(self, frame: str, stamp: float, now: float) -> RigidTransform | None:
         """Pose of a frame in ``map``; None for a missing one."""

@@ -4,7 +4,13 @@ from pathlib import Path
 import pytest
 
 from iveg.domain.geometry import Box3D, Pose2D, Twist2D
-from iveg.domain.observations import Detection, LaserScan, Odometry, Origin
+from iveg.domain.observations import (
+    Detection,
+    DetectionFrame,
+    LaserScan,
+    Odometry,
+    Origin,
+)
 from iveg.robot.replay.logs import LogReader, RecordingEntry
 from iveg.robot.replay.playback import Playback
 from tests import data
@@ -86,6 +92,45 @@ def test_a_detection_is_seen_for_a_moment_of_the_recording() -> None:
     assert len(seen) == 1
     assert (at_first, later) == (False, True)
     assert paused == seen
+    assert playback.detections == ()
+
+
+def looked(at: float, *xs: float, unread: tuple[str, ...] = ()) -> RecordingEntry:
+    boxes = tuple(saw(at, x).observation for x in xs)
+    detections = tuple(one for one in boxes if isinstance(one, Detection))
+    return RecordingEntry(at, DetectionFrame("", Origin(), detections, unread))
+
+
+def test_a_whole_frame_counts_until_the_next_and_an_empty_one_is_empty() -> None:
+    frames = looked(0.2, 1.0, 5.0, unread=("farmer",)), looked(1.1)
+    entries = moved(0.0, 0.0), *frames, moved(9.0, 1.0)
+    playback = Playback(log(*entries), loop=False)
+
+    playback.advance(0.7)
+    both, lost = playback.detections, playback.unread
+    playback.advance(0.5)
+
+    assert [one.box.xmin for one in both] == [0.5, 4.5]
+    assert lost == ("farmer",)
+    assert (playback.detections, playback.unread) == ((), ())
+    assert playback.has_detector
+
+
+@pytest.mark.parametrize("loop", [False, True])
+def test_a_detector_of_whole_frames_that_falls_silent_sees_nobody_no_longer(
+    loop: bool,
+) -> None:
+    entries = moved(0.0, 0.0), looked(0.5, 1.0), moved(2.0, 1.0), moved(3.0, 1.0)
+    playback = Playback(log(*entries), loop=loop)
+
+    playback.advance(1.4)
+    seen = playback.has_detector
+    playback.advance(0.2)
+    silent = playback.has_detector
+    playback.advance(1.5)
+
+    assert (seen, silent) == (True, False)
+    assert not playback.has_detector
     assert playback.detections == ()
 
 
