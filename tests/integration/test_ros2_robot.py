@@ -1,6 +1,7 @@
 """``iveg robot`` as a process: one gate a robot, a flood on a real DDS, and a check."""
 
 import asyncio
+import math
 import re
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
@@ -12,16 +13,20 @@ import pytest
 from iveg.adapters import clock
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.domain.feedback import CLEAR, Feedback
-from iveg.domain.observations import Origin, SafetyReport
+from iveg.domain.observations import DetectionFrame, Origin, SafetyReport
 from iveg.ngsi import codec
-from iveg.ngsi.names import direct_topic
+from iveg.ngsi.names import direct_topic, measure_topic
 from iveg.ros2 import cdr, names
+from iveg.ros2 import detector_messages as d
 from iveg.ros2 import messages as m
 from tests.brokers import broker_on
 from tests.dds import Dds, free_domain, loopback
 from tests.processes import Program, Site, site
 
 ROBOT = "AGI"
+_KEY, _DETECTIONS = "iveg", "_yolox_bounding_boxes"
+PERSON = d.BoundingBox3d("farmer", 0.9, 2.8, 0.2, 3.2, 0.8, 0.0, 1.8)
+"""3 m before the robot and 0.5 m to its left."""
 _BURST = 100
 """Twice what a reader holds."""
 
@@ -51,8 +56,10 @@ def riding(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Riding]:
     who += ["--ros-interface", "127.0.0.1", "--ros-peer", "127.0.0.1"]
     words = ["robot", "--attended", *who]
     one, other = (tmp_path_factory.mktemp(name) for name in ("one", "other"))
+    config = one / "robot.toml"
+    config.write_text('[topics]\ndetections_3d = "/yolact_coordinate"\n')
     with site(one, IVEG_ROBOTS=ROBOT) as place:
-        gate = place.start(*words)
+        gate = place.start(*words, "--config", str(config))
         gate.wait_until_ready()
         with site(other, **place.settings | {"XDG_DATA_HOME": str(other)}) as second:
             here, elsewhere = place.start(*words), second.start(*words)
@@ -64,14 +71,20 @@ class Iveg:
 
     def __init__(self, address: BrokerAddress) -> None:
         self.report: SafetyReport | None = None
-        self.link = MqttLink(
-            address, "iveg", {direct_topic(ROBOT, "_safety"): 1}, self._take
-        )
+        self.frame: DetectionFrame | None = None
+        self._devices = {
+            direct_topic(ROBOT, "_safety"): f"{ROBOT}_safety",
+            measure_topic(_KEY, f"{ROBOT}{_DETECTIONS}"): f"{ROBOT}{_DETECTIONS}",
+        }
+        topics = dict.fromkeys(self._devices, 1)
+        self.link = MqttLink(address, "iveg", topics, self._take)
 
-    def _take(self, _: str, payload: bytes) -> None:
-        for one in codec.read_measure(f"{ROBOT}_safety", payload).observations:
+    def _take(self, topic: str, payload: bytes) -> None:
+        for one in codec.read_measure(self._devices[topic], payload).observations:
             if isinstance(one, SafetyReport):
                 self.report = one
+            elif isinstance(one, DetectionFrame):
+                self.frame = one
 
     async def talk(self) -> None:
         """Name the newest report ten times a second."""
@@ -94,6 +107,7 @@ class Sensors:
     def __init__(self, dds: Dds) -> None:
         self._odometry = dds.writer("/odom", m.Odometry, names.DEFAULT.newest(_BURST))
         self._tf = dds.writer("/tf", m.TFMessage, names.DEFAULT)
+        self._boxes = dds.writer("/yolact_coordinate", d.BoundingBoxes3d, names.DEFAULT)
         self.drive = dds.reader("/cmd_vel", m.Twist, names.DEFAULT)
         self.burst = 1
 
@@ -107,6 +121,8 @@ class Sensors:
                 m.TransformStamped(odom, "base_link"),
             )
             self._tf.write(cdr.write(m.TFMessage(links)))
+            base = m.Header(stamp, "base_link")
+            self._boxes.write(cdr.write(d.BoundingBoxes3d(base, (PERSON,))))
             for _ in range(self.burst):
                 self._odometry.write(cdr.write(m.Odometry(odom, "base_link")))
             await asyncio.sleep(1 / 30)
@@ -143,6 +159,19 @@ async def reported(iveg: Iveg, faults: set[str], factor: float) -> None:
             await asyncio.sleep(0.05)
 
 
+async def test_a_detector_with_its_own_messages_tells_iveg_of_its_person(
+    riding: Riding,
+) -> None:
+    async with at_work(riding) as (iveg, _):
+        async with asyncio.timeout(30.0):
+            while iveg.frame is None or not iveg.frame.detections:  # noqa: ASYNC110
+                await asyncio.sleep(0.05)
+
+    (seen,) = iveg.frame.detections
+    assert (seen.class_id, seen.frame_id) == ("farmer", "map")
+    assert math.dist(seen.box.centre[:2], (3.0, 0.5)) <= 0.1
+
+
 async def test_a_flood_on_dds_is_named_and_slows_the_robot_until_it_is_over(
     riding: Riding,
 ) -> None:
@@ -169,6 +198,7 @@ async def test_a_check_tells_a_robot_that_talks_what_it_lacks(riding: Riding) ->
     assert "TF: map → odom → base_link" in said
     assert "Nobody publishes /scan (sensor_msgs/msg/LaserScan): if it has one." in said
     assert "The gate of AGI is running." in said
+    assert "/yolact_coordinate is a detector's (gb_visual_detection_3d_msgs/" in said
     assert "publishes /cmd_vel:" not in said
     assert "Nobody listens on /cmd_vel:" not in said
     assert "broker" not in said
