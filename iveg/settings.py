@@ -4,6 +4,7 @@ Built once from an environment that is handed in; read by ``cli`` and ``app`` al
 ``docs/settings.md`` is generated from the table below.
 """
 
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
@@ -24,6 +25,7 @@ from pydantic import (
 from iveg.domain.errors import SettingsError
 from iveg.domain.fleet import split_word
 from iveg.domain.limits import LIMITS
+from iveg.domain.retention import Retention
 
 # --- what values may be: a rule, and behind it the same in words ----------------------
 
@@ -94,6 +96,9 @@ _DirectRead = Annotated[
     Literal["all", "safety", "off"],
     BeforeValidator(lambda text: {"on": "all"}.get(text.lower(), text.lower())),
     "one of all, safety, off, or on, which means all",
+]
+_Days = Annotated[
+    int, Interval(ge=0, le=36500), "a number of whole days from 0, for ever, to 36500"
 ]
 _QUIET: Final = ConfigDict(hide_input_in_errors=True)
 """A secret that cannot be used stands in no traceback either."""
@@ -249,6 +254,27 @@ class Settings:
         "Remind of a STOP drill when a robot's last one is older than this (days); "
         "0: never. A robot that was never drilled is not reminded of.",
     )
+    keep_positions_days: _Days = setting(
+        "IVEG_KEEP_POSITIONS_DAYS",
+        Retention.positions,
+        "Places of people in detections, decisions and log; the rows stay without them "
+        "(days; 0: for ever).",
+    )
+    keep_telemetry_days: _Days = setting(
+        "IVEG_KEEP_TELEMETRY_DAYS",
+        Retention.telemetry,
+        "Odometry, detections, climate and readings of sensors (days; 0: for ever).",
+    )
+    keep_decisions_days: _Days = setting(
+        "IVEG_KEEP_DECISIONS_DAYS",
+        Retention.decisions,
+        "Decisions, commands, alerts and log (days; 0: for ever).",
+    )
+    keep_audit_days: _Days = setting(
+        "IVEG_KEEP_AUDIT_DAYS",
+        Retention.audit,
+        "The audit trail of STOP, release and resume (days; 0: for ever).",
+    )
     uplink: Literal["per-topic", "single"] = setting(
         "IVEG_UPLINK",
         "per-topic",
@@ -279,13 +305,31 @@ class Settings:
                 shown = "(hidden)" if variable in _SECRETS else _without_login(text)
                 raise SettingsError(variable, shown, _allowed(hint)) from error
         settings = cls(**values)
-        if settings.feedback_stand_s <= settings.feedback_slow_s:
-            raise SettingsError(
-                "IVEG_FEEDBACK_STAND_S",
-                f"{settings.feedback_stand_s:g}",
-                "more than IVEG_FEEDBACK_SLOW_S",
-            )
+        settings._check_together()
         return settings
+
+    def _check_together(self) -> None:
+        """Raise SettingsError where two settings contradict each other."""
+        kept, forever = self.retention, math.inf
+        if self.feedback_stand_s <= self.feedback_slow_s:
+            name, value = "IVEG_FEEDBACK_STAND_S", f"{self.feedback_stand_s:g}"
+            raise SettingsError(name, value, "more than IVEG_FEEDBACK_SLOW_S")
+        if (kept.positions or forever) > (kept.decisions or forever):
+            name, value = "IVEG_KEEP_POSITIONS_DAYS", str(kept.positions)
+            raise SettingsError(name, value, "no longer than IVEG_KEEP_DECISIONS_DAYS")
+        if (kept.audit or forever) < (kept.decisions or forever):
+            name, value = "IVEG_KEEP_AUDIT_DAYS", str(kept.audit)
+            raise SettingsError(name, value, "no shorter than IVEG_KEEP_DECISIONS_DAYS")
+
+    @property
+    def retention(self) -> Retention:
+        """How long the history keeps what."""
+        return Retention(
+            self.keep_positions_days,
+            self.keep_telemetry_days,
+            self.keep_decisions_days,
+            self.keep_audit_days,
+        )
 
     @property
     def notify_address(self) -> str:

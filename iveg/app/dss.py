@@ -41,6 +41,8 @@ from iveg.pipeline.build import Choices, Ports, build, build_services
 from iveg.pipeline.latency import hours_of
 from iveg.pipeline.ports import MessageSender
 from iveg.pipeline.restore import remember
+from iveg.pipeline.retention import PART as RETENTION
+from iveg.pipeline.retention import HistoryUpkeep
 from iveg.settings import Settings
 from iveg.web.api import messages
 from iveg.web.build import Face
@@ -99,9 +101,16 @@ class Dss:
         greenhouse = load_greenhouse(settings.greenhouse)
         self.pipeline = build(fleet, greenhouse, self._ports(), choices)
         self.services = build_services(self.pipeline, kept, self._senders(), clock.now)
+        self.upkeep = HistoryUpkeep(
+            self.stores.retained(),
+            settings.retention,
+            self.pipeline.event_log,
+            self.pipeline.supervision,
+        )
         self.counted: list[Counter[str]] = [
             log_filter.counted,
             self.services.messenger.counters,
+            self.upkeep.counters,
         ]
         self.worker = Worker(partial(self.pipeline.supervision.failed, "worker"))
         self._attach_reader()
@@ -248,6 +257,7 @@ class Dss:
             "coverage": lambda: beside.coverage.run(clock.now),
             "provisioner": self.provisioner.run,
             "history": self.stores.recorder.run,
+            RETENTION: lambda: self.upkeep.run(clock.now),
             "messages": beside.messenger.run,
             "earlier": self._remember,
             "loop-watch": LoopWatch(supervision.note_turn).run,

@@ -9,6 +9,7 @@ from iveg.adapters.detectors import FileDetectors
 from iveg.adapters.history.engine import history_url, sqlite_file
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.recorder import Recorder, journal_file
+from iveg.adapters.history.upkeep import RecordedHistory
 from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.journal import FileJournal
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
@@ -44,6 +45,10 @@ class Stores:
     def history_state(self) -> HopState:
         """State of the history."""
         return self.recorder.health(clock.now()).state
+
+    def retained(self) -> RecordedHistory:
+        """The history as its upkeep sees it."""
+        return RecordedHistory(self.recorder, self.queries, self.directory)
 
     def kept_choices(self, first: DetectionRule) -> KeptChoices:
         """Choices of earlier runs; ``first`` is the rule where there is none."""

@@ -74,6 +74,7 @@ class DetectionRecord:
         at: When it reached iVeg.
         stamp: The robot's clock, exactly as sent.
         class_: Canonical; None for a class that the alias table does not know.
+        x, y, z: None where the place is no longer kept (``retention.py``).
         confident: Whether it reached the threshold.
         transport: Id of the transport whose copy was first.
         box: The box with its ``frame_id``; None when it was not kept.
@@ -83,9 +84,9 @@ class DetectionRecord:
     robot_id: str
     class_id: str
     probability: float
-    x: float
-    y: float
-    z: float
+    x: float | None = None
+    y: float | None = None
+    z: float | None = None
     confident: bool
     transport: str
     stamp: str | None = None

@@ -1,5 +1,7 @@
 """The evening sheet: one day of the fleet (docs/interfaces/resources.md)."""
 
+from typing import Literal
+
 from pydantic import Field
 
 from iveg.models.base import Model
@@ -62,4 +64,10 @@ class Day(Model):
         description="Robots whose STOP drill is due by the end of the next day."
     )
     unseen: int = Field(description="P1s that nobody has acknowledged.")
+    lost: list[Literal["places", "telemetry"]] = Field(
+        description=(
+            "What of the day is no longer kept: places of people (no passes, no aisles "
+            "of causes) or odometry and detections (nothing worked, no passes)."
+        )
+    )
     map: GreenhouseMap

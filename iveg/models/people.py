@@ -73,8 +73,8 @@ class DetectionBox(Model):
         )
 
 
-class Detection(Model):
-    """One box of one detection frame, placed in ``map``."""
+class KeptDetection(Model):
+    """One box of one detection frame, as it is remembered."""
 
     robot_id: str
     stamp: str | None
@@ -87,7 +87,9 @@ class Detection(Model):
     class_: str | None = Field(validation_alias="class", serialization_alias="class")
     class_id: str
     probability: float
-    position: Position
+    position: Position | None = Field(
+        description="Null in the history, where it is no longer kept."
+    )
     box: DetectionBox | None
     confident: bool
     person_id: str | None
@@ -95,6 +97,29 @@ class Detection(Model):
         default=None, description="The robot of the fleet that was seen."
     )
     transport: TransportId = Field(description="Transport of the copy that was first.")
+
+    @classmethod
+    def of_record(cls, record: DetectionRecord) -> "KeptDetection":
+        """One detection as it is remembered."""
+        return cls(
+            robot_id=record.robot_id,
+            stamp=record.stamp,
+            received_at=format_stamp(record.at),
+            class_=record.class_,
+            class_id=record.class_id,
+            probability=record.probability,
+            position=_position(record),
+            box=_box(record.box),
+            confident=record.confident,
+            person_id=record.person_id,
+            transport=TransportId(record.transport),
+        )
+
+
+class Detection(KeptDetection):
+    """One box of one detection frame, placed in ``map``."""
+
+    position: Position
 
     @classmethod
     def of(
@@ -116,22 +141,11 @@ class Detection(Model):
             transport=transport,
         )
 
-    @classmethod
-    def of_record(cls, record: DetectionRecord) -> "Detection":
-        """One detection as it is remembered."""
-        return cls(
-            robot_id=record.robot_id,
-            stamp=record.stamp,
-            received_at=format_stamp(record.at),
-            class_=record.class_,
-            class_id=record.class_id,
-            probability=record.probability,
-            position=Position(x=record.x, y=record.y, z=record.z),
-            box=_box(record.box),
-            confident=record.confident,
-            person_id=record.person_id,
-            transport=TransportId(record.transport),
-        )
+
+def _position(record: DetectionRecord) -> Position | None:
+    if record.x is None or record.y is None:
+        return None
+    return Position(x=record.x, y=record.y, z=record.z or 0.0)
 
 
 def _box(found: Json | None) -> DetectionBox | None:

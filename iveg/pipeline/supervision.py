@@ -13,6 +13,7 @@ import logging
 from collections import Counter
 from collections.abc import Awaitable, Callable, Iterable
 from functools import wraps
+from itertools import chain
 from typing import ParamSpec
 
 from iveg.domain.alerts.conditions import SHOWN_S
@@ -52,6 +53,7 @@ class Supervision:
         """Of this minute, and of the one before."""
         self._long_turns: dict[str, tuple[float, float]] = {}
         """Part → when its newest long turn ended (monotonic, s), and its CPU (s)."""
+        self._found: dict[str, tuple[Condition, ...]] = {}
 
     def guard(self, part: str, call: Callable[_P, object]) -> Callable[_P, None]:
         """The same call, whose failure is the part's and not its caller's."""
@@ -92,6 +94,10 @@ class Supervision:
             self._stopped.discard(part)
             pause_s = min(LONGEST_PAUSE_S, 2.0 * pause_s)
 
+    def report(self, part: str, wrong: Iterable[Condition]) -> None:
+        """What a part has found wrong, in the place of what it found before."""
+        self._found[part] = tuple(wrong)
+
     def note_turn(self, part: str, cpu_s: float) -> None:
         """One turn of the loop is over, which took so much CPU (s)."""
         now = self._clock()
@@ -114,7 +120,11 @@ class Supervision:
         self._minute = minute
 
     def conditions(self, now: Instant) -> Iterable[Condition]:
-        """A P3 for each part that is down, a P2 for each that held up the loop."""
+        """A P3 for each part that is down, a P2 for each that held up the loop.
+
+        Beside them, what parts have reported.
+        """
+        yield from chain.from_iterable(self._found.values())
         for part in self._failed_at:
             if self._is_down(part, now):
                 yield Condition("P3", "alert.part_down", part, None, {"part": part})

@@ -43,6 +43,13 @@ BAD = [
     ("IVEG_DIRECT_READ", "1", "one of all, safety, off, or on, which means all"),
     ("IVEG_FEEDBACK_SLOW_S", "0", "a number from 0.1 to 10"),
     ("IVEG_FEEDBACK_STAND_S", "61", "a number from 0.2 to 60"),
+    ("IVEG_KEEP_TELEMETRY_DAYS", "-1", "whole days from 0, for ever, to 36500"),
+    ("IVEG_KEEP_TELEMETRY_DAYS", "nan", "whole days from 0"),
+    ("IVEG_KEEP_DECISIONS_DAYS", "0.5", "whole days from 0"),
+    ("IVEG_KEEP_AUDIT_DAYS", "36501", "whole days from 0"),
+    ("IVEG_KEEP_POSITIONS_DAYS", "366", "no longer than IVEG_KEEP_DECISIONS_DAYS"),
+    ("IVEG_KEEP_POSITIONS_DAYS", "0", "no longer than IVEG_KEEP_DECISIONS_DAYS"),
+    ("IVEG_KEEP_AUDIT_DAYS", "364", "no shorter than IVEG_KEEP_DECISIONS_DAYS"),
     ("IVEG_UPLINK", "both", "one of per-topic, single"),
     ("IVEG_ON_LINK_LOSS", "drive", "one of stop, slow"),
 ]
@@ -93,6 +100,16 @@ def test_a_password_inside_an_address_is_not_told(variable: str) -> None:
 def test_a_robot_stands_later_than_it_slows() -> None:
     with pytest.raises(SettingsError, match="more than IVEG_FEEDBACK_SLOW_S"):
         Settings.from_environment({"IVEG_FEEDBACK_SLOW_S": "3.0"})
+
+
+def test_what_is_kept_for_ever_is_kept_longer_than_all_else() -> None:
+    for_ever = {"IVEG_KEEP_DECISIONS_DAYS": "0", "IVEG_KEEP_POSITIONS_DAYS": "4000"}
+
+    kept = Settings.from_environment(for_ever | {"IVEG_KEEP_AUDIT_DAYS": "0"}).retention
+
+    assert (kept.decisions, kept.positions, kept.audit) == (0, 4000, 0)
+    with pytest.raises(SettingsError, match=r"IVEG_KEEP_AUDIT_DAYS='400' .* shorter"):
+        Settings.from_environment(for_ever)
 
 
 def test_an_empty_environment_gives_the_defaults_of_the_contract() -> None:
@@ -153,6 +170,10 @@ GOOD = {
     "IVEG_FEEDBACK_STAND_S": "2.0",
     "IVEG_ON_LINK_LOSS": "slow",
     "IVEG_DRILL_DAYS": "7",
+    "IVEG_KEEP_POSITIONS_DAYS": "3",
+    "IVEG_KEEP_TELEMETRY_DAYS": "0",
+    "IVEG_KEEP_DECISIONS_DAYS": "100",
+    "IVEG_KEEP_AUDIT_DAYS": "500",
     "IVEG_UPLINK": "single",
     "IVEG_GREENHOUSE": "none",
     "IVEG_FLEET": "/etc/iveg/fleet.toml",

@@ -104,6 +104,8 @@ def _with_timeout(url: URL) -> URL:
 def _prepare_sqlite(connection: DBAPIConnection, _: ConnectionPoolEntry) -> None:
     connection.isolation_level = None
     for pragma in (
+        # Counts in a new file alone, and before anything is written to it.
+        "auto_vacuum=INCREMENTAL",
         "journal_mode=WAL",
         "synchronous=NORMAL",
         "foreign_keys=ON",

@@ -7,12 +7,12 @@ up the event loop nor takes the threads that a STOP's journal needs.
 import asyncio
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
-from sqlalchemy import Connection, Select, and_, func, or_, select
+from sqlalchemy import Connection, Select, func, select
 from sqlalchemy.exc import SQLAlchemyError
 
-from iveg.adapters.history import lists, series
+from iveg.adapters.history import ages, lists, series
 from iveg.adapters.history.engine import reading_engine
 from iveg.adapters.history.lists import Filter, Page, R, record_of
 from iveg.adapters.history.migrate import reason_of
@@ -21,6 +21,7 @@ from iveg.adapters.history.tables import (
     command_events,
     commands,
     decisions,
+    is_open_command,
     latency,
 )
 from iveg.domain.day import DaySighting, Pose
@@ -91,12 +92,9 @@ class Queries:
     async def open_commands(self) -> tuple[CommandRecord, ...]:
         """Commands whose last row says that they still go on, oldest first."""
         c = commands.c
-        ended = ("RUNNING", "REPLACED", "EXPIRED")
-        stops = and_(c.kind == "stop", c.state.not_in(ended))
         wanted = (
             select(commands)
-            # A release that was refused or confirmed keeps the state that followed.
-            .where(or_(stops, and_(c.kind != "stop", c.state == "RELEASING")))
+            .where(is_open_command())
             .order_by(c.requested_at, c.command_id)
         )
         return await self._records(CommandRecord, wanted)
@@ -186,6 +184,12 @@ class Queries:
         poses = await self._ask(lambda c: series.poses_of(c, since, until))
         return poses, await self._ask(lambda c: series.people_seen(c, since, until))
 
+    async def lost_of_day(
+        self, since: float, until: float
+    ) -> tuple[Literal["places", "telemetry"], ...]:
+        """What of a range is no longer kept, or of a part of it."""
+        return await self._ask(lambda c: ages.lost_of(c, since, until))
+
     async def climate_series(self, since: float, until: float) -> series.ClimateSeries:
         """The air over a range, at most 288 points."""
         return await self._ask(lambda c: series.climate_series(c, since, until))
@@ -211,6 +215,14 @@ class Queries:
         c = latency.c
         wanted = select(latency).where(c.at >= since).order_by(c.at, c.row_id)
         return await self._records(LatencyRecord, wanted)
+
+    async def recorded_days(self, most: int) -> tuple[int, ...]:
+        """Days (UTC, since 1970) with a line in the log, newest first."""
+        return await self._ask(lambda c: ages.recorded_days(c, most))
+
+    async def oldest_telemetry(self) -> float | None:
+        """The oldest row of telemetry (Unix s); None where there is none."""
+        return await self._ask(ages.oldest_telemetry)
 
     def close(self) -> None:
         """Let go of threads and connections."""

@@ -16,7 +16,9 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, TypeVar
+
+from sqlalchemy import Connection
 
 from iveg.adapters import clock
 from iveg.adapters.history.engine import sqlite_file
@@ -28,6 +30,7 @@ from iveg.domain.records import CommandEventRecord, CommandRecord, Record
 from iveg.pipeline.record import CAPACITY, RecordQueue, Waiting
 
 _log = logging.getLogger(__name__)
+_T = TypeVar("_T")
 _BATCH = 500
 _GATHER_S = 0.25
 _LATE_S = 2.0
@@ -138,6 +141,27 @@ class Recorder:
             "history_rejected": self._store.rejected + self._journal.unreadable,
             "history_waiting": len(self._queue),
         }
+
+    # --- beside it ----------------------------------------------------------------
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether rows wait that go before any other work.
+
+        Not while the database is away: a full disk has no room for them before
+        something is deleted.
+        """
+        return self._lost_since is None and len(self._queue) >= _BATCH
+
+    async def between_batches(self, work: Callable[[Connection], _T]) -> _T:
+        """Other work of the one writer, a transaction between two batches.
+
+        Raises:
+            HopError: the database is away.
+            DataFileError: it cannot be used.
+        """
+        loop = asyncio.get_running_loop()
+        return await loop.run_in_executor(self._thread, self._store.run, work)
 
     # --- the one writer -----------------------------------------------------------
 

@@ -18,7 +18,12 @@ from sqlalchemy import (
 )
 
 from iveg.adapters.history.lists import record_of
-from iveg.adapters.history.tables import climate, commands, detections, odometry
+from iveg.adapters.history.tables import (
+    climate,
+    commands,
+    detections,
+    odometry,
+)
 from iveg.domain.day import DaySighting, Pose
 from iveg.domain.records import ByTransport, CommandRecord
 
@@ -158,6 +163,8 @@ def people_seen(
     wanted = (
         select(second, func.avg(c.x), func.avg(c.y), c.robot_id)
         .where(c.at >= since, c.at < until, c.confident, c.class_ == "person")
+        # A place that is no longer kept is no place near a robot.
+        .where(c.x.is_not(None))
         # Two people of one second must not become one between them.
         .group_by(c.robot_id, c.person_id, second)
         .order_by(second)

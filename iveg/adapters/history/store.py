@@ -5,8 +5,9 @@ and left out, so that it cannot hold up everything behind it.
 """
 
 import logging
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import fields
+from typing import TypeVar
 
 from sqlalchemy import Connection, Engine, Insert, Table, delete
 from sqlalchemy.dialects import postgresql, sqlite
@@ -28,6 +29,7 @@ from iveg.pipeline.record import Waiting
 
 _log = logging.getLogger(__name__)
 _Row = dict[str, object]
+_T = TypeVar("_T")
 _FIELDS = {kind: tuple(f.name for f in fields(kind)) for kind in TABLE_MAPPINGS}
 _VALUE_ERRORS = (ValueError, TypeError, OverflowError)
 
@@ -56,6 +58,23 @@ class Store:
                 self._let_go(error)
                 raise HopError("database", reason_of(error)) from error
             self._write_one_by_one(engine, rows)
+
+    def run(self, work: Callable[[Connection], _T]) -> _T:
+        """Other work of the one writer, in a transaction of its own.
+
+        Raises:
+            HopError: the database is away, locked, full or damaged.
+            DataFileError: it cannot be brought to the shape that is written here.
+        """
+        engine = self._ready()
+        try:
+            with engine.connect() as connection:
+                _choose_durability(connection, ())
+                with connection.begin():
+                    return work(connection)
+        except DBAPIError as error:
+            self._let_go(error)
+            raise HopError("database", reason_of(error)) from error
 
     def close(self) -> None:
         """Let go of the connection; the next write makes a new one."""

@@ -13,6 +13,7 @@ from sqlalchemy import (
     BigInteger,
     Boolean,
     Column,
+    ColumnElement,
     Double,
     Index,
     Integer,
@@ -20,7 +21,10 @@ from sqlalchemy import (
     Table,
     Text,
     UniqueConstraint,
+    and_,
     false,
+    or_,
+    text,
 )
 from sqlalchemy.types import TypeEngine
 
@@ -116,9 +120,9 @@ detections = Table(
     _text("robot_id", null=False),
     _text("class_id", null=False),
     _number("probability", null=False),
-    _number("x", null=False),
-    _number("y", null=False),
-    _number("z", null=False),
+    _number("x"),
+    _number("y"),
+    _number("z"),
     Column("confident", Boolean, nullable=False),
     _text("transport", null=False),
     _text("stamp"),
@@ -163,6 +167,7 @@ command_events = Table(
     _text("why", null=False),
     UniqueConstraint("command_id", "at", "state", "why"),
     Index(None, "robot_id", "at"),
+    Index(None, "at"),
     sqlite_autoincrement=True,
 )
 
@@ -267,6 +272,30 @@ readings = Table(
     Index(None, "robot_id", "at"),
     sqlite_autoincrement=True,
 )
+
+
+def _placed(name: str, at: Column[float], sqlite: str, postgresql: str) -> Index:
+    """Index of the rows that have a place still, by which they are found to lose it."""
+    return Index(name, at, sqlite_where=text(sqlite), postgresql_where=text(postgresql))
+
+
+placed_detections = _placed(
+    "ix_detections_placed", detections.c.at, "x IS NOT NULL", "x IS NOT NULL"
+)
+placed_decisions = _placed(
+    "ix_decisions_placed", decisions.c.started_at, "x IS NOT NULL", "x IS NOT NULL"
+)
+placed_lines = _placed(
+    "ix_log_placed", log.c.at, "instr(slots, '\"x\":') > 0", "slots ? 'x'"
+)
+
+
+def is_open_command() -> ColumnElement[bool]:
+    """Whether the last row of a command says that it still goes on."""
+    c = commands.c
+    stops = and_(c.kind == "stop", c.state.not_in(("RUNNING", "REPLACED", "EXPIRED")))
+    # A release that was refused or confirmed keeps the state that followed.
+    return or_(stops, and_(c.kind != "stop", c.state == "RELEASING"))
 
 
 @dataclass(frozen=True, slots=True)

@@ -125,6 +125,7 @@ class _Reading:
             stops=[Command.of_record(one) for one in await self._stops(since, until)],
             drills_due=due_drills(last, self._drill_days, by),
             unseen=len(await self._queries.unseen_alerts(MOST_KEPT)),
+            lost=list(await self._queries.lost_of_day(since, until)),
             map=GreenhouseMap.of(self._greenhouse),
         )
 

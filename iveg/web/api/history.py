@@ -32,7 +32,7 @@ from iveg.models.base import Listing, Model, write_json
 from iveg.models.climate import ClimateReading
 from iveg.models.command import Command
 from iveg.models.decision import Decision
-from iveg.models.people import Detection
+from iveg.models.people import KeptDetection
 from iveg.models.reading import Reading
 from iveg.pipeline.ports import Clock
 from iveg.web.api import exports
@@ -179,8 +179,8 @@ def _lists(queries: Queries, flood: Callable[[], Flood]) -> tuple[_List[Any], ..
             "detections",
             lists.DETECTIONS,
             queries.detections,
-            Detection.of_record,
-            Listing[Detection],
+            KeptDetection.of_record,
+            Listing[KeptDetection],
             "What robots saw, by when it reached iVeg",
         ),
         _List(

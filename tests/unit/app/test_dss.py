@@ -22,6 +22,7 @@ async def test_mqtt_and_the_rule_loop_alone_share_the_fate_of_the_process(
         "coverage",
         "provisioner",
         "history",
+        "retention",
         "messages",
         "earlier",
         "loop-watch",

@@ -8,11 +8,14 @@ import httpx
 import pytest
 from fastapi import FastAPI
 
+from iveg.adapters.history.engine import writing_engine
+from iveg.adapters.history.purge import purge_batch
 from iveg.adapters.history.store import Store
 from iveg.domain.geometry import Rectangle
 from iveg.domain.greenhouse import DriveLane, Greenhouse
 from iveg.domain.observations import Instant
 from iveg.domain.records import Record
+from iveg.domain.retention import DAY_S, PURGE_STEPS
 from iveg.pipeline.record import Waiting
 from iveg.web.api import day
 from iveg.web.pages.contexts import Site
@@ -43,8 +46,12 @@ RECORDS: tuple[Record, ...] = (
 
 
 @pytest.fixture
-async def browser(tmp_path: Path) -> AsyncIterator[httpx.AsyncClient]:
-    url = f"sqlite:///{tmp_path / 'history.db'}"
+def url(tmp_path: Path) -> str:
+    return f"sqlite:///{tmp_path / 'history.db'}"
+
+
+@pytest.fixture
+async def browser(url: str) -> AsyncIterator[httpx.AsyncClient]:
     store = Store(url)
     store.write([Waiting(one, n, 0.0) for n, one in enumerate(RECORDS, 1)])
     store.close()
@@ -84,6 +91,49 @@ async def test_another_day_has_none_of_it(browser: httpx.AsyncClient) -> None:
     told = (await browser.get("/api/v1/day", params={"day": "2026-11-19"})).json()
 
     assert (told["worked"], told["passes"], told["stops"]) == ([], [], [])
+
+
+@pytest.mark.parametrize(
+    ("days", "kind", "lost", "sentences"),
+    [
+        ("2026-11-20", None, [], ()),
+        (
+            "2026-11-20",
+            "positions",
+            ["places"],
+            ("positions of people of that day are no longer kept", "aisle no longer"),
+        ),
+        (
+            "2026-11-19",
+            None,
+            ["telemetry"],
+            ("no longer holds where robots drove", "Nobody can say any more"),
+        ),
+    ],
+)
+async def test_what_a_day_lost_is_told_and_is_not_nothing(
+    browser: httpx.AsyncClient,
+    url: str,
+    days: str,
+    kind: str | None,
+    lost: list[str],
+    sentences: tuple[str, ...],
+) -> None:
+    engine = writing_engine(url)
+    with engine.begin() as connection:
+        for step in PURGE_STEPS:
+            if step.kind == kind:
+                purge_batch(connection, step, MORNING + DAY_S, lambda: 0.0)
+    engine.dispose()
+
+    told = (await browser.get("/api/v1/day", params={"day": days})).json()
+    sheet = await browser.get(
+        "/day", params={"day": days}, headers={"Accept-Language": "en"}
+    )
+
+    assert told["lost"] == lost
+    for sentence in sentences:
+        assert sentence in sheet.text
 
 
 @pytest.mark.parametrize(

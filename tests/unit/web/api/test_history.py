@@ -648,7 +648,7 @@ async def test_the_lists_are_described_for_integrators(past: Past) -> None:
         "text/csv",
         "application/x-ndjson",
     }
-    fields = described["components"]["schemas"]["Detection"]["properties"]
+    fields = described["components"]["schemas"]["KeptDetection"]["properties"]
     assert {"class", "position", "transport"} <= set(fields)
 
 

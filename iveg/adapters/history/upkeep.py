@@ -1,0 +1,78 @@
+"""The history as its upkeep sees it: batches of the one writer, and the disk."""
+
+import asyncio
+from collections.abc import Callable
+from pathlib import Path
+
+from iveg.adapters import clock
+from iveg.adapters.disk import disk_space
+from iveg.adapters.history.engine import sqlite_file
+from iveg.adapters.history.purge import (
+    PurgeBatch,
+    give_back,
+    purge_batch,
+    room_inside,
+)
+from iveg.adapters.history.queries import Queries
+from iveg.adapters.history.recorder import Recorder
+from iveg.domain.disk_space import DiskSpace
+from iveg.domain.errors import HopError
+from iveg.domain.retention import PurgeStep
+
+
+class RecordedHistory:
+    """Implements ``pipeline.retention.RetainedHistory``.
+
+    Args:
+        recorder: The one writer.
+        queries: Its reading side.
+        directory: Of the data, whose disk is watched.
+        stopwatch: Bounds each batch; monotonic (s).
+        read_space: Room on the disk of a directory.
+    """
+
+    def __init__(
+        self,
+        recorder: Recorder,
+        queries: Queries,
+        directory: Path,
+        stopwatch: Callable[[], float] = clock.mono,
+        read_space: Callable[[Path], DiskSpace] = disk_space,
+    ) -> None:
+        self._recorder = recorder
+        self._directory = directory
+        self._stopwatch = stopwatch
+        self._read_space = read_space
+        self._is_file = sqlite_file(queries.url) is not None
+        self.recorded_days = queries.recorded_days
+        self.oldest_telemetry = queries.oldest_telemetry
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether rows wait that go first."""
+        return self._recorder.is_busy
+
+    async def purge(self, step: PurgeStep, before: float) -> PurgeBatch:
+        """One batch of a step, of rows older than this (Unix s)."""
+        return await self._recorder.between_batches(
+            lambda connection: purge_batch(connection, step, before, self._stopwatch)
+        )
+
+    async def give_back(self) -> PurgeBatch:
+        """One batch of room that is given back to the disk."""
+        return await self._recorder.between_batches(
+            lambda connection: give_back(connection, self._stopwatch)
+        )
+
+    async def room_inside(self) -> int | None:
+        """Bytes of its file that new rows fill first; None on a server's own disk."""
+        if not self._is_file:
+            return None
+        return await self._recorder.between_batches(room_inside)
+
+    async def disk_space(self) -> DiskSpace:
+        """Room on the disk of the data."""
+        try:
+            return await asyncio.to_thread(self._read_space, self._directory)
+        except OSError as error:
+            raise HopError("disk", error.strerror or str(error)) from error
