@@ -103,9 +103,9 @@ def _settings(_: Call) -> int:
 
 
 def _db(call: Call) -> int:
-    from iveg.cli.serve import upgrade_database
+    from iveg.cli.database import run_db
 
-    return upgrade_database(call.settings, call.data)
+    return run_db(call.options, call.settings, call.data)
 
 
 COMMANDS = (

@@ -72,7 +72,12 @@ def add_serve(serve: argparse.ArgumentParser) -> None:
 
 def add_db(database: argparse.ArgumentParser) -> None:
     """Arguments of ``iveg db``."""
-    database.add_argument("action", choices=("upgrade",))
+    actions = database.add_subparsers(dest="action", required=True)
+    actions.add_parser("upgrade", help="to the newest schema")
+    actions.add_parser("stats", help="rows, bytes and ages of each table")
+    purge = actions.add_parser("purge", help="delete now what is kept no longer")
+    purge.add_argument("--dry-run", action="store_true", help="count it alone")
+    actions.add_parser("vacuum", help="give the room of deleted rows back")
 
 
 def add_replay(replay: argparse.ArgumentParser) -> None:

@@ -112,11 +112,3 @@ async def _upgrade_history(settings: Settings, data: Path) -> None:
         await asyncio.to_thread(upgrade, history_url(settings.database_url, data))
     except HopError as error:
         _log.warning("the history starts without its database: %s", error)
-
-
-def upgrade_database(settings: Settings, data: Path) -> int:
-    """Upgrade the history's database to the newest schema."""
-    data.mkdir(parents=True, exist_ok=True)
-    upgrade(history_url(settings.database_url, data))
-    print("The database is up to date.")
-    return 0

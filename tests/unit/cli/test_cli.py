@@ -9,12 +9,17 @@ from typing import Literal
 import pytest
 
 from iveg import __version__
+from iveg.adapters import clock
+from iveg.adapters.history.store import Store
 from iveg.cli import UNUSABLE, main
 from iveg.cli.nodes import node_settings
 from iveg.cli.running import print_sign_in_link, sign_in_link
 from iveg.domain.errors import SettingsError
+from iveg.domain.records import Record
 from iveg.lab.commands.demo import on_free_ports
+from iveg.pipeline.record import Waiting
 from iveg.settings import Settings, describe
+from tests.fakes.records import NOON, log_record, odometry_record
 
 
 @pytest.fixture(autouse=True)
@@ -73,7 +78,9 @@ def test_a_bad_setting_stops_the_start_with_one_sentence(
         ["replay", "log.jsonl", "--robot", "AGI", "--pose", "AGI:1,2"],
         ["replay", "log.jsonl", "--robot", "AGI", "--pose", "AGI:1,nan,0"],
         ["replay", "log.jsonl", "--robot", "AGI", "--frame", "our map"],
+        ["db"],
         ["db", "downgrade"],
+        ["db", "stats", "--dry-run"],
     ],
 )
 def test_words_that_mean_nothing_are_refused(
@@ -141,6 +148,72 @@ def test_the_database_is_made_where_data_lives(
     assert run(["db", "upgrade"]) == 0
     assert (tmp_path / "iveg" / "iveg.sqlite").exists()
     assert capsys.readouterr().out == "The database is up to date.\n"
+
+
+@pytest.mark.parametrize("action", ["stats", "purge", "vacuum"])
+def test_a_database_that_is_not_there_is_one_sentence(
+    capsys: pytest.CaptureFixture[str], action: str
+) -> None:
+    assert run(["db", action]) == 1
+    assert "there is none; `iveg db upgrade` makes it" in capsys.readouterr().err
+
+
+@pytest.fixture
+def old_rows(tmp_path: Path) -> str:
+    """A database where data lives, with odometry of 2023 and a line of today."""
+    run(["db", "upgrade"])
+    url = f"sqlite:///{tmp_path / 'iveg' / 'iveg.sqlite'}"
+    store = Store(url)
+    rows: list[Record] = [odometry_record(at=NOON + n) for n in range(120)]
+    rows += (log_record(id=n, at=clock.wall() - n * 86400.0) for n in range(40))
+    store.write([Waiting(one, n, 0.0) for n, one in enumerate(rows)])
+    store.close()
+    return url
+
+
+def test_a_purge_is_counted_first_and_then_done(
+    capsys: pytest.CaptureFixture[str], old_rows: str
+) -> None:
+    capsys.readouterr()
+
+    assert run(["db", "purge", "--dry-run"]) == 0
+    counted = capsys.readouterr().out
+    assert run(["db", "purge"]) == 0
+    done = capsys.readouterr().out
+    assert run(["db", "purge"]) == 0
+    again = capsys.readouterr().out
+
+    assert "\n       120 rows of odometry before " in counted
+    assert counted.endswith("Nothing was deleted.\n")
+    assert "\n       120 rows of odometry before " in done
+    assert "\n         0 rows of odometry before " in again
+    assert "\n         0 rows of log before " in done
+
+
+def test_stats_say_what_fills_the_disk(
+    capsys: pytest.CaptureFixture[str], old_rows: str
+) -> None:
+    capsys.readouterr()
+
+    assert run(["db", "stats"]) == 0
+    head, *lines, hours = capsys.readouterr().out.splitlines()
+    told = {line.split()[0]: line.split()[1:] for line in lines}
+
+    assert head.split()[:3] == ["table", "rows", "MB"]
+    rows, _, *ages, _ = told["odometry"]
+    assert rows == "120"
+    assert ages == ["2023-11-14T22:13:20.000Z", "2023-11-14T22:15:19.000Z"]
+    assert told["all"][0] == "160"
+    assert hours == "0.1 robot-hours of odometry."
+
+
+def test_a_vacuum_says_that_it_is_done(
+    capsys: pytest.CaptureFixture[str], old_rows: str
+) -> None:
+    capsys.readouterr()
+
+    assert run(["db", "vacuum"]) == 0
+    assert capsys.readouterr().out == "The room of deleted rows is given back.\n"
 
 
 # --- the demo's addresses ---------------------------------------------------------
