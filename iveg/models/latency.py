@@ -60,6 +60,9 @@ class SegmentOrder(Model):
     missing: int
     reordered: int
     repeated: int
+    skipped: int = Field(
+        default=0, description="Of those that passed, not read: newer ones were there."
+    )
 
 
 class LatencyStream(Model):

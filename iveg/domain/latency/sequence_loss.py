@@ -30,13 +30,14 @@ class SequenceLoss:
         newest: Highest number so far; None before the first of a boot.
         missing: Numbers that never came; ``reordered`` that came after a later one;
             ``repeated`` that came twice.
-        unread: Came since the newest was taken, and were not looked into.
+        unread: Came since the newest was taken, and were not looked into; ``skipped``
+            of all time.  They have passed.
     """
 
     def __init__(self) -> None:
         self.newest: int | None = None
         self.passed = self.missing = self.reordered = self.repeated = 0
-        self.unread = 0
+        self.unread = self.skipped = 0
         self._past: deque[tuple[int, int, int]] = deque(maxlen=_RECENT_S + 1)
 
     def restart(self) -> None:

@@ -48,7 +48,8 @@ class Stream:
         excluded: Messages that are in no statistics, by hop and reason.
         up: Order of arrival at the broker; ``fiware`` at Orion.
         is_throttled: Orion was told to leave most of it out: Δt₂ is a sample.
-        orion_first: How often Orion's copy was here before our reading of the broker.
+        orion_first: How often Orion's copy was here before our reading of the broker:
+            these have a total, and neither Δt₁ nor Δt₂.
         decided_at: When the newest was decided on (monotonic, s); None: never.
     """
 
@@ -88,7 +89,10 @@ class Stream:
             return
         self.up.count(seq)
         if self._seqs[place] == seq:
-            self._overtaken(place, at.mono)
+            # When it was at the broker is not known, so nothing says how the way of
+            # Orion's copy, which is measured, divides.
+            self.orion_first += 1
+            self._state[place] = _BOTH
             return
         took = self._transit("uplink", origin, at, composed_at)
         self._put(place, seq, at.mono, took, _AGENT if agent else _DENSE)
@@ -98,6 +102,7 @@ class Stream:
         """So many were at the broker, and newer ones with them: none is lost."""
         self._heard += count
         self.up.unread += count
+        self.up.skipped += count
 
     def notified(
         self, origin: Origin, at: Instant, composed_at: float | None, *, thinned: bool
@@ -187,18 +192,6 @@ class Stream:
     def _put(self, place: int, seq: int, at: float, took: float, state: int) -> None:
         self._seqs[place], self._seen_at[place] = seq, at
         self._took[place], self._state[place] = took, state
-
-    def _overtaken(self, place: int, now: float) -> None:
-        """Orion's copy was here before our own reading of the same message.
-
-        The broker had it by then at the latest: all the way counts as Δt₁, and Δt₂ is
-        less than what the reading itself takes.
-        """
-        self.orion_first += 1
-        self._state[place] = _BOTH
-        self.segments["fiware"].add(0.0, now)
-        if not isnan(self._took[place]):
-            self.segments["uplink"].add(self._took[place], now)
 
     def _transit(
         self, hop: Segment, origin: Origin, at: Instant, composed_at: float | None

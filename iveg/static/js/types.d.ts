@@ -804,6 +804,8 @@ export type SegmentOrder = {
   missing: number;
   reordered: number;
   repeated: number;
+  /** Of those that passed, not read: newer ones were there. */
+  skipped: number;
 };
 
 /** A present problem of a hop: key and values of a sentence. */

@@ -242,6 +242,7 @@ def _order(of: SequenceLoss) -> SegmentOrder:
         missing=of.missing,
         reordered=of.reordered,
         repeated=of.repeated,
+        skipped=of.skipped,
     )
 
 

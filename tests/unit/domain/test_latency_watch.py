@@ -83,16 +83,12 @@ def test_without_direct_reading_both_ways_are_one_number() -> None:
     assert chain.took("fiware").count == 0
 
 
-def test_a_fiware_that_is_faster_than_our_reading_shows_as_zero_and_never_below() -> (
-    None
-):
+def test_a_way_whose_parting_nobody_saw_is_a_total_alone() -> None:
     chain = Chain(reading=still(0.030))
 
     chain.run(5.0)
 
-    assert chain.took("fiware").count >= 97
-    assert chain.took("fiware").most == 0.0
-    assert chain.took("uplink").mean == pytest.approx(0.024, abs=0.001)
+    assert chain.took("fiware").count == chain.took("uplink").count == 0
     assert chain.took("robot_orion").mean == pytest.approx(0.024, abs=0.001)
     assert chain.stream().orion_first >= 97
 
@@ -295,7 +291,7 @@ def test_what_newer_ones_overtook_before_it_was_read_is_not_lost() -> None:
     watch.arrived(received(odometry(origin=origin(5)), transport=DIRECT.id))
 
     (stream,) = (one for one in watch.streams if one.data == "odometry")
-    assert (stream.up.passed, stream.up.missing) == (5, 1)
+    assert (stream.up.passed, stream.up.missing, stream.up.skipped) == (5, 1, 3)
 
 
 def test_disorder_is_named_at_its_hop() -> None:
