@@ -77,7 +77,7 @@ class Ensured:
     copies: Mapping[WantedSubscription, tuple[str, bool]] = field(default_factory=dict)
 
 
-_ROBOTS = (("idPattern", ".*"), ("type", names.ROBOT_TYPE))
+ALL_ROBOTS = (("idPattern", ".*"), ("type", names.ROBOT_TYPE))
 
 
 def _names_of(kind: Kind) -> tuple[str, ...]:
@@ -86,14 +86,16 @@ def _names_of(kind: Kind) -> tuple[str, ...]:
 
 WANTED_OF_ALL = (
     *(
-        WantedSubscription(one.name, _ROBOTS, _names_of(one))
+        WantedSubscription(one.name, ALL_ROBOTS, _names_of(one))
         for one in MEASURED
         if not one.is_copied
     ),
-    WantedSubscription("commands", _ROBOTS, (names.COMMAND_STATUS, names.COMMAND_INFO)),
+    WantedSubscription(
+        "commands", ALL_ROBOTS, (names.COMMAND_STATUS, names.COMMAND_INFO)
+    ),
     WantedSubscription(
         "single uplink",
-        _ROBOTS,
+        ALL_ROBOTS,
         tuple(names.ALGORITHM_1),
         condition=("timestamp", "pose", "class"),
     ),

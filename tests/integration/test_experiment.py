@@ -1,5 +1,6 @@
 """The smallest experiment, for real: it dies, is interrupted, goes on, and reports."""
 
+import asyncio
 import json
 import os
 import signal
@@ -12,7 +13,12 @@ from typing import Any
 
 import pytest
 
+from iveg.adapters.orion import OrionClient
+from iveg.lab.experiment.message_recorder import DESCRIPTION
+from iveg.lab.experiment.slices import HOPS
+from iveg.settings import Settings
 from tests.processes import ROOT, Site, children_of, is_alive, site, until
+from tests.recounting import recounted, reported
 
 pytestmark = pytest.mark.timeout(240)
 PLACES = ("IVEG_HOST", "IVEG_PORT", "IVEG_MQTT_URL", "IVEG_ORION_URL", "IVEG_IOTA_URL")
@@ -59,6 +65,18 @@ def read(file: Path) -> Any:
     return json.loads(file.read_text())
 
 
+def subscriptions(place: Site) -> list[str]:
+    """The experiment's own at Orion that are left."""
+    tenant = Settings().fiware_service, Settings().fiware_servicepath
+
+    async def read() -> list[str]:
+        async with OrionClient(place.settings["IVEG_ORION_URL"], *tenant) as orion:
+            told = await orion.read_subscriptions()
+        return [one["id"] for one in told if one["description"] == DESCRIPTION]
+
+    return asyncio.run(read())
+
+
 def is_word(pid: int, word: bytes) -> bool:
     return b"\0" + word + b"\0" in Path(f"/proc/{pid}/cmdline").read_bytes()
 
@@ -89,9 +107,10 @@ def test_an_experiment_survives_a_death_and_ctrl_c_and_ends_on_a_named_fiware(
     with site(tmp_path) as place:
         place.start("fiware").wait_until_ready()
         named = ["--fiware", *(place.settings[name] for name in FIWARE)]
-        with running(out, place, *named) as process:
+        with running(out, place, "--keep-raw", *named) as process:
             code, said = ended(process)
-    assert code == 0, said
+        assert code == 0, said
+        assert subscriptions(place) == []
 
     told = read(out / "result.json")
     assert told["completion"] == {"runs": 1, "completed": 1, "planned": 1}
@@ -100,7 +119,12 @@ def test_an_experiment_survives_a_death_and_ctrl_c_and_ends_on_a_named_fiware(
     person = told["stack"]["detection"]["farmer"]
     assert person["tp"] + person["fn"] > 0
     hops = {row["data"]: row["hops"] for row in told["latency"]["rows"]}
-    assert all(hops[data]["robot_orion"]["count"] > 20 for data in hops)
+    for data in hops:
+        up, on, total = (hops[data][hop] for hop in HOPS[:3])
+        assert up["count"] == on["count"] == total["count"] > 20
+        parts_ms = up["mean_ms"] + on["mean_ms"]
+        assert parts_ms == pytest.approx(total["mean_ms"], abs=0.02)
+    assert recounted(out) == reported(told)
     assert {one["robot_id"] for one in told["stack"]["stops"]} == {"AGI", "AGII"}
     assert "Broken off" not in (out / "result.html").read_text()
     assert not list(out.glob("partial.*"))

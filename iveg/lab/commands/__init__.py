@@ -114,6 +114,11 @@ def _add_experiment(experiment: argparse.ArgumentParser) -> None:
     run.add_argument("--profile", choices=("field", "simulation"), default="field")
     run.add_argument("--seed", type=int, metavar="S")
     run.add_argument("--out", type=Path, metavar="DIR", help="where results go")
+    run.add_argument(
+        "--keep-raw",
+        action="store_true",
+        help="keep truth, frames and times of every message (always with --full)",
+    )
     add_end(run)
     compare = words.add_parser("compare", help="two results beside each other")
     compare.add_argument("before", type=Path, metavar="A")

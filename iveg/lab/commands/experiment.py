@@ -6,6 +6,7 @@ on free ports, with a data directory of its own.
 """
 
 import asyncio
+import os
 import secrets
 import sys
 from collections.abc import Mapping
@@ -26,12 +27,11 @@ from iveg.domain.stamps import format_stamp
 from iveg.lab.commands.demo import on_free_ports
 from iveg.lab.commands.processes import Parts
 from iveg.lab.experiment import compare
-from iveg.lab.experiment.observer import watch
+from iveg.lab.experiment.message_recorder import LAST_COPIES_S, recorder
+from iveg.lab.experiment.observer import ObservedRun, watch
 from iveg.lab.experiment.outcome import (
-    Outcome,
-    counted_of,
+    half_of,
     outcome_of,
-    read_truth,
     stack_of,
 )
 from iveg.lab.experiment.plan import (
@@ -43,6 +43,8 @@ from iveg.lab.experiment.plan import (
     directory_of,
     read_json,
 )
+from iveg.lab.experiment.raw import write_raw
+from iveg.lab.experiment.recording import read_truth
 from iveg.lab.experiment.run_store import Progress, RunStore
 from iveg.lab.experiment.virtual_run import VirtualRun
 from iveg.settings import Settings
@@ -68,7 +70,13 @@ def experiment(call: Call) -> int:
     placed = experiment_settings(
         directory, on_free_ports(named, environment, fiware=embedded)
     )
-    lab = Lab(RunStore(plan, directory), plan.profile, placed, embedded=embedded)
+    lab = Lab(
+        RunStore(plan, directory),
+        plan.profile,
+        placed,
+        embedded=embedded,
+        keep_raw=options.keep_raw or plan.size == "full",
+    )
     work = lab.run(environment)
     return run_until_stopped(work, until_eof=options.until_eof) or lab.exit_code
 
@@ -113,6 +121,7 @@ class Lab:
 
     Attributes:
         embedded: Whether FIWARE is started as well.
+        keep_raw: Whether raw data stay.
         exit_code: 1 if it ended before its plan was complete.
     """
 
@@ -120,6 +129,7 @@ class Lab:
     profile: str
     settings: Settings
     embedded: bool = True
+    keep_raw: bool = False
     exit_code: int = 1
 
     async def run(self, environment: Mapping[str, str]) -> None:
@@ -150,19 +160,23 @@ class Lab:
 
     async def _step(self, step: PlannedRun, parts: Parts, progress: Progress) -> None:
         progress.begin(step, "counting", clock.mono())
-        rehearsal = VirtualRun(step, self.profile, self._rule, WATCHED)
-        played = await parts.outlast(rehearsal.play(step.counted_s))
-        counted = counted_of(played, WATCHED)
+        rehearsal = VirtualRun(step, self.profile, self._rule)
+        virtual = await parts.outlast(rehearsal.play(step.counted_s))
         progress.begin(step, "running", clock.mono())
+        before = os.getloadavg()[0]
         truth = self.notebook.directory / f"{step.name}.truth.jsonl"
         started = len(parts.running)
         try:
-            stack = await self._real(step, parts, truth)
+            real = await self._real(step, parts, truth)
         finally:
             if len(parts.running) > started:
                 await parts.stop_newest()
             truth.unlink(missing_ok=True)
-        self.notebook.keep(step, outcome_of(step, counted, stack))
+        load = before, os.getloadavg()[0]
+        outcome = outcome_of(step, half_of(virtual), stack_of(real), load)
+        if self.keep_raw:
+            write_raw(self.notebook.raw(step), outcome, virtual, real, self._chosen())
+        self.notebook.keep(step, outcome)
         progress.end(step, clock.mono())
 
     @property
@@ -173,21 +187,26 @@ class Lab:
             threshold=settings.confidence_threshold, radius_m=settings.safety_radius_m
         )
 
-    async def _real(self, step: PlannedRun, parts: Parts, truth: Path) -> Outcome:
+    async def _real(self, step: PlannedRun, parts: Parts, truth: Path) -> ObservedRun:
         """The same run by all programs, any of which may end early."""
         words = ["--scenario", step.family, "--seed", str(step.seed)]
         words += ["--profile", self.profile, "--truth", str(truth)]
         since = format_stamp(clock.wall())
-        await parts.start("emulator", *words)
-        completed = await parts.outlast(self._until_live())
         url, token = self._url, self.settings.api_token
-        watched = await parts.outlast(watch(url, token, step.seconds, WATCHED))
-        completed = completed and await self._are_live()
+        async with recorder(self.settings) as recorded:
+            await parts.start("emulator", *words)
+            completed = await parts.outlast(self._until_live())
+            await parts.outlast(recorded.settle())
+            real = await parts.outlast(watch(url, token, step.seconds, WATCHED))
+            await parts.outlast(asyncio.sleep(LAST_COPIES_S))
+            real.times = recorded.times(real.edges[0], real.edges[-1])
+        real.truth = read_truth(truth)
+        real.completed = completed and await self._are_live() and bool(real.pairs)
         # Stopped robots are not released here, so STOP comes last.
-        stops = await self._stop() if self.notebook.is_last(step) else []
-        decisions = (await self._ask(f"decisions?since={since}&limit=500"))["items"]
-        stack = stack_of(watched, read_truth(truth), decisions, WATCHED)
-        return {**stack, "completed": completed and stack["completed"], "stops": stops}
+        real.stops = await self._stop() if self.notebook.is_last(step) else []
+        asked = f"decisions?since={since}&limit=500"
+        real.decisions = (await self._ask(asked))["items"]
+        return real
 
     async def _until_live(self) -> bool:
         deadline = clock.mono() + _LIVE_WITHIN_S

@@ -2,11 +2,13 @@
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO
 
 import orjson
 
+from iveg.domain.geometry import Pose2D
 from iveg.lab.emulator.camera import Target
+from iveg.lab.emulator.greenhouse import Disc
 from iveg.lab.emulator.world import RobotHardware, SimulatedWorld
 
 
@@ -20,50 +22,64 @@ def in_view(
             yield target, part
 
 
-class TruthLog:
-    """Ground truth as one line of JSON per picture.
+def true_picture(
+    rig: RobotHardware, world: SimulatedWorld, at: float
+) -> dict[str, Any]:
+    """The truth of one picture.
 
     ``{"robot", "at": Unix s, "pose": {"x", "y", "yaw"}, "speed", "visible": [{"key",
-    "class", "x", "y", "part"}], "people": [{"key", "x", "y"}]}``: the robot's true pose
-    in ``map`` (m, rad) and speed (m/s), all targets of which a part (0 to 1) is in its
-    view, and every person in the greenhouse, by their true positions, whatever the
-    detector reports.  Robots and people of all lines are enough to score protection.
+    "class", "x", "y", "part"}], "people": [{"key", "x", "y"}], "robots": [{"key", "x",
+    "y", "yaw"}]}``: the robot's true pose in ``map`` (m, rad) and speed (m/s), all
+    targets of which a part (0 to 1) is in its view, and every person and robot in the
+    greenhouse, by their true positions, whatever the detector reports.
+
+    Args:
+        rig: The robot whose picture it is.
+        world: Everybody.
+        at: When the picture was taken (Unix s, by the robot's own clock).
     """
+    return {
+        "robot": rig.robot_id,
+        "at": at,
+        "pose": _pose(rig.vehicle.pose),
+        "speed": round(rig.vehicle.twist.linear_x, 3),
+        "visible": [
+            {
+                "key": target.key,
+                "class": target.class_id,
+                **_place(target.body.pose),
+                "part": round(part, 2),
+            }
+            for target, part in in_view(rig, world)
+        ],
+        "people": [
+            {"key": f"person-{number}", **_place(one)}
+            for number, one in enumerate(world.discs())
+        ],
+        "robots": [
+            {"key": one.robot_id, **_pose(one.vehicle.pose)}
+            for one in world.rigs.values()
+        ],
+    }
+
+
+def _place(of: Pose2D | Disc) -> dict[str, float]:
+    return {"x": round(of.x, 3), "y": round(of.y, 3)}
+
+
+def _pose(of: Pose2D) -> dict[str, float]:
+    return {**_place(of), "yaw": round(of.yaw, 4)}
+
+
+class TruthLog:
+    """Ground truth as one line of JSON per picture; see ``true_picture``."""
 
     def __init__(self, file: Path) -> None:
         self._file: TextIO = file.open("w", encoding="utf-8", buffering=1)
 
     def record(self, rig: RobotHardware, world: SimulatedWorld, at: float) -> None:
         """Record a robot's view at its picture (``at`` Unix s, by its own clock)."""
-        visible = []
-        for target, part in in_view(rig, world):
-            pose = target.body.pose
-            visible.append(
-                {
-                    "key": target.key,
-                    "class": target.class_id,
-                    "x": round(pose.x, 3),
-                    "y": round(pose.y, 3),
-                    "part": round(part, 2),
-                }
-            )
-        true = rig.vehicle.pose
-        picture = {
-            "robot": rig.robot_id,
-            "at": at,
-            "pose": {
-                "x": round(true.x, 3),
-                "y": round(true.y, 3),
-                "yaw": round(true.yaw, 4),
-            },
-            "speed": round(rig.vehicle.twist.linear_x, 3),
-            "visible": visible,
-            "people": [
-                {"key": f"person-{number}", "x": round(one.x, 3), "y": round(one.y, 3)}
-                for number, one in enumerate(world.discs())
-            ],
-        }
-        self._file.write(orjson.dumps(picture).decode() + "\n")
+        self._file.write(orjson.dumps(true_picture(rig, world, at)).decode() + "\n")
 
     def close(self) -> None:
         """Close the file."""

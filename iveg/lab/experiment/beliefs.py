@@ -1,7 +1,8 @@
 """People in a robot's costmap whom its own sensors could not see."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, Final, Literal
 
 import numpy as np
@@ -37,9 +38,38 @@ def belief_in(answer: Mapping[str, Any]) -> Belief:
     return lambda x, y: "told" if _is_taken(told, x, y) else "nobody"
 
 
-def injections(
-    truth: Sequence[Picture], beliefs: Sequence[tuple[float, Belief]], robot_id: str
-) -> dict[str, int]:
+@dataclass(frozen=True, slots=True)
+class Question:
+    """A person whom others had in view and a robot's camera had not, and its costmap.
+
+    Attributes:
+        at: Moment (s, by the clock of the pictures).
+        key: The person; ``x``, ``y`` their true place in ``map`` (m).
+        held: What the costmap held there.
+        first: Whether the robot's camera had not had them before.
+    """
+
+    at: float
+    key: str
+    x: float
+    y: float
+    held: Held
+    first: bool
+
+
+def questions(
+    truth: Sequence[Picture], beliefs: Iterable[tuple[float, Belief]], robot_id: str
+) -> Iterator[Question]:
+    """Every person out of the robot's sight at every moment of its costmap."""
+    sighted = _first_sights(truth, robot_id)
+    for at, belief in beliefs:
+        for one in _hidden(truth, at, robot_id):
+            is_first = sighted.get(one.key, float("inf")) > at
+            held = belief(one.x, one.y)
+            yield Question(at, one.key, one.x, one.y, held, is_first)
+
+
+def injections(asked: Sequence[Question]) -> dict[str, int]:
     """How often the costmap contained a person whom the robot could not see.
 
     ``asked``: moments at which another robot had a person in view and this robot's
@@ -47,23 +77,11 @@ def injections(
     person.  ``people``: people whom another robot had in view first; ``ahead``: those
     in the costmap before its own camera had them.
     """
-    asked = injected = 0
-    sighted = _first_sights(truth, robot_id)
-    first: set[str] = set()
-    ahead: set[str] = set()
-    for at, belief in beliefs:
-        for one in _hidden(truth, at, robot_id):
-            held = belief(one.x, one.y)
-            asked += held != "own"
-            injected += held == "told"
-            is_first = sighted.get(one.key, float("inf")) > at
-            first |= {one.key} if is_first else set()
-            ahead |= {one.key} if is_first and held == "told" else set()
     return {
-        "asked": asked,
-        "injected": injected,
-        "people": len(first),
-        "ahead": len(ahead),
+        "asked": sum(one.held != "own" for one in asked),
+        "injected": sum(one.held == "told" for one in asked),
+        "people": len({one.key for one in asked if one.first}),
+        "ahead": len({one.key for one in asked if one.first and one.held == "told"}),
     }
 
 

@@ -1,19 +1,18 @@
 """Comparison of two results: better, worse, or undecided."""
 
 from collections.abc import Iterator, Mapping
-from typing import Any, Final
+from typing import Any
 
 from iveg.domain.errors import DataFileError
 from iveg.domain.latency.account import Cell
-from iveg.domain.latency.segments import DATA, Segment
+from iveg.domain.latency.segments import DATA
 from iveg.lab.experiment.outcome import slices_of
 from iveg.lab.experiment.paper_tables import CLASSES
-from iveg.lab.experiment.slices import latency_changes, whole
+from iveg.lab.experiment.plan import FORMAT
+from iveg.lab.experiment.slices import HOPS, latency_changes, whole
 from iveg.lab.experiment.statistics import Interval, difference, verdict
 
 Result = Mapping[str, Any]
-FORMAT: Final = 2
-_HOPS: Final[tuple[Segment, ...]] = ("uplink", "fiware", "robot_orion", "iveg")
 
 
 def write_comparison(before: Result, after: Result) -> str:
@@ -56,7 +55,7 @@ def _latencies(before: Result, after: Result) -> Iterator[str]:
     """Bootstrapped intervals; a longer time is worse."""
     old, new = slices_of(before), slices_of(after)
     was, now = whole(old), whole(new)
-    cells: list[Cell] = [(data, hop) for data in DATA for hop in _HOPS]
+    cells: list[Cell] = [(data, hop) for data in DATA for hop in HOPS]
     for cell in cells:
         for name, between in latency_changes(old, new, cell):
             one, other = was[cell], now[cell]

@@ -3,7 +3,7 @@
 import asyncio
 import contextlib
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,32 +13,36 @@ from websockets.asyncio.client import connect
 from websockets.exceptions import WebSocketException
 from websockets.typing import Subprotocol
 
-from iveg.domain.stamps import parse_stamp
-from iveg.lab.experiment.beliefs import Belief, belief_in
-from iveg.lab.experiment.scoring import Picture, SeenObject
+from iveg.adapters import clock
+from iveg.lab.experiment.beliefs import belief_in
+from iveg.lab.experiment.message_times import MessageTimes
+from iveg.lab.experiment.recording import Recording, Row, picture_of
 from iveg.lab.experiment.slices import Slice, slice_between
 
 _MAP_EVERY_S = 1.0
 _SLICE_S = 5.0
-_ORDER = ("passed", "missing", "reordered", "repeated")
+_PATIENCE_S = 20.0
+"""For the table of latency: iVeg starts a process of its own for the first (s)."""
 
 
 @dataclass(slots=True)
-class ObservedRun:
-    """Recorded output.
+class ObservedRun(Recording):
+    """Recorded output of ``/live`` and the API.
 
     Attributes:
-        pictures: Detection frames of ``/live``.
-        beliefs: Content of a robot's costmap at some moments (Unix s).
-        slices: Latencies in slices of a few seconds.
-        order: By hop, messages that passed, are missing, out of order or
-            duplicated.
+        slices: Latencies of decisions in slices of a few seconds.
+        edges: When each slice began, and the last one ended (Unix s).
+        read: Messages that reached the broker by iVeg's own count, and how many it
+            ``skipped`` of them because newer ones were there.
+        times: Each message between the first edge and the last.
+        stops: STOP of the fleet, robot by robot; empty unless it was the last run.
     """
 
-    pictures: list[Picture] = field(default_factory=list)
-    beliefs: list[tuple[float, Belief]] = field(default_factory=list)
     slices: list[Slice] = field(default_factory=list)
-    order: dict[str, dict[str, int]] = field(default_factory=dict)
+    edges: list[float] = field(default_factory=list)
+    read: dict[str, int] = field(default_factory=dict)
+    times: list[MessageTimes] = field(default_factory=list)
+    stops: list[Row] = field(default_factory=list)
 
 
 async def watch(url: str, token: str, seconds: float, robot_id: str) -> ObservedRun:
@@ -74,36 +78,36 @@ async def _measure(
     """A slice every few seconds, the last one at the end."""
     slices = max(1, math.floor(seconds / _SLICE_S))
     start = before = await _told(api)
+    watched.edges.append(clock.wall())
     for _ in range(slices):
         await asyncio.sleep(seconds / slices)
         now = await _told(api)
-        if before is not None and now is not None:
-            watched.slices.append(slice_between(before["rows"], now["rows"]))
+        watched.edges.append(clock.wall())
+        both = before is not None and now is not None
+        watched.slices.append(
+            slice_between(before["rows"], now["rows"]) if both else {}
+        )
         before = now or before
     if start is not None and before is not None:
-        watched.order = _order_between(start["streams"], before["streams"])
+        watched.read = _read_between(start["streams"], before["streams"])
 
 
 async def _told(api: httpx.AsyncClient) -> Any:
     """Response of the latency API since iVeg's start; None: none."""
     path = "/latency?window=24h&figures=false&bins=true"
     try:
-        return (await api.get(path)).raise_for_status().json()
+        answer = await api.get(path, timeout=_PATIENCE_S)
+        return answer.raise_for_status().json()
     except httpx.HTTPError:
         return None
 
 
-def _order_between(
-    before: Sequence[Mapping[str, Any]], after: Sequence[Mapping[str, Any]]
-) -> dict[str, dict[str, int]]:
-    return {
-        hop: {
-            name: sum(one[hop][name] for one in after)
-            - sum(one[hop][name] for one in before)
-            for name in _ORDER
-        }
-        for hop in ("uplink", "fiware")
-    }
+def _read_between(before: Sequence[Row], after: Sequence[Row]) -> dict[str, int]:
+    def more(name: str) -> int:
+        start, end = (sum(one["uplink"][name] for one in x) for x in (before, after))
+        return int(end - start)
+
+    return {"passed": more("passed"), "skipped": more("skipped")}
 
 
 async def _listen(url: str, bearer: dict[str, str], watched: ObservedRun) -> None:
@@ -130,7 +134,7 @@ def _hear(frame: bytes, watched: ObservedRun) -> int:
         if part["topic"].startswith("detections/"):
             picture = picture_of(part["data"])
             if picture is not None:
-                watched.pictures.append(picture)
+                watched.told.append(picture)
     return int(head["frame"])
 
 
@@ -138,37 +142,8 @@ async def _believe(api: httpx.AsyncClient, robot_id: str, watched: ObservedRun) 
     while True:
         with contextlib.suppress(httpx.HTTPError):
             answer = await api.get(f"/costmap?robot={robot_id}")
-            if answer.status_code == 200 and watched.pictures:
+            if answer.status_code == 200 and watched.told:
                 # Clock of the detection frames, with which it is compared.
-                newest = watched.pictures[-1].at
+                newest = watched.told[-1].at
                 watched.beliefs.append((newest, belief_in(answer.json())))
         await asyncio.sleep(_MAP_EVERY_S)
-
-
-def picture_of(told: Mapping[str, Any]) -> Picture | None:
-    """One detection frame of the live topic; None without a readable stamp."""
-    at = parse_stamp(told["stamp"] or "")
-    if at is None:
-        return None
-    seen = tuple(
-        SeenObject(
-            str(place),
-            one["class_id"],
-            one["position"]["x"],
-            one["position"]["y"],
-            one["probability"],
-        )
-        for place, one in enumerate(told["items"])
-    )
-    return Picture(told["robot_id"], at, seen)
-
-
-def slowdowns_of(decisions: Sequence[Mapping[str, Any]]) -> dict[str, int]:
-    """Decisions that slowed a robot: number, applied, observed, out of sight."""
-    slowed = [one for one in decisions if one["reason"] in ("person", "robot")]
-    return {
-        "decided": len(slowed),
-        "applied": sum(one["applied_at"] is not None for one in slowed),
-        "observed": sum(one["observed_at"] is not None for one in slowed),
-        "out_of_sight": sum(one["in_sight"] is False for one in slowed),
-    }

@@ -3,68 +3,73 @@
 import os
 import platform
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
-from pathlib import Path
+from itertools import pairwise
+from math import ceil
 from statistics import fmean
 from typing import Any
 
-import orjson
-
 from iveg import __version__
-from iveg.domain.latency.segments import DATA, SEGMENTS
+from iveg.domain.latency.segments import DATA
 from iveg.domain.latency.sketch import Sketch
 from iveg.lab.experiment.beliefs import injections
-from iveg.lab.experiment.observer import ObservedRun, slowdowns_of
+from iveg.lab.experiment.message_times import counts_of
+from iveg.lab.experiment.observer import ObservedRun
 from iveg.lab.experiment.paper_tables import CLASSES
-from iveg.lab.experiment.plan import Plan, PlannedRun
-from iveg.lab.experiment.scoring import Picture, SeenObject, Tally, paired, score, tally
-from iveg.lab.experiment.slices import Slice, whole
+from iveg.lab.experiment.plan import FORMAT, Plan, PlannedRun
+from iveg.lab.experiment.recording import Recording
+from iveg.lab.experiment.scoring import Tally, score, tally
+from iveg.lab.experiment.slices import HOPS, Slice, whole, with_messages
 from iveg.lab.experiment.statistics import thinned
-from iveg.lab.experiment.virtual_run import VirtualRunResult
 
 Outcome = dict[str, Any]
 
 
-def counted_of(run: VirtualRunResult, robot_id: str) -> Outcome:
-    """Result of a run on the virtual clock; reproducible."""
-    real = [one for one, _ in run.pairs]
+def half_of(run: Recording) -> Outcome:
+    """Result of one half; that of the virtual one is reproducible."""
+    pairs = run.pairs
     return {
         "completed": run.completed,
-        "pictures": len(run.pairs),
-        "classes": _tallied(tally(run.pairs)),
-        "slowdowns": slowdowns_of([asdict(one) for one in run.decisions]),
-        "injection": injections(real, run.beliefs, robot_id),
-    }
-
-
-def stack_of(
-    watched: ObservedRun,
-    truth: Sequence[Picture],
-    decisions: Sequence[Mapping[str, Any]],
-    robot_id: str,
-) -> Outcome:
-    """Result of the run in real time through all programs."""
-    pairs = list(paired(truth, watched.pictures))
-    return {
-        "completed": bool(pairs),
         "pictures": len(pairs),
-        "classes": _tallied(tally(pairs)),
-        "slowdowns": slowdowns_of(decisions),
-        "injection": injections(truth, watched.beliefs, robot_id),
-        "order": watched.order,
-        "slices": watched.slices,
-        "stops": [],
+        "classes": {name: asdict(one) for name, one in tally(pairs).items()},
+        "slowdowns": slowdowns_of(run.decisions),
+        "injection": injections(run.asked),
     }
 
 
-def outcome_of(step: PlannedRun, counted: Outcome, stack: Outcome) -> Outcome:
-    """One run as stored."""
-    return {**asdict(step), "counted": counted, "stack": stack}
+def stack_of(run: ObservedRun) -> Outcome:
+    """Result of the run in real time through all programs."""
+    within = zip(pairwise(run.edges), run.slices, strict=True)
+    return {
+        **half_of(run),
+        "messages": counts_of(run.times),
+        "read": run.read,
+        "slices": [
+            with_messages(decided, (m for m in run.times if begin <= m.broker < end))
+            for (begin, end), decided in within
+        ],
+        "stops": run.stops,
+    }
 
 
-def _tallied(tallies: Mapping[str, Tally]) -> dict[str, Any]:
-    return {name: asdict(one) for name, one in tallies.items()}
+def slowdowns_of(decisions: Sequence[Mapping[str, Any]]) -> dict[str, int]:
+    """Decisions that slowed a robot: number, applied, observed, out of sight."""
+    slowed = [one for one in decisions if one["reason"] in ("person", "robot")]
+    return {
+        "decided": len(slowed),
+        "applied": sum(one["applied_at"] is not None for one in slowed),
+        "observed": sum(one["observed_at"] is not None for one in slowed),
+        "out_of_sight": sum(one["in_sight"] is False for one in slowed),
+    }
+
+
+def outcome_of(
+    step: PlannedRun, counted: Outcome, stack: Outcome, load: Sequence[float]
+) -> Outcome:
+    """One run as stored; ``load`` of the machine before and after its second half."""
+    told = {"counted": counted, "stack": stack}
+    return {**asdict(step), **told, "load": [round(one, 1) for one in load]}
 
 
 def result_of(
@@ -77,7 +82,7 @@ def result_of(
     stack = [one["stack"] for one in outcomes]
     slices = [piece for one in stack for piece in one["slices"]]
     return {
-        "format": 2,
+        "format": FORMAT,
         "plan": asdict(plan),
         "ended_early": why,
         "version": __version__,
@@ -86,10 +91,10 @@ def result_of(
         **_summed(plan, [one["counted"] for one in outcomes]),
         "stack": {
             **_summed(plan, stack),
-            "order": _order(stack),
+            "read": _sum(one["read"] for one in stack),
             "stops": [stop for one in stack for stop in one["stops"]],
         },
-        "latency": {"rows": _rows(slices), "slices": len(slices)},
+        "latency": {"rows": [*_rows(slices, stack)], "slices": len(slices)},
         "runs": list(outcomes),
     }
 
@@ -138,15 +143,31 @@ def scored(classes: Sequence[str], runs: Sequence[Outcome]) -> dict[str, Any]:
         "confidence": fmean(sure) if sure else None,
         "precision": None if precision is None else asdict(precision),
         "recall": None if recall is None else asdict(recall),
+        "place": {
+            "map": _off([off for each in told for off in each.off_map]),
+            "robot": _off([off for each in told for off in each.off_robot]),
+        },
     }
 
 
-def _rows(slices: Sequence[Slice]) -> list[dict[str, Any]]:
+def _off(distances: Sequence[float]) -> dict[str, float] | None:
+    """Mean and 95th percentile (nearest rank) of distances (m)."""
+    if not distances:
+        return None
+    rank = ceil(0.95 * len(distances))
+    return {"mean_m": fmean(distances), "p95_m": sorted(distances)[rank - 1]}
+
+
+def _rows(
+    slices: Sequence[Slice], stack: Sequence[Outcome]
+) -> Iterator[dict[str, Any]]:
     found = whole(slices)
-    return [
-        {"data": data, "hops": {hop: _told(found[data, hop]) for hop in SEGMENTS}}
-        for data in DATA
-    ]
+    for data in DATA:
+        yield {
+            "data": data,
+            "hops": {hop: _told(found[data, hop]) for hop in HOPS},
+            "messages": _sum(one["messages"].get(data, {}) for one in stack),
+        }
 
 
 def _told(of: Sketch) -> dict[str, Any]:
@@ -162,29 +183,8 @@ def _told(of: Sketch) -> dict[str, Any]:
     }
 
 
-def _order(runs: Sequence[Outcome]) -> dict[str, dict[str, int]]:
-    hops = ("uplink", "fiware")
-    return {hop: _sum(one["order"].get(hop, {}) for one in runs) for hop in hops}
-
-
 def _sum(counts: Iterable[Mapping[str, int]]) -> dict[str, int]:
     total: Counter[str] = Counter()
     for one in counts:
         total.update(one)
     return dict(total)
-
-
-def read_truth(file: Path) -> list[Picture]:
-    """Ground truth of the emulator; an incomplete last line is omitted."""
-    pictures = []
-    for line in file.read_bytes().splitlines():
-        try:
-            told = orjson.loads(line)
-        except orjson.JSONDecodeError:
-            continue
-        seen = tuple(
-            SeenObject(one["key"], one["class"], one["x"], one["y"])
-            for one in told["visible"]
-        )
-        pictures.append(Picture(told["robot"], told["at"], seen))
-    return pictures

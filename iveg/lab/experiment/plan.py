@@ -87,8 +87,11 @@ PLANS: Final[dict[Size, Plan]] = {
 runs of each are the paper's own number in simulation."""
 
 
+FORMAT: Final = 3
+"""Of results and runs; those of another are not mixed with these."""
 PROGRESS: Final = "progress.json"
-_PLAN: Final = "plan.json"
+RAW: Final = "raw"
+PLAN: Final = "plan.json"
 
 
 def read_json(file: Path) -> Any:
@@ -128,7 +131,7 @@ def directory_of(place: Path, plan: Plan) -> Path:
 def belongs_to(directory: Path, plan: Plan) -> bool:
     """Whether a directory is empty, or contains runs of this very plan and version."""
     try:
-        return bool(read_json(directory / _PLAN) == _written(plan))
+        return bool(read_json(directory / PLAN) == _written(plan))
     except DataFileError:
         return not list(directory.glob("*-*.json"))
 
@@ -143,8 +146,10 @@ def claim(directory: Path, plan: Plan) -> None:
     if not belongs_to(directory, plan):
         reason = "holds runs of another plan or version; name another directory"
         raise DataFileError(str(directory), "", reason)
-    write_json(directory / _PLAN, _written(plan))
+    write_json(directory / PLAN, _written(plan))
 
 
 def _written(plan: Plan) -> Any:
-    return orjson.loads(orjson.dumps({"version": __version__, "plan": asdict(plan)}))
+    return orjson.loads(
+        orjson.dumps({"version": __version__, "format": FORMAT, "plan": asdict(plan)})
+    )

@@ -38,13 +38,17 @@ _COUNTED = (
     "scenario through all programs (MQTT, IoT Agent, Orion, /live), where counts "
     "depend on when programs get the processor. Every picture counts: a target in view "
     "that was told (TP) or not (FN), a box that belongs to none (FP); boxes match from "
-    "an overlap of one half at the target's true size. Brackets are 95 % Wilson "
+    "an overlap of one half at the target's true size, in the robot's own frame, so "
+    "that an error of its pose is none of its detector. Brackets are 95 % Wilson "
     "intervals, in which two seconds of one robot at one target are worth one count, "
     "as mistakes last so long."
 )
 _TIMED = (
     "All times are of the real programs. Δt₁ robot → broker, Δt₂ broker → Orion's "
-    "notification, Δt₃ decision; no page was open, so that Δt₄ is not told."
+    "notification, both by a reader of its own that does nothing else; total = Δt₁ + "
+    "Δt₂ of the same messages. Messages of which Orion's copy was read first are in "
+    "none of the three; their share is told. Δt₃ decision, by iVeg's own account, of "
+    "all that it read; no page was open, so that Δt₄ is not told."
 )
 
 
@@ -56,6 +60,8 @@ def write_report(result: Result) -> str:
         "<h2>Detection</h2>",
         f"<p>{_COUNTED}</p>",
         _table(tables.DETECTION, tables.detection(result)),
+        "<h2>Error of place (m)</h2>",
+        _table(tables.PLACE, tables.place(result)),
         "<h2>What the text says</h2>",
         _table(tables.CLAIMS, tables.claims(result)),
         "<h2>Slow-downs, and who was not in sight</h2>",

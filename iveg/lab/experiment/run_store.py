@@ -5,6 +5,7 @@
     plan.json                     whose runs these are
     progress.json                 how far it is
     together-1.json … one for each finished run
+    raw/together-1/ … its raw data, where they were asked for
     partial.json, partial.html    it broke off: what there is so far
     result.json, result.html      it is whole
 
@@ -22,6 +23,7 @@ from iveg.domain.errors import DataFileError
 from iveg.lab.experiment.outcome import Outcome, result_of
 from iveg.lab.experiment.plan import (
     PROGRESS,
+    RAW,
     Plan,
     PlannedRun,
     claim,
@@ -61,6 +63,10 @@ class RunStore:
     def keep(self, step: PlannedRun, outcome: Outcome) -> None:
         """Store a finished run."""
         write_json(self._file(step), outcome)
+
+    def raw(self, step: PlannedRun) -> Path:
+        """Directory of a run's raw data."""
+        return self.directory / RAW / step.name
 
     def finish(self, chosen: Mapping[str, Any], why: str) -> Path:
         """Write the result, or the part that exists.

@@ -1,10 +1,13 @@
 """Reported detections compared with the ground truth, frame by frame.
 
+As in the paper a detector is scored by its own picture, in the frame of its robot: how
+well the robot knew where it stood is told apart, as an error of place in the map.
 Errors of a detector persist: a person missed in one frame is missed in the next twenty
 as well.  So frames are counted, but the confidence interval of a rate uses the number
 of *looks*: two seconds of one robot at one target, as long as an error lasts.
 """
 
+import math
 from bisect import bisect_left
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
@@ -27,6 +30,7 @@ class SeenObject:
     Attributes:
         key: Id of a target; of a detection its index in the frame.
         confidence: Confidence of a detection (0 to 1).
+        local: Centre in ``base_link`` of its robot (m); None: known in ``map`` alone.
     """
 
     key: str
@@ -34,6 +38,7 @@ class SeenObject:
     x: float
     y: float
     confidence: float = 1.0
+    local: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +77,8 @@ class Tally:
 
     Attributes:
         found: Confidence of each reported detection of a target.
+        off_map, off_robot: Distance of each to the target, in ``map`` and in
+            the robot's frame (m).
         missed: Number of frames with a target in view but not reported.
         ghosts: Confidence of each detection without a target.
         looks, claims: As in ``Score``.
@@ -82,6 +89,8 @@ class Tally:
     ghosts: tuple[float, ...] = ()
     looks: int = 0
     claims: int = 0
+    off_map: tuple[float, ...] = ()
+    off_robot: tuple[float, ...] = ()
 
 
 @dataclass(slots=True)
@@ -91,6 +100,8 @@ class _Count:
     found: list[float] = field(default_factory=list)
     missed: int = 0
     ghosts: list[float] = field(default_factory=list)
+    off_map: list[float] = field(default_factory=list)
+    off_robot: list[float] = field(default_factory=list)
     looks: set[tuple[str, str, int]] = field(default_factory=set)
     claims: set[tuple[str, str, int]] = field(default_factory=set)
 
@@ -101,7 +112,16 @@ class _Count:
             tuple(self.ghosts),
             len(self.looks),
             len(self.claims),
+            tuple(self.off_map),
+            tuple(self.off_robot),
         )
+
+    def find(self, target: SeenObject, one: SeenObject) -> None:
+        """A detection of a target."""
+        self.found.append(round(one.confidence, 4))
+        off = math.hypot(one.x - target.x, one.y - target.y)
+        self.off_map.append(round(off, 4))
+        self.off_robot.append(round(math.hypot(*_between(target, one)), 4))
 
 
 def tally(pairs: Iterable[Pair]) -> dict[str, Tally]:
@@ -114,7 +134,7 @@ def tally(pairs: Iterable[Pair]) -> dict[str, Tally]:
             one, place = counts[target.class_id], (robot_id, target.key, look)
             one.looks.add(place)
             if target.key in matched:
-                one.found.append(round(matched[target.key], 4))
+                one.find(target, matched[target.key])
                 one.claims.add(place)
             else:
                 one.missed += 1
@@ -136,9 +156,9 @@ def paired(truth: Iterable[Picture], told: Iterable[Picture]) -> Iterator[Pair]:
 
 def match(
     real: Sequence[SeenObject], told: Sequence[SeenObject]
-) -> tuple[dict[str, float], list[SeenObject]]:
+) -> tuple[dict[str, SeenObject], list[SeenObject]]:
     """Detection of each target, most confident first, and unmatched detections."""
-    matched: dict[str, float] = {}
+    matched: dict[str, SeenObject] = {}
     wrong: list[SeenObject] = []
     for one in sorted(told, key=lambda seen: -seen.confidence):
         free = [
@@ -150,16 +170,23 @@ def match(
         if best is None or overlap(best, one) < OVERLAP:
             wrong.append(one)
         else:
-            matched[best.key] = one.confidence
+            matched[best.key] = one
     return matched, wrong
 
 
 def overlap(real: SeenObject, told: SeenObject) -> float:
     """Intersection over union of two squares of the target's size at these centres."""
     size = SIZE_M.get(real.class_id, _ROBOT_SIZE_M)
-    dx, dy = abs(real.x - told.x), abs(real.y - told.y)
-    shared = max(0.0, size - dx) * max(0.0, size - dy)
+    dx, dy = _between(real, told)
+    shared = max(0.0, size - abs(dx)) * max(0.0, size - abs(dy))
     return shared / (2 * size * size - shared)
+
+
+def _between(real: SeenObject, told: SeenObject) -> tuple[float, float]:
+    """From a target to a detection (m): in the robot's frame, where both are known."""
+    if real.local is None or told.local is None:
+        return told.x - real.x, told.y - real.y
+    return told.local[0] - real.local[0], told.local[1] - real.local[1]
 
 
 def score(tallies: Iterable[Tally]) -> Score:

@@ -1,10 +1,12 @@
-"""Latencies in slices of a few seconds, from the latency API.
+"""Latencies in slices of a few seconds.
 
-The API reports totals since iVeg's start; the difference of two responses is a slice.
-The slices of all runs add up to the experiment, and resampling them gives the interval
-of a mean or a quantile: messages of one slice are not independent.
+Δt₁ and Δt₂ are of messages that were timed at the broker and at Orion; Δt₃ is iVeg's
+own account: its API reports totals since its start, and the difference of two responses
+is a slice.  The slices of all runs add up to the experiment, and resampling them gives
+the interval of a mean or a quantile: messages of one slice are not independent.
 """
 
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final
 
@@ -12,13 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iveg.domain.latency.account import Cell
-from iveg.domain.latency.segments import DATA, SEGMENTS
-from iveg.domain.latency.sketch import Sketch, from_bins, merged
+from iveg.domain.latency.segments import DATA, SEGMENTS, Segment
+from iveg.domain.latency.sketch import Sketch, from_bins, merged, sketch_of
+from iveg.lab.experiment.message_times import MessageTimes
 from iveg.lab.experiment.statistics import Interval
 
 Slice = dict[str, dict[str, dict[str, Any]]]
 """By kind of data and hop: ``edges_ms``, ``counts``, ``total_ms``; empty cells are
 left out."""
+HOPS: Final[tuple[Segment, ...]] = SEGMENTS[:4]
+"""All but the last: no page is open."""
 _EMPTY: Final[Mapping[str, Any]] = {"edges_ms": [], "counts": [], "total_ms": 0.0}
 _DRAWS: Final = 1000
 _FEWEST: Final = 4
@@ -27,15 +32,34 @@ _SEED: Final = 14
 
 
 def slice_between(before: Sequence[Any], after: Sequence[Any]) -> Slice:
-    """Measurements between two responses' ``rows``."""
-    old = {row["data"]: row["bins"] for row in before}
-    found: Slice = {}
-    for row in after:
-        for hop, bins in row["bins"].items():
-            more = _less(bins, old.get(row["data"], {}).get(hop, _EMPTY))
-            if more["counts"]:
-                found.setdefault(row["data"], {})[hop] = more
-    return found
+    """Decisions (Δt₃) between two responses' ``rows``."""
+    old = {row["data"]: row["bins"]["iveg"] for row in before}
+    decided = {
+        row["data"]: _less(row["bins"]["iveg"], old.get(row["data"], _EMPTY))
+        for row in after
+    }
+    return {data: {"iveg": more} for data, more in decided.items() if more["counts"]}
+
+
+def with_messages(decided: Slice, times: Iterable[MessageTimes]) -> Slice:
+    """A slice of decisions with the messages of the same time."""
+    took: dict[str, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
+    for one in times:
+        for hop, duration in (one.hops or {}).items():
+            took[one.data][hop].append(duration)
+    return {
+        data: {
+            **{hop: _bins(found) for hop, found in took[data].items()},
+            **decided.get(data, {}),
+        }
+        for data in DATA
+    }
+
+
+def _bins(durations: Sequence[float]) -> dict[str, Any]:
+    edges, counts = sketch_of(durations).bins()
+    told = {"edges_ms": [1000.0 * edge for edge in edges], "counts": counts}
+    return {**told, "total_ms": 1000.0 * sum(durations)}
 
 
 def _less(after: Mapping[str, Any], before: Mapping[str, Any]) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from statistics import fmean
 from typing import Any, Final
 
 from iveg.domain.latency.paper import PAPER, Place
-from iveg.domain.latency.segments import DATA
+from iveg.domain.latency.segments import Data
 from iveg.lab.experiment.paper_tables import (
     CLASSES,
     COMPLETION,
@@ -17,6 +17,7 @@ from iveg.lab.experiment.paper_tables import (
     PaperScore,
     disagreements,
 )
+from iveg.lab.experiment.slices import HOPS
 
 Result = Mapping[str, Any]
 Rows = Iterator[Sequence[object]]
@@ -66,6 +67,29 @@ def _means(result: Result) -> Sequence[object]:
     return "mean", "here", "", "", "", *cells, ap
 
 
+PLACE: Final = (
+    *("class", "source", "n", "in the map, mean", "P95"),
+    *("in the robot's frame, mean", "P95"),
+)
+
+
+def place(result: Result) -> Rows:
+    """Distance of each correct detection from its target (m)."""
+    for source, half in (("here", result), ("here, real time", result["stack"])):
+        for class_id in CLASSES:
+            told = half["detection"][class_id]
+            cells = [
+                _metres(off, name)
+                for off in (told["place"]["map"], told["place"]["robot"])
+                for name in ("mean_m", "p95_m")
+            ]
+            yield class_id, source, told["tp"], *cells
+
+
+def _metres(off: Mapping[str, float] | None, name: str) -> str:
+    return "–" if off is None else f"{off[name]:.3f}"
+
+
 DISAGREES: Final = ("row", "table", "number", "printed", "follows")
 
 
@@ -89,10 +113,16 @@ def claims(result: Result) -> Rows:
     sure = [f"{CONFIDENCE[place]:.0%}" for place in PRINTED]
     yield "mean confidence", "–" if told is None else f"{told:.0%}", *sure
     yield "…of these at or above the rule's threshold", _confident(result), "", ""
-    order = result["stack"]["order"]
-    yield "messages that never came out of Orion", _lost(order["fiware"]), "none", ""
+    sent, lost, reordered = (
+        sum(row["messages"].get(name, 0) for row in result["latency"]["rows"])
+        for name in ("sent", "lost", "reordered")
+    )
+    yield "messages that never came out of Orion", f"{lost} of {sent}", "none", ""
+    yield "messages that came out of Orion after a later one", f"{reordered}", "", ""
+    read = result["stack"]["read"]
     skipped = "messages that iVeg's own reading of the broker skipped for newer ones"
-    yield skipped, _lost(order["uplink"]), "", ""
+    of = f"{read.get('skipped', 0)} of {read.get('passed', 0)}"
+    yield skipped, of, "", ""
     below = [f"below {P95_BELOW_MS[place]:.0f} ms" for place in PRINTED]
     yield "P95 from robot to Orion", _worst(result), *below
 
@@ -104,12 +134,6 @@ def _confident(result: Result) -> str:
     if threshold is None or not found:
         return "–"
     return f"{sum(one >= threshold for one in found) / len(found):.0%} ({threshold})"
-
-
-def _lost(order: Mapping[str, int]) -> str:
-    if not order:
-        return "–"
-    return f"{order['missing']} of {order['passed'] + order['missing']}"
 
 
 def _worst(result: Result) -> str:
@@ -156,30 +180,39 @@ def stops(result: Result) -> Rows:
 
 
 LATENCY: Final = (
-    *("data", "source", "n", "Δt₁", "P95", "Δt₂", "P95", "total", "P95"),
-    *("Δt₃", "P95"),
+    *("data", "source", "n", "Δt₁", "P95", "n", "Δt₂", "P95"),
+    *("n", "total", "P95", "Orion first", "n", "Δt₃", "P95"),
 )
 
 
 def latency(result: Result) -> Rows:
     """The paper's table (ms)."""
-    rows = {one["data"]: one["hops"] for one in result["latency"]["rows"]}
-    for data in DATA:
-        hops = [rows[data][h] for h in ("uplink", "fiware", "robot_orion", "iveg")]
-        cells = [ms(hop[name]) for hop in hops for name in ("mean_ms", "p95_ms")]
-        yield data, "here", hops[2]["count"], *cells
+    for one in result["latency"]["rows"]:
+        data: Data = one["data"]
+        up, on, total, decided = (
+            (told["count"], ms(told["mean_ms"]), ms(told["p95_ms"]))
+            for told in (one["hops"][hop] for hop in HOPS)
+        )
+        yield data, "here", *up, *on, *total, _first(one["messages"]), *decided
         for place, printed in PAPER.items():
             row = printed[data]
-            told = (
-                *(row.uplink_mean, row.uplink_p95, row.fiware_mean, row.fiware_p95),
-                *(row.total_mean, row.total_p95),
+            yield (
+                *(data, f"paper, {place}"),
+                *("", ms(row.uplink_mean), ms(row.uplink_p95)),
+                *("", ms(row.fiware_mean), ms(row.fiware_p95)),
+                *("", ms(row.total_mean), ms(row.total_p95), "", "", "", ""),
             )
-            yield data, f"paper, {place}", "", *map(ms, told), "", ""
+
+
+def _first(messages: Mapping[str, int]) -> str:
+    """Share of the messages that were read at Orion before they were at the broker."""
+    came = messages.get("sent", 0) - messages.get("lost", 0)
+    return f"{messages['orion_first'] / came:.1%}" if came else "–"
 
 
 RUNS: Final = (
     *("run", "scenario", "seed", "pictures", "completed"),
-    *("in real time", "completed"),
+    *("in real time", "completed", "load before", "after"),
 )
 
 
@@ -191,7 +224,7 @@ def runs(result: Result) -> Rows:
             for half in (one["counted"], one["stack"])
             for cell in (half["pictures"], "yes" if half["completed"] else "no")
         ]
-        yield one["number"], one["family"], one["seed"], *cells
+        yield one["number"], one["family"], one["seed"], *cells, *one["load"]
 
 
 def _interval(told: Mapping[str, float] | None) -> str:

@@ -4,6 +4,7 @@ from contextlib import closing
 from pathlib import Path
 
 import orjson
+import pytest
 
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.lab.emulator.camera import Counts, DetectorModel
@@ -11,7 +12,7 @@ from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.scenarios import scenario_named
 from iveg.lab.emulator.truth import TruthLog
 from iveg.lab.emulator.world import SimulatedWorld
-from iveg.lab.experiment.outcome import read_truth
+from iveg.lab.experiment.recording import picture_of_truth, read_truth
 
 BLIND = DetectorModel(0.9, counts={"farmer": Counts(0, 0, 1), "AGI": Counts(0, 0, 1)})
 
@@ -26,12 +27,17 @@ def test_a_person_whom_the_detector_misses_is_in_the_truth(tmp_path: Path) -> No
         told = rig.detect(0.0, world)
         log.record(rig, world, 1000.5)
 
-    [picture] = read_truth(tmp_path / "truth.jsonl")
+    [row] = read_truth(tmp_path / "truth.jsonl")
+    picture = picture_of_truth(row)
     [person] = world.discs()
     assert told.detections == ()
     assert (picture.robot_id, picture.at) == ("AGI", 1000.5)
     [seen] = [one for one in picture.seen if one.class_id == "farmer"]
     assert (seen.x, seen.y) == (round(person.x, 3), round(person.y, 3))
+    assert seen.local is not None
+    assert rig.vehicle.pose.transform(*seen.local) == pytest.approx(
+        (person.x, person.y), abs=0.002
+    )
 
 
 def test_everybody_is_in_the_truth_with_the_robot_s_true_pose(tmp_path: Path) -> None:
@@ -49,3 +55,5 @@ def test_everybody_is_in_the_truth_with_the_robot_s_true_pose(tmp_path: Path) ->
         round(one.x, 3) for one in world.discs()
     ]
     assert (told["pose"]["x"], told["speed"]) == (round(pose.x, 3), 0.0)
+    assert [one["key"] for one in told["robots"]] == ["AGI", "AGII"]
+    assert told["robots"][0] == {"key": "AGI", **told["pose"]}

@@ -6,8 +6,15 @@ import numpy as np
 import pytest
 
 from iveg.domain.costmap import Grid, InflatedGrid
-from iveg.lab.experiment.beliefs import Belief, belief_in, belief_of, injections
-from iveg.lab.experiment.observer import picture_of, slowdowns_of
+from iveg.lab.experiment.beliefs import (
+    Belief,
+    belief_in,
+    belief_of,
+    injections,
+    questions,
+)
+from iveg.lab.experiment.outcome import slowdowns_of
+from iveg.lab.experiment.recording import picture_of
 from iveg.lab.experiment.scoring import Picture, SeenObject
 
 FARMER = SeenObject("person-0", "farmer", 1.0, 1.0)
@@ -15,6 +22,12 @@ FARMER = SeenObject("person-0", "farmer", 1.0, 1.0)
 
 def look(robot_id: str, *seen: SeenObject, at: float = 0.0) -> Picture:
     return Picture(robot_id, at, seen)
+
+
+def injected(
+    truth: list[Picture], beliefs: list[tuple[float, Belief]]
+) -> dict[str, int]:
+    return injections(list(questions(truth, beliefs, "AGII")))
 
 
 def answer(*, taken: bool) -> dict[str, Any]:
@@ -36,7 +49,7 @@ def test_somebody_out_of_sight_is_injected_when_the_costmap_has_them(
 ) -> None:
     belief = belief_in(answer(taken=taken))
 
-    found = injections([look("AGI", FARMER), look("AGII")], [(0.0, belief)], "AGII")
+    found = injected([look("AGI", FARMER), look("AGII")], [(0.0, belief)])
 
     assert found == {
         "asked": 1,
@@ -49,7 +62,7 @@ def test_somebody_out_of_sight_is_injected_when_the_costmap_has_them(
 def test_whom_a_robot_sees_itself_was_not_injected() -> None:
     both = [look("AGI", FARMER), look("AGII", FARMER)]
 
-    found = injections(both, [(0.0, belief_in(answer(taken=True)))], "AGII")
+    found = injected(both, [(0.0, belief_in(answer(taken=True)))])
 
     assert found["asked"] == 0
 
@@ -59,8 +72,8 @@ def test_whom_a_robots_own_laser_found_was_not_injected() -> None:
     told = belief_of(costmap(taken=False), costmap(taken=True))
     seen = [look("AGI", FARMER), look("AGII")]
 
-    by_laser = injections(seen, [(0.0, own)], "AGII")
-    by_others = injections(seen, [(0.0, told)], "AGII")
+    by_laser = injected(seen, [(0.0, own)])
+    by_others = injected(seen, [(0.0, told)])
 
     assert (by_laser["asked"], by_laser["injected"]) == (0, 0)
     assert (by_others["asked"], by_others["injected"]) == (1, 1)
@@ -73,17 +86,19 @@ def test_only_who_was_told_of_before_the_own_camera_saw_them_is_ahead(
     belief: Belief = belief_in(answer(taken=True))
     seen = [look("AGI", FARMER), look("AGII"), look("AGII", FARMER, at=own_at)]
 
-    assert injections(seen, [(0.0, belief)], "AGII")["ahead"] == ahead
+    assert injected(seen, [(0.0, belief)])["ahead"] == ahead
 
 
 def test_a_picture_is_read_as_live_tells_it() -> None:
+    box = {"xmin": 2.0, "xmax": 3.0, "ymin": -1.0, "ymax": 0.0, "frame_id": "base_link"}
     item = {"class_id": "farmer", "position": {"x": 1.0, "y": 2.0}, "probability": 0.9}
+    item |= {"box": box}
     told = {"robot_id": "AGI", "stamp": "2026-01-01T00:00:00.000Z", "items": [item]}
 
     picture = picture_of(told)
 
     assert picture is not None
-    assert picture.seen == (SeenObject("0", "farmer", 1.0, 2.0, 0.9),)
+    assert picture.seen == (SeenObject("0", "farmer", 1.0, 2.0, 0.9, (2.5, -0.5)),)
     assert picture_of({**told, "stamp": None}) is None
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from iveg.domain.errors import DataFileError
 from iveg.lab.experiment.compare import write_comparison
-from iveg.lab.experiment.outcome import outcome_of, read_truth, result_of
+from iveg.lab.experiment.outcome import outcome_of, result_of
 from iveg.lab.experiment.plan import (
     FAMILIES,
     PLANS,
@@ -19,6 +19,7 @@ from iveg.lab.experiment.plan import (
     read_json,
     write_json,
 )
+from iveg.lab.experiment.recording import read_truth
 from iveg.lab.experiment.report import write_report
 from iveg.lab.experiment.run_store import RunStore
 from iveg.lab.experiment.scoring import Tally
@@ -47,9 +48,14 @@ def half(farmer: Tally | None = None, slices: list[Any] | None = None) -> Any:
     }
     if slices is None:
         return told
-    passed = {"passed": 990, "missing": 10, "reordered": 0, "repeated": 0}
-    order = {"uplink": passed, "fiware": passed}
-    return {**told, "slices": slices, "order": order, "stops": []}
+    sent = {"sent": 1000, "lost": 10, "reordered": 3, "orion_first": 99}
+    return {
+        **told,
+        "slices": slices,
+        "messages": {"odometry": sent},
+        "read": {"passed": 1600, "skipped": 421},
+        "stops": [],
+    }
 
 
 def result(
@@ -66,7 +72,7 @@ def result(
     farmer = Tally((confidence,) * found, missed, (0.6,) * ghosts, *of)
     step = PlannedRun("together", 1, 6.0, 7)
     stack = half(farmer, [piece(one) for one in took_ms])
-    outcome = outcome_of(step, half(farmer), stack)
+    outcome = outcome_of(step, half(farmer), stack, (1.24, 3.0))
     return result_of(PLANS["minimal"], [outcome], CHOSEN, why)
 
 
@@ -85,9 +91,12 @@ def test_the_report_sets_the_papers_latency_beside_what_was_measured() -> None:
     page = write_report(result(took_ms=(5.0, 5.0)))
 
     assert "<td>lidar</td><td>here</td><td>200</td><td>5.0</td>" in page
+    assert "<td>10.0%</td><td>200</td><td>5.0</td>" in page
     assert "<td>paper, field</td><td></td><td>17.4</td><td>97.2</td>" in page
     assert "odometry, paper, simulation" in page
     assert "10 of 1000" in page
+    assert "421 of 1600" in page
+    assert "<td>1.2</td><td>3.0</td>" in page
     assert "below 320 ms" in page
 
 
@@ -205,7 +214,7 @@ def test_quick_stays_under_three_minutes_and_full_has_enough_messages() -> None:
 
 def finished(step: PlannedRun) -> Any:
     farmer = Tally((0.9,), 0, (), 1, 1)
-    return outcome_of(step, half(farmer), half(farmer, []))
+    return outcome_of(step, half(farmer), half(farmer, []), (0.0, 0.0))
 
 
 def test_an_experiment_that_broke_off_keeps_what_it_has_and_goes_on(

@@ -2,9 +2,12 @@
 
 from typing import Any
 
+import pytest
+
 from iveg.domain.detection_rule import DetectionRule
-from iveg.lab.experiment.outcome import counted_of
+from iveg.lab.experiment.outcome import half_of
 from iveg.lab.experiment.plan import ROBOTS, PlannedRun
+from iveg.lab.experiment.scoring import Tally, score
 from iveg.lab.experiment.virtual_run import VirtualRun
 
 RULE = DetectionRule()
@@ -16,8 +19,8 @@ async def counted(
     profile: str = "field",
     seconds: float = 5.0,
 ) -> Any:
-    rehearsal = VirtualRun(PlannedRun(family, 1, 6.0, seed), profile, RULE, "AGII")
-    return counted_of(await rehearsal.play(seconds), "AGII")
+    rehearsal = VirtualRun(PlannedRun(family, 1, 6.0, seed), profile, RULE)
+    return half_of(await rehearsal.play(seconds))
 
 
 async def test_the_same_seed_gives_the_same_counts_to_the_last_digit() -> None:
@@ -33,15 +36,16 @@ async def test_every_picture_of_every_robot_is_counted() -> None:
     assert len(farmer["found"]) + farmer["missed"] > 20
 
 
-async def test_a_perfect_detector_makes_no_mistake_on_its_way_through_iveg() -> None:
-    told = await counted(7, profile="perfect")
+async def test_a_perfect_detector_scores_one_although_poses_are_wrong() -> None:
+    told = await counted(2027, "together", "perfect", 60.0)
 
-    assert {name: one["missed"] for name, one in told["classes"].items()} == {
-        "AGI": 0,
-        "AGII": 0,
-        "farmer": 0,
-    }
-    assert not [one for one in told["classes"].values() if one["ghosts"]]
+    of = score(Tally(**one) for one in told["classes"].values())
+    off = [place for one in told["classes"].values() for place in one["off_map"]]
+    own = [place for one in told["classes"].values() for place in one["off_robot"]]
+    assert (of.fp, of.fn) == (0, 0)
+    assert of.ap == pytest.approx(1.0)
+    assert of.tp > 900
+    assert max(off) > 0.2 > 0.002 > max(own)
 
 
 async def test_a_person_whom_only_agi_sees_stands_in_agiis_costmap() -> None:

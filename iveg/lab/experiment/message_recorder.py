@@ -1,0 +1,195 @@
+"""Reads each message at the broker and at Orion, and does nothing else.
+
+iVeg reads the broker every few hundredths of a second and skips what is old; Orion's
+copy is often there before.  Here every message is read at once, from the agent's own
+topics and by subscriptions of our own at Orion, and decoded when the run is over.
+"""
+
+import asyncio
+import contextlib
+import ssl
+import threading
+from collections.abc import AsyncIterator, Iterator
+from dataclasses import replace
+from http import HTTPStatus
+from typing import Any, Final
+from urllib.parse import urlsplit
+
+from paho.mqtt import client as paho
+from paho.mqtt.enums import CallbackAPIVersion
+
+from iveg.adapters import clock
+from iveg.adapters.orion import OrionClient
+from iveg.adapters.post_listener import post_listener
+from iveg.adapters.subscriptions import (
+    ALL_ROBOTS,
+    WantedSubscription,
+    write_subscription,
+)
+from iveg.cli.nodes import broker_of
+from iveg.domain.errors import HopError, UnreadableError
+from iveg.domain.kinds import MEASURED
+from iveg.domain.latency.segments import data_of
+from iveg.domain.observations import kind_of
+from iveg.lab.experiment.message_times import MessageTimes
+from iveg.ngsi import codec, names
+from iveg.settings import Settings
+
+DESCRIPTION: Final = "iVeg experiment, times of messages"
+"""Of its subscriptions; iVeg's own begin otherwise, so that it leaves these alone."""
+LAST_COPIES_S: Final = 2.0
+"""How long Orion's copies of the last messages are waited for (s)."""
+_SUBSCRIBED_WITHIN_S = 5.0
+_SETTLED_S, _SETTLES_WITHIN_S, _LOOK_EVERY_S = 0.5, 60.0, 0.5
+
+
+class MessageRecorder:
+    """Holds what was read, and when; decodes it when asked."""
+
+    def __init__(self) -> None:
+        # Steps of the wall clock must not get between two readings.
+        self._since = clock.wall() - clock.mono()
+        self._heard: list[tuple[float, str, bytes]] = []
+        self._notified: list[tuple[float, bytes]] = []
+
+    def heard(self, topic: str, payload: bytes) -> None:
+        """The broker has passed a message on."""
+        self._heard.append((self._now, topic, payload))
+
+    def notified(self, body: bytes) -> tuple[HTTPStatus, str]:
+        """Orion has posted a notification."""
+        self._notified.append((self._now, body))
+        return HTTPStatus.NO_CONTENT, ""
+
+    @property
+    def _now(self) -> float:
+        return self._since + clock.mono()
+
+    async def settle(self) -> None:
+        """Wait until Orion keeps up: robots start at full rate behind a backlog."""
+        deadline = clock.mono() + _SETTLES_WITHIN_S
+        in_time = 0
+        while in_time < 2 and clock.mono() < deadline:
+            await asyncio.sleep(_LOOK_EVERY_S)
+            in_time = in_time + 1 if self._lag_s < _SETTLED_S else 0
+
+    @property
+    def _lag_s(self) -> float:
+        """Age of the newest of Orion's copies when it came (s)."""
+        for at, body in self._notified[-1:]:
+            for one in _read_notification(body):
+                if one.stamp is not None:
+                    return at - one.stamp
+        return float("inf")
+
+    def times(self, begin: float, end: float) -> list[MessageTimes]:
+        """Messages that were at the broker within a time (Unix s), in that order."""
+        found: dict[MessageTimes, MessageTimes] = {}
+        for at, topic, payload in self._heard:
+            if begin <= at < end:
+                read = codec.read_measure(topic.split("/")[2], payload)
+                for one in _messages_in(read):
+                    found.setdefault(one, replace(one, broker=at))
+        for at, body in self._notified:
+            for one in _read_notification(body):
+                known = found.get(one)
+                if known is not None and known.orion is None:
+                    found[one] = replace(known, orion=at)
+        return list(found.values())
+
+
+def _messages_in(read: codec.ReadResult) -> Iterator[MessageTimes]:
+    """The messages of a reading that count themselves; times are not known yet."""
+    for one in read.observations:
+        data, origin = data_of(kind_of(one)), one.origin
+        if data is not None and origin.boot is not None and origin.seq is not None:
+            robot_id: str = one.robot_id
+            yield MessageTimes(robot_id, data, origin.boot, origin.seq, origin.stamp_s)
+
+
+def _read_notification(body: bytes) -> Iterator[MessageTimes]:
+    with contextlib.suppress(UnreadableError):
+        yield from _messages_in(codec.read_notification(body)[1])
+
+
+# --- where it listens -----------------------------------------------------------------
+
+
+@contextlib.asynccontextmanager
+async def recorder(settings: Settings) -> AsyncIterator[MessageRecorder]:
+    """Record while the block lasts.
+
+    Raises:
+        HopError: the broker or Orion does not take it.
+    """
+    recorded = MessageRecorder()
+    tenant = settings.fiware_service, settings.fiware_servicepath
+    host = urlsplit(settings.notify_address).hostname
+    async with (
+        _hearing(settings, recorded),
+        post_listener(recorded.notified, settings.host) as port,
+        OrionClient(settings.orion_url, *tenant) as orion,
+    ):
+        await _unsubscribe(orion)
+        for document in _subscriptions(f"http://{host}:{port}/"):
+            await orion.create_subscription(document)
+        try:
+            yield recorded
+        finally:
+            await _unsubscribe(orion)
+
+
+def _subscriptions(url: str) -> Iterator[dict[str, Any]]:
+    """One for each kind of data: each notification has one message."""
+    for kind in MEASURED:
+        if data_of(kind.of) is not None:
+            attributes = tuple(name for name, _ in kind.attributes)
+            wanted = WantedSubscription("", ALL_ROBOTS, attributes)
+            yield {
+                **write_subscription(wanted, url, "experiment"),
+                "description": DESCRIPTION,
+            }
+
+
+async def _unsubscribe(orion: OrionClient) -> None:
+    """Remove ours, and what a start that was killed left."""
+    for one in await orion.read_subscriptions():
+        if one.get("description") == DESCRIPTION:
+            await orion.delete_subscription(one["id"])
+
+
+@contextlib.asynccontextmanager
+async def _hearing(
+    settings: Settings, recorded: MessageRecorder
+) -> AsyncIterator[None]:
+    """Read the agent's own topics at the broker, in a thread of its own.
+
+    A message has its time as soon as it is read, before any of Orion's that wait.
+    """
+    address, stands = broker_of(settings), threading.Event()
+    topic = names.measure_topic(settings.apikey, "+")
+
+    def connected(client: paho.Client, *_: object) -> None:
+        client.subscribe(topic)
+
+    def arrived(_client: object, _data: object, message: paho.MQTTMessage) -> None:
+        recorded.heard(message.topic, bytes(message.payload))
+
+    client = paho.Client(CallbackAPIVersion.VERSION2)
+    client.username_pw_set(address.user, address.password)
+    if address.tls:
+        client.tls_set_context(ssl.create_default_context())
+    client.on_connect, client.on_message = connected, arrived
+    client.on_subscribe = lambda *_: stands.set()
+    try:
+        await asyncio.to_thread(client.connect, address.host, address.port)
+    except OSError as error:
+        raise HopError("mqtt", str(error)) from error
+    client.loop_start()
+    try:
+        if not await asyncio.to_thread(stands.wait, _SUBSCRIBED_WITHIN_S):
+            raise HopError("mqtt", "takes no subscription to the robots' measures")
+        yield
+    finally:
+        client.disconnect()
+        await asyncio.to_thread(client.loop_stop)

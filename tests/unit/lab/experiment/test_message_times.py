@@ -1,0 +1,89 @@
+"""Δt₁ and Δt₂ of the same messages, and the share of which nobody knows them."""
+
+import pytest
+
+from iveg.lab.experiment.message_recorder import MessageRecorder
+from iveg.lab.experiment.message_times import MessageTimes, counts_of
+from iveg.lab.experiment.slices import with_messages
+from iveg.ngsi.codec import write_odometry
+from tests.builders import START, notification, odometry, origin, pose_value
+
+
+def message(
+    seq: int = 0, stamp: float | None = 0.0, broker: float = 0.01, **more: float
+) -> MessageTimes:
+    return MessageTimes("AGI", "odometry", "b", seq, stamp, broker, **more)
+
+
+def test_both_parts_of_the_way_are_the_whole_way_of_the_same_message() -> None:
+    hops = message(stamp=1.0, broker=1.01, orion=1.05).hops
+
+    assert hops is not None
+    assert list(hops) == ["uplink", "fiware", "robot_orion"]
+    assert list(hops.values()) == pytest.approx([0.01, 0.04, 0.05])
+
+
+@pytest.mark.parametrize(
+    "one",
+    [
+        message(orion=0.009),
+        message(),
+        message(stamp=None, orion=0.02),
+        message(stamp=0.02, orion=0.03),
+        message(stamp=-61.0, orion=0.03),
+    ],
+    ids=["Orion first", "lost", "no stamp", "from the future", "a minute old"],
+)
+def test_a_way_of_which_one_time_is_not_known_is_in_no_column(
+    one: MessageTimes,
+) -> None:
+    assert one.hops is None
+
+
+def test_a_slice_has_as_many_in_each_column_and_no_zeros_for_what_is_not_known() -> (
+    None
+):
+    times = [message(n, orion=0.03) for n in range(3)] + [message(3, orion=0.005)]
+
+    told = with_messages({}, times)["odometry"]
+
+    assert {hop: sum(bins["counts"]) for hop, bins in told.items()} == {
+        "uplink": 3,
+        "fiware": 3,
+        "robot_orion": 3,
+    }
+    assert told["fiware"]["total_ms"] == pytest.approx(60.0)
+
+
+def test_what_never_came_came_late_or_came_first_is_counted_once() -> None:
+    times = [
+        message(0, orion=0.020),
+        message(2, orion=0.021),
+        message(1, orion=0.022),
+        message(3),
+        message(4, orion=0.002),
+    ]
+
+    assert counts_of(times)["odometry"] == {
+        "sent": 5,
+        "lost": 1,
+        "reordered": 3,
+        "orion_first": 1,
+    }
+
+
+def test_a_message_of_the_robots_topic_is_found_again_in_orions_copy() -> None:
+    recorder = MessageRecorder()
+    for seq in (7, 8):
+        sent = odometry(origin=origin(seq))
+        recorder.heard("/iveg/AGI_odom/attrs", write_odometry(sent))
+    recorder.notified(b"no notification")
+    recorder.notified(notification({"base_pose_ground_truth": pose_value(seq=8)}))
+
+    lost, came = recorder.times(0.0, float("inf"))
+
+    assert (lost.seq, lost.stamp, lost.orion) == (7, START.wall, None)
+    assert (came.seq, came.robot_id, came.data) == (8, "AGI", "odometry")
+    assert came.orion is not None
+    assert came.orion >= came.broker
+    assert recorder.times(0.0, lost.broker) == []
