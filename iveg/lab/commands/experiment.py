@@ -10,7 +10,7 @@ import os
 import secrets
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 from urllib.parse import urlsplit
@@ -27,6 +27,7 @@ from iveg.domain.stamps import format_stamp
 from iveg.lab.commands.demo import on_free_ports
 from iveg.lab.commands.processes import Parts
 from iveg.lab.experiment import compare
+from iveg.lab.experiment.desired_states import forget_stops, refuse_held_robots
 from iveg.lab.experiment.message_recorder import LAST_COPIES_S, recorder
 from iveg.lab.experiment.observer import ObservedRun, watch
 from iveg.lab.experiment.outcome import (
@@ -131,6 +132,8 @@ class Lab:
     embedded: bool = True
     keep_raw: bool = False
     exit_code: int = 1
+    _stops: list[str] = field(default_factory=list)
+    """Ids of the STOPs that it sent."""
 
     async def run(self, environment: Mapping[str, str]) -> None:
         """Run every step that is not done yet, then write the report."""
@@ -144,6 +147,7 @@ class Lab:
         try:
             if not self.embedded:
                 await refuse_live_robots(self.settings)
+                await refuse_held_robots(self.settings, ROBOTS)
             async with Parts(surroundings) as parts:
                 if self.embedded:
                     await parts.start("fiware")
@@ -156,7 +160,18 @@ class Lab:
             why = str(error)
         finally:
             ticking.cancel()
+            why = await self._give_back() or why
             self._finish(why, progress)
+
+    async def _give_back(self) -> str:
+        """Leave a site's robots as they were; why not, or empty."""
+        if self.embedded or not self._stops:
+            return ""
+        try:
+            await forget_stops(self.settings, ROBOTS, self._stops)
+        except HopError as error:
+            return f"its STOP is still retained at the broker: {error}"
+        return ""
 
     async def _step(self, step: PlannedRun, parts: Parts, progress: Progress) -> None:
         progress.begin(step, "counting", clock.mono())
@@ -222,7 +237,8 @@ class Lab:
 
     async def _stop(self) -> Any:
         """Stop the fleet; time until each robot stood (ms)."""
-        await self._ask("fleet/stop", "POST")
+        pressed = await self._ask("fleet/stop", "POST")
+        self._stops = [one["command_id"] for one in pressed["commands"]]
         deadline = clock.mono() + _STOPS_WITHIN_S
         while True:
             await asyncio.sleep(0.5)

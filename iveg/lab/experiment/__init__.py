@@ -6,7 +6,7 @@
 half is a ``recording``, whose rows ``raw`` writes.  ``scoring`` and ``beliefs`` compare
 both with the emulator's ground truth, ``message_times`` and ``slices`` give the times,
 ``statistics`` the intervals, ``outcome`` and ``run_store`` store results and progress,
-``tables``,
+``desired_states`` gives a site its robots back, ``tables``,
 ``report`` and ``compare`` present them beside the paper; ``runner`` starts one from the
 page, ``api`` has its routes.
 """
