@@ -25,6 +25,15 @@ class Experiment(Model):
             "Why it broke off, in a word or the program's own; empty where it did not."
         )
     )
+    profile: str | None = Field(
+        default=None, description="Of the emulated detector: ``field``, ``simulation``."
+    )
+    seed: int | None = Field(
+        default=None, description="First seed; each run's own is in the report."
+    )
+    load: float | None = Field(
+        default=None, description="Of the machine, mean of the last minute of it."
+    )
     began_at: str
     report: bool = Field(
         description=(

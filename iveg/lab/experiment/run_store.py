@@ -15,6 +15,7 @@ Progress is reported in that file, on a terminal, and elsewhere in plain lines::
 """
 
 import contextlib
+import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Final, Literal, TextIO
@@ -175,6 +176,7 @@ class Progress:
             "of": self._of,
             "left_s": round(left_s),
             "why": why,
+            "load": round(os.getloadavg()[0], 1),
         }
         write_json(self._directory / PROGRESS, progress)
 

@@ -21,6 +21,7 @@ from typing import Any, Final
 from iveg.domain.errors import DataFileError, ExperimentRefusedError
 from iveg.domain.stamps import format_stamp
 from iveg.lab.experiment.plan import (
+    PLAN,
     PLANS,
     PROGRESS,
     Size,
@@ -46,6 +47,7 @@ _UNKNOWN: Final[Mapping[str, Any]] = {
     "of": 0,
     "left_s": 0,
     "why": "",
+    "load": None,
 }
 
 
@@ -179,6 +181,7 @@ class ExperimentRunner:
             name=directory.name,
             size=directory.name.partition("-")[0],
             **known,
+            **_chosen(directory),
             began_at=format_stamp(_began(directory)),
             report=self.file(directory.name, "html") is not None,
         )
@@ -186,8 +189,17 @@ class ExperimentRunner:
 
 def _began(directory: Path) -> float:
     """Time at which its plan was written (Unix s)."""
-    file = directory / "plan.json"
+    file = directory / PLAN
     return (file if file.exists() else directory).stat().st_mtime
+
+
+def _chosen(directory: Path) -> dict[str, Any]:
+    """Profile and seed of its plan; nothing before it is written."""
+    try:
+        plan = read_json(directory / PLAN)["plan"]
+    except (DataFileError, KeyError):
+        return {}
+    return {key: plan.get(key) for key in ("profile", "seed")}
 
 
 def _progress(directory: Path) -> dict[str, Any]:

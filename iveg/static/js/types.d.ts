@@ -322,6 +322,12 @@ export type Experiment = {
   left_s: number;
   /** Why it broke off, in a word or the program's own; empty where it did not. */
   why: string;
+  /** Of the emulated detector: ``field``, ``simulation``. */
+  profile: string | null;
+  /** First seed; each run's own is in the report. */
+  seed: number | null;
+  /** Of the machine, mean of the last minute of it. */
+  load: number | null;
   began_at: string;
   /** Whether there is something to open: the report, or what a break left. */
   report: boolean;

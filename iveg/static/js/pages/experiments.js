@@ -106,8 +106,17 @@ function rowOf(one, i18n) {
   head.setAttribute("scope", "row");
   row.append(head, make("td", "", dayAndTime(one.began_at)));
   row.append(make("td", "", stateOf(one, i18n)));
-  row.append(make("td", "number", `${one.done}/${one.of}`), filesOf(one, i18n));
+  row.append(make("td", "number", `${one.done}/${one.of}`));
+  row.append(make("td", "", withOf(one, i18n)), filesOf(one, i18n));
   return row;
+}
+
+/** @param {Experiment} one @param {import("../core/i18n.js").I18n} i18n */
+function withOf({ profile, seed, load }, i18n) {
+  if (profile === null || seed === null) return "";
+  const told = i18n.t(`experiments.profile.${profile}`);
+  const said = i18n.t("experiments.with", { profile: told, seed: String(seed) });
+  return load === null ? said : `${said} ${i18n.t("experiments.load", { load })}`;
 }
 
 /** @param {Experiment} one @param {import("../core/i18n.js").I18n} i18n */

@@ -28,7 +28,8 @@ def test_the_file_says_which_run_it_is_at_and_how_long_it_takes(tmp_path: Path) 
     progress.begin(STEPS[0], "running", 4.0)
     progress.tick(10.0)
 
-    assert told(tmp_path) == {
+    assert told(tmp_path).pop("load") >= 0.0
+    assert {key: value for key, value in told(tmp_path).items() if key != "load"} == {
         "state": "running",
         "run": "peers-1",
         "phase": "running",

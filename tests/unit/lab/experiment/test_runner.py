@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from iveg.domain.errors import ExperimentRefusedError
-from iveg.lab.experiment.plan import PLANS, expected_s, read_json, write_json
+from iveg.lab.experiment.plan import PLANS, claim, expected_s, read_json, write_json
 from iveg.lab.experiment.runner import ExperimentRunner
 from iveg.models.experiment import Experiment
 from tests.processes import is_alive
@@ -20,7 +20,7 @@ PROGRAM = """
 import json, os, pathlib, signal, sys
 place = pathlib.Path(sys.argv[sys.argv.index("--out") + 1])
 told = {"state": "running", "run": "peers-1", "phase": "running", "done": 1, "of": 5,
-        "left_s": 80, "why": "", "pid": os.getpid()}
+        "left_s": 80, "why": "", "load": 6.5, "pid": os.getpid()}
 def write(**more):
     part = place / "own.part"
     part.write_text(json.dumps({**told, **more}))
@@ -66,11 +66,14 @@ async def until(
 async def test_one_that_runs_is_watched_and_its_end_is_told(tmp_path: Path) -> None:
     async with bench_of(tmp_path, FINISHES) as bench:
         begun = bench.start("quick")
+        claim(tmp_path / "experiments" / begun.name, PLANS["quick"])
         ended = await until(bench, lambda one: one.state == "done")
 
     assert (begun.name, begun.state, begun.of) == ("quick-001", "running", 5)
     assert begun.left_s == round(sum(map(expected_s, PLANS["quick"].steps())))
     assert (ended.done, ended.why, ended.report) == (5, "", True)
+    assert (begun.profile, begun.seed, begun.load) == (None, None, None)
+    assert (ended.profile, ended.seed, ended.load) == ("field", 2026, 6.5)
     assert bench.file("quick-001", "html") is not None
 
 
