@@ -27,7 +27,8 @@ _ORDERS = ("", "id", "!id")
 async def list_entities(broker: ContextBroker, call: Call) -> Response:
     """``GET /v2/entities``.
 
-    A requested attribute may be missing: the entity is then listed without it.
+    A requested attribute may be missing: the entity is then listed without it, but one
+    that was only registered is not.
     """
     wanted, view = _Wanted.read(call), call.view()
     tenant = broker.tenant(call.scope.service)
@@ -35,21 +36,14 @@ async def list_entities(broker: ContextBroker, call: Call) -> Response:
     told = await _ask_providers(broker, call, "", view.names)
     known = {(one.id, one.type) for one in found}
     strange = [key for key in told if key not in known]
-    bare = [
-        key
-        for key in bare_entities(tenant.registrations, call.scope, view.names)
-        if key not in known and key not in told
-    ]
-    ghosts = [_ghost(call.scope, *key) for key in (*strange, *bare)]
+    ghosts = [_ghost(call.scope, *key) for key in strange]
     if order := call.query.get("orderBy"):
         found.sort(key=lambda one: one.id, reverse=order.startswith("!"))
     chosen = [one for one in (*found, *ghosts) if wanted.fits(one)]
     shown = [
         write_entity(one, view, told.get((one.id, one.type), {})) for one in chosen
     ]
-    # Orion does not count those that it lists by name alone.
-    total = sum((one.id, one.type) not in bare for one in chosen)
-    return call.page(shown, total)
+    return call.page(shown, len(chosen))
 
 
 @dataclass(frozen=True, slots=True)

@@ -104,8 +104,8 @@ def bare_entities(
 ) -> list[tuple[str, str]]:
     """Registered entities whose providers need not be queried, by id and type.
 
-    When no provider has a requested attribute, Orion still lists the entities of its
-    registrations.
+    When no provider has a requested attribute, Orion still finds an entity of its
+    registrations by its id.
     """
     if not names or "*" in names:
         return []

@@ -61,11 +61,11 @@ async def test_poison_is_survived_in_silence(
 async def test_what_is_discarded_changes_nothing(
     up: Running, orion: OrionClient
 ) -> None:
-    before = await orion.read_robots()
     for payload in (b"x", b'{"a":"<"}', b"[1]"):
         up.agent.hear("/iveg/AGI/attrs", payload)
     up.agent.hear("/AGI/mqtt_feedback", b"none of its business")
-    assert await orion.read_robots() == before == [{"id": "AGI", "type": "Robot"}]
+    assert await orion.read_robots() == []
+    assert not await orion.has_attribute("AGI", "a")
 
 
 @pytest.mark.parametrize(

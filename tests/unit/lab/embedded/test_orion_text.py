@@ -29,10 +29,13 @@ def test_what_looks_clean_holds_nothing_forbidden(value: Any) -> None:
 
 
 @pytest.mark.parametrize("character", list("<>\"'=;()"))
-def test_each_forbidden_character_is_found_in_keys_and_values(character: str) -> None:
-    for value in ({"k": [f"a{character}"]}, {f"k{character}": 1}):
-        assert holds_forbidden(value)
-        assert not looks_clean(orjson.dumps(value))
+def test_each_forbidden_character_is_found_in_values_and_not_in_keys(
+    character: str,
+) -> None:
+    value = {"k": [f"a{character}"]}
+    assert holds_forbidden(value)
+    assert not looks_clean(orjson.dumps(value))
+    assert not holds_forbidden({f"k{character}": 1})
 
 
 def test_an_escaped_forbidden_character_does_not_look_clean() -> None:
