@@ -102,6 +102,12 @@ def lag_in_words(lag_s: float, *, growing: bool = False, at_least: bool = False)
     return f"measures reach Orion {least}{late} s late{more}"
 
 
+def stopped_in_words(lag_s: float | None) -> str:
+    """That nothing passes, and for how long by now where a probe tells (s)."""
+    for_s = "" if lag_s is None else f", for {lag_s:.0f} s by now"
+    return f"measures do not reach Orion{for_s}"
+
+
 def _count(origin: Origin) -> Origin:
     """Identity of a probe; stamps may be reprinted on the way."""
     return Origin(origin.boot, origin.seq)

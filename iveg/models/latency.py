@@ -5,7 +5,7 @@ from typing import Any
 from pydantic import Field
 
 from iveg.domain.latency.segments import Data, Segment, Window
-from iveg.models.base import Model
+from iveg.models.base import Model, Slots
 
 
 class SegmentSpread(Model):
@@ -90,7 +90,7 @@ class SegmentRemark(Model):
 
     key: str
     hop: str
-    slots: dict[str, str | float]
+    slots: Slots
 
 
 class SegmentStep(Model):

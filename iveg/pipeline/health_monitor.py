@@ -17,7 +17,7 @@ from typing import Literal
 
 from iveg.domain.hops import Hop
 from iveg.domain.observations import Instant, Origin
-from iveg.domain.probe import ProbeLag, lag_in_words
+from iveg.domain.probe import ProbeLag, lag_in_words, stopped_in_words
 
 HopState = Literal["ok", "late", "down", "unknown"]
 Earlier = Literal["known", "reading", "unknown"]
@@ -204,7 +204,7 @@ class HealthMonitor:
         if state == "ok" or (state == "late" and self._was_behind):
             state, detail = self._agent_says(lag, growing=growing)
         else:
-            detail = "" if state == "unknown" else "measures do not reach Orion"
+            detail = "" if state == "unknown" else stopped_in_words(lag)
         return HopHealth(Hop.AGENT, state, age, detail, lag, growing)
 
     def _lag(self, now: Instant) -> tuple[float | None, bool]:

@@ -818,7 +818,7 @@ export type SegmentOrder = {
 export type SegmentRemark = {
   key: string;
   hop: string;
-  slots: Record<string, string | number>;
+  slots: Record<string, string | boolean | number | null>;
 };
 
 /** Latency of one hop; null where nothing was measured. */

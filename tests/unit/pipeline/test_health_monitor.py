@@ -141,6 +141,17 @@ def test_a_probe_that_takes_long_makes_the_agent_late() -> None:
     assert (late.lag_s, late.growing) == (3.0, False)
 
 
+def test_measures_that_do_not_come_are_told_with_how_long_by_now() -> None:
+    health_monitor = healthy(10.0)
+    health_monitor.sent(Origin("b", 1, "now"), at(11.0))
+    health_monitor.orion_ok_at = at(20.0).mono
+
+    down = hop(health_monitor, "iot_agent", 20.0)
+
+    assert (down.state, down.lag_s) == ("down", 9.0)
+    assert down.detail == "measures do not reach Orion, for 9 s by now"
+
+
 def behind(lags: list[float], every_s: float = 2.0) -> tuple[HealthMonitor, float]:
     """A monitor whose probes came back this late each, and when the last one did."""
     health_monitor, now = healthy(10.0), 10.0

@@ -8,6 +8,8 @@ import pytest
 
 from iveg.domain.observations import FeedbackRef, Origin, Received
 from iveg.domain.transports import DIRECT, FIWARE
+from iveg.models.base import Slots
+from iveg.models.latency import SegmentRemark
 from tests.builders import START, odometry
 from tests.unit.web.desk import WebDesk
 
@@ -35,6 +37,13 @@ async def ask(desk: WebDesk, query: str = "window=1min") -> dict[str, Any]:
     assert answer.status_code == 200, answer.text
     body: dict[str, Any] = answer.json()
     return body
+
+
+def test_a_count_in_a_sentence_is_a_whole_number() -> None:
+    slots: Slots = {"robot": "AGI", "data": "odometry", "count": 5}
+    remark = SegmentRemark(key="reordered", hop="fiware", slots=slots)
+
+    assert '"count":5}' in remark.model_dump_json()
 
 
 def row(told: dict[str, Any], data: str = "odometry") -> dict[str, Any]:
