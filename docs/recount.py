@@ -343,7 +343,8 @@ def tables(directory):
             (
                 *(run["number"], run["family"], run["seed"]),
                 *(seen[n], yes(run["completed"]["virtual"])),
-                *(seen_through[n], yes(run["completed"]["real"]), *run["load"]),
+                *(seen_through[n], yes(run["completed"]["real"])),
+                *(yes(run["settled"]), *run["load"]),
             )
             for n, run in enumerate(runs)
         ),

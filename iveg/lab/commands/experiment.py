@@ -211,11 +211,11 @@ class Lab:
         async with recorder(self.settings) as recorded:
             await parts.start("emulator", *words)
             completed = await parts.outlast(self._until_live())
-            await parts.outlast(recorded.settle())
+            settled = await parts.outlast(recorded.settle())
             real = await parts.outlast(watch(url, token, step.seconds, WATCHED))
             await parts.outlast(asyncio.sleep(LAST_COPIES_S))
             real.times = recorded.times(real.edges[0], real.edges[-1])
-        real.truth = read_truth(truth)
+        real.truth, real.settled = read_truth(truth), settled
         real.completed = completed and await self._are_live() and bool(real.pairs)
         # Stopped robots are not released here, so STOP comes last.
         real.stops = await self._stop() if self.notebook.is_last(step) else []

@@ -65,13 +65,18 @@ class MessageRecorder:
     def _now(self) -> float:
         return self._since + clock.mono()
 
-    async def settle(self) -> None:
-        """Wait until Orion keeps up: robots start at full rate behind a backlog."""
-        deadline = clock.mono() + _SETTLES_WITHIN_S
+    async def settle(self, within_s: float = _SETTLES_WITHIN_S) -> bool:
+        """Wait until Orion keeps up: robots start at full rate behind a backlog.
+
+        Returns:
+            Whether it does.
+        """
+        deadline = clock.mono() + within_s
         in_time = 0
         while in_time < 2 and clock.mono() < deadline:
             await asyncio.sleep(_LOOK_EVERY_S)
             in_time = in_time + 1 if self._lag_s < _SETTLED_S else 0
+        return in_time == 2
 
     @property
     def _lag_s(self) -> float:

@@ -35,6 +35,7 @@ class ObservedRun(Recording):
         read: Messages that reached the broker by iVeg's own count, and how many it
             ``skipped`` of them because newer ones were there.
         times: Each message between the first edge and the last.
+        settled: Whether Orion kept up when the first slice began.
         stops: STOP of the fleet, robot by robot; empty unless it was the last run.
     """
 
@@ -42,6 +43,7 @@ class ObservedRun(Recording):
     edges: list[float] = field(default_factory=list)
     read: dict[str, int] = field(default_factory=dict)
     times: list[MessageTimes] = field(default_factory=list)
+    settled: bool = True
     stops: list[Row] = field(default_factory=list)
 
 

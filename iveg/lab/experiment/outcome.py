@@ -49,6 +49,7 @@ def stack_of(run: ObservedRun) -> Outcome:
             with_messages(decided, (m for m in run.times if begin <= m.broker < end))
             for (begin, end), decided in within
         ],
+        "settled": run.settled,
         "stops": run.stops,
     }
 

@@ -45,6 +45,7 @@ def write_raw(
         "completed": {"virtual": virtual.completed, "real": real.completed},
         "configuration": configuration,
         "read": real.read,
+        "settled": real.settled,
         "stops": real.stops,
     }
     write_json(directory / "run.json", {**{k: outcome[k] for k in kept}, **told})

@@ -212,7 +212,7 @@ def _first(messages: Mapping[str, int]) -> str:
 
 RUNS: Final = (
     *("run", "scenario", "seed", "pictures", "completed"),
-    *("in real time", "completed", "load before", "after"),
+    *("in real time", "completed", "Orion kept up", "load before", "after"),
 )
 
 
@@ -224,7 +224,8 @@ def runs(result: Result) -> Rows:
             for half in (one["counted"], one["stack"])
             for cell in (half["pictures"], "yes" if half["completed"] else "no")
         ]
-        yield one["number"], one["family"], one["seed"], *cells, *one["load"]
+        kept_up = "yes" if one["stack"]["settled"] else "no"
+        yield one["number"], one["family"], one["seed"], *cells, kept_up, *one["load"]
 
 
 def _interval(told: Mapping[str, float] | None) -> str:

@@ -2,10 +2,11 @@
 
 import pytest
 
+from iveg.adapters import clock
 from iveg.lab.experiment.message_recorder import MessageRecorder
 from iveg.lab.experiment.message_times import MessageTimes, counts_of
 from iveg.lab.experiment.slices import with_messages
-from iveg.ngsi.codec import write_odometry
+from iveg.ngsi.codec import format_stamp, write_odometry
 from tests.builders import START, notification, odometry, origin, pose_value
 
 
@@ -87,3 +88,14 @@ def test_a_message_of_the_robots_topic_is_found_again_in_orions_copy() -> None:
     assert came.orion is not None
     assert came.orion >= came.broker
     assert recorder.times(0.0, lost.broker) == []
+
+
+@pytest.mark.parametrize(("late_s", "keeps_up"), [(0.1, True), (9.0, False)])
+async def test_a_run_begins_when_orion_keeps_up_and_says_where_it_does_not(
+    late_s: float, *, keeps_up: bool
+) -> None:
+    recorder = MessageRecorder()
+    pose = pose_value() | {"stamp": format_stamp(clock.wall() - late_s)}
+    recorder.notified(notification({"base_pose_ground_truth": pose}))
+
+    assert await recorder.settle(within_s=1.2) is keeps_up

@@ -53,6 +53,7 @@ async def run(directory: Path, step: PlannedRun) -> Any:
         completed=step.number == 1,
         slices=[{"lidar": {"iveg": decided}}, {}],
         edges=[0.0, SECONDS / 2, SECONDS],
+        settled=step.number == 2,
         read={"passed": 1000, "skipped": 377},
         times=[one for one in messages(step.seed) if one.broker < SECONDS],
         stops=[

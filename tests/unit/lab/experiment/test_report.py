@@ -54,6 +54,7 @@ def half(farmer: Tally | None = None, slices: list[Any] | None = None) -> Any:
         "slices": slices,
         "messages": {"odometry": sent},
         "read": {"passed": 1600, "skipped": 421},
+        "settled": False,
         "stops": [],
     }
 
@@ -96,7 +97,7 @@ def test_the_report_sets_the_papers_latency_beside_what_was_measured() -> None:
     assert "odometry, paper, simulation" in page
     assert "10 of 1000" in page
     assert "421 of 1600" in page
-    assert "<td>1.2</td><td>3.0</td>" in page
+    assert "<td>no</td><td>1.2</td><td>3.0</td>" in page
     assert "below 320 ms" in page
 
 
