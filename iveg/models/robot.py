@@ -17,6 +17,7 @@ from iveg.models.base import Model, rounded
 from iveg.models.command import Command
 from iveg.models.margin import Margin
 from iveg.models.places import Point
+from iveg.models.situation import Situation
 
 Mode = Literal["RUNNING", "SLOW", "STOPPED"]
 
@@ -225,6 +226,7 @@ class _Robot(Model):
 
     robot_id: str
     link: Link
+    situation: Situation
     mode: Mode = Field(
         description="The robot's recent report; without one, the speed limit."
     )

@@ -52,6 +52,9 @@ class Alerting:
         for alert in changed:
             self._event_log.alert(alert)
             self._event_log.log(alert_line(alert), now)
+            if alert.condition.robot_id is not None:
+                # A P1 is part of its situation.
+                self._event_log.changed(topics.ROBOT.of(alert.condition.robot_id))
         raised = [one for one in changed if one.cleared is None]
         if raised:
             self.on_raised(raised)

@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterable
 
 from iveg.domain import margins as margins_
 from iveg.domain.acknowledgements import acknowledgements_of
-from iveg.domain.limits import LIMITS
 from iveg.domain.margins import LeastMargins
 from iveg.domain.observations import Instant
 from iveg.domain.records import LogRecord
@@ -39,9 +38,11 @@ from iveg.models.robot import (
     Twist,
 )
 from iveg.models.rule import Rule
+from iveg.models.situation import Situation
 from iveg.ngsi.names import ROBOT_DEVICES
 from iveg.pipeline.build import Pipeline
 from iveg.pipeline.health_monitor import HopHealth
+from iveg.pipeline.situations import Situations, fresh_report
 
 _FIRST_LINES = 200
 
@@ -59,6 +60,7 @@ class Views:
     ) -> None:
         self._evaluator, self._commander = parts.evaluator, parts.commander
         self._margins = parts.margins
+        self._situations = Situations(parts.evaluator)
         self.scans = parts.scans
         self._world, self._people = parts.world, parts.evaluator.people
         self._greenhouse = parts.evaluator.greenhouse
@@ -83,9 +85,11 @@ class Views:
         robot = self._world.robot(robot_id)
         machine = self._commander.machine(robot_id)
         odometry, safety, age = robot.odometry, robot.safety, robot.age_s(now)
+        margin = self._margin(robot, margins, now)
         return Robot(
             robot_id=robot_id,
             link=robot.link(now),
+            situation=Situation.of(self._situations.of(robot, machine, margin, now)),
             mode=self._mode(robot, machine, now),
             pose=None if odometry is None else Pose.of(odometry.pose),
             twist=None if odometry is None else Twist.of(odometry.twist),
@@ -109,7 +113,7 @@ class Views:
             clock_offset_s=rounded(robot.clock.offset_s(now)),
             transport=self._world.feeds.of(robot_id).transport(now.mono),
             profile=Profile.of(robot.profile),
-            margin=Margin.of(self._margin(robot, margins, now)),
+            margin=Margin.of(margin),
             cmd_status=robot.command_status,
             **Robot.sensed(robot, now),
         )
@@ -128,11 +132,8 @@ class Views:
         alone, and not by an old one.
         """
         factor = self._evaluator.speed_limits[robot.robot_id].speed_factor
-        report, received = robot.safety, robot.safety_received
-        is_fresh = (
-            received is not None and now.mono - received.mono <= LIMITS.report_stale_s
-        )
-        if report is not None and is_fresh:
+        report = fresh_report(robot, now)
+        if report is not None:
             factor = 0.0 if report.holds else report.speed_factor
         if factor <= 0.0 or machine.state == "STANDING":
             return "STOPPED"

@@ -718,6 +718,7 @@ export type Recipient = {
 export type Robot = {
   robot_id: string;
   link: "UNKNOWN" | "LIVE" | "LATE" | "LOST";
+  situation: Situation;
   /** The robot's recent report; without one, the speed limit. */
   mode: "RUNNING" | "SLOW" | "STOPPED";
   pose: Pose | null;
@@ -861,6 +862,24 @@ export type SignInCode = {
   image: string;
   /** The address works on the server's own computer alone. */
   local: boolean;
+};
+
+/** The worst that holds for a robot now, and what a person can do. */
+export type Situation = {
+  level: "danger" | "caution" | "doubt" | "locked" | "working" | "away";
+  /** Its sentence is `situation.is.{state}`. */
+  state: string;
+  /** The reason that is applied. */
+  cause: string;
+  /** Its sentence is `situation.why.{why}`. */
+  why: string | null;
+  /** The person, robot or hold of the cause. */
+  about: string | null;
+  /** Its sentence is `situation.do.{action}`. */
+  action: "none" | "press_stop" | "red_button" | "keep_away" | "as_moving" | "check_robot" | "check_camera" | "check_network" | "check_fleet_file" | "release" | "unlock" | "resume";
+  /** The strictest speed factor in force. */
+  factor: number | null;
+  slots: Record<string, string | boolean | number | null>;
 };
 
 /** The first frame of ``/live``. */

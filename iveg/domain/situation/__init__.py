@@ -1,0 +1,1 @@
+"""How it stands with a robot: one truth, which every surface says."""

@@ -1,0 +1,77 @@
+"""One truth a robot: whatever happens, its situation contradicts nothing beside it."""
+
+from typing import Any
+
+from hypothesis import given, settings
+
+from iveg.domain.limits import LIMITS
+from tests.worlds import days, told
+
+Robot = dict[str, Any]
+
+
+def is_fresh(robot: Robot) -> bool:
+    applied = robot["applied"]
+    return applied is not None and applied["age_s"] <= LIMITS.report_stale_s
+
+
+def contradictions(robot: Robot, *, alarmed: bool) -> dict[str, bool]:
+    """What must not be, by name."""
+    found, link, margin = robot["situation"], robot["link"], robot["margin"]
+    level, state, factor = found["level"], found["state"], found["factor"]
+    fresh = is_fresh(robot)
+    reason = robot["applied"]["reason"] if fresh else None
+    moves = (
+        abs(robot["twist"]["linear"]) > LIMITS.standing_speed if link == "LIVE" else 0
+    )
+    too_close = margin is not None and margin["band"] in ("inside", "unknown")
+    silent = link in ("LOST", "UNKNOWN")
+    return {
+        "clear beside a link that is not": state == "clear" and link != "LIVE",
+        "clear beside a margin": state == "clear" and too_close and moves,
+        "clear beside a lack": state == "clear" and bool(robot["missing"]),
+        "clear that the robot does not say": state == "clear" and reason != "clear",
+        "clear beside a limit": state == "clear" and factor != 1.0,
+        "clear beside a lock": state == "clear" and fresh and bool(robot["holds"]),
+        "half that it does not apply": state == "half" and factor != 0.5,
+        "half that it does not say": state == "half" and robot["speed_factor"] != 0.5,
+        "a reason that is not applied": state == "half" and found["cause"] != reason,
+        "held without locks": state == "held" and not (fresh and robot["holds"]),
+        "locked beside a limit": level == "locked" and factor != 0.0,
+        "work beside silence": level in ("working", "locked") and silent,
+        "silence without one": state in ("late", "lost") and link == "LIVE",
+        "a P1 that is no danger": alarmed and level != "danger" and silent,
+        "danger without a P1": level == "danger" and not alarmed,
+        "a call to STOP without a P1": found["action"] == "press_stop" and not alarmed,
+        "a sentence of somebody that names no one": found["why"] == "person_in"
+        and "lane" not in found["slots"],
+    }
+
+
+@settings(max_examples=60, deadline=None)
+@given(days)
+def test_no_situation_contradicts_what_is_told_beside_it(
+    day: list[tuple[Any, ...]],
+) -> None:
+    for moment in told(day):
+        for robot in moment.robots:
+            alarmed = robot["robot_id"] in moment.alarmed
+            found = contradictions(robot, alarmed=alarmed)
+            assert [name for name, holds in found.items() if holds] == [], robot
+
+
+@settings(max_examples=15, deadline=None)
+@given(days)
+def test_a_p1_of_a_robot_that_is_heard_is_its_situation(
+    day: list[tuple[Any, ...]],
+) -> None:
+    for moment in told([*day, ("wait", 0.1)]):
+        levels = {one["robot_id"]: one["situation"]["level"] for one in moment.robots}
+        assert {levels[name] for name in moment.alarmed} <= {"danger"}
+
+
+def test_a_healthy_fleet_is_clear() -> None:
+    """Else all of this would hold of a program that never says so."""
+    last = told([("healthy", 2.5, 0.8)])[-1]
+
+    assert [one["situation"]["state"] for one in last.robots] == ["clear", "clear"]
