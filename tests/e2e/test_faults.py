@@ -60,7 +60,7 @@ def test_a_dead_server_is_said_and_the_page_recovers(
     page.wait_for_selector('[data-robot="AGI"][data-link="LIVE"]')
 
     _program(stack, "serve").kill()
-    expect(page.locator("#banner")).to_contain_text("Sin conexión", timeout=WITHIN_MS)
+    expect(page.locator("#status")).to_contain_text("Sin conexión", timeout=WITHIN_MS)
 
     stack.start("serve")
     stack.wait_until_live(deadline_s=60.0)
@@ -70,7 +70,7 @@ def test_a_dead_server_is_said_and_the_page_recovers(
         "data-connection", "open", timeout=WITHIN_MS
     )
     expect(card(page, "AGI")).to_have_attribute("data-link", "LIVE", timeout=WITHIN_MS)
-    expect(page.locator("#banner")).to_be_hidden()
+    expect(page.locator("#status")).not_to_contain_text("Sin conexión")
     assert page.url == f"{stack.url}/"
 
 

@@ -13,7 +13,13 @@ import pytest
 from playwright.sync_api import Browser, Page, WebSocketRoute, expect
 
 from tests.e2e.frozen import Frozen, frozen, frozen_page, past_site, settle
-from tests.e2e.reading import COVERED_STOPS, OVERFLOW, SMALLEST_STOP, evaluate
+from tests.e2e.reading import (
+    COVERED_STOPS,
+    OVERFLOW,
+    SMALLEST_STOP,
+    evaluate,
+    strip_stop,
+)
 from tests.processes import Site
 
 pytestmark = pytest.mark.e2e
@@ -115,7 +121,7 @@ def test_13_4_the_user_opens_a_menu_with_a_way_out(fleet: Fleet) -> None:
 
 @pytest.mark.parametrize("fleet", [2], indirect=True)
 def test_13_19_a_low_screen_is_mostly_map(fleet: Fleet) -> None:
-    for size, high in (((1024, 768), 520), ((844, 390), 340), ((667, 375), 320)):
+    for size, high in (((1024, 768), 520), ((844, 390), 300), ((667, 375), 285)):
         box = fleet.at(size).locator("#map").bounding_box()
         assert box is not None
         assert box["height"] >= high, size
@@ -130,6 +136,65 @@ def test_a_tablet_shows_the_strip_of_time_above_the_stops(fleet: Fleet) -> None:
     assert stops is not None
     border_px = 1
     assert strip["y"] + strip["height"] <= stops["y"] + border_px
+
+
+SAID = """() => {
+  const said = document.querySelector('#status-said');
+  const size = (of) => parseFloat(getComputedStyle(of).fontSize);
+  const words = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+  const larger = [];
+  while (words.nextNode()) {
+    const of = words.currentNode.parentElement;
+    if (!words.currentNode.data.trim() || !of.checkVisibility()) continue;
+    const isOther = of.closest('.stop, #status, .visually-hidden');
+    if (!isOther && size(of) > size(said)) larger.push(of.textContent);
+  }
+  const box = document.querySelector('#status').getBoundingClientRect();
+  return {
+    first: box.top === 0, whole: said.scrollHeight <= box.height,
+    larger, high: box.height,
+    long: document.querySelector('#status').hasAttribute('data-long'),
+  };
+}"""
+"""The status line: where it stands, whether it fits, and whether no text is larger."""
+LEVELS: tuple[dict[str, Any], ...] = (
+    {"level": "working", "state": "clear"},
+    {"level": "danger", "state": "unconfirmed", "action": "red_button"},
+    {
+        "level": "danger",
+        "state": "not_slowing",
+        "action": "press_stop",
+        "why": "person_in",
+        "slots": {"lane": "Pasillo 3", "distance": 1.4},
+    },
+    {
+        "level": "caution",
+        "state": "close",
+        "why": "person_in",
+        "slots": {"lane": "Pasillo 3", "distance": 1.4, "short": 2.3},
+    },
+)
+
+
+@pytest.mark.parametrize("fleet", [2], indirect=True)
+def test_the_status_line_is_first_and_largest_and_nothing_moves(fleet: Fleet) -> None:
+    told = frozen()["snapshot"]["robots"]
+    for size in SIZES:
+        places = set()
+        for level in LEVELS:
+            for robot in told:
+                situation = {**robot["situation"], "why": None, "slots": {}, **level}
+                fleet.tell({**robot, "situation": situation, "age_s": 0.0})
+            page = fleet.at(size)
+            page.clock.run_for(1500)
+            found = evaluate(page, SAID)
+            assert (found["first"], found["whole"]) == (True, True), (size, level)
+            is_small = size[0] < 400 and found["long"]
+            assert found["larger"] == [] or is_small, (size, level)
+            stop = strip_stop(page, "fleet").bounding_box()
+            assert stop is not None
+            places.add((found["high"], stop["x"], stop["y"]))
+        assert len(places) == 1, size
 
 
 HELD = {"mode": "STOPPED", "holds": [{"id": "x", "source": "hw", "ack": "local"}]}

@@ -230,7 +230,7 @@ def test_without_the_server_the_page_says_so_and_draws_a_veil(
 
     _newest(stack, "serve").kill()
 
-    expect(only.locator("#banner")).to_contain_text("Sin conexión", timeout=30_000)
+    expect(only.locator("#status")).to_contain_text("Sin conexión", timeout=30_000)
     expect(only.locator("body")).to_have_attribute("data-connection", "lost")
     until(lambda: _changed(before, _pixels(only)) > 0.2, 30.0, "a veil")
     assert _at_each_width(only, COVERED_STOPS) == [[]] * len(SIZES)

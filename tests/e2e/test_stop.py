@@ -146,7 +146,7 @@ def test_i10_a_browser_whose_line_is_dead_shows_itself_stale(
     expect(card(other, "AGI")).to_have_attribute(
         "data-link", re.compile("LATE|LOST"), timeout=WITHIN_MS
     )
-    expect(other.locator("#banner")).to_contain_text("Sin conexión", timeout=WITHIN_MS)
+    expect(other.locator("#status")).to_contain_text("Sin conexión", timeout=WITHIN_MS)
     strip_stop(page, "AGI").click()
     expect(strip_stop(page, "AGI")).to_contain_text(STANDING, timeout=WITHIN_MS)
     expect(control).to_have_attribute("data-state", "lost")

@@ -105,7 +105,7 @@ def test_a_robot_that_does_not_brake_fails_its_drill(page: Page, agv: Puppet) ->
         "Fallido: en 5 s no se comprobó que se parase.", timeout=WITHIN_MS
     )
     expect(card(page, "AGV").locator('[data-field="mode"]')).to_have_text(
-        "Parada · Recibida, pero se mueve"
+        "Recibió la parada y se mueve"
     )
     agv.brakes = True
     expect(strip_stop(page, "AGV")).to_have_attribute(

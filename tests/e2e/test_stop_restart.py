@@ -51,7 +51,7 @@ def test_the_open_page_recovers_from_a_kill_by_itself_and_its_stop_stands(
     page: Page, agv: Puppet, stack: Site
 ) -> None:
     _server(stack).kill()
-    expect(page.locator("#banner")).to_contain_text("Sin conexión", timeout=WITHIN_MS)
+    expect(page.locator("#status")).to_contain_text("Sin conexión", timeout=WITHIN_MS)
     expect(strip_stop(page, "AGV")).to_have_attribute("data-state", "lost")
     _serve_again(stack)
 
@@ -84,7 +84,7 @@ def test_f42_a_page_whose_session_is_over_stops_and_asks_to_sign_in_for_the_rest
 
     control = strip_stop(page, "AGV")
     expect(control).to_contain_text("PARAR AGV (sesión terminada)", timeout=WITHIN_MS)
-    expect(page.locator("#banner")).to_contain_text("La sesión ha terminado")
+    expect(page.locator("#status")).to_contain_text("La sesión ha terminado")
     control.click()
 
     expect(control).to_contain_text("Orden entregada: mire el robot o entre de nuevo")

@@ -2,6 +2,7 @@
  * Live messages with defaults; a test overrides what matters to it.
  *
  * @typedef {import("../../iveg/static/js/core/protocol.js").Robot} Robot
+ * @typedef {import("../../iveg/static/js/core/situation.js").Situation} Situation
  * @typedef {import("../../iveg/static/js/core/protocol.js").Person} Person
  * @typedef {import("../../iveg/static/js/core/protocol.js").Detection} Detection
  * @typedef {import("../../iveg/static/js/core/protocol.js").Command} Command
@@ -29,11 +30,25 @@ const CLEAR = {
   foretold_s: null,
 };
 
+/** At work, all clear. @param {Partial<Situation>} [changes] @returns {Situation} */
+export const situation = (changes = {}) => ({
+  level: "working",
+  state: "clear",
+  cause: "clear",
+  why: null,
+  about: null,
+  action: "none",
+  factor: 1,
+  slots: {},
+  ...changes,
+});
+
 /** @param {Partial<Robot>} [changes] @returns {Robot} */
 export function robot(changes = {}) {
   return {
     robot_id: "AGI",
     link: "LIVE",
+    situation: situation(),
     mode: "RUNNING",
     pose: { x: 1, y: 2, yaw: 0 },
     twist: { linear: 0.5, angular: 0 },

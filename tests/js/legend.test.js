@@ -115,6 +115,7 @@ test("without news the facts over the map grow old and say so", () => {
     people: () => [seen],
     get: (/** @type {string} */ topic) => told[topic],
     subscribe: () => {},
+    connection: { state: "open" },
   };
   const map = /** @type {any} */ ({ layers: () => [] });
   const draw = createMapFacts(/** @type {any} */ ({ store, i18n: words }), map);

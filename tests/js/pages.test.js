@@ -16,6 +16,11 @@ import { equal, test } from "./harness.js";
 const hops = (states) =>
   ORDER.map((hop) => ({ hop, state: states[hop] ?? /** @type {const} */ ("ok") }));
 
+/** @param {string} id @param {import("../../iveg/static/js/core/clock.js").Link} link */
+const heard = (id, link = "LIVE") => ({ id, link });
+const LIVE = [heard("AGI"), heard("AGII")];
+const LOST = heard("AGI", "LOST");
+
 /** @param {Partial<import("../../iveg/static/js/core/protocol.js").Command>} [differs] */
 const order = (differs = {}) =>
   command({
@@ -37,13 +42,13 @@ const order = (differs = {}) =>
   });
 
 test("a whole chain is said to work", () => {
-  equal(judgeDataPath(hops({}), [], true).key, "fleet.whole");
+  equal(judgeDataPath(hops({}), LIVE, true).key, "fleet.whole");
 });
 
 test("of several broken hops the one nearest to the robots is named", () => {
   const found = judgeDataPath(
     hops({ notifications: "down", iot_agent: "down" }),
-    [],
+    LIVE,
     true,
   );
   equal(found.key, "health.hop.iot_agent.down");
@@ -51,14 +56,14 @@ test("of several broken hops the one nearest to the robots is named", () => {
 });
 
 test("a hop that is down is worse news than a late one before it", () => {
-  const found = judgeDataPath(hops({ mqtt: "late", orion: "down" }), [], true);
+  const found = judgeDataPath(hops({ mqtt: "late", orion: "down" }), LIVE, true);
   equal(found.hop, "orion");
 });
 
 test("an agent that falls behind is said to be late by its seconds", () => {
   const found = judgeDataPath(
     [{ hop: "iot_agent", state: "late", lag_s: 23.4, growing: true }],
-    [],
+    LIVE,
     true,
   );
   equal([found.key, found.slots.lag], ["health.lag.growing", 23.4]);
@@ -75,16 +80,20 @@ test("what is late for another reason than its lag keeps its sentence", () => {
 });
 
 test("a silent robot before a merely late chain is named with its id", () => {
-  const found = judgeDataPath(hops({ mqtt: "late" }), ["AGI", "AGII"], true);
+  const found = judgeDataPath(
+    hops({ mqtt: "late" }),
+    [LOST, heard("AGII", "UNKNOWN")],
+    true,
+  );
   equal([found.key, found.slots.robots], ["fleet.silent_robots", "AGI, AGII"]);
 });
 
 test("a dead broker explains silent robots", () => {
-  equal(judgeDataPath(hops({ mqtt: "down" }), ["AGI"], true).hop, "mqtt");
+  equal(judgeDataPath(hops({ mqtt: "down" }), [LOST], true).hop, "mqtt");
 });
 
 test("without the server nothing else is known", () => {
-  equal(judgeDataPath(hops({}), [], false).key, "fleet.silent_server");
+  equal(judgeDataPath(hops({}), LIVE, false).key, "fleet.silent_server");
 });
 
 test("each transport is measured from the press on, and silence is no number", () => {
@@ -136,8 +145,13 @@ test("the median is a number that was measured", () => {
 
 test("13.5 a chain that nobody has heard of, or without robots, is not said to work", () => {
   equal(judgeDataPath([], [], true).key, "fleet.unknown");
-  const silent = judgeDataPath(hops({}), ["AGI"], true, 3);
+  const silent = judgeDataPath(hops({}), [LOST, heard("AGII")], true);
   equal([silent.key, silent.slots.robots], ["fleet.silent_robots", "AGI"]);
-  const none = judgeDataPath(hops({}), [], true, 0);
+  const none = judgeDataPath(hops({}), [], true);
   equal([none.key, none.state], ["fleet.no_robots", "unknown"]);
+  const late = judgeDataPath(hops({}), [heard("AGI"), heard("AGII", "LATE")], true);
+  equal(
+    [late.key, late.state, late.slots.robots],
+    ["fleet.late_robots", "late", "AGII"],
+  );
 });

@@ -5,11 +5,10 @@ import { createGauge, readingOf } from "../../iveg/static/js/panels/gauge.js";
 import {
   certaintySaid,
   gaugeSaid,
+  marginPartsSaid,
   marginSaid,
-  modeSaid,
   readoutsSaid,
   taskSaid,
-  whySaid,
 } from "../../iveg/static/js/panels/robot_texts.js";
 import { detection } from "./builders.js";
 import { equal, test } from "./harness.js";
@@ -32,33 +31,30 @@ function robot(differs = {}) {
       mode: "RUNNING",
       pose: { x: 1, y: 1, yaw: 0 },
       twist: { linear: 0.5, angular: 0 },
-      speed_factor: 1,
-      applied: { reason: "clear", faults: [] },
-      speed_limit: { speed_factor: 1, reason: "clear", distance_m: null },
-      holds: [],
-      stop: null,
+      situation: { factor: 1 },
       profile: { max_speed: 2 },
       ...differs,
     })
   );
 }
 
-test("13.8 the gauge draws the stricter of what was ordered and what is applied", () => {
-  const ordered = { speed_limit: { speed_factor: 0.5, reason: "person" } };
+test("13.8 the gauge draws the factor of the robot's situation", () => {
   equal(readingOf(robot()).factor, 1);
-  equal(readingOf(robot(ordered)).factor, 0.5);
-  equal(readingOf(robot({ speed_factor: 0 })).factor, 0);
-  equal(readingOf(robot({ ...ordered, speed_factor: 0 })).factor, 0);
+  equal(readingOf(robot({ situation: { factor: 0 } })).factor, 0);
+  equal(readingOf(robot({ situation: { factor: null } })).factor, null);
 });
 
-test("13.8 a robot at 0.00 m/s is waiting, and its way is not said to be clear", () => {
-  const waiting = robot({ twist: { linear: 0.002, angular: 0 } });
-  equal(modeSaid(waiting, words), "robot.mode.WAITING");
-  equal(whySaid(waiting, words), "");
-  equal(modeSaid(robot(), words), "robot.mode.RUNNING");
-  equal(whySaid(robot(), words), "robot.why.clear ");
-  const turning = robot({ twist: { linear: 0, angular: 0.3 } });
-  equal(modeSaid(turning, words), "robot.mode.RUNNING");
+test("a robot that stands is not said to be too close to stop in time", () => {
+  const parts = { person_walks_m: 1.3 };
+  const margin = { margin_m: -0.4, gap_m: 1.2, band: "inside", person_id: "P1", parts };
+  const still = { linear: 0, angular: 0 };
+  const drives = robot({ margin });
+  const stands = robot({ margin, twist: still });
+  equal(marginSaid(drives, words), "robot.margin_value -0.4 robot.margin_band.inside");
+  equal(marginSaid(stands, words).split(" ")[0], "robot.margin_stands");
+  equal(marginPartsSaid(drives, words).split(" ")[0], "robot.margin_parts");
+  equal(marginPartsSaid(stands, words).split(" ")[0], "robot.margin_parts_stands");
+  equal(marginPartsSaid(robot({ margin: null }), words), "");
 });
 
 test("13.8 a margin that nobody knows has no number", () => {
@@ -72,24 +68,18 @@ test("13.8 a margin that nobody knows has no number", () => {
   equal(marginSaid(near, words), "robot.margin_value 1.2 robot.margin_band.clear");
 });
 
-test("a robot that is lost has no margin, and its way is not said to be clear", () => {
+test("a robot that is lost has no margin", () => {
   const margin = { margin_m: 1.2, band: "clear", person_id: "P1" };
   const lost = robot({ age_s: 9, margin });
   equal(marginSaid(lost, words), "robot.margin_lost");
-  equal(whySaid(lost, words), "");
   const restored = robot({ age_s: null, margin });
   equal(marginSaid(restored, words), "robot.margin_lost");
-  equal(whySaid(restored, words), "");
-  const limited = { speed_factor: 0.5, reason: "stale", distance_m: null };
-  equal(whySaid(robot({ age_s: 9, speed_limit: limited }), words), "robot.why.stale ");
 });
 
-test("13.5 a robot that was never heard has no speed, no limit and no reason", () => {
-  const silent = robot({ pose: null, twist: null, applied: null, speed_factor: null });
+test("13.5 a robot that was never heard has no speed and no limit", () => {
+  const silent = robot({ pose: null, twist: null, situation: { factor: null } });
   equal(readingOf(silent), { speed: null, max: 2, factor: null });
   equal(readingOf(undefined), { speed: null, max: 1, factor: null });
-  equal(modeSaid(silent, words), "robot.mode.UNKNOWN");
-  equal(whySaid(silent, words), "");
 });
 
 test("13.16 no task is never the word none", () => {
@@ -152,45 +142,6 @@ test("what a restart restored has an age that nobody knows, and says so on the m
     [labels.ago(12.4), labels.ago(Number.POSITIVE_INFINITY)],
     ["map.ghost 12", "? s"],
   );
-});
-
-/** @param {string} premise @param {string} robot_id @param {string} reason */
-function lacking(premise, robot_id, reason) {
-  return robot({
-    speed_limit: { speed_factor: 0.5, reason, cause: robot_id, distance_m: null },
-    missing: [{ premise, robot_id }],
-  });
-}
-
-test("a robot says what it lacks to be clear, and whose it is", () => {
-  equal(whySaid(lacking("pose", "AGI", "stale"), words), "robot.missing.pose AGI");
-  equal(
-    whySaid(lacking("detector", "AGI", "stale"), words),
-    "robot.missing.detector_own AGI",
-  );
-  equal(
-    whySaid(lacking("detector", "AGII", "stale"), words),
-    "robot.missing.detector AGII",
-  );
-  equal(whySaid(lacking("doubt", "AGII", "doubt"), words), "robot.missing.doubt AGII");
-});
-
-test("near a person that is the reason, whatever else is missing", () => {
-  const near = robot({
-    speed_limit: { speed_factor: 0.5, reason: "person", distance_m: 1.4 },
-    missing: [{ premise: "detector", robot_id: "AGII" }],
-  });
-  equal(whySaid(near, words), "robot.why.person 1.4");
-});
-
-test("a person whose zone lies ahead is said with the seconds until it", () => {
-  const ahead = robot({
-    speed_limit: {
-      ...{ speed_factor: 0.5, reason: "person", distance_m: 3.1 },
-      foretold_s: 1.2,
-    },
-  });
-  equal(whySaid(ahead, words), "robot.why.person_ahead 3.1 1.2");
 });
 
 test("a camera is read, not read, out of service or not there", () => {

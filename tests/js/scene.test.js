@@ -1,7 +1,7 @@
 import { Store } from "../../iveg/static/js/core/store.js";
 import { isSeenHeld } from "../../iveg/static/js/map/layers/robot.js";
 import { marked, readPerson, readScene } from "../../iveg/static/js/map/scene.js";
-import { command, detection, person, robot, snapshot } from "./builders.js";
+import { command, detection, person, robot, situation, snapshot } from "./builders.js";
 import { equal, near, test } from "./harness.js";
 
 /** @param {Partial<import("./builders.js").Snapshot>} [changes] */
@@ -80,13 +80,15 @@ test("a robot that drives on widens by its newest word, not by that of the last 
 });
 
 test("I12 a padlock is drawn from what a robot said just now alone", () => {
-  const store = storeOf({ robots: [robot({ mode: "STOPPED", age_s: 0 })] });
+  const standing = situation({ level: "locked", state: "standing" });
+  const store = storeOf({ robots: [robot({ situation: standing, age_s: 0 })] });
   const seen = [0, 1500, 1600, 60_000].map((ms) =>
     isSeenHeld(readScene(store, ms).robots[0]),
   );
   equal(seen, [true, true, false, false]);
-  equal(isSeenHeld({ mode: "RUNNING", ageS: 0 }), false);
-  equal(isSeenHeld({ mode: "STOPPED", ageS: Number.POSITIVE_INFINITY }), false);
+  equal(isSeenHeld({ situation: situation(), ageS: 0 }), false);
+  const ageS = Number.POSITIVE_INFINITY;
+  equal(isSeenHeld({ situation: standing, ageS }), false);
 });
 
 test("a confirmed stop has no such disc", () => {

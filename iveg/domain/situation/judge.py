@@ -160,7 +160,8 @@ def _held(facts: RobotFacts) -> Iterator[Situation]:
 def _limited(facts: RobotFacts) -> Iterator[Situation]:
     """Slow: by its own report, or because iVeg tells it and it does not say so yet."""
     report, limit, applied = facts.report, facts.limit, facts.applied
-    if facts.stop != "RUNNING" or (report is not None and report.reason == "hold"):
+    held = report is not None and (report.holds or report.reason == "hold")
+    if held or facts.stop != "RUNNING":
         return
     if limit.speed_factor < applied:
         yield _slow("told", limit.speed_factor, limit.reason, facts.told_near, facts)

@@ -9,9 +9,9 @@ import { loadI18n, switchLanguage } from "./core/i18n.js";
 import { createPainting } from "./core/painting.js";
 import { LiveLine } from "./core/socket.js";
 import { Store } from "./core/store.js";
-import { createBanner } from "./panels/banner.js";
 import { createDialogs } from "./panels/dialogs.js";
 import { all, setAttribute } from "./panels/dom.js";
+import { createStatusLine } from "./panels/status_line.js";
 import { StopPanel } from "./panels/stop.js";
 import { createThemePanel } from "./panels/theme.js";
 
@@ -41,7 +41,7 @@ async function start() {
   const line = new LiveLine({ url: liveUrl(), store, draws, whenPainted });
   const app = /** @type {App} */ ({ store, i18n, line, painting, dialogs });
   app.stops = new StopPanel(app);
-  createBanner(app);
+  createStatusLine(app);
   const { startPage } = await import("./core/page.js");
   await startPage(app);
 }

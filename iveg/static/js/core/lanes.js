@@ -5,22 +5,28 @@
 
 /** Names of lanes in iVeg's greenhouse files, and the key of the message for each. */
 const GIVEN = /** @type {const} */ ([
-  [/^(?:Pasillo )?(\d+)$/, "lane.number"],
-  [/^Pasillo (\d+) norte$/, "lane.number_north"],
-  [/^Pasillo (\d+) sur$/, "lane.number_south"],
-  [/^Pasillo central$/, "lane.central"],
-  [/^Cabecera norte$/, "lane.end_north"],
-  [/^Cabecera sur$/, "lane.end_south"],
+  [/^(?:Pasillo )?(\d+)$/, "number"],
+  [/^Pasillo (\d+) norte$/, "number_north"],
+  [/^Pasillo (\d+) sur$/, "number_south"],
+  [/^Pasillo central$/, "central"],
+  [/^Cabecera norte$/, "end_north"],
+  [/^Cabecera sur$/, "end_south"],
 ]);
 
-/**
- * @param {string} label
- * @param {(key: string, slots?: Record<string, string>) => string} t
- */
-export function laneName(label, t) {
+/** @typedef {(key: string, slots?: Record<string, string>) => string} Translate */
+
+/** @param {string} label @param {Translate} t */
+export const laneName = (label, t) => named("lane", label, t) ?? label;
+
+/** Where somebody is: "in aisle 3". @param {string} label @param {Translate} t */
+export const placeName = (label, t) =>
+  named("place", label, t) ?? t("place.default", { label });
+
+/** @param {string} block @param {string} label @param {Translate} t */
+function named(block, label, t) {
   for (const [form, key] of GIVEN) {
     const found = form.exec(label);
-    if (found) return t(key, { n: found[1] ?? "" });
+    if (found) return t(`${block}.${key}`, { n: found[1] ?? "" });
   }
-  return label;
+  return null;
 }

@@ -12,7 +12,7 @@
  * @typedef {{[name: string]: string | Blocks}} Blocks
  */
 
-import { laneName } from "./lanes.js";
+import { laneName, placeName } from "./lanes.js";
 
 const LOCALES = { es: "es-ES", en: "en-GB" };
 /** Greenhouses live by the clock on their wall; data stay in UTC. */
@@ -36,6 +36,7 @@ const FORMATS = {
   data: (value, messages) => messages.named("stream", value),
   drive: (value, messages) => messages.named("drive", value),
   lane: (value, messages) => laneName(String(value), messages.say),
+  place: (value, messages) => placeName(String(value), messages.say),
   person: trackOf,
   sentence: sentenceOf,
 };

@@ -14,7 +14,7 @@
  *
  * @typedef {{
  *   id: string, slot: number, pose: Pose, link: import("../core/protocol.js").Link,
- *   ageS: number, mode: import("../core/protocol.js").Mode, replay: boolean,
+ *   ageS: number, situation: import("../core/situation.js").Situation, replay: boolean,
  *   drive: string, length: number, width: number,
  *   task: string | null, goal: Point | null, path: [number, number][],
  *   unsureM: number,
@@ -46,6 +46,7 @@
 
 import { ageOf, linkOf } from "../core/clock.js";
 import { LIMITS, ringRadius } from "../core/limits.js";
+import { situationOf } from "../core/situation.js";
 
 /** The server is silent for two seconds when the line is called lost; one more. */
 const VEIL_AFTER_MS = 1000;
@@ -106,7 +107,7 @@ function readRobot(robot, pose, store, nowMs) {
     pose,
     link: linkOf(ageS),
     ageS,
-    mode: robot.mode,
+    situation: situationOf(robot, nowMs),
     replay: robot.replay,
     drive,
     length,

@@ -4,6 +4,7 @@
 
 import { readApi } from "../core/api.js";
 import { aboutAge, ageOf, isSilent, linkOfRobot } from "../core/clock.js";
+import { capitalised, sentenceOf, situationOf } from "../core/situation.js";
 import {
   all,
   fill,
@@ -14,8 +15,8 @@ import {
   setText,
 } from "../panels/dom.js";
 import { readingsOf } from "../panels/readings.js";
-import { isHeard, modeSaid, taskSaid } from "../panels/robot_texts.js";
-import { judgeDataPath } from "./health_sentence.js";
+import { isHeard, taskSaid } from "../panels/robot_texts.js";
+import { heardOf, judgeDataPath } from "./health_sentence.js";
 import { createTiles } from "./tiles.js";
 
 /** @typedef {import("../core/protocol.js").Robot} Robot */
@@ -61,27 +62,24 @@ export function start(page) {
     const isOpen = store.connection.state === "open";
     /** @type {import("../core/protocol.js").Health | null} */
     const health = store.get("health") ?? null;
-    const silent = robots.filter((robot) => isSilent(linkOfRobot(robot)));
+    const heard = heardOf(robots);
     const hops = health?.hops ?? [];
-    const found = judgeDataPath(
-      hops,
-      silent.map(({ robot_id }) => robot_id),
-      isOpen || store.connection.state === "connecting",
-      robots.length,
-    );
+    const isHeard = isOpen || store.connection.state === "connecting";
+    const found = judgeDataPath(hops, heard, isHeard);
     setAttribute(need("#data-path-status"), "data-state", found.state);
     setText(need("#data-path-sentence"), i18n.t(found.key, found.slots));
-    for (const box of all(".hop-box")) drawBox(box, hops, robots, silent.length);
+    for (const box of all(".hop-box")) drawBox(box, hops, heard);
   }
 
   /** @param {HTMLElement} box @param {import("../core/protocol.js").Health["hops"]} hops
-   * @param {Robot[]} robots @param {number} silent */
-  function drawBox(box, hops, robots, silent) {
+   * @param {import("./health_sentence.js").Heard[]} robots */
+  function drawBox(box, hops, robots) {
     const name = String(box.dataset.hop);
     const isOpen = store.connection.state === "open";
     if (name === "robots") {
-      const live = robots.filter((robot) => linkOfRobot(robot) === "LIVE").length;
-      const state = silent ? "down" : live < robots.length ? "late" : "ok";
+      const live = robots.filter(({ link }) => link === "LIVE").length;
+      const isDown = robots.some(({ link }) => isSilent(link));
+      const state = isDown ? "down" : live < robots.length ? "late" : "ok";
       setAttribute(box, "data-state", robots.length ? state : "unknown");
       const slots = { live, total: robots.length };
       setText(need("small", box), i18n.t("fleet.robots_live", slots));
@@ -145,6 +143,10 @@ function ageSaid(age, i18n) {
   return Number.isFinite(age) ? i18n.t("health.age", { age }) : i18n.t("fleet.never");
 }
 
+/** How it stands with a robot. @param {Robot} robot @param {I18n} i18n */
+export const statusOf = (robot, i18n) =>
+  capitalised(sentenceOf(situationOf(robot), i18n));
+
 /** @param {Robot} robot @param {I18n} i18n @returns {(string | Node)[]} */
 function machineCells(robot, i18n) {
   const link = linkOfRobot(robot);
@@ -155,7 +157,7 @@ function machineCells(robot, i18n) {
   return [
     make("b", "", robot.robot_id),
     `${i18n.t(`robot.link.${link}`)} · ${age}`,
-    isSilent(link) ? "—" : modeSaid(robot, i18n),
+    statusOf(robot, i18n),
     profile && isKnown ? i18n.t("robot.profile", profile) : "—",
     navigation?.task ? taskSaid(navigation.task, i18n) : "—",
     robot.transport && isKnown ? i18n.t(`fleet.transport.${robot.transport}`) : "—",

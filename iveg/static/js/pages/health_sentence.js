@@ -8,7 +8,11 @@
  * @typedef {{hop: string, state: State, lag_s?: number | null, growing?: boolean}} Hop
  * @typedef {{key: string, slots: Record<string, string | number>}} Sentence
  * @typedef {Sentence & {state: State, hop: string | null}} Verdict
+ * @typedef {{id: string, link: import("../core/clock.js").Link}} Heard
+ * @typedef {import("../core/protocol.js").Robot} Robot
  */
+
+import { isSilent, linkOfRobot } from "../core/clock.js";
 
 /** In the order of the data path; then the hops beside it. */
 export const ORDER = [
@@ -25,15 +29,17 @@ const LATE_S = 1;
 const WORST_FIRST = ["down", "late", "unknown"];
 
 /**
+ * The chain from the robots to this screen: whole only while every robot is live.
+ *
  * @param {readonly Hop[]} hops as the server tells them
- * @param {readonly string[]} lost ids of robots that are silent, or never spoke
+ * @param {readonly Heard[]} robots the fleet, as this screen hears it
  * @param {boolean} isOpen whether this screen hears the server
- * @param {number} [heard] how many robots anything is known of
  * @returns {Verdict}
  */
-export function judgeDataPath(hops, lost, isOpen, heard = 1) {
+export function judgeDataPath(hops, robots, isOpen) {
   if (!isOpen) return verdict("fleet.silent_server", "down", "server");
   if (!hops.length) return verdict("fleet.unknown", "unknown", null);
+  const lost = robots.filter(({ link }) => isSilent(link));
   for (const state of WORST_FIRST) {
     const broken = hops
       .filter((hop) => hop.state === state)
@@ -42,10 +48,26 @@ export function judgeDataPath(hops, lost, isOpen, heard = 1) {
     if (state === "late" && lost.length) break;
     if (broken) return { ...sentenceOf(broken), state, hop: broken.hop };
   }
-  if (!lost.length && !heard) return verdict("fleet.no_robots", "unknown", "robots");
-  if (!lost.length) return verdict("fleet.whole", "ok", null);
-  const robots = lost.join(", ");
-  return { ...verdict("fleet.silent_robots", "down", "robots"), slots: { robots } };
+  if (!robots.length) return verdict("fleet.no_robots", "unknown", "robots");
+  if (lost.length) return ofRobots("fleet.silent_robots", "down", lost);
+  const late = robots.filter(({ link }) => link !== "LIVE");
+  if (late.length) return ofRobots("fleet.late_robots", "late", late);
+  return verdict("fleet.whole", "ok", null);
+}
+
+/** The fleet with the link of each robot now. @param {Iterable<Robot>} robots */
+export const heardOf = (robots) =>
+  [...robots].map((robot) => ({ id: robot.robot_id, link: linkOfRobot(robot) }));
+
+/**
+ * @param {string} key
+ * @param {State} state
+ * @param {readonly Heard[]} robots
+ * @returns {Verdict}
+ */
+function ofRobots(key, state, robots) {
+  const named = robots.map(({ id }) => id).join(", ");
+  return { ...verdict(key, state, "robots"), slots: { robots: named } };
 }
 
 /**

@@ -10,6 +10,7 @@
  * @typedef {import("../core/protocol.js").GreenhouseMap} GreenhouseMap
  */
 
+import { UNHEARD } from "../core/situation.js";
 import * as greenhouse from "../map/layers/greenhouse.js";
 import * as grid from "../map/layers/grid.js";
 import { createLabels } from "../map/layers/labels.js";
@@ -57,7 +58,7 @@ export function sceneOf({ position, places, rule, ...told }, map) {
       pose,
       link: /** @type {const} */ ("LIVE"),
       ageS: 0,
-      mode: /** @type {const} */ ("RUNNING"),
+      situation: UNHEARD,
       replay: false,
       task: null,
       goal: null,

@@ -25,22 +25,16 @@ const DEFAULT_MAX = 1;
  */
 
 /**
- * The values of a gauge: the stricter of the robot's speed limit and the factor that it
- * reports to apply; null for unknown values.
+ * The values of a gauge, its factor that of the robot's situation; null for unknown ones.
  *
  * @param {import("../core/protocol.js").Robot | undefined} robot
  * @returns {{speed: number | null, max: number, factor: number | null}}
  */
 export function readingOf(robot) {
-  const told = robot?.speed_limit?.speed_factor ?? null;
-  const applied = robot?.applied ? (robot.speed_factor ?? null) : null;
-  const known = [told, applied].filter((factor) => factor !== null);
-  const speed = robot?.twist?.linear ?? null;
-  const isHeard = speed !== null || applied !== null;
   return {
-    speed,
+    speed: robot?.twist?.linear ?? null,
     max: robot?.profile?.max_speed ?? DEFAULT_MAX,
-    factor: isHeard && known.length ? Math.min(...known) : null,
+    factor: robot?.situation.factor ?? null,
   };
 }
 

@@ -4,11 +4,10 @@
 
 import { onBeat } from "../core/beat.js";
 import { ageOf } from "../core/clock.js";
-import { sentenceOf } from "../pages/health_sentence.js";
+import { heardOf, judgeDataPath, sentenceOf } from "../pages/health_sentence.js";
 import { fill, make, need, setAttribute, setText } from "./dom.js";
 
 const TICK_MS = 1000;
-const WORST_FIRST = ["down", "late", "unknown", "ok"];
 
 /** @typedef {import("../core/protocol.js").Health["hops"][number]} Hop */
 
@@ -19,7 +18,7 @@ export function createHealthPanel({ store, i18n, line }) {
   function draw() {
     /** @type {import("../core/protocol.js").Health | undefined} */
     const health = store.get("health") ?? undefined;
-    drawChip(worstOf(health?.hops ?? []));
+    drawChip(health?.hops ?? []);
     const ms = line.roundTripMs();
     const isOpen = store.connection.state === "open";
     setText(
@@ -31,14 +30,17 @@ export function createHealthPanel({ store, i18n, line }) {
     drawCounters(health?.counters ?? {});
   }
 
-  /** @param {Hop | undefined} worst */
-  function drawChip(worst) {
+  /** The same verdict as on the fleet page. @param {Hop[]} hops */
+  function drawChip(hops) {
+    const heard = heardOf(store.robots().values());
     const isOpen = store.connection.state === "open";
-    const state = isOpen ? (worst?.state ?? "unknown") : "down";
-    const hop = isOpen ? (worst?.hop ?? "") : "server";
+    const { state, hop, key, slots } = judgeDataPath(hops, heard, isOpen);
+    const live = heard.filter(({ link }) => link === "LIVE").length;
+    const chipKey = hop === "robots" && heard.length ? "robots" : state;
+    const counted = { hop: hop ?? "", live, total: heard.length };
     setAttribute(chip, "data-state", state);
-    setText(need("#health-sentence"), i18n.t(`health.chip.${state}`, { hop }));
-    chip.title = isOpen && worst ? said(worst) : "";
+    setText(need("#health-sentence"), i18n.t(`health.chip.${chipKey}`, counted));
+    setAttribute(chip, "title", i18n.t(key, slots));
   }
 
   /** @param {Hop} hop */
@@ -84,10 +86,4 @@ function makeItem() {
   const item = make("li");
   item.append(make("span", "shape"), make("b"), make("small"), make("p"));
   return item;
-}
-
-/** @param {Hop[]} hops */
-function worstOf(hops) {
-  const rank = (/** @type {Hop} */ hop) => WORST_FIRST.indexOf(hop.state);
-  return [...hops].sort((a, b) => rank(a) - rank(b))[0];
 }

@@ -2,6 +2,8 @@
  * The legend: every sign of the map, drawn by the layer that draws it on the map.
  */
 
+import { LIMITS } from "../core/limits.js";
+import { UNHEARD } from "../core/situation.js";
 import { createCostmapLayer } from "../map/layers/costmap.js";
 import * as coverage from "../map/layers/coverage.js";
 import * as detections from "../map/layers/detections.js";
@@ -36,7 +38,7 @@ const ROBOT = {
   pose: { x: 0, y: 0, yaw: 0 },
   link: "LIVE",
   ageS: 0,
-  mode: "RUNNING",
+  situation: UNHEARD,
   replay: false,
   drive: "differential",
   length: 1.2,
@@ -80,6 +82,8 @@ const GREENHOUSE = {
   posts: [],
   obstacles: [],
 };
+const HALF_SPEED = { ...UNHEARD, state: "half", slots: { factor: LIMITS.slow_factor } };
+const LOCKED = { ...UNHEARD, level: "locked" };
 const LEFT = { ...ROBOT, pose: { x: -1.3, y: 0, yaw: 0 } };
 const RIGHT = { ...PERSON, x: 1.3, ringM: 0 };
 const LANE = { label: "", xmin: -2, xmax: 2, ymin: -0.8, ymax: 0.8 };
@@ -123,7 +127,7 @@ export const SIGNS = [
     name: "slow",
     layer: "robot",
     draw: robots.draw,
-    scene: oneRobot({ mode: "SLOW" }),
+    scene: oneRobot({ situation: HALF_SPEED }),
     right: 0.95,
     up: 0.75,
   },
@@ -131,7 +135,7 @@ export const SIGNS = [
     name: "held",
     layer: "robot",
     draw: robots.draw,
-    scene: oneRobot({ mode: "STOPPED" }),
+    scene: oneRobot({ situation: LOCKED }),
     right: -0.5,
     up: 0.75,
   },

@@ -23,24 +23,17 @@ const COVERAGE_OLD_S = 6;
  */
 export function createMapFacts({ store, i18n }, map) {
   function drawPeople() {
-    const nowMs = performance.now();
-    const people = store.people().filter((person) => isPresent(person, nowMs));
-    setText(need("#people-count"), peopleSaid(people.length));
-    const unseen = people.flatMap(({ acting }) => acting).filter((it) => !it.in_sight);
+    const isOpen = store.connection.state === "open";
+    const said = peopleSaid(store.people(), store.get("coverage"), isOpen, i18n);
+    setText(need("#people-count"), said);
+    const about = isOpen ? store.people().filter(isPresent) : [];
+    const acting = about.flatMap((person) => person.acting);
+    const unseen = acting.filter((it) => !it.in_sight);
     const nlos = need("#nlos-count");
     setHidden(nlos, unseen.length === 0);
     const slowed = new Set(unseen.map(({ robot_id }) => robot_id)).size;
     const key = slowed === 1 ? "map.nlos_one" : "map.nlos_count";
     setText(nlos, i18n.t(key, { count: slowed }));
-  }
-
-  /** @param {number} count */
-  function peopleSaid(count) {
-    const said = coverageSaid(store.get("coverage"), i18n);
-    if (count === 0 && said.isBlind) return said.text;
-    const seen = count === 1 ? "map.people_one" : "map.people_count";
-    const people = count ? i18n.t(seen, { count }) : i18n.t("map.people_none");
-    return said.text ? `${people} · ${said.text}` : people;
   }
 
   function drawCostmapAge() {
@@ -81,6 +74,7 @@ export function createMapFacts({ store, i18n }, map) {
   setInterval(onBeat, AGE_MS, draw);
   store.subscribe("people", drawPeople);
   store.subscribe("coverage", drawPeople);
+  store.subscribe("connection", drawPeople);
   store.subscribe("costmap", drawCostmapAge);
   store.subscribe("climate", drawClimate);
   return draw;
@@ -105,10 +99,34 @@ export function coverageSaid(coverage, i18n) {
 }
 
 /**
- * Whether somebody is still about, as the map shows it: silence makes people of the past.
+ * Who is there: seen now, or seen lately and remembered; nobody sees without a camera, and
+ * nobody knows without the server.
  *
- * @param {Person} person @param {number} nowMs
+ * @param {readonly Person[]} people
+ * @param {import("../core/protocol.js").Coverage | undefined} coverage
+ * @param {boolean} isOpen whether this screen hears the server
+ * @param {import("../core/i18n.js").I18n} i18n
  */
-function isPresent(person, nowMs) {
-  return person.class === "person" && readPerson(person, nowMs).stage !== "last_seen";
+export function peopleSaid(people, coverage, isOpen, i18n) {
+  if (!isOpen) return i18n.t("map.people_no_link");
+  const stages = people.filter(isPresent).map(stageOf);
+  const said = coverageSaid(coverage, i18n);
+  const seen = said.isBlind ? 0 : stages.filter((stage) => stage === "seen").length;
+  const lately = stages.length - seen;
+  const parts = [
+    seen && i18n.t(seen === 1 ? "map.people_one" : "map.people_count", { count: seen }),
+    lately &&
+      i18n.t(`map.people_lately${lately === 1 ? "_one" : ""}`, { count: lately }),
+    !seen && !lately && !said.isBlind && i18n.t("map.people_none"),
+    said.text,
+  ];
+  return parts.filter(Boolean).join(" · ");
 }
+
+/** As the map shows it. @param {Person} person */
+const stageOf = (person) => readPerson(person, performance.now()).stage;
+
+/** Whether somebody is still about: silence makes people of the past.
+ * @param {Person} person */
+const isPresent = (person) =>
+  person.class === "person" && stageOf(person) !== "last_seen";

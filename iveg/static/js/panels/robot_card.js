@@ -5,6 +5,7 @@
  */
 
 import { aboutAge, ageOf, linkOfRobot } from "../core/clock.js";
+import { capitalised, phrasesOf, situationOf } from "../core/situation.js";
 import { createDetector } from "./detector.js";
 import { all, setAttribute, setHidden, setText } from "./dom.js";
 import { createDrill } from "./drill.js";
@@ -17,11 +18,10 @@ import {
   faultsSaid,
   gaugeSaid,
   isHeard,
+  marginPartsSaid,
   marginSaid,
-  modeSaid,
   readoutsSaid,
   taskSaid,
-  whySaid,
 } from "./robot_texts.js";
 
 /** @typedef {import("../main.js").App} App */
@@ -70,6 +70,10 @@ export class RobotCard {
     this.#detector.draw(robot);
   }
 
+  get element() {
+    return this.#card;
+  }
+
   get #panel() {
     return /** @type {HTMLDialogElement} */ (this.#parts.panel);
   }
@@ -104,10 +108,13 @@ export class RobotCard {
 
   /** @param {Robot | undefined} robot */
   #drawMode(robot) {
-    const { i18n, stops } = this.#app;
+    const { i18n } = this.#app;
     const { why, faults } = this.#parts;
-    setText(this.#fields.mode, modeSaid(robot, i18n, stops.isResuming(this.#robotId)));
-    setText(why, whySaid(robot, i18n));
+    const situation = situationOf(robot);
+    const phrases = phrasesOf(situation, i18n);
+    setAttribute(this.#card, "data-level", situation.level);
+    setText(this.#fields.mode, capitalised(phrases.said));
+    setText(why, [phrases.why, phrases.todo].filter(Boolean).join(" — "));
     const said = robot ? faultsSaid(robot, i18n).join(" · ") : "";
     setHidden(faults, !said);
     setText(faults, said);
@@ -140,11 +147,9 @@ export class RobotCard {
   /** @param {Robot | undefined} robot */
   #drawMarginParts(robot) {
     const place = this.#parts["margin-parts"];
-    const margin = robot?.margin;
-    setHidden(place, !margin);
-    if (!margin) return;
-    const slots = { ...margin, ...margin.parts };
-    setText(place, this.#app.i18n.t("robot.margin_parts", slots));
+    const said = marginPartsSaid(robot, this.#app.i18n);
+    setHidden(place, !said);
+    setText(place, said);
   }
 }
 

@@ -12,87 +12,18 @@ import { readingOf } from "./gauge.js";
 /** @typedef {import("../core/protocol.js").DetectionFrame} DetectionFrame */
 /** @typedef {import("../core/protocol.js").Robot} Robot */
 
-/** Shown as 0.00 (m/s, rad/s). */
-const STILL = 0.005;
 /** An older detection frame says nothing of now (s). */
 const CERTAIN_FOR_S = 3;
 const DEGREES = 180 / Math.PI;
 
-/**
- * What a robot does; an order to stop is not yet a standstill.
- *
- * @param {Robot | undefined} robot
- * @param {I18n} i18n
- * @param {boolean} [isResuming] the order under way is a resume, and no release
- */
-export function modeSaid(robot, i18n, isResuming = false) {
-  const { mode = "UNKNOWN", stop } = robot ?? {};
-  if (!isHeard(robot)) return i18n.t("robot.mode.UNKNOWN");
-  if (stop && stop.state !== "STANDING") {
-    if (stop.state === "RELEASING" && isResuming) return i18n.t("robot.mode_resuming");
-    const state = i18n.t(`history.state.${stop.state}`);
-    return i18n.t("robot.mode_stopping", { state });
-  }
-  if (isWaiting(robot)) return i18n.t("robot.mode.WAITING");
-  if (mode !== "SLOW") return i18n.t(`robot.mode.${mode}`);
-  return i18n.t("robot.mode_slow", { factor: LIMITS.slow_factor });
-}
-
-/**
- * Why it does that; empty for a robot without any message yet.
- *
- * @param {Robot | undefined} robot
- * @param {I18n} i18n
- */
-export function whySaid(robot, i18n) {
-  if (!robot || !isHeard(robot)) return "";
-  if (robot.holds.length) {
-    const names = robot.holds.map(({ source }) =>
-      i18n.t(`release.hold_source.${source}`),
-    );
-    return i18n.t("robot.why.held", { sources: [...new Set(names)].join(", ") });
-  }
-  const isLimited = (robot.speed_limit?.speed_factor ?? 1) < 1;
-  const reason = isLimited ? robot.speed_limit?.reason : robot.applied?.reason;
-  const [lacks] = robot.missing ?? [];
-  if (isLimited && lacks && (reason === "stale" || reason === "doubt")) {
-    return missingSaid(lacks, robot.robot_id, i18n);
-  }
-  const distance = robot.speed_limit?.distance_m ?? null;
-  if (distance === null && (reason === "person" || reason === "robot")) {
-    return i18n.t(`why.${reason}`);
-  }
-  const isHollow = isWaiting(robot) || isSilent(linkOfRobot(robot));
-  if (!reason || (reason === "clear" && isHollow)) return "";
-  const seconds = robot.speed_limit?.foretold_s ?? null;
-  if (isLimited && seconds !== null) {
-    return i18n.t(`robot.why.${reason}_ahead`, { distance, seconds });
-  }
-  return i18n.t(`robot.why.${reason}`, { distance });
-}
-
-/**
- * What a robot lacks to be clear.
- *
- * @param {import("../types.js").MissingPremise} lacks
- * @param {string} ownId
- * @param {I18n} i18n
- */
-function missingSaid({ premise, robot_id }, ownId, i18n) {
-  const own = premise !== "pose" && robot_id === ownId ? "_own" : "";
-  return i18n.t(`robot.missing.${premise}${own}`, { robot: robot_id });
-}
-
 /** Whether a robot has ever sent a pose or a report. @param {Robot | undefined} robot */
 export const isHeard = (robot) => Boolean(robot?.pose ?? robot?.applied);
 
-/** Whether a robot could drive and does not. @param {Robot | undefined} robot */
-function isWaiting(robot) {
-  const { mode, twist } = robot ?? {};
+/** Whether a robot is at rest. @param {Robot | undefined} robot */
+function isAtRest(robot) {
   return (
-    mode === "RUNNING" &&
-    Math.abs(twist?.linear ?? 1) < STILL &&
-    Math.abs(twist?.angular ?? 1) < STILL
+    Math.abs(robot?.twist?.linear ?? 1) < LIMITS.standing_speed &&
+    Math.abs(robot?.twist?.angular ?? 1) < LIMITS.standing_speed
   );
 }
 
@@ -115,9 +46,25 @@ export function marginSaid(robot, i18n) {
   if (isSilent(linkOfRobot(robot))) return i18n.t("robot.margin_lost");
   const margin = robot?.margin;
   if (!margin) return i18n.t("robot.margin_nobody");
+  // A robot that stands stops nothing.
+  if (isAtRest(robot) && margin.band !== "unknown")
+    return i18n.t("robot.margin_stands", margin);
   const band = i18n.t(`robot.margin_band.${margin.band}`);
   if (margin.band === "unknown") return band;
   return i18n.t("robot.margin_value", { margin_m: margin.margin_m, band });
+}
+
+/**
+ * What the margin is made of; empty without one.
+ *
+ * @param {Robot | undefined} robot
+ * @param {I18n} i18n
+ */
+export function marginPartsSaid(robot, i18n) {
+  const margin = robot?.margin;
+  if (!margin) return "";
+  const key = isAtRest(robot) ? "robot.margin_parts_stands" : "robot.margin_parts";
+  return i18n.t(key, { ...margin, ...margin.parts });
 }
 
 /** A task in the reader's language; a task that iVeg does not know, as it was sent.

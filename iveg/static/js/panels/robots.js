@@ -3,6 +3,8 @@
  */
 
 import { onBeat } from "../core/beat.js";
+import { situationOf } from "../core/situation.js";
+import { createCardOrder } from "./card_order.js";
 import { all, need, needPart, setAttribute, setHidden, setText } from "./dom.js";
 import { RobotCard } from "./robot_card.js";
 
@@ -24,6 +26,7 @@ export function createRobotsPanel(app) {
   /** @type {Map<string, string>} */
   const did = new Map();
   const sight = createSight();
+  const order = createCardOrder(place);
   let ticks = 0;
 
   /** @param {string} robotId */
@@ -69,8 +72,16 @@ export function createRobotsPanel(app) {
 
   function tick() {
     ticks += 1;
+    sort();
     if (ticks % UNSEEN_TICKS === 0) return drawAll();
     for (const robot of store.robots().values()) drawSeen(robot);
+  }
+
+  function sort() {
+    const fleet = [...store.robots()].map(([id, robot]) => {
+      return { id, card: cardOf(id).element, situation: situationOf(robot) };
+    });
+    order.sort(fleet);
   }
 
   /**
@@ -79,7 +90,8 @@ export function createRobotsPanel(app) {
    * @param {Robot} robot
    */
   function take(robot) {
-    const does = `${robot.mode} ${robot.stop?.state} ${robot.speed_limit?.reason}`;
+    const { level, state, why } = robot.situation;
+    const does = `${level} ${state} ${why} ${robot.stop?.state}`;
     if (did.get(robot.robot_id) !== does) drawSeen(robot);
     did.set(robot.robot_id, does);
   }

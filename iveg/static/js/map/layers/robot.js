@@ -212,12 +212,12 @@ function drawHeading(ctx, length, width, hue, ink) {
 }
 
 /**
- * Whether a padlock is true: a fresh report of the robot says that it is held.
+ * Whether a padlock is true: the robot is locked, and was heard a moment ago.
  *
- * @param {Pick<SceneRobot, "mode" | "ageS">} robot
+ * @param {Pick<SceneRobot, "situation" | "ageS">} robot
  */
-export const isSeenHeld = ({ mode, ageS }) =>
-  mode === "STOPPED" && ageS <= LIMITS.report_stale_s;
+export const isSeenHeld = ({ situation, ageS }) =>
+  situation.level === "locked" && ageS <= LIMITS.report_stale_s;
 
 /**
  * A dark octagon with a padlock: held, and not by accident.
@@ -299,18 +299,19 @@ function heightOfTag(paint, robot, length) {
 }
 
 /**
- * @param {Paint} paint
+ * @param {Pick<Paint, "theme" | "labels">} paint
  * @param {SceneRobot} robot
  * @returns {[string, string, string][]} words, their ground and their ink
  */
-function tagsOf({ theme, labels }, robot) {
+export function tagsOf({ theme, labels }, robot) {
   const { alert, bg, muted, onAlert2, text } = theme;
   /** @type {[string, string, string][]} */
   const tags = [];
   if (robot.link === "LATE") tags.push([labels.age(robot.ageS), alert[1], onAlert2]);
   if (isSilent(robot.link)) tags.push([labels.ago(robot.ageS), muted, bg]);
-  if (robot.mode === "SLOW" && !isSilent(robot.link)) {
-    tags.push([labels.percent(LIMITS.slow_factor), text, bg]);
+  const { state, slots } = robot.situation;
+  if ((state === "half" || state === "slow") && typeof slots.factor === "number") {
+    tags.push([labels.percent(slots.factor), text, bg]);
   }
   if (robot.replay) tags.push([labels.replay(), muted, bg]);
   return tags;

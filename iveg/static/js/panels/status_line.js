@@ -1,0 +1,169 @@
+/**
+ * The status line: the worst that holds now in one sentence, the first thing on every page.
+ *
+ * Without the server nothing is known of any robot, and that is what it says.  What is
+ * worse shows at once; what is better, and what is read aloud, has to last first.
+ */
+
+import { onBeat } from "../core/beat.js";
+import { fleetSaid, LEVELS } from "../core/situation.js";
+import { need, setAttribute, setText } from "./dom.js";
+
+/** @typedef {import("../core/situation.js").Level} Level */
+/** @typedef {{level: Level, said: string, about: string}} Told `about`: the same while
+ *   only its numbers change */
+/** @typedef {import("../core/store.js").ConnectionState} ConnectionState */
+
+const TICK_MS = 200;
+const BACK_SHOWN_MS = 3000;
+/** A first connection quicker than this is not worth a word (ms). */
+const PATIENCE_MS = 1500;
+/** More letters than this are smaller on a phone. */
+const LONG = 64;
+/** What lasts less than this is not told (ms). */
+export const LASTS_MS = 1000;
+
+/** @param {import("../main.js").App} app */
+export function createStatusLine({ store, i18n }) {
+  const place = need("#status");
+  const calm = createCalm();
+  let wasLost = false;
+  let backAtMs = Number.NEGATIVE_INFINITY;
+
+  function draw() {
+    const { state, since } = store.connection;
+    const nowMs = performance.now();
+    if (state === "open" && wasLost) backAtMs = nowMs;
+    if (state === "open") wasLost = false;
+    if (state === "lost") wasLost = true;
+    const shown = state === "connecting" && wasLost ? "lost" : state;
+    const fleet = ofFleet(store, i18n, nowMs);
+    const isBack = nowMs - backAtMs < BACK_SHOWN_MS && isQuiet(fleet);
+    const line = ofConnection(shown, nowMs - since, isBack, i18n);
+    write(calm.take(line ?? fleet, nowMs));
+    setAttribute(document.body, "data-connection", state);
+    drawMark(state);
+  }
+
+  /** @param {{shown: Told, aloud: Told | null}} told */
+  function write({ shown, aloud }) {
+    setAttribute(place, "data-level", shown.level);
+    place.toggleAttribute("data-long", shown.said.length > LONG);
+    setText(need("#status-said"), shown.said);
+    if (aloud) setText(need("#status-told"), aloud.said);
+  }
+
+  /** @param {ConnectionState} state */
+  function drawMark(state) {
+    const mark = need("#mark");
+    const isReplay = [...store.robots().values()].some(({ replay }) => replay);
+    const live = isReplay ? "header.replay" : "header.live";
+    setAttribute(mark, "data-state", state === "open" && isReplay ? "replay" : state);
+    setText(
+      need("[data-i18n]", mark),
+      i18n.t(state === "lost" || state === "signed-out" ? "header.no_link" : live),
+    );
+  }
+
+  measureMessages();
+  store.subscribe("connection", draw);
+  store.subscribe("snapshot", draw);
+  i18n.onChange(draw);
+  setInterval(onBeat, TICK_MS, draw);
+  draw();
+}
+
+/** Panels and the drawer open below the messages, which must not be covered. */
+function measureMessages() {
+  const messages = need(".messages");
+  new ResizeObserver(() => {
+    const height = `${messages.offsetHeight}px`;
+    document.documentElement.style.setProperty("--messages", height);
+  }).observe(messages);
+}
+
+/**
+ * What there is to say of the line to the server; null where the robots come first.
+ *
+ * @param {ConnectionState} state
+ * @param {number} forMs how long it has been so
+ * @param {boolean} isBack whether it was lost a moment ago
+ * @param {import("../core/i18n.js").I18n} i18n
+ * @returns {Told | null}
+ */
+export function ofConnection(state, forMs, isBack, i18n) {
+  if (state === "signed-out") return told("danger", "banner.signed_out", i18n);
+  if (state === "lost") {
+    const slots = { seconds: Math.ceil(forMs / 1000) };
+    return told("danger", "banner.lost", i18n, slots);
+  }
+  if (state === "connecting") {
+    const level = forMs > PATIENCE_MS ? "doubt" : "away";
+    return told(level, "banner.connecting", i18n);
+  }
+  return isBack ? told("away", "banner.back", i18n) : null;
+}
+
+/**
+ * @param {Level} level
+ * @param {string} key
+ * @param {import("../core/i18n.js").I18n} i18n
+ * @param {Record<string, number>} [slots]
+ * @returns {Told}
+ */
+const told = (level, key, i18n, slots) => ({
+  level,
+  said: i18n.t(key, slots),
+  about: key,
+});
+
+/**
+ * @param {import("../core/store.js").Store} store
+ * @param {import("../core/i18n.js").I18n} i18n
+ * @param {number} nowMs
+ * @returns {Told}
+ */
+function ofFleet(store, i18n, nowMs) {
+  const { level, said, robotId } = fleetSaid(store.robots().values(), i18n, nowMs);
+  const { state, why } = store.robots().get(robotId ?? "")?.situation ?? {};
+  return { level, said, about: [level, robotId, state, why].join(" ") };
+}
+
+/**
+ * Joins what flaps: a better level shows, and anything is read aloud, once it has lasted.
+ */
+export function createCalm() {
+  /** @type {Told | null} */
+  let shown = null;
+  let betterSinceMs = Number.POSITIVE_INFINITY;
+  let aboutSinceMs = Number.NEGATIVE_INFINITY;
+  /** @type {string | null} */
+  let aloud = null;
+
+  /**
+   * @param {Told} told @param {number} nowMs
+   * @returns {{shown: Told, aloud: Told | null}} `aloud`: to be read out now
+   */
+  function take(told, nowMs) {
+    const isBetter = shown !== null && rank(told) > rank(shown);
+    betterSinceMs = isBetter
+      ? Math.min(betterSinceMs, nowMs)
+      : Number.POSITIVE_INFINITY;
+    if (shown === null || !isBetter || nowMs - betterSinceMs >= LASTS_MS) {
+      if (shown?.about !== told.about) aboutSinceMs = nowMs;
+      shown = told;
+      betterSinceMs = Number.POSITIVE_INFINITY;
+    }
+    const isNews = aloud !== shown.about && nowMs - aboutSinceMs >= LASTS_MS;
+    if (isNews) aloud = shown.about;
+    return { shown, aloud: isNews ? shown : null };
+  }
+
+  return { take };
+}
+
+/** @param {Told} told */
+const isQuiet = ({ level }) => rank({ level }) >= LEVELS.indexOf("locked");
+
+/** @param {Pick<Told, "level">} told */
+const rank = ({ level }) => LEVELS.indexOf(level);

@@ -1,0 +1,175 @@
+import { createI18n } from "../../iveg/static/js/core/i18n.js";
+import {
+  fleetSaid,
+  sentenceOf,
+  situationOf,
+} from "../../iveg/static/js/core/situation.js";
+import { sorted } from "../../iveg/static/js/panels/card_order.js";
+import { peopleSaid } from "../../iveg/static/js/panels/map_facts.js";
+import {
+  createCalm,
+  LASTS_MS,
+  ofConnection,
+} from "../../iveg/static/js/panels/status_line.js";
+import { person, robot, situation } from "./builders.js";
+import { equal, test } from "./harness.js";
+
+/** @typedef {import("./builders.js").Situation} Situation */
+
+/** @param {"es" | "en"} language */
+async function words(language) {
+  const load = async () => (await fetch(`/static/i18n/${language}.json`)).json();
+  const i18n = createI18n(load);
+  await i18n.use(language);
+  return i18n;
+}
+
+const EN = await words("en");
+const NOW_MS = 10_000;
+
+/** A robot heard so long ago (s). @param {number | null} age_s @param {Situation} of */
+const heard = (age_s, of, robot_id = "AGI") =>
+  robot({ robot_id, age_s, situation: of, receivedAtMs: NOW_MS });
+
+const CLEAR = situation();
+const NEAR = situation({
+  ...{ level: "caution", state: "half", cause: "person", why: "person_in" },
+  ...{ about: "P1", factor: 0.5, slots: { factor: 0.5, distance: 1.4, lane: "3" } },
+});
+const NOT_SLOWING = situation({ ...NEAR, level: "danger", state: "not_slowing" });
+const STANDING = situation({ level: "locked", state: "standing", action: "release" });
+
+test("a clear way grows old by itself: late, lost, and never clear again", () => {
+  const ages = [0.1, 1.5, 4, null];
+  const found = ages.map((age_s) => situationOf(heard(age_s, CLEAR), NOW_MS));
+  equal(
+    found.map(({ level, state }) => `${level} ${state}`),
+    ["working clear", "doubt late", "doubt lost", "away no_data"],
+  );
+});
+
+test("silence makes nothing better: a late robot near somebody stays one", () => {
+  equal(situationOf(heard(1.5, NEAR), NOW_MS).level, "caution");
+  equal(situationOf(heard(9, NEAR), NOW_MS).level, "caution");
+  equal(situationOf(heard(9, NOT_SLOWING), NOW_MS), NOT_SLOWING);
+  equal(situationOf(undefined, NOW_MS).level, "away");
+});
+
+test("what follows an order has the server's own rules while it is late, not lost", () => {
+  equal(situationOf(heard(1.5, STANDING), NOW_MS).state, "standing");
+  equal(situationOf(heard(9, STANDING), NOW_MS).state, "lost");
+});
+
+test("the seconds of a silence go on", () => {
+  const lost = situation({
+    level: "danger",
+    state: "lost_moving",
+    slots: { age: 3.1 },
+  });
+  equal(situationOf(heard(4, lost), NOW_MS + 2000).slots.age, 6);
+});
+
+test("a sentence has what, why and what to do", () => {
+  equal(sentenceOf(NEAR, EN), "at half speed: person in aisle 3 at 1.4 m");
+  const called = { ...NOT_SLOWING, action: /** @type {const} */ ("press_stop") };
+  equal(
+    sentenceOf(called, EN),
+    "does not slow down: person in aisle 3 at 1.4 m — press STOP",
+  );
+  const named = { ...NEAR, slots: { ...NEAR.slots, lane: "Vivero" } };
+  equal(sentenceOf(named, EN), "at half speed: person in Vivero at 1.4 m");
+});
+
+/** @param {import("./builders.js").Robot[]} fleet */
+const said = (fleet) => fleetSaid(fleet, EN, NOW_MS);
+
+test("the worst of the fleet is said, of several as bad the first", () => {
+  const fleet = [heard(0, CLEAR, "A"), heard(0, NEAR, "B"), heard(0, NEAR, "C")];
+  equal(said(fleet), {
+    level: "caution",
+    said: "B: at half speed: person in aisle 3 at 1.4 m",
+    robotId: "B",
+  });
+  const two = [heard(0, NOT_SLOWING, "A"), heard(0, NOT_SLOWING, "B")];
+  equal(said(two).said.endsWith("(+1 in danger)"), true);
+});
+
+test("all clear needs every robot: one away, waiting or late is not clear", () => {
+  const clear = heard(0, CLEAR, "A");
+  const waiting = heard(0, situation({ state: "waiting" }), "B");
+  equal(said([clear]).said, "A at work, all clear");
+  equal(said([clear, heard(0, CLEAR, "B")]).said, "2 robots at work, all clear");
+  equal(said([waiting]).said, "Nothing to report: B");
+  equal(said([clear, waiting]).said, "1 at work, all clear. Nothing to report: B");
+  const away = said([clear, heard(null, CLEAR, "B")]);
+  equal([away.level, away.said], ["away", "Nothing heard yet of B"]);
+  equal(said([heard(null, CLEAR)]).said, "No robot has spoken yet");
+  equal(said([clear, heard(1.5, CLEAR, "B")]).level, "doubt");
+  equal(said([]).level, "away");
+});
+
+test("cards stand worst first, and as bad in the fleet's order", () => {
+  const card = document.createElement("article");
+  const all = [CLEAR, STANDING, NEAR, CLEAR, NOT_SLOWING];
+  const fleet = all.map((of, i) => ({ id: `R${i}`, card, situation: of }));
+  equal(
+    sorted(fleet).map(({ id }) => id),
+    ["R4", "R2", "R1", "R0", "R3"],
+  );
+});
+
+test("without the server the line says so, in red", () => {
+  equal(ofConnection("lost", 6400, false, EN)?.level, "danger");
+  equal(ofConnection("lost", 6400, false, EN)?.said.includes("7 s"), true);
+  equal(ofConnection("signed-out", 0, false, EN)?.level, "danger");
+  equal(ofConnection("connecting", 100, false, EN)?.level, "away");
+  equal(ofConnection("connecting", 9000, false, EN)?.level, "doubt");
+  equal(ofConnection("open", 0, false, EN), null);
+});
+
+/** @param {import("../../iveg/static/js/core/situation.js").Level} level */
+const told = (level) => ({ level, said: level, about: level });
+
+test("what is worse shows at once, what is better once it has lasted", () => {
+  const calm = createCalm();
+  const seen = [
+    ...[calm.take(told("working"), 0), calm.take(told("danger"), 10)],
+    ...[calm.take(told("working"), 20), calm.take(told("danger"), 900)],
+    ...[calm.take(told("working"), 1000), calm.take(told("working"), 1999)],
+    calm.take(told("working"), 1000 + LASTS_MS),
+  ];
+  equal(
+    seen.map(({ shown }) => shown.level),
+    ["working", "danger", "danger", "danger", "danger", "danger", "working"],
+  );
+});
+
+test("only what lasts is read aloud, once, whatever its numbers do", () => {
+  const calm = createCalm();
+  const aloud = (/** @type {any} */ of, /** @type {number} */ ms) =>
+    calm.take(of, ms).aloud?.said ?? null;
+  const near = (/** @type {string} */ text) => ({ ...told("caution"), said: text });
+  equal(aloud(told("working"), 0), null);
+  equal(aloud(told("working"), LASTS_MS), "working");
+  equal(aloud(near("1.4 m"), 1100), null);
+  equal(aloud(near("1.3 m"), 1500), null);
+  equal(aloud(near("1.2 m"), 2100), "1.2 m");
+  equal(aloud(near("1.1 m"), 9000), null);
+});
+
+test("people who are not seen are not counted as seen, and without a link nobody knows", () => {
+  const receivedAtMs = performance.now();
+  const now = person({ receivedAtMs });
+  const before = person({ stage: "remembered", age_s: 4, receivedAtMs });
+  const cameras = /** @type {any} */ ({ cameras: 1, share: 0.5, receivedAtMs });
+  const blind = { ...cameras, cameras: 0 };
+  equal(peopleSaid([now, now], cameras, true, EN).startsWith("2 people · "), true);
+  equal(
+    peopleSaid([now, before], cameras, true, EN),
+    "1 person · 1 seen lately · 50% of aisles in view",
+  );
+  equal(peopleSaid([now, now], blind, true, EN), "2 seen lately · No camera sees it");
+  equal(peopleSaid([], blind, true, EN), "No camera sees it");
+  equal(peopleSaid([], cameras, true, EN), "Nobody seen · 50% of aisles in view");
+  equal(peopleSaid([now], cameras, false, EN), "No link: unknown who is there");
+});

@@ -1,0 +1,98 @@
+/**
+ * Everything that the page says of a fleet, surface by surface, by its own pure functions.
+ *
+ * Without a language a text is its key and slots, so that a test can compare facts.
+ */
+
+import { linkOfRobot } from "../../iveg/static/js/core/clock.js";
+import { createI18n } from "../../iveg/static/js/core/i18n.js";
+import {
+  fleetSaid,
+  phrasesOf,
+  sentenceOf,
+  situationOf,
+} from "../../iveg/static/js/core/situation.js";
+import { isSeenHeld, tagsOf } from "../../iveg/static/js/map/layers/robot.js";
+import { statusOf } from "../../iveg/static/js/pages/fleet.js";
+import { heardOf, judgeDataPath } from "../../iveg/static/js/pages/health_sentence.js";
+import { readingOf } from "../../iveg/static/js/panels/gauge.js";
+import { marginSaid } from "../../iveg/static/js/panels/robot_texts.js";
+
+/** @typedef {import("./builders.js").Robot} Robot */
+/** @typedef {import("../../iveg/static/js/core/i18n.js").I18n} I18n */
+
+const KEYS = /** @type {I18n} */ (
+  /** @type {unknown} */ ({
+    t: (/** @type {string} */ key, /** @type {object} */ slots = {}) =>
+      [key, ...Object.values(slots)].join(" "),
+    has: () => true,
+    number: String,
+  })
+);
+
+/** @param {string} language empty: keys @returns {Promise<I18n>} */
+async function wordsOf(language) {
+  if (!language) return KEYS;
+  const load = async () => (await fetch(`/static/i18n/${language}.json`)).json();
+  const i18n = createI18n(load);
+  await i18n.use(/** @type {"es" | "en"} */ (language));
+  return i18n;
+}
+
+/**
+ * @param {Robot[]} robots as the server told them
+ * @param {number} waitedS ago
+ * @param {string} language
+ */
+export async function all(robots, waitedS, language) {
+  const i18n = await wordsOf(language);
+  const [nowMs, read] = [performance.now(), performance.now];
+  performance.now = () => nowMs; // one moment for all surfaces
+  try {
+    return surfaces(robots, nowMs - waitedS * 1000, i18n);
+  } finally {
+    performance.now = read;
+  }
+}
+
+/** @param {Robot[]} robots @param {number} receivedAtMs @param {I18n} i18n */
+function surfaces(robots, receivedAtMs, i18n) {
+  const fleet = robots.map((robot) => ({ ...robot, receivedAtMs }));
+  const { level, said } = fleetSaid(fleet, i18n);
+  const chain = judgeDataPath([{ hop: "mqtt", state: "ok" }], heardOf(fleet), true);
+  return {
+    level,
+    status: said,
+    chain: chain.key,
+    chip: chain.state,
+    robots: fleet.map((robot) => ofRobot(robot, i18n)),
+  };
+}
+
+/** @param {Robot} robot @param {I18n} i18n */
+function ofRobot(robot, i18n) {
+  const situation = situationOf(robot);
+  const link = linkOfRobot(robot);
+  const seen = /** @type {any} */ ({ situation, link, ageS: 0, replay: false });
+  const labels = /** @type {any} */ ({
+    percent: (/** @type {number} */ share) => `${share}`,
+    age: () => "",
+    ago: () => "",
+  });
+  const theme = /** @type {any} */ ({ alert: [] });
+  const said = phrasesOf(situation, i18n);
+  return {
+    link,
+    level: situation.level,
+    said: said.said,
+    line: sentenceOf(situation, i18n),
+    row: statusOf(robot, i18n),
+    margin: marginSaid(robot, i18n),
+    factor: readingOf(robot).factor,
+    locks: robot.holds.length,
+    padlock: isSeenHeld(seen),
+    pill: tagsOf({ theme, labels }, seen)
+      .map(([text]) => text)
+      .join(""),
+  };
+}

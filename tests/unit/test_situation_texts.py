@@ -1,0 +1,229 @@
+"""What pages say of a fleet: no two texts contradict, and one line says enough.
+
+The page's own pure functions write the texts, in a browser, of robots as the server
+told them; ``tests.worlds`` lives the days, and the page also grows old by itself.
+"""
+
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from playwright.sync_api import Browser, Page
+
+from iveg.domain.events import Condition
+from iveg.domain.feedback import CLEAR, SpeedLimit
+from iveg.domain.margins import SafetyMargin
+from iveg.domain.observations import Hold
+from iveg.domain.situation.facts import Near, RobotFacts
+from iveg.domain.situation.judge import situation_of
+from iveg.models.situation import Situation
+from tests.builders import safety_report
+from tests.unit.test_js_modules import browser, files
+from tests.worlds import days, told
+
+__all__ = ["browser", "files"]
+
+SAY = """async ([robots, waitedS, language]) => {
+  const {all} = await import('/tests/js/surfaces.js');
+  return all(robots, waitedS, language);
+}"""
+
+
+@pytest.fixture(scope="module")
+def page(browser: Browser, files: str) -> Iterator[Page]:
+    opened = browser.new_page()
+    opened.goto(files)
+    yield opened
+    opened.close()
+
+
+def contradictions(one: dict[str, Any]) -> dict[str, bool]:
+    """What must not stand beside each other on the surfaces of one robot, by name."""
+    is_clear = "situation.is.clear" in one["said"]
+    slow = "situation.is.half" in one["said"] or "situation.is.slow" in one["said"]
+    locked = "situation.is.held" in one["said"]
+    return {
+        "clear, and a link that is not": is_clear and one["link"] != "LIVE",
+        "clear, and too close": is_clear and "band.inside" in one["margin"],
+        "clear, and a margin that nobody knows": is_clear
+        and ("band.unknown" in one["margin"] or "margin_lost" in one["margin"]),
+        "clear, and a limit": is_clear and one["factor"] != 1.0,
+        "slow, and limit 0.00": slow and one["factor"] == 0.0,
+        "locked, and no locks": locked and not one["locks"],
+        "locked, and a limit": locked and one["factor"] != 0.0,
+        "a padlock, and not locked": one["padlock"] and one["level"] != "locked",
+        "slow on the map alone": bool(one["pill"]) and not slow,
+        "a fleet page of its own": one["row"].lower() != one["line"].lower(),
+        "a silent robot at work": one["link"] in ("LOST", "UNKNOWN")
+        and one["level"] in ("working", "locked"),
+    }
+
+
+def of_fleet(fleet: dict[str, Any]) -> dict[str, bool]:
+    """The same of the status line, the chip and the health sentence."""
+    robots = fleet["robots"]
+    live = all(one["link"] == "LIVE" for one in robots)
+    worst = {one["level"] for one in robots}
+    return {
+        "all works, and not all are live": "fleet.whole" in fleet["chain"] and not live,
+        "a chip in order, and not all live": fleet["chip"] == "ok" and not live,
+        "all clear, and somebody is not": "fleet.clear" in fleet["status"]
+        and any("situation.is.clear" not in one["said"] for one in robots),
+        "danger that is not said": "danger" in worst and fleet["level"] != "danger",
+        "quiet above something bad": fleet["level"] in ("working", "away")
+        and bool(worst & {"danger", "caution", "doubt", "locked"}),
+        "red for nothing": fleet["level"] == "danger" and "danger" not in worst,
+    }
+
+
+@settings(
+    max_examples=25,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+@given(days, st.sampled_from((0.0, 0.0, 0.9, 1.4, 4.0)))
+def test_no_two_texts_of_one_robot_contradict(
+    page: Page, day: list[tuple[Any, ...]], waited_s: float
+) -> None:
+    with ThreadPoolExecutor(1) as aside:  # the browser's loop runs in this one
+        moments = aside.submit(told, day).result()
+    for moment in moments:
+        fleet = page.evaluate(SAY, [moment.robots, waited_s, ""])
+        for one in fleet["robots"]:
+            found = [name for name, holds in contradictions(one).items() if holds]
+            assert found == [], one
+        assert [name for name, holds in of_fleet(fleet).items() if holds] == [], fleet
+
+
+# --- ten seconds ----------------------------------------------------------------------
+
+
+def facts(**differs: Any) -> RobotFacts:
+    """AGI at work, all clear; a test says what differs."""
+    clear = safety_report("AGI", speed_factor=1.0, reason="clear")
+    plain: dict[str, Any] = {
+        "robot_id": "AGI",
+        "link": "LIVE",
+        "age_s": 0.1,
+        "stands": False,
+        "report": clear,
+        "limit": CLEAR,
+    }
+    return RobotFacts(**{**plain, **differs})
+
+
+def p1(key: str) -> Condition:
+    return Condition.of_robot("P1", key, "AGI")
+
+
+AISLE_3 = Near("person", "P1", 1.4, "Pasillo 3")
+HALF = safety_report("AGI", speed_factor=0.5, reason="person")
+TOLD = SpeedLimit(0.5, "person", "P1", 1.4)
+LOCKED = safety_report("AGI", Hold("x", "hw", "local"))
+MARGIN = SafetyMargin("AGI", "P1", 1.4, 1.3, 0.8, 1.2, 0.1, 0.5)
+
+STAGED = {
+    "does not slow": (
+        facts(alarm=p1("alert.person_not_slowing"), alarmed_by=AISLE_3),
+        "danger",
+        ("no frena", "persona en el pasillo 3", "pulse PARAR"),
+        ("does not slow down", "person in aisle 3", "press STOP"),
+    ),
+    "lost while moving": (
+        facts(link="LOST", age_s=4.0, alarm=p1("alert.moving_robot_lost")),
+        "danger",
+        ("sin contacto hace 4 s", "aléjese"),
+        ("no contact for 4 s while moving", "keep away; it should stop by itself"),
+    ),
+    "STOP not confirmed": (
+        facts(alarm=p1("alert.stop_unconfirmed"), stop="UNCONFIRMED"),
+        "danger",
+        ("parada sin confirmar", "use la seta roja"),
+        ("STOP not confirmed", "use the red button"),
+    ),
+    "STOP not obeyed": (
+        facts(alarm=p1("alert.stop_still_moving"), stop="STILL_MOVING"),
+        "danger",
+        ("recibió la parada y se mueve", "use la seta roja"),
+        ("received STOP and still moves", "use the red button"),
+    ),
+    "half speed": (
+        facts(report=HALF, near=AISLE_3, limit=TOLD, told_near=AISLE_3),
+        "caution",
+        ("a media velocidad", "persona en el pasillo 3 a 1,4 m"),
+        ("at half speed", "person in aisle 3 at 1.4 m"),
+    ),
+    "too close to stop": (
+        facts(margin=MARGIN, margin_near=AISLE_3),
+        "caution",
+        ("faltan 2,3 m para parar a tiempo", "persona en el pasillo 3"),
+        ("2.3 m short of a safe stop", "person in aisle 3"),
+    ),
+    "stopping": (
+        facts(stop="SENT"),
+        "caution",
+        ("parada enviada", "trátelo como en movimiento"),
+        ("STOP sent, not confirmed yet", "treat it as moving"),
+    ),
+    "late": (
+        facts(link="LATE", age_s=1.8),
+        "doubt",
+        ("última noticia hace 1,8 s", "trátelo como en movimiento"),
+        ("last news 1.8 s ago", "treat it as moving"),
+    ),
+    "contradicts itself": (
+        facts(doubts=("jumped",)),
+        "doubt",
+        ("salta de un lugar a otro", "revise el robot"),
+        ("jumps from place to place", "check the robot"),
+    ),
+    "red button": (
+        facts(report=LOCKED, stands=True),
+        "locked",
+        ("bloqueado: seta roja del robot", "desbloquéelo en el robot"),
+        ("locked: red button on the robot", "unlock it at the robot"),
+    ),
+    "stopped from a page": (
+        facts(stop="STANDING", stands=True, report=LOCKED),
+        "locked",
+        ("bloqueado por la parada", "rearme cuando la vía esté libre"),
+        ("locked by STOP", "release it when the way is free"),
+    ),
+    "all clear": (
+        facts(),
+        "working",
+        ("en marcha, vía libre",),
+        ("at work, all clear",),
+    ),
+}
+"""Facts, level, and what the status line says besides the robot's name."""
+
+
+@pytest.mark.parametrize("language", ["es", "en"])
+@pytest.mark.parametrize("name", STAGED)
+def test_the_status_line_alone_names_robot_danger_and_action(
+    page: Page, name: str, language: str
+) -> None:
+    known, level, *sentences = STAGED[name]
+    situation = Situation.of(situation_of(known)).model_dump(mode="json")
+    robot: dict[str, Any] = {
+        "robot_id": "AGI",
+        "age_s": known.age_s,
+        "situation": situation,
+        "holds": [],
+        "margin": None,
+        "twist": None,
+    }
+    said = page.evaluate(SAY, [[robot], 0.0, language])
+
+    assert said["level"] == level
+    words = sentences[language == "en"]
+    assert [part for part in ("AGI", *words) if part not in said["status"]] == []
+    assert len(said["status"]) <= 86, "two lines of a phone"
+    calls = ("PARAR", "STOP")[language == "en"]
+    assert (
+        f"{'pulse' if language == 'es' else 'press'} {calls}" in said["status"]
+    ) == (name == "does not slow")
