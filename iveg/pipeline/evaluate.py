@@ -155,7 +155,7 @@ class Evaluator:
             case Climate():
                 self._event_log.climate(observation, received.at)
             case SafetyReport():
-                self._reported(observation, received.at)
+                self._reported(observation, received.at, is_kept=received.asked)
             case DetectionFrame():
                 self._unjudged = _later(self._unjudged, received.at)
         return True
@@ -188,11 +188,14 @@ class Evaluator:
         self._unjudged = _later(self._unjudged, at)
         self._moved[odometry.robot_id] = odometry
 
-    def _reported(self, report: SafetyReport, at: Instant) -> None:
+    def _reported(self, report: SafetyReport, at: Instant, *, is_kept: bool) -> None:
+        """Take a report; one that Orion kept says nothing of now and is no news."""
         published_at = self._feedback_publisher.published_at
         changed = self.decisions.reported(report, published_at, at)
         self._event_log.decisions(changed)
         self._doubt_ignored_limit(report, at)
+        if is_kept:
+            return
         if report.speed_factor != self._applied.get(report.robot_id):
             self._applied[report.robot_id] = report.speed_factor
             self._log_speed(report, at)

@@ -15,7 +15,13 @@ from iveg.domain.records import (
 )
 from iveg.domain.transports import DIRECT, FIWARE
 from iveg.models.decision import Decision
-from tests.builders import detection, detection_frame, odometry, origin
+from tests.builders import (
+    detection,
+    detection_frame,
+    odometry,
+    origin,
+    safety_report,
+)
 from tests.fakes.records import alert_record
 from tests.unit.pipeline.desk import Desk, conditions_of
 
@@ -610,6 +616,20 @@ def test_a_held_robot_says_so_in_the_log_once() -> None:
         desk.report("AGI", Hold("hw-1", "hw", "local"), factor=0.0, reason="hold")
 
     assert desk.sentences().count("log.speed_down.hold") == 1
+
+
+def test_what_orion_kept_of_an_earlier_run_slows_nobody_in_the_log() -> None:
+    desk = Desk()
+    kept = safety_report(
+        "AGI", speed_factor=0.5, reason="stale", origin=desk.next_origin()
+    )
+    desk.hear(kept, asked=True)
+    before = desk.sentences()
+
+    desk.report("AGI", factor=0.5, reason="stale")
+
+    assert not any(key.startswith("log.speed") for key in before)
+    assert desk.sentences()[-1].startswith("log.speed_down")
 
 
 def test_older_odometry_moves_nobody() -> None:
