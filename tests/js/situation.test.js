@@ -4,7 +4,7 @@ import {
   sentenceOf,
   situationOf,
 } from "../../iveg/static/js/core/situation.js";
-import { sorted } from "../../iveg/static/js/panels/card_order.js";
+import { createCardOrder, sorted } from "../../iveg/static/js/panels/card_order.js";
 import { peopleSaid } from "../../iveg/static/js/panels/map_facts.js";
 import {
   createCalm,
@@ -116,6 +116,38 @@ test("cards stand worst first, and as bad in the fleet's order", () => {
     sorted(fleet).map(({ id }) => id),
     ["R4", "R2", "R1", "R0", "R3"],
   );
+});
+
+test("a card moves once its order has lasted, and never under a finger or in use", () => {
+  const place = document.createElement("section");
+  const cards = ["A", "B"].map((id) =>
+    Object.assign(document.createElement("article"), { id, tabIndex: 0 }),
+  );
+  place.append(...cards);
+  document.body.replaceChildren(place);
+  const [first, second] = cards;
+  const order = createCardOrder(place);
+  const shown = (/** @type {Situation} */ a, /** @type {number} */ ms) => {
+    const fleet = [
+      { id: "A", card: first, situation: a },
+      { id: "B", card: second, situation: NEAR },
+    ];
+    order.sort(fleet, ms);
+    return [...place.children].map(({ id }) => id).join("");
+  };
+  const touch = (/** @type {string} */ name) =>
+    document.dispatchEvent(new PointerEvent(name, { pointerId: 7 }));
+
+  equal([shown(CLEAR, 0), shown(CLEAR, 900)], ["AB", "AB"]);
+  touch("pointerdown");
+  equal(shown(CLEAR, 5000), "AB");
+  touch("pointerup");
+  first.focus();
+  equal(shown(CLEAR, 5100), "AB");
+  first.blur();
+  equal(shown(CLEAR, 5200), "BA");
+  equal([shown(NOT_SLOWING, 5300), shown(CLEAR, 5900)], ["BA", "BA"]);
+  equal([shown(NOT_SLOWING, 6000), shown(NOT_SLOWING, 7000)], ["BA", "AB"]);
 });
 
 test("without the server the line says so, in red", () => {
