@@ -82,7 +82,7 @@ def _sources() -> list[tuple[str, str]]:
     return [
         (str(file.relative_to(ROOT)), file.read_text())
         for file in files
-        if file.suffix in (".py", ".js")
+        if file.suffix in (".py", ".js") and file.parent.name != "vendor"
     ]
 
 

@@ -1,8 +1,9 @@
 """Rows become Plotly figures; the only importer of plotly.
 
-The package checks every figure as it is made; the browser draws it with the library
-that lies in the same package, so the two always fit.  ``meta`` names what a trace or an
-axis shows, and the page puts the words in the reader's language.
+The package checks every figure as it is made.  The browser draws it with the basic
+bundle of the same version, which lies beside the page (docs/decisions, "What each
+dependency is for").  ``meta`` names what a trace or an axis shows, and the page puts
+the words in the reader's language.
 """
 
 import gzip
@@ -28,6 +29,7 @@ from iveg.domain.transports import TRANSPORTS
 
 _Trace = Mapping[str, object]
 
+_BUNDLE = "plotly-basic.min.js"
 _SILENCE_S = 5.0
 _AIR_SILENCE_S = 300.0
 _LEAST_ROOM = {"temperature": 4.0, "humidity": 20.0, "co2": 100.0}
@@ -181,8 +183,8 @@ class Library:
 
 @cache
 def library() -> Library:
-    """The script that lies in the installed package; the first call takes a while."""
-    data = importlib.resources.files("plotly") / "package_data" / "plotly.min.js"
+    """The script beside the page; the first call takes a while."""
+    data = importlib.resources.files("iveg") / "static" / "vendor" / _BUNDLE
     script = data.read_bytes()
     digest = hashlib.sha256(script).hexdigest()[:16]
     # The sheets that parts of the library bring along are named by their hash.

@@ -7,7 +7,7 @@
  * @typedef {{data: Trace[], layout: Record<string, any>}} Figure
  */
 
-import { loadPlotly, styled, token } from "./history/charts.js";
+import { readyPlotly, styled, token } from "./history/charts.js";
 
 const CONFIG = { displayModeBar: false, responsive: true, displaylogo: false };
 const COLOURS = /** @type {Record<string, string>} */ ({
@@ -29,7 +29,7 @@ const DASHES = /** @type {Record<string, string>} */ ({
  * @throws {Error} the library could not be loaded
  */
 export async function drawHopFigure(place, { data, layout }, source, i18n) {
-  const plotly = await loadPlotly(source);
+  const plotly = await readyPlotly(source);
   const traces = data.map((trace) => dressed(trace, layout.meta, i18n));
   const laid = styled(layout, { since: 0, until: 0 }, i18n);
   if (layout.meta.y === "hop") {

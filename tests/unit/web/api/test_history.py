@@ -1,6 +1,8 @@
 import csv
 import gzip
+import importlib.resources
 import io
+import re
 import sqlite3
 from collections.abc import AsyncIterator
 from contextlib import closing
@@ -606,7 +608,7 @@ async def test_a_range_that_cannot_be_drawn_is_refused(
     assert answer.status_code == 422
 
 
-async def test_the_page_gets_plotly_from_the_installed_package_and_keeps_it(
+async def test_the_page_gets_plotly_from_this_server_and_keeps_it(
     client: httpx.AsyncClient,
 ) -> None:
     address = (await client.get("/api/v1/history/charts")).json()["library"]
@@ -614,11 +616,25 @@ async def test_the_page_gets_plotly_from_the_installed_package_and_keeps_it(
     async with client.stream("GET", address) as answer:
         raw = b"".join([part async for part in answer.aiter_raw()])
 
-    assert b"plotly.js v" in gzip.decompress(raw)[:100]
+    assert b"plotly.js (basic" in gzip.decompress(raw)[:100]
     assert answer.headers["content-type"].startswith("text/javascript")
     assert "immutable" in answer.headers["cache-control"]
     other = await client.get("/vendor/plotly-0.min.js")
     assert other.status_code == 404
+
+
+def test_the_browser_draws_with_the_version_that_checks_the_figures() -> None:
+    drawing = gzip.decompress(charts.library().packed)
+    package = importlib.resources.files("plotly") / "package_data" / "plotly.min.js"
+    checking = package.read_bytes()
+
+    assert _version(drawing) == _version(checking)
+
+
+def _version(script: bytes) -> str:
+    found = re.search(rb"v(\d+\.\d+\.\d+)", script[:100])
+    assert found is not None
+    return found[1].decode()
 
 
 async def test_a_database_that_is_away_is_a_problem_and_not_a_crash(

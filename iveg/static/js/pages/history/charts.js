@@ -2,12 +2,13 @@
  * The server's figures, in this page's colours and language.
  *
  * The library is large and comes from this server; it is asked for with the first
- * figure.  It styles a plot by sheets that a strict policy refuses, so an element of
+ * figure.  The library and each figure wait until the page rests, each in a task of its
+ * own.  It styles a plot by sheets that a strict policy refuses, so an element of
  * each sheet's name keeps it from trying, and the style sheet of pages with figures has
  * the rules for a plot.  A figure's `meta` describes its traces and axes.
  *
  * @typedef {{type: string, mode?: string, name: string, x: (number | null)[],
- *   y: (number | null)[], meta: Record<string, any>, line?: object,
+ *   y: (number | null)[], meta: Record<string, any>, yaxis?: string, line?: object,
  *   marker?: object}} Trace
  * @typedef {{data: Trace[], layout: Record<string, any>}} Figure
  * @typedef {"speed" | "detections" | "stops"} ChartName
@@ -16,8 +17,10 @@
  * @typedef {{since: number, until: number}} Span Unix milliseconds
  */
 
+import { whenResting } from "../../core/rest.js";
 import { all, make, need, setHidden, setText } from "../../panels/dom.js";
 import { wallText } from "./local_time.js";
+import { keepInStep, placesIn, stripsOf } from "./strips.js";
 
 /** @type {readonly ChartName[]} */
 export const CHARTS = ["speed", "detections", "stops"];
@@ -50,10 +53,24 @@ export async function drawCharts(charts, asked, i18n) {
     setHidden(need(`#chart-${name}-empty`), charts[name].data.length > 0);
   }
   if (CHARTS.every((name) => charts[name].data.length === 0)) return;
-  for (const name of CHARTS) {
+  // The library's first drawing costs as much again as a small figure.
+  for (const name of /** @type {const} */ (["stops", "detections"])) {
     if (charts[name].data.length === 0) continue;
     await drawFigure(need(`#chart-${name}`), charts[name], charts, asked, i18n);
   }
+  if (charts.speed.data.length) await drawStrips(charts, asked, i18n);
+}
+
+/**
+ * @param {Charts} charts @param {Span} span
+ * @param {import("../../core/i18n.js").I18n} i18n
+ */
+async function drawStrips(charts, span, i18n) {
+  const strips = stripsOf(charts.speed);
+  const places = placesIn(need("#chart-speed"), strips.length);
+  for (const [index, strip] of strips.entries())
+    await drawFigure(places[index], strip, charts, span, i18n);
+  keepInStep(await readyPlotly(charts), places);
 }
 
 /**
@@ -67,16 +84,23 @@ export async function drawCharts(charts, asked, i18n) {
  * @throws {Error} the library could not be loaded
  */
 export async function drawFigure(place, { data, layout }, source, span, i18n) {
-  const plotly = await loadPlotly(source);
+  const plotly = await readyPlotly(source);
   const traces = data.map((trace, index) => dressed(trace, index, i18n));
   await plotly.react(place, traces, styled(layout, span, i18n), CONFIG);
 }
 
-/** @param {Source} source */
-export async function loadPlotly(source) {
+/**
+ * The library, once the page rests.
+ *
+ * @param {Source} source
+ * @throws {Error} it could not be loaded
+ */
+export async function readyPlotly(source) {
   library ??= summon(source);
   try {
-    return await library;
+    const plotly = await library;
+    await whenResting();
+    return plotly;
   } catch (error) {
     library = null;
     throw error;
@@ -91,6 +115,7 @@ async function summon(source) {
     keeper.hidden = true;
     document.body.append(keeper);
   }
+  await whenResting();
   await import(source.library);
   return /** @type {any} */ (globalThis).Plotly;
 }
@@ -137,9 +162,12 @@ function colourOf(kind, who, index) {
  * @param {import("../../core/i18n.js").I18n} i18n
  */
 export function styled(layout, asked, i18n) {
+  const { isAbove = false } = layout.meta;
+  const said = (/** @type {string} */ name) =>
+    i18n.t(`history.axis.${layout.meta[name]}`);
   const axis = (/** @type {string} */ name) => ({
     ...layout[`${name}axis`],
-    title: { text: i18n.t(`history.axis.${layout.meta[name]}`), standoff: 8 },
+    title: { text: isAbove && name === "x" ? "" : said(name), standoff: 8 },
     gridcolor: token("--line"),
     // Where all lines are black for sunlight, solid limits would hide the measured line.
     griddash: "1px,4px",
@@ -149,6 +177,7 @@ export function styled(layout, asked, i18n) {
     // warning); these hold the widest label of either language.
     automargin: false,
     fixedrange: name === "y",
+    showticklabels: name === "y" || !isAbove,
     ...(layout.meta[name] === "time"
       ? {
           range: [wallText(asked.since), wallText(asked.until)],
@@ -163,20 +192,13 @@ export function styled(layout, asked, i18n) {
     ...layout,
     xaxis: axis("x"),
     yaxis: { ...axis("y"), ...layout.yaxis },
-    ...Object.fromEntries(
-      Object.keys(layout)
-        .filter((key) => /^yaxis\d/.test(key))
-        .map((key) => [key, { ...axis("y"), ...layout[key] }]),
-    ),
-    shapes: layout.shapes?.map((/** @type {Record<string, any>} */ shape) =>
-      shape.name === "slow" ? shaded(shape) : { ...shape, line },
-    ),
+    shapes: shapesOf(layout.shapes ?? [], line),
     paper_bgcolor: "rgba(0,0,0,0)",
     plot_bgcolor: "rgba(0,0,0,0)",
     font: { family: token("--font"), size: 12, color: token("--text-2") },
     hoverlabel: { bgcolor: token("--raised"), font: { color: token("--text") } },
     separators: i18n.language() === "es" ? ",." : ".,",
-    margin: { l: 60, r: 16, t: showlegend ? 36 : 12, b: 60 },
+    margin: { l: 60, r: 16, t: showlegend ? 36 : 12, b: isAbove ? 6 : 60 },
     legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0 },
     showlegend,
     hovermode: "closest",
@@ -184,11 +206,30 @@ export function styled(layout, asked, i18n) {
   };
 }
 
-/** A time in which a robot was to be slow. @param {Record<string, any>} shape */
-function shaded(shape) {
-  const [x0, x1] = [wallText(shape.x0), wallText(shape.x1)];
-  return { ...shape, x0, x1, fillcolor: token("--gauge"), line: { width: 0 } };
+/** @param {Record<string, any>[]} shapes @param {object} line of those that are no time */
+function shapesOf(shapes, line) {
+  const slow = shapes.filter(({ name }) => name === "slow");
+  const others = shapes.filter(({ name }) => name !== "slow");
+  const lines = others.map((shape) => ({ ...shape, line }));
+  return slow.length ? [shaded(slow), ...lines] : lines;
 }
+
+/**
+ * The times in which a robot was to be slow as one shape: hundreds of them would block
+ * the page.
+ *
+ * @param {Record<string, any>[]} times
+ */
+function shaded(times) {
+  const path = times
+    .map(({ x0, x1 }) => `M${at(x0)},0H${at(x1)}V1H${at(x0)}Z`)
+    .join("");
+  const look = { fillcolor: token("--gauge"), line: { width: 0 } };
+  return { type: "path", layer: "below", yref: "y domain", path, ...look };
+}
+
+/** A time as paths of shapes have it. @param {number} ms */
+const at = (ms) => wallText(ms).replace("T", "_");
 
 /**
  * A figure in one sentence, which is its text alternative, too.
