@@ -76,7 +76,14 @@ export function createClassForm(store, i18n, guard) {
   }
 
   async function save() {
-    const body = { ...typed(), version: Number(seen?.version) };
+    if (!seen) return;
+    if (!isDirty()) return say("rule.unchanged", { version: seen.version });
+    // Only what was edited: a threshold in force may be finer than the form shows it.
+    const before = /** @type {Record<string, unknown>} */ (writtenOf(seen));
+    const edited = Object.entries(typed()).filter(
+      ([key, value]) => JSON.stringify(value) !== JSON.stringify(before[key]),
+    );
+    const body = { ...Object.fromEntries(edited), version: seen.version };
     tellAnswer(await guard.put(body), { fill, renew, say });
   }
 

@@ -62,13 +62,22 @@ export function createRuleForm(store, i18n, guard) {
     draw();
   }
 
+  /** What was typed; the threshold in force may be finer than the form shows it.
+   * @param {Rule} rule */
+  function typed(rule) {
+    return {
+      ...(threshold.value !== percentOf(rule) && {
+        confidence_threshold: threshold.valueAsNumber / 100,
+      }),
+      ...(radius.value !== String(rule.radius_m) && { radius_m: radius.valueAsNumber }),
+    };
+  }
+
   async function save() {
-    const answer = await guard.put({
-      confidence_threshold: threshold.valueAsNumber / 100,
-      radius_m: radius.valueAsNumber,
-      // Numbers: the server detects an outdated version by this one.
-      version: Number(seen?.version),
-    });
+    if (!seen) return;
+    if (shows(seen)) return say("rule.unchanged", { version: seen.version });
+    // The server detects an outdated version by its number.
+    const answer = await guard.put({ ...typed(seen), version: seen.version });
     tellAnswer(answer, { fill, renew, say });
   }
 
