@@ -106,6 +106,25 @@ def test_a_new_stop_appears_on_the_commands_page_by_itself(
     assert evaluate(page, RUN_OVER) == []
 
 
+def test_a_list_shows_one_robot_or_what_is_searched_for(
+    open_page: OpenPage, shown: Site
+) -> None:
+    page = open_page(390, 844, route="/commands")
+    rows = page.locator("#orders-rows tbody tr")
+    expect(rows.filter(has_text="program").first).to_be_visible()
+
+    page.locator('[data-only="AGI"]').click()
+    expect(rows.filter(has_text=re.compile(r"AGII"))).to_have_count(0)
+    expect(rows.first).to_contain_text("AGI")
+    page.locator("#orders-search").fill("agi PROGRAM")
+    expect(rows.filter(has_not_text="program")).to_have_count(0)
+    expect(rows.first).to_be_visible()
+
+    page.locator("#orders-search").fill("nadie")
+    expect(page.locator("#orders-empty")).to_contain_text("estos filtros")
+    assert evaluate(page, OVERFLOW) <= 0
+
+
 def test_paper_gets_the_table_and_no_stop(open_page: OpenPage, shown: Site) -> None:
     page = open_page(route="/commands")
     expect(page.locator("#orders-rows tbody tr").first).to_be_visible()

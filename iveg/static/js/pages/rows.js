@@ -6,6 +6,7 @@
 
 import { readApi } from "../core/api.js";
 import { make, need, setHidden, setText } from "../panels/dom.js";
+import { createFilters } from "./filters.js";
 
 const ROWS = 50;
 
@@ -24,10 +25,11 @@ export function createRows({ name, path, i18n, cells, admits = () => true, onIte
   let next = null;
   let status = 200;
   let isLoaded = false;
+  const filters = createFilters(name, { onRobot: load, onSearch: draw });
 
   function draw() {
-    const shown = items.filter(admits);
-    body.replaceChildren(...shown.map(makeRow));
+    const shown = items.filter(admits).map(makeRow).filter(filters.admits);
+    body.replaceChildren(...shown);
     const failed = need(`#${name}-error`);
     setHidden(failed, status === 200);
     setText(failed, i18n.t(status ? "rows.failed" : "rows.offline", { status }));
@@ -35,7 +37,8 @@ export function createRows({ name, path, i18n, cells, admits = () => true, onIte
     setHidden(need(`#${name}-scroll`), shown.length === 0);
     const empty = need(`#${name}-empty`);
     setHidden(empty, !isLoaded || shown.length > 0 || status !== 200);
-    const why = items.length ? "logpanel.empty_filter" : `rows.empty.${name}`;
+    const isFiltered = items.length > 0 || filters.isOn();
+    const why = isFiltered ? "logpanel.empty_filter" : `rows.empty.${name}`;
     setText(empty, i18n.t(why));
     setHidden(more, next === null);
     onItems?.(items);
@@ -48,9 +51,11 @@ export function createRows({ name, path, i18n, cells, admits = () => true, onIte
     return row;
   }
 
-  /** @param {string} query */
+  /** Null also where another robot has been asked for since. @param {string} query */
   async function read(query) {
-    const answer = await readApi(`${path}?limit=${ROWS}${query}`);
+    const asked = filters.query();
+    const answer = await readApi(`${path}?limit=${ROWS}${asked}${query}`);
+    if (asked !== filters.query()) return null;
     status = answer.status;
     isLoaded = true;
     return /** @type {Listing | null} */ (status === 200 ? answer.body : null);

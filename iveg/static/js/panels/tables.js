@@ -1,6 +1,6 @@
 /**
  * Tables as cards on a phone: each cell carries the head of its column, which the style
- * sheet writes before it where there is no room for columns.
+ * sheet writes before it where there is no room for columns, and which cells say nothing.
  */
 
 import { all } from "./dom.js";
@@ -27,6 +27,7 @@ export function labelCells(table) {
       const name = heads[i] ?? "";
       const has = cell.getAttribute("data-head");
       if (has !== name) cell.setAttribute("data-head", name);
+      cell.toggleAttribute("data-none", cell.textContent === "—");
     }
   }
 }
