@@ -55,6 +55,7 @@ _SCRIPTED: Final = {
     "alerts": "/alerts",
     "climate": "/climate",
     "commands": "/commands",
+    "decisions": "/decisions",
     "fleet": "/fleet",
     "history": "/history",
     "latency": "/latency",

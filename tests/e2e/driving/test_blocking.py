@@ -22,7 +22,7 @@ pytestmark = pytest.mark.e2e
 BUDGET_MS = 100.0
 TRIES = 3
 SETTLES_MS = 400
-ROUTES = ("/", "/alerts", "/commands", "/fleet", "/settings")
+ROUTES = ("/", "/alerts", "/commands", "/decisions", "/fleet", "/settings")
 FIGURES = ("/history", "/climate", "/latency")
 """Pages that draw by Plotly."""
 PAUSE_MS = 2500

@@ -21,7 +21,15 @@ from tests.processes import Site, until
 
 pytestmark = pytest.mark.e2e
 
-ROUTES = ("/alerts", "/commands", "/fleet", "/climate", "/latency", "/settings")
+ROUTES = (
+    "/alerts",
+    "/commands",
+    "/decisions",
+    "/fleet",
+    "/climate",
+    "/latency",
+    "/settings",
+)
 OTHERS = ("/history", "/docs", "/about")
 """Looked at in one theme."""
 THEMES = ("dark", "sunlight")
@@ -123,6 +131,20 @@ def test_a_list_shows_one_robot_or_what_is_searched_for(
     page.locator("#orders-search").fill("nadie")
     expect(page.locator("#orders-empty")).to_contain_text("estos filtros")
     assert evaluate(page, OVERFLOW) <= 0
+
+
+def test_every_decision_is_listed_and_leads_to_its_own_page(
+    open_page: OpenPage, shown: Site
+) -> None:
+    page = open_page(390, 844, route="/decisions")
+    row = page.locator("#decisions-rows tbody tr").first
+    expect(row).to_contain_text("bajó al 50", timeout=60_000)
+    assert evaluate(page, OVERFLOW) <= 0
+
+    row.locator("a").click()
+
+    expect(page.locator("#decision-record")).to_contain_text("bajó al 50")
+    page.wait_for_url(re.compile(r"/decisions/.+"))
 
 
 def test_paper_gets_the_table_and_no_stop(open_page: OpenPage, shown: Site) -> None:

@@ -32,6 +32,7 @@ const ROUTES = {
   latency: () => import("../pages/hops.js"),
   experiments: () => import("../pages/experiments.js"),
   settings: () => import("../pages/settings.js"),
+  decisions: () => import("../pages/decisions.js"),
   decision: () => import("../pages/decision.js"),
   day: () => import("../pages/day.js"),
   about: () => import("../pages/about.js"),

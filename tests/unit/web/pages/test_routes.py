@@ -35,6 +35,7 @@ ROUTES = (
     "/climate",
     "/latency",
     "/settings",
+    "/decisions",
     "/decisions/d-1",
     "/docs",
     "/about",

@@ -70,10 +70,7 @@ export function createTable(name, i18n, cells, readMore) {
  * @param {import("../../core/i18n.js").I18n} i18n
  */
 export function decisionCells(item, i18n) {
-  const lasted =
-    item.ended_at === null
-      ? null
-      : (Date.parse(item.ended_at) - Date.parse(item.started_at)) / 1000;
+  const lasted = lastedOf(item);
   const running = make("td", "rows__number", i18n.t("decision.running"));
   return [
     make("td", "", dayAndTime(item.started_at)),
@@ -102,13 +99,24 @@ export function commandCells(item, i18n) {
   ];
 }
 
+/** How long a decision held (s); null while it does. @param {any} item */
+export function lastedOf({ started_at, ended_at }) {
+  if (ended_at === null) return null;
+  return (Date.parse(ended_at) - Date.parse(started_at)) / 1000;
+}
+
+/** The worst verdict of a decision's links. @param {any} item */
+export function worstOf({ links }) {
+  const verdicts = links.map((/** @type {any} */ link) => link.verdict);
+  return VERDICTS.find((verdict) => verdicts.includes(verdict)) ?? "n/a";
+}
+
 /** The verdict as shape and text; a press opens the whole decision. */
 function chainCell(
   /** @type {any} */ item,
   /** @type {import("../../core/i18n.js").I18n} */ i18n,
 ) {
-  const verdicts = item.links.map((/** @type {any} */ link) => link.verdict);
-  const worst = VERDICTS.find((verdict) => verdicts.includes(verdict)) ?? "n/a";
+  const worst = worstOf(item);
   const button = make("button", "rows__open");
   button.type = "button";
   button.dataset.verdict = worst;
