@@ -3,8 +3,9 @@
  */
 
 import { onBeat } from "../core/beat.js";
-import { make, need, setHidden, setText } from "./dom.js";
+import { make, need, needPart, setHidden, setText } from "./dom.js";
 import { createChosen, createLogChips } from "./log_filter.js";
+import { rowsOf } from "./log_rows.js";
 
 /** @typedef {import("../main.js").App} App */
 /** @typedef {import("../core/protocol.js").Entry} Entry */
@@ -34,8 +35,9 @@ export function createLogPanel(app, decision) {
     onChange: rebuild,
   });
 
-  /** @param {Entry} entry */
-  function makeItem(entry) {
+  /** @param {import("./log_rows.js").Row} row */
+  function makeItem(row) {
+    const { entry } = row;
     const item = make("li");
     item.dataset.kind = entry.kind;
     item.dataset.id = String(entry.id);
@@ -44,9 +46,12 @@ export function createLogPanel(app, decision) {
     const time = make("time", "", i18n.time(entry.at));
     time.dateTime = entry.at;
     const place = entry.decision_id ? makeOpener(entry) : text;
-    place.append(time, " ", sentenceOf(entry, i18n));
+    const lasted = make("span");
+    lasted.dataset.part = "lasted";
+    place.append(time, " ", sentenceOf(entry, i18n), " ", lasted);
     if (place !== text) text.append(place);
     item.append(make("span", "log__mark"), text);
+    writeLasted(item, row);
     return item;
   }
 
@@ -69,14 +74,32 @@ export function createLogPanel(app, decision) {
   }
 
   function addFresh() {
-    const entries = fresh.splice(0);
-    learn(entries);
-    const shown = entries.filter(chosen.admits).slice(-SHOWN).reverse();
+    learn(fresh.splice(0));
+    const shown = newestOf(store.log());
     if (!shown.length) return;
-    list.prepend(...shown.map(makeItem));
-    while (list.children.length > SHOWN) list.lastElementChild?.remove();
+    const rows = new Map(shown.map((row) => [String(row.entry.id), row]));
+    const newest = Number(list.firstElementChild?.getAttribute("data-id") ?? -1);
+    // Rows that stay are not touched: one of them may have the focus.
+    for (const item of /** @type {HTMLElement[]} */ ([...list.children])) {
+      const row = rows.get(String(item.dataset.id));
+      if (row) writeLasted(item, row);
+      else item.remove();
+    }
+    list.prepend(...shown.filter(({ entry }) => entry.id > newest).map(makeItem));
     setHidden(empty, true);
     setHidden(clear, true);
+  }
+
+  /** @param {HTMLElement} item @param {import("./log_rows.js").Row} row */
+  function writeLasted(item, { lastedS }) {
+    const said = lastedS === null ? "" : i18n.t("log.lasted", { seconds: lastedS });
+    setText(needPart("lasted", item), said);
+  }
+
+  /** The rows that the filter admits, newest first. @param {readonly Entry[]} entries */
+  function newestOf(entries) {
+    const admitted = rowsOf(entries).filter(({ entry }) => chosen.admits(entry));
+    return admitted.slice(-SHOWN).reverse();
   }
 
   /** @param {readonly Entry[]} entries */
@@ -91,7 +114,7 @@ export function createLogPanel(app, decision) {
     const entries = store.log();
     fresh = [];
     learn(entries);
-    const shown = entries.filter(chosen.admits).slice(-SHOWN).reverse();
+    const shown = newestOf(entries);
     list.replaceChildren(...shown.map(makeItem));
     setHidden(empty, shown.length > 0);
     const isHidden = entries.length > 0 && shown.length === 0;
