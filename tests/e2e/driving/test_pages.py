@@ -262,6 +262,21 @@ def test_the_latency_page_shows_the_papers_table_live_beside_what_it_printed(
     assert evaluate(page, OVERFLOW) <= 0
 
 
+def test_on_a_phone_the_latency_page_folds_its_tables_behind_the_figures(
+    open_page: OpenPage,
+) -> None:
+    page = open_page(390, 844, route="/latency")
+    expect(page.locator("#hops-bars .main-svg").first).to_be_visible(timeout=60_000)
+    table = page.locator("#hops-table tbody")
+    expect(table).to_be_hidden()
+    assert page.evaluate("document.documentElement.scrollHeight") < 3500
+
+    page.locator(".fold summary").first.click()
+
+    expect(table).to_be_visible()
+    assert evaluate(page, OVERFLOW) <= 0
+
+
 def test_the_settings_page_shows_the_rule_in_force(
     open_page: OpenPage, stack: Site
 ) -> None:

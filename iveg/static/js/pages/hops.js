@@ -85,6 +85,9 @@ export function start({ i18n }) {
     load();
   }
 
+  // The tables are long where there is no room for columns.
+  if (matchMedia("(max-width: 567px)").matches)
+    for (const fold of all(".fold")) fold.removeAttribute("open");
   for (const chip of all("[data-window]")) {
     chip.addEventListener("click", () => ask({ window: chip.dataset.window }));
   }
