@@ -111,6 +111,7 @@ class Pipeline:
         total["live.browsers"] = self.hub.watchers
         total["nlos.protected"] = self.evaluator.protected_unseen
         total.update({f"slow_s.{why}": n for why, n in self.slow_time.seconds.items()})
+        total.update({f"near_s.{how}": n for how, n in self.slow_time.near.items()})
         return total
 
 

@@ -1,4 +1,4 @@
-"""Why robots drove slowly: seconds by cause, beside the rule loop, for people.
+"""Why robots drove slowly, and whether near people: seconds, beside the rule loop.
 
 *Memory* is the ring of a person who was not seen for a second: where nobody looks, it
 grows, and most of the time that robots crawl with nobody near is this.
@@ -19,18 +19,28 @@ _LONGEST_S = 1.0
 
 
 class SlowTime:
-    """Seconds in which a robot moved and said that it was limited, since the start."""
+    """Seconds in which a robot moved and said that it was limited, since the start.
+
+    Of those in which it moved with somebody in sight within two metres, whether it was
+    slow, is counted apart: by what iVeg itself knows, which is less than the truth.
+    """
 
     def __init__(self, world: World, people: People) -> None:
         self._world = world
         self._people = people
         self._spent: defaultdict[str, float] = defaultdict(float)
+        self._near = {"slow": 0.0, "fast": 0.0}
         self._at: float | None = None
 
     @property
     def seconds(self) -> dict[str, int]:
         """Whole ones, by cause: ``memory``, or the reason that the robot reported."""
         return {why: int(spent_s) for why, spent_s in self._spent.items()}
+
+    @property
+    def near(self) -> dict[str, int]:
+        """Whole seconds near somebody who is seen: ``slow`` and ``fast``."""
+        return {how: int(spent_s) for how, spent_s in self._near.items()}
 
     def tick(self, now: Instant) -> None:
         """Let time pass; it is counted twice a second."""
@@ -42,6 +52,19 @@ class SlowTime:
             why = self._why(robot, now)
             if why is not None:
                 self._spent[why] += past
+            if not robot.stands and self._is_near(robot, now):
+                self._near["fast" if why is None else "slow"] += past
+
+    def _is_near(self, robot: RobotState, now: Instant) -> bool:
+        if robot.odometry is None:
+            return False
+        distance_to = robot.odometry.pose.distance_to
+        return any(
+            one.class_ == "person"
+            and one.age_s(now) <= LIMITS.seen_s
+            and distance_to(one.newest.x, one.newest.y) <= LIMITS.ring_default_m
+            for one in self._people.known.values()
+        )
 
     def _why(self, robot: RobotState, now: Instant) -> str | None:
         """Why a robot drives slowly now; None where it does not, or nobody knows."""

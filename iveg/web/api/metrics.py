@@ -62,6 +62,7 @@ def router(
             *_queues(queues()),
             *_turns(longest_turn_s(now)),
             *_safety(state.safety),
+            *_protection(state.counters),
         ]
         # Twenty robots have 300 sketches to sum up: beside the loop, not in it.
         lines += await asyncio.to_thread(lambda: list(_latency(parts)))
@@ -197,9 +198,9 @@ def _clocks(watch: LatencyWatch) -> Iterator[str]:
 
 def _queues(queues: Queues) -> Iterator[str]:
     for name, kind, told, label, counts in (
-        ("queue_depth", "gauge", "What waits.", "queue", queues.depths),
-        ("dropped_total", "counter", "What gave way.", "queue", queues.dropped),
-        ("retries_total", "counter", "What was done again.", "what", queues.retries),
+        ("queue_depth", "gauge", "Items that wait.", "queue", queues.depths),
+        ("dropped_total", "counter", "Items dropped.", "queue", queues.dropped),
+        ("retries_total", "counter", "Operations done again.", "what", queues.retries),
     ):
         samples = ((_labels(**{label: key}), count) for key, count in counts.items())
         yield from _family(name, kind, told, samples)
@@ -252,6 +253,17 @@ def _safety(safety: Safety) -> Iterator[str]:
         ),
     ):
         yield from _family(name, "gauge", told, [("", value)])
+
+
+def _protection(counters: Mapping[str, int]) -> Iterator[str]:
+    slow_s, fast_s = (counters.get(f"near_s.{how}", 0) for how in ("slow", "fast"))
+    near_s = slow_s + fast_s
+    yield from _family(
+        "protection_ratio",
+        "gauge",
+        "Share of the time near a person in sight that robots drove slowly.",
+        [("", slow_s / near_s if near_s else None)],
+    )
 
 
 def _seconds(ms: float | None) -> float | None:

@@ -45,6 +45,42 @@ def test_who_stands_or_is_not_limited_spends_nothing(scene: Scene) -> None:
     assert spent(scene, 0.0, None) == []
 
 
+@pytest.mark.parametrize(
+    ("factor", "linear", "near"),
+    [
+        (0.5, 0.5, {"slow": 4, "fast": 0}),
+        (1.0, 0.5, {"slow": 0, "fast": 4}),
+        (0.5, 0.0, {"slow": 0, "fast": 0}),
+    ],
+)
+def test_seconds_near_a_person_in_sight_are_counted_as_slow_or_fast(
+    scene: Scene, factor: float, linear: float, near: dict[str, int]
+) -> None:
+    counted = SlowTime(scene.world, scene.people)
+    for tenth in range(41):
+        scene.now = round(tenth / 10, 1)
+        scene.look("AGI", person(1.5))
+        scene.drive("AGI", 0.0, linear=linear)
+        scene.report("AGI", factor=factor, reason="person")
+        counted.tick(at(scene.now))
+
+    assert counted.near == near
+
+
+def test_nobody_is_near_who_is_farther_than_two_metres_or_out_of_sight(
+    scene: Scene,
+) -> None:
+    counted = SlowTime(scene.world, scene.people)
+    for tenth in range(41):
+        scene.now = round(1.1 + tenth / 10, 1)
+        scene.look("AGI", person(5.0))
+        scene.drive("AGI", 0.0)
+        scene.report("AGI", factor=1.0, reason="clear")
+        counted.tick(at(scene.now))
+
+    assert counted.near == {"slow": 0, "fast": 0}
+
+
 def test_an_old_report_is_no_reason(scene: Scene) -> None:
     counted = SlowTime(scene.world, scene.people)
     scene.report("AGI", factor=0.5, reason="person")

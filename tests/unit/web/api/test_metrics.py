@@ -94,6 +94,20 @@ async def test_the_safety_tiles_are_told() -> None:
     assert "iveg_worst_margin_metres" in told
 
 
+async def test_the_share_of_slow_time_near_people_is_told() -> None:
+    desk = WebDesk()
+    for factor in (0.5, 1.0):
+        for _ in range(31):
+            desk.drive("AGI", 0.0)
+            desk.look("AGI", detection("farmer", 1.5))
+            desk.report("AGI", factor=factor, reason="person", linear=0.5)
+            await desk.wait(0.1)
+
+    told = samples(await told_by(desk))
+
+    assert told["iveg_protection_ratio"] == pytest.approx(0.5, abs=0.2)
+
+
 async def test_a_summary_never_forgets_what_it_has_counted() -> None:
     desk = await busy_desk()
     name = f'iveg_latency_seconds_count{{{AGI},hop="fiware"}}'
