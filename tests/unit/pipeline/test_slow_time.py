@@ -5,6 +5,7 @@ import pytest
 from iveg.pipeline.slow_time import SlowTime
 from tests.builders import at
 from tests.unit.domain.scene import Scene, person
+from tests.unit.pipeline.desk import Desk
 
 
 def spent(
@@ -79,6 +80,18 @@ def test_nobody_is_near_who_is_farther_than_two_metres_or_out_of_sight(
         counted.tick(at(scene.now))
 
     assert counted.near == {"slow": 0, "fast": 0}
+
+
+async def test_the_pipeline_counts_them() -> None:
+    desk = Desk()
+    for _ in range(31):
+        desk.look("AGI", person(1.5))
+        desk.drive("AGI")
+        desk.report("AGI", factor=0.5, reason="person", linear=0.5)
+        await desk.wait(0.1)
+
+    counters = desk.parts.counters()
+    assert counters["near_s.slow"] == counters["slow_s.person"] >= 2
 
 
 def test_an_old_report_is_no_reason(scene: Scene) -> None:

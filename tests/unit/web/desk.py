@@ -61,7 +61,8 @@ class WebDesk(Desk):
         kept = KeptChoices(self.rule_store, self.contact_store, self.detector_store)
         self.services = build_services(self.parts, kept, {**self.senders}, self.clock)
         self.rules = self.services.rules
-        self.views = Views(self.parts, lambda: Counter({"some": 1}))
+        self.counters = Counter({"some": 1})
+        self.views = Views(self.parts, lambda: self.counters)
         self.encoder = socket.Encoder(self.views, self.hub, self.clock)
         self.notifications = notifications.NotificationEndpoint(
             self.ingest,
