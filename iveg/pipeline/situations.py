@@ -1,6 +1,7 @@
 """What is known of each robot, gathered for its situation (``domain/situation``)."""
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 from iveg.domain.events import Condition
 from iveg.domain.feedback import SpeedLimit
@@ -46,12 +47,12 @@ class Situations:
             missing=self._evaluator.missing(robot.robot_id),
             doubts=robot.doubts.active(now),
             alarm=alarm,
-            alarmed_by=None if alarm is None else self._alarmed_by(robot, alarm),
-            near=None if report is None else self._reported(robot, report, limit),
-            told_near=self._told(robot, limit),
+            alarmed_by=None if alarm is None else self._alarmed_by(robot, alarm, now),
+            near=None if report is None else self._reported(robot, report, limit, now),
+            told_near=self._told(robot, limit, now),
             margin=margin,
             margin_near=self._person(
-                robot, None if margin is None else margin.person_id
+                robot, None if margin is None else margin.person_id, now
             ),
             stop=machine.state,
             is_resuming=once is not None and once.kind == "resume",
@@ -67,18 +68,24 @@ class Situations:
             if one.cleared is None and one.condition.robot_id == robot_id
         )
 
-    def _alarmed_by(self, robot: RobotState, alarm: Condition) -> Near | None:
+    def _alarmed_by(
+        self, robot: RobotState, alarm: Condition, now: Instant
+    ) -> Near | None:
         """Whom an alarm is about; its own distance is of this moment."""
         about, distance_m = alarm.slots.get("person"), alarm.slots.get("distance")
         if not isinstance(about, str):
             return None
-        found = self._near(robot, about)
+        found = self._near(robot, about, now)
         if found is None or not isinstance(distance_m, float):
             return found
-        return Near(found.kind, about, distance_m, found.lane)
+        return replace(found, distance_m=distance_m)
 
     def _reported(
-        self, robot: RobotState, report: SafetyReport, limit: SpeedLimit
+        self,
+        robot: RobotState,
+        report: SafetyReport,
+        limit: SpeedLimit,
+        now: Instant,
     ) -> Near | None:
         """Whom a robot says that it is slow for.
 
@@ -88,45 +95,60 @@ class Situations:
         if report.reason not in ("person", "robot"):
             return None
         if report.reason == limit.reason and report.cause in (None, limit.cause):
-            return self._told(robot, limit)
+            return self._told(robot, limit, now)
         known = self._evaluator.people.known.values()
         named = {report.decision_id, report.cause} - {None}
         found = next(
             (one for one in known if {one.decision_id, one.person_id} & named), None
         )
         if found is not None:
-            return self._to_person(robot, found)
-        return self._near(robot, report.cause) or Near(report.reason)
+            return self._to_person(robot, found, now)
+        return self._near(robot, report.cause, now) or Near(report.reason)
 
-    def _told(self, robot: RobotState, limit: SpeedLimit) -> Near | None:
+    def _told(self, robot: RobotState, limit: SpeedLimit, now: Instant) -> Near | None:
         """Whom our speed limit is for."""
         if limit.reason not in ("person", "robot"):
             return None
-        found = self._near(robot, limit.cause)
-        lane = None if found is None else found.lane
-        return Near(limit.reason, limit.cause, limit.distance_m, lane, limit.foretold_s)
+        found = self._near(robot, limit.cause, now)
+        return replace(
+            found or Near(limit.reason),
+            kind=limit.reason,
+            about=limit.cause,
+            distance_m=limit.distance_m,
+            foretold_s=limit.foretold_s,
+        )
 
-    def _near(self, robot: RobotState, about: str | None) -> Near | None:
+    def _near(self, robot: RobotState, about: str | None, now: Instant) -> Near | None:
         """A person or robot by its id; None where nothing of it is known."""
         peer = self._evaluator.world.robots.get(about or "")
         if peer is None:
-            return self._person(robot, about)
+            return self._person(robot, about, now)
         if peer.odometry is None or robot.odometry is None:
             return Near("robot", about)
         place = peer.odometry.pose
         return Near("robot", about, robot.odometry.pose.distance_to(place.x, place.y))
 
-    def _person(self, robot: RobotState, person_id: str | None) -> Near | None:
+    def _person(
+        self, robot: RobotState, person_id: str | None, now: Instant
+    ) -> Near | None:
         known = self._evaluator.people.known.get(person_id or "")
-        return None if known is None else self._to_person(robot, known)
+        return None if known is None else self._to_person(robot, known, now)
 
-    def _to_person(self, robot: RobotState, person: TrackedPerson) -> Near:
+    def _to_person(
+        self, robot: RobotState, person: TrackedPerson, now: Instant
+    ) -> Near:
         """A person, or a robot that is not of the fleet."""
         x, y = person.newest.x, person.newest.y
         lane = self._evaluator.greenhouse.lane_at(x, y)
         odometry = robot.odometry
         distance_m = None if odometry is None else odometry.pose.distance_to(x, y)
-        return Near(person.class_, person.person_id, distance_m, lane)
+        return Near(
+            person.class_,
+            person.person_id,
+            distance_m,
+            lane,
+            unseen_s=person.age_s(now),
+        )
 
 
 def fresh_report(robot: RobotState, now: Instant) -> SafetyReport | None:

@@ -6,6 +6,7 @@ told them; ``tests.worlds`` lives the days, and the page also grows old by itsel
 
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -120,6 +121,7 @@ def p1(key: str) -> Condition:
 
 
 AISLE_3 = Near("person", "P1", 1.4, "Pasillo 3")
+UNSEEN = replace(AISLE_3, unseen_s=4.1)
 HALF = safety_report("AGI", speed_factor=0.5, reason="person")
 TOLD = SpeedLimit(0.5, "person", "P1", 1.4)
 LOCKED = safety_report("AGI", Hold("x", "hw", "local"))
@@ -155,6 +157,12 @@ STAGED = {
         "caution",
         ("a media velocidad", "persona en el pasillo 3 a 1,4 m"),
         ("at half speed", "person in aisle 3 at 1.4 m"),
+    ),
+    "half speed for a memory": (
+        facts(report=HALF, near=UNSEEN, limit=TOLD, told_near=UNSEEN),
+        "caution",
+        ("a media velocidad", "hubo una persona en el pasillo 3", "hace 4 s"),
+        ("at half speed", "a person was in aisle 3", "unseen for 4 s"),
     ),
     "too close to stop": (
         facts(margin=MARGIN, margin_near=AISLE_3),

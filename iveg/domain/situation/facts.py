@@ -39,6 +39,7 @@ class Near:
         about: Its id, where it is known.
         distance_m: To it (m); ``lane`` is where it is.
         foretold_s: Until the robot reaches its ring (s); None: it is inside.
+        unseen_s: Since anybody saw it (s); of a robot of the fleet 0.
     """
 
     kind: str
@@ -46,6 +47,7 @@ class Near:
     distance_m: float | None = None
     lane: str | None = None
     foretold_s: float | None = None
+    unseen_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,6 +12,7 @@ from typing import get_args
 
 from iveg.domain.events import Condition, Slot
 from iveg.domain.feedback import FULL_SPEED, HALF_SPEED
+from iveg.domain.limits import LIMITS
 from iveg.domain.rule.premises import Missing
 from iveg.domain.situation.facts import Action, Level, Near, RobotFacts, Situation
 from iveg.domain.stop.commands import State
@@ -216,6 +217,10 @@ def _because(of: Situation, near: Near) -> Situation:
         elif near.kind == "person" and near.lane is not None:
             slots["lane"] = near.lane
             why = "person_in"
+    if near.kind == "person" and near.unseen_s > LIMITS.seen_s:
+        # A distance to where somebody was is no distance to anybody.
+        slots["unseen"] = round(near.unseen_s)
+        why = "person_unseen" if near.lane is None else "person_was_in"
     if near.kind == "robot" and near.about is not None:
         slots["about"] = near.about
     return replace(of, why=why, cause=near.kind, about=near.about, slots=slots)
