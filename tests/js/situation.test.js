@@ -200,8 +200,8 @@ test("people who are not seen are not counted as seen, and without a link nobody
     peopleSaid([now, before], cameras, true, EN),
     "1 person · 1 seen lately · 50% of aisles in view",
   );
-  equal(peopleSaid([now, now], blind, true, EN), "2 seen lately · No camera sees it");
-  equal(peopleSaid([], blind, true, EN), "No camera sees it");
+  equal(peopleSaid([now, now], blind, true, EN), "2 seen lately · No camera coverage");
+  equal(peopleSaid([], blind, true, EN), "No camera coverage");
   equal(peopleSaid([], cameras, true, EN), "Nobody seen · 50% of aisles in view");
   equal(peopleSaid([now], cameras, false, EN), "No link: unknown who is there");
 });

@@ -107,7 +107,7 @@ async def test_another_day_has_none_of_it(browser: httpx.AsyncClient) -> None:
             "2026-11-19",
             None,
             ["telemetry"],
-            ("no longer holds where robots drove", "Nobody can say any more"),
+            ("no longer holds where robots drove", "Not known any more"),
         ),
     ],
 )

@@ -222,9 +222,9 @@ def test_a_letter_says_how_grave_and_when_in_the_readers_language() -> None:
     write = writer()
 
     assert write(OutboundMessage([one]), "es") == MessageText(
-        "iVeg: alarma P1", "Una alarma P1 desde las 23:13:20. Abra iVeg para verla."
+        "iVeg: alerta P1", "Una alerta P1 desde las 23:13:20. Abra iVeg para verla."
     )
     assert write(OutboundMessage([one, one]), "en").body == (
-        "2 alarms since 23:13:20; the gravest is P1. Open iVeg to see them."
+        "2 alerts since 23:13:20; the gravest is P1. Open iVeg to see them."
     )
     assert write(OutboundMessage(), "en").title == "iVeg: test"
