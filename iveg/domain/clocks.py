@@ -32,6 +32,8 @@ STEP_S = 0.5
 AGREE = 5
 """So many messages of one transport and boot must agree before a leap is believed."""
 _DIRECT_FRESH_S = 10.0
+_HEARD_S = 2.0
+"""Orion may be told to send one pose a second."""
 _TOLERANCE_S = 0.25
 OFFSET_WARN_S, _WARNED_S = 0.25, 60.0
 _MAX_FILTERS = 16
@@ -154,7 +156,8 @@ class RobotClock:
         if kind is DetectionFrame:
             beyond = self._beyond_odometry(transport, origin, at.mono)
             if beyond is None:
-                self.detector_apart_at = at.mono
+                if self._hears_odometry(transport, origin, at.mono):
+                    self.detector_apart_at = at.mono
                 return None
             own = None if own is None else max(own, beyond)
         if transport != FIWARE.id:
@@ -191,6 +194,17 @@ class RobotClock:
         return max(
             0.0, transit - (transit if odometry.least is None else odometry.least)
         )
+
+    def _hears_odometry(
+        self, transport: TransportId, origin: Origin, now: float
+    ) -> bool:
+        """Whether odometry came just before, by the same way.
+
+        The first frame behind a gap is as late as the gap was long, and nothing tells
+        that from another clock until odometry has passed it, too.
+        """
+        odometry = self._filters[transport, origin.boot, False]
+        return now - odometry.seen_at <= _HEARD_S
 
     def _against_direct(self, origin: Origin, now: float) -> float | None:
         """The delay against the fastest direct message, while there are such (s)."""

@@ -249,6 +249,17 @@ def test_a_frame_that_is_stamped_by_another_clock_is_of_unknown_age(
     assert robot.estimate.detector_apart_at == at(0.1).mono
 
 
+def test_the_first_frame_behind_a_gap_accuses_no_clock() -> None:
+    robot = Robot()
+    robot.send(0.0)
+
+    assert robot.send(1.0, 80.0, kind=DetectionFrame) is None
+    assert robot.estimate.detector_apart_at is None
+    robot.send(1.0, 80.1)
+    robot.send(1.1, 80.1, kind=DetectionFrame)
+    assert robot.estimate.detector_apart_at is None
+
+
 def test_a_detectors_clock_makes_no_pose_old() -> None:
     robot = Robot()
     robot.send(0.0)
