@@ -9,15 +9,13 @@ from dataclasses import dataclass
 from typing import Literal
 
 from iveg.domain.hops import NEEDS, Check, Hop
-from iveg.domain.probe import lag_in_words
+from iveg.domain.probe import SLOW_S, lag_in_words
 
 State = Literal["ok", "failed", "not tried"]
 
 
 _ORION_WAITS_S = 4.0
 """Nearly the five seconds for which Orion waits for an agent."""
-LATE_S = 1.0
-"""Age of a late measure (s), as in a running iVeg."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,6 +96,8 @@ class DiagnosisRow:
 
 
 Findings = Mapping[Check, Finding]
+Case = Callable[[str, Findings], bool]
+"""Whether a cause explains a failure, by its reason and by all findings."""
 
 
 def missing(check: Check, findings: Findings) -> tuple[Check, ...]:
@@ -131,189 +131,163 @@ def table(rows: Sequence[DiagnosisRow]) -> str:
 
 def _row(check: Check, findings: Findings, stack: Stack) -> DiagnosisRow:
     finding = findings.get(check)
-    if finding is None and stack.lag is not None and check.hop is Hop.AGENT:
-        return DiagnosisRow(
-            check, "not tried", None, "The agent is behind: nothing is added."
-        )
     if finding is None:
-        because = " and ".join(f"“{need}”" for need in missing(check, findings))
-        return DiagnosisRow(
-            check, "not tried", None, f"Stands on {because}." if because else ""
-        )
+        return DiagnosisRow(check, "not tried", None, _why_not(check, findings, stack))
     if finding.trouble is None:
-        late = check == Check.MEASURE and finding.took_s > LATE_S
+        late = check == Check.MEASURE and finding.took_s > SLOW_S
         sentence = f"{Lag(finding.took_s).sentence}." if late else ""
         return DiagnosisRow(check, "ok", finding.took_s, sentence)
-    said = finding.trouble or f"nothing came in {finding.took_s:.1f} s"
-    away = check == Check.AGENT and not _is_silence(said)
-    if stack.lag is not None and check.hop is Hop.AGENT and not away:
-        sentence = _overloaded(check, said, stack, stack.lag)
-        return DiagnosisRow(check, "failed", finding.took_s, sentence)
     return DiagnosisRow(
-        check, "failed", finding.took_s, _SENTENCES[check](said, stack, findings)
+        check, "failed", finding.took_s, _advice(finding, findings, stack)
     )
 
 
-def _overloaded(check: Check, said: str, stack: Stack, lag: Lag) -> str:
-    """Overload, reported before addresses, tenants or databases."""
-    if check not in (Check.AGENT, Check.MEASURE):
-        return f"The agent is behind ({said}); {lag_in_words(lag.lag_s)}."
-    return (
-        f"{lag.sentence} ({said}): the agent at {stack.agent} is overloaded. Let the "
-        "robots send less, or let several agents share the load; STOP still goes "
-        "straight over MQTT."
-    )
+def _why_not(check: Check, findings: Findings, stack: Stack) -> str:
+    if stack.lag is not None and check.hop is Hop.AGENT:
+        return "The agent is behind: nothing is added."
+    because = " and ".join(f"“{need}”" for need in missing(check, findings))
+    return f"Stands on {because}." if because else ""
 
 
-def _broker(said: str, stack: Stack, _: Findings) -> str:
-    if "not auth" in said.lower() or "password" in said.lower():
-        who = f"user {stack.user}" if stack.user else "nobody in particular"
-        return (
-            f"The broker at {stack.broker} refuses {who} ({said}): look at "
-            "IVEG_MQTT_USER and IVEG_MQTT_PASSWORD and at the broker's password file."
+def _advice(failed: Finding, findings: Findings, stack: Stack) -> str:
+    """Sentence about a failure; overload comes before addresses and databases."""
+    check, lag = failed.check, stack.lag
+    said = failed.trouble or f"nothing came in {failed.took_s:.1f} s"
+    is_away = check == Check.AGENT and not _is_silence(said, findings)
+    if lag is not None and check.hop is Hop.AGENT and not is_away:
+        is_first = check in (Check.AGENT, Check.MEASURE)
+        form = _OVERLOADED if is_first else _BEHIND
+    else:
+        known = (
+            form
+            for one, applies, form in _KNOWN_CAUSES
+            if one == check and applies(said, findings)
         )
-    if "echo" in said:
-        return (
-            f"The broker at {stack.broker} lets us in and {said}: look at its access "
-            f"list; user {stack.user or '(nobody)'} must write and read "
-            f"{stack.topics}#."
-        )
-    return (
-        f"No MQTT at {stack.broker} ({said}): look whether the broker runs, and at "
-        "IVEG_MQTT_URL."
+        form = next(known, _FAILED[check])
+    return form.format(
+        said=said,
+        at=stack,
+        user=stack.user or "(nobody)",
+        who=f"user {stack.user}" if stack.user else "nobody in particular",
+        lag=lag and lag.sentence,
+        late=lag and lag_in_words(lag.lag_s),
+        least=Lag(stack.waited_s, at_least=True).sentence,
     )
 
 
-def _orion(said: str, stack: Stack, _: Findings) -> str:
-    return (
-        f"No Orion at {stack.orion} ({said}): look whether Orion and its MongoDB run, "
-        "and at IVEG_ORION_URL."
-    )
+def _says(*words: str) -> Case:
+    """A failure whose reason names one of these words."""
+    return lambda said, _: any(word in said.lower() for word in words)
 
 
-def _agent(said: str, stack: Stack, _: Findings) -> str:
-    if _is_silence(said):
-        return (
-            f"The IoT Agent at {stack.agent} takes questions and does not answer "
-            f"({said}): it is overloaded or hung; look at its processor time first, "
-            "then at its log."
-        )
-    return (
-        f"No IoT Agent at {stack.agent} ({said}): look whether it runs, at its log, "
-        "and at IVEG_IOTA_URL."
-    )
-
-
-def _device(said: str, stack: Stack, _: Findings) -> str:
-    if _is_silence(said):
-        return (
-            f"The agent at {stack.agent} did not answer to a new device ({said}): it "
-            "is overloaded or hung; look at its processor time first, then at its log."
-        )
-    return (
-        f"The agent at {stack.agent} does not take a device with a command ({said}): "
-        "it registers the command at Orion, so look at the agent's own address of "
-        "Orion, at its MongoDB and at IVEG_FIWARE_SERVICE and IVEG_FIWARE_SERVICEPATH."
-    )
-
-
-def _measure(said: str, stack: Stack, findings: Findings) -> str:
-    least = Lag(stack.waited_s, at_least=True).sentence
-    first = (
-        f"{least}, or never ({said}). First look whether the agent is overloaded: the "
-        "processor time it takes, and whether this changes within a minute. If not, "
-    )
-    command = findings.get(Check.COMMAND)
-    if command is not None and command.well:
-        return first + (
-            f"it sends commands and receives nothing on {stack.topics}attrs: its "
-            "connection is broken, or the broker's access list keeps the topic from "
-            "it; restart the agent and look at its log."
-        )
-    return first + (
-        "look whether the agent is connected to the same broker, may read "
-        f"{stack.topics}attrs, and reaches Orion at the address that iVeg gave it "
-        "(IVEG_IOTA_CB_URL)."
-    )
-
-
-def _notification(said: str, stack: Stack, _: Findings) -> str:
-    return (
-        f"Orion did not post to {stack.listener} ({said}): look whether Orion's "
-        "machine reaches this one there (firewall, container network), and at the "
-        "host in IVEG_NOTIFY_URL."
-    )
-
-
-def _command(said: str, stack: Stack, findings: Findings) -> str:
-    if said.startswith("404") and _took_long(findings):
-        return (
-            f"Orion cannot pass a command on ({said}): the agent did not answer Orion "
-            "in five seconds, so it is overloaded or hung; look at its processor time."
-        )
-    if said.startswith("404"):
-        return (
-            f"Orion cannot pass a command on ({said}): with this answer it says that "
-            "it does not reach the agent; look at IOTA_PROVIDER_URL of the agent, the "
-            "address under which Orion calls it."
-        )
-    return (
-        f"Orion took a command and the device never got it ({said}): look whether the "
-        f"agent is connected to the broker and may write {stack.topics}cmd. STOP still "
-        "goes straight over MQTT."
-    )
-
-
-def _took_long(findings: Findings) -> bool:
-    """Orion answers 404 at once for an absent agent, after 5 s for a silent one."""
-    finding = findings.get(Check.COMMAND)
-    return finding is not None and finding.took_s > _ORION_WAITS_S
-
-
-def _is_silence(said: str) -> bool:
+def _is_silence(said: str, _: Findings) -> bool:
     return said.startswith(("no answer", "nothing came"))
 
 
-def _answer(said: str, stack: Stack, _: Findings) -> str:
+def _sends(_: str, findings: Findings) -> bool:
+    """Whether the agent sends commands, though it receives nothing."""
+    command = findings.get(Check.COMMAND)
+    return command is not None and command.well
+
+
+def _is_refused(said: str, _: Findings) -> bool:
+    return said.startswith("404")
+
+
+def _is_refused_late(said: str, findings: Findings) -> bool:
+    """Orion answers 404 at once for an absent agent, after 5 s for a silent one."""
     return (
-        f"The device's answer on {stack.topics}cmdexe is not in Orion ({said}), though "
-        "its measure was: look whether the broker lets the agent read the topic."
+        _is_refused(said, findings) and findings[Check.COMMAND].took_s > _ORION_WAITS_S
     )
 
 
-def _direct(said: str, stack: Stack, _: Findings) -> str:
-    return (
-        f"A command straight on {stack.topics}cmd did not arrive ({said}): look at the "
-        f"broker's access list; user {stack.user or '(nobody)'} must write /+/+/cmd."
-    )
-
-
-def _database(said: str, stack: Stack, _: Findings) -> str:
-    if "iveg db upgrade" in said:
-        return f"The history in {stack.database} cannot be used yet: {said}."
-    return (
-        f"The history in {stack.database} cannot be read ({said}): look whether the "
-        "server runs, and at IVEG_DATABASE_URL. STOP and the live map go on without."
-    )
-
-
-def _page(said: str, stack: Stack, _: Findings) -> str:
-    return (
-        f"iVeg itself does not answer at {stack.page} ({said}): look whether `iveg "
-        "serve` runs, and at IVEG_HOST and IVEG_PORT."
-    )
-
-
-_SENTENCES: Mapping[Check, Callable[[str, Stack, Findings], str]] = {
-    Check.BROKER: _broker,
-    Check.ORION: _orion,
-    Check.AGENT: _agent,
-    Check.DEVICE: _device,
-    Check.MEASURE: _measure,
-    Check.NOTIFICATION: _notification,
-    Check.COMMAND: _command,
-    Check.ANSWER: _answer,
-    Check.DIRECT: _direct,
-    Check.DATABASE: _database,
-    Check.PAGE: _page,
+_OVERLOADED = (
+    "{lag} ({said}): the agent at {at.agent} is overloaded. Let the robots send less, "
+    "or let several agents share the load; STOP still goes straight over MQTT."
+)
+_BEHIND = "The agent is behind ({said}); {late}."
+_NEVER_CAME = (
+    "{least}, or never ({said}). First look whether the agent is overloaded: the "
+    "processor time it takes, and whether this changes within a minute. If not, "
+)
+_KNOWN_CAUSES: Sequence[tuple[Check, Case, str]] = (
+    (
+        Check.BROKER,
+        _says("not auth", "password"),
+        "The broker at {at.broker} refuses {who} ({said}): look at IVEG_MQTT_USER and "
+        "IVEG_MQTT_PASSWORD and at the broker's password file.",
+    ),
+    (
+        Check.BROKER,
+        _says("echo"),
+        "The broker at {at.broker} lets us in and {said}: look at its access list; "
+        "user {user} must write and read {at.topics}#.",
+    ),
+    (
+        Check.AGENT,
+        _is_silence,
+        "The IoT Agent at {at.agent} takes questions and does not answer ({said}): it "
+        "is overloaded or hung; look at its processor time first, then at its log.",
+    ),
+    (
+        Check.DEVICE,
+        _is_silence,
+        "The agent at {at.agent} did not answer to a new device ({said}): it is "
+        "overloaded or hung; look at its processor time first, then at its log.",
+    ),
+    (
+        Check.MEASURE,
+        _sends,
+        _NEVER_CAME + "it sends commands and receives nothing on {at.topics}attrs: its "
+        "connection is broken, or the broker's access list keeps the topic from it; "
+        "restart the agent and look at its log.",
+    ),
+    (
+        Check.COMMAND,
+        _is_refused_late,
+        "Orion cannot pass a command on ({said}): the agent did not answer Orion in "
+        "five seconds, so it is overloaded or hung; look at its processor time.",
+    ),
+    (
+        Check.COMMAND,
+        _is_refused,
+        "Orion cannot pass a command on ({said}): with this answer it says that it "
+        "does not reach the agent; look at IOTA_PROVIDER_URL of the agent, the "
+        "address under which Orion calls it.",
+    ),
+    (
+        Check.DATABASE,
+        _says("iveg db upgrade"),
+        "The history in {at.database} cannot be used yet: {said}.",
+    ),
+)
+"""Failures whose cause the reason tells."""
+_FAILED: Mapping[Check, str] = {
+    Check.BROKER: "No MQTT at {at.broker} ({said}): look whether the broker runs, and "
+    "at IVEG_MQTT_URL.",
+    Check.ORION: "No Orion at {at.orion} ({said}): look whether Orion and its MongoDB "
+    "run, and at IVEG_ORION_URL.",
+    Check.AGENT: "No IoT Agent at {at.agent} ({said}): look whether it runs, at its "
+    "log, and at IVEG_IOTA_URL.",
+    Check.DEVICE: "The agent at {at.agent} does not take a device with a command "
+    "({said}): it registers the command at Orion, so look at the agent's own address "
+    "of Orion, at its MongoDB and at IVEG_FIWARE_SERVICE and IVEG_FIWARE_SERVICEPATH.",
+    Check.MEASURE: _NEVER_CAME + "look whether the agent is connected to the same "
+    "broker, may read {at.topics}attrs, and reaches Orion at the address that iVeg "
+    "gave it (IVEG_IOTA_CB_URL).",
+    Check.NOTIFICATION: "Orion did not post to {at.listener} ({said}): look whether "
+    "Orion's machine reaches this one there (firewall, container network), and at the "
+    "host in IVEG_NOTIFY_URL.",
+    Check.COMMAND: "Orion took a command and the device never got it ({said}): look "
+    "whether the agent is connected to the broker and may write {at.topics}cmd. STOP "
+    "still goes straight over MQTT.",
+    Check.ANSWER: "The device's answer on {at.topics}cmdexe is not in Orion ({said}), "
+    "though its measure was: look whether the broker lets the agent read the topic.",
+    Check.DIRECT: "A command straight on {at.topics}cmd did not arrive ({said}): look "
+    "at the broker's access list; user {user} must write /+/+/cmd.",
+    Check.DATABASE: "The history in {at.database} cannot be read ({said}): look "
+    "whether the server runs, and at IVEG_DATABASE_URL. STOP and the live map go on "
+    "without.",
+    Check.PAGE: "iVeg itself does not answer at {at.page} ({said}): look whether `iveg "
+    "serve` runs, and at IVEG_HOST and IVEG_PORT.",
 }

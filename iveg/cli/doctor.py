@@ -38,7 +38,6 @@ from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.orion import OrionClient
 from iveg.adapters.post_listener import post_listener
 from iveg.cli.diagnosis import (
-    LATE_S,
     Finding,
     Lag,
     Stack,
@@ -52,6 +51,7 @@ from iveg.cli.probe import Probe
 from iveg.cli.running import run_until_stopped
 from iveg.domain.errors import HopError, IvegError
 from iveg.domain.hops import Check, Hop
+from iveg.domain.probe import SLOW_S
 from iveg.ngsi import names
 from iveg.settings import Settings
 
@@ -238,7 +238,7 @@ class Examination:
         with contextlib.suppress(HopError):
             left, came = await self._orion.read_probe_times()
             fresh = clock.wall() - came < _FRESH_S
-            if fresh and came - left > LATE_S:
+            if fresh and came - left > SLOW_S:
                 return Lag(came - left, told_by=", as the running iVeg's probe shows")
         return None
 
@@ -247,7 +247,7 @@ class Examination:
         """Whether the agent also answered other requests late."""
         asked = (Check.AGENT, Check.DEVICE, Check.COMMAND)
         found = [self.findings[check] for check in asked if check in self.findings]
-        return any(one.took_s > LATE_S for one in found)
+        return any(one.took_s > SLOW_S for one in found)
 
     # --- hops ---------------------------------------------------------------------
 
@@ -341,7 +341,7 @@ def _lag_told(health: Any) -> Lag | None:
     except (KeyError, TypeError, ValueError, StopIteration):
         return None
     told_by = ", as the running iVeg says"
-    return Lag(lag_s, growing=growing, told_by=told_by) if lag_s > LATE_S else None
+    return Lag(lag_s, growing=growing, told_by=told_by) if lag_s > SLOW_S else None
 
 
 def _bind_to(host: str) -> str:

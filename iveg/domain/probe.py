@@ -19,6 +19,8 @@ from iveg.domain.observations import Instant, Origin
 _KEPT = 600
 """Probes remembered: twenty minutes of them, at one in two seconds."""
 _GROWS_S, _GROWS_WITHIN_S = 0.5, 10.0
+SLOW_S = 1.0
+"""A probe, a measure or an answer that takes longer is late (s)."""
 
 
 @dataclass(slots=True)

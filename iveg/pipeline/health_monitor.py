@@ -17,7 +17,7 @@ from typing import Literal
 
 from iveg.domain.hops import Hop
 from iveg.domain.observations import Instant, Origin
-from iveg.domain.probe import ProbeLag, lag_in_words, stopped_in_words
+from iveg.domain.probe import SLOW_S, ProbeLag, lag_in_words, stopped_in_words
 
 HopState = Literal["ok", "late", "down", "unknown"]
 Earlier = Literal["known", "reading", "unknown"]
@@ -26,8 +26,6 @@ PROBE_PERIOD_S = 2.0
 LATE_S, DOWN_S = 4.0, 5.5
 GRACE_S = 6.0
 """For this long after the start no hop is reported as down."""
-SLOW_S = 1.0
-"""A probe or an answer that takes longer is late."""
 EARLIER_GRACE_S = 2.0
 """A history that has not told what earlier runs left by then is said to be missing."""
 _LONGEST_GAP_S = 30.0
