@@ -12,11 +12,17 @@ from tests.architecture import documents
 from tests.processes import ROOT
 
 _ROW = re.compile(r"^\| \d+ \| `([^`]+)` \| ([^|]+) \|", re.M)
-STEPS = [
-    (path, name)
-    for path, cell in _ROW.findall((documents.DOCS / "tour.md").read_text())
-    for name in re.findall(r"`([^`]+)`", cell)
-]
+
+
+def rows(heading: str) -> list[tuple[str, list[str]]]:
+    """File and names of each row under a heading of the tour that begins so."""
+    parts = (documents.DOCS / "tour.md").read_text().split("\n## ")
+    (part,) = [one for one in parts if one.startswith(heading)]
+    return [(path, re.findall(r"`([^`]+)`", cell)) for path, cell in _ROW.findall(part)]
+
+
+DETECTION, STOP = rows("One detection"), rows("One STOP")
+STEPS = [(path, name) for path, names in (*DETECTION, *STOP) for name in names]
 _FILE = re.compile(r"`((?:iveg|tests|benchmarks)/[\w/-]+\.\w+)`")
 
 
