@@ -4,7 +4,6 @@ import asyncio
 from collections.abc import Iterator
 from functools import cache
 from importlib.resources import files
-from typing import Any
 
 from fastapi import APIRouter, Depends, FastAPI
 from starlette.staticfiles import StaticFiles
@@ -40,7 +39,7 @@ def create_app(dss: Dss) -> FastAPI:
     )
 
     @app.get("/openapi.json", dependencies=[Depends(require("read"))])
-    async def document() -> Any:
+    async def document() -> object:
         """This interface in OpenAPI."""
         # Made once, in a thread: it takes most of a second.
         return Json(await asyncio.to_thread(app.openapi))

@@ -222,7 +222,7 @@ async def _ensure_device(
     return [f"{verb} device {device_id}."]
 
 
-def _shape(device: Mapping[str, Any]) -> tuple[Any, ...]:
+def _shape(device: Mapping[str, Any]) -> tuple[object, ...]:
     """The parts of a device that must be as wanted."""
     return (
         device.get("apikey"),

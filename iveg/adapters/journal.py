@@ -146,7 +146,7 @@ def _entry(
     wall: float,
     named: Sequence[str] = (),
     challenge: str | None = None,
-) -> dict[str, Any]:
+) -> dict[str, object]:
     return {
         "at": wall,
         "robot_id": robot_id,
@@ -185,7 +185,7 @@ class _Memory:
             by, hold_id, self._named, self._asked, self._challenge
         )
 
-    def entries(self, robot_id: str) -> Iterator[dict[str, Any]]:
+    def entries(self, robot_id: str) -> Iterator[dict[str, object]]:
         """The fewest lines with the same content."""
         by, at, hold_id = self._by, self._at, None
         if self.wanted is not None:

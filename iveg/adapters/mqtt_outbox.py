@@ -40,7 +40,7 @@ class OutboxClient(InboxClient):
         take: Told what has come; messages at QoS 1 are acknowledged afterwards.
     """
 
-    def __init__(self, *args: Any, take: Take, **kwargs: Any) -> None:
+    def __init__(self, *args: object, take: Take, **kwargs: Any) -> None:
         super().__init__(*args, take=self._take_in, **kwargs)
         self._hand_over = take
         self._awaited: dict[int, _Batch] = {}

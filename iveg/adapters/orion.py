@@ -80,7 +80,7 @@ class OrionClient(OrionSubscriptions):
             timeout_s=timeout_s,
         )
 
-    async def read_robots(self) -> list[dict[str, Any]]:
+    async def read_robots(self) -> list[dict[str, object]]:
         """Every robot that Orion knows, as ``ngsi.codec.read_entity`` takes them.
 
         Raises:

@@ -1,16 +1,13 @@
 """Subscriptions and registrations at Orion."""
 
-from collections.abc import Mapping
-from typing import Any
-
-from iveg.adapters.fiware_http import FiwareClient
+from iveg.adapters.fiware_http import Document, FiwareClient
 from iveg.domain.errors import HopError
 
 
 class OrionSubscriptions(FiwareClient):
     """Subscriptions and registrations of one tenant."""
 
-    async def read_registrations(self) -> list[dict[str, Any]]:
+    async def read_registrations(self) -> list[Document]:
         """Every registration of our tenant.
 
         Raises:
@@ -27,7 +24,7 @@ class OrionSubscriptions(FiwareClient):
         path = f"/v2/registrations/{registration_id}"
         await self.http.ask("DELETE", path, also=(404,))
 
-    async def read_subscriptions(self) -> list[dict[str, Any]]:
+    async def read_subscriptions(self) -> list[Document]:
         """Every subscription of our tenant.
 
         Raises:
@@ -35,7 +32,7 @@ class OrionSubscriptions(FiwareClient):
         """
         return await self.http.read_all("/v2/subscriptions")
 
-    async def create_subscription(self, document: Mapping[str, Any]) -> str:
+    async def create_subscription(self, document: Document) -> str:
         """Subscribe; the id of the subscription.
 
         Raises:
@@ -48,7 +45,7 @@ class OrionSubscriptions(FiwareClient):
         return made
 
     async def update_subscription(
-        self, subscription_id: str, changes: Mapping[str, Any]
+        self, subscription_id: str, changes: Document
     ) -> None:
         """Change a subscription; each part that is named replaces the old one whole.
 

@@ -10,8 +10,9 @@ the others.
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Protocol
 
+from iveg.adapters.fiware_http import Document
 from iveg.domain.kinds import MEASURED, Kind
 from iveg.domain.observations import Observation
 from iveg.ngsi import names
@@ -25,14 +26,14 @@ _TIMEOUT_MS = 2000
 class SubscriptionStore(Protocol):
     """Port to the subscriptions: Orion, or a fake of it."""
 
-    async def read_subscriptions(self) -> list[dict[str, Any]]:
+    async def read_subscriptions(self) -> list[Document]:
         """All of our tenant."""
 
-    async def create_subscription(self, document: Mapping[str, Any]) -> str:
+    async def create_subscription(self, document: Document) -> str:
         """Add one; its id."""
 
     async def update_subscription(
-        self, subscription_id: str, changes: Mapping[str, Any]
+        self, subscription_id: str, changes: Document
     ) -> None:
         """Replace the parts that are named."""
 
@@ -151,7 +152,7 @@ async def ensure_subscriptions(
     Raises:
         HopError: Orion does not answer or does not take one.
     """
-    ours: dict[str, list[dict[str, Any]]] = {}
+    ours: dict[str, list[Document]] = {}
     for one in await orion.read_subscriptions():
         description = str(one.get("description", ""))
         if description.startswith(PREFIX):
@@ -174,12 +175,12 @@ async def ensure_subscriptions(
     return Ensured(frozenset(ids), tuple(mended), failing, copies)
 
 
-def is_throttled(subscription: Mapping[str, Any]) -> bool:
+def is_throttled(subscription: Document) -> bool:
     """Whether Orion leaves out notifications of this subscription."""
     return bool(subscription.get("throttling"))
 
 
-def _failing(ours: Mapping[str, Sequence[Mapping[str, Any]]]) -> str:
+def _failing(ours: Mapping[str, Sequence[Document]]) -> str:
     """Orion's account of failing deliveries; one sentence for all."""
     deliveries = [
         one.get("notification", {}) for known in ours.values() for one in known
@@ -195,8 +196,8 @@ def _failing(ours: Mapping[str, Sequence[Mapping[str, Any]]]) -> str:
 async def _ensure(
     orion: SubscriptionStore,
     want: WantedSubscription,
-    document: dict[str, Any],
-    known: list[dict[str, Any]],
+    document: Document,
+    known: list[Document],
 ) -> tuple[str, list[str]]:
     name = want.name
     if not known:
@@ -218,7 +219,7 @@ async def _ensure(
     return str(kept["id"]), mended
 
 
-def _limits(want: WantedSubscription, kept: Mapping[str, Any]) -> list[str]:
+def _limits(want: WantedSubscription, kept: Document) -> list[str]:
     """Limits that a subscription must not have; a copy may be throttled our own way."""
     limits = [part for part in ("throttling", "expires") if kept.get(part)]
     if want.copied is not None and kept.get("throttling") == THROTTLING_S:
@@ -226,7 +227,7 @@ def _limits(want: WantedSubscription, kept: Mapping[str, Any]) -> list[str]:
     return limits
 
 
-def _differs(kept: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:
+def _differs(kept: Document, wanted: Document) -> str:
     """The difference from the wanted subscription; empty for none."""
     if kept.get("status") != "active":
         return f"it was {kept.get('status')}"
@@ -246,7 +247,7 @@ def _differs(kept: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:
     return ""
 
 
-def _same_receiver(kept: Mapping[str, Any], wanted: Mapping[str, Any]) -> bool:
+def _same_receiver(kept: Document, wanted: Document) -> bool:
     there, here = kept.get("httpCustom", {}), wanted["httpCustom"]
     headers = {name.lower(): value for name, value in there.get("headers", {}).items()}
     return (
@@ -258,7 +259,7 @@ def _same_receiver(kept: Mapping[str, Any], wanted: Mapping[str, Any]) -> bool:
 
 def write_subscription(
     want: WantedSubscription, notify_url: str, token: str
-) -> dict[str, Any]:
+) -> Document:
     """The document that Orion is sent."""
     return {
         "description": PREFIX + want.name,

@@ -4,7 +4,7 @@ They share nothing, so that a fault of one leaves the other alone.
 """
 
 from collections.abc import Iterable, Mapping
-from typing import Any, Literal
+from typing import Literal
 
 from iveg.adapters.mqtt import MqttLink
 from iveg.adapters.orion import OrionClient
@@ -41,7 +41,7 @@ class MqttTransport:
         """Publish a resume, once."""
         await self._once(robot_id, codec.write_resume(challenge, attempt))
 
-    async def _once(self, robot_id: str, value: Mapping[str, Any]) -> None:
+    async def _once(self, robot_id: str, value: Mapping[str, object]) -> None:
         """Publish at QoS 0: no client sends it again after a lost connection."""
         topic = names.command_topic(self._apikey, robot_id)
         await self._link.publish(topic, codec.write_command(value), qos=0)

@@ -10,11 +10,11 @@ import multiprocessing
 import os
 import pickle
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
-from typing import Any, ParamSpec, TypeVar
+from typing import ParamSpec, TypeVar
 
 from iveg.domain.errors import HopError
 
@@ -80,7 +80,12 @@ class Worker:
 
     # --- in the thread ------------------------------------------------------------
 
-    def _ask(self, work: Callable[..., Any], args: Any, kwargs: Any) -> Any:
+    def _ask(
+        self,
+        work: Callable[..., _T],
+        args: Sequence[object],
+        kwargs: Mapping[str, object],
+    ) -> _T:
         if self._process is not None and not self._process.is_alive():
             self._end()
         line = self._line or self._begin()
@@ -88,6 +93,7 @@ class Worker:
             line.send((work, args, kwargs))
             if not line.poll(self._limit_s):
                 raise EOFError("took too long")
+            result: _T
             result, hop, detail = line.recv()
         except (EOFError, OSError) as error:
             self._end()
@@ -131,7 +137,11 @@ def _serve(line: Connection) -> None:
         line.send_bytes(_answer(work, args, kwargs))
 
 
-def _answer(work: Callable[..., Any], args: Any, kwargs: Any) -> bytes:
+def _answer(
+    work: Callable[..., object],
+    args: Sequence[object],
+    kwargs: Mapping[str, object],
+) -> bytes:
     """The result, or the hop that failed and its detail, pickled."""
     try:
         return pickle.dumps((work(*args, **kwargs), "", ""))

@@ -6,7 +6,6 @@ have been executed all the same.
 
 import asyncio
 from collections.abc import Awaitable
-from typing import Any
 
 from iveg.adapters.iot_agent import (
     RESOURCE,
@@ -189,7 +188,7 @@ class Probe:
             await self._orion.delete_entity(entity_id, kind)
 
 
-def _subscription(url: str) -> dict[str, Any]:
+def _subscription(url: str) -> dict[str, object]:
     return {
         "description": DESCRIPTION,
         "subject": {

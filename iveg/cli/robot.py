@@ -227,7 +227,7 @@ def _with_words(config: RobotConfig, options: argparse.Namespace) -> RobotConfig
     )
 
 
-def _without_none(said: Mapping[str, Any]) -> dict[str, Any]:
+def _without_none(said: Mapping[str, object]) -> dict[str, Any]:
     return {key: value for key, value in said.items() if value is not None}
 
 

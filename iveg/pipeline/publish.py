@@ -7,7 +7,7 @@ sent; a browser that lets them pile up is sent back for a snapshot.
 
 import asyncio
 from collections import Counter, deque
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from iveg.pipeline.topics import is_telemetry
 from iveg.pipeline.waiting import wait_set
@@ -29,7 +29,7 @@ class Subscriber:
     def __init__(self) -> None:
         self.dirty: dict[str, None] = {}
         self.telemetry: dict[str, None] = {}
-        self.pending: deque[tuple[str, Any]] = deque()
+        self.pending: deque[tuple[str, object]] = deque()
         self.overflowed = False
         self.wants_telemetry = True
         self._awake = asyncio.Event()
@@ -48,7 +48,7 @@ class Subscriber:
         if self.wants_telemetry:
             self.wake()
 
-    def append(self, topic: str, item: Any) -> None:
+    def append(self, topic: str, item: object) -> None:
         """Queue an event, which is never dropped."""
         if len(self.pending) >= MAX_PENDING:
             self.overflowed = True
@@ -60,7 +60,7 @@ class Subscriber:
         """Wait until there may be something to take, or for that long (s)."""
         await wait_set(self._awake, within_s)
 
-    def drain_events(self) -> list[tuple[str, Any]]:
+    def drain_events(self) -> list[tuple[str, object]]:
         """Every event since the last time, in order."""
         return _taken(self.pending)
 
@@ -107,7 +107,7 @@ class Hub:
         for subscriber in self._subscribers:
             subscriber.changed(topic)
 
-    def append(self, topic: str, item: Any) -> None:
+    def append(self, topic: str, item: object) -> None:
         """Queue an event for every browser; none is dropped."""
         for subscriber in self._subscribers:
             subscriber.append(topic, item)

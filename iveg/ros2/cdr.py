@@ -208,7 +208,7 @@ class _Run:
         source.at += prepared.size
         return found
 
-    def write(self, out: _Out, values: Iterator[Any]) -> None:
+    def write(self, out: _Out, values: Iterator[object]) -> None:
         """The inverse."""
         prepared = self._layouts[out.order][len(out.data) % 8]
         out.data += prepared.pack(*itertools.islice(values, self._length))
@@ -234,7 +234,7 @@ class _String:
         begin = source.pass_over(size)
         return (str(source.data[begin : max(begin, source.at - 1)], "utf-8"),)
 
-    def write(self, out: _Out, values: Iterator[Any]) -> None:
+    def write(self, out: _Out, values: Iterator[object]) -> None:
         """The inverse."""
         raw = str(next(values)).encode() + b"\x00"
         out.count(len(raw))
@@ -259,7 +259,7 @@ class _Numbers:
         found = np.frombuffer(source.data, kind, count, begin)
         return (found if kind.isnative else found.astype(kind.newbyteorder("=")),)
 
-    def write(self, out: _Out, values: Iterator[Any]) -> None:
+    def write(self, out: _Out, values: Iterator[object]) -> None:
         """The inverse."""
         numbers = np.asarray(next(values), self._types[out.order])
         if self._fixed is None:

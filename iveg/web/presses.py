@@ -5,7 +5,6 @@ The keys are the same over HTTP and WebSocket (docs/interfaces/http.md).
 
 import asyncio
 import math
-from typing import Any
 
 from starlette.requests import ClientDisconnect, Request
 
@@ -17,7 +16,7 @@ _LONGEST_ID = 64
 _BODY_WITHIN_S = 0.25
 _LARGEST_BODY = 4096
 
-DESCRIBED: dict[str, Any] = {
+DESCRIBED: dict[str, object] = {
     "requestBody": {
         "required": False,
         "description": "What the page knows of the press; never a reason to refuse.",

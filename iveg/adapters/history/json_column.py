@@ -21,7 +21,9 @@ class JsonValue(TypeDecorator[Any]):
     impl = JSON
     cache_ok = True
 
-    def __init__(self, shape: type[dict[str, Any]] | type[list[Any]] = dict) -> None:
+    def __init__(
+        self, shape: type[dict[str, object]] | type[list[object]] = dict
+    ) -> None:
         super().__init__()
         self.shape = shape
 
@@ -30,18 +32,18 @@ class JsonValue(TypeDecorator[Any]):
         kind: TypeEngine[Any] = Text() if dialect.name == "sqlite" else JSONB()
         return dialect.type_descriptor(kind)
 
-    def process_bind_param(self, value: Any, dialect: Dialect) -> Any:
+    def process_bind_param(self, value: object, dialect: Dialect) -> object:
         """A value on its way in."""
         return orjson.dumps(value).decode() if dialect.name == "sqlite" else value
 
-    def process_result_value(self, value: Any, dialect: Dialect) -> Any:
+    def process_result_value(self, value: Any, dialect: Dialect) -> object:
         """A value on its way out."""
         if dialect.name == "sqlite" and value is not None:
             value = _loaded(value)
         return value if isinstance(value, self.shape) else None
 
 
-def _loaded(text: str) -> Any:
+def _loaded(text: str) -> object:
     try:
         return orjson.loads(text)
     except orjson.JSONDecodeError:

@@ -63,7 +63,7 @@ def _text(name: str, *, null: bool = True, key: str | None = None) -> Column[str
 
 def _json(
     name: str,
-    shape: type[dict[str, Any]] | type[list[Any]] = dict,
+    shape: type[dict[str, object]] | type[list[object]] = dict,
     *,
     null: bool = False,
 ) -> Column[Any]:

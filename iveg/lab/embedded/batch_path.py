@@ -1,6 +1,6 @@
 """``/v2/op/update``: many entities in one request."""
 
-from typing import Any, Literal
+from typing import Literal
 
 from pydantic import Field
 
@@ -15,13 +15,13 @@ _NOT_DONE = ("appendStrict", "delete", "replace")
 
 
 class _Batch(Document):
-    entities: list[dict[str, Any]] = Field(min_length=1)
+    entities: list[dict[str, object]] = Field(min_length=1)
     action_type: Literal["append", "update"]
 
 
 async def batch_update(broker: ContextBroker, call: Call) -> Response:
     """``POST /v2/op/update``: executes what is possible and reports what is not."""
-    raw = call.object()
+    raw = call.read_object()
     if raw.get("actionType") in _NOT_DONE:
         raise not_supported(f"actionType {raw['actionType']}")
     batch = read_document(_Batch, raw)

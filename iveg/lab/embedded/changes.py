@@ -1,7 +1,6 @@
 """Attributes of a request, read into changes of an entity."""
 
 from collections.abc import Collection, Mapping
-from typing import Any
 
 from iveg.lab.embedded.entities import EntityChange, default_type, metadata_json
 from iveg.lab.embedded.errors import bad_request
@@ -15,7 +14,7 @@ from iveg.lab.embedded.orion_text import (
 
 
 def read_changes(
-    attributes: Mapping[str, Any], *, key_values: bool, clean: bool
+    attributes: Mapping[str, object], *, key_values: bool, clean: bool
 ) -> dict[str, EntityChange]:
     """Read attributes from a request.
 
@@ -33,7 +32,7 @@ def read_changes(
     }
 
 
-def _read_change(name: str, raw: Any, *, clean: bool) -> EntityChange:
+def _read_change(name: str, raw: object, *, clean: bool) -> EntityChange:
     check_name(name, "attribute name")
     if not isinstance(raw, dict):
         raise bad_request(
@@ -49,7 +48,7 @@ def _read_change(name: str, raw: Any, *, clean: bool) -> EntityChange:
     return EntityChange(kind, value, read)
 
 
-def _read_metadata(raw: Any, *, clean: bool) -> dict[str, bytes]:
+def _read_metadata(raw: object, *, clean: bool) -> dict[str, bytes]:
     if not isinstance(raw, dict):
         raise bad_request("metadata must be a JSON object")
     metadata = {}
@@ -61,8 +60,8 @@ def _read_metadata(raw: Any, *, clean: bool) -> dict[str, bytes]:
 
 
 def _read_typed(
-    raw: Any, known: Collection[str], what: str, *, clean: bool
-) -> tuple[str | None, Any]:
+    raw: object, known: Collection[str], what: str, *, clean: bool
+) -> tuple[str | None, object]:
     """Type, if there is one, and value of an attribute or its metadata."""
     if not isinstance(raw, dict) or not raw.keys() <= set(known):
         raise bad_request(f"unrecognized property for {_PLACES[what]}")

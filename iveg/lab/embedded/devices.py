@@ -64,7 +64,7 @@ class _Provisioned(BaseModel):
         """It as the agent shows it."""
         return self.model_dump(by_alias=True, exclude_none=True)
 
-    def changed(self, raw: Mapping[str, Any]) -> Self:
+    def changed(self, raw: Mapping[str, object]) -> Self:
         """It after a ``PUT``; absent fields stay.
 
         Raises:
@@ -138,7 +138,7 @@ class Device(_Provisioned):
         return {one.name: one for one in self.commands}
 
 
-def _read(kind: type[_Read], raw: Mapping[str, Any]) -> _Read:
+def _read(kind: type[_Read], raw: Mapping[str, object]) -> _Read:
     try:
         return kind.model_validate(raw)
     except ValidationError as error:
@@ -148,7 +148,7 @@ def _read(kind: type[_Read], raw: Mapping[str, Any]) -> _Read:
         raise wrong_syntax() from error
 
 
-def read_group(raw: Mapping[str, Any], tenancy: Tenancy) -> Group:
+def read_group(raw: Mapping[str, object], tenancy: Tenancy) -> Group:
     """Read a group from a ``POST``.
 
     Raises:
@@ -166,7 +166,7 @@ def read_group(raw: Mapping[str, Any], tenancy: Tenancy) -> Group:
 
 
 def read_device(
-    raw: Mapping[str, Any], tenancy: Tenancy, group: Group | None
+    raw: Mapping[str, object], tenancy: Tenancy, group: Group | None
 ) -> Device:
     """Read a device from a ``POST``; a group completes it.
 
@@ -183,7 +183,7 @@ def read_device(
     name = f"{kind}:{raw['device_id']}"
     defaults = {
         "apikey": group.apikey if group else "",
-        "entity_name": group.entity_name(raw["device_id"]) if group else name,
+        "entity_name": group.entity_name(str(raw["device_id"])) if group else name,
     }
     own = {
         "entity_type": kind,

@@ -6,7 +6,7 @@ replaced before anything uses them, the others are sent many times.
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import orjson
 
@@ -27,7 +27,7 @@ class Value:
 
     __slots__ = ("_given", "_json")
 
-    def __init__(self, given: Any = None, json: bytes = b"") -> None:
+    def __init__(self, given: object = None, json: bytes = b"") -> None:
         self._given = given
         self._json = json
 
@@ -92,7 +92,7 @@ class EntityChange(NamedTuple):
     """
 
     type: str | None
-    value: Any
+    value: object
     metadata: Mapping[str, bytes] | None = None
 
 
@@ -206,7 +206,7 @@ def _changed(old: Attribute | None, change: EntityChange, now: float) -> Attribu
     return Attribute(kind, kept, metadata, old.created, now)
 
 
-def _value(kind: str, value: Any) -> Value:
+def _value(kind: str, value: object) -> Value:
     return Value(json=date_text(value)) if kind == "DateTime" else Value(value)
 
 
@@ -214,7 +214,7 @@ def _merged(old: Mapping[str, bytes], new: Mapping[str, bytes]) -> Mapping[str, 
     return new if old.keys() <= new.keys() else {**old, **new}
 
 
-def _operated(attribute: Attribute | None, value: Mapping[str, Any]) -> Any:
+def _operated(attribute: Attribute | None, value: Mapping[str, object]) -> object:
     """The value after Orion's update operators; a key that begins with ``$`` is one."""
     name = next((key for key in value if key.startswith("$")), "")
     if not name:
@@ -228,7 +228,7 @@ def _operated(attribute: Attribute | None, value: Mapping[str, Any]) -> Any:
     return argument + (old if isinstance(old, int | float) else 0)
 
 
-def default_type(value: Any) -> str:
+def default_type(value: object) -> str:
     """Type that Orion assigns to a value without type."""
     if isinstance(value, bool):
         return "Boolean"
@@ -239,7 +239,7 @@ def default_type(value: Any) -> str:
     return "Text" if isinstance(value, str) else "StructuredValue"
 
 
-def metadata_json(kind: str, value: Any) -> bytes:
+def metadata_json(kind: str, value: object) -> bytes:
     """One metadata entry as Orion prints it."""
     text = date_text(value) if kind == "DateTime" else print_value(value)
     return b'{"type":%b,"value":%b}' % (quoted(kind), text)

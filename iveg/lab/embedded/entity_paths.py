@@ -82,7 +82,7 @@ class _Wanted:
 
 async def create_entity(broker: ContextBroker, call: Call) -> Response:
     """``POST /v2/entities``."""
-    raw = call.object()
+    raw = call.read_object()
     entity_id, kind = read_id(raw)
     kind = kind or "Thing"
     changes = call.changes(raw)
@@ -147,7 +147,7 @@ async def delete_entity(broker: ContextBroker, call: Call) -> Response:
 
 async def append_attributes(broker: ContextBroker, call: Call) -> Response:
     """``POST /v2/entities/{id}/attrs``."""
-    changes = call.changes(call.object())
+    changes = call.changes(call.read_object())
     entity = broker.find(call.scope, call.parts[1], call.kind)
     broker.append(call.scope, entity, changes, forced="forcedUpdate" in call.options)
     return Response(204)
@@ -155,7 +155,7 @@ async def append_attributes(broker: ContextBroker, call: Call) -> Response:
 
 async def update_attributes(broker: ContextBroker, call: Call) -> Response:
     """``PATCH /v2/entities/{id}/attrs``."""
-    changes = call.changes(call.object())
+    changes = call.changes(call.read_object())
     if not changes:
         raise bad_request("empty payload")
     await _update(broker, call, changes)
@@ -164,7 +164,7 @@ async def update_attributes(broker: ContextBroker, call: Call) -> Response:
 
 async def replace_attributes(broker: ContextBroker, call: Call) -> Response:
     """``PUT /v2/entities/{id}/attrs``."""
-    changes = call.changes(call.object())
+    changes = call.changes(call.read_object())
     entity = broker.find(call.scope, call.parts[1], call.kind)
     broker.replace(call.scope, entity, changes)
     return Response(204)

@@ -8,7 +8,6 @@ are listed in ``docs/fiware.md``.
 import logging
 from collections.abc import Mapping
 from functools import lru_cache
-from typing import Any
 
 import orjson
 
@@ -128,7 +127,7 @@ class IotAgent:
 
     # --- devices ----------------------------------------------------------------
 
-    def provision(self, raw: Mapping[str, Any], tenancy: Tenancy) -> None:
+    def provision(self, raw: Mapping[str, object], tenancy: Tenancy) -> None:
         """Create one device from a ``POST``.
 
         Raises:
@@ -186,7 +185,7 @@ class IotAgent:
     # --- commands ----------------------------------------------------------------
 
     async def command(
-        self, tenancy: Tenancy, name: str, kind: str, values: Mapping[str, Any]
+        self, tenancy: Tenancy, name: str, kind: str, values: Mapping[str, object]
     ) -> None:
         """Execute an ``op/update`` of one entity: publish its commands.
 
@@ -206,7 +205,7 @@ class IotAgent:
             pending = dict.fromkeys(known, ("PENDING", None))
             self._write(device, status_changes(pending, now), now)
 
-    def _publish(self, device: Device, command: Command, value: Any) -> None:
+    def _publish(self, device: Device, command: Command, value: object) -> None:
         how = command.mqtt or Publishing()
         topic = f"/{device.apikey}/{device.device_id}/cmd"
         payload = orjson.dumps({command.name: value})
@@ -214,7 +213,7 @@ class IotAgent:
 
     async def query(
         self, tenancy: Tenancy, name: str, kind: str, names: list[str]
-    ) -> dict[str, Any]:
+    ) -> dict[str, object]:
         """Execute an ``op/query`` of one entity: its commands, with empty values.
 
         Raises:

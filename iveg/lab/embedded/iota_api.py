@@ -176,7 +176,7 @@ def _object(request: Request) -> dict[str, Any]:
     return value
 
 
-def _listed(request: Request, name: str) -> list[dict[str, Any]]:
+def _listed(request: Request, name: str) -> list[dict[str, object]]:
     listed = _object(request).get(name)
     if not isinstance(listed, list) or not all(isinstance(one, dict) for one in listed):
         raise wrong_syntax()

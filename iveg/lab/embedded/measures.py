@@ -5,7 +5,6 @@ not JSON, bare numbers and strings, lists of numbers, an invalid ``TimeInstant``
 """
 
 from collections.abc import Mapping
-from typing import Any
 
 import orjson
 
@@ -28,7 +27,7 @@ from iveg.lab.embedded.orion_text import (
 MAX_MEASURE = (1 << 20) - 256
 _INSTANT = "TimeInstant"
 _RENAMED = {"id": "measure_id", "type": "measure_type"}
-_NOTHING: dict[str, Any] = {"undefined": None}
+_NOTHING: dict[str, object] = {"undefined": None}
 
 
 def read_measures(
@@ -91,7 +90,7 @@ def _check(payload: bytes) -> bool:
 
 
 def _read_one(
-    device: Device, measure: Mapping[str, Any], now: float, *, clean: bool
+    device: Device, measure: Mapping[str, object], now: float, *, clean: bool
 ) -> dict[str, EntityChange] | None:
     given = measure.get(_INSTANT)
     try:
@@ -114,7 +113,7 @@ def _read_one(
 
 
 def status_changes(
-    results: Mapping[str, tuple[str, Any]], now: float
+    results: Mapping[str, tuple[str, object]], now: float
 ) -> dict[str, EntityChange]:
     """Changes that the agent writes for the status of commands.
 

@@ -3,7 +3,6 @@
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from iveg.lab.embedded.changes import read_changes
 from iveg.lab.embedded.entities import EntityChange, Scope
@@ -57,7 +56,7 @@ class Call:
         """``?type=``."""
         return self.query.get("type", "")
 
-    def object(self) -> dict[str, Any]:
+    def read_object(self) -> dict[str, object]:
         """The body, which must be an object.
 
         Raises:
@@ -68,7 +67,7 @@ class Call:
             raise parse_error()
         return value
 
-    def changes(self, raw: Mapping[str, Any]) -> dict[str, EntityChange]:
+    def changes(self, raw: Mapping[str, object]) -> dict[str, EntityChange]:
         """Read attributes of the body.
 
         Raises:
@@ -207,7 +206,7 @@ def split_names(text: str | None) -> tuple[str, ...]:
     return tuple(name for name in (text or "").split(",") if name)
 
 
-def read_id(raw: Mapping[str, Any]) -> tuple[str, str]:
+def read_id(raw: Mapping[str, object]) -> tuple[str, str]:
     """Id and type of an entity in a body; the type is empty where it has none.
 
     Raises:
@@ -219,7 +218,7 @@ def read_id(raw: Mapping[str, Any]) -> tuple[str, str]:
     return entity_id, check_given_name(raw["type"], "entity type")
 
 
-def read_value(request: Request) -> Any:
+def read_value(request: Request) -> object:
     """The body of ``PUT …/value``.
 
     Raises:

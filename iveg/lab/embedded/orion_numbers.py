@@ -5,8 +5,6 @@ So long lists of numbers are rounded as arrays, where only those whose tenth dec
 too close to a half for a double are handled one by one.  All else is.
 """
 
-from typing import Any
-
 import numpy as np
 import orjson
 from numpy.typing import NDArray
@@ -24,12 +22,12 @@ _DOUBT = 2.0**-51
 _NUMERIC = {float, int, type(None)}
 
 
-def print_value(value: Any) -> bytes:
+def print_value(value: object) -> bytes:
     """JSON text that Orion would print for a value."""
     return orjson.dumps(_as_double(value))
 
 
-def _print_array(values: list[Any]) -> bytes:
+def _print_array(values: list[object]) -> bytes:
     """Print a long list of numbers and nulls; empty for all other lists."""
     if len(values) < _MANY or not _NUMERIC.issuperset(map(type, values)):
         return b""
@@ -64,7 +62,7 @@ def _without_point(text: bytes) -> bytes:
     return text.replace(b".0,", b",").replace(b".0]", b"]").removesuffix(b".0")
 
 
-def _as_double(value: Any) -> Any:
+def _as_double(value: object) -> object:
     if isinstance(value, float):
         return _number(value)
     if isinstance(value, int) and not isinstance(value, bool):

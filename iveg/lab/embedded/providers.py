@@ -7,7 +7,6 @@ an entity that does not exist.
 
 import asyncio
 from collections.abc import Iterable, Mapping
-from typing import Any
 from urllib.parse import urlsplit
 
 import orjson
@@ -171,7 +170,7 @@ async def _forward_query(
     }
 
 
-def _read_told(one: Mapping[str, Any], now: float) -> dict[str, Attribute]:
+def _read_told(one: Mapping[str, object], now: float) -> dict[str, Attribute]:
     return {
         name: Attribute(
             raw.get("type") or default_type(raw.get("value")),

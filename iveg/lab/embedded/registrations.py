@@ -1,7 +1,7 @@
 """Registrations: which attributes of which entities another context provider has."""
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 from pydantic import Field
 
@@ -70,7 +70,7 @@ class Registration:
         """Address of the provider."""
         return self.document.provider.http.url
 
-    def show(self) -> dict[str, Any]:
+    def show(self) -> dict[str, object]:
         """The registration as a client gets it."""
         return {"id": self.id, **self.document.show(), "status": "active"}
 

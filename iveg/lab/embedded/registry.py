@@ -1,7 +1,6 @@
 """Groups and devices in memory, in the order that MongoDB's index would give."""
 
 from collections.abc import Mapping
-from typing import Any
 
 from iveg.lab.embedded.devices import Device, Group, Tenancy
 from iveg.lab.embedded.errors import FiwareError, no_device
@@ -37,7 +36,7 @@ class Registry:
         self._groups[key] = group
 
     def change_group(
-        self, tenancy: Tenancy, resource: str, apikey: str, raw: Mapping[str, Any]
+        self, tenancy: Tenancy, resource: str, apikey: str, raw: Mapping[str, object]
     ) -> None:
         """Change a group.
 
@@ -73,7 +72,7 @@ class Registry:
             (one for one in self._groups.values() if one.apikey == apikey), None
         )
 
-    def group_in(self, tenancy: Tenancy, apikey: str | None) -> Group | None:
+    def group_in(self, tenancy: Tenancy, apikey: object) -> Group | None:
         """A group of a tenant: that of the API key, else the first one."""
         found = self.groups(tenancy)
         return next((one for one in found if not apikey or apikey == one.apikey), None)

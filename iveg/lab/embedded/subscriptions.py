@@ -2,7 +2,6 @@
 
 from collections.abc import Collection
 from dataclasses import dataclass
-from typing import Any
 
 from iveg.lab.embedded.documents import new_id, read_document
 from iveg.lab.embedded.entities import Touched
@@ -97,7 +96,7 @@ class Subscription:
         if limit is not None and self.fails > limit:
             self.status = "inactive"
 
-    def show(self, now: float) -> dict[str, Any]:
+    def show(self, now: float) -> dict[str, object]:
         """The subscription as a client gets it."""
         shown = self.document.show()
         if not self.document.throttling:
@@ -106,7 +105,7 @@ class Subscription:
         status = "expired" if self.expired(now) else self.status
         return {"id": self.id, **shown, "status": status}
 
-    def _counters(self) -> dict[str, Any]:
+    def _counters(self) -> dict[str, object]:
         """What became of the notifications; nothing is said of what never was."""
         counters = {
             "timesSent": self.times_sent,

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, TextIO
+from typing import TextIO
 
 import orjson
 
@@ -24,7 +24,7 @@ def in_view(
 
 def true_picture(
     rig: RobotHardware, world: SimulatedWorld, at: float
-) -> dict[str, Any]:
+) -> dict[str, object]:
     """The truth of one picture.
 
     ``{"robot", "at": Unix s, "pose": {"x", "y", "yaw"}, "speed", "visible": [{"key",

@@ -12,7 +12,7 @@ import threading
 from collections.abc import AsyncIterator, Iterator
 from dataclasses import replace
 from http import HTTPStatus
-from typing import Any, Final
+from typing import Final
 from urllib.parse import urlsplit
 
 from paho.mqtt import client as paho
@@ -144,7 +144,7 @@ async def recorder(settings: Settings) -> AsyncIterator[MessageRecorder]:
             await _unsubscribe(orion)
 
 
-def _subscriptions(url: str) -> Iterator[dict[str, Any]]:
+def _subscriptions(url: str) -> Iterator[dict[str, object]]:
     """One for each kind of data: each notification has one message."""
     for kind in MEASURED:
         if data_of(kind.of) is not None:

@@ -54,7 +54,7 @@ def stack_of(run: ObservedRun) -> Outcome:
     }
 
 
-def slowdowns_of(decisions: Sequence[Mapping[str, Any]]) -> dict[str, int]:
+def slowdowns_of(decisions: Sequence[Mapping[str, object]]) -> dict[str, int]:
     """Decisions that slowed a robot: number, applied, observed, out of sight."""
     slowed = [one for one in decisions if one["reason"] in ("person", "robot")]
     return {
@@ -76,9 +76,9 @@ def outcome_of(
 def result_of(
     plan: Plan,
     outcomes: Sequence[Outcome],
-    chosen: Mapping[str, Any],
+    chosen: Mapping[str, object],
     why: str = "",
-) -> dict[str, Any]:
+) -> dict[str, object]:
     """The whole experiment; ``why`` is the reason of an early end, or empty."""
     stack = [one["stack"] for one in outcomes]
     slices = [piece for one in stack for piece in one["slices"]]
@@ -100,7 +100,7 @@ def result_of(
     }
 
 
-def machine() -> dict[str, Any]:
+def machine() -> dict[str, object]:
     """The machine that it ran on."""
     return {
         "system": platform.platform(),
@@ -115,7 +115,7 @@ def slices_of(result: Mapping[str, Any]) -> list[Slice]:
     return [piece for one in result["runs"] for piece in one["stack"]["slices"]]
 
 
-def _summed(plan: Plan, runs: Sequence[Outcome]) -> dict[str, Any]:
+def _summed(plan: Plan, runs: Sequence[Outcome]) -> dict[str, object]:
     planned = len(list(plan.steps()))
     done = sum(one["completed"] for one in runs)
     return {
@@ -127,7 +127,7 @@ def _summed(plan: Plan, runs: Sequence[Outcome]) -> dict[str, Any]:
     }
 
 
-def scored(classes: Sequence[str], runs: Sequence[Outcome]) -> dict[str, Any]:
+def scored(classes: Sequence[str], runs: Sequence[Outcome]) -> dict[str, object]:
     """Counts, rates with their intervals and AP of some classes over all runs."""
     told = [
         Tally(**one["classes"][name])
@@ -161,7 +161,7 @@ def _off(distances: Sequence[float]) -> dict[str, float] | None:
 
 def _rows(
     slices: Sequence[Slice], stack: Sequence[Outcome]
-) -> Iterator[dict[str, Any]]:
+) -> Iterator[dict[str, object]]:
     found = whole(slices)
     for data in DATA:
         yield {
@@ -171,7 +171,7 @@ def _rows(
         }
 
 
-def _told(of: Sketch) -> dict[str, Any]:
+def _told(of: Sketch) -> dict[str, object]:
     def ms(seconds: float | None) -> float | None:
         return None if seconds is None else round(1000.0 * seconds, 2)
 

@@ -149,7 +149,7 @@ def claim(directory: Path, plan: Plan) -> None:
     write_json(directory / PLAN, _written(plan))
 
 
-def _written(plan: Plan) -> Any:
+def _written(plan: Plan) -> object:
     return orjson.loads(
         orjson.dumps({"version": __version__, "format": FORMAT, "plan": asdict(plan)})
     )

@@ -18,7 +18,7 @@ import contextlib
 import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any, Final, Literal, TextIO
+from typing import Final, Literal, TextIO
 
 from iveg.domain.errors import DataFileError
 from iveg.lab.experiment.outcome import Outcome, result_of
@@ -69,7 +69,7 @@ class RunStore:
         """Directory of a run's raw data."""
         return self.directory / RAW / step.name
 
-    def finish(self, chosen: Mapping[str, Any], why: str) -> Path:
+    def finish(self, chosen: Mapping[str, object], why: str) -> Path:
         """Write the result, or the part that exists.
 
         Args:
@@ -168,7 +168,7 @@ class Progress:
 
     def _keep(self, state: State, why: str, left_s: float) -> None:
         name, phase, _ = self._now or (None, None, 0.0)
-        progress: dict[str, Any] = {
+        progress: dict[str, object] = {
             "state": state,
             "run": name,
             "phase": phase,

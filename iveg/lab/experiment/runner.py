@@ -39,7 +39,7 @@ _LOOK_EVERY_S: Final = 0.2
 _GRACE_S: Final = 20.0
 _OUTPUT_KEPT: Final = 300
 """Characters of a failed program's output that are kept."""
-_UNKNOWN: Final[Mapping[str, Any]] = {
+_UNKNOWN: Final[Mapping[str, object]] = {
     "state": "broken",
     "run": None,
     "phase": None,

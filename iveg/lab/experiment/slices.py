@@ -7,8 +7,8 @@ the interval of a mean or a quantile: messages of one slice are not independent.
 """
 
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any, Final
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any, Final, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,12 +19,20 @@ from iveg.domain.latency.sketch import Sketch, from_bins, merged, sketch_of
 from iveg.lab.experiment.message_times import MessageTimes
 from iveg.lab.experiment.statistics import Interval
 
-Slice = dict[str, dict[str, dict[str, Any]]]
-"""By kind of data and hop: ``edges_ms``, ``counts``, ``total_ms``; empty cells are
-left out."""
+
+class Bins(TypedDict):
+    """Durations as ``GET /latency?bins=true`` has them."""
+
+    edges_ms: list[float]
+    counts: list[int]
+    total_ms: float
+
+
+Slice = dict[str, dict[str, Bins]]
+"""By kind of data and hop; empty cells are left out."""
 HOPS: Final[tuple[Segment, ...]] = SEGMENTS[:4]
 """All but the last: no page is open."""
-_EMPTY: Final[Mapping[str, Any]] = {"edges_ms": [], "counts": [], "total_ms": 0.0}
+_EMPTY: Final[Bins] = {"edges_ms": [], "counts": [], "total_ms": 0.0}
 _DRAWS: Final = 1000
 _FEWEST: Final = 4
 """Least number of slices for an interval."""
@@ -56,13 +64,16 @@ def with_messages(decided: Slice, times: Iterable[MessageTimes]) -> Slice:
     }
 
 
-def _bins(durations: Sequence[float]) -> dict[str, Any]:
+def _bins(durations: Sequence[float]) -> Bins:
     edges, counts = sketch_of(durations).bins()
-    told = {"edges_ms": [1000.0 * edge for edge in edges], "counts": counts}
-    return {**told, "total_ms": 1000.0 * sum(durations)}
+    return {
+        "edges_ms": [1000.0 * edge for edge in edges],
+        "counts": counts,
+        "total_ms": 1000.0 * sum(durations),
+    }
 
 
-def _less(after: Mapping[str, Any], before: Mapping[str, Any]) -> dict[str, Any]:
+def _less(after: Bins, before: Bins) -> Bins:
     known = dict(zip(before["edges_ms"], before["counts"], strict=True))
     told = zip(after["edges_ms"], after["counts"], strict=True)
     more = [(edge, count - known.get(edge, 0)) for edge, count in told]
@@ -81,7 +92,7 @@ def sketches_of(slices: Iterable[Slice], cell: Cell) -> list[Sketch]:
     return [_sketch(one.get(data, {}).get(hop, _EMPTY)) for one in slices]
 
 
-def _sketch(bins: Mapping[str, Any]) -> Sketch:
+def _sketch(bins: Bins) -> Sketch:
     edges = [edge / 1000.0 for edge in bins["edges_ms"]]
     return from_bins(edges, bins["counts"], bins["total_ms"] / 1000.0)
 

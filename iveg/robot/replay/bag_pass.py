@@ -76,7 +76,7 @@ class BagPass:
             "tf_static": lambda one, _: self._places.add(one, static=True),
         }
 
-    def observe(self, use: Use, message: Any, now: float) -> BagObservation | None:
+    def observe(self, use: Use, message: object, now: float) -> BagObservation | None:
         """What follows from one message; ``now`` is when it was written (s).
 
         Raises:

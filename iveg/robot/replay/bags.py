@@ -102,7 +102,7 @@ class Bag:
                 yield RecordingEntry(at - start, found)
         self._tell_counts(this)
 
-    def _time(self, recorded: Recorded, message: Any) -> float:
+    def _time(self, recorded: Recorded, message: object) -> float:
         header = getattr(message, "header", None)
         if self._bag_time or header is None:
             return recorded.logged_s
@@ -126,7 +126,7 @@ class Bag:
             with suppress(UnreadableError):
                 yield recorded, self._read(recorded, use)
 
-    def _read(self, recorded: Recorded, use: Use) -> Any:
+    def _read(self, recorded: Recorded, use: Use) -> object:
         return cdr.read(use.form, recorded.payload)
 
     def _look_ahead(self) -> BagTree:

@@ -110,7 +110,9 @@ def _telling(kind: type[R], reader: Sentences) -> Callable[[Any], str] | None:
     return tell
 
 
-def ndjson_rows(model: Callable[..., Model], rows: Iterable[tuple[Any, ...]]) -> bytes:
+def ndjson_rows(
+    model: Callable[..., Model], rows: Iterable[tuple[object, ...]]
+) -> bytes:
     """Rows as one JSON value a line, each as the list has it."""
     return b"".join(write_json(model(*row)) + b"\n" for row in rows)
 

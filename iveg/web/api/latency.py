@@ -93,7 +93,7 @@ _CSV = {
 
 def _told(
     watch: LatencyWatch, streams: list[Stream], asked: Asked, now: Instant
-) -> dict[str, Any]:
+) -> dict[str, object]:
     """Values read from the streams, in the loop's thread."""
     return {
         "at": format_stamp(now.wall),

@@ -86,7 +86,7 @@ class Encoder:
         return text(topic, topics.find(topic)[0].tell(self._views, item, now), now)
 
 
-def text(topic: str, data: Any, now: Instant) -> bytes:
+def text(topic: str, data: object, now: Instant) -> bytes:
     """A JSON frame; ``at`` is when it was true, on the server's monotonic clock."""
     return write_json({"topic": topic, "data": data, "at": now.mono})
 
@@ -293,7 +293,7 @@ class ClientMessages:
             case "stop":
                 await self._press(message)
 
-    async def _press(self, message: dict[str, Any]) -> None:
+    async def _press(self, message: dict[str, object]) -> None:
         robot_id = message.get("robot_id")
         allowed = _may_still(self._websocket, self._principal, "stop")
         if allowed and (robot_id is None or isinstance(robot_id, str)):

@@ -6,7 +6,7 @@ the moment of its truth (``at``, the server's monotonic clock).
 """
 
 from collections.abc import Iterable, Sequence
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import orjson
@@ -161,7 +161,7 @@ class _RobotState:
     def __init__(self) -> None:
         self.version = -1
         self._at = 0.0
-        self._values: dict[str, Any] = {}
+        self._values: dict[str, object] = {}
         self._members: dict[str, tuple[int, bytes]] = {}
 
     def update(self, told: Robot, version: int, at: float) -> None:
@@ -195,7 +195,7 @@ class _People:
         self._at = 0.0
         self._changed = -1
         self._ids: list[str] = []
-        self._values: dict[str, Any] = {}
+        self._values: dict[str, object] = {}
         self._texts: dict[str, tuple[int, bytes]] = {}
 
     def update(self, told: Sequence[Person], version: int, at: float) -> None:
@@ -229,7 +229,7 @@ class _People:
         return Part(self.version, head)
 
 
-def _without_ages(person: Person) -> dict[str, Any]:
+def _without_ages(person: Person) -> dict[str, object]:
     told, margin = dict(person.__dict__), person.margin
     del told["age_s"]
     if margin is not None:

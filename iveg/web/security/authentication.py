@@ -15,7 +15,7 @@ import hmac
 import logging
 import math
 from collections.abc import Iterator, Mapping
-from typing import Any, Final
+from typing import Final
 
 from fastapi.dependencies.models import Dependant
 from starlette.exceptions import WebSocketException
@@ -264,7 +264,7 @@ def require(action: Action) -> Requirement:
     return _REQUIREMENTS[action]
 
 
-def declared_action(route: Any) -> Action | None:
+def declared_action(route: object) -> Action | None:
     """The action that a route, or its FastAPI context, declares; None without one."""
     dependant = getattr(route, "dependant", None)
     if not isinstance(dependant, Dependant):

@@ -3,13 +3,13 @@
 import asyncio
 import contextlib
 import logging
-from collections.abc import AsyncIterator, Callable, Mapping
-from typing import Any
+from collections.abc import AsyncIterator, Callable
 
 import orjson
 import pytest
 
 from iveg.adapters import clock
+from iveg.adapters.fiware_http import Document
 from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.adapters.orion import OrionClient
@@ -46,7 +46,7 @@ class HastyOrion(OrionClient):
         self.notify: Callable[[str], object] = bool
         self.taken: list[object] = []
 
-    async def create_subscription(self, document: Mapping[str, Any]) -> str:
+    async def create_subscription(self, document: Document) -> str:
         made = await super().create_subscription(document)
         self.taken.append(self.notify(made))
         return made

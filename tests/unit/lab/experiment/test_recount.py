@@ -14,6 +14,7 @@ from iveg.lab.experiment.observer import ObservedRun
 from iveg.lab.experiment.outcome import half_of, outcome_of, result_of, stack_of
 from iveg.lab.experiment.plan import PLANS, PlannedRun
 from iveg.lab.experiment.raw import write_raw
+from iveg.lab.experiment.slices import Bins
 from iveg.lab.experiment.virtual_run import VirtualRun
 from tests.recounting import recounted, reported
 
@@ -44,7 +45,7 @@ async def run(directory: Path, step: PlannedRun) -> Any:
     rule = DetectionRule()
     virtual = await VirtualRun(step, "field", rule).play(SECONDS)
     told = await VirtualRun(step, "simulation", rule).play(SECONDS)
-    decided = {"edges_ms": [4.0, 40.0], "counts": [70, 9], "total_ms": 512.3}
+    decided: Bins = {"edges_ms": [4.0, 40.0], "counts": [70, 9], "total_ms": 512.3}
     real = ObservedRun(
         told.truth,
         told.told[7:],
