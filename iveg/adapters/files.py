@@ -4,21 +4,24 @@ Each file begins with a line that names its content and version; a file without 
 line is of version 0.  A file of a newer iVeg is refused.
 """
 
+import asyncio
 import contextlib
 import logging
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
+from typing import IO, TypeVar
 
 import orjson
+from pydantic import ValidationError
 
-from iveg.domain.errors import DataFileError
+from iveg.domain.errors import DataFileError, HopError
 
 _log = logging.getLogger(__name__)
 
 _OWNER_ALONE = 0o600
+_T = TypeVar("_T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +45,18 @@ def write_lines(path: Path, form: Form, values: Iterable[object]) -> None:
     """
     lines = (orjson.dumps(value) + b"\n" for value in values)
     write_bytes(path, form.line + b"".join(lines))
+
+
+async def save_lines(path: Path, form: Form, values: Iterable[object]) -> None:
+    """The same in a thread; returns when it is on disk.
+
+    Raises:
+        HopError: the disk did not take it; the old file stands.
+    """
+    try:
+        await asyncio.to_thread(write_lines, path, form, values)
+    except OSError as error:
+        raise HopError("disk", str(error)) from error
 
 
 def write_bytes(path: Path, content: bytes) -> None:
@@ -82,6 +97,15 @@ def read_lines(path: Path, form: Form) -> Iterator[tuple[int, bytes]]:
             continue
         if line:
             yield number, line
+
+
+def load_lines(path: Path, form: Form, read: Callable[[bytes], _T]) -> list[_T]:
+    """The values of a file; one with a line that cannot be read is put aside whole."""
+    try:
+        return [read(line) for _, line in read_lines(path, form)]
+    except (ValidationError, DataFileError, OSError) as error:
+        put_aside(path, type(error).__name__)
+        return []
 
 
 def _is_head(path: Path, form: Form, line: bytes) -> bool:
