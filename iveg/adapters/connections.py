@@ -6,7 +6,7 @@ STOP gets through while somebody holds a thousand half-sent requests open::
     opened ──> awaited ──> busy ──> idle ──> awaited …
                   └── too late ──> ended
 
-A connection whose request was signed in is *vouched for*: it gives way last, and never
+A connection whose request was signed in is *vouched for*: it is closed last, and never
 while it is busy.  A part of all places is kept for addresses that have signed in.
 """
 
@@ -137,7 +137,7 @@ class Connection:
 
     @property
     def is_kept(self) -> bool:
-        """Whether it gives way to nobody: a signed-in request, or an open WebSocket."""
+        """Whether no other displaces it: a signed-in request, or an open WebSocket."""
         return self.vouched and self.is_busy
 
     def belongs_to(self, client: str) -> bool:
@@ -158,11 +158,11 @@ class ConnectionTable:
     Args:
         now: Monotonic clock (s).
         caps: What the listener bears.
-        is_proxy: Whether an address is a proxy's, whose clients are told apart by what
-            it says of them, so that it has no cap of its own.
+        is_proxy: Whether an address is a proxy's, whose clients are distinguished by
+            what it says of them, so that it has no cap of its own.
 
     Attributes:
-        counters: Connections that gave way, were refused or came too late.
+        counters: Connections that were closed for others, refused or too late.
     """
 
     def __init__(

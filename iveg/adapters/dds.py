@@ -99,7 +99,7 @@ class Dds(AbstractContextManager["Dds"]):
 
     Args:
         network: Where.
-        gate: Id of the robot whose gate it is, told with every endpoint.
+        gate: Id of the robot whose gate it is; every endpoint carries it.
 
     Raises:
         HopError: no participant can be made there.
@@ -377,7 +377,7 @@ def write_qos(qos: Qos) -> DdsQos:
         Policy.DurabilityService(0, history, -1, -1, -1),
         # ROS 2 sends and takes plain CDR of version 1.
         Policy.DataRepresentation(use_cdrv0_representation=True),
-        # Its endpoints call the members of a type as they please, or tell no type.
+        # Its endpoints name the members of a type freely, or give no type.
         Policy.TypeConsistency.AllowTypeCoercion(ignore_member_names=True),
     )
 
@@ -439,7 +439,7 @@ class _Watch:
             self._rest.acquire(timeout=_REARM_S)
 
     def _tell(self) -> None:
-        # First, so that news which on_data just misses is told again.
+        # First, so that a sample which on_data just misses is announced again.
         self._told = False
         if not self._ended.is_set():
             self._on_data()

@@ -62,7 +62,7 @@ def load_fleet(file: str = "", words: Sequence[str] = ()) -> FleetDescription:
 
 @cache
 def built_in() -> FleetDescription:
-    """The robots that iVeg knows without being told: AGI and AGII."""
+    """The built-in robots: AGI and AGII."""
     text = (resources.files("iveg") / "data" / "fleet.toml").read_text("utf-8")
     return read_fleet(text, "fleet.toml")
 

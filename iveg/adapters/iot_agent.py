@@ -152,7 +152,7 @@ async def _ensure_group(
     known = next(
         (one for one in await agent.read_groups() if one.get("apikey") == apikey), {}
     )
-    # The agent never shows the address of its broker, so it is always told again.
+    # The agent never shows the address of its broker, so it is always sent again.
     told = ("entity_type", "cbroker", "autoprovision")
     await agent.change_group(apikey, {name: wanted[name] for name in told})
     if known.get("entity_type") == names.ROBOT_TYPE:
@@ -334,7 +334,7 @@ def write_device(
     *,
     has_command: bool = False,
 ) -> Document:
-    """A device as the agent is told; ``attributes`` are names and NGSI types."""
+    """A device as it is sent to the agent; ``attributes`` are names and NGSI types."""
     return {
         "device_id": device_id,
         "entity_name": entity,

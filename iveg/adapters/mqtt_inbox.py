@@ -1,4 +1,4 @@
-"""Reading MQTT: all that has arrived in one call, and of telemetry only the newest.
+"""Reader of MQTT: one call reads the whole buffer, and of telemetry only the newest.
 
 The client library reads a packet's parts one by one from the socket, one packet a turn
 of the loop, and makes two tasks for each message.  While the loop has much else to do,
@@ -69,7 +69,7 @@ Take = Callable[[Arrived], None]
 
 
 class InboxClient(aiomqtt.Client):
-    """A client that reads all that has arrived, and then rests.
+    """A client that reads the whole buffer, and then rests.
 
     A fleet sends hundreds of messages in a second, and each event costs as much as
     reading one of them: what comes within ``apart_s`` is read together.
@@ -191,7 +191,7 @@ class ReadAhead:
             return None
         except OSError:
             return b""
-        # No event tells of what is decrypted already.
+        # There is no event for data that is decrypted already.
         while came and isinstance(inner, ssl.SSLSocket) and (ahead := inner.pending()):
             came += inner.recv(ahead)
         return came

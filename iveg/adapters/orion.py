@@ -121,7 +121,7 @@ class OrionClient(OrionSubscriptions):
             Seconds, Unix time, by iVeg's clock and by Orion's.
 
         Raises:
-            HopError: Orion does not answer, or has none that tells.
+            HopError: Orion does not answer, or its probe has no times.
         """
         response = await self.http.ask(
             "GET",

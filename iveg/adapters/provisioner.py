@@ -327,7 +327,7 @@ class Provisioner:
                         Received(observation, at, FIWARE.id, asked=True)
                     )
 
-    # --- telling ------------------------------------------------------------------
+    # --- log ----------------------------------------------------------------------
 
     def _explain(self, mended: Iterable[str]) -> None:
         for sentence in mended:

@@ -1,6 +1,6 @@
 """Positions in a TOML file, for errors that name line and column.
 
-``tomllib`` tells places of syntax errors alone, in their words.  This finds the rest
+``tomllib`` gives positions of syntax errors alone, in their text.  This finds the rest
 line by line: tables, lists of tables, dotted keys and inline tables, as people write
 them.
 """

@@ -80,7 +80,7 @@ class PushSender:
         except OutboundError as error:
             failed = error.why
         except ValueError:
-            failed = "gone"  # what the browser told is no key: it cannot be reached
+            failed = "gone"  # the browser sent no valid key: it cannot be reached
         return MessageDelivery("push", device.who, now, failed, device.device_id)
 
 

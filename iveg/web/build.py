@@ -114,7 +114,7 @@ def build_app(
         face: Its parts.
         pages: Draws problems for people.
         routers: Its routes.
-        facts: What FastAPI is told besides.
+        facts: Further arguments of FastAPI.
     """
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None, **facts)
     app.state.authenticator, app.state.orion = face.authenticator, face.orion

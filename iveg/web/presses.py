@@ -43,7 +43,7 @@ DESCRIBED: dict[str, object] = {
 
 
 async def press_of(request: Request) -> Press:
-    """The press in a request's body; a late or unreadable body tells nothing."""
+    """The press in a request's body; none in a late or unreadable body."""
     try:
         async with asyncio.timeout(_BODY_WITHIN_S):
             body = await request.body()

@@ -20,7 +20,7 @@ class TableStats:
     """Size of one table with its indexes.
 
     Attributes:
-        size: (bytes); where SQLite does not tell, the table's share of all rows.
+        size: (bytes); where SQLite does not say, the table's share of all rows.
         oldest: (Unix s); None of an empty table, as ``newest``.
         hourly: Bytes for each hour of each robot, of rows since the oldest odometry;
             None without any.
@@ -104,7 +104,7 @@ def _sizes(connection: Connection, rows: dict[str, int]) -> dict[str, int]:
     try:
         return {row[0]: row[1] for row in connection.execute(text(_PAGES_OF))}
     except OperationalError:
-        # Some builds of SQLite cannot tell tables apart.
+        # Some builds of SQLite have no size of each table.
         pages, page = (
             connection.exec_driver_sql(f"PRAGMA {one}").scalar() or 0
             for one in ("page_count", "page_size")

@@ -1,7 +1,7 @@
 """Contacts for messages outside iVeg, over HTTP: an operator reads and tests them.
 
 What goes in as a secret never comes out: a password, the address of a webhook and the
-keys of browsers are written, replaced, and told to nobody.
+keys of browsers are written and replaced, and never shown.
 """
 
 import asyncio
@@ -165,7 +165,7 @@ class Desk:
     """What the routes do with people to be told.
 
     Attributes:
-        messenger: Who keeps and tells people.
+        messenger: Keeps recipients and sends messages.
         new_id: Names a device.
         clock: The time.
     """
@@ -278,14 +278,14 @@ def _add_channels(routes: APIRouter, desk: Desk) -> None:
 def _add_devices(routes: APIRouter, desk: Desk) -> None:
     @routes.post("/devices", response_model=Messages)
     async def add_device(body: DeviceBody, who: _Operator) -> Response:
-        """Have this browser told; the same one again takes its own place."""
+        """Subscribe this browser; the same browser again replaces itself."""
         desk.check(body)
         device = body.device(desk.new_id(), desk.clock().wall)
         return await desk.change("push", who, lambda all_: _joined(all_, device))
 
     @routes.delete("/devices/{device_id}", response_model=Messages)
     async def remove_device(device_id: str, who: _Operator) -> Response:
-        """Have a browser told no more."""
+        """Unsubscribe a browser."""
         known = {one.device_id for one in desk.contacts.push.devices}
         if device_id not in known:
             raise HTTPException(404, "There is no such device.")

@@ -92,19 +92,25 @@ def _labels(**values: str) -> str:
 
 def _events(counters: Mapping[str, int]) -> Iterator[str]:
     samples = ((_labels(name=name), count) for name, count in counters.items())
-    yield from _family("events_total", "counter", "Everything counted.", samples)
+    yield from _family(
+        "events_total", "counter", "Events since the start, by name.", samples
+    )
 
 
 def _hops(hops: Iterable[HopHealth]) -> Iterator[str]:
     known = [(_labels(hop=hop.hop), hop) for hop in hops]
     up = ((labels, hop.state == "ok") for labels, hop in known)
-    yield from _family("hop_up", "gauge", "Whether a hop is well.", up)
+    yield from _family("hop_up", "gauge", "1 while the hop works, else 0.", up)
     lag = ((labels, hop.lag_s) for labels, hop in known)
-    yield from _family("lag_seconds", "gauge", "How late a probe passes it.", lag)
+    yield from _family(
+        "lag_seconds", "gauge", "Lag of the heartbeat probe at the hop.", lag
+    )
     growing = (
         (labels, None if hop.lag_s is None else hop.growing) for labels, hop in known
     )
-    yield from _family("lag_growing", "gauge", "Whether that grows.", growing)
+    yield from _family(
+        "lag_growing", "gauge", "1 while that lag grows, else 0.", growing
+    )
 
 
 def _parts(watch: LatencyWatch) -> _Parts:
@@ -133,7 +139,7 @@ def _latency(parts: _Parts) -> Iterator[str]:
     yield from _family(
         "latency_seconds",
         "summary",
-        "What a hop took; quantiles of the last minute.",
+        "Latency of a hop; quantiles are of the last minute.",
         quantiles,
     )
     # Of one family in the text format: no header of their own.
@@ -152,10 +158,10 @@ def _streams(watch: LatencyWatch) -> Iterator[str]:
         for hop, order in (("uplink", one.up), ("fiware", one.fiware))
     ]
     for name, told in (
-        ("passed", "Messages that passed a hop."),
-        ("missing", "Messages that never came out of a hop."),
-        ("reordered", "Messages that a later one overtook."),
-        ("repeated", "Messages that came twice."),
+        ("passed", "Messages that passed the hop."),
+        ("missing", "Messages that were lost at the hop."),
+        ("reordered", "Messages that arrived after a later one."),
+        ("repeated", "Messages that arrived twice."),
     ):
         samples = ((labels, getattr(order, name)) for labels, order in orders)
         yield from _family(f"messages_{name}_total", "counter", told, samples)
@@ -167,7 +173,7 @@ def _streams(watch: LatencyWatch) -> Iterator[str]:
     yield from _family(
         "messages_excluded_total",
         "counter",
-        "Messages that are in no statistics.",
+        "Messages without a usable latency, by reason.",
         excluded,
     )
     rates = (
@@ -175,32 +181,43 @@ def _streams(watch: LatencyWatch) -> Iterator[str]:
         for one in streams
         for way in ("heard", "agent", "orion")
     )
-    yield from _family("rate_hertz", "gauge", "Messages a second, really.", rates)
+    yield from _family("rate_hertz", "gauge", "Measured rate of messages.", rates)
     lags = (
         (_labels(hop=hop, robot=robot), lag)
         for (hop, robot), lag in watch.overloads.lags.items()
         if hop in SEGMENTS
     )
-    yield from _family("behind_seconds", "gauge", "How far a hop is behind.", lags)
+    yield from _family(
+        "behind_seconds", "gauge", "Delay of the newest messages at the hop.", lags
+    )
 
 
 def _clocks(watch: LatencyWatch) -> Iterator[str]:
     clocks = [(_labels(robot=name), one) for name, one in watch.clocks.items()]
     offsets = ((labels, one.offset_s) for labels, one in clocks)
     yield from _family(
-        "clock_offset_seconds", "gauge", "Robot's clock less ours.", offsets
+        "clock_offset_seconds",
+        "gauge",
+        "Clock of the robot minus clock of the server.",
+        offsets,
     )
     within = ((labels, one.uncertainty_s) for labels, one in clocks)
     yield from _family(
-        "clock_uncertainty_seconds", "gauge", "How wrong that may be.", within
+        "clock_uncertainty_seconds", "gauge", "Greatest error of that offset.", within
     )
 
 
 def _queues(queues: Queues) -> Iterator[str]:
     for name, kind, told, label, counts in (
-        ("queue_depth", "gauge", "Items that wait.", "queue", queues.depths),
-        ("dropped_total", "counter", "Items dropped.", "queue", queues.dropped),
-        ("retries_total", "counter", "Operations done again.", "what", queues.retries),
+        ("queue_depth", "gauge", "Items in the queue.", "queue", queues.depths),
+        (
+            "dropped_total",
+            "counter",
+            "Items that a full queue dropped.",
+            "queue",
+            queues.dropped,
+        ),
+        ("retries_total", "counter", "Repeated operations.", "what", queues.retries),
     ):
         samples = ((_labels(**{label: key}), count) for key, count in counts.items())
         yield from _family(name, kind, told, samples)
@@ -210,7 +227,7 @@ def _turns(longest_s: float) -> Iterator[str]:
     yield from _family(
         "loop_longest_turn_seconds",
         "gauge",
-        "CPU of the longest turn of the loop, last two minutes.",
+        "CPU time of the longest turn of the loop in the last two minutes.",
         [("", round(longest_s, 4))],
     )
 
@@ -222,7 +239,7 @@ def _safety(safety: Safety) -> Iterator[str]:
     yield from _family(
         "alert_latency_seconds",
         "gauge",
-        "Look at a person to the robot's own report, last five minutes.",
+        "Time from a detection of a person to the robot's report, last five minutes.",
         [
             (_labels(quantile="0.5"), _seconds(latency.p50_ms)),
             (_labels(quantile="0.95"), _seconds(latency.p95_ms)),
@@ -232,23 +249,27 @@ def _safety(safety: Safety) -> Iterator[str]:
     for name, told, value in (
         (
             "alerts_not_echoed",
-            "Alerts not answered within a second, last five minutes.",
+            "Alerts without an answer within one second, last five minutes.",
             asked.count,
         ),
-        ("alerts_asked", "Alerts that should have been answered.", asked.of),
+        (
+            "alerts_asked",
+            "Alerts that required an answer, last five minutes.",
+            asked.of,
+        ),
         (
             "negative_margin_ratio",
-            "Share of today's known time with a margin below zero.",
+            "Share of today's time with known margins in which one was negative.",
             margin.share,
         ),
         (
             "margin_known_seconds",
-            "Today's time in which margins were known.",
+            "Time of today with known margins.",
             margin.known_s,
         ),
         (
             "worst_margin_metres",
-            "Least margin of today.",
+            "Smallest margin of today.",
             None if worst is None else worst.margin_m,
         ),
     ):

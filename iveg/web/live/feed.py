@@ -40,7 +40,7 @@ class TelemetryFeed:
         """All that have ever moved, by topic."""
         self._read_outs: dict[str, float] = {}
         self._pictures: dict[str, float] = {}
-        """Topics that have changed, and when each may be told (monotonic, s)."""
+        """Changed topics, and when each may be sent (monotonic, s)."""
         self._told: dict[str, tuple[int, float]] = {}
         self._is_full = False
 
@@ -195,12 +195,12 @@ class _Frame:
 
 
 def _next_picture(told_at: float) -> float:
-    """When a scan or a detection frame may be told again (monotonic, s)."""
+    """When a scan or a detection frame may be sent again (monotonic, s)."""
     return told_at + PICTURE_S
 
 
 def _next_beat(told_at: float) -> float:
-    """When a read-out may be told again (monotonic, s).
+    """When a read-out may be sent again (monotonic, s).
 
     Read-outs go together, at the same moments to all browsers: what takes all robots
     and people is worked out once for all of them.

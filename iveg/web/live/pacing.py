@@ -111,7 +111,7 @@ class CreditWindow:
             return False
         if not self._sent or number < self._sent[0].number:
             return False
-        # The oldest of them tells how long credit is away.
+        # The oldest of them says how long the credit has been out.
         away_s = now - self._sent[0].at
         self._round_trip_s += _LEARNS * (away_s - self._round_trip_s)
         while self._sent and self._sent[0].number <= number:
@@ -123,6 +123,6 @@ class CreditWindow:
 
 
 def _bounded(told: object, most: float) -> float | None:
-    """A time that a page has told; None where it is none, or longer than possible."""
+    """A time that a page has sent; None where it is none, or longer than possible."""
     number = read_number(told)
     return number if number is not None and 0.0 <= number <= most else None

@@ -65,7 +65,7 @@ class Encoder:
         self._frames: dict[str, tuple[int, bytes]] = {}
 
     def frame(self, topic: str) -> bytes | None:
-        """The newest frame of a topic told at once; None with nothing to say."""
+        """The newest frame of a topic without pacing; None without data."""
         version = self._hub.versions[topic]
         kept = self._frames.get(topic)
         if kept is not None and kept[0] == version:
@@ -137,7 +137,7 @@ def router(
         except* (WebSocketDisconnect, ConnectionError) as gone:
             _log.debug("browser gone: %s", gone)
         except* Exception:
-            # A mistake of ours, told as one; the browser comes back by itself.
+            # A fault of ours, logged as one; the browser reconnects by itself.
             _log.exception("live: the line of a browser has failed")
         finally:
             hub.leave(subscriber)

@@ -1,6 +1,6 @@
 """Who a connection serves: the client behind a proxy, and whether it is signed in.
 
-A connection of somebody who is signed in gives way last, and an open WebSocket never
+A connection of somebody who is signed in is closed last, and an open WebSocket never
 (``adapters/connections``).
 """
 

@@ -1,7 +1,7 @@
 """Headers and the size limit in front of every route.
 
 Pure ASGI.  Notifications come hundreds of times a second and no browser reads their
-answers, so their path is told apart first and pays for the size limit alone.
+answers, so their path is recognized first and passes the size limit alone.
 """
 
 from starlette.datastructures import MutableHeaders

@@ -113,7 +113,7 @@ class SocketLimits:
     Five for a session, twenty for all programs together; twenty messages a second each
     (painted frames: 300).
 
-    Of more WebSockets the silent one gives way: it is a page that lost its line and
+    Of more WebSockets the silent one is closed: it is a page that lost its line and
     came back.  When all of them are alive the new one is refused, so that the pages of
     one person do not push each other out in turn.
 
