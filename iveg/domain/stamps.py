@@ -1,8 +1,10 @@
-"""Moments as text: ISO-8601 UTC, as in the contract and all documents."""
+"""Moments as text (ISO-8601 UTC, as in contract and documents) and as seconds."""
 
 from datetime import UTC, datetime
 from functools import lru_cache
 from math import floor
+
+from iveg.domain.observations import Instant
 
 
 def format_stamp(wall: float) -> str:
@@ -27,3 +29,8 @@ def parse_stamp(text: str) -> float | None:
     if moment.tzinfo is None:
         moment = moment.replace(tzinfo=UTC)
     return moment.timestamp()
+
+
+def wall_of(at: Instant | None) -> float | None:
+    """Wall-clock time of an instant (Unix s); None of None."""
+    return None if at is None else at.wall

@@ -5,10 +5,9 @@ from typing import cast
 from pydantic import Field
 
 from iveg.domain.alerts import alert_book, flood
-from iveg.domain.alerts.stored import read_occurrence
+from iveg.domain.alerts.stored import write_alert, write_delivery
 from iveg.domain.messages import Channel, MessageDelivery, Priority
-from iveg.domain.observations import Instant
-from iveg.domain.records import AlertRecord, LogRecord
+from iveg.domain.records import AlertRecord, Json, LogRecord
 from iveg.domain.stamps import format_stamp
 from iveg.models.base import Listing, Model, Slots, moment, stamp
 
@@ -24,8 +23,15 @@ class Told(Model):
     @classmethod
     def of(cls, one: MessageDelivery) -> "Told":
         """One that is in memory."""
-        at = format_stamp(one.at.wall)
-        return cls(channel=one.channel, to=one.to, at=at, failed=one.failed)
+        return cls.of_record(write_delivery(one))
+
+    @classmethod
+    def of_record(cls, one: Json) -> "Told":
+        """One as an alert's record has it."""
+        at = format_stamp(one["at"])
+        return cls(
+            channel=one["channel"], to=one["to"], at=at, failed=one.get("failed")
+        )
 
 
 class Occurrence(Model):
@@ -40,16 +46,16 @@ class Occurrence(Model):
     told: list[Told] = Field(description="Recipients outside iVeg.")
 
     @classmethod
-    def of(cls, one: alert_book.AlertOccurrence) -> "Occurrence":
-        """One that is in memory."""
+    def of_record(cls, one: Json) -> "Occurrence":
+        """One as an alert's record has it."""
         return cls(
-            priority=one.priority,
-            raised_at=format_stamp(one.raised.wall),
-            cleared_at=moment(one.cleared),
-            acknowledged_at=moment(one.acknowledged),
-            acknowledged_by=one.acknowledged_by,
-            note=one.note or None,
-            told=[Told.of(told) for told in one.deliveries],
+            priority=one["priority"],
+            raised_at=format_stamp(one["raised_at"]),
+            cleared_at=stamp(one.get("cleared_at")),
+            acknowledged_at=stamp(one.get("acknowledged_at")),
+            acknowledged_by=one.get("acknowledged_by"),
+            note=one.get("note") or None,
+            told=[Told.of_record(told) for told in one.get("told", ())],
         )
 
 
@@ -78,30 +84,12 @@ class Alert(Model):
     @classmethod
     def of(cls, alert: alert_book.BookedAlert) -> "Alert":
         """One alert with its newest occurrences."""
-        condition, last = alert.condition, alert.last
-        return cls(
-            alert_id=alert.alert_id,
-            priority=alert.priority,
-            key=condition.key,
-            slots=dict(condition.slots),
-            robot_id=condition.robot_id,
-            raised_at=format_stamp(alert.raised.wall),
-            last_raised_at=format_stamp(last.raised.wall),
-            cleared_at=moment(last.cleared),
-            acknowledged_at=moment(last.acknowledged),
-            acknowledged_by=last.acknowledged_by,
-            note=last.note or None,
-            count=alert.count,
-            told=[Told.of(one) for one in last.deliveries],
-            members=[Occurrence.of(one) for one in alert.members],
-        )
+        return cls.of_record(write_alert(alert))
 
     @classmethod
     def of_record(cls, record: AlertRecord) -> "Alert":
         """One alert as it is remembered."""
-        members = [
-            Occurrence.of(read_occurrence(one, _by_the_wall)) for one in record.members
-        ]
+        members = [Occurrence.of_record(one) for one in record.members]
         return cls(
             alert_id=record.alert_id,
             priority=cast("Priority", record.priority),
@@ -118,11 +106,6 @@ class Alert(Model):
             told=members[-1].told if members else [],
             members=members,
         )
-
-
-def _by_the_wall(seconds: float) -> Instant:
-    """A moment of an earlier run, of which only the wall clock is shown."""
-    return Instant(0.0, seconds)
 
 
 class Flood(Model):

@@ -11,7 +11,7 @@ from functools import wraps
 from typing import Concatenate, ParamSpec
 
 from iveg.domain.alerts.alert_book import BookedAlert
-from iveg.domain.alerts.stored import write_occurrence
+from iveg.domain.alerts.stored import cleared_behind, write_alert
 from iveg.domain.decisions import SlowdownDecision
 from iveg.domain.events import LogEvent
 from iveg.domain.kinds import Kind
@@ -29,10 +29,11 @@ from iveg.domain.records import (
     ReadingRecord,
 )
 from iveg.domain.robot_state import RobotState
+from iveg.domain.stamps import wall_of
 from iveg.domain.stop import Changed, Closed, FollowedCommand
 from iveg.domain.tracking.people import Placed
 from iveg.pipeline import topics
-from iveg.pipeline.evidence import cleared_behind, left_behind, record_of, wall_of
+from iveg.pipeline.evidence import left_behind, record_of
 from iveg.pipeline.publish import Hub
 from iveg.pipeline.record import OdometryThinner, RecordSink
 from iveg.pipeline.supervision import Supervision
@@ -316,22 +317,5 @@ class EventLog:
     @_guarded
     def alert(self, alert: BookedAlert) -> None:
         """Record an alert that was raised, acknowledged or cleared."""
-        condition, last = alert.condition, alert.last
-        self._sink.enqueue(
-            AlertRecord(
-                alert_id=alert.alert_id,
-                priority=alert.priority,
-                key=condition.key,
-                raised_at=alert.raised.wall,
-                last_raised_at=last.raised.wall,
-                slots=dict(condition.slots),
-                robot_id=condition.robot_id,
-                cleared_at=wall_of(last.cleared),
-                acknowledged_at=wall_of(last.acknowledged),
-                acknowledged_by=last.acknowledged_by,
-                note=last.note or None,
-                count=alert.count,
-                members=[write_occurrence(one) for one in alert.members],
-            )
-        )
+        self._sink.enqueue(write_alert(alert))
         self.changed(topics.ALERTS.name)

@@ -6,10 +6,10 @@ from dataclasses import asdict, replace
 from iveg.domain.decisions import Link, Place, SlowdownDecision
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import HALF_SPEED
-from iveg.domain.observations import Instant
-from iveg.domain.records import AlertRecord, DecisionRecord
+from iveg.domain.records import DecisionRecord
 from iveg.domain.rule.speed_limits import Crossing
 from iveg.domain.rule.zones import Zone
+from iveg.domain.stamps import wall_of
 from iveg.domain.tracking.looks import Looks
 from iveg.domain.world import World
 
@@ -78,12 +78,6 @@ def left_behind(record: DecisionRecord, found: float) -> DecisionRecord:
     return replace(record, ended_at=found, links=links)
 
 
-def cleared_behind(record: AlertRecord, found: float) -> AlertRecord:
-    """An alert that an earlier run left active; what is still wrong is a new one."""
-    last = [{**one, "cleared_at": found} for one in record.members[-1:]]
-    return replace(record, cleared_at=found, members=[*record.members[:-1], *last])
-
-
 def _parameters(rule: DetectionRule, zone: Zone) -> dict[str, object]:
     looks = None if zone.sighting is None else zone.sighting.looks
     return {
@@ -107,8 +101,3 @@ def _link(link: Link) -> dict[str, object]:
         "value": link.value,
         "verdict": link.verdict,
     }
-
-
-def wall_of(at: Instant | None) -> float | None:
-    """Wall-clock time of an instant (Unix s); None of None."""
-    return None if at is None else at.wall

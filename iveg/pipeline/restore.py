@@ -7,19 +7,11 @@ that earlier alerts are unknown.
 
 import asyncio
 from collections.abc import Sequence
-from functools import partial
-from typing import Protocol, cast
+from typing import Protocol
 
-from iveg.domain.alerts.alert_book import (
-    MOST_KEPT,
-    AlertOccurrence,
-    BookedAlert,
-)
-from iveg.domain.alerts.stored import read_occurrence
+from iveg.domain.alerts.alert_book import MOST_KEPT
+from iveg.domain.alerts.stored import read_alert
 from iveg.domain.errors import HopError
-from iveg.domain.events import Condition
-from iveg.domain.messages import Priority
-from iveg.domain.observations import Instant
 from iveg.domain.records import (
     AlertRecord,
     CommandRecord,
@@ -29,7 +21,6 @@ from iveg.domain.records import (
 from iveg.pipeline.command import Commander
 from iveg.pipeline.evaluate import Evaluator
 from iveg.pipeline.event_log import EventLog
-from iveg.pipeline.evidence import cleared_behind
 from iveg.pipeline.health_monitor import HealthMonitor
 from iveg.pipeline.ports import Clock
 
@@ -84,47 +75,7 @@ async def remember(
         commander.close_earlier(left_open, now)
         commander.drills.remember(drilled)
         evaluator.close_earlier(decisions, alerted, now)
-        evaluator.alerts.remember(alert_of(one, now) for one in unseen)
+        evaluator.alerts.remember(read_alert(one, now) for one in unseen)
         event_log.recall(lines)
         health_monitor.earlier_read = True
         return
-
-
-def alert_of(record: AlertRecord, now: Instant) -> BookedAlert:
-    """An alert of the history as one that is over, with its life as it was."""
-    if record.cleared_at is None:
-        record = cleared_behind(record, now.wall)
-    priority = cast("Priority", record.priority)
-    moment = partial(_moment, now=now)
-    members = tuple(read_occurrence(one, moment) for one in record.members)
-    last = AlertOccurrence(
-        priority,
-        _moment(record.last_raised_at, now),
-        _moment(record.cleared_at or now.wall, now),
-    )
-    return BookedAlert(
-        record.alert_id,
-        Condition(
-            priority,
-            record.key,
-            _subject(record),
-            record.robot_id,
-            record.slots,
-        ),
-        _moment(record.raised_at, now),
-        members or (last,),
-        unseen=priority if record.acknowledged_at is None else None,
-        count=record.count,
-    )
-
-
-def _subject(record: AlertRecord) -> str:
-    """The robot or person concerned; the person is unknown after a restart."""
-    if record.robot_id is None or "person" in record.slots:
-        return record.alert_id
-    return record.robot_id
-
-
-def _moment(wall: float, now: Instant) -> Instant:
-    """A moment of an earlier run on this run's clock."""
-    return Instant(now.mono - (now.wall - wall), wall)

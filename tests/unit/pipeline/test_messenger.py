@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import pytest
 
+from iveg.domain.alerts.stored import read_alert
 from iveg.domain.events import Condition
 from iveg.domain.messages import (
     CHANNELS,
@@ -22,7 +23,6 @@ from iveg.domain.messages import (
 from iveg.domain.records import AlertRecord
 from iveg.models.alert import Alert
 from iveg.pipeline.messenger import MOST_WAITING, TRIES, Messenger
-from iveg.pipeline.restore import alert_of
 from tests.builders import START
 from tests.fakes.messages import FakeContacts, FakeSender
 from tests.unit.pipeline.desk import Desk
@@ -117,7 +117,7 @@ async def test_the_alert_says_who_was_told_and_when_in_the_history_too() -> None
     record = post.desk.records(AlertRecord)[-1]
     assert isinstance(record, AlertRecord)
     assert [one.model_dump() for one in Alert.of_record(record).told] == told
-    again = Alert.of(alert_of(record, post.desk.clock()))
+    again = Alert.of(read_alert(record, post.desk.clock()))
     assert [one.model_dump() for one in again.told] == told
 
 

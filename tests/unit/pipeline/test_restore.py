@@ -4,9 +4,10 @@ import asyncio
 from dataclasses import replace
 from typing import cast
 
+from iveg.domain.alerts.stored import read_alert
 from iveg.domain.errors import HopError
 from iveg.domain.records import AlertRecord, LogRecord
-from iveg.pipeline.restore import History, alert_of, remember
+from iveg.pipeline.restore import History, remember
 from tests.builders import at
 from tests.fakes.records import alert_record, log_record
 from tests.unit.pipeline.desk import Desk
@@ -93,11 +94,11 @@ async def test_the_log_goes_on_where_it_broke_off_for_open_pages_too() -> None:
 
 def test_an_alert_keeps_its_life_over_the_restart() -> None:
     desk = Desk()
-    desk.evaluator.alerts.remember([alert_of(unseen("A1", at(-60).wall), at(0))])
+    desk.evaluator.alerts.remember([read_alert(unseen("A1", at(-60).wall), at(0))])
     desk.evaluator.alerts.acknowledge("A1", "ana", "battery", at(1))
     kept = desk.records(AlertRecord)[-1]
 
-    again = alert_of(kept, at(5))
+    again = read_alert(kept, at(5))
 
     assert (again.unseen, again.count) == (None, kept.count)
     assert (again.last.acknowledged_by, again.last.note) == ("ana", "battery")
