@@ -94,6 +94,9 @@ class Telling:
     async def resume(self, *_: object) -> None:
         """Nor sent on."""
 
+    async def goal(self, *_: object) -> None:
+        """Nor sent anywhere."""
+
     async def set_desired_state(self, *_: object) -> None:
         """Nor held."""
 

@@ -16,7 +16,7 @@ from iveg.domain.errors import HopError
 from iveg.ngsi import names
 
 RESOURCE = "/iot/json"
-_COMMAND = {"name": names.COMMAND, "type": "command"}
+_COMMANDS = [{"name": name, "type": "command"} for name in names.COMMANDS]
 
 
 class IotAgentClient(FiwareClient):
@@ -246,12 +246,13 @@ async def _clear_registration(orion: OrionClient, robot_id: str) -> list[str]:
     for old in registered[:-1]:
         await orion.delete_registration(old["id"])
         mended.append(f"Removed an old registration of the command of {robot_id}.")
-    if await orion.has_attribute(robot_id, names.COMMAND):
-        await orion.delete_attribute(robot_id, names.COMMAND)
-        mended.append(
-            f"Deleted attribute {names.COMMAND} of {robot_id} at Orion: "
-            "commands were stored there and went no further."
-        )
+    for name in names.COMMANDS:
+        if await orion.has_attribute(robot_id, name):
+            await orion.delete_attribute(robot_id, name)
+            mended.append(
+                f"Deleted attribute {name} of {robot_id} at Orion: "
+                "commands were stored there and went no further."
+            )
     return mended
 
 
@@ -345,5 +346,5 @@ def write_device(
         "attributes": [
             {"object_id": name, "name": name, "type": kind} for name, kind in attributes
         ],
-        "commands": [_COMMAND] if has_command else [],
+        "commands": _COMMANDS if has_command else [],
     }

@@ -28,9 +28,11 @@ ROBOT_ATTRIBUTES = (
     names.NAVIGATION,
     names.COMMAND_STATUS,
     names.COMMAND_INFO,
+    names.GOAL_INFO,
     *names.ALGORITHM_1,
 )
-"""Attributes read of a robot.  Never ``cmd``: Orion would query the agent for it."""
+"""Attributes read of a robot.  Never ``cmd`` or ``goal``, for which Orion would
+query the agent."""
 
 
 class OrionClient(OrionSubscriptions):
@@ -56,7 +58,11 @@ class OrionClient(OrionSubscriptions):
         return str(about.get("version", "unknown"))
 
     async def update_command(
-        self, robot_id: str, value: Mapping[str, Any], timeout_s: float = 1.5
+        self,
+        robot_id: str,
+        value: Mapping[str, Any],
+        timeout_s: float = 1.5,
+        name: str = names.COMMAND,
     ) -> None:
         """Ask Orion to pass a command on.
 
@@ -68,6 +74,7 @@ class OrionClient(OrionSubscriptions):
             robot_id: The robot.
             value: The command (docs/interfaces/commands.md).
             timeout_s: How long Orion may take (s).
+            name: Of the NGSI command.
 
         Raises:
             HopError: Orion did not take it; 404 also means that the agent is away.
@@ -76,7 +83,7 @@ class OrionClient(OrionSubscriptions):
             "PATCH",
             f"/v2/entities/{robot_id}/attrs",
             query={"type": names.ROBOT_TYPE},
-            body={names.COMMAND: {"type": "command", "value": dict(value)}},
+            body={name: {"type": "command", "value": dict(value)}},
             timeout_s=timeout_s,
         )
 

@@ -94,6 +94,7 @@ WANTED_OF_ALL = (
     WantedSubscription(
         "commands", ALL_ROBOTS, (names.COMMAND_STATUS, names.COMMAND_INFO)
     ),
+    WantedSubscription("goals", ALL_ROBOTS, (names.GOAL_INFO,)),
     WantedSubscription(
         "single uplink",
         ALL_ROBOTS,

@@ -9,6 +9,7 @@ from typing import Literal
 from iveg.adapters.mqtt import MqttLink
 from iveg.adapters.orion import OrionClient
 from iveg.domain.feedback import Feedback
+from iveg.domain.goals import CancelOrder, GoalOrder
 from iveg.ngsi import codec, names
 
 
@@ -40,6 +41,12 @@ class MqttTransport:
     async def resume(self, robot_id: str, challenge: str, attempt: str) -> None:
         """Publish a resume, once."""
         await self._once(robot_id, codec.write_resume(challenge, attempt))
+
+    async def goal(self, robot_id: str, order: GoalOrder | CancelOrder) -> None:
+        """Publish a goal or its cancellation, once."""
+        topic = names.command_topic(self._apikey, robot_id)
+        payload = codec.write_command(codec.write_goal(order), names.GOAL)
+        await self._link.publish(topic, payload, qos=0)
 
     async def _once(self, robot_id: str, value: Mapping[str, object]) -> None:
         """Publish at QoS 0: no client sends it again after a lost connection."""
@@ -76,3 +83,8 @@ class OrionTransport:
         """Ask for a resume, once."""
         value = codec.write_resume(challenge, attempt)
         await self._orion.update_command(robot_id, value)
+
+    async def goal(self, robot_id: str, order: GoalOrder | CancelOrder) -> None:
+        """Ask for a goal or its cancellation, once."""
+        value = codec.write_goal(order)
+        await self._orion.update_command(robot_id, value, name=names.GOAL)

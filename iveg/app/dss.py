@@ -236,6 +236,7 @@ class Dss:
                 await close()
             self.pipeline.evaluator.leave(clock.now())
             await self.pipeline.commander.close()
+            await self.pipeline.goals.close()
             await self.outside.close()
             self.worker.close()
 

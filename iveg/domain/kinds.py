@@ -16,6 +16,7 @@ from iveg.domain.observations import (
     CommandAnswer,
     CommandStatus,
     DetectionFrame,
+    GoalAnswer,
     HeartbeatProbe,
     LaserScan,
     Navigation,
@@ -205,6 +206,7 @@ KINDS = (
         qos=1,
         vital=True,
     ),
+    Kind(GoalAnswer, "goal_answer", may_drop=False, direct="safety", qos=1),
     Kind(Climate, "climate", ordered="by arrival", lands="climate", changes="climate"),
     Kind(HeartbeatProbe, "heartbeat", ordered="by arrival", vital=True),
 )

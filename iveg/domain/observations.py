@@ -279,6 +279,21 @@ class CommandAnswer(Observation):
 
 
 @dataclass(frozen=True, slots=True)
+class GoalAnswer(Observation):
+    """The robot's own word of a goal, on ``cmdexe`` (or ``goal_info``).
+
+    Attributes:
+        id: Of the goal.
+        result: ``ACCEPTED``, ``REFUSED``, ``REACHED`` or ``DROPPED``.
+        why: Code of the reason of a refusal, or for which it was dropped.
+    """
+
+    id: str
+    result: str
+    why: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Climate(Observation):
     """Air in the greenhouse: °C, 0–1, ppm; None where a sensor is silent."""
 

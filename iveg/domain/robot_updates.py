@@ -6,6 +6,7 @@ from iveg.domain.observations import (
     CommandAnswer,
     CommandStatus,
     DetectionFrame,
+    GoalAnswer,
     Instant,
     LaserScan,
     Navigation,
@@ -51,7 +52,7 @@ def apply_newest(robot: RobotState, received: Received, moment: float | None) ->
             robot.navigation, robot.navigation_received = observation, at
         case CommandStatus():
             robot.command_status = observation.status
-        case CommandAnswer():
+        case CommandAnswer() | GoalAnswer():
             pass  # an event: the machine of its command takes it
         case _:
             robot.sensed[type(observation)] = Sensed(observation, dated(at, moment))

@@ -15,6 +15,7 @@ from iveg.domain.stamps import format_stamp
 from iveg.domain.transports import TransportId
 from iveg.models.base import Model, rounded
 from iveg.models.command import Command
+from iveg.models.goal import Goal
 from iveg.models.margin import Margin
 from iveg.models.places import Point
 from iveg.models.situation import Situation
@@ -249,6 +250,7 @@ class _Robot(Model):
     stop: Command | None
     stop_state: str
     navigation: Navigation | None
+    goal: Goal | None = Field(description="The newest that a person gave it.")
     replay: bool
     clock_offset_s: float | None
     transport: TransportId = Field(description="Transport that feeds the pose.")

@@ -34,6 +34,9 @@ BOXES, BOXES_HEADER = _attributes(DetectionFrame)
 UNPLACED = "unplaced"
 """``frame_id`` of what a robot sensed without knowing where."""
 COMMAND, COMMAND_STATUS, COMMAND_INFO = "cmd", "cmd_status", "cmd_info"
+GOAL, GOAL_INFO = "goal", "goal_info"
+COMMANDS = (COMMAND, GOAL)
+"""NGSI commands of a robot, by what they carry: STOP and its end; goals."""
 ALGORITHM_1 = {
     "class": "Text",
     "conf": "Number",

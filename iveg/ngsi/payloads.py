@@ -198,6 +198,14 @@ class AnswerValue(OriginFields):
     attempt: Text | None = None
 
 
+class GoalAnswerValue(OriginFields):
+    """A robot's word of a goal on ``cmdexe``."""
+
+    id: Text
+    r: Literal["ACCEPTED", "REFUSED", "REACHED", "DROPPED"]
+    why: Text | None = None
+
+
 class ClimateValue(Wire):
     """The climate device's message."""
 

@@ -21,6 +21,7 @@ from iveg.pipeline.coverage import CoverageMonitor
 from iveg.pipeline.detectors import Detectors
 from iveg.pipeline.evaluate import Evaluator
 from iveg.pipeline.event_log import EventLog
+from iveg.pipeline.goals import GoalDispatcher
 from iveg.pipeline.health_monitor import HealthMonitor, HopState
 from iveg.pipeline.ingest import Ingest
 from iveg.pipeline.latency import LatencyMonitor
@@ -101,6 +102,7 @@ class Pipeline:
     margins: MarginTotals
     slow_time: SlowTime
     scans: ScanReader
+    goals: GoalDispatcher
 
     def counters(self) -> Counter[str]:
         """Everything that is counted in it."""
@@ -170,6 +172,7 @@ def build(
         scans.newest,
     )
     commander = _commander(fleet.ids, ports, choices, event_log, health_monitor)
+    goals = _goals(world, greenhouse, commander, ports, event_log)
     totals = MarginTotals(world, evaluator.people), SlowTime(world, evaluator.people)
     loop = RuleLoop(
         ingest,
@@ -181,6 +184,7 @@ def build(
         supervision,
         guard("latency", watch.decided),
         (guard("latency", latency.tick), *[guard("totals", t.tick) for t in totals]),
+        (guard("goals", goals.heard), guard("goals", goals.tick)),
     )
     return Pipeline(
         hub,
@@ -195,6 +199,7 @@ def build(
         supervision,
         *totals,
         scans,
+        goals,
     )
 
 
@@ -217,6 +222,18 @@ def _commander(
         agent_lag_s=health_monitor.probe.lag,
         is_cut=lambda way, at: way == FIWARE.id and health_monitor.is_cut(at),
     )
+
+
+def _goals(
+    world: World,
+    greenhouse: Greenhouse,
+    commander: Commander,
+    ports: Ports,
+    event_log: EventLog,
+) -> GoalDispatcher:
+    transports, new_id = ports.transports, ports.new_id
+    machines = commander.machines
+    return GoalDispatcher(world, greenhouse, machines, transports, event_log, new_id)
 
 
 def _ingest(

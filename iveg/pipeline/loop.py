@@ -11,6 +11,7 @@ from iveg.domain.events import LogEvent
 from iveg.domain.kinds import kind
 from iveg.domain.observations import (
     CommandAnswer,
+    GoalAnswer,
     HeartbeatProbe,
     Instant,
     Received,
@@ -49,6 +50,7 @@ class RuleLoop:
         supervision: Names what of comfort is down.
         decided: Comfort that measures: called with what a judgement was made of.
         ticks: Comfort that lets time pass, called with each tick; all of it guarded.
+        goals: Comfort, likewise: called with each new word on a goal; with each tick.
     """
 
     def __init__(
@@ -62,6 +64,7 @@ class RuleLoop:
         supervision: Supervision,
         decided: Callable[[Iterable[Received], Instant], None],
         ticks: Sequence[Callable[[Instant], None]],
+        goals: tuple[Callable[[GoalAnswer, Instant], None], Callable[[Instant], None]],
     ) -> None:
         self._ingest = ingest
         self._evaluator = evaluator
@@ -71,7 +74,8 @@ class RuleLoop:
         self._clock = clock
         self._supervision = supervision
         self._decided = decided
-        self._ticks = ticks
+        self._goal_heard, tick_goals = goals
+        self._ticks = (tick_goals, *ticks)
         self._ticked = float("-inf")
         self._health_at = float("-inf")
         self._taken: list[Received] = []
@@ -118,9 +122,7 @@ class RuleLoop:
             if not fresh and not isinstance(received.observation, CommandAnswer):
                 continue
             if self._evaluator.world.may_act(received):
-                self._commander.apply(
-                    received, self._evaluator.world.age_then(received)
-                )
+                self._act(received)
         if judges:
             self._evaluator.settle()
         if self._taken and not self._evaluator.is_unjudged:
@@ -135,6 +137,15 @@ class RuleLoop:
             self._watch_chain(now)
             for tick in self._ticks:
                 tick(now)
+
+    def _act(self, received: Received) -> None:
+        """Hand an observation to whoever follows an order."""
+        observation = received.observation
+        if isinstance(observation, GoalAnswer):
+            self._goal_heard(observation, received.at)
+        else:
+            age_s = self._evaluator.world.age_then(received)
+            self._commander.apply(received, age_s)
 
     def _apply(self, received: Received) -> bool:
         """Whether it became part of the state.

@@ -6,11 +6,23 @@ from typing import Literal, Protocol
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.detector import OutOfService
 from iveg.domain.feedback import Feedback
+from iveg.domain.goals import CancelOrder, GoalOrder
 from iveg.domain.messages import Contacts, MessageDelivery, OutboundMessage
 from iveg.domain.observations import Instant
 
 
-class CommandPort(Protocol):
+class GoalPort(Protocol):
+    """A transport's port for goals, each sent once; 2xx or PUBACK is no evidence."""
+
+    async def goal(self, robot_id: str, order: GoalOrder | CancelOrder) -> None:
+        """Send a goal, or its cancellation.
+
+        Raises:
+            HopError: it was not taken.
+        """
+
+
+class CommandPort(GoalPort, Protocol):
     """A transport's port for orders; an answer of 2xx or a PUBACK is no evidence.
 
     A release or resume is sent once: never retained, never sent again.

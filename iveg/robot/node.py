@@ -18,10 +18,12 @@ from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.domain.errors import UnreadableError
 from iveg.domain.feedback import Feedback
 from iveg.domain.fleet import RobotProfile
-from iveg.domain.geometry import REST, Twist2D
+from iveg.domain.geometry import REST, Pose2D, Twist2D
+from iveg.domain.goals import Goal
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import (
     CommandAnswer,
+    GoalAnswer,
     Hold,
     Instant,
     LaserScan,
@@ -37,6 +39,7 @@ from iveg.ngsi.codec import read_feedback
 from iveg.robot.caps import FREE, Cap
 from iveg.robot.echo import Echo
 from iveg.robot.effects import Answer, Drive, Effect, Persist, Report
+from iveg.robot.goals import Facts, Navigate, RobotGoals, read_goal
 from iveg.robot.hold_file import read_holds, write_holds
 from iveg.robot.judgement import Limits, OnLinkLoss
 from iveg.robot.lane import SafetyLane
@@ -88,6 +91,7 @@ class RobotNode:
         replay: It plays a recording, which is in this map frame: its messages are
             marked, and echo no feedback, since their content was measured long ago.
         on_feedback: Called with the topic's robot and each feedback that could be read.
+        navigate: Takes goals of iVeg; None: the robot takes none.
         read_clock: The robot's own clocks.
     """
 
@@ -101,6 +105,7 @@ class RobotNode:
         held: bool = False,
         replay: str | None = None,
         on_feedback: Callable[[str, Feedback], None] | None = None,
+        navigate: Navigate | None = None,
         read_clock: Callable[[], Instant] = clock.now,
     ) -> None:
         self._read_clock = read_clock
@@ -115,6 +120,9 @@ class RobotNode:
         self._nobody_there = held
         self._loop: asyncio.AbstractEventLoop | None = None
         self._commanded: tuple[Twist2D, float] = REST, 0.0
+        self._goals = RobotGoals(robot_id, navigate)
+        self._placed: tuple[Pose2D | None, Twist2D, float] = None, REST, 0.0
+        """Newest pose and twist, and when they came (monotonic, s)."""
         self._broken: asyncio.Future[None] | None = None
         self._next_tick: asyncio.TimerHandle | None = None
         self._command_topic = names.command_topic(settings.apikey, robot_id)
@@ -129,16 +137,7 @@ class RobotNode:
         self._lane = SafetyLane(
             partial(write_holds, hold_file), partial(self._link.publish, qos=1)
         )
-        self._uplink = Uplink(
-            robot_id,
-            settings.apikey,
-            self.boot,
-            self._link.enqueue,
-            form=settings.uplink,
-            first_report=1 + secrets.randbelow(2**31),
-            echo=self._echo if replay is None else None,
-            replay=replay,
-        )
+        self._uplink = self._new_uplink(settings, replay)
         limits = Limits(
             profile.max_speed,
             profile.max_turn,
@@ -149,6 +148,18 @@ class RobotNode:
             settings.plan,
         )
         self._machine = self._new_machine(hold_file, limits)
+
+    def _new_uplink(self, settings: NodeSettings, replay: str | None) -> Uplink:
+        return Uplink(
+            self._id,
+            settings.apikey,
+            self.boot,
+            self._link.enqueue,
+            form=settings.uplink,
+            first_report=1 + secrets.randbelow(2**31),
+            echo=self._echo if replay is None else None,
+            replay=replay,
+        )
 
     def _new_machine(self, hold_file: Path, limits: Limits) -> SafetyMachine:
         stored = read_holds(hold_file)
@@ -183,6 +194,11 @@ class RobotNode:
         twist at all, for 0.5 s.
         """
         return self._machine.may_drive
+
+    @property
+    def goal(self) -> Goal | None:
+        """Where it was sent; None: wherever its own work takes it."""
+        return self._goals.goal
 
     @property
     def speed_factor(self) -> float:
@@ -220,6 +236,7 @@ class RobotNode:
         mono = now.mono
         for one in observations:
             if isinstance(one, Odometry):
+                self._placed = one.pose, one.twist, mono
                 self._perform(self._machine.odometry(one.pose, one.twist, mono), mono)
             elif isinstance(one, LaserScan) and not self._is_replay:
                 self._perform(self._machine.scan(one, mono), mono)
@@ -283,7 +300,13 @@ class RobotNode:
     def _on_message(self, topic: str, payload: bytes) -> None:
         now = self._read_clock().mono
         if topic == self._command_topic:
-            self._perform(self._machine.command(payload, now), now)
+            order = read_goal(payload)
+            if order is None:
+                self._perform(self._machine.command(payload, now), now)
+            else:
+                # First what the machine knows by now: the link may have just been lost.
+                self._perform(self._machine.tick(now), now)
+                self._tell_goal(self._goals.take(order, self._facts(now)))
         elif topic == self._desired_topic:
             self._perform(self._machine.desired(payload, now), now)
         else:
@@ -314,6 +337,30 @@ class RobotNode:
                     self._answer(answer)
                 case Report(report, is_measure):
                     self._report(report, is_measure=is_measure)
+        if self._goals.goal is not None:
+            self._tell_goal(self._goals.settle(self._facts(now)))
+
+    def _facts(self, now: float) -> Facts:
+        pose, twist, at = self._placed
+        return Facts(
+            self._machine.state(now) == "RUNNING",
+            self._machine.challenge,
+            now - self._started,
+            pose if now - at <= LIMITS.pose_stand_s else None,
+            max(abs(twist.linear_x), abs(twist.angular_z)) < LIMITS.standing_speed,
+        )
+
+    def _tell_goal(self, answers: list[GoalAnswer]) -> None:
+        for answer in answers:
+            _log.info(
+                "%s: goal %s %s %s",
+                self._id,
+                answer.id,
+                answer.result,
+                answer.why or "",
+            )
+            own = self._own(self._read_clock())
+            self._lane.answer(self._uplink.goal_answer(answer, own))
 
     def _command_drive(self, twist: Twist2D, now: float) -> None:
         """Send zero and changes at once; do not repeat a command just sent."""

@@ -18,6 +18,7 @@ from iveg.domain.kinds import KIND_OF, SENSED
 from iveg.domain.observations import (
     CommandAnswer,
     DetectionFrame,
+    GoalAnswer,
     Instant,
     LaserScan,
     Navigation,
@@ -47,7 +48,7 @@ _WRITERS: dict[type, Callable[[Any], bytes]] = {
 }
 _UNPLACED = {"odometry": Odometry, "scan": LaserScan}
 _SAFETY = KIND_OF[SafetyReport].suffix or ""
-_ANSWERS = "cmdexe"
+_ANSWERS, _GOALS = "cmdexe", "goal"
 _SAID = {
     kind: attrgetter(*(one.name for one in fields(kind) if one.name != "robot_id"))
     for kind in _WRITERS
@@ -135,6 +136,13 @@ class Uplink:
         origin = self._origin(_ANSWERS, at)
         topic = names.answer_topic(self._apikey, self._id)
         return LaneMessage(topic, codec.write_answer(replace(answer, origin=origin)))
+
+    def goal_answer(self, answer: GoalAnswer, at: Instant) -> LaneMessage:
+        """The message of a word on a goal on ``cmdexe``."""
+        origin = self._origin(_GOALS, at)
+        topic = names.answer_topic(self._apikey, self._id)
+        payload = codec.write_goal_answer(replace(answer, origin=origin))
+        return LaneMessage(topic, payload)
 
     def _send_single(
         self, single: SinglePayload, observation: Observation, at: Instant

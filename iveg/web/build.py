@@ -20,6 +20,7 @@ from iveg.web.api import (
     costmap,
     coverage,
     detectors,
+    goals,
     health,
     latency,
     messages,
@@ -92,6 +93,7 @@ def live_routers(face: Face) -> Iterator[APIRouter]:
     yield costmap.router(beside.mapper, evaluator, clock)
     yield coverage.router(beside.coverage, clock)
     yield commands.router(parts.commander, clock)
+    yield goals.router(parts.goals, clock)
     yield alerts.router(evaluator, clock)
     yield rule.router(beside.rules, clock)
     yield detectors.router(beside.detectors, clock)

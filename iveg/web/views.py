@@ -18,6 +18,7 @@ from iveg.models.base import moment, rounded
 from iveg.models.climate import Climate
 from iveg.models.command import Command as CommandModel
 from iveg.models.device import Device
+from iveg.models.goal import Goal
 from iveg.models.health import Health, Safety
 from iveg.models.health import HopHealth as HopModel
 from iveg.models.margin import Margin
@@ -59,7 +60,7 @@ class Views:
         self, parts: Pipeline, counters: Callable[[], Counter[str]] | None = None
     ) -> None:
         self._evaluator, self._commander = parts.evaluator, parts.commander
-        self._margins = parts.margins
+        self._margins, self._goals = parts.margins, parts.goals
         self._situations = Situations(parts.evaluator)
         self.scans = parts.scans
         self._world, self._people = parts.world, parts.evaluator.people
@@ -86,6 +87,7 @@ class Views:
         machine = self._commander.machine(robot_id)
         odometry, safety, age = robot.odometry, robot.safety, robot.age_s(now)
         margin = self._margin(robot, margins, now)
+        goal = self._goals.newest(robot_id, now)
         return Robot(
             robot_id=robot_id,
             link=robot.link(now),
@@ -109,6 +111,7 @@ class Views:
             stop=None if machine.stop is None else self.command(machine.stop, now),
             stop_state=machine.state,
             navigation=Navigation.of(robot),
+            goal=None if goal is None else Goal.of(goal),
             replay=robot.is_replay,
             clock_offset_s=rounded(robot.clock.offset_s(now)),
             transport=self._world.feeds.of(robot_id).transport(now.mono),

@@ -4,6 +4,7 @@ import asyncio
 from collections.abc import Iterable
 
 from iveg.domain.errors import HopError
+from iveg.domain.goals import CancelOrder, GoalOrder
 
 
 class FakeContextBroker:
@@ -37,6 +38,12 @@ class FakeContextBroker:
     async def resume(self, robot_id: str, challenge: str, attempt: str) -> None:
         self.orders.append((challenge, attempt))
         await self._ask("resume", robot_id, ())
+
+    async def goal(self, robot_id: str, order: GoalOrder | CancelOrder) -> None:
+        goal_id = (
+            order.goal_id if isinstance(order, CancelOrder) else order.goal.goal_id
+        )
+        await self._ask("goal", robot_id, (goal_id,))
 
     def refuse(self) -> None:
         """From now on Orion is down."""

@@ -6,6 +6,7 @@ from typing import Literal
 
 from iveg.domain.errors import HopError
 from iveg.domain.feedback import Feedback
+from iveg.domain.goals import CancelOrder, GoalOrder
 
 
 class FakeFleet:
@@ -17,6 +18,7 @@ class FakeFleet:
         asked: (what, robot, hold ids) of each release and resume.
         orders: (challenge, attempt) of the same.
         levels: (robot, desired, ids) likewise.
+        goals: (robot, order) of each goal and cancellation.
         fails: Every publication is refused.
         opened: Cleared, every STOP hangs until it is set.
     """
@@ -27,6 +29,7 @@ class FakeFleet:
         self.asked: list[tuple[str, str, tuple[str, ...]]] = []
         self.orders: list[tuple[str, str]] = []
         self.levels: list[tuple[str, str, tuple[str, ...]]] = []
+        self.goals: list[tuple[str, GoalOrder | CancelOrder]] = []
         self.fails = False
         self.opened = asyncio.Event()
         self.opened.set()
@@ -48,6 +51,10 @@ class FakeFleet:
     async def resume(self, robot_id: str, challenge: str, attempt: str) -> None:
         self.asked.append(("resume", robot_id, ()))
         self.orders.append((challenge, attempt))
+        await self._answer()
+
+    async def goal(self, robot_id: str, order: GoalOrder | CancelOrder) -> None:
+        self.goals.append((robot_id, order))
         await self._answer()
 
     async def set_desired_state(

@@ -65,6 +65,7 @@ export function robot(changes = {}) {
     stop: null,
     stop_state: "RUNNING",
     navigation: null,
+    goal: null,
     replay: false,
     clock_offset_s: 0,
     transport: "direct",

@@ -6,6 +6,7 @@ A period has three slots: drive and odometry, laser, camera.
 import asyncio
 from contextlib import AsyncExitStack
 from dataclasses import dataclass, replace
+from functools import partial
 
 from iveg.adapters import clock
 from iveg.domain.geometry import REST, Twist2D
@@ -79,6 +80,7 @@ class EmulatedRobot:
             profile=self._rig.profile,
             drive=self._obey_gate,
             held=held,
+            navigate=partial(self._rig.pursue, around=self._world),
             read_clock=self._read_clock,
         )
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import REST, Twist2D
+from iveg.domain.goals import Goal
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import (
     Climate,
@@ -30,12 +31,12 @@ from iveg.lab.emulator.camera import (
     robot_target,
     upright_box,
 )
-from iveg.lab.emulator.following import Follower
 from iveg.lab.emulator.greenhouse import Body, Disc, Scenery
 from iveg.lab.emulator.grounded import GroundedCamera
 from iveg.lab.emulator.kinematics import Odometer, Vehicle
 from iveg.lab.emulator.layout import Layout
 from iveg.lab.emulator.lidar import LaserModel, sweep
+from iveg.lab.emulator.navigation import Navigator
 from iveg.lab.emulator.orders import FaultOrder
 from iveg.lab.emulator.people import SimulatedPerson
 from iveg.lab.emulator.scripts import RobotScript
@@ -68,7 +69,6 @@ class RobotHardware:
         self.command = REST
         self.false_person: tuple[float, float] | None = None
         self.hides_people = False
-        self._script = script
         self._rng = rng
         self._odometer = Odometer(rng)
         place = None
@@ -77,9 +77,7 @@ class RobotHardware:
         self._detector = Detector(profile, detector, rng, place)
         self.vehicle = Vehicle(self.profile, script.start)
         self._believed = script.start
-        self._follower = Follower(
-            self.profile, script.route(), script.start, script.cruise, script.stations
-        )
+        self._navigator = Navigator(profile, script)
 
     def drive(self, command: Twist2D) -> None:
         """Set the command of the drive; it holds until the next."""
@@ -104,7 +102,11 @@ class RobotHardware:
         discs = around.discs()
         for body in around.bodies_but(self.robot_id):
             discs.extend(body.discs())
-        return self._follower.requested_twist(self.vehicle.pose, now, discs)
+        return self._navigator.requested_twist(self.vehicle.pose, now, discs)
+
+    def pursue(self, goal: Goal | None, around: "SimulatedWorld") -> bool:
+        """Drive to a goal, or give it up; whether a way there is known."""
+        return self._navigator.pursue(goal, self.vehicle.pose, around.scenery)
 
     # --- sensors ------------------------------------------------------------------
 
@@ -150,9 +152,7 @@ class RobotHardware:
 
     def navigation(self) -> Navigation:
         """The intent: task, goal and path."""
-        path = self._follower.path()
-        task = "waiting" if self._follower.at_station else self._script.task
-        return Navigation(self.robot_id, Origin(), task, path[-1], path)
+        return self._navigator.intent(self.robot_id)
 
 
 class SimulatedWorld:

@@ -14,6 +14,7 @@ from iveg.domain.observations import (
     CommandAnswer,
     CommandStatus,
     DetectionFrame,
+    GoalAnswer,
     HeartbeatProbe,
     LaserScan,
     Navigation,
@@ -187,6 +188,16 @@ def command_answer(robot_id: str, attributes: Mapping[str, object]) -> CommandAn
     )
 
 
+def _goal_info(robot_id: str, attributes: Mapping[str, object]) -> GoalAnswer:
+    return goal_answer(robot_id, {names.GOAL: attributes[names.GOAL_INFO]})
+
+
+def goal_answer(robot_id: str, attributes: Mapping[str, object]) -> GoalAnswer:
+    """A robot's own word of a goal (docs/interfaces/commands.md)."""
+    value = payloads.GoalAnswerValue.model_validate(attributes[names.GOAL])
+    return GoalAnswer(robot_id, read_origin(value), value.id, value.r, value.why)
+
+
 def _single_pose(robot_id: str, attributes: Mapping[str, object]) -> Odometry:
     value = payloads.OdometryValue.model_validate(attributes["pose"])
     odometry = _odometry_of(robot_id, value)
@@ -204,6 +215,7 @@ _READERS: Mapping[str, Reader] = {
     names.NAVIGATION: _navigation,
     names.COMMAND_STATUS: _command_status,
     names.COMMAND_INFO: _command_info,
+    names.GOAL_INFO: _goal_info,
     "pose": _single_pose,
     "laser_scan": read_single_scan,
     "class": read_single_detection,

@@ -5,6 +5,7 @@ from typing import Literal
 
 import orjson
 
+from iveg.domain.goals import CancelOrder, GoalOrder
 from iveg.ngsi import names
 
 
@@ -31,9 +32,18 @@ def write_resume(challenge: str, attempt: str) -> dict[str, object]:
     return {"resume": {"ch": challenge, "attempt": attempt}}
 
 
-def write_command(value: Mapping[str, object]) -> bytes:
+def write_goal(order: GoalOrder | CancelOrder) -> dict[str, object]:
+    """The value of ``goal`` that gives a goal, or takes it back."""
+    if isinstance(order, CancelOrder):
+        return {"cancel": {"id": order.goal_id}}
+    goal = order.goal
+    told = {"id": goal.goal_id, "kind": goal.kind, "x": goal.x, "y": goal.y}
+    return {"set": {**told, "ch": order.challenge, "until": order.until_s}}
+
+
+def write_command(value: Mapping[str, object], name: str = names.COMMAND) -> bytes:
     """A command as the IoT Agent puts it on the robot's topic."""
-    return orjson.dumps({names.COMMAND: value})
+    return orjson.dumps({name: value})
 
 
 def write_desired(desired: Literal["stopped", "run"], ids: Iterable[str]) -> bytes:

@@ -18,6 +18,7 @@ from iveg.ngsi.codec.attributes import (
     Readers,
     climate,
     command_answer,
+    goal_answer,
     heartbeat,
     read_attributes,
     read_one,
@@ -124,4 +125,6 @@ def read_answer(robot_id: str, payload: bytes) -> ReadResult:
         return unread(robot_id, error.reason, error.detail)
     if not isinstance(value, dict):
         return unread(robot_id, "not_an_object")
+    if names.GOAL in value and names.COMMAND not in value:
+        return read_one(robot_id, goal_answer, value, names.GOAL)
     return read_one(robot_id, command_answer, value, names.COMMAND)

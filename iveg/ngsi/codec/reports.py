@@ -9,6 +9,7 @@ from iveg.domain.observations import (
     Climate,
     CommandAnswer,
     DetectionFrame,
+    GoalAnswer,
     LaserScan,
     Navigation,
     Observation,
@@ -184,6 +185,12 @@ def write_answer(value: CommandAnswer) -> bytes:
             }
         }
     )
+
+
+def write_goal_answer(value: GoalAnswer) -> bytes:
+    """The bytes of ``/{apikey}/{robot}/cmdexe`` that tell of a goal."""
+    told = {"id": value.id, "r": value.result, "why": value.why}
+    return orjson.dumps({names.GOAL: told | write_origin(value.origin)})
 
 
 def _mark(origin: Origin) -> dict[str, str]:

@@ -360,6 +360,23 @@ export type Flood = {
   since: string | null;
 };
 
+/** A goal, in ``map`` (m). */
+export type Goal = {
+  goal_id: string;
+  robot_id: string;
+  kind: "here" | "aisle" | "return" | "pause";
+  x: number;
+  y: number;
+  aisle: string | null;
+  by: string;
+  state: "SENT" | "DRIVING" | "UNCONFIRMED" | "CANCELLING" | "REACHED" | "REFUSED" | "CANCELLED" | "DELETED" | "REPLACED";
+  why: string | null;
+  sent_at: string;
+  answered_at: string | null;
+  ended_at: string | null;
+  forgotten_at: string | null;
+};
+
 /** The greenhouse as the page draws it. */
 export type GreenhouseMap = {
   name: string;
@@ -740,6 +757,8 @@ export type Robot = {
   stop: Command | null;
   stop_state: string;
   navigation: Navigation | null;
+  /** The newest that a person gave it. */
+  goal: Goal | null;
   replay: boolean;
   clock_offset_s: number | null;
   /** Transport that feeds the pose. */

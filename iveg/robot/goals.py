@@ -1,0 +1,177 @@
+"""Goals on the robot: what it was told to drive to, until anything holds it.
+
+::
+
+    none ──set, while it runs──> driving ──near and at rest──> there
+    driving, there ──a hold, cancelled, replaced──> none
+
+A goal has no say in what the gate lets through: it only tells navigation where to go,
+and every hold makes the robot forget it.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from pydantic import Field, ValidationError
+
+from iveg.domain.errors import UnreadableError
+from iveg.domain.geometry import Pose2D
+from iveg.domain.goals import CancelOrder, Goal, GoalKind, GoalOrder
+from iveg.domain.observations import GoalAnswer, Origin
+from iveg.ngsi import names, payloads
+from iveg.ngsi.codec import load_json
+
+Navigate = Callable[[Goal | None], bool]
+"""Takes a goal, or None to give it up; whether it knows a way there."""
+
+NEAR_M = 0.5
+_REMEMBERED = 64
+
+
+class _Named(payloads.Wire, extra="forbid"):
+    id: Annotated[payloads.Text, Field(min_length=1)]
+
+
+class _Set(_Named):
+    kind: GoalKind
+    x: payloads.Metres
+    y: payloads.Metres
+    ch: Annotated[str, Field(min_length=1)]
+    until: float
+
+
+class _Value(payloads.Wire, extra="forbid"):
+    set: _Set | None = None
+    cancel: _Named | None = None
+
+
+def read_goal(payload: bytes) -> GoalOrder | CancelOrder | None:
+    """Read a message of ``/{apikey}/{robot}/cmd`` that is about a goal.
+
+    Returns:
+        None for anything else, and for whatever might be a STOP.
+    """
+    if b"stop" in payload.lower():
+        return None
+    try:
+        message = load_json(payload)
+        if not isinstance(message, dict) or message.keys() != {names.GOAL}:
+            return None
+        value = _Value.model_validate(message[names.GOAL])
+    except (UnreadableError, ValidationError):
+        return None
+    if value.cancel is not None and value.set is None:
+        return CancelOrder(value.cancel.id)
+    if value.set is None or value.cancel is not None:
+        return None
+    told = value.set
+    goal = Goal(told.id, told.kind, told.x, told.y)
+    return GoalOrder(goal, told.ch, told.until)
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """What the robot knows of itself at this moment.
+
+    Attributes:
+        runs: It may drive: no hold, and resumed.
+        challenge: As reported: every hold and resume makes another.
+        own_s: Its monotonic clock (s).
+        pose: In ``map``; None while it does not know.
+        stands: Whether it is measured to stand.
+    """
+
+    runs: bool
+    challenge: str
+    own_s: float
+    pose: Pose2D | None
+    stands: bool
+
+
+class RobotGoals:
+    """The goal of one robot.
+
+    Args:
+        robot_id: This robot.
+        navigate: Its navigation; None: nobody drives it anywhere.
+
+    Attributes:
+        goal: Where it is to be; None: wherever its own work takes it.
+    """
+
+    def __init__(self, robot_id: str, navigate: Navigate | None = None) -> None:
+        self._id = robot_id
+        self._navigate = navigate
+        self.goal: Goal | None = None
+        self._is_there = False
+        self._judged: dict[str, GoalAnswer] = {}
+
+    def take(self, order: GoalOrder | CancelOrder, facts: Facts) -> list[GoalAnswer]:
+        """Judge the first copy of an order; give every other the same answer."""
+        if isinstance(order, CancelOrder):
+            return self._cancel(order.goal_id)
+        goal_id = order.goal.goal_id
+        if goal_id in self._judged:
+            return [self._judged[goal_id]]
+        why = self._why_not(order, facts)
+        answers = [] if why else self._drop("replaced")
+        if why is None and not (self._navigate and self._navigate(order.goal)):
+            why = "no_way"
+        if why is None:
+            self.goal, self._is_there = order.goal, False
+        return [*answers, self._judge(goal_id, why)]
+
+    def settle(self, facts: Facts) -> list[GoalAnswer]:
+        """Forget the goal of a robot that is held; note when it is there."""
+        goal = self.goal
+        if goal is None:
+            return []
+        if not facts.runs:
+            return self._drop("held")
+        if self._is_there or facts.pose is None or not facts.stands:
+            return []
+        is_near = facts.pose.distance_to(goal.x, goal.y) <= NEAR_M
+        if not is_near and goal.kind != "pause":
+            return []
+        self._is_there = True
+        return [self._answer(goal.goal_id, "REACHED")]
+
+    def _why_not(self, order: GoalOrder, facts: Facts) -> str | None:
+        """Code of the reason against a goal; None when it may be driven to."""
+        if not facts.runs:
+            return "held"
+        if order.challenge != facts.challenge:
+            return "challenge"
+        if facts.own_s > order.until_s:
+            return "too_late"
+        return "no_pose" if facts.pose is None else None
+
+    def _cancel(self, goal_id: str) -> list[GoalAnswer]:
+        # A copy of the goal may come after its cancellation, by another transport.
+        if goal_id not in self._judged:
+            self._judge(goal_id, "cancelled")
+        if self.goal is not None and self.goal.goal_id == goal_id:
+            return self._drop("cancelled")
+        return [self._answer(goal_id, "DROPPED", "cancelled")]
+
+    def _drop(self, why: str) -> list[GoalAnswer]:
+        """Forget the goal; navigation is told before anybody else."""
+        goal, self.goal = self.goal, None
+        if goal is None:
+            return []
+        if self._navigate is not None:
+            self._navigate(None)
+        return [self._answer(goal.goal_id, "DROPPED", why)]
+
+    def _judge(self, goal_id: str, why: str | None) -> GoalAnswer:
+        result: Literal["ACCEPTED", "REFUSED"] = (
+            "ACCEPTED" if why is None else "REFUSED"
+        )
+        self._judged[goal_id] = self._answer(goal_id, result, why)
+        while len(self._judged) > _REMEMBERED:
+            del self._judged[next(iter(self._judged))]
+        return self._judged[goal_id]
+
+    def _answer(self, goal_id: str, result: str, why: str | None = None) -> GoalAnswer:
+        return GoalAnswer(self._id, Origin(), goal_id, result, why)

@@ -1,0 +1,65 @@
+"""A goal through real processes: given by API, driven to by the emulator, and told."""
+
+from contextlib import closing
+from typing import Any
+
+import httpx
+import pytest
+
+from tests.processes import EMULATOR, Site, until
+
+pytestmark = pytest.mark.slow
+SOON_S = 60.0
+TOLD = ["log.goal.sent.here", "log.goal.accepted", "log.goal.reached"]
+THERE = {"kind": "here", "x": 10.0, "y": 7.5}
+
+
+def operator(place: Site) -> httpx.Client:
+    """The page of whoever opened iVeg's link."""
+    headers = {"X-IVEG": "1", "Sec-Fetch-Site": "same-origin"}
+    client = httpx.Client(base_url=place.url, headers=headers, follow_redirects=True)
+    client.get(place.sign_in_link).raise_for_status()
+    return client
+
+
+def test_a_goal_is_driven_to_and_a_stop_deletes_the_next(served: Site) -> None:
+    served.start(*EMULATOR, "--seed", "3", "--profile", "perfect")
+    served.wait_until_live()
+    served.wait_until_whole()
+    with closing(operator(served)) as page:
+
+        def robot() -> dict[str, Any]:
+            return dict(page.get("/api/v1/robots/AGI").raise_for_status().json())
+
+        def goal_is(state: str) -> dict[str, Any] | None:
+            told = robot()
+            return told if told["goal"]["state"] == state else None
+
+        def told() -> list[str]:
+            lines = page.get("/api/v1/log", params={"robot": "AGI"}).json()["items"]
+            keys = (str(one["key"]) for one in reversed(lines))
+            return [key for key in keys if key.startswith("log.goal")]
+
+        given = page.post("/api/v1/robots/AGI/goal", json=THERE)
+        assert given.status_code == 202, given.text
+        there = until(lambda: goal_is("REACHED"), SOON_S, "AGI is at its goal")
+        away = (
+            (there["pose"]["x"] - 10.0) ** 2 + (there["pose"]["y"] - 7.5) ** 2
+        ) ** 0.5
+        assert away < 0.6
+        until(lambda: told() == TOLD or None, SOON_S, "the log tells each step")
+        counted = page.get("/api/v1/health").json()["counters"]
+        assert counted["fiware.GoalAnswer"] >= 2
+
+        page.post("/api/v1/robots/AGI/goal", json={**THERE, "y": 16.0})
+        until(lambda: goal_is("DRIVING"), SOON_S, "AGI is on its way")
+        assert page.post("/api/v1/robots/AGI/stop").status_code == 202
+        until(
+            lambda: robot()["goal"]["forgotten_at"] and goal_is("DELETED"),
+            SOON_S,
+            "both have deleted the goal",
+        )
+        until(lambda: robot()["stop_state"] == "STANDING" or None, SOON_S, "it stands")
+        held = page.post("/api/v1/robots/AGI/goal", json=THERE)
+        assert (held.status_code, held.json()["why"]) == (409, "held")
+    served.assert_clean()

@@ -1,0 +1,216 @@
+"""Goals between a person, the transports and the robot's own word."""
+
+from dataclasses import replace
+
+import pytest
+
+from iveg.domain.errors import CommandRefusedError, UnknownRobotError
+from iveg.domain.goals import CancelOrder, FollowedGoal, GoalOrder, GoalWish
+from iveg.domain.observations import GoalAnswer, Hold, Origin
+from tests.builders import odometry, safety_report
+from tests.unit.pipeline.desk import Desk, settle
+
+THERE = GoalWish("here", 5.0, 6.0)
+
+
+def counted(desk: Desk) -> Origin:
+    return replace(desk.next_origin(), mono=desk.clock.now)
+
+
+def free(desk: Desk, *holds: Hold) -> None:
+    """AGI says where it is and that it may drive, or what holds it."""
+    limit = (0.0, "hold") if holds else (1.0, "clear")
+    desk.hear(odometry("AGI", 3.0, linear=0.0, origin=counted(desk)))
+    desk.hear(
+        safety_report(
+            "AGI",
+            *holds,
+            speed_factor=limit[0],
+            reason=limit[1],
+            origin=counted(desk),
+        )
+    )
+
+
+async def sent(wish: GoalWish = THERE) -> Desk:
+    desk = Desk()
+    free(desk)
+    desk.parts.goals.give("AGI", wish, "ana", desk.clock())
+    await settle()
+    return desk
+
+
+def newest(desk: Desk) -> FollowedGoal:
+    goal = desk.parts.goals.newest("AGI", desk.clock())
+    assert goal is not None
+    return goal
+
+
+def say(desk: Desk, result: str, why: str | None = None) -> None:
+    goal_id = newest(desk).goal.goal_id
+    origin = replace(counted(desk), stamp=None, stamp_s=None)
+    desk.hear(GoalAnswer("AGI", origin, goal_id, result, why))
+
+
+async def test_a_goal_goes_once_on_each_transport_with_challenge_and_deadline() -> None:
+    desk = await sent()
+    await desk.wait(3.0)
+
+    (orders,) = [desk.fleet.goals]
+    ((robot_id, order),) = orders
+    assert isinstance(order, GoalOrder)
+    assert (robot_id, order.goal.x, order.goal.y) == ("AGI", 5.0, 6.0)
+    assert (order.challenge, order.until_s) == ("0123456789abcdef", 10.0)
+    assert [one[0] for one in desk.broker.asked] == ["goal"]
+    assert desk.fleet.stops == []
+    assert desk.commander.machine("AGI").state == "RUNNING"
+
+
+async def test_answer_and_progress_are_recorded() -> None:
+    desk = await sent()
+    say(desk, "ACCEPTED")
+    desk.clock.now += 4.0
+    free(desk)
+    say(desk, "REACHED")
+
+    goal = newest(desk)
+    lines = [one for one in desk.event_log.lines if one.key.startswith("log.goal")]
+    assert goal.state == "REACHED"
+    assert [one.key.removeprefix("log.goal.") for one in lines] == [
+        "sent.here",
+        "accepted",
+        "reached",
+    ]
+    assert (lines[0].slots["by"], lines[-1].slots["s"]) == ("ana", 4.0)
+
+
+async def test_an_unanswered_goal_is_not_confirmed_and_never_sent_again() -> None:
+    desk = await sent()
+    await desk.wait(10.2)
+
+    assert newest(desk).state == "UNCONFIRMED"
+    await desk.wait(30.0)
+    assert len(desk.fleet.goals) == 1
+
+
+async def test_a_refusal_is_told_with_its_reason() -> None:
+    desk = await sent()
+    say(desk, "REFUSED", "no_way")
+
+    assert (newest(desk).state, newest(desk).why) == ("REFUSED", "no_way")
+
+
+@pytest.mark.parametrize("answer", [None, "ACCEPTED"])
+async def test_a_stop_deletes_the_goal_at_once(answer: str | None) -> None:
+    desk = await sent()
+    if answer is not None:
+        say(desk, answer)
+    await desk.commander.stop(["AGI"], "ben", desk.clock())
+
+    assert newest(desk).state == "DELETED"
+    assert "log.goal.held" in desk.sentences()
+
+
+async def test_the_robots_own_hold_deletes_the_goal_too() -> None:
+    desk = await sent()
+    free(desk, Hold("hw-1", "hw", "local"))
+    await desk.wait(0.1)
+
+    assert newest(desk).state == "DELETED"
+
+
+async def test_a_release_and_a_resume_bring_no_goal_back() -> None:
+    desk = await sent()
+    say(desk, "ACCEPTED")
+    free(desk, Hold("hw-1", "hw", "local"))
+    await desk.wait(0.1)
+    free(desk)
+    say(desk, "ACCEPTED")
+    await desk.wait(5.0)
+
+    assert newest(desk).state == "DELETED"
+    assert len(desk.fleet.goals) == 1
+
+
+async def test_a_stop_before_the_goal_left_keeps_it_back() -> None:
+    desk = Desk()
+    free(desk)
+    desk.parts.goals.give("AGI", THERE, "ana", desk.clock())
+    await desk.commander.stop(["AGI"], "ben", desk.clock())
+    await settle()
+
+    assert desk.fleet.goals == []
+
+
+async def test_the_robots_word_that_it_forgot_is_kept_beside_a_deletion() -> None:
+    desk = await sent()
+    await desk.commander.stop(["AGI"], "ben", desk.clock())
+    assert newest(desk).forgotten is None
+
+    say(desk, "DROPPED", "held")
+
+    assert (newest(desk).state, newest(desk).forgotten) == ("DELETED", desk.clock())
+
+
+async def test_a_cancellation_names_the_goal_and_waits_for_the_robot() -> None:
+    desk = await sent()
+    say(desk, "ACCEPTED")
+    desk.parts.goals.cancel("AGI", "ben", desk.clock())
+    await settle()
+
+    goal_id = newest(desk).goal.goal_id
+    assert newest(desk).state == "CANCELLING"
+    assert desk.fleet.goals[-1] == ("AGI", CancelOrder(goal_id))
+    say(desk, "DROPPED", "cancelled")
+    assert newest(desk).state == "CANCELLED"
+
+
+async def test_without_a_goal_there_is_nothing_to_cancel() -> None:
+    desk = Desk()
+
+    with pytest.raises(CommandRefusedError, match="no_goal"):
+        desk.parts.goals.cancel("AGI", "ana", desk.clock())
+
+
+async def test_a_goal_for_nobody_is_refused() -> None:
+    desk = Desk()
+
+    with pytest.raises(UnknownRobotError):
+        desk.parts.goals.give("AGX", THERE, "ana", desk.clock())
+
+
+async def test_words_of_another_goal_change_nothing() -> None:
+    desk = await sent()
+    desk.hear(GoalAnswer("AGI", counted(desk), "01OTHER", "REACHED"))
+
+    assert newest(desk).state == "SENT"
+
+
+async def test_an_answer_that_orion_kept_changes_nothing() -> None:
+    desk = await sent()
+    answer = GoalAnswer("AGI", counted(desk), newest(desk).goal.goal_id, "REACHED")
+    desk.hear(answer, asked=True)
+
+    assert newest(desk).state == "SENT"
+
+
+async def test_why_the_robot_may_not_is_told_before_what_is_wrong_with_the_place() -> (
+    None
+):
+    desk = Desk()
+    free(desk, Hold("hw-1", "hw", "local"))
+
+    with pytest.raises(CommandRefusedError, match="held"):
+        desk.parts.goals.give("AGI", GoalWish("here", 1e5, 0.0), "ana", desk.clock())
+    assert desk.fleet.goals == []
+
+
+async def test_a_transport_that_fails_hurts_nothing() -> None:
+    desk = Desk()
+    free(desk)
+    desk.broker.refuse()
+    desk.parts.goals.give("AGI", THERE, "ana", desk.clock())
+    await settle()
+
+    assert len(desk.fleet.goals) == 1
+    assert newest(desk).state == "SENT"

@@ -1,0 +1,99 @@
+"""Goals by REST: who may send one, and one clear problem for each that is refused."""
+
+import pytest
+
+from iveg.domain.observations import Hold
+from iveg.web.security.authentication import Role
+from tests.unit.pipeline.desk import settle
+from tests.unit.pipeline.test_goals import free, say
+from tests.unit.web.desk import WebDesk
+
+GOAL = "/api/v1/robots/AGI/goal"
+THERE = {"kind": "here", "x": 5.0, "y": 6.0}
+
+
+async def test_a_goal_is_sent_and_shown_with_the_robot() -> None:
+    desk = WebDesk()
+    free(desk)
+    async with desk.browser() as browser:
+        given = await browser.post(GOAL, json=THERE)
+        await settle()
+        say(desk, "ACCEPTED")
+        shown = (await browser.get("/api/v1/robots/AGI")).json()["goal"]
+        cancelled = await browser.delete(GOAL)
+
+    told = given.json()
+    assert given.status_code == 202
+    assert (told["state"], told["kind"], told["by"]) == ("SENT", "here", "ana")
+    assert (shown["goal_id"], shown["state"]) == (told["goal_id"], "DRIVING")
+    assert (cancelled.status_code, cancelled.json()["state"]) == (202, "CANCELLING")
+
+
+@pytest.mark.parametrize("role", ["viewer", "expired"])
+async def test_who_may_only_stop_may_send_nobody_anywhere(role: Role) -> None:
+    desk = WebDesk()
+    free(desk)
+    async with desk.browser(role) as browser:
+        answers = [await browser.post(GOAL, json=THERE), await browser.delete(GOAL)]
+
+    assert [one.status_code for one in answers] == [403, 403]
+    assert desk.fleet.goals == []
+
+
+async def test_a_program_may_not() -> None:
+    desk = WebDesk()
+    free(desk)
+    async with desk.program() as program:
+        assert (await program.post(GOAL, json=THERE)).status_code == 403
+
+
+@pytest.mark.parametrize(
+    ("body", "status"),
+    [
+        ('{"kind": "here", "x": NaN, "y": 1}', 422),
+        ('{"kind": "here", "x": 1e999, "y": 1}', 422),
+        ('{"kind": "here", "x": "5", "y": 1}', 422),
+        ('{"kind": "here", "x": true, "y": 1}', 422),
+        ('{"kind": "here", "x": 1e9, "y": 1}', 422),
+        ('{"kind": "here", "x": 1}', 422),
+        ('{"kind": "race"}', 422),
+        ('{"kind": "return", "speed": 3}', 422),
+        ('{"kind": "aisle", "aisle": ""}', 422),
+        ('{"kind": ', 400),
+        ('{"kind": "here", "x": 1e5, "y": 1}', 409),
+        ('{"kind": "aisle", "aisle": "Pasillo 99"}', 409),
+    ],
+)
+async def test_a_bad_goal_is_one_problem_and_disturbs_nothing(
+    body: str, status: int
+) -> None:
+    desk = WebDesk()
+    free(desk)
+    async with desk.browser() as browser:
+        headers = {"Content-Type": "application/json"}
+        answer = await browser.post(GOAL, content=body, headers=headers)
+    await settle()
+
+    assert answer.status_code == status
+    assert answer.headers["Content-Type"] == "application/problem+json"
+    assert answer.json()["detail"]
+    assert desk.fleet.goals == []
+    assert desk.parts.goals.newest("AGI", desk.clock()) is None
+    assert desk.commander.machine("AGI").state == "RUNNING"
+
+
+async def test_a_held_robot_an_unheard_one_and_a_stranger_are_problems() -> None:
+    desk = WebDesk()
+    free(desk, Hold("hw-1", "hw", "local"))
+    async with desk.browser() as browser:
+        held = await browser.post(GOAL, json=THERE)
+        unheard = await browser.post("/api/v1/robots/AGII/goal", json=THERE)
+        stranger = await browser.post("/api/v1/robots/AGX/goal", json=THERE)
+        none = await browser.delete(GOAL)
+
+    assert [(one.status_code, one.json().get("why")) for one in (held, unheard)] == [
+        (409, "held"),
+        (409, "no_pose"),
+    ]
+    assert stranger.status_code == 404
+    assert (none.status_code, none.json()["why"]) == (409, "no_goal")
