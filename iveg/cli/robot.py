@@ -36,6 +36,7 @@ from iveg.domain.fleet import (
 from iveg.domain.geometry import Twist2D
 from iveg.domain.witness import Plan
 from iveg.ngsi import names
+from iveg.robot.goals import Navigate
 from iveg.robot.node import NodeSettings, RobotNode
 from iveg.robot.ros2.checking import Heard, judge, lines
 from iveg.robot.ros2.config import RobotConfig, read_classes, read_config
@@ -112,6 +113,7 @@ def _node(
     config: RobotConfig,
     drive: Callable[[Twist2D], None],
     on_feedback: Callable[[str, Feedback], None],
+    navigate: Navigate,
 ) -> RobotNode:
     return RobotNode(
         robot_id,
@@ -119,6 +121,7 @@ def _node(
         profile=_profile(_fleet(settings).of_robot(robot_id), config),
         drive=drive,
         on_feedback=on_feedback,
+        navigate=navigate,
     )
 
 

@@ -12,6 +12,7 @@ import math
 from iveg.adapters import clock
 from iveg.domain.errors import UnreadableError
 from iveg.domain.geometry import REST, Pose2D, Twist2D
+from iveg.domain.goals import Goal
 from iveg.domain.observations import Detection
 from iveg.lab.emulator.greenhouse import into
 from iveg.lab.emulator.orders import FaultOrder
@@ -115,6 +116,9 @@ class Ros2Base:
         self._commands = network.reader(
             names["cmd_vel_out"], m.Twist, config.qualities["cmd_vel_out"].newest(50)
         )
+        self._goals = network.reader(
+            names["goal"], m.PoseStamped, config.qualities["goal"].newest()
+        )
         self._wishes = writer("cmd_vel_in", m.Twist)
         self._tf, self._tf_static = (
             writer("tf", m.TFMessage),
@@ -152,6 +156,7 @@ class Ros2Base:
     def _drive(self, dt: float) -> None:
         now = clock.now()
         self._read_commands(now.mono)
+        self._read_goal()
         command = self._base.command(now.mono)
         self._rig.drive(command)
         requested = self._rig.requested_twist(now.mono - self._run_began, self._world)
@@ -171,6 +176,18 @@ class Ros2Base:
             _log.warning("%s: unusable command: %s", self.robot_id, error)
             return
         self._base.replace_command(twist, now)
+
+    def _read_goal(self) -> None:
+        """Take the newest goal; one without a way is left, as Nav2 aborts it."""
+        waited = self._goals.take()
+        if not waited:
+            return
+        try:
+            place = cdr.read(m.PoseStamped, waited[-1]).pose.position
+        except UnreadableError as error:
+            _log.warning("%s: unusable goal: %s", self.robot_id, error)
+            return
+        self._rig.pursue(Goal("", "here", place.x, place.y), self._world)
 
     def _tell_place(self, stamp: m.Time) -> None:
         measured = self._rig.odometry()

@@ -15,12 +15,15 @@ from iveg.adapters import clock
 from iveg.domain.errors import HopError
 from iveg.domain.feedback import Feedback
 from iveg.domain.geometry import Twist2D
+from iveg.domain.goals import Goal
 from iveg.domain.observations import RobotFault
+from iveg.robot.goals import Navigate
 from iveg.robot.node import RobotNode
 from iveg.robot.pacing import every
 from iveg.robot.ros2 import neighbours
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.drive import DriveTopics, message_of
+from iveg.robot.ros2.goal_pose import pose_for
 from iveg.robot.ros2.input_faults import speed_of
 from iveg.robot.ros2.inputs import SensorInputs
 from iveg.robot.ros2.lookout import Lookout, forms_published
@@ -43,9 +46,9 @@ _ORDER = list(TOPICS)
 
 
 NodeMaker = Callable[
-    [Callable[[Twist2D], None], Callable[[str, Feedback], None]], RobotNode
+    [Callable[[Twist2D], None], Callable[[str, Feedback], None], Navigate], RobotNode
 ]
-"""Makes the safety node from its drive and a callback for feedback."""
+"""Makes the safety node from its drive, a callback for feedback, and navigation."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +107,7 @@ class Ros2Robot:
         self._lookout = Lookout(config, self._input_faults, clock.mono())
         self._ticks = itertools.count()
         self._open(network)
-        self.node = make_node(self._drive, self._on_feedback)
+        self.node = make_node(self._drive, self._on_feedback, self.navigate)
 
     def _open(self, network: Network) -> None:
         qualities, drive = self._config.qualities, self._config.drive
@@ -122,11 +125,11 @@ class Ros2Robot:
             message_of(stamped=drive.stamped_out),
             qualities["cmd_vel_out"].newest(),
         )
-        self._cloud, self._markers = (
+        self._goal, self._cloud, self._markers = (
             network.writer(name, TOPICS[topic].message, qualities[topic].newest())
             if (name := self._names[topic])
             else None
-            for topic in ("obstacles", "markers")
+            for topic in ("goal", "obstacles", "markers")
         )
 
     def _listen(self, topic: str, form: type[Message]) -> None:
@@ -235,6 +238,19 @@ class Ros2Robot:
             _log.debug("%s: %s", self._id, error)
             out = self._names["cmd_vel_out"]
             self._input_faults.note("drive_refused", out, clock.mono())
+
+    def navigate(self, goal: Goal | None) -> bool:
+        """Publish a goal; a topic takes none back, so to give up is to stay here."""
+        writer, place = _heard(self._goal), self.inputs.place
+        if writer is None or place is None:
+            return False
+        frame = self._config.frames.map
+        try:
+            writer.write(cdr.write(pose_for(goal, place.flat(), clock.wall(), frame)))
+        except HopError as error:
+            _log.warning("%s: goal not published: %s", self._id, error)
+            return False
+        return True
 
     def _tell_neighbours(self) -> None:
         place = self.inputs.place

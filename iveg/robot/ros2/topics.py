@@ -13,7 +13,7 @@ from iveg.ros2.schema import Message
 Role = Literal["stream", "state", "picture", "transforms", "drive", "output"]
 """``stream``: old messages do not count; ``state``: the newest counts; ``picture``: one
 of which few may be pending; ``transforms``: every message counts; ``drive``: on either
-side of the gate, stamped or not; ``output``: what neighbours are published on."""
+side of the gate, stamped or not; ``output``: what goals and neighbours go out on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +63,8 @@ TOPICS: Mapping[str, Topic] = {
     "tf": Topic("tf", m.TFMessage, "transforms", TF),
     "cmd_vel_in": Topic("cmd_vel_nav", m.Twist, "drive"),
     "cmd_vel_out": Topic("cmd_vel", m.Twist, "drive", DEFAULT),
+    # Goals of iVeg, as Nav2 takes them.
+    "goal": Topic("goal_pose", m.PoseStamped, "output", DEFAULT),
     # People and peers, for Nav2's obstacle layer and for RViz.
     "obstacles": Topic("iveg/obstacles", m.PointCloud2, "output", DEFAULT),
     "markers": Topic("iveg/markers", m.MarkerArray, "output", DEFAULT),

@@ -126,6 +126,18 @@ async def test_algorithm_1_finds_the_robot_where_it_believes_itself(
     assert {LaserScan, DetectionFrame, Navigation} <= set(found)
 
 
+async def test_it_drives_to_a_goal_and_ignores_one_without_a_way(
+    emulated: Emulated,
+) -> None:
+    header = m.Header(m.Time(), "map")
+    for x, y in ((18.0, 10.0), (2.0, 5.0)):
+        pose = m.Pose(m.Point(x, y))
+        emulated.network.publish("/agii/goal_pose", m.PoseStamped(header, pose))
+        await until(lambda: not emulated.network.readers["/agii/goal_pose"].waiting)
+
+    assert emulated.rig.navigation().goal == (18.0, 10.0)
+
+
 async def test_it_drives_as_it_is_told_and_halts_when_nothing_comes(
     emulated: Emulated,
 ) -> None:

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import math
 import time
 from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass
@@ -13,7 +14,9 @@ from iveg.adapters import clock
 from iveg.adapters.mqtt import BrokerAddress
 from iveg.domain.feedback import Feedback
 from iveg.domain.geometry import Pose2D, Twist2D
+from iveg.domain.goals import Goal
 from iveg.domain.observations import Origin
+from iveg.robot.goals import Navigate
 from iveg.robot.node import NodeSettings, RobotNode
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.rig import Ros2Robot
@@ -57,7 +60,9 @@ async def riding(folder: Path) -> AsyncIterator[Site]:
     told: list[Callable[[str, Feedback], None]] = []
 
     def node(
-        drive: Callable[[Twist2D], None], hear: Callable[[str, Feedback], None]
+        drive: Callable[[Twist2D], None],
+        hear: Callable[[str, Feedback], None],
+        navigate: Navigate,
     ) -> RobotNode:
         told.append(hear)
         return RobotNode(
@@ -70,6 +75,7 @@ async def riding(folder: Path) -> AsyncIterator[Site]:
             profile=AGI,
             drive=drive,
             on_feedback=hear,
+            navigate=navigate,
         )
 
     robot = Ros2Robot("AGI", RobotConfig(namespace="/agi"), network, node)
@@ -106,6 +112,36 @@ async def test_while_it_is_held_the_base_is_told_zero_again_and_again(
     await until(lambda: len(site.driven) >= 20)
 
     assert set(site.driven) == {m.Twist()}
+
+
+async def test_a_goal_goes_out_as_nav2_takes_it_and_is_given_up_by_staying(
+    site: Site,
+) -> None:
+    placed(site.network)
+    await until(lambda: site.robot.inputs.place)
+    writer = site.network.writers["/agi/goal_pose"]
+
+    assert site.robot.navigate(Goal("01G", "here", 0.0, 5.0))
+    assert site.robot.navigate(Goal("01H", "pause", 9.0, 9.0))
+    assert site.robot.navigate(None)
+
+    sent, paused, stays = writer.said()
+    assert sent.header.frame_id == "map"
+    assert (sent.pose.position.x, sent.pose.position.y) == (0.0, 5.0)
+    assert sent.pose.orientation.z == pytest.approx(math.sin(math.pi / 4))
+    assert paused.pose == stays.pose == m.Pose()
+
+
+async def test_a_goal_that_nobody_hears_is_none(site: Site) -> None:
+    assert not site.robot.navigate(Goal("01G", "here", 0.0, 5.0))
+
+    placed(site.network)
+    await until(lambda: site.robot.inputs.place)
+    writer = site.network.writers["/agi/goal_pose"]
+    writer.readers = 0
+
+    assert not site.robot.navigate(Goal("01G", "here", 0.0, 5.0))
+    assert writer.sent == []
 
 
 async def test_a_second_publisher_of_the_drives_topic_makes_it_stand(

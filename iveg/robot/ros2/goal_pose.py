@@ -1,0 +1,27 @@
+"""Goals of iVeg as Nav2 takes them: ``geometry_msgs/PoseStamped`` on ``goal_pose``."""
+
+import math
+
+from iveg.domain.geometry import Pose2D
+from iveg.domain.goals import Goal
+from iveg.ros2 import messages as m
+
+
+def pose_for(goal: Goal | None, here: Pose2D, wall: float, frame: str) -> m.PoseStamped:
+    """The pose to drive to, looking the way that leads there.
+
+    Args:
+        goal: None, or one to pause: the pose where the robot is.
+        here: Where it is, in ``map``.
+        wall: The robot's clock (Unix s).
+        frame: Name of ``map``.
+    """
+    if goal is None or goal.kind == "pause":
+        x, y, yaw = here.x, here.y, here.yaw
+    else:
+        x, y = goal.x, goal.y
+        yaw = math.atan2(y - here.y, x - here.x)
+    turned = m.Quaternion(z=math.sin(yaw / 2), w=math.cos(yaw / 2))
+    return m.PoseStamped(
+        m.Header(m.Time.of(wall), frame), m.Pose(m.Point(x, y), turned)
+    )
