@@ -46,6 +46,7 @@ def test_what_moves_a_robot_asks_for_more_than_what_stops_it(app: FastAPI) -> No
     assert asked["stop"] == "stop"
     assert asked["release"] == "release"
     assert asked["resume"] == "release"
+    assert asked["goal"] == "release"
 
 
 def test_every_route_of_the_api_has_its_heading_in_the_contract(app: FastAPI) -> None:

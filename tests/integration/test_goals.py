@@ -1,17 +1,32 @@
 """A goal through real processes: given by API, driven to by the emulator, and told."""
 
+from collections.abc import Iterator
 from contextlib import closing
+from pathlib import Path
 from typing import Any
 
 import httpx
 import pytest
 
-from tests.processes import EMULATOR, Site, until
+from tests.processes import EMULATOR, Site, site, until
 
 pytestmark = pytest.mark.slow
 SOON_S = 60.0
 TOLD = ["log.goal.sent.here", "log.goal.accepted", "log.goal.reached"]
 THERE = {"kind": "here", "x": 10.0, "y": 7.5}
+
+
+@pytest.fixture
+def driving(tmp_path: Path) -> Iterator[Site]:
+    """FIWARE, dashboard and robots; orders go through Orion and the agent alone."""
+    with site(tmp_path, IVEG_STOP_DIRECT="off") as place:
+        place.start("fiware").wait_until_ready()
+        place.start("serve")
+        place.wait_until_served()
+        place.start(*EMULATOR, "--seed", "3", "--profile", "perfect")
+        place.wait_until_live()
+        place.wait_until_whole()
+        yield place
 
 
 def operator(place: Site) -> httpx.Client:
@@ -22,11 +37,8 @@ def operator(place: Site) -> httpx.Client:
     return client
 
 
-def test_a_goal_is_driven_to_and_a_stop_deletes_the_next(served: Site) -> None:
-    served.start(*EMULATOR, "--seed", "3", "--profile", "perfect")
-    served.wait_until_live()
-    served.wait_until_whole()
-    with closing(operator(served)) as page:
+def test_a_goal_is_driven_to_and_a_stop_deletes_the_next(driving: Site) -> None:
+    with closing(operator(driving)) as page:
 
         def robot() -> dict[str, Any]:
             return dict(page.get("/api/v1/robots/AGI").raise_for_status().json())
@@ -62,4 +74,4 @@ def test_a_goal_is_driven_to_and_a_stop_deletes_the_next(served: Site) -> None:
         until(lambda: robot()["stop_state"] == "STANDING" or None, SOON_S, "it stands")
         held = page.post("/api/v1/robots/AGI/goal", json=THERE)
         assert (held.status_code, held.json()["why"]) == (409, "held")
-    served.assert_clean()
+    driving.assert_clean()

@@ -161,6 +161,29 @@ async def test_a_shadow_of_the_command_at_orion_is_deleted(site: Site) -> None:
     assert await site.command_arrives("AGI")
 
 
+async def test_a_shadow_of_the_goal_at_orion_is_deleted_too(site: Site) -> None:
+    await site.provision("AGI")
+    body = {"id": "AGI", "type": "Robot", "goal": {"type": "command", "value": ""}}
+    await site.orion.http.ask(
+        "POST", "/v2/entities", query={"options": "upsert"}, body=body
+    )
+    (told,) = (await site.provision("AGI")).mended
+    assert told.startswith("Deleted attribute goal of AGI")
+
+
+async def test_a_device_of_an_earlier_version_gets_its_second_command(
+    site: Site,
+) -> None:
+    await site.provision("AGI")
+    devices = {one["device_id"]: one for one in await site.agent.read_devices()}
+    only_cmd = {**devices["AGI"], "commands": devices["AGI"]["commands"][:1]}
+    await site.agent.delete_device("AGI")
+    await site.agent.create_device(only_cmd)
+
+    assert (await site.provision("AGI")).mended == ("Made anew device AGI.",)
+    assert await site.command_arrives("AGI")
+
+
 async def test_registrations_of_an_agent_that_forgot_are_cleared(site: Site) -> None:
     await site.provision("AGI")
     stale = {

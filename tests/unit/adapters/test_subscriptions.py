@@ -170,9 +170,19 @@ SINGLE = orjson.dumps({"pose": {"x": 1, "y": 2, "yaw": 0}, "timestamp": "t"})
         ),
         ("/iveg/AGI/attrs", SINGLE, ["single uplink"]),
         ("/iveg/AGI/cmdexe", b'{"cmd": {"id": "01A", "r": "LATCHED"}}', ["commands"]),
+        ("/iveg/AGI/cmdexe", b'{"goal": {"id": "01G", "r": "REACHED"}}', ["goals"]),
         ("/iveg/AGI/attrs", BOTH, ["odometry AGI", "safety"]),
     ],
-    ids=["odometry", "scan", "look", "report", "single", "answer", "two at once"],
+    ids=[
+        "odometry",
+        "scan",
+        "look",
+        "report",
+        "single",
+        "answer",
+        "goal",
+        "two at once",
+    ],
 )
 async def test_an_update_is_one_request_for_each_subscription_that_is_about_it(
     topic: str, payload: bytes, told: list[str]

@@ -10,6 +10,7 @@ import pytest
 from iveg.adapters.orion import OrionClient
 from iveg.adapters.transports import OrionTransport
 from iveg.domain.errors import HopError
+from iveg.domain.goals import CancelOrder, Goal, GoalOrder
 
 
 @asynccontextmanager
@@ -65,6 +66,19 @@ async def test_a_command_is_one_attribute_alone(what: str, value: object) -> Non
             "PATCH /v2/entities/AGI/attrs?type=Robot HTTP/1.1",
             {"cmd": {"type": "command", "value": value}},
         )
+    ]
+
+
+async def test_a_goal_is_a_command_of_its_own_alone() -> None:
+    goal = Goal("01G", "aisle", 10.0, 7.5)
+    async with orion(b"204 No Content") as (transport, asked):
+        await transport.goal("AGI", GoalOrder(goal, "c", 17.5))
+        await transport.goal("AGI", CancelOrder("01G"))
+
+    told = {"id": "01G", "kind": "aisle", "x": 10.0, "y": 7.5, "ch": "c", "until": 17.5}
+    assert [body for _, body in asked] == [
+        {"goal": {"type": "command", "value": {"set": told}}},
+        {"goal": {"type": "command", "value": {"cancel": {"id": "01G"}}}},
     ]
 
 
