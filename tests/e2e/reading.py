@@ -90,3 +90,26 @@ SMALLEST_STOP = """() => Math.min(...[...document.querySelectorAll(
     return [width, height];
   }), document.querySelector('#stops [data-stop]') ? Infinity : 0)"""
 """The shorter side of the smallest STOP of the strip (px); 0 without any."""
+
+
+ON_SCREEN = """async ([rings, robots]) => {
+  const {createViewport, fitTo, screenX, screenY} =
+    await import('/static/js/map/viewport.js');
+  const {coverOf} = await import('/static/js/map/layers/scalebar.js');
+  const {bounds} = await (await fetch('/api/v1/map')).json();
+  const {left, top, width, height} =
+    document.querySelector('#map').getBoundingClientRect();
+  const over = [...document.querySelectorAll('[data-over-map]')].map((element) => {
+    const box = element.getBoundingClientRect();
+    return {left: box.left - left, top: box.top - top,
+            right: box.right - left, bottom: box.bottom - top};
+  });
+  const covers = [...over, coverOf({height})];
+  const view = fitTo(createViewport(width, height), bounds, undefined, covers);
+  const place = ({x, y}) => [screenX(view, x), screenY(view, y)];
+  const far = (ring) => robots.every(({x, y}) =>
+    Math.hypot(x - ring.x, y - ring.y) * view.scale > 30);
+  return rings.filter(far).map(place).find(([x, y]) =>
+    x > 0 && y > 0 && x < width && y < height) ?? null;
+}"""
+"""Where the first of some rings is, with the code that the map itself is drawn by."""

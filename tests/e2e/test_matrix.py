@@ -16,6 +16,7 @@ from playwright.sync_api import Browser, Page, expect
 from tests.e2e.hands import press_open
 from tests.e2e.reading import (
     COVERED_STOPS,
+    ON_SCREEN,
     OVERFLOW,
     SMALLEST_STOP,
     card,
@@ -274,7 +275,7 @@ def _ring(page: Page, stack: Site) -> tuple[float, float] | None:
     places = [robot["pose"] for robot in robots if robot["pose"]]
     causes = {robot["speed_limit"]["cause"] for robot in robots}
     rings = [person["position"] for person in people if person["person_id"] in causes]
-    found = page.evaluate(_ON_SCREEN, [rings, places])
+    found = page.evaluate(ON_SCREEN, [rings, places])
     return None if found is None else (found[0], found[1])
 
 
@@ -306,24 +307,3 @@ _THUMBNAIL = """(canvas) => {
   const {data} = context.getImageData(0, 0, small.width, small.height);
   return [...data].filter((_, i) => i % 4 === 1);
 }"""
-_ON_SCREEN = """async ([rings, robots]) => {
-  const {createViewport, fitTo, screenX, screenY} =
-    await import('/static/js/map/viewport.js');
-  const {coverOf} = await import('/static/js/map/layers/scalebar.js');
-  const {bounds} = await (await fetch('/api/v1/map')).json();
-  const {left, top, width, height} =
-    document.querySelector('#map').getBoundingClientRect();
-  const over = [...document.querySelectorAll('[data-over-map]')].map((element) => {
-    const box = element.getBoundingClientRect();
-    return {left: box.left - left, top: box.top - top,
-            right: box.right - left, bottom: box.bottom - top};
-  });
-  const covers = [...over, coverOf({height})];
-  const view = fitTo(createViewport(width, height), bounds, undefined, covers);
-  const place = ({x, y}) => [screenX(view, x), screenY(view, y)];
-  const far = (ring) => robots.every(({x, y}) =>
-    Math.hypot(x - ring.x, y - ring.y) * view.scale > 30);
-  return rings.filter(far).map(place).find(([x, y]) =>
-    x > 0 && y > 0 && x < width && y < height) ?? null;
-}"""
-"""Where the first of some rings is, with the code that the map itself is drawn by."""

@@ -53,6 +53,7 @@ export function createMap(canvas, store, options = {}) {
     onMeasure?.(measure);
     frames.ask();
   });
+  const asking = createAsking(frames.ask);
   const looks = createLooks(canvas, frames.ask);
   let scene = readScene(store, now());
   const camera = redrawing(
@@ -78,8 +79,12 @@ export function createMap(canvas, store, options = {}) {
   /** @param {number} px @param {number} py */
   function mark(px, py) {
     const view = camera.view();
-    measuring.mark({ x: worldX(view, px), y: worldY(view, py) });
+    const place = { x: worldX(view, px), y: worldY(view, py) };
+    if (asking.isOn()) asking.take(place);
+    else measuring.mark(place);
   }
+
+  const isMarking = () => asking.isOn() || measuring.isOn();
 
   function resize() {
     covers.forget();
@@ -88,7 +93,7 @@ export function createMap(canvas, store, options = {}) {
   }
 
   const endings = [
-    wireGestures(canvas, camera, picking, measuring.isOn, mark),
+    wireGestures(canvas, camera, picking, isMarking, mark),
     wireKeys(canvas, camera, store, choices.hasShortcuts, {
       measure: () => measuring.set(!measuring.isOn()),
       mark: () => mark(camera.view().width / 2, camera.view().height / 2),
@@ -112,6 +117,7 @@ export function createMap(canvas, store, options = {}) {
     ...choicesOf(choices),
     ...{ setTheme: looks.setTheme, setLanguage: looks.setLanguage },
     ...{ setMeasuring: measuring.set, isMeasuring: measuring.isOn },
+    askPlace: asking.ask,
     ...{ onPick: picking.onPick, onDrawn: frames.onDrawn },
     afterDrawn: frames.afterDrawn,
     destroy() {
@@ -163,6 +169,34 @@ function createLooks(canvas, onChange) {
     setLanguage(translate) {
       labels = createLabels(translate);
       onChange();
+    },
+  };
+}
+
+/**
+ * The next tap on the map as an answer, where somebody has asked for a place.
+ *
+ * @param {() => void} onChange
+ */
+function createAsking(onChange) {
+  /** @typedef {(place: {x: number, y: number}) => void} Answer in `map` (m) */
+  /** @type {Answer | null} */
+  let answer = null;
+
+  /** @param {Answer | null} next null asks no more */
+  function ask(next) {
+    answer = next;
+    onChange();
+  }
+
+  return {
+    isOn: () => answer !== null,
+    ask,
+    /** @param {{x: number, y: number}} place */
+    take(place) {
+      const asked = answer;
+      ask(null);
+      asked?.(place);
     },
   };
 }
@@ -230,15 +264,15 @@ function redrawing(camera, invalidate) {
  * @param {HTMLCanvasElement} canvas
  * @param {Camera} camera
  * @param {ReturnType<typeof createPicking>} picking
- * @param {() => boolean} isMeasuring
+ * @param {() => boolean} isMarking
  * @param {(px: number, py: number) => void} mark
  */
-function wireGestures(canvas, camera, picking, isMeasuring, mark) {
+function wireGestures(canvas, camera, picking, isMarking, mark) {
   return listen(canvas, {
     pan: camera.pan,
     zoom: camera.zoom,
     pinch: camera.pinch,
-    tap: (px, py) => (isMeasuring() ? mark(px, py) : picking.tap(px, py)),
+    tap: (px, py) => (isMarking() ? mark(px, py) : picking.tap(px, py)),
     doubleTap(px, py) {
       const picked = picking.at(px, py);
       if (picked?.kind === "robot") camera.follow(picked.id);
@@ -246,7 +280,7 @@ function wireGestures(canvas, camera, picking, isMeasuring, mark) {
     },
     hover(px, py) {
       const idle = picking.at(px, py) ? "pointer" : "grab";
-      canvas.style.cursor = isMeasuring() ? "crosshair" : idle;
+      canvas.style.cursor = isMarking() ? "crosshair" : idle;
     },
   });
 }

@@ -9,6 +9,7 @@ import { followCostmap, followCoverage } from "../map/costmap.js";
 import { hears } from "../map/layers/belief.js";
 import { createMap } from "../map/map.js";
 import { all, need, setAttribute, setHidden, setText } from "./dom.js";
+import { createGoalMap } from "./goal_map.js";
 import { drawHidden } from "./hidden_layers.js";
 import { createLegend } from "./legend.js";
 import { createMapFacts } from "./map_facts.js";
@@ -93,10 +94,13 @@ export function createMapbox(app, decision) {
   need("#map-measure").addEventListener("click", () =>
     map.setMeasuring(!map.isMeasuring()),
   );
+  const goals = createGoalMap(app, map);
   // Before the panels hear it: the key that closes a panel ends no measuring.
   const isPanelOpen = () => document.body.hasAttribute("data-panel");
   function onKey(/** @type {KeyboardEvent} */ { key }) {
-    if (key === "Escape" && !isPanelOpen()) map.setMeasuring(false);
+    if (key !== "Escape" || isPanelOpen()) return;
+    map.setMeasuring(false);
+    goals.end();
   }
   document.addEventListener("keydown", onKey, { capture: true });
   need("#layers").addEventListener("change", showHidden);

@@ -10,6 +10,7 @@ import { createDetector } from "./detector.js";
 import { all, setAttribute, setHidden, setText } from "./dom.js";
 import { createDrill } from "./drill.js";
 import { createGauge } from "./gauge.js";
+import { createGoal } from "./goal.js";
 import { drawReadings } from "./readings.js";
 import { createRelease } from "./release.js";
 import {
@@ -38,6 +39,7 @@ export class RobotCard {
   #release;
   #drill;
   #detector;
+  #goal;
 
   /** @param {App} app @param {HTMLElement} card */
   constructor(app, card) {
@@ -50,6 +52,7 @@ export class RobotCard {
     this.#release = createRelease(app, card, this.#robotId);
     this.#drill = createDrill(app, card, this.#robotId);
     this.#detector = createDetector(app, card, this.#robotId);
+    this.#goal = createGoal(app, card, this.#robotId);
     this.#parts.gauge.append(this.#gauge.svg, this.#gauge.bar);
     this.#parts.menu.addEventListener("click", (event) => this.#toggle(event));
     this.#parts.follow.addEventListener("click", () => this.#follow());
@@ -68,6 +71,7 @@ export class RobotCard {
     this.#release.draw(robot);
     this.#drill.draw(this.#release.factsOf(robot));
     this.#detector.draw(robot);
+    this.#goal.draw(this.#release.factsOf(robot));
   }
 
   get element() {

@@ -1,0 +1,71 @@
+"""A goal from the page: the card's menu asks for a place, the next tap is it."""
+
+import math
+from typing import Any
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.e2e.conftest import OpenPage
+from tests.e2e.hands import look, open_menu
+from tests.e2e.reading import ON_SCREEN, card, evaluate
+from tests.processes import Site, until
+
+pytestmark = pytest.mark.e2e
+
+PLACE = {"x": 10.0, "y": 7.5}
+OUTSIDE = {"x": -1.5, "y": 10.0}
+
+
+def tap_map(page: Page, place: dict[str, float]) -> None:
+    """Tap a place of ``map`` (m), wherever the picture has it now."""
+    page.locator("#map-fit").click()
+    x, y = evaluate(page, ON_SCREEN, [place], [])
+    page.locator("#map").click(position={"x": x, "y": y})
+
+
+def ask_for_a_place(page: Page) -> None:
+    open_menu(page, "AGI")
+    panel = card(page, "AGI").locator("dialog")
+    expect(panel.locator('[data-part="goal-why"]')).to_have_text("It may be sent.")
+    panel.locator('[data-goal="here"]').click()
+    expect(page.locator("#sending")).to_contain_text("Tap the place to send AGI to")
+
+
+def test_a_goal_is_tapped_and_driven_and_a_plain_tap_is_none(
+    open_page: OpenPage, stack: Site
+) -> None:
+    # Of the place that is refused a browser rightly complains.
+    page = open_page(locale="en-GB", alone=True)
+
+    def goal() -> dict[str, Any]:
+        return look(page, stack, "AGI")["goal"] or {}
+
+    tap_map(page, PLACE)
+    ask_for_a_place(page)
+    page.locator("#sending-end").click()
+    expect(page.locator("#sending")).to_be_hidden()
+    ask_for_a_place(page)
+    page.keyboard.press("Escape")
+    expect(page.locator("#sending")).to_be_hidden()
+    tap_map(page, PLACE)
+    assert goal() == {}
+
+    ask_for_a_place(page)
+    tap_map(page, OUTSIDE)
+    expect(page.locator("#sending")).to_contain_text(
+        "the place is outside the greenhouse"
+    )
+    assert goal() == {}
+
+    ask_for_a_place(page)
+    tap_map(page, PLACE)
+    expect(page.locator("#sending")).to_contain_text("on its way to the robot")
+    until(lambda: goal()["state"] == "REACHED" or None, 60.0, "AGI is there")
+    pose, given = look(page, stack, "AGI")["pose"], goal()
+    # The picture moves a little while it is tapped: lines come and go above the map.
+    assert math.dist((given["x"], given["y"]), PLACE.values()) < 0.8
+    assert math.dist((pose["x"], pose["y"]), (given["x"], given["y"])) < 0.6
+    open_menu(page, "AGI")
+    said = card(page, "AGI").locator('[data-part="goal-state"]')
+    expect(said).to_contain_text("the robot is there")
