@@ -116,6 +116,22 @@ class KeptDetection(Model):
         )
 
 
+class DetectionRow(KeptDetection):
+    """One detection of the history; what a CSV has beside the rest stands here too."""
+
+    at: str = Field(description="As ``received_at``, under the name of the CSV.")
+    x: float | None
+    y: float | None
+    z: float | None
+
+    @classmethod
+    def of_row(cls, record: DetectionRecord) -> "DetectionRow":
+        """One detection as it is remembered."""
+        told = dict(KeptDetection.of_record(record))
+        at = format_stamp(record.at)
+        return cls(**told, at=at, x=record.x, y=record.y, z=record.z)
+
+
 class Detection(KeptDetection):
     """One box of one detection frame, placed in ``map``."""
 

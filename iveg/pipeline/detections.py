@@ -1,7 +1,7 @@
 """Detection frames become persons on the map and lines of the log.
 
-A sighting is logged at its start and recorded once in two seconds, so that a person who
-stands before a camera for an hour does not fill the log.
+A sighting is logged at its start, so that a person who stands before a camera for an
+hour does not fill the log.
 """
 
 from iveg.domain.detection_rule import DetectionRule
@@ -14,6 +14,7 @@ from iveg.domain.tracking.people import People, Placed
 from iveg.domain.world import World
 from iveg.pipeline import topics
 from iveg.pipeline.event_log import EventLog
+from iveg.pipeline.kept_detections import KeptDetections
 from iveg.pipeline.ports import Ids
 
 _LOGGED_S = 2.0
@@ -33,6 +34,7 @@ class DetectionTracking:
     Attributes:
         placed: What each robot's newest look found, faint ones included.
         other: When the newest confident object of another class came, by robot.
+        kept: Chooses the detections that become rows.
     """
 
     def __init__(
@@ -44,6 +46,7 @@ class DetectionTracking:
     ) -> None:
         self.placed: dict[str, list[Placed]] = {}
         self.other: dict[str, Instant] = {}
+        self.kept = KeptDetections(event_log)
         self._world = world
         self._people = people
         self._event_log = event_log
@@ -126,21 +129,19 @@ class DetectionTracking:
         at, robot_id = received.at, frame.robot_id
         subject = one.peer or (one.person.person_id if one.person else "")
         subject = subject or f"{one.kind}:{one.detection.class_id}"
+        self.kept.look(one, subject, frame, received)
         last = self._logged_at.get((robot_id, subject))
         if one.kind == "other":
             self.other[robot_id] = at
         if last is not None and at.mono - last < _LOGGED_S:
-            # The first moment stays, so that a long sighting gets a row every so often.
             return
         self._logged_at[robot_id, subject] = at.mono
-        self._event_log.detection(
-            one, robot_id, frame.origin.stamp, at, received.transport
-        )
         if last is None or at.mono - last >= 2 * _LOGGED_S:
             self._event_log.log(_line(one, robot_id, subject), at)
 
     def forget(self, now: Instant) -> None:
-        """Forget log lines about persons who are gone."""
+        """Forget log lines and rows about persons who are gone."""
+        self.kept.forget(now)
         if len(self._logged_at) > _MAX_SUBJECTS:
             self._logged_at = {
                 key: at

@@ -247,6 +247,10 @@ class Evaluator:
             self._event_log.decisions(ended)
             return
         self.protected_unseen += not crossing.in_sight
+        if crossing.zone.sighting is not None:
+            self.tracking.kept.keep_evidence(
+                crossing.zone.cause, crossing.zone.sighting
+            )
         places = places_of(crossing, self.world)
         begun = self.decisions.begin(crossing, self.rule, places)
         self._event_log.decisions([begun])

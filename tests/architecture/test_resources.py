@@ -8,13 +8,21 @@ from pydantic.json_schema import models_json_schema
 from iveg.models.base import Model
 from iveg.models.day import Day
 from iveg.models.device import Device
-from iveg.models.people import KeptDetection
+from iveg.models.odometry import OdometryRow
+from iveg.models.people import DetectionRow, KeptDetection
 from iveg.models.typescript import TOLD
 from tests.architecture import documents
 from tests.processes import ROOT
 
 PAGE = (documents.INTERFACES / "resources.md").read_text()
-_SHOWN: tuple[type[Model], ...] = (*TOLD, Day, Device, KeptDetection)
+_SHOWN: tuple[type[Model], ...] = (
+    *TOLD,
+    Day,
+    Device,
+    KeptDetection,
+    DetectionRow,
+    OdometryRow,
+)
 _, _DOCUMENT = models_json_schema([(model, "serialization") for model in _SHOWN])
 _SHAPES = _DOCUMENT["$defs"]
 MODELS = {

@@ -4,6 +4,7 @@ That nearly every slow-down carries every link is proven on the virtual clock, i
 ``tests/unit/lab/emulator/test_scenarios.py``.
 """
 
+from functools import partial
 from typing import Any
 
 import httpx
@@ -24,6 +25,42 @@ def limiting_decision(api: httpx.Client) -> str | None:
 
 def links_of(decision: dict[str, Any]) -> dict[str, str]:
     return {link["link"]: link["verdict"] for link in decision["links"]}
+
+
+def evidence_of(api: httpx.Client, decision: dict[str, Any]) -> list[dict[str, Any]]:
+    """Detections that the history keeps and the decision names by its own keys."""
+    asked = {"robot": decision["observer"], "person": decision["person_id"]}
+    rows = api.get("detections", params={**asked, "limit": 1000}).json()["items"]
+    return [
+        row
+        for row in rows
+        if (row["probability"], row["position"])
+        == (decision["confidence"], decision["position"])
+    ]
+
+
+@pytest.mark.slow
+def test_the_detections_that_decisions_rest_on_are_found_by_rest(
+    driving: Site,
+) -> None:
+    with driving.api() as api:
+        decisions = until(
+            lambda: [
+                one
+                for one in api.get("decisions").json()["items"]
+                if one["confidence"] is not None
+            ],
+            WATCHED_S,
+            "a decision about somebody who was seen",
+        )
+        for one in decisions:
+            until(partial(evidence_of, api, one), 5.0, one["decision_id"])
+        lines = api.get("tracks", params={"format": "csv", "limit": 1}).text
+        (track,) = api.get("tracks", params={"limit": 1}).json()["items"]
+        (pose,) = api.get("odometry", params={"limit": 1}).json()["items"]
+    assert set(lines.splitlines()[0].split(",")) <= set(track)
+    assert track["person_id"] is not None
+    assert pose["robot_id"] in ("AGI", "AGII")
 
 
 @pytest.mark.slow

@@ -7,7 +7,7 @@ new rows nor deep pages make the next one wrong or slow.
 import base64
 import binascii
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Generic, TypeVar
 
 import orjson
@@ -31,6 +31,7 @@ from iveg.domain.records import (
     DecisionRecord,
     DetectionRecord,
     LogRecord,
+    OdometryRecord,
     ReadingRecord,
     Record,
 )
@@ -55,6 +56,7 @@ class Filter:
     Attributes:
         since: Inclusive; ``until`` exclusive (Unix seconds).
         class_: Canonical class, or class as the detector said.
+        person: Id of a person.
         min_probability: Inclusive, 0 to 1.
         limit: Rows of a page.
     """
@@ -63,6 +65,7 @@ class Filter:
     until: float | None = None
     robot: str | None = None
     class_: str | None = None
+    person: str | None = None
     min_probability: float | None = None
     limit: int = USUAL_ROWS
     cursor: Cursor | None = None
@@ -83,6 +86,7 @@ class ListOf(Generic[R]):
     Attributes:
         at: The column that orders it; ``key`` settles equal times.
         classes: Columns that the class filter looks at.
+        which: Rows that are in the list at all; None: every one of the table.
     """
 
     kind: type[R]
@@ -91,6 +95,7 @@ class ListOf(Generic[R]):
     key: Column[int] | Column[str]
     classes: tuple[Column[str], ...] = ()
     probability: Column[float] | None = None
+    which: ColumnElement[bool] | None = None
 
 
 DECISIONS = ListOf(
@@ -108,6 +113,13 @@ DETECTIONS = ListOf(
     tables.detections.c.row_id,
     (tables.detections.c.class_, tables.detections.c.class_id),
     tables.detections.c.probability,
+)
+TRACKS = replace(DETECTIONS, which=tables.detections.c.person_id.is_not(None))
+ODOMETRY = ListOf(
+    OdometryRecord,
+    tables.odometry,
+    tables.odometry.c.at,
+    tables.odometry.c.row_id,
 )
 COMMANDS = ListOf(
     CommandRecord,
@@ -157,12 +169,16 @@ def read_page(connection: Connection, of: ListOf[R], asked: Filter) -> Page[R]:
 
 def conditions(of: ListOf[R], asked: Filter) -> Iterator[ColumnElement[bool]]:
     """SQL conditions of a filter."""
+    if of.which is not None:
+        yield of.which
     if asked.since is not None:
         yield of.at >= asked.since
     if asked.until is not None:
         yield of.at < asked.until
     if asked.robot is not None:
         yield of.table.c.robot_id == asked.robot
+    if asked.person is not None and "person_id" in of.table.c:
+        yield of.table.c.person_id == asked.person
     if asked.class_ is not None and of.classes:
         yield or_(*(column == asked.class_ for column in of.classes))
     if asked.min_probability is not None and of.probability is not None:

@@ -34,6 +34,7 @@ from iveg.domain.records import (
     DetectionRecord,
     LatencyRecord,
     LogRecord,
+    OdometryRecord,
     ReadingRecord,
 )
 
@@ -62,6 +63,14 @@ class Queries:
     async def detections(self, asked: Filter) -> Page[DetectionRecord]:
         """Detections by ``at``."""
         return await self._ask(lambda c: lists.read_page(c, lists.DETECTIONS, asked))
+
+    async def tracks(self, asked: Filter) -> Page[DetectionRecord]:
+        """Detections of people, by ``at``."""
+        return await self._ask(lambda c: lists.read_page(c, lists.TRACKS, asked))
+
+    async def odometry(self, asked: Filter) -> Page[OdometryRecord]:
+        """Poses of robots, by ``at``."""
+        return await self._ask(lambda c: lists.read_page(c, lists.ODOMETRY, asked))
 
     async def commands(self, asked: Filter) -> Page[CommandRecord]:
         """Commands by ``requested_at``."""

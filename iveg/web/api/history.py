@@ -32,7 +32,8 @@ from iveg.models.base import Listing, Model, write_json
 from iveg.models.climate import ClimateReading
 from iveg.models.command import Command
 from iveg.models.decision import Decision
-from iveg.models.people import KeptDetection
+from iveg.models.odometry import OdometryRow
+from iveg.models.people import DetectionRow
 from iveg.models.reading import Reading
 from iveg.pipeline.ports import Clock
 from iveg.web.api import exports
@@ -176,14 +177,6 @@ def _lists(queries: Queries, flood: Callable[[], Flood]) -> tuple[_List[Any], ..
             "Why robots were slowed, by when it began",
         ),
         _List(
-            "detections",
-            lists.DETECTIONS,
-            queries.detections,
-            KeptDetection.of_record,
-            Listing[KeptDetection],
-            "What robots saw, by when it reached iVeg",
-        ),
-        _List(
             "commands",
             lists.COMMANDS,
             queries.commands,
@@ -208,6 +201,37 @@ def _lists(queries: Queries, flood: Callable[[], Flood]) -> tuple[_List[Any], ..
             LogEntry.of_record,
             Listing[LogEntry],
             "The action and inference log",
+        ),
+        *_measured(queries),
+    )
+
+
+def _measured(queries: Queries) -> tuple[_List[Any], ...]:
+    """Lists of what was measured; each column of the CSV is a key of the JSON."""
+    return (
+        _List(
+            "detections",
+            lists.DETECTIONS,
+            queries.detections,
+            DetectionRow.of_row,
+            Listing[DetectionRow],
+            "What robots saw, by when it reached iVeg",
+        ),
+        _List(
+            "tracks",
+            lists.TRACKS,
+            queries.tracks,
+            DetectionRow.of_row,
+            Listing[DetectionRow],
+            "Where people were: their detections, by when each reached iVeg",
+        ),
+        _List(
+            "odometry",
+            lists.ODOMETRY,
+            queries.odometry,
+            OdometryRow.of_record,
+            Listing[OdometryRow],
+            "Poses and speeds of robots with their speed limits, twice a second",
         ),
         _List(
             "readings",

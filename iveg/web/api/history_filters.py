@@ -87,6 +87,12 @@ class Filters(Range):
         pattern=_NO_CONTROLS,
         description="Canonical class, or as sent",
     )
+    person: str | None = Field(
+        None,
+        max_length=64,
+        pattern=_NO_CONTROLS,
+        description="Person id; of decisions, detections and tracks",
+    )
     min_probability: float | None = Field(
         None, ge=0, le=1, allow_inf_nan=False, description="Least confidence, inclusive"
     )
@@ -114,6 +120,7 @@ def filter_of(filters: Filters, of: ListOf[R]) -> Filter:
         until=_seconds(filters.until),
         robot=filters.robot,
         class_=filters.class_,
+        person=filters.person,
         min_probability=filters.min_probability,
         limit=filters.limit or lists.USUAL_ROWS,
         cursor=_cursor(filters.cursor, of),

@@ -432,14 +432,14 @@ def test_a_robot_that_reports_nothing_is_told_by_its_speed_limit() -> None:
     assert desk.sentences()[-1] == "log.speed_down.person"
 
 
-def test_a_long_sighting_is_one_line_and_a_row_every_two_seconds() -> None:
+def test_a_long_sighting_is_one_line_and_two_rows_a_second() -> None:
     desk = watched(Desk())
     for _ in range(50):
         desk.clock.now = round(desk.clock.now + 0.1, 6)
         desk.look("AGII", detection("farmer", 80.0))
 
     assert desk.sentences().count("log.detection") == 1
-    assert len(desk.records(DetectionRecord)) == 3
+    assert len(desk.records(DetectionRecord)) == 10
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from iveg.models.command import Command, Drill, Latency
 from iveg.models.decision import Decision
 from iveg.models.health import Health
 from iveg.models.latency import LatencyTable
-from iveg.models.people import Detection, Person
+from iveg.models.people import DetectionRow, Person
 from iveg.models.places import GreenhouseMap, Scan
 from iveg.models.robot import Robot
 from iveg.models.rule import Rule
@@ -29,7 +29,7 @@ PROMISED: dict[str, Any] = {
     "REST rule/versions": Listing[Rule],
     "REST decisions": Listing[Decision],
     "REST decisions/D1": Decision,
-    "REST detections": Listing[Detection],
+    "REST detections": Listing[DetectionRow],
     "REST commands": Listing[Command],
     "REST commands/C1": Command,
     "REST commands/latency": Latency,
@@ -38,7 +38,7 @@ PROMISED: dict[str, Any] = {
     "REST log": Listing[LogEntry],
     "REST latency": LatencyTable,
     "NDJSON decisions": list[Decision],
-    "NDJSON detections": list[Detection],
+    "NDJSON detections": list[DetectionRow],
     "NDJSON commands": list[Command],
     "NDJSON alerts": list[Alert],
     "NDJSON log": list[LogEntry],

@@ -23,6 +23,7 @@ from iveg.domain.observations import Instant
 from iveg.domain.records import DecisionRecord, ReadingRecord, Record
 from iveg.pipeline.record import Waiting
 from iveg.web import problems
+from iveg.web.api import exports
 from iveg.web.api.history import router
 from iveg.web.pages import charts
 from iveg.web.security.authentication import require
@@ -39,7 +40,10 @@ from tests.fakes.records import (
 )
 from tests.fakes.worker import FakeWorker
 
-LISTS = ("decisions", "detections", "commands", "alerts", "log", "readings")
+LISTS = (
+    *("decisions", "detections", "commands", "alerts", "log", "readings"),
+    *("tracks", "odometry"),
+)
 
 
 class Past:
@@ -137,6 +141,10 @@ async def test_a_detection_reads_as_the_contract_says(
         "person_id": "P1",
         "peer": None,
         "transport": "direct",
+        "at": "2023-11-14T22:13:20.000Z",
+        "x": -3.5,
+        "y": 2.0,
+        "z": 0.9,
     }
 
 
@@ -655,6 +663,38 @@ async def test_a_database_that_is_away_is_a_problem_and_not_a_crash(
     assert "secret" not in answer.text
 
 
+async def test_each_column_of_what_was_measured_is_a_key_of_its_json(
+    client: httpx.AsyncClient, past: Past
+) -> None:
+    past.holds(
+        detection_record(person_id="P1"),
+        odometry_record(),
+        ReadingRecord(at=NOON, robot_id="AGI", kind="battery", value={"voltage": 25}),
+    )
+
+    for path in ("detections", "tracks", "odometry", "readings"):
+        [item] = (await client.get(f"/api/v1/{path}")).json()["items"]
+        lines = (await client.get(f"/api/v1/{path}?format=csv")).text
+        [row] = csv.DictReader(io.StringIO(lines))
+        assert row == {name: exports.cell(name, item[name]) for name in row}
+
+
+async def test_a_track_is_what_was_seen_of_one_person(
+    client: httpx.AsyncClient, past: Past
+) -> None:
+    past.holds(
+        detection_record(at=NOON, person_id="P1-5f0c9a12"),
+        detection_record(at=NOON + 1.0, person_id="P2-5f0c9a12"),
+        detection_record(at=NOON + 2.0, person_id=None),
+    )
+
+    every = (await client.get("/api/v1/tracks")).json()["items"]
+    one = (await client.get("/api/v1/tracks?person=P1-5f0c9a12")).json()["items"]
+
+    assert [row["person_id"] for row in every] == ["P2-5f0c9a12", "P1-5f0c9a12"]
+    assert [row["person_id"] for row in one] == ["P1-5f0c9a12"]
+
+
 async def test_the_lists_are_described_for_integrators(past: Past) -> None:
     described = past.app.openapi()
 
@@ -664,7 +704,7 @@ async def test_the_lists_are_described_for_integrators(past: Past) -> None:
         "text/csv",
         "application/x-ndjson",
     }
-    fields = described["components"]["schemas"]["KeptDetection"]["properties"]
+    fields = described["components"]["schemas"]["DetectionRow"]["properties"]
     assert {"class", "position", "transport"} <= set(fields)
 
 
