@@ -285,6 +285,9 @@ class Settings:
         "mvsim-20x20",
         "`mvsim-20x20`, `agroconnect`, `none` (open field), or a file.",
     )
+    equipment: str = setting(
+        "IVEG_EQUIPMENT", "", "File of docs/equipment.md, or `demo`; empty: none."
+    )
 
     @classmethod
     def from_environment(cls, environment: Mapping[str, str]) -> "Settings":

@@ -5,13 +5,14 @@ It keeps the way of commands to the robot clear; the traps are in docs/fiware.md
 "Provisioning".
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from iveg.adapters.fiware_http import PROBE_TIMEOUT_S, Document, FiwareClient
 from iveg.adapters.orion import OrionClient
 from iveg.adapters.orphan_entities import remove_orphans
+from iveg.domain.equipment import Tile
 from iveg.domain.errors import HopError
 from iveg.ngsi import names
 
@@ -116,6 +117,7 @@ async def provision(
     robots: Sequence[str],
     apikey: str,
     cbroker_url: str,
+    tiles: Sequence[Tile] = (),
 ) -> Provisioned:
     """Make group, devices and command registrations of a fleet what they should be.
 
@@ -125,13 +127,15 @@ async def provision(
         robots: The fleet.
         apikey: First part of every topic.
         cbroker_url: Orion as the agent reaches it.
+        tiles: Of other equipment, whose devices are made where they name one.
 
     Raises:
         HopError: a neighbour does not answer or does not take something.
     """
     mended = await _ensure_group(agent, apikey, cbroker_url)
     known = {str(one.get("device_id")): one for one in await agent.read_devices()}
-    mended += await _ensure_device(agent, known, _climate_device(apikey))
+    for device in (_climate_device(apikey), *_devices_of(tiles, apikey)):
+        mended += await _ensure_device(agent, known, device)
     problems = []
     for robot_id in robots:
         mended += await _ensure_robot(agent, orion, known, robot_id, apikey)
@@ -298,6 +302,15 @@ def _climate_device(apikey: str) -> Document:
     return write_device(
         names.CLIMATE_DEVICE, names.CLIMATE_ID, names.CLIMATE_TYPE, attributes, apikey
     )
+
+
+def _devices_of(tiles: Sequence[Tile], apikey: str) -> Iterator[Document]:
+    """A device for each that tiles name, with the attributes of all of them."""
+    for name in dict.fromkeys(one.device for one in tiles if one.device):
+        mine = [one for one in tiles if one.device == name]
+        attributes = [(one.attribute, "Number") for one in mine]
+        entity, kind = mine[0].entity_id, mine[0].entity_type
+        yield write_device(name, entity, kind, attributes, apikey)
 
 
 def _heartbeat_device(apikey: str) -> Document:

@@ -19,6 +19,7 @@ from iveg.adapters.mqtt import MqttLink
 from iveg.adapters.orion import OrionClient
 from iveg.adapters.subscriptions import Ensured, ensure_subscriptions, wanted_for
 from iveg.adapters.throttle import Throttle
+from iveg.domain.equipment import Tile
 from iveg.domain.errors import HopError, NoAnswerError
 from iveg.domain.feeds import Feeds
 from iveg.domain.observations import HeartbeatProbe, Instant, Origin, Received
@@ -42,6 +43,7 @@ class Provisioner:
 
     Args:
         feeds: Which transport feeds each robot.
+        tiles: Of other equipment.
 
     Attributes:
         throttle: Keeps Orion from sending what comes straight from MQTT already.
@@ -63,6 +65,7 @@ class Provisioner:
         notify_token: str,
         boot: str,
         read_clock: Callable[[], Instant],
+        tiles: Sequence[Tile] = (),
     ) -> None:
         self._orion = orion
         self._agent = agent
@@ -70,6 +73,7 @@ class Provisioner:
         self._health_monitor = health_monitor
         self._ingest = ingest
         self._robots = robots
+        self._tiles = tiles
         self._apikey = apikey
         self._context_broker_url = context_broker_url
         self._notify_url = notify_url
@@ -258,6 +262,7 @@ class Provisioner:
             robots=self._robots,
             apikey=self._apikey,
             cbroker_url=self._context_broker_url,
+            tiles=self._tiles,
         )
         try:
             done: Provisioned = await _made_sense("iot_agent", work)
@@ -283,7 +288,7 @@ class Provisioner:
             self._orion,
             self._notify_url,
             self._notify_token,
-            wanted_for(self._robots),
+            wanted_for(self._robots, self._tiles),
         )
         self._is_subscribing = True
         try:

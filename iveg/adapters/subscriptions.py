@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from iveg.adapters.fiware_http import Document
+from iveg.domain.equipment import Tile
 from iveg.domain.kinds import MEASURED, Kind
 from iveg.domain.observations import Observation
 from iveg.ngsi import names
@@ -114,10 +115,21 @@ WANTED_OF_ALL = (
 )
 
 
-def wanted_for(robots: Iterable[str]) -> tuple[WantedSubscription, ...]:
-    """All subscriptions for a fleet."""
+def wanted_for(
+    robots: Iterable[str], tiles: Iterable[Tile] = ()
+) -> tuple[WantedSubscription, ...]:
+    """All subscriptions for a fleet and for other equipment."""
     copies = [one for robot_id in robots for one in _copies_of(robot_id)]
-    return (*copies, *WANTED_OF_ALL)
+    return (*copies, *WANTED_OF_ALL, *map(_of_tile, tiles))
+
+
+def _of_tile(tile: Tile) -> WantedSubscription:
+    """One for each attribute: in a common one Orion would send what is silent along.
+
+    Its notifications then prove that this very attribute was measured.
+    """
+    entity = (("id", tile.entity_id), ("type", tile.entity_type))
+    return WantedSubscription(f"tile {tile.key}", entity, (tile.attribute,))
 
 
 def _copies_of(robot_id: str) -> Iterator[WantedSubscription]:

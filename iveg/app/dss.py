@@ -15,6 +15,7 @@ from fastapi import FastAPI
 from iveg import __version__
 from iveg.adapters import clock, log_filter
 from iveg.adapters.direct import DirectReader
+from iveg.adapters.equipment_files import load_equipment
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.adapters.ids import new_id
@@ -38,6 +39,7 @@ from iveg.domain.observations import Instant
 from iveg.domain.stop.drills import Drills
 from iveg.domain.transports import DIRECT, FIWARE
 from iveg.pipeline.build import Choices, Ports, build, build_services
+from iveg.pipeline.equipment import PART as EQUIPMENT
 from iveg.pipeline.latency import hours_of
 from iveg.pipeline.ports import MessageSender
 from iveg.pipeline.restore import remember
@@ -97,7 +99,8 @@ class Dss:
             )
         )
         drills, era = Drills(settings.drill_days), f"-{self._boot[:8]}"
-        choices = Choices(kept.rules[-1], drills, self._boot, era)
+        tiles = load_equipment(settings.equipment, fleet.ids)
+        choices = Choices(kept.rules[-1], drills, self._boot, era, tiles)
         greenhouse = load_greenhouse(settings.greenhouse)
         self.pipeline = build(fleet, greenhouse, self._ports(), choices)
         self.services = build_services(self.pipeline, kept, self._senders(), clock.now)
@@ -177,6 +180,7 @@ class Dss:
             notify_token=self.notify_secret.current,
             boot=self._boot,
             read_clock=clock.now,
+            tiles=parts.equipment.equipment.tiles,
         )
         provisioner.throttle.allowed = settings.orion_throttle
         return provisioner
@@ -197,6 +201,8 @@ class Dss:
             (settings.fiware_service, settings.fiware_servicepath),
             self._notified,
             self.provisioner.throttle.is_throttled,
+            parts.equipment.equipment.entities,
+            parts.supervision.guard(EQUIPMENT, parts.equipment.receive),
         )
         site = Site(
             parts.evaluator.greenhouse.name,
@@ -258,6 +264,7 @@ class Dss:
             "coverage": lambda: beside.coverage.run(clock.now),
             "provisioner": self.provisioner.run,
             "history": self.stores.recorder.run,
+            EQUIPMENT: lambda: self.pipeline.equipment.run(clock.now),
             RETENTION: lambda: self.upkeep.run(clock.now),
             "messages": beside.messenger.run,
             "earlier": self._remember,

@@ -2,6 +2,7 @@
 
 import asyncio
 
+from iveg.adapters.equipment_files import load_equipment
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.iot_agent import IotAgentClient, provision
 from iveg.adapters.orion import OrionClient
@@ -17,12 +18,14 @@ def provision_fleet(settings: Settings) -> int:
             OrionClient(settings.orion_url, *tenant) as orion,
             IotAgentClient(settings.iota_url, *tenant) as agent,
         ):
+            robots = load_fleet(settings.fleet, settings.robots).ids
             done = await provision(
                 agent,
                 orion,
-                robots=load_fleet(settings.fleet, settings.robots).ids,
+                robots=robots,
                 apikey=settings.apikey,
                 cbroker_url=settings.iota_cb_url or settings.orion_url,
+                tiles=load_equipment(settings.equipment, robots),
             )
         said = [*done.mended, *done.problems]
         print("\n".join(said) or "Everything was as it should be.")

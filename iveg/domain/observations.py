@@ -4,7 +4,7 @@ The field names are those of ``nav_msgs``, ``sensor_msgs`` and the NGSI entity; 
 are Unix seconds unless said otherwise.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -302,6 +302,17 @@ class Climate(Observation):
     temperature: float | None = None
     relative_humidity: float | None = None
     co2: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class EntityReading:
+    """Attributes of other equipment as Orion tells them, still unread.
+
+    It is of no robot and waits in no queue of theirs (``pipeline.equipment``).
+    """
+
+    entity_id: str
+    attributes: Mapping[str, object]
 
 
 @dataclass(frozen=True, slots=True)

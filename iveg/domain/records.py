@@ -260,6 +260,21 @@ class ReadingRecord:
     value: Mapping[str, float | str | bool | None]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MeasurementRecord:
+    """One number of other equipment, as its tile shows it.
+
+    Attributes:
+        unit: Of the tile at that time (``domain.equipment.UNITS``).
+    """
+
+    at: float
+    entity_id: str
+    attribute: str
+    value: float
+    unit: str
+
+
 Record = (
     DecisionRecord
     | DetectionRecord
@@ -271,6 +286,7 @@ Record = (
     | ClimateRecord
     | LatencyRecord
     | ReadingRecord
+    | MeasurementRecord
 )
 RECORD_TYPES: tuple[type[Record], ...] = (
     DecisionRecord,
@@ -283,6 +299,7 @@ RECORD_TYPES: tuple[type[Record], ...] = (
     ClimateRecord,
     LatencyRecord,
     ReadingRecord,
+    MeasurementRecord,
 )
 
 
@@ -294,5 +311,6 @@ def is_telemetry(record: Record) -> bool:
         | DetectionRecord
         | ClimateRecord
         | LatencyRecord
-        | ReadingRecord,
+        | ReadingRecord
+        | MeasurementRecord,
     )

@@ -36,6 +36,7 @@ PURGE_STEPS = (
     PurgeStep("telemetry", "detections"),
     PurgeStep("telemetry", "climate"),
     PurgeStep("telemetry", "readings"),
+    PurgeStep("telemetry", "measurements"),
     PurgeStep("decisions", "decisions"),
     PurgeStep("decisions", "commands"),
     PurgeStep("decisions", "alerts"),
@@ -51,7 +52,7 @@ class Retention:
 
     Attributes:
         positions: Until people's places go from detections, decisions and log.
-        telemetry: Of odometry, detections, climate and readings.
+        telemetry: Of odometry, detections, climate, readings and measurements.
         decisions: Of decisions, commands, alerts and log.
         audit: Of the audit trail of commands.
     """

@@ -6,6 +6,7 @@ from iveg.models.alert import Alert, Flood, LogEntry
 from iveg.models.base import Model
 from iveg.models.climate import Climate
 from iveg.models.command import Command
+from iveg.models.equipment import Tile
 from iveg.models.health import Health
 from iveg.models.people import DetectionFrame, Person
 from iveg.models.places import GreenhouseMap
@@ -46,3 +47,4 @@ class Snapshot(Model):
     log: list[LogEntry] = Field(description="The newest 200, oldest first.")
     health: Health
     climate: Climate | None
+    equipment: list[Tile]

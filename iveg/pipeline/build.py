@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.detector import OutOfService
+from iveg.domain.equipment import Equipment, Tile
 from iveg.domain.events import LogEvent
 from iveg.domain.fleet import FleetDescription
 from iveg.domain.greenhouse import Greenhouse
@@ -19,6 +20,7 @@ from iveg.domain.world import World
 from iveg.pipeline.command import Commander
 from iveg.pipeline.coverage import CoverageMonitor
 from iveg.pipeline.detectors import Detectors
+from iveg.pipeline.equipment import EquipmentMonitor
 from iveg.pipeline.evaluate import Evaluator
 from iveg.pipeline.event_log import EventLog
 from iveg.pipeline.goals import GoalDispatcher
@@ -77,12 +79,14 @@ class Choices:
     Attributes:
         boot: Random, new at each start; identity of our feedback.
         era: Ends the ids of people, which are unique across starts by it.
+        tiles: Of other equipment.
     """
 
     rule: DetectionRule = field(default_factory=DetectionRule)
     drills: Drills = field(default_factory=Drills)
     boot: str = "iveg-boot"
     era: str = ""
+    tiles: Sequence[Tile] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,6 +107,7 @@ class Pipeline:
     slow_time: SlowTime
     scans: ScanReader
     goals: GoalDispatcher
+    equipment: EquipmentMonitor
 
     def counters(self) -> Counter[str]:
         """Everything that is counted in it."""
@@ -200,6 +205,9 @@ def build(
         *totals,
         scans,
         goals,
+        EquipmentMonitor(
+            Equipment(choices.tiles, start), ports.sink, event_log, supervision
+        ),
     )
 
 

@@ -16,6 +16,7 @@ from iveg.domain.stop import FollowedCommand as StopCommand
 from iveg.models.alert import Alert, Flood, LogEntry
 from iveg.models.climate import Climate
 from iveg.models.command import Command
+from iveg.models.equipment import Tile
 from iveg.models.health import Health
 from iveg.models.people import DetectionFrame, Person
 from iveg.models.places import GreenhouseMap, Scan
@@ -67,6 +68,9 @@ class StateReader(Protocol):
 
     def climate(self, now: Instant) -> Climate | None:
         """The newest reading of the air."""
+
+    def equipment(self, now: Instant) -> list[Tile]:
+        """Every tile of other equipment."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -168,6 +172,12 @@ CLIMATE = Topic(
     member="climate",
     read=lambda reader, now: reader.climate(now),
 )
+EQUIPMENT = Topic(
+    "equipment",
+    list[Tile],
+    member="equipment",
+    read=lambda reader, now: reader.equipment(now),
+)
 SNAPSHOT = Topic("snapshot")
 PONG = Topic("pong")
 PROBLEM = Topic("problem")
@@ -187,6 +197,7 @@ TOPICS = (
     EARLIER_LOG,
     HEALTH,
     CLIMATE,
+    EQUIPMENT,
     SNAPSHOT,
     PONG,
     PROBLEM,

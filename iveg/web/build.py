@@ -20,6 +20,7 @@ from iveg.web.api import (
     costmap,
     coverage,
     detectors,
+    equipment,
     goals,
     health,
     latency,
@@ -90,6 +91,7 @@ def live_routers(face: Face) -> Iterator[APIRouter]:
     encoder = socket.Encoder(views, parts.hub, clock)
     yield socket.router(parts.hub, encoder, face.snapshot, clock, face.stop, watch)
     yield robots.router(views, clock)
+    yield equipment.router(views, clock)
     yield costmap.router(beside.mapper, evaluator, clock)
     yield coverage.router(beside.coverage, clock)
     yield commands.router(parts.commander, clock)

@@ -4,14 +4,14 @@ Hundreds come in a second, so this is plain ASGI beside the layers that pages ne
 its own limit and secret.  Refusals look like those of the rest of the application.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Container, Mapping
 from typing import Final
 
 from starlette.routing import Route
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from iveg.domain.errors import UnreadableError
-from iveg.domain.observations import Instant, Received
+from iveg.domain.observations import EntityReading, Instant, Received
 from iveg.domain.transports import FIWARE
 from iveg.ngsi.codec import UNREAD, read_notification
 from iveg.pipeline.ingest import Ingest
@@ -38,6 +38,8 @@ class NotificationEndpoint:
         tenant: The Fiware service and path that count.
         heard: Told of each notification of Orion's.
         is_thinned: Whether Orion leaves out most of what a subscription is about.
+        equipment: Id and type of the entities that ``measured`` is told of.
+        measured: Told of other equipment; must neither wait nor fail.
     """
 
     action: Final[Action] = "open"
@@ -52,6 +54,8 @@ class NotificationEndpoint:
         tenant: tuple[str, str],
         heard: Callable[[Instant], None],
         is_thinned: Callable[[str], bool],
+        equipment: Container[tuple[str, str]] = frozenset(),
+        measured: Callable[[EntityReading, Instant], None] = lambda *_: None,
     ) -> None:
         self._ingest = ingest
         self._secret = secret
@@ -60,6 +64,8 @@ class NotificationEndpoint:
         self._tenant = tenant
         self._heard = heard
         self._is_thinned = is_thinned
+        self._equipment = equipment
+        self._measured = measured
 
     def route(self) -> Route:
         """Its place in the application's table of routes."""
@@ -131,7 +137,7 @@ class NotificationEndpoint:
     def _receive(self, body: bytes, at: Instant) -> Problem | None:
         try:
             subscription_id, reading = read_notification(
-                body, self._ingest.is_past, UNREAD
+                body, self._ingest.is_past, UNREAD, self._equipment
             )
         except UnreadableError as error:
             return problem_of(error)
@@ -141,6 +147,8 @@ class NotificationEndpoint:
         self._heard(at)
         for problem in reading.problems:
             self._ingest.reject(problem.source, problem.reason, problem.detail)
+        for told in reading.equipment:
+            self._measured(told, at)
         thinned = self._is_thinned(subscription_id)
         for observation in reading.observations:
             self._ingest.enqueue(Received(observation, at, FIWARE.id, thinned=thinned))

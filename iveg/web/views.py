@@ -18,6 +18,7 @@ from iveg.models.base import moment, rounded
 from iveg.models.climate import Climate
 from iveg.models.command import Command as CommandModel
 from iveg.models.device import Device
+from iveg.models.equipment import Tile
 from iveg.models.goal import Goal
 from iveg.models.health import Health, Safety
 from iveg.models.health import HopHealth as HopModel
@@ -67,6 +68,7 @@ class Views:
         self._greenhouse = parts.evaluator.greenhouse
         self._event_log = parts.event_log
         self._health_monitor = parts.health_monitor
+        self._equipment = parts.equipment.equipment
         self._counters = counters or parts.counters
 
     # --- robots -------------------------------------------------------------------
@@ -279,6 +281,14 @@ class Views:
         if climate is None or received is None:
             return None
         return Climate.of(climate, received, now)
+
+    def equipment(self, now: Instant) -> list[Tile]:
+        """Every tile of other equipment, in the order of its file."""
+        known = self._equipment
+        return [
+            Tile.of(one, known.status(one), known.state(one, now), now)
+            for one in known.tiles
+        ]
 
     def map(self) -> GreenhouseMap:
         """The greenhouse as the page draws it."""

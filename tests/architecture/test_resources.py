@@ -8,6 +8,7 @@ from pydantic.json_schema import models_json_schema
 from iveg.models.base import Model
 from iveg.models.day import Day
 from iveg.models.device import Device
+from iveg.models.equipment import Measurement
 from iveg.models.odometry import OdometryRow
 from iveg.models.people import DetectionRow, KeptDetection
 from iveg.models.typescript import TOLD
@@ -22,6 +23,7 @@ _SHOWN: tuple[type[Model], ...] = (
     KeptDetection,
     DetectionRow,
     OdometryRow,
+    Measurement,
 )
 _, _DOCUMENT = models_json_schema([(model, "serialization") for model in _SHOWN])
 _SHAPES = _DOCUMENT["$defs"]

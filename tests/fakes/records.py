@@ -12,6 +12,7 @@ from iveg.domain.records import (
     DetectionRecord,
     LatencyRecord,
     LogRecord,
+    MeasurementRecord,
     OdometryRecord,
 )
 
@@ -161,3 +162,15 @@ def log_record(**fields: Any) -> LogRecord:
         "robot_id": "AGI",
     }
     return LogRecord(**(defaults | fields))
+
+
+def measurement_record(**fields: Any) -> MeasurementRecord:
+    """One number of other equipment."""
+    given: dict[str, Any] = {
+        "at": NOON,
+        "entity_id": "unit",
+        "attribute": "flow",
+        "value": 18.5,
+        "unit": "L/min",
+    }
+    return MeasurementRecord(**given | fields)

@@ -205,6 +205,7 @@ export function snapshot(changes = {}) {
     log: [],
     health: /** @type {any} */ (null),
     climate: null,
+    equipment: [],
     ...changes,
   };
 }

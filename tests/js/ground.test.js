@@ -10,7 +10,7 @@ const VIEW = { width: 100, height: 80, scale: 10, x: 0, y: 0 };
 /** @param {number[][]} scans points of each (m) @param {number} [nowMs] */
 function sceneOf(scans, nowMs = 0) {
   return {
-    ...{ nowMs, robots: [], map: null, coverage: null, costmap: null },
+    ...{ nowMs, robots: [], map: null, coverage: null, costmap: null, tiles: [] },
     scans: scans.map((points, i) => ({
       ...{ robotId: `R${i}`, slot: i + 1, strength: 1 },
       points: new Float32Array(points),

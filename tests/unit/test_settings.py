@@ -176,6 +176,7 @@ GOOD = {
     "IVEG_KEEP_AUDIT_DAYS": "500",
     "IVEG_UPLINK": "single",
     "IVEG_GREENHOUSE": "none",
+    "IVEG_EQUIPMENT": "demo",
     "IVEG_FLEET": "/etc/iveg/fleet.toml",
 }
 

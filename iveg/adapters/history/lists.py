@@ -31,6 +31,7 @@ from iveg.domain.records import (
     DecisionRecord,
     DetectionRecord,
     LogRecord,
+    MeasurementRecord,
     OdometryRecord,
     ReadingRecord,
     Record,
@@ -148,6 +149,13 @@ READINGS = ListOf(
     tables.readings.c.row_id,
     (tables.readings.c.kind,),
 )
+MEASUREMENTS = ListOf(
+    MeasurementRecord,
+    tables.measurements,
+    tables.measurements.c.at,
+    tables.measurements.c.row_id,
+    (tables.measurements.c.entity_id, tables.measurements.c.attribute),
+)
 
 
 def read_page(connection: Connection, of: ListOf[R], asked: Filter) -> Page[R]:
@@ -175,7 +183,7 @@ def conditions(of: ListOf[R], asked: Filter) -> Iterator[ColumnElement[bool]]:
         yield of.at >= asked.since
     if asked.until is not None:
         yield of.at < asked.until
-    if asked.robot is not None:
+    if asked.robot is not None and "robot_id" in of.table.c:
         yield of.table.c.robot_id == asked.robot
     if asked.person is not None and "person_id" in of.table.c:
         yield of.table.c.person_id == asked.person

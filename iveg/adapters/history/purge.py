@@ -46,6 +46,7 @@ _ROW = {
     "odometry": (tables.odometry.c.at, tables.odometry.c.row_id),
     "climate": (tables.climate.c.at, tables.climate.c.row_id),
     "readings": (tables.readings.c.at, tables.readings.c.row_id),
+    "measurements": (tables.measurements.c.at, tables.measurements.c.row_id),
     "commands": (tables.commands.c.requested_at, tables.commands.c.command_id),
     "alerts": (tables.alerts.c.last_raised_at, tables.alerts.c.alert_id),
     "command_events": (tables.command_events.c.at, tables.command_events.c.row_id),

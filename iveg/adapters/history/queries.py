@@ -5,7 +5,7 @@ up the event loop nor takes the threads that a STOP's journal needs.
 """
 
 import asyncio
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Literal, TypeVar
 
@@ -34,6 +34,7 @@ from iveg.domain.records import (
     DetectionRecord,
     LatencyRecord,
     LogRecord,
+    MeasurementRecord,
     OdometryRecord,
     ReadingRecord,
 )
@@ -87,6 +88,16 @@ class Queries:
     async def readings(self, asked: Filter) -> Page[ReadingRecord]:
         """Readings of small sensors, by ``at``; the class filter asks for the kind."""
         return await self._ask(lambda c: lists.read_page(c, lists.READINGS, asked))
+
+    async def measurements(self, asked: Filter) -> Page[MeasurementRecord]:
+        """Numbers of other equipment, by ``at``; class: an entity or an attribute."""
+        return await self._ask(lambda c: lists.read_page(c, lists.MEASUREMENTS, asked))
+
+    async def measurement_series(
+        self, since: float, until: float
+    ) -> Mapping[tuple[str, str], series.MeasurementSeries]:
+        """Other equipment over a range, at most 288 points an entity and attribute."""
+        return await self._ask(lambda c: series.measurement_series(c, since, until))
 
     async def decision(self, decision_id: str) -> DecisionRecord | None:
         """One decision; None when it is not known."""

@@ -22,6 +22,7 @@ from iveg.adapters.history.tables import (
     climate,
     commands,
     detections,
+    measurements,
     odometry,
 )
 from iveg.domain.day import DaySighting, Pose
@@ -30,6 +31,8 @@ from iveg.domain.records import ByTransport, CommandRecord
 MOST_POINTS = 2000
 MOST_READINGS = 288
 """A day of the air in slices of five minutes."""
+READING_PERIOD_S = 60.0
+"""Between two kept readings (``pipeline.event_log``)."""
 CONFIDENCE_BINS = 20
 
 
@@ -67,6 +70,20 @@ class ClimateSeries:
     temperature: tuple[float | None, ...] = ()
     relative_humidity: tuple[float | None, ...] = ()
     co2: tuple[float | None, ...] = ()
+    slice_s: float = field(default=0.0, kw_only=True)
+
+
+@dataclass(frozen=True, slots=True)
+class MeasurementSeries:
+    """One attribute of other equipment over a range.
+
+    Attributes:
+        at: Unix seconds, rising; ``value`` has its length, a slice its mean.
+        slice_s: Length of a slice (s); 0 where each point is one reading.
+    """
+
+    at: tuple[float, ...]
+    value: tuple[float, ...]
     slice_s: float = field(default=0.0, kw_only=True)
 
 
@@ -133,6 +150,34 @@ def climate_series(
     place = _whole(connection, (c.at - since) / slice_s)
     means = (func.min(c.at), *(func.avg(value) for value in values))
     return ClimateSeries(*_columns(connection, means, asked, place), slice_s=slice_s)
+
+
+def measurement_series(
+    connection: Connection, since: float, until: float, most: int = MOST_READINGS
+) -> dict[tuple[str, str], MeasurementSeries]:
+    """Every attribute in ``since <= at < until``, by entity and attribute.
+
+    A range with more than a reading in each slice is answered in slices.
+    """
+    c = measurements.c
+    slice_s = (until - since) / most
+    is_sliced = slice_s > READING_PERIOD_S
+    place = _whole(connection, (c.at - since) / slice_s) if is_sliced else c.row_id
+    names = (c.entity_id, c.attribute)
+    wanted = (
+        select(*names, func.min(c.at), func.avg(c.value))
+        .where(c.at >= since, c.at < until)
+        .group_by(*names, place)
+        .order_by(*names, func.min(c.at))
+    )
+    found: dict[tuple[str, str], list[tuple[float, float]]] = {}
+    for entity_id, attribute, at, value in connection.execute(wanted):
+        found.setdefault((entity_id, attribute), []).append((at, value))
+    told_s = slice_s if is_sliced else 0.0
+    return {
+        key: MeasurementSeries(*zip(*points, strict=True), slice_s=told_s)
+        for key, points in found.items()
+    }
 
 
 def poses_of(connection: Connection, since: float, until: float) -> tuple[Pose, ...]:

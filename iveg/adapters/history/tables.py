@@ -38,6 +38,7 @@ from iveg.domain.records import (
     DetectionRecord,
     LatencyRecord,
     LogRecord,
+    MeasurementRecord,
     OdometryRecord,
     ReadingRecord,
 )
@@ -274,6 +275,21 @@ readings = Table(
 )
 
 
+measurements = Table(
+    "measurements",
+    metadata,
+    _row_id(),
+    _number("at", null=False),
+    _text("entity_id", null=False),
+    _text("attribute", null=False),
+    _number("value", null=False),
+    _text("unit", null=False),
+    Index(None, "at", "row_id"),
+    Index(None, "entity_id", "attribute", "at"),
+    sqlite_autoincrement=True,
+)
+
+
 def _placed(name: str, at: Column[float], sqlite: str, postgresql: str) -> Index:
     """Index of the rows that have a place still, by which they are found to lose it."""
     return Index(name, at, sqlite_where=text(sqlite), postgresql_where=text(postgresql))
@@ -327,4 +343,5 @@ TABLE_MAPPINGS: dict[type, TableMapping] = {
     ClimateRecord: TableMapping(climate),
     LatencyRecord: TableMapping(latency, keep_s=86400.0),
     ReadingRecord: TableMapping(readings),
+    MeasurementRecord: TableMapping(measurements),
 }

@@ -13,6 +13,7 @@ from dataclasses import replace
 from typing import Any
 from urllib.parse import urlsplit
 
+from iveg.adapters.equipment_files import DEMO
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.free_ports import bind_once
 from iveg.cli.arguments import Call
@@ -39,6 +40,7 @@ def demo(call: Call) -> int:
         sign_in_token=settings.sign_in_token or secrets.token_hex(32),
         notify_token=settings.notify_token or secrets.token_hex(32),
         data_directory=str(directory),
+        equipment=settings.equipment or DEMO,
     )
     # Each demo starts anew: no hold of the last demo's robots remains.
     (directory / "commands.jsonl").unlink(missing_ok=True)

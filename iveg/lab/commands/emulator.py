@@ -7,6 +7,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
+from iveg.adapters.equipment_files import DEMO
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.cli.nodes import node_settings
@@ -45,6 +46,7 @@ async def emulator(options: argparse.Namespace, settings: Settings) -> None:
                 options.held,
                 options.hz,
                 truth,
+                has_equipment=settings.equipment == DEMO,
             ),
             scenario=options.scenario,
             seed=options.seed,

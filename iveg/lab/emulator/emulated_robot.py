@@ -30,12 +30,14 @@ class FleetSettings:
         held: The boot hold is not released at the robots.
         rate_hz: Of odometry, laser and camera each.
         truth: Log of the targets really in view.
+        has_equipment: Whether other equipment measures, too (``equipment``).
     """
 
     node: NodeSettings
     held: bool = False
     rate_hz: float = 30.0
     truth: TruthLog | None = None
+    has_equipment: bool = False
 
 
 class EmulatedRobot:

@@ -19,6 +19,7 @@ from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.stamps import format_stamp
 from iveg.lab.emulator.camera import DETECTORS
 from iveg.lab.emulator.emulated_robot import EmulatedRobot, FleetSettings
+from iveg.lab.emulator.equipment import tell_all
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.orders import FaultOrder, Order, open_fault_port
 from iveg.lab.emulator.radio import Radio
@@ -162,6 +163,8 @@ class SimulatedFleet:
         def tell(_: float) -> None:
             wall = clock.wall()
             link.enqueue(topic, write_climate(climate_at(wall), format_stamp(wall)))
+            if self._settings.has_equipment:
+                tell_all(link, self._settings.node.apikey, wall)
 
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(link.run(), name="climate-link")

@@ -4,13 +4,13 @@ A part that cannot be read becomes a ``Problem`` beside its neighbours and never
 them.
 """
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 
 from pydantic import ValidationError
 
 from iveg.domain.errors import UnreadableError
 from iveg.domain.kinds import KIND_OF
-from iveg.domain.observations import DetectionFrame
+from iveg.domain.observations import DetectionFrame, EntityReading
 from iveg.ngsi import names, payloads
 from iveg.ngsi.codec.attributes import (
     NO_OTHERS,
@@ -36,7 +36,10 @@ _FRAME_SUFFIX = KIND_OF[DetectionFrame].suffix or ""
 
 
 def read_notification(
-    body: bytes, is_past: IsPast | None = None, instead: Readers = NO_OTHERS
+    body: bytes,
+    is_past: IsPast | None = None,
+    instead: Readers = NO_OTHERS,
+    equipment: Container[tuple[str, str]] = frozenset(),
 ) -> tuple[str, ReadResult]:
     """Read a notification, normalized or keyValues.
 
@@ -44,6 +47,7 @@ def read_notification(
         body: JSON.
         is_past: Tells by its identity what need not be read; None reads all.
         instead: Other readers of some attributes, such as ``UNREAD``.
+        equipment: Id and type of entities whose attributes are handed on as they are.
 
     Returns:
         The subscription's id and what its entities hold.
@@ -55,7 +59,9 @@ def read_notification(
         notification = payloads.NotificationValue.model_validate(load_json(body))
     except ValidationError as error:
         raise UnreadableError("not_a_notification", first_complaint(error)) from error
-    entities = [read_entity(entity, is_past, instead) for entity in notification.data]
+    entities = [
+        read_entity(entity, is_past, instead, equipment) for entity in notification.data
+    ]
     read = entities[0] if len(entities) == 1 else merge(entities)
     return notification.subscriptionId, read
 
@@ -64,6 +70,7 @@ def read_entity(
     entity: Mapping[str, object],
     is_past: IsPast | None = None,
     instead: Readers = NO_OTHERS,
+    equipment: Container[tuple[str, str]] = frozenset(),
 ) -> ReadResult:
     """Read one NGSI-v2 entity in either representation."""
     entity_id, entity_type = entity.get("id"), entity.get("type")
@@ -82,6 +89,8 @@ def read_entity(
         return read_one(entity_id, climate, attributes)
     if (entity_id, entity_type) == (names.HEARTBEAT_ID, names.HEARTBEAT_TYPE):
         return read_one(entity_id, heartbeat, attributes)
+    if (entity_id, entity_type) in equipment:
+        return ReadResult(equipment=(EntityReading(entity_id, attributes),))
     return unread(
         payloads.clean_text(entity_id),
         "foreign_entity",

@@ -7,7 +7,7 @@ import orjson
 from pydantic import ValidationError
 
 from iveg.domain.errors import UnreadableError
-from iveg.domain.observations import Observation
+from iveg.domain.observations import EntityReading, Observation
 from iveg.ngsi import payloads
 
 MAX_DEPTH = 32
@@ -31,10 +31,15 @@ class UnreadPart:
 
 @dataclass(frozen=True, slots=True)
 class ReadResult:
-    """Content of a message: observations, and the parts that could not be read."""
+    """Content of a message: observations, and the parts that could not be read.
+
+    Attributes:
+        equipment: What it says of entities that are no robots, still unread.
+    """
 
     observations: tuple[Observation, ...] = ()
     problems: tuple[UnreadPart, ...] = ()
+    equipment: tuple[EntityReading, ...] = ()
 
 
 def load_json(body: bytes | str) -> object:
@@ -80,10 +85,12 @@ def merge(readings: Iterable[ReadResult]) -> ReadResult:
     """Several readings as one, in order."""
     observations: list[Observation] = []
     problems: list[UnreadPart] = []
+    equipment: list[EntityReading] = []
     for reading in readings:
         observations.extend(reading.observations)
         problems.extend(reading.problems)
-    return ReadResult(tuple(observations), tuple(problems))
+        equipment.extend(reading.equipment)
+    return ReadResult(tuple(observations), tuple(problems), tuple(equipment))
 
 
 def first_complaint(error: ValidationError) -> str:

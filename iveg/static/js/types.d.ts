@@ -919,6 +919,7 @@ export type Snapshot = {
   log: LogEntry[];
   health: Health;
   climate: Climate | null;
+  equipment: Tile[];
 };
 
 /** Greatest speed factor of a robot, and its reason. */
@@ -930,6 +931,37 @@ export type SpeedLimit = {
   decision_id: string | null;
   /** Until it reaches the ring of the cause; null: it is inside. */
   foretold_s: number | null;
+};
+
+/** One attribute of one entity, with its newest number. */
+export type Tile = {
+  /** Entity and attribute. */
+  key: string;
+  entity_id: string;
+  attribute: string;
+  name: TileName;
+  unit: string;
+  decimals: number;
+  limits: Record<string, number>;
+  state: "waiting" | "ok" | "low" | "high" | "low_low" | "high_high" | "silent" | "unreadable";
+  /** The newest number; null before the first. */
+  value: number | null;
+  received_at: string | null;
+  age_s: number | null;
+  trend: boolean;
+  place: TilePlace | null;
+};
+
+/** What people call it, by language. */
+export type TileName = {
+  es: string;
+  en: string;
+};
+
+/** Where its mark stands in ``map`` (m). */
+export type TilePlace = {
+  x: number;
+  y: number;
 };
 
 /** A recipient of an alert outside iVeg; ``failed`` is the reason of a failure. */

@@ -3,7 +3,6 @@
 Lists answer JSON, CSV or NDJSON, as ``Accept`` or ``format`` says.
 """
 
-import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
@@ -17,30 +16,22 @@ from iveg.adapters import clock
 from iveg.adapters.history import lists
 from iveg.adapters.history.lists import Filter, ListOf, Page
 from iveg.adapters.history.queries import Queries
-from iveg.adapters.history.series import (
-    ClimateSeries,
-    CommandLatency,
-    ConfidenceCount,
-    SpeedSeries,
-)
 from iveg.domain.alerts.flood import FloodState as NoFlood
 from iveg.domain.fleet import NOBODY, FleetDescription
 from iveg.domain.records import CommandRecord, DecisionRecord, Record
-from iveg.domain.stamps import format_stamp
 from iveg.models.alert import Alert, AlertListing, Flood, LogEntry
 from iveg.models.base import Listing, Model, write_json
-from iveg.models.climate import ClimateReading
 from iveg.models.command import Command
 from iveg.models.decision import Decision
+from iveg.models.equipment import Measurement
 from iveg.models.odometry import OdometryRow
 from iveg.models.people import DetectionRow
 from iveg.models.reading import Reading
 from iveg.pipeline.ports import Clock
-from iveg.web.api import exports
+from iveg.web.api import exports, figures
 from iveg.web.api.answers import Apart, Json
 from iveg.web.api.exports import MEDIA_TYPES, Form
-from iveg.web.api.history_filters import Filters, Range, Span, filter_of, range_of
-from iveg.web.pages import charts
+from iveg.web.api.history_filters import Filters, filter_of
 from iveg.web.pages.local_time import in_madrid
 from iveg.web.pages.sentences import Sentences
 from iveg.web.pages.translations import read_translations
@@ -119,46 +110,7 @@ def router(
             raise HTTPException(404, "There is no such decision.")
         return Json(Decision.of_record(found))
 
-    @routes.get(
-        "/api/v1/history/charts",
-        summary="Plotly figures of a range",
-        description="Speed with the speed limit, detections by class and "
-        "confidence, how long each STOP took; the last 15 minutes unless told.",
-        response_class=Response,
-        responses={200: {"content": {"application/json": {}}}},
-    )
-    async def draw(asked: Annotated[Range, Query()]) -> Response:
-        since, until = range_of(asked, read_clock().wall)
-        found = await asyncio.gather(
-            queries.speed_series(since, until, asked.robot),
-            queries.confidence_counts(since, until, asked.robot),
-            queries.command_latencies(since, until, asked.robot),
-        )
-        body = await worker.run(_draw_charts, *found, threshold(), fleet)
-        return Response(body, media_type=MEDIA_TYPES["json"])
-
-    @routes.get(
-        "/api/v1/history/climate",
-        summary="The air over a range",
-        description="Readings, or their means over slices of time, and Plotly figures "
-        "of them; the last 24 hours unless told.",
-        response_class=Response,
-        responses={200: {"content": {"application/json": {}}}},
-    )
-    async def climate(asked: Annotated[Span, Query()]) -> Response:
-        since, until = range_of(asked, read_clock().wall, _DAY_S)
-        series = await queries.climate_series(since, until)
-        body = await worker.run(_draw_climate, series, since, until)
-        return Response(body, media_type=MEDIA_TYPES["json"])
-
-    @routes.get("/vendor/{name}", include_in_schema=False)
-    async def vendor(name: str) -> Response:
-        script = await asyncio.to_thread(charts.library)
-        if name != script.name:
-            raise HTTPException(404, "There is no such file.")
-        headers = {"Content-Encoding": "gzip", "Cache-Control": _FOR_GOOD}
-        return Response(script.packed, 200, headers, "text/javascript")
-
+    figures.add_routes(routes, queries, worker, threshold, fleet, read_clock)
     return routes
 
 
@@ -240,6 +192,14 @@ def _measured(queries: Queries) -> tuple[_List[Any], ...]:
             Reading.of_record,
             Listing[Reading],
             "What small sensors of robots said; `class` asks for a kind, as `battery`",
+        ),
+        _List(
+            "measurements",
+            lists.MEASUREMENTS,
+            queries.measurements,
+            Measurement.of_record,
+            Listing[Measurement],
+            "Numbers of other equipment; `class` asks for an entity or an attribute",
         ),
     )
 
@@ -334,40 +294,3 @@ async def _pages(
     while whole and page.next is not None:
         page = await one.ask(replace(asked, cursor=page.next))
         yield page.items
-
-
-def _draw_charts(
-    speeds: Sequence[SpeedSeries],
-    counts: Sequence[ConfidenceCount],
-    stops: Sequence[CommandLatency],
-    threshold: float | None,
-    fleet: FleetDescription,
-) -> bytes:
-    return write_json(
-        {
-            **charts.library_facts(),
-            "speed": Fragment(charts.speed_figure(speeds, fleet)),
-            "detections": Fragment(charts.confidence_figure(counts, threshold)),
-            "stops": Fragment(charts.stop_figure(stops)),
-        }
-    )
-
-
-def _draw_climate(series: ClimateSeries, since: float, until: float) -> bytes:
-    figures = charts.climate_figures(series)
-    return write_json(
-        {
-            "since": format_stamp(since),
-            "until": format_stamp(until),
-            "slice_s": round(series.slice_s, 3),
-            "items": _readings(series),
-            **charts.library_facts(),
-            "figures": {kind: Fragment(drawn) for kind, drawn in figures.items()},
-        }
-    )
-
-
-def _readings(series: ClimateSeries) -> list[ClimateReading]:
-    """Oldest first."""
-    columns = (series.at, series.temperature, series.relative_humidity, series.co2)
-    return [ClimateReading.of_series(*one) for one in zip(*columns, strict=True)]

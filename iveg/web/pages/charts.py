@@ -21,6 +21,7 @@ from iveg.adapters.history.series import (
     ClimateSeries,
     CommandLatency,
     ConfidenceCount,
+    MeasurementSeries,
     SpeedSeries,
 )
 from iveg.domain.feedback import FULL_SPEED
@@ -240,6 +241,23 @@ def _climate_figure(
     heard = [value for value in values if value is not None]
     layout = {"showlegend": False, "yaxis": {"range": _room(heard, _LEAST_ROOM[kind])}}
     return figure_of([trace] if heard else [], ("time", kind), layout)
+
+
+def measurement_figure(series: MeasurementSeries) -> bytes:
+    """One attribute of other equipment over time, as JSON."""
+    at = [_ms(moment) for moment in series.at]
+    gaps = _gaps(series.at, max(_AIR_SILENCE_S, 3 * series.slice_s))
+    trace: _Trace = {
+        "type": "scatter",
+        "mode": "lines+markers",
+        "name": "value",
+        "meta": {"kind": "measurement", "slice_s": series.slice_s},
+        "marker": {"size": 4},
+        "x": _broken(at, gaps, at),
+        "y": _broken(series.value, gaps, [None] * len(at)),
+        "connectgaps": False,
+    }
+    return figure_of([trace], ("time", "measurement"), {"showlegend": False})
 
 
 def _room(values: Sequence[float], least: float) -> list[float] | None:

@@ -70,6 +70,9 @@ class Sentences:
             return self._sentence(value, slots)
         if form == "person":
             return self._person(str(value))
+        if form == "own":
+            # What the grower calls it in this language, as the equipment's file says.
+            return str(slots.get(f"tile_{self.translations.language}", value))
         if form == "lane":
             return self.lane(str(value))
         if form in _NAMED:

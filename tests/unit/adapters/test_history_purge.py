@@ -41,6 +41,7 @@ from tests.fakes.records import (
     decision_record,
     detection_record,
     log_record,
+    measurement_record,
     odometry_record,
 )
 
@@ -68,6 +69,7 @@ def everything(at: float, mark: str) -> list[Record]:
         odometry_record(at=at),
         climate_record(at=at),
         reading_record(at),
+        measurement_record(at=at),
         command_record(command_id=mark, requested_at=at, state="RUNNING"),
         alert_record(
             alert_id=mark, raised_at=at, last_raised_at=at, cleared_at=at + 1.0

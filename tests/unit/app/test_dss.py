@@ -21,6 +21,7 @@ async def test_mqtt_and_the_rule_loop_alone_share_the_fate_of_the_process(
         "costmap",
         "coverage",
         "provisioner",
+        "equipment",
         "history",
         "retention",
         "messages",

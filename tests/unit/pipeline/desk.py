@@ -1,10 +1,11 @@
 """The pipeline with fakes round it, on one clock that is moved by hand."""
 
 import asyncio
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import TypeVar
 
+from iveg.domain.equipment import Tile
 from iveg.domain.geometry import Rectangle
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import (
@@ -47,6 +48,7 @@ class Desk:
         *,
         direct: bool = True,
         also: Mapping[Transport, CommandPort] | None = None,
+        tiles: Sequence[Tile] = (),
     ) -> None:
         self.clock = FakeClock()
         self.fleet = FakeFleet()
@@ -70,7 +72,7 @@ class Desk:
                 self.clock,
                 self.ids,
             ),
-            Choices(),
+            Choices(tiles=tiles),
         )
         self.hub, self.event_log, self.health_monitor = (
             parts.hub,

@@ -3,13 +3,14 @@
 import asyncio
 import contextlib
 from collections import Counter
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Sequence
 from functools import cache
 
 import httpx
 import uvicorn
 
 from iveg.adapters.connections import ConnectionCaps, ConnectionTable
+from iveg.domain.equipment import Tile
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.messages import CHANNELS
 from iveg.domain.observations import Instant
@@ -45,8 +46,9 @@ class WebDesk(Desk):
         self,
         robots: tuple[str, ...] = ("AGI", "AGII"),
         greenhouse: Greenhouse = FIELD,
+        tiles: Sequence[Tile] = (),
     ) -> None:
-        super().__init__(robots, greenhouse)
+        super().__init__(robots, greenhouse, tiles=tiles)
         self.heard: list[Instant] = []
         self.queues = metrics.Queues({"ingest": 3}, {"history": 2}, {"stop_send": 1})
         self.authenticator = Authenticator(
@@ -72,6 +74,8 @@ class WebDesk(Desk):
             ("agroconnect", "/greenhouse"),
             self.heard.append,
             "thinned".__eq__,
+            self.parts.equipment.equipment.entities,
+            self.parts.supervision.guard("equipment", self.parts.equipment.receive),
         )
         self.face = Face(
             pipeline=self.parts,

@@ -85,6 +85,7 @@ export function topicsOf(snapshot) {
     ["rule", snapshot.rule],
     ["health", snapshot.health],
     ["climate", snapshot.climate],
+    ["equipment", snapshot.equipment ?? []],
   ];
 }
 

@@ -37,6 +37,8 @@ const FORMATS = {
   drive: (value, messages) => messages.named("drive", value),
   lane: (value, messages) => laneName(String(value), messages.say),
   place: (value, messages) => placeName(String(value), messages.say),
+  // What the grower calls it in this language, as the equipment's file says.
+  own: (value, messages, slots) => String(slots[`tile_${messages.language}`] ?? value),
   person: trackOf,
   sentence: sentenceOf,
 };

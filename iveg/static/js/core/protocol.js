@@ -26,6 +26,7 @@
  * @typedef {Aged & import("../types.js").Health} Health
  * @typedef {import("../types.js").Safety} Safety
  * @typedef {Aged & import("../types.js").Climate} Climate
+ * @typedef {Aged & import("../types.js").Tile} Tile
  * @typedef {import("../types.js").GreenhouseMap} GreenhouseMap
  * @typedef {Aged & {robot_id: string, stamp: string | null, points: Float32Array}} Scan
  * @typedef {Aged & import("../types.js").Costmap} Costmap

@@ -14,6 +14,7 @@
 import { createCostmapLayer } from "./layers/costmap.js";
 import * as coverage from "./layers/coverage.js";
 import * as detections from "./layers/detections.js";
+import * as equipment from "./layers/equipment.js";
 import * as greenhouse from "./layers/greenhouse.js";
 import * as grid from "./layers/grid.js";
 import { createGround } from "./layers/ground.js";
@@ -41,6 +42,7 @@ export const LAYERS = [
   "scan",
   "intent",
   "links",
+  "equipment",
   "detections",
   "robot",
   "people",
@@ -78,6 +80,7 @@ export function createPicture(canvas, trails) {
     scan: createScanLayer(),
     intent: intent.draw,
     links: links.draw,
+    equipment: equipment.draw,
     detections: detections.draw,
     robot: robot.draw,
     people: people.draw,

@@ -41,6 +41,7 @@
  *   robots: SceneRobot[], people: ScenePerson[], detections: SceneDetection[],
  *   scans: SceneScan[], costmap: import("../core/protocol.js").Costmap | null,
  *   coverage: import("../core/protocol.js").Coverage | null,
+ *   tiles: import("../core/protocol.js").Tile[],
  * }} Scene
  */
 
@@ -78,7 +79,15 @@ export function readScene(store, nowMs) {
     scans: readScans(store, nowMs),
     costmap: store.get("costmap") ?? null,
     coverage: store.get("coverage") ?? null,
+    tiles: readTiles(store),
   };
+}
+
+/** Tiles of other equipment that have a place. @param {Store} store */
+function readTiles(store) {
+  /** @type {import("../core/protocol.js").Tile[]} */
+  const tiles = store.get("equipment") ?? [];
+  return tiles.filter(({ place }) => place !== null);
 }
 
 /** @param {Store} store @param {number} nowMs */

@@ -11,6 +11,7 @@ import { ageOf } from "../core/clock.js";
 import { CLIMATE_OLD_S, climateAgo } from "../panels/climate_texts.js";
 import { need, setAttribute, setHidden, setText } from "../panels/dom.js";
 import { onThemeChange } from "../panels/theme.js";
+import { startEquipment } from "./equipment.js";
 import { drawFigure } from "./history/charts.js";
 
 /** @type {readonly Part[]} */
@@ -20,8 +21,10 @@ const TICK_MS = 1000;
 const DAY_MS = 60_000;
 
 /** @param {import("../core/page.js").Page} page */
-export function start({ store, i18n }) {
+export function start(page) {
+  const { store, i18n } = page;
   const day = createDay(i18n);
+  startEquipment(page);
 
   function draw() {
     /** @type {import("../core/protocol.js").Climate | null} */

@@ -70,6 +70,7 @@ export function sceneOf({ position, places, rule, ...told }, map) {
     scans: [],
     costmap: null,
     coverage: null,
+    tiles: [],
   };
 }
 

@@ -7,6 +7,7 @@ import { UNHEARD } from "../core/situation.js";
 import { createCostmapLayer } from "../map/layers/costmap.js";
 import * as coverage from "../map/layers/coverage.js";
 import * as detections from "../map/layers/detections.js";
+import * as equipment from "../map/layers/equipment.js";
 import * as greenhouse from "../map/layers/greenhouse.js";
 import * as grid from "../map/layers/grid.js";
 import * as intent from "../map/layers/intent.js";
@@ -74,6 +75,13 @@ const BOX = {
   confident: true,
   named: true,
   item: {},
+};
+const TILE = {
+  place: { x: 0, y: 0.4 },
+  state: "ok",
+  value: 2.4,
+  unit: "mS/cm",
+  decimals: 1,
 };
 const GREENHOUSE = {
   bounds: { xmin: -9, xmax: 9, ymin: -9, ymax: 9 },
@@ -200,6 +208,12 @@ export const SIGNS = [
         { ...RIGHT, acting: [{ robot_id: "", distance_m: 1.9, in_sight: false }] },
       ],
     },
+  },
+  {
+    name: "equipment",
+    layer: "equipment",
+    draw: equipment.draw,
+    scene: { tiles: [TILE] },
   },
   {
     name: "intent",

@@ -36,13 +36,14 @@ from tests.fakes.records import (
     decision_record,
     detection_record,
     log_record,
+    measurement_record,
     odometry_record,
 )
 from tests.fakes.worker import FakeWorker
 
 LISTS = (
     *("decisions", "detections", "commands", "alerts", "log", "readings"),
-    *("tracks", "odometry"),
+    *("tracks", "odometry", "measurements"),
 )
 
 
@@ -663,6 +664,43 @@ async def test_a_database_that_is_away_is_a_problem_and_not_a_crash(
     assert "secret" not in answer.text
 
 
+async def test_a_day_of_other_equipment_is_a_figure_of_each_attribute(
+    client: httpx.AsyncClient, past: Past
+) -> None:
+    past.holds(
+        measurement_record(at=NOON - 3600.0, attribute="flow", value=18.0),
+        measurement_record(at=NOON, attribute="flow", value=19.0),
+        measurement_record(at=NOON, attribute="ec", value=2.4),
+    )
+
+    exact = (
+        await client.get("/api/v1/history/equipment?since=2023-11-14T21:00:00Z")
+    ).json()
+    means = (await client.get("/api/v1/history/equipment")).json()
+
+    assert set(exact["figures"]) == set(means["figures"]) == {"unit/flow", "unit/ec"}
+    for day in (exact, means):
+        [trace] = day["figures"]["unit/flow"]["data"]
+        # The line breaks between readings that are an hour apart.
+        assert trace["y"] == [18.0, None, 19.0]
+
+
+async def test_numbers_of_other_equipment_are_asked_for_by_entity_or_attribute(
+    client: httpx.AsyncClient, past: Past
+) -> None:
+    past.holds(
+        measurement_record(attribute="flow", value=18.0),
+        measurement_record(attribute="ec", value=2.4),
+    )
+
+    for asked, values in (("unit", {18.0, 2.4}), ("flow", {18.0}), ("other", set())):
+        items = (await client.get(f"/api/v1/measurements?class={asked}")).json()[
+            "items"
+        ]
+        assert {one["value"] for one in items} == values
+    assert (await client.get("/api/v1/measurements?robot=AGI")).status_code == 200
+
+
 async def test_each_column_of_what_was_measured_is_a_key_of_its_json(
     client: httpx.AsyncClient, past: Past
 ) -> None:
@@ -670,9 +708,10 @@ async def test_each_column_of_what_was_measured_is_a_key_of_its_json(
         detection_record(person_id="P1"),
         odometry_record(),
         ReadingRecord(at=NOON, robot_id="AGI", kind="battery", value={"voltage": 25}),
+        measurement_record(),
     )
 
-    for path in ("detections", "tracks", "odometry", "readings"):
+    for path in ("detections", "tracks", "odometry", "readings", "measurements"):
         [item] = (await client.get(f"/api/v1/{path}")).json()["items"]
         lines = (await client.get(f"/api/v1/{path}?format=csv")).text
         [row] = csv.DictReader(io.StringIO(lines))

@@ -40,6 +40,15 @@ export function createLabels(t = untranslated, locale = document.documentElement
       const said = t(key);
       return said === key || said === task.toUpperCase() ? task : said;
     },
+    /** A number of other equipment. @param {import("../../core/protocol.js").Tile} tile */
+    tile: ({ value, state, unit, decimals }) => {
+      if (value === null || state === "silent" || state === "unreadable") return "—";
+      const said = value.toLocaleString(language, {
+        minimumFractionDigits: decimals,
+        maximumFractionDigits: decimals,
+      });
+      return unit === "1" ? said : `${said} ${unit}`;
+    },
     /** @param {number} share 0–1 */
     percent: (share) => percents.format(share),
     /** An age short enough for a tag; tenths while they matter. @param {number} s */

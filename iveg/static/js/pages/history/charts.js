@@ -32,7 +32,7 @@ const TICKS = [
   { dtickrange: [86_400_000, null], value: "%d/%m/%y" },
 ];
 const PEOPLE = new Set(["person", "farmer", "human", "operator"]);
-const AIR = new Set(["temperature", "humidity", "co2"]);
+const AIR = new Set(["temperature", "humidity", "co2", "measurement"]);
 const SYMBOLS = { direct: "circle", fiware: "diamond", standstill: "square" };
 
 /** @type {Promise<any> | null} */

@@ -1,0 +1,194 @@
+"""Equipment files: TOML in, checked tiles out (docs/equipment.md)."""
+
+import tomllib
+from collections.abc import Sequence
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Self
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationError,
+    model_validator,
+)
+
+from iveg.adapters.toml_positions import Path as TomlPath
+from iveg.adapters.toml_positions import place_of, syntax_error
+from iveg.domain.equipment import UNITS, Limit, Tile, contradiction
+from iveg.domain.errors import DataFileError
+from iveg.ngsi import names
+
+DEMO = "demo"
+"""Name of the file of the equipment that the emulator plays."""
+_LIMITS: tuple[Limit, ...] = ("low_low", "low", "high", "high_high")
+_FARTHEST_M = 1e6
+
+
+def load_equipment(name_or_file: str, robots: Sequence[str] = ()) -> tuple[Tile, ...]:
+    """The tiles of a file, or of ``demo``; none of an empty name.
+
+    Args:
+        name_or_file: What the setting says.
+        robots: The fleet, whose entities and devices are no equipment's.
+
+    Raises:
+        DataFileError: the file cannot be used; it says file, line and column.
+    """
+    if not name_or_file:
+        return ()
+    if name_or_file == DEMO:
+        file = resources.files("iveg") / "data" / "equipment.toml"
+        return read_equipment(file.read_text("utf-8"), "equipment.toml", robots)
+    try:
+        text = Path(name_or_file).read_text("utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = f"cannot be read as text in UTF-8: {error}."
+        raise DataFileError(name_or_file, "", reason) from error
+    return read_equipment(text, name_or_file, robots)
+
+
+def read_equipment(
+    text: str, file: str, robots: Sequence[str] = ()
+) -> tuple[Tile, ...]:
+    """Read tiles from TOML; ``file`` is its name in complaints.
+
+    Raises:
+        DataFileError: naming file, line, column, key and reason.
+    """
+    try:
+        raw = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        line, column, why = syntax_error(error, text)
+        reason = f"is not TOML: {why}."
+        raise DataFileError(f"{file}:{line}:{column}", "", reason) from error
+    try:
+        page = _FileTable.model_validate(raw)
+    except ValidationError as error:
+        complaints = error.errors(include_input=False, include_url=False)
+        # A key that was mistyped says more than that the right one is missing.
+        first = min(complaints, key=lambda one: one["type"] != "extra_forbidden")
+        raise _complaint(text, file, first["loc"], first["msg"]) from error
+    tiles = tuple(one.value() for one in page.tiles)
+    wrong = contradiction(tiles) or _taken(tiles, robots)
+    if wrong is not None:
+        index, key, reason = wrong
+        raise _complaint(text, file, ("tiles", index, key), reason)
+    return tiles
+
+
+def _complaint(text: str, file: str, path: TomlPath, reason: str) -> DataFileError:
+    line, column = place_of(text, path)
+    key = "".join(f"[{one}]" if isinstance(one, int) else f".{one}" for one in path)
+    said = reason.removeprefix("Value error, ")
+    return DataFileError(f"{file}:{line}:{column}", key.lstrip("."), f"{said}.")
+
+
+def _taken(tiles: Sequence[Tile], robots: Sequence[str]) -> tuple[int, str, str] | None:
+    """The first tile that would take a robot's entity, or its device and orders."""
+    for index, tile in enumerate(tiles):
+        for key, name in (("entity", tile.entity_id), ("device", tile.device)):
+            if name in robots:
+                return index, key, f"{name} is a robot of the fleet"
+    return None
+
+
+# --- the shape of the file --------------------------------------------------------
+
+
+def _known_unit(text: str) -> str:
+    if text not in UNITS:
+        raise ValueError(f"must be one of {', '.join(UNITS)}")
+    return text
+
+
+def _free_device(text: str) -> str:
+    if not names.is_robot_id(text):
+        raise ValueError("must be 1 to 64 letters, digits and hyphens, and not iVeg's")
+    return text
+
+
+def _other_type(text: str) -> str:
+    if text in (names.ROBOT_TYPE, names.HEARTBEAT_TYPE):
+        raise ValueError(f"{text} is no equipment: robots have sensors of their own")
+    return text
+
+
+def _other_entity(text: str) -> str:
+    if text == names.CLIMATE_ID:
+        raise ValueError("the climate has its tiles already")
+    return text
+
+
+# What NGSI-v2 allows in ids, types and names of attributes.
+_Word = Annotated[str, Field(pattern=r"""^[^\s<>"'=;()&?/#]{1,128}$""")]
+_Name = Annotated[str, Field(min_length=1, max_length=48)]
+_Metres = Annotated[float, Field(ge=-_FARTHEST_M, le=_FARTHEST_M)]
+
+
+class _Table(BaseModel):
+    # A number may be written without a point; a text is no number.
+    model_config = ConfigDict(
+        strict=True, extra="forbid", allow_inf_nan=False, frozen=True
+    )
+
+
+class _Names(_Table):
+    es: _Name
+    en: _Name
+
+
+class _Place(_Table):
+    x: _Metres
+    y: _Metres
+
+
+class _Tile(_Table):
+    entity: Annotated[_Word, AfterValidator(_other_entity)]
+    type: Annotated[_Word, AfterValidator(_other_type)]
+    attribute: _Word
+    name: _Names
+    unit: Annotated[str, AfterValidator(_known_unit)]
+    decimals: Annotated[int, Field(ge=0, le=4)] = 1
+    low_low: float | None = None
+    low: float | None = None
+    high: float | None = None
+    high_high: float | None = None
+    deadband: Annotated[float, Field(ge=0)] = 0.0
+    silent_after_s: Annotated[float, Field(ge=1, le=604_800)] = 300.0
+    trend: bool = True
+    place: _Place | None = None
+    device: Annotated[str, AfterValidator(_free_device)] = ""
+
+    @model_validator(mode="after")
+    def _limits_rise(self) -> Self:
+        told = list(self._limits().values())
+        if told != sorted(set(told)):
+            raise ValueError("low_low, low, high and high_high must rise")
+        return self
+
+    def _limits(self) -> dict[Limit, float]:
+        found = {name: getattr(self, name) for name in _LIMITS}
+        return {name: one for name, one in found.items() if one is not None}
+
+    def value(self) -> Tile:
+        return Tile(
+            entity_id=self.entity,
+            entity_type=self.type,
+            attribute=self.attribute,
+            name={"es": self.name.es, "en": self.name.en},
+            unit=self.unit,
+            decimals=self.decimals,
+            limits=self._limits(),
+            deadband=self.deadband,
+            silent_after_s=self.silent_after_s,
+            has_trend=self.trend,
+            place=None if self.place is None else (self.place.x, self.place.y),
+            device=self.device,
+        )
+
+
+class _FileTable(_Table):
+    tiles: Annotated[list[_Tile], Field(min_length=1, max_length=64)]

@@ -1,0 +1,116 @@
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from iveg.adapters.equipment_files import DEMO, load_equipment, read_equipment
+from iveg.domain.equipment import UNITS
+from iveg.domain.errors import DataFileError
+from iveg.lab.emulator.equipment import EQUIPMENT
+from tests.processes import ROOT
+
+ONE = """\
+[[tiles]]
+entity = "panel-1"
+type = "ThermalPanel"
+attribute = "outlet"
+name = { es = "Panel: salida", en = "Panel: outlet" }
+unit = "°C"
+low = 5
+high = 60.0
+place = { x = 1.0, y = 2 }
+device = "panel-1"
+"""
+OTHER = ONE.replace('"outlet"', '"inlet"').replace("panel-1", "panel-2")
+
+
+def complaint(text: str) -> str:
+    with pytest.raises(DataFileError) as refused:
+        read_equipment(text, "tiles.toml", ["AGI"])
+    return str(refused.value)
+
+
+def test_what_the_file_says_is_the_tile() -> None:
+    one, other = read_equipment(ONE + OTHER, "tiles.toml")
+
+    assert (one.key, other.key) == ("panel-1/outlet", "panel-2/inlet")
+    assert one.name == {"es": "Panel: salida", "en": "Panel: outlet"}
+    assert one.limits == {"low": 5.0, "high": 60.0}
+    assert (one.place, one.silent_after_s, one.device) == ((1.0, 2.0), 300.0, "panel-1")
+
+
+def test_no_file_is_no_equipment() -> None:
+    assert load_equipment("") == ()
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "said"),
+    [
+        ("high = 60.0", "hihg = 60.0", "tiles.toml:8:1, tiles[0].hihg"),
+        ("high = 60.0", "high = nan", "tiles.toml:8:1, tiles[0].high"),
+        ("high = 60.0", "high = inf", "finite"),
+        ("high = 60.0", "high = 5", "tiles.toml:1:1, tiles[0]: low_low, low, high"),
+        ("high = 60.0", 'high = "60"', "valid number"),
+        ('"°C"', '"bananas"', "tiles.toml:6:1, tiles[0].unit: must be one of °C"),
+        ('"ThermalPanel"', '"Robot"', "tiles.toml:3:1"),
+        ('entity = "panel-1"', 'entity = "greenhouse-climate"', "tiles.toml:2:1"),
+        ('entity = "panel-1"', 'entity = "AGI"', "AGI is a robot of the fleet"),
+        ('device = "panel-1"', 'device = "AGI"', "tiles.toml:10:1"),
+        ('device = "panel-1"', 'device = "climate"', "and not iVeg's"),
+        ('device = "panel-1"', 'device = "a/b"', "letters, digits and hyphens"),
+        ('entity = "panel-1"', 'entity = "a b"', "tiles.toml:2:1"),
+        ('attribute = "outlet"\n', "", "tiles.toml:1:1, tiles[0].attribute"),
+        (', en = "Panel: outlet"', "", "tiles[0].name.en"),
+        ("low = 5", "low = 5\nsilent_after_s = 0", "tiles[0].silent_after_s"),
+        ("low = 5", "low = ", "tiles.toml:7:7"),
+    ],
+)
+def test_a_file_that_cannot_be_used_is_one_sentence_with_its_line(
+    before: str, after: str, said: str
+) -> None:
+    assert before in ONE
+
+    found = complaint(ONE.replace(before, after))
+
+    assert said in found
+    assert len(found.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (ONE + ONE, "tiles.toml:14:1, tiles[1].attribute: panel-1/outlet has a tile"),
+        (
+            ONE + ONE.replace('"outlet"', '"inlet"').replace("ThermalPanel", "Boiler"),
+            "tiles.toml:13:1, tiles[1].type: panel-1 is a ThermalPanel",
+        ),
+        (
+            ONE + OTHER.replace('device = "panel-2"', 'device = "panel-1"'),
+            "tiles.toml:20:1, tiles[1].device: panel-1 feeds panel-1",
+        ),
+        ("tiles = []", "tiles.toml:1:1, tiles"),
+    ],
+)
+def test_tiles_that_contradict_each_other_are_refused(text: str, said: str) -> None:
+    assert said in complaint(text)
+
+
+def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(DataFileError, match=r"nowhere\.toml"):
+        load_equipment(str(tmp_path / "nowhere.toml"))
+
+
+def test_the_emulator_measures_each_tile_of_the_demo() -> None:
+    for tile in load_equipment(DEMO):
+        value = EQUIPMENT[tile.device](1_795_000_000.0)[tile.attribute]
+        assert tile.limits.get("low", value) <= value <= tile.limits.get("high", value)
+
+
+def test_the_page_has_every_unit_and_an_example_that_can_be_used() -> None:
+    page = (ROOT / "docs/equipment.md").read_text()
+    example = page.partition("```toml\n")[2].partition("```")[0]
+
+    assert [one for one in UNITS if f"`{one}`" not in page] == []
+    assert len(read_equipment(example, "example")) == 1
+    keys = {key for tile in tomllib.loads(example)["tiles"] for key in tile}
+    assert [key for key in keys if f"`{key}`" not in page] == []

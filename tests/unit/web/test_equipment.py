@@ -1,0 +1,131 @@
+"""Other equipment from Orion's notification to REST, history and alert."""
+
+from typing import Any
+
+import orjson
+
+from iveg.domain.equipment import Tile
+from iveg.domain.records import MeasurementRecord
+from iveg.web.pages.sentences import Sentences
+from iveg.web.pages.translations import read_translations
+from tests.unit.web.desk import WebDesk
+
+CONDUCTIVITY = Tile(
+    entity_id="fertigation-1",
+    entity_type="FertigationUnit",
+    attribute="conductivity",
+    name={"es": "Conductividad", "en": "Conductivity"},
+    unit="mS/cm",
+    limits={"high": 3.5},
+)
+FLOW = Tile(
+    entity_id="fertigation-1",
+    entity_type="FertigationUnit",
+    attribute="flow",
+    name={"es": "Caudal", "en": "Flow"},
+    unit="L/min",
+    silent_after_s=60.0,
+)
+
+
+async def notify(desk: WebDesk, **values: Any) -> int:
+    """Orion tells attributes of the unit; the answer's status."""
+    unit = {"id": "fertigation-1", "type": "FertigationUnit"}
+    attributes = {
+        name: {"type": "Number", "value": value, "metadata": {}}
+        for name, value in values.items()
+    }
+    body = orjson.dumps({"subscriptionId": "ours", "data": [{**unit, **attributes}]})
+    async with desk.orion() as orion:
+        answer = await orion.post(
+            "/ngsi/notifications",
+            content=body,
+            headers={"Content-Type": "application/json"},
+        )
+    return answer.status_code
+
+
+async def tiles(desk: WebDesk) -> dict[str, Any]:
+    async with desk.program() as program:
+        items = (await program.get("/api/v1/equipment")).json()["items"]
+    return {one["attribute"]: one for one in items}
+
+
+def alerts(desk: WebDesk) -> set[str]:
+    """What is wrong with equipment now, as people in England read it."""
+    desk.parts.equipment.tick(desk.clock())
+    desk.loop.step([], desk.clock())
+    desk.evaluator.tick(desk.clock(), desk.parts.supervision.conditions(desk.clock()))
+    say = Sentences(read_translations("en")).say
+    return {
+        say(one.condition.key, one.condition.slots)
+        for one in desk.evaluator.alerts.waiting
+        if one.condition.key.startswith("alert.tile")
+    }
+
+
+async def test_a_value_is_told_and_waits_in_no_queue_of_robots() -> None:
+    desk = WebDesk(tiles=[CONDUCTIVITY, FLOW])
+
+    assert await notify(desk, conductivity=2.4) == 204
+
+    assert desk.ingest.waiting == 0
+    told = await tiles(desk)
+    assert (told["conductivity"]["value"], told["conductivity"]["state"]) == (2.4, "ok")
+    assert told["flow"]["state"] == "waiting"
+    assert desk.hub.versions["equipment"] == 1
+    assert desk.ingest.counters == {}
+
+
+async def test_a_tile_that_loses_its_signal_says_so_and_raises_an_alert() -> None:
+    desk = WebDesk(tiles=[CONDUCTIVITY, FLOW])
+    await notify(desk, conductivity=2.4, flow=18.0)
+    desk.clock.now += 61.0
+    await notify(desk, conductivity=2.5)
+
+    assert alerts(desk) == {"Flow: no signal for 1 min"}
+    told = await tiles(desk)
+    assert (told["flow"]["state"], told["flow"]["value"]) == ("silent", 18.0)
+    assert told["conductivity"]["state"] == "ok"
+
+    await notify(desk, flow=17.0)
+    assert alerts(desk) == set()
+
+
+async def test_a_limit_and_a_text_are_alerts_of_their_own_tiles() -> None:
+    desk = WebDesk(tiles=[CONDUCTIVITY, FLOW])
+
+    assert await notify(desk, conductivity=3.6, flow="open") == 204
+
+    assert alerts(desk) == {
+        "Conductivity is above 3.5 mS/cm",
+        "Flow: the value is not a number",
+    }
+
+
+async def test_one_number_a_minute_is_kept() -> None:
+    desk = WebDesk(tiles=[CONDUCTIVITY, FLOW])
+    for second in range(0, 121, 10):
+        desk.clock.now = float(second)
+        await notify(desk, conductivity=2.0 + second, flow="open")
+
+    kept = desk.records(MeasurementRecord)
+    assert [one.value for one in kept] == [2.0, 62.0, 122.0]
+    assert {(one.entity_id, one.unit) for one in kept} == {("fertigation-1", "mS/cm")}
+
+
+async def test_an_entity_without_a_tile_stays_foreign() -> None:
+    desk = WebDesk()
+
+    assert await notify(desk, conductivity=2.4) == 204
+
+    assert desk.ingest.counters["rejected.foreign_entity"] == 1
+
+
+async def test_a_history_that_fails_takes_no_notification_down() -> None:
+    desk = WebDesk(tiles=[FLOW])
+    desk.parts.equipment._keep = None  # type: ignore[assignment, method-assign]
+
+    assert await notify(desk, flow=1.0) == 204
+
+    assert desk.parts.supervision.counters["comfort_failed.equipment"] == 1
