@@ -1,24 +1,17 @@
 """Equipment files: TOML in, checked tiles out (docs/equipment.md)."""
 
-import tomllib
 from collections.abc import Sequence
 from importlib import resources
-from pathlib import Path
 from typing import Annotated, Self
 
 from pydantic import (
     AfterValidator,
-    BaseModel,
-    ConfigDict,
     Field,
-    ValidationError,
     model_validator,
 )
 
-from iveg.adapters.toml_positions import Path as TomlPath
-from iveg.adapters.toml_positions import place_of, syntax_error
+from iveg.adapters.toml_files import Table, complaint, read_table, read_text
 from iveg.domain.equipment import UNITS, Limit, Tile, contradiction
-from iveg.domain.errors import DataFileError
 from iveg.ngsi import names
 
 DEMO = "demo"
@@ -42,12 +35,7 @@ def load_equipment(name_or_file: str, robots: Sequence[str] = ()) -> tuple[Tile,
     if name_or_file == DEMO:
         file = resources.files("iveg") / "data" / "equipment.toml"
         return read_equipment(file.read_text("utf-8"), "equipment.toml", robots)
-    try:
-        text = Path(name_or_file).read_text("utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = f"cannot be read as text in UTF-8: {error}."
-        raise DataFileError(name_or_file, "", reason) from error
-    return read_equipment(text, name_or_file, robots)
+    return read_equipment(read_text(name_or_file), name_or_file, robots)
 
 
 def read_equipment(
@@ -58,32 +46,13 @@ def read_equipment(
     Raises:
         DataFileError: naming file, line, column, key and reason.
     """
-    try:
-        raw = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        line, column, why = syntax_error(error, text)
-        reason = f"is not TOML: {why}."
-        raise DataFileError(f"{file}:{line}:{column}", "", reason) from error
-    try:
-        page = _FileTable.model_validate(raw)
-    except ValidationError as error:
-        complaints = error.errors(include_input=False, include_url=False)
-        # A key that was mistyped says more than that the right one is missing.
-        first = min(complaints, key=lambda one: one["type"] != "extra_forbidden")
-        raise _complaint(text, file, first["loc"], first["msg"]) from error
+    page = read_table(text, file, _FileTable)
     tiles = tuple(one.value() for one in page.tiles)
     wrong = contradiction(tiles) or _taken(tiles, robots)
     if wrong is not None:
         index, key, reason = wrong
-        raise _complaint(text, file, ("tiles", index, key), reason)
+        raise complaint(text, file, ("tiles", index, key), reason)
     return tiles
-
-
-def _complaint(text: str, file: str, path: TomlPath, reason: str) -> DataFileError:
-    line, column = place_of(text, path)
-    key = "".join(f"[{one}]" if isinstance(one, int) else f".{one}" for one in path)
-    said = reason.removeprefix("Value error, ")
-    return DataFileError(f"{file}:{line}:{column}", key.lstrip("."), f"{said}.")
 
 
 def _taken(tiles: Sequence[Tile], robots: Sequence[str]) -> tuple[int, str, str] | None:
@@ -128,24 +97,17 @@ _Name = Annotated[str, Field(min_length=1, max_length=48)]
 _Metres = Annotated[float, Field(ge=-_FARTHEST_M, le=_FARTHEST_M)]
 
 
-class _Table(BaseModel):
-    # A number may be written without a point; a text is no number.
-    model_config = ConfigDict(
-        strict=True, extra="forbid", allow_inf_nan=False, frozen=True
-    )
-
-
-class _Names(_Table):
+class _Names(Table):
     es: _Name
     en: _Name
 
 
-class _Place(_Table):
+class _Place(Table):
     x: _Metres
     y: _Metres
 
 
-class _Tile(_Table):
+class _Tile(Table):
     entity: Annotated[_Word, AfterValidator(_other_entity)]
     type: Annotated[_Word, AfterValidator(_other_type)]
     attribute: _Word
@@ -190,5 +152,5 @@ class _Tile(_Table):
         )
 
 
-class _FileTable(_Table):
+class _FileTable(Table):
     tiles: Annotated[list[_Tile], Field(min_length=1, max_length=64)]

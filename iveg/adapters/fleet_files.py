@@ -6,25 +6,19 @@ each comes from the file, or else from iVeg's own fleet; a robot may have none.
 """
 
 import math
-import tomllib
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 from importlib import resources
-from pathlib import Path
 from typing import Annotated, Literal, Self
 
 from pydantic import (
     AfterValidator,
-    BaseModel,
-    ConfigDict,
     Field,
-    ValidationError,
     model_validator,
 )
 
-from iveg.adapters.toml_positions import place_of, syntax_error
-from iveg.domain.errors import DataFileError
+from iveg.adapters.toml_files import Table, complaint, read_table, read_text
 from iveg.domain.fleet import (
     CAUTIOUS,
     FleetDescription,
@@ -49,7 +43,7 @@ def load_fleet(file: str = "", words: Sequence[str] = ()) -> FleetDescription:
     Raises:
         DataFileError: the file cannot be used; it says file, line and column.
     """
-    known = built_in() if not file else _load(file)
+    known = built_in() if not file else read_fleet(read_text(file), file)
     if not words:
         return known
     robots = []
@@ -67,50 +61,20 @@ def built_in() -> FleetDescription:
     return read_fleet(text, "fleet.toml")
 
 
-def _load(file: str) -> FleetDescription:
-    try:
-        text = Path(file).read_text("utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = f"cannot be read as text in UTF-8: {error}."
-        raise DataFileError(file, "", reason) from error
-    return read_fleet(text, file)
-
-
 def read_fleet(text: str, file: str) -> FleetDescription:
     """Read a fleet from TOML; ``file`` is its name in complaints.
 
     Raises:
         DataFileError: naming file, line, column, key and reason.
     """
-    try:
-        raw = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        line, column, why = syntax_error(error, text)
-        reason = f"is not TOML: {why}."
-        raise DataFileError(f"{file}:{line}:{column}", "", reason) from error
-    try:
-        page = _FileTable.model_validate(raw)
-    except ValidationError as error:
-        complaints = error.errors(include_input=False, include_url=False)
-        # A key that was mistyped says more than that the right one is missing.
-        first = min(complaints, key=lambda one: one["type"] != "extra_forbidden")
-        raise _complaint(text, file, first["loc"], first["msg"]) from error
+    page = read_table(text, file, _FileTable)
     robots = [one.value() for one in page.robots]
     names = [one.robot_id for one in robots]
     for index, name in enumerate(names):
         if name in names[:index]:
             path = ("robots", index, "id")
-            raise _complaint(text, file, path, f"{name} is in the list twice")
+            raise complaint(text, file, path, f"{name} is in the list twice")
     return FleetDescription.of(robots)
-
-
-def _complaint(
-    text: str, file: str, path: tuple[str | int, ...], reason: str
-) -> DataFileError:
-    line, column = place_of(text, path)
-    key = "".join(f"[{one}]" if isinstance(one, int) else f".{one}" for one in path)
-    said = reason.removeprefix("Value error, ")
-    return DataFileError(f"{file}:{line}:{column}", key.lstrip("."), f"{said}.")
 
 
 # --- the shape of the file --------------------------------------------------------
@@ -128,19 +92,12 @@ _Metres = Annotated[float, Field(gt=0, le=20)]
 _Acceleration = Annotated[float, Field(gt=0, le=20)]
 
 
-class _Table(BaseModel):
-    # A number may be written without a point; a text is no number.
-    model_config = ConfigDict(
-        strict=True, extra="forbid", allow_inf_nan=False, frozen=True
-    )
-
-
-class _Body(_Table):
+class _Body(Table):
     length_m: _Metres
     width_m: _Metres
 
 
-class _Drive(_Table):
+class _Drive(Table):
     type: Literal["differential", "ackermann"]
     max_speed_m_s: Annotated[float, Field(gt=0, le=10)]
     max_turn_rad_s: Annotated[float, Field(gt=0, le=10)] = CAUTIOUS.max_turn
@@ -156,7 +113,7 @@ class _Drive(_Table):
         return self
 
 
-class _Camera(_Table):
+class _Camera(Table):
     x_m: _Place = 0.0
     y_m: _Place = 0.0
     yaw_rad: _Angle = 0.0
@@ -166,13 +123,13 @@ class _Camera(_Table):
     unlabelled_frame: Frame | None = None
 
 
-class _Laser(_Table):
+class _Laser(Table):
     x_m: _Place = 0.0
     y_m: _Place = 0.0
     yaw_rad: _Angle = 0.0
 
 
-class _Robot(_Table):
+class _Robot(Table):
     id: Annotated[str, AfterValidator(_checked_id)]
     kind: Kind = "live"
     detector: bool = True
@@ -218,5 +175,5 @@ def _driven(profile: RobotProfile, drive: _Drive) -> RobotProfile:
     )
 
 
-class _FileTable(_Table):
+class _FileTable(Table):
     robots: Annotated[list[_Robot], Field(min_length=1, max_length=100)]
