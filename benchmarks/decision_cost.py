@@ -31,6 +31,7 @@ from iveg.adapters.greenhouses import load_greenhouse
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import Feedback
 from iveg.domain.observations import Instant, Received
+from iveg.domain.peer_scan import PeerScan
 from iveg.domain.records import Record
 from iveg.domain.tracking.people import People
 from iveg.domain.world import World
@@ -79,6 +80,10 @@ class Telling:
         """Write one feedback."""
         self._writer.write(feedback)
         self.left = time.perf_counter()
+
+    def publish_peer_scan(self, told: PeerScan) -> None:
+        """Write one scan for peers."""
+        codec.write_peer_scan(told)
 
     def taken(self) -> float | None:
         """When the newest left since the last time of asking (s)."""

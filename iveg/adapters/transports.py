@@ -10,6 +10,7 @@ from iveg.adapters.mqtt import MqttLink
 from iveg.adapters.orion import OrionClient
 from iveg.domain.feedback import Feedback
 from iveg.domain.goals import CancelOrder, GoalOrder
+from iveg.domain.peer_scan import PeerScan
 from iveg.ngsi import codec, names
 
 
@@ -25,6 +26,11 @@ class MqttTransport:
         """Offer feedback; a newer one overtakes what has not left yet."""
         topic = names.FEEDBACK_TOPIC.format(robot_id=feedback.robot_id)
         self._link.enqueue(topic, self._writer.write(feedback), qos=1)
+
+    def publish_peer_scan(self, told: PeerScan) -> None:
+        """Offer a scan at QoS 0; a newer one overtakes what has not left yet."""
+        topic = names.PEER_SCAN_TOPIC.format(robot_id=told.robot_id)
+        self._link.enqueue(topic, codec.write_peer_scan(told))
 
     async def stop(self, robot_id: str, hold_id: str, by: str) -> None:
         """Publish a STOP, never retained; returns when the broker has it."""

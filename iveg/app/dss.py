@@ -261,6 +261,7 @@ class Dss:
         beside, supervision = self.services, self.pipeline.supervision
         return {
             "costmap": lambda: beside.mapper.run(clock.now),
+            "peer-scans": lambda: self.pipeline.peer_scans.run(clock.now),
             "coverage": lambda: beside.coverage.run(clock.now),
             "provisioner": self.provisioner.run,
             "history": self.stores.recorder.run,

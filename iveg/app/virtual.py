@@ -13,6 +13,7 @@ from iveg.domain.feedback import Feedback
 from iveg.domain.fleet import FleetDescription
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import Instant, Received
+from iveg.domain.peer_scan import PeerScan
 from iveg.domain.records import DecisionRecord, Record
 from iveg.domain.transports import DIRECT
 from iveg.ngsi import codec
@@ -28,7 +29,7 @@ class VirtualPipeline:
 
     Attributes:
         now: Its time.
-        feedback: Feedback to robots, oldest first.
+        feedback: Feedback to robots, oldest first; ``peer_scans`` likewise.
         decisions: All decisions as they stand, by id.
         parts: The pipeline.
     """
@@ -39,6 +40,7 @@ class VirtualPipeline:
         ids = count(1)
         self.now = START
         self.feedback: list[Feedback] = []
+        self.peer_scans: list[PeerScan] = []
         self.decisions: dict[str, DecisionRecord] = {}
         ports = Ports(
             self, {}, self, self, lambda: self.now, lambda: f"{next(ids):026d}"
@@ -60,6 +62,10 @@ class VirtualPipeline:
     def publish_feedback(self, feedback: Feedback) -> None:
         """Keep the feedback."""
         self.feedback.append(feedback)
+
+    def publish_peer_scan(self, told: PeerScan) -> None:
+        """Keep the scan for peers."""
+        self.peer_scans.append(told)
 
     def enqueue(self, record: Record) -> None:
         """Keep a decision; ignore other records."""

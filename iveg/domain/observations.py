@@ -220,6 +220,7 @@ class SafetyReport(Observation):
         linear: Measured speed (m/s); ``angular`` (rad/s).
         feedback_age_s: How old the newest feedback is that the robot acts on (s).
         faults: What it finds wrong with its own data.
+        peer_scans: It asks for scans of its peers.
     """
 
     speed_factor: float
@@ -233,6 +234,7 @@ class SafetyReport(Observation):
     angular: float = 0.0
     feedback_age_s: float | None = None
     faults: tuple[RobotFault, ...] = ()
+    peer_scans: bool = False
 
 
 @dataclass(frozen=True, slots=True)

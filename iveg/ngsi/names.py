@@ -50,6 +50,8 @@ ALGORITHM_1 = {
 FEEDBACK_TOPIC = "/{robot_id}/mqtt_feedback"
 FEEDBACK_FILTER = "/+/mqtt_feedback"
 DESIRED_TOPIC = "/{robot_id}/iveg/desired"
+PEER_SCAN_TOPIC = "/{robot_id}/iveg/peer_scan"
+PEER_SCAN_FILTER = "/+/iveg/peer_scan"
 
 _ROBOT_ID = re.compile(r"[A-Za-z0-9-]{1,64}")
 DOCTOR_ID = "iveg-doctor"

@@ -5,6 +5,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
+from iveg.domain.peer_scan import BEAMS, PLACES
+
 MAX_BEAMS = 4096
 MAX_RANGE_M = 1e6
 MAX_BOXES = 256
@@ -165,6 +167,7 @@ class SafetyValue(OriginFields):
     w: Speed = 0.0
     feedback_age_s: Seconds | None = None
     faults: Annotated[list[FaultValue], Field(max_length=MAX_TEXT)] = []
+    peer_scans: object = None
 
 
 class PointValue(Wire):
@@ -258,6 +261,41 @@ class FeedbackValue(OriginFields):
     clear: Annotated[list[Text], Field(max_length=MAX_ROBOTS)] = []
     seen: Annotated[dict[str, int], Field(max_length=MAX_ROBOTS)] = {}
     backlog: object = None
+
+
+class MountValue(Wire):
+    """A laser in ``base_link`` (m, rad): no robot is longer than twice this."""
+
+    x: Annotated[float, Field(ge=-5, le=5)]
+    y: Annotated[float, Field(ge=-5, le=5)]
+    yaw: Radians
+
+
+class PeerPoseValue(Wire):
+    """Where a peer's ``base_link`` was (m, rad)."""
+
+    x: Metres
+    y: Metres
+    yaw: Radians
+    frame_id: Literal["map"]
+
+
+class PeerScanValue(OriginFields):
+    """``/{robot}/iveg/peer_scan``."""
+
+    robot_id: Text
+    robot_pose: PeerPoseValue
+    age_s: Annotated[float, Field(ge=0, le=2)]
+    mount: MountValue
+    range_max: Annotated[float, Field(gt=0, le=1e4)]
+    ranges: Annotated[
+        list[Annotated[float, Field(ge=0, le=1e4)] | None],
+        Field(min_length=BEAMS, max_length=BEAMS),
+    ]
+    places: Annotated[
+        list[Annotated[int, Field(ge=0, lt=PLACES)]],
+        Field(min_length=BEAMS, max_length=BEAMS),
+    ]
 
 
 class NotificationValue(Wire):

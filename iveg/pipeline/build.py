@@ -31,6 +31,7 @@ from iveg.pipeline.loop import RuleLoop
 from iveg.pipeline.mapping import Mapper
 from iveg.pipeline.margins import MarginTotals
 from iveg.pipeline.messenger import Messenger
+from iveg.pipeline.peer_scans import PeerScans
 from iveg.pipeline.ports import (
     Clock,
     CommandPort,
@@ -108,6 +109,7 @@ class Pipeline:
     scans: ScanReader
     goals: GoalDispatcher
     equipment: EquipmentMonitor
+    peer_scans: PeerScans
 
     def counters(self) -> Counter[str]:
         """Everything that is counted in it."""
@@ -208,6 +210,7 @@ def build(
         EquipmentMonitor(
             Equipment(choices.tiles, start), ports.sink, event_log, supervision
         ),
+        PeerScans(world, scans, ports.fleet.publish_peer_scan, choices.boot),
     )
 
 

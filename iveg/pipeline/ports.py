@@ -9,6 +9,7 @@ from iveg.domain.feedback import Feedback
 from iveg.domain.goals import CancelOrder, GoalOrder
 from iveg.domain.messages import Contacts, MessageDelivery, OutboundMessage
 from iveg.domain.observations import Instant
+from iveg.domain.peer_scan import PeerScan
 
 
 class GoalPort(Protocol):
@@ -57,6 +58,9 @@ class FleetPort(Protocol):
 
     def publish_feedback(self, feedback: Feedback) -> None:
         """Publish feedback to the fleet; the newest of each topic counts."""
+
+    def publish_peer_scan(self, told: PeerScan) -> None:
+        """Publish a scan for peers, which may be lost."""
 
     async def set_desired_state(
         self, robot_id: str, desired: Literal["stopped", "run"], ids: Iterable[str]

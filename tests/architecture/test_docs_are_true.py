@@ -45,6 +45,7 @@ def test_every_measure_topic_has_its_heading(device: names.Device) -> None:
         names.answer_topic("{apikey}", "{robot}"),
         names.FEEDBACK_TOPIC.format(robot_id="{robot}"),
         names.DESIRED_TOPIC.format(robot_id="{robot}"),
+        names.PEER_SCAN_TOPIC.format(robot_id="{robot}"),
         *(names.direct_topic("{robot}", suffix) for suffix in names.DIRECT_SUFFIXES),
     ],
 )
@@ -60,5 +61,6 @@ def test_what_a_page_says_of_small_sensors_is_fresh(name: str) -> None:
     assert page == sensor_pages.PAGES[name](page), stale
 
 
-def test_what_robots_subscribe_to_is_in_the_contract() -> None:
-    assert f"`{names.FEEDBACK_FILTER}`" in documents.interfaces()
+@pytest.mark.parametrize("one", [names.FEEDBACK_FILTER, names.PEER_SCAN_FILTER])
+def test_what_robots_subscribe_to_is_in_the_contract(one: str) -> None:
+    assert f"`{one}`" in documents.interfaces()

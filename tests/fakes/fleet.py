@@ -7,13 +7,14 @@ from typing import Literal
 from iveg.domain.errors import HopError
 from iveg.domain.feedback import Feedback
 from iveg.domain.goals import CancelOrder, GoalOrder
+from iveg.domain.peer_scan import PeerScan
 
 
 class FakeFleet:
     """Implements ``pipeline.ports.FleetPort``.
 
     Attributes:
-        told: Feedback in the order it was offered.
+        told: Feedback in the order it was offered; ``scans`` for peers likewise.
         stops: (robot, hold) in the order it was published.
         asked: (what, robot, hold ids) of each release and resume.
         orders: (challenge, attempt) of the same.
@@ -25,6 +26,7 @@ class FakeFleet:
 
     def __init__(self) -> None:
         self.told: list[Feedback] = []
+        self.scans: list[PeerScan] = []
         self.stops: list[tuple[str, str]] = []
         self.asked: list[tuple[str, str, tuple[str, ...]]] = []
         self.orders: list[tuple[str, str]] = []
@@ -36,6 +38,9 @@ class FakeFleet:
 
     def publish_feedback(self, feedback: Feedback) -> None:
         self.told.append(feedback)
+
+    def publish_peer_scan(self, told: PeerScan) -> None:
+        self.scans.append(told)
 
     async def stop(self, robot_id: str, hold_id: str, by: str) -> None:  # noqa: ARG002 - the port
         self.stops.append((robot_id, hold_id))

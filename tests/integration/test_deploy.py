@@ -185,7 +185,10 @@ def straight(robot: str) -> set[str]:
 
 AIR = {"/iveg/climate/attrs", "/json/iveg/climate/attrs"}
 COMMANDS = {"/iveg/AGI/cmd", "/iveg/AGII/cmd"}
-FEEDBACK = {"/AGI/mqtt_feedback", "/AGII/mqtt_feedback"}
+FEEDBACK = {
+    *("/AGI/mqtt_feedback", "/AGII/mqtt_feedback"),
+    *("/AGI/iveg/peer_scan", "/AGII/iveg/peer_scan"),
+}
 DESIRED = {"/AGI/iveg/desired", "/AGII/iveg/desired"}
 PROBES = {
     "/iveg/iveg-doctor/attrs",

@@ -20,6 +20,7 @@ from iveg.ngsi.codec.incoming import (
     read_measure,
     read_notification,
 )
+from iveg.ngsi.codec.peer_scans import read_peer_scan, write_peer_scan
 from iveg.ngsi.codec.reports import (
     write_answer,
     write_climate,
@@ -52,6 +53,7 @@ __all__ = [
     "read_feedback",
     "read_measure",
     "read_notification",
+    "read_peer_scan",
     "write_answer",
     "write_climate",
     "write_command",
@@ -63,6 +65,7 @@ __all__ = [
     "write_heartbeat",
     "write_navigation",
     "write_odometry",
+    "write_peer_scan",
     "write_release",
     "write_resume",
     "write_safety",

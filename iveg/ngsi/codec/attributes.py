@@ -148,6 +148,7 @@ def _safety(robot_id: str, attributes: Mapping[str, object]) -> SafetyReport:
         value.w,
         value.feedback_age_s,
         tuple(RobotFault(one.code, one.about, one.for_s) for one in value.faults),
+        value.peer_scans is True,
     )
 
 

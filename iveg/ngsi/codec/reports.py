@@ -109,6 +109,7 @@ def write_safety(value: SafetyReport) -> bytes:
                 "w": round(value.angular, 4),
                 "feedback_age_s": rounded(value.feedback_age_s),
                 **_faults(value),
+                **({"peer_scans": True} if value.peer_scans else {}),
                 **write_origin(value.origin),
             }
         },

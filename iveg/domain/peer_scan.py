@@ -1,0 +1,136 @@
+"""A scan as peers are told of it: 72 beams all round, for their own costmaps.
+
+A beam is 5° wide and as long as the shortest ray in it, so that nothing is free that
+the laser did not see to be free; where any ray in it says nothing, it says nothing.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iveg.domain.geometry import Pose2D
+from iveg.domain.observations import LaserScan, Origin
+
+BEAMS: Final = 72
+PLACES: Final = 10
+"""Parts of a beam across, one of which its shortest ray was in."""
+OLDEST_S: Final = 2.0
+_WIDTH = math.tau / BEAMS
+_CENTIMETRE = 100.0
+_USED_FROM_M = 0.01
+"""A shorter beam says nothing."""
+_ROUNDED = 0.05
+"""Of the angle between two rays."""
+SAYS_NOTHING = np.float32(0.0)
+
+_Floats = NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PeerScan:
+    """One message on ``/{robot_id}/iveg/peer_scan``.
+
+    Attributes:
+        pose: Where ``base_link`` of the peer was, in ``map``.
+        age_s: Age of the scan when this was sent (s).
+        mount: The laser's pose in ``base_link``.
+        range_max: Longest range that counts (m).
+        ranges: Shape (72,) (m), the first beam from −π on; ``inf`` where nothing came
+            back, 0 where the beam says nothing.
+        places: Shape (72,): where across the beam its range was measured.
+    """
+
+    robot_id: str
+    origin: Origin
+    pose: Pose2D
+    age_s: float
+    mount: Pose2D
+    range_max: float
+    ranges: _Floats
+    places: NDArray[np.uint8]
+
+    def ended(self) -> NDArray[np.bool_]:
+        """Which beams ended at something."""
+        return (self.ranges >= _USED_FROM_M) & (self.ranges <= self.range_max)
+
+    def returns(self) -> _Floats:
+        """What came back, in ``map``; shape (m, 2), (m)."""
+        sensor, ended = self.pose.compose(self.mount), self.ended()
+        across = (self.places[ended] + 0.5) / PLACES
+        bearing = sensor.yaw - math.pi + _WIDTH * (np.flatnonzero(ended) + across)
+        far = self.ranges[ended]
+        found = sensor.x + far * np.cos(bearing), sensor.y + far * np.sin(bearing)
+        return np.stack(found, axis=1).astype(np.float32)
+
+    def without(self, refused: NDArray[np.bool_]) -> "PeerScan":
+        """The same where beams say nothing whose return (m,) is refused."""
+        ranges = self.ranges.copy()
+        ranges[np.flatnonzero(self.ended())[refused]] = SAYS_NOTHING
+        return replace(self, ranges=ranges)
+
+    def scan(self) -> LaserScan:
+        """The beams as a sweep; what they ended at is in ``returns``."""
+        return LaserScan(
+            self.robot_id,
+            self.origin,
+            _WIDTH / 2 - math.pi,
+            _WIDTH,
+            _USED_FROM_M,
+            self.range_max,
+            self.mount,
+            self.ranges,
+        )
+
+
+def peer_scan_of(scan: LaserScan, pose: Pose2D, age_s: float) -> PeerScan:
+    """What peers are told of a scan that was taken at ``pose`` in ``map``."""
+    bearing = _bearings(scan.angle_increment)
+    ray = _nearest_rays(scan, bearing)
+    said = np.where(ray < 0, SAYS_NOTHING, _lengths(scan)[ray])
+    shortest = said.argmin(axis=1)[:, None]
+    ranges = np.take_along_axis(said, shortest, 1)[:, 0]
+    ray = np.take_along_axis(ray, shortest, 1)[:, 0]
+    at = scan.angle_min + scan.angle_increment * ray - bearing[:, 0]
+    # The ray at an edge may lie just outside.
+    aside = (at + math.pi) % math.tau - math.pi
+    places = np.clip(np.floor(aside / _WIDTH * PLACES), 0, PLACES - 1)
+    return PeerScan(
+        scan.robot_id,
+        scan.origin,
+        pose,
+        age_s,
+        scan.mount,
+        scan.range_max,
+        (np.floor(ranges * _CENTIMETRE) / _CENTIMETRE).astype(np.float32),
+        places.astype(np.uint8),
+    )
+
+
+def _bearings(increment: float) -> NDArray[np.float64]:
+    """Bearings in each beam, both edges among them, two for each ray or more (rad)."""
+    parts = 2 * max(1, math.ceil(_WIDTH / abs(increment)))
+    edges = np.arange(BEAMS)[:, None] * _WIDTH - math.pi
+    return edges + np.linspace(0.0, _WIDTH, parts + 1)[None, :]
+
+
+def _nearest_rays(scan: LaserScan, bearing: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Number of the ray that each bearing is nearest to; -1 where none is near."""
+    step, turn = scan.angle_increment, math.tau / abs(scan.angle_increment)
+    place = ((bearing - scan.angle_min) / step) % turn
+    ray = np.floor(place + 0.5).astype(np.intp)
+    ray[place > turn - 0.5] = 0
+    # A turn of rays closes but for what the driver's numbers were rounded by.
+    last = scan.ranges.size - 1
+    ray[(ray > last) & (place < last + 0.5 + _ROUNDED)] = last
+    ray[ray > last] = -1
+    return ray
+
+
+def _lengths(scan: LaserScan) -> _Floats:
+    """How far each ray went (m); 0 where it says nothing."""
+    ranges = scan.ranges
+    went = np.where(ranges > scan.range_max, np.float32(np.inf), ranges)
+    return np.where(ranges >= scan.range_min, went, SAYS_NOTHING)

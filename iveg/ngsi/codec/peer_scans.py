@@ -1,0 +1,67 @@
+"""Scans that iVeg hands on to robots which ask for them, both ways."""
+
+import numpy as np
+import orjson
+from pydantic import ValidationError
+
+from iveg.domain.errors import UnreadableError
+from iveg.domain.geometry import Pose2D
+from iveg.domain.peer_scan import PeerScan
+from iveg.ngsi import payloads
+from iveg.ngsi.codec.fields import read_origin, rounded
+from iveg.ngsi.codec.untrusted import first_complaint, load_json
+
+LARGEST = 1024
+"""Size of a message at most (bytes)."""
+
+
+def write_peer_scan(told: PeerScan) -> bytes:
+    """The bytes of ``/{robot}/iveg/peer_scan``."""
+    centimetres = told.ranges.astype(np.float64).round(2).tolist()
+    return orjson.dumps(
+        {
+            "boot": told.origin.boot,
+            "seq": told.origin.seq,
+            "stamp": told.origin.stamp,
+            "robot_id": told.robot_id,
+            "robot_pose": {**_pose(told.pose), "frame_id": "map"},
+            "age_s": round(told.age_s, 3),
+            "mount": _pose(told.mount),
+            "range_max": round(told.range_max, 3),
+            "ranges": [None if one == np.inf else one for one in centimetres],
+            "places": told.places.tolist(),
+        }
+    )
+
+
+def _pose(pose: Pose2D) -> dict[str, float | None]:
+    return {"x": rounded(pose.x), "y": rounded(pose.y), "yaw": rounded(pose.yaw)}
+
+
+def read_peer_scan(robot_id: str, payload: bytes) -> PeerScan:
+    """Read ``/{robot}/iveg/peer_scan``.
+
+    Raises:
+        UnreadableError: ``too_large``, ``not_json``, ``not_a_peer_scan``, or
+            ``another_robot`` than ``robot_id``.
+    """
+    if len(payload) > LARGEST:
+        raise UnreadableError("too_large", f"{len(payload)} bytes")
+    try:
+        value = payloads.PeerScanValue.model_validate(load_json(payload))
+    except ValidationError as error:
+        raise UnreadableError("not_a_peer_scan", first_complaint(error)) from error
+    if value.robot_id != robot_id:
+        raise UnreadableError("another_robot", value.robot_id)
+    pose, mount = value.robot_pose, value.mount
+    ranges = np.array([np.inf if r is None else r for r in value.ranges], np.float32)
+    return PeerScan(
+        robot_id,
+        read_origin(value),
+        Pose2D(pose.x, pose.y, pose.yaw),
+        value.age_s,
+        Pose2D(mount.x, mount.y, mount.yaw),
+        value.range_max,
+        ranges,
+        np.array(value.places, np.uint8),
+    )
