@@ -34,7 +34,7 @@ from iveg.domain.fleet import (
     RobotProfile,
 )
 from iveg.domain.geometry import Twist2D
-from iveg.domain.witness import Plan
+from iveg.domain.witness import Outline, Plan
 from iveg.ngsi import names
 from iveg.robot.goals import Navigate
 from iveg.robot.node import NodeSettings, RobotNode
@@ -96,8 +96,16 @@ async def _ride(
         await refuse_second_gate(dds, config.full_topics["cmd_vel_out"])
         safety = node_settings(settings, data / "robots", _plan(options.greenhouse))
         node = partial(_node, options.id, settings, safety, config)
+        body = _profile(_fleet(settings).of_robot(options.id), config)
         robot = Ros2Robot(
-            options.id, config, dds, node, classes=classes, sim_time=options.sim_time
+            options.id,
+            config,
+            dds,
+            node,
+            classes=classes,
+            sim_time=options.sim_time,
+            outline=Outline(body.length, body.width),
+            area=None if safety.plan is None else safety.plan.bounds,
         )
         if options.attended:
             robot.node.release_locally()

@@ -116,10 +116,15 @@ class InflatedGrid:
 
 
 class Occupancy:
-    """Log-odds of one grid: 0 unknown, below free, above taken."""
+    """Log-odds of one grid: 0 unknown, below free, above taken.
 
-    def __init__(self, grid: Grid) -> None:
+    Args:
+        half_life_s: In so long half of what is known is forgotten (s).
+    """
+
+    def __init__(self, grid: Grid, half_life_s: float = _HALF_LIFE_S) -> None:
         self.grid = grid
+        self._half_life_s = half_life_s
         self._log: _Log = np.zeros((grid.height, grid.width), np.float32)
         self._faded: float | None = None
 
@@ -135,12 +140,12 @@ class Occupancy:
             passed = max(0.0, mono - self._faded)
             if passed < _FADES_EVERY_S:
                 return
-            self._log *= np.float32(0.5 ** (passed / _HALF_LIFE_S))
+            self._log *= np.float32(0.5 ** (passed / self._half_life_s))
         self._faded = mono
 
     def moved_to(self, grid: Grid) -> "Occupancy":
         """The same knowledge on a grid of the same resolution that lies elsewhere."""
-        other = Occupancy(grid)
+        other = Occupancy(grid, self._half_life_s)
         other._faded = self._faded
         old = self.grid
         down, left = old.index(
@@ -158,7 +163,7 @@ class Occupancy:
         cost = np.clip(self._log * (100.0 / _MOST), 0.0, 100.0).astype(np.int8)
         cost[np.abs(self._log) < _KNOWN] = UNKNOWN
         for zone in zones:
-            _inflate(cost, self.grid, zone)
+            inflate(cost, self.grid, zone.x, zone.y, zone.radius_m)
         return InflatedGrid(self.grid, cost)
 
 
@@ -197,11 +202,14 @@ def _stretch(low: float, high: float) -> tuple[float, float]:
     return middle - half, middle + half
 
 
-def sweep_of(scan: LaserScan, pose: Pose2D, grid: Grid) -> Sweep:
+def sweep_of(
+    scan: LaserScan, pose: Pose2D, grid: Grid, returns: _Log | None = None
+) -> Sweep:
     """Read one scan, taken at ``pose`` in ``map``, cell by cell.
 
     Each cell looks up its beam, rather than each beam its cells, so that no holes
-    remain between beams that are far apart.
+    remain between beams that are far apart.  ``returns``, shape (m, 2), (m): where
+    beams ended in ``map``, where that is not in their middle.
     """
     sensor = pose.compose(scan.mount)
     reach = min(scan.range_max, _REACH_M)
@@ -222,7 +230,8 @@ def sweep_of(scan: LaserScan, pose: Pose2D, grid: Grid) -> Sweep:
         free_to = _free_to(scan, sensor.yaw, bearing[part], reach)
         free = distance[part] < free_to - np.float32(grid.resolution)
         np.multiply(free, np.float32(_MISS), out=change)
-        rows, columns = _hits(scan, pose, sensor, grid, reach)
+        points = scan.points(pose) if returns is None else returns
+        rows, columns = _hits(points, sensor, grid, reach)
         inside = (rows >= cells[0].start) & (rows < cells[0].stop)
         inside &= (columns >= cells[1].start) & (columns < cells[1].stop)
         change[rows[inside] - cells[0].start, columns[inside] - cells[1].start] = _HIT
@@ -282,9 +291,9 @@ def _lengths(scan: LaserScan, size: int, reach: float) -> _Log:
 
 
 def _hits(
-    scan: LaserScan, pose: Pose2D, sensor: Pose2D, grid: Grid, reach: float
+    points: _Log, sensor: Pose2D, grid: Grid, reach: float
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    points = scan.points(pose).astype(np.float64)
+    points = points.astype(np.float64)
     near = np.hypot(points[:, 0] - sensor.x, points[:, 1] - sensor.y) <= reach
     points = points[near]
     column = np.floor((points[:, 0] - grid.xmin) / grid.resolution).astype(np.int64)
@@ -292,11 +301,13 @@ def _hits(
     return row, column
 
 
-def _inflate(cost: NDArray[np.int8], grid: Grid, ring: Zone) -> None:
+def inflate(
+    cost: NDArray[np.int8], grid: Grid, x: float, y: float, radius_m: float
+) -> None:
     """Lay one ring over the costs: dear at its edge, dearest at its centre."""
-    cells = grid.window(ring.x, ring.y, ring.radius_m)
-    dx, dy = grid.offsets(cells, ring.x, ring.y)
-    inward = 1.0 - np.hypot(dx, dy) / np.float32(ring.radius_m)
+    cells = grid.window(x, y, radius_m)
+    dx, dy = grid.offsets(cells, x, y)
+    inward = 1.0 - np.hypot(dx, dy) / np.float32(radius_m)
     added = _RING_EDGE + (_RING_CENTRE - _RING_EDGE) * inward
     laid = np.where(inward >= 0.0, added, UNKNOWN).astype(np.int8)
     cost[cells] = np.maximum(cost[cells], laid)

@@ -49,6 +49,7 @@ from iveg.robot.uplink import Form, Uplink
 _log = logging.getLogger(__name__)
 _GATE_EVERY_S = 0.04
 """25 Hz, so that a late timer still gives the drive its 20."""
+_PEER_SCAN = names.PEER_SCAN_TOPIC.format(robot_id="")[1:]
 _SAID_WITHIN_S = 0.03
 """Odometry, upstream twist and feedback that arrive together give one drive command."""
 
@@ -116,6 +117,8 @@ class RobotNode:
         self._echo = Echo()
         self._on_feedback_read = on_feedback
         self._faults: tuple[RobotFault, ...] = ()
+        self._on_peer_scan: Callable[[str, bytes], None] | None = None
+        self._asks_for_scans = False
         self._is_replay = replay is not None
         self._nobody_there = held
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -130,7 +133,7 @@ class RobotNode:
         self._link = MqttLink(
             settings.address,
             f"robot {robot_id}",
-            {self._command_topic: 1, self._desired_topic: 1, names.FEEDBACK_FILTER: 1},
+            self._subscriptions(),
             self._on_message,
         )
         hold_file = settings.directory / f"{robot_id}.holds.json"
@@ -160,6 +163,10 @@ class RobotNode:
             echo=self._echo if replay is None else None,
             replay=replay,
         )
+
+    def _subscriptions(self) -> dict[str, int]:
+        own = self._command_topic, self._desired_topic
+        return dict.fromkeys((*own, names.FEEDBACK_FILTER), 1)
 
     def _new_machine(self, hold_file: Path, limits: Limits) -> SafetyMachine:
         stored = read_holds(hold_file)
@@ -263,6 +270,16 @@ class RobotNode:
         """Set the data faults that the next reports carry."""
         self._faults = faults
 
+    def hear_peer_scans(self, on_scan: Callable[[str, bytes], None]) -> None:
+        """Hand on scans of peers as they come, by topic; call it before ``run``."""
+        self._on_peer_scan = on_scan
+        topics = {**self._subscriptions(), names.PEER_SCAN_FILTER: 0}
+        self._link.attach(topics, self._on_message)
+
+    def ask_for_peer_scans(self, wanted: bool) -> None:
+        """Have the next reports ask iVeg for scans of peers, or no longer."""
+        self._asks_for_scans = wanted
+
     def add_local_hold(self, source: Literal["hw", "bumper"]) -> None:
         """Hold the robot because its red button or bumper was pressed."""
         now = self._read_clock().mono
@@ -309,6 +326,8 @@ class RobotNode:
                 self._tell_goal(self._goals.take(order, self._facts(now)))
         elif topic == self._desired_topic:
             self._perform(self._machine.desired(payload, now), now)
+        elif self._on_peer_scan is not None and topic.endswith(_PEER_SCAN):
+            self._on_peer_scan(topic, payload)
         else:
             self._on_feedback(topic, payload, now)
 
@@ -378,7 +397,8 @@ class RobotNode:
         self._lane.answer(self._uplink.answer(answer, self._own(self._read_clock())))
 
     def _report(self, report: SafetyReport, *, is_measure: bool) -> None:
-        report, now = replace(report, faults=self._faults), self._read_clock()
+        now, wish = self._read_clock(), self._asks_for_scans
+        report = replace(report, faults=self._faults, peer_scans=wish)
         seq, messages = self._uplink.report(
             report, self._own(now), is_measure=is_measure
         )

@@ -24,6 +24,7 @@ from iveg.ros2.schema import (
 
 Floats = Annotated[NDArray[np.float32], Many("float32")]
 Doubles = Annotated[NDArray[np.float64], Many("float64")]
+Cells = Annotated[NDArray[np.int8], Many("int8")]
 Octets = Annotated[NDArray[np.uint8], Many("uint8")]
 Covariance = Annotated[NDArray[np.float64], Many("float64", 36)]
 Nine = Annotated[NDArray[np.float64], Many("float64", 9)]
@@ -210,6 +211,25 @@ class Path(Stamped, package="nav_msgs"):
     """Planned path of navigation."""
 
     poses: tuple[PoseStamped, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class MapMetaData(Message, package="nav_msgs"):
+    """Size (m, cells) of a grid, and where its first cell begins."""
+
+    map_load_time: Time = Time()
+    resolution: Float32 = 0.0
+    width: Uint32 = 0
+    height: Uint32 = 0
+    origin: Pose = Pose()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OccupancyGrid(Stamped, package="nav_msgs"):
+    """Costs row by row, 0 to 100; -1 unknown."""
+
+    info: MapMetaData = MapMetaData()
+    data: Cells = field(default_factory=lambda: np.zeros(0, np.int8))
 
 
 # --- sensor_msgs -------------------------------------------------------------------

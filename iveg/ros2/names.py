@@ -64,6 +64,8 @@ class Endpoint:
 DEFAULT = Qos()
 SENSOR_DATA = Qos(reliable=False, depth=5)
 TF = Qos(depth=100)
+LATCHED = Qos(transient_local=True, depth=1)
+"""Of maps: whoever listens late gets the newest."""
 TF_STATIC = Qos(transient_local=True, depth=100)
 
 

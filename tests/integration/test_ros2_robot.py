@@ -3,17 +3,20 @@
 import asyncio
 import math
 import re
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Iterator, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from urllib.parse import urlsplit
 
+import numpy as np
 import pytest
 
 from iveg.adapters import clock
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.domain.feedback import CLEAR, Feedback
-from iveg.domain.observations import DetectionFrame, Origin, SafetyReport
+from iveg.domain.geometry import Pose2D
+from iveg.domain.observations import DetectionFrame, LaserScan, Origin, SafetyReport
+from iveg.domain.peer_scan import peer_scan_of
 from iveg.ngsi import codec
 from iveg.ngsi.names import direct_topic, measure_topic
 from iveg.ros2 import cdr, names
@@ -72,6 +75,7 @@ class Iveg:
     def __init__(self, address: BrokerAddress) -> None:
         self.report: SafetyReport | None = None
         self.frame: DetectionFrame | None = None
+        self._told = 0
         self._devices = {
             direct_topic(ROBOT, "_safety"): f"{ROBOT}_safety",
             measure_topic(_KEY, f"{ROBOT}{_DETECTIONS}"): f"{ROBOT}{_DETECTIONS}",
@@ -99,6 +103,20 @@ class Iveg:
             topic = f"/{ROBOT}/mqtt_feedback"
             self.link.enqueue(topic, codec.write_feedback(said), 1)
             await asyncio.sleep(0.1)
+
+    def tell_of_peer(self) -> None:
+        """Another robot is 6 m ahead, and its laser met something 3 m beyond."""
+        self._told += 1
+        stamp = codec.format_stamp(clock.wall())
+        here = Pose2D(6.0, 0.0, 0.0)
+        whole = Origin("b", self._told, stamp)
+        peer = Feedback("AGII", whole, pose=here, pose_stamp=stamp)
+        self.link.enqueue("/AGII/mqtt_feedback", codec.write_feedback(peer), 1)
+        rays = np.full(360, 3.04, np.float32)
+        turn = -math.pi, math.tau / 360, 0.1, 12.0
+        scan = LaserScan("AGII", whole, *turn, Pose2D(0.0, 0.0, 0.0), rays)
+        told = codec.write_peer_scan(peer_scan_of(scan, here, 0.1))
+        self.link.enqueue("/AGII/iveg/peer_scan", told)
 
 
 class Sensors:
@@ -213,3 +231,40 @@ def test_a_second_gate_refuses_and_says_who_drives(riding: Riding) -> None:
     assert said in riding.here.text()
     assert "only one program may drive this robot" in riding.elsewhere.text()
     assert riding.gate.process.poll() is None
+
+
+async def test_nav2s_static_layer_gets_the_fleets_picture(riding: Riding) -> None:
+    """A peer of the feedback, and what its laser met, which the robot asked for."""
+    kept = names.LATCHED
+    async with at_work(riding) as (iveg, _):
+        with Dds(loopback(riding.domain)) as nav2:
+            layer = nav2.reader("/iveg/costmap", m.OccupancyGrid, kept)
+            async with asyncio.timeout(30.0):
+                while iveg.report is None or not iveg.report.peer_scans:  # noqa: ASYNC110
+                    await asyncio.sleep(0.05)
+                grid = None
+                while grid is None or cost(grid, 9.05, 0.05) < 100:
+                    iveg.tell_of_peer()
+                    grid = newest(layer.take(), grid)
+                    await asyncio.sleep(0.2)
+
+    assert grid.header.frame_id == "map"
+    assert cost(grid, 6.05, 0.05) == 100
+    assert cost(grid, 8.55, 0.05) == 0
+    assert cost(grid, 0.05, 0.05) == -1
+
+
+def newest(waited: Sequence[bytes], before: m.OccupancyGrid | None) -> m.OccupancyGrid:
+    """The last of what came, if anything did."""
+    empty = m.OccupancyGrid()
+    return cdr.read(m.OccupancyGrid, waited[-1]) if waited else before or empty
+
+
+def cost(grid: m.OccupancyGrid, x: float, y: float) -> int:
+    """At a place in ``map`` (m); unknown in a grid without cells."""
+    info = grid.info
+    if not grid.data.size:
+        return -1
+    column = math.floor((x - info.origin.position.x) / info.resolution)
+    row = math.floor((y - info.origin.position.y) / info.resolution)
+    return int(grid.data[row * info.width + column])

@@ -14,14 +14,19 @@ from dataclasses import dataclass
 from iveg.adapters import clock
 from iveg.domain.errors import HopError
 from iveg.domain.feedback import Feedback
-from iveg.domain.geometry import Twist2D
+from iveg.domain.fleet import CAUTIOUS
+from iveg.domain.geometry import Rectangle, Twist2D
 from iveg.domain.goals import Goal
 from iveg.domain.observations import RobotFault
+from iveg.domain.witness import Outline
+from iveg.robot.costmap import FleetCostmap
 from iveg.robot.goals import Navigate
+from iveg.robot.neighbours import Neighbours
 from iveg.robot.node import RobotNode
 from iveg.robot.pacing import every
 from iveg.robot.ros2 import neighbours
 from iveg.robot.ros2.config import RobotConfig
+from iveg.robot.ros2.costmap import CostmapTopic
 from iveg.robot.ros2.drive import DriveTopics, message_of
 from iveg.robot.ros2.goal_pose import pose_for
 from iveg.robot.ros2.input_faults import speed_of
@@ -43,6 +48,7 @@ _LOOK_ROUND_TICKS, _TELL_TICKS = 15, 6
 """Ticks between two checks of endpoints, and between two outputs of neighbours."""
 _KNOWN_WITHIN_S = 8.0
 _ORDER = list(TOPICS)
+_LARGE = Outline(CAUTIOUS.length, CAUTIOUS.width)
 
 
 NodeMaker = Callable[
@@ -77,6 +83,8 @@ class Ros2Robot:
         make_node: Makes its safety node.
         classes: A detector's class names by number.
         sim_time: Stamps are a simulator's.
+        outline: The robot's footprint.
+        area: What its costmap covers; None: a window round it.
     """
 
     def __init__(
@@ -88,6 +96,8 @@ class Ros2Robot:
         *,
         classes: tuple[str, ...] = (),
         sim_time: bool = False,
+        outline: Outline = _LARGE,
+        area: Rectangle | None = None,
     ) -> None:
         self._id = robot_id
         self._config, self._names = config, config.full_topics
@@ -100,7 +110,8 @@ class Ros2Robot:
             config.frames.base_link,
             self._input_faults,
         )
-        self._neighbours = neighbours.Neighbours(robot_id)
+        self._neighbours = Neighbours(robot_id)
+        self._fleet_costmap = FleetCostmap(robot_id, outline, area)
         self._said: frozenset[tuple[str, str]] = frozenset()
         self._first_feedback: float | None = None
         self._known = False
@@ -108,6 +119,8 @@ class Ros2Robot:
         self._ticks = itertools.count()
         self._open(network)
         self.node = make_node(self._drive, self._on_feedback, self.navigate)
+        self.node = make_node(self._drive, self._on_feedback)
+        self._costmap = self._open_costmap(network)
 
     def _open(self, network: Network) -> None:
         qualities, drive = self._config.qualities, self._config.drive
@@ -132,6 +145,23 @@ class Ros2Robot:
             for topic in ("goal", "obstacles", "markers")
         )
 
+    def _open_costmap(self, network: Network) -> CostmapTopic | None:
+        name = self._names["costmap"]
+        if not name:
+            return None
+        topic = CostmapTopic(
+            network.writer(
+                name, TOPICS["costmap"].message, self._config.qualities["costmap"]
+            ),
+            self._fleet_costmap,
+            self._neighbours,
+            self._config.frames.map,
+            lambda: None if (place := self.inputs.place) is None else place.flat(),
+            self.node.ask_for_peer_scans,
+        )
+        self.node.hear_peer_scans(topic.hear)
+        return topic
+
     def _listen(self, topic: str, form: type[Message]) -> None:
         quality = self._config.qualities[topic]
         is_picture = TOPICS[topic].role == "picture"
@@ -150,6 +180,8 @@ class Ros2Robot:
                 ("senses", every(1 / RATE_HZ, self._tick)),
             ):
                 tasks.create_task(work, name=f"{self._id}-{name}")
+            if self._costmap is not None:
+                tasks.create_task(self._costmap.run(), name=f"{self._id}-costmap")
 
     def _tick(self, _: float) -> None:
         number = next(self._ticks)
@@ -227,6 +259,7 @@ class Ros2Robot:
             self._first_feedback = now
         self._known = self._known or self._id in feedback.seen
         self._neighbours.note(peer, feedback, now)
+        self._fleet_costmap.note(feedback)
 
     # --- out ----------------------------------------------------------------------
 

@@ -7,7 +7,7 @@ from typing import Literal
 from iveg.robot.ros2.detectors import BOXES, LOOKS
 from iveg.robot.ros2.sensors import ROS_SENSORS
 from iveg.ros2 import messages as m
-from iveg.ros2.names import DEFAULT, SENSOR_DATA, TF, TF_STATIC, Qos
+from iveg.ros2.names import DEFAULT, LATCHED, SENSOR_DATA, TF, TF_STATIC, Qos
 from iveg.ros2.schema import Message
 
 Role = Literal["stream", "state", "picture", "transforms", "drive", "output"]
@@ -68,6 +68,8 @@ TOPICS: Mapping[str, Topic] = {
     # People and peers, for Nav2's obstacle layer and for RViz.
     "obstacles": Topic("iveg/obstacles", m.PointCloud2, "output", DEFAULT),
     "markers": Topic("iveg/markers", m.MarkerArray, "output", DEFAULT),
+    # The fleet's picture, for Nav2's static layer.
+    "costmap": Topic("iveg/costmap", m.OccupancyGrid, "output", LATCHED),
 }
 """By key in ``robot.toml``."""
 

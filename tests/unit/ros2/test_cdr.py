@@ -189,6 +189,15 @@ CASES: dict[str, tuple[Any, str]] = {
         f"{STAMP} {MAP} 01000000 01000000 01000000 02000000 'x' 2*-- 00000000 07 3*-- "
         "01000000 00 3*-- 04000000 04000000 04000000 00 00 80 3f 01",
     ),
+    "OccupancyGrid": (
+        m.OccupancyGrid(
+            IN_MAP,
+            m.MapMetaData(AT_7_S, 0.5, 3, 1, HERE),
+            np.array([-1, 0, 100], np.int8),
+        ),
+        f"{STAMP} {MAP} {STAMP} 0000003f 03000000 01000000 4*-- {POSE} "
+        "03000000 ff 00 64",
+    ),
     "MarkerArray, pose after 40 bytes": (
         m.MarkerArray(
             (

@@ -9,8 +9,8 @@ import pytest
 from iveg.domain.feedback import Feedback, FeedbackAlert
 from iveg.domain.geometry import Pose2D
 from iveg.domain.observations import Origin
+from iveg.robot.neighbours import Neighbour, Neighbours
 from iveg.robot.ros2 import neighbours
-from iveg.robot.ros2.neighbours import Neighbour, Neighbours
 from iveg.ros2 import messages as m
 
 HERE = Pose2D(1.0, 2.0, math.pi / 2)

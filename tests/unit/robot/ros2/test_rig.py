@@ -16,6 +16,7 @@ from iveg.domain.feedback import Feedback
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.goals import Goal
 from iveg.domain.observations import Origin
+from iveg.robot.costmap import FleetCostmap
 from iveg.robot.goals import Navigate
 from iveg.robot.node import NodeSettings, RobotNode
 from iveg.robot.ros2.config import RobotConfig
@@ -181,6 +182,47 @@ async def test_who_is_near_goes_out_for_the_costmap_and_for_rviz(site: Site) -> 
 
     assert cloud.said()[-1].header.frame_id == "base_link"
     assert {one.text for one in markers.said()[-1].markers} == {"", "AGII"}
+
+
+async def test_the_fleets_picture_goes_out_while_somebody_listens(site: Site) -> None:
+    writer = site.network.writers["/agi/iveg/costmap"]
+    _, qos = site.network.asked["/agi/iveg/costmap"]
+    placed(site.network)
+    site.feedback("AGII", Feedback("AGII", Origin("c", 1), pose=Pose2D(5.0, 0.0, 0.0)))
+
+    await until(lambda: writer.sent and (writer.said()[-1].data == 100).any())
+    grid = writer.said()[-1]
+    writer.readers = 0
+    await until(lambda: (writer.said()[-1].data == -1).all())
+    last = len(writer.sent)
+    await asyncio.sleep(1.1)
+
+    assert (qos.reliable, qos.transient_local, qos.depth) == (True, True, 1)
+    assert grid.header.frame_id == "map"
+    assert grid.data.size == grid.info.width * grid.info.height
+    row, column = divmod(int((grid.data == 100).argmax()), grid.info.width)
+    assert abs(grid.info.origin.position.x + column * grid.info.resolution - 5.0) < 1.0
+    assert abs(grid.info.origin.position.y + row * grid.info.resolution) < 1.0
+    assert len(writer.sent) == last
+
+
+async def test_a_costmap_that_fails_is_logged_once_and_the_gate_goes_on(
+    site: Site, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    failures: list[object] = []
+
+    def fail(*args: object) -> None:
+        failures.append(args)
+        raise ValueError
+
+    monkeypatch.setattr(FleetCostmap, "draw", fail)
+    placed(site.network)
+    await until(lambda: len(failures) >= 2)
+    before = len(site.driven)
+    await until(lambda: len(site.driven) > before + 10)
+
+    assert len([one for one in caplog.messages if "the costmap has failed" in one]) == 1
+    assert not site.task.done()
 
 
 async def test_what_is_wrong_goes_out_with_the_next_report(site: Site) -> None:
