@@ -6,23 +6,28 @@ wire.  The same seed gives the same run on any machine, however busy it is.
 """
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from itertools import count
 from typing import Final
 
+from iveg.domain.costmap import InflatedGrid
 from iveg.domain.feedback import Feedback
 from iveg.domain.geometry import REST
 from iveg.domain.observations import Instant
+from iveg.domain.peer_scan import PeerScan
 from iveg.domain.witness import Outline, Plan
 from iveg.lab.emulator.orders import FaultOrder
 from iveg.lab.emulator.scripts import Incident
 from iveg.lab.emulator.world import RobotHardware, SimulatedWorld
-from iveg.ngsi import codec
+from iveg.ngsi import codec, names
 from iveg.pipeline.ingest import Ingest
 from iveg.pipeline.loop import RuleLoop
+from iveg.robot.costmap import FleetCostmap
 from iveg.robot.echo import Echo
 from iveg.robot.effects import Answer, Drive, Effect, Report
 from iveg.robot.holds import HoldSet
 from iveg.robot.judgement import Limits
+from iveg.robot.neighbours import Neighbours
 from iveg.robot.safety import SafetyMachine
 from iveg.robot.uplink import Uplink
 
@@ -43,6 +48,7 @@ class StagedRobot:
         plan: What stands in the greenhouse.
 
     Attributes:
+        costmap: Its picture of the fleet; None: it asks for no scans of peers.
         wanted: Speed that it would drive if nothing limited it (m/s).
     """
 
@@ -61,7 +67,9 @@ class StagedRobot:
         self._hear = hear
         self._looked = looked
         self._scan_every = scan_every
+        self.costmap: FleetCostmap | None = None
         self.wanted = 0.0
+        self._neighbours = Neighbours(rig.robot_id)
         self._echo = Echo()
         self._uplink = Uplink(rig.robot_id, "iveg", "b1", self._say, echo=self._echo)
         self._machine = SafetyMachine(
@@ -119,11 +127,27 @@ class StagedRobot:
         """Take iVeg's feedback to a robot of the fleet."""
         feedback = codec.read_feedback(payload)
         self._echo.note(feedback.origin)
+        self._neighbours.note(topic, feedback, now.mono)
+        if self.costmap is not None:
+            self.costmap.note(feedback)
         self._perform(self._machine.feedback(topic, feedback, now.mono), now)
 
     def order(self, payload: bytes, now: Instant) -> None:
         """Take an order that iVeg sends to this robot."""
         self._perform(self._machine.command(payload, now.mono), now)
+
+    def listen_to_scan(self, topic: str, payload: bytes) -> None:
+        """Take a scan of a peer, where it asked for those."""
+        if self.costmap is not None:
+            self.costmap.hear(topic, payload, self._rig.odometry().pose)
+
+    def believe(self, now: Instant) -> InflatedGrid | None:
+        """Its costmap as it stands; None: it has none."""
+        if self.costmap is None:
+            return None
+        own = self._rig.odometry().pose
+        present = self._neighbours.present(own, now.mono)
+        return self.costmap.draw(self.costmap.take(), present, own, now.mono)
 
     @property
     def speed(self) -> float:
@@ -141,6 +165,7 @@ class StagedRobot:
                 case Drive(twist):
                     self._rig.drive(twist)
                 case Report(report):
+                    report = replace(report, peer_scans=self.costmap is not None)
                     seq, (_, message) = self._uplink.report(report, self._dated(now))
                     self._machine.reported(seq, now.mono)
                     self._say(message.topic, message.payload)
@@ -162,6 +187,7 @@ class Stage:
         move_clock: Advances the clock by seconds; returns the time.
         hear: Called with each message of a robot, from its creation on.
         looked, scan_every, plan: As for ``StagedRobot``.
+        peer_scans: Scans for peers that iVeg has published; it grows.
 
     Attributes:
         robots: Its robots, by id.
@@ -180,6 +206,7 @@ class Stage:
         looked: Looked = lambda _: None,
         scan_every: int = 0,
         plan: Plan | None = None,
+        peer_scans: Sequence[PeerScan] = (),
     ) -> None:
         self._world = world
         self._incidents = [(one.at_s, one.order) for one in incidents]
@@ -190,7 +217,9 @@ class Stage:
             robot_id: StagedRobot(rig, self.now, hear, looked, scan_every, plan)
             for robot_id, rig in world.rigs.items()
         }
+        self._scans = peer_scans
         self._delivered = 0
+        self._scans_delivered = 0
         self._steps = 0
 
     def step(self) -> None:
@@ -212,10 +241,16 @@ class Stage:
         self.robots[order.robot].obey(order)
 
     def _deliver(self) -> None:
-        """Deliver new feedback to every robot."""
+        """Deliver new feedback and scans to every robot."""
         new = self._feedback[self._delivered :]
         self._delivered += len(new)
         for feedback in new:
             payload = codec.write_feedback(feedback)
             for robot in self.robots.values():
                 robot.listen(feedback.robot_id, payload, self.now)
+        scans = self._scans[self._scans_delivered :]
+        self._scans_delivered += len(scans)
+        for told in scans:
+            topic = names.PEER_SCAN_TOPIC.format(robot_id=told.robot_id)
+            for robot in self.robots.values():
+                robot.listen_to_scan(topic, codec.write_peer_scan(told))

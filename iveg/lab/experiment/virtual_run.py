@@ -11,7 +11,7 @@ from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.app.virtual import VirtualPipeline
 from iveg.domain.detection_rule import DetectionRule
-from iveg.domain.rule.zones import zones_of
+from iveg.domain.witness import Outline
 from iveg.lab.emulator.camera import DETECTORS
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.scenarios import scenario_named
@@ -23,6 +23,7 @@ from iveg.lab.experiment.recording import Recording, Row, picture_of
 from iveg.lab.experiment.scoring import Picture
 from iveg.lab.experiment.stage import STEP_S, Stage
 from iveg.pipeline.mapping import Mapper
+from iveg.robot.costmap import FleetCostmap
 from iveg.web.views import Views
 
 _SCAN_EVERY, _BELIEVE_EVERY, _REST_EVERY = 6, 20, 20
@@ -66,13 +67,19 @@ class VirtualRun:
             iveg.hear,
             looked=self._looked,
             scan_every=_SCAN_EVERY,
+            peer_scans=iveg.peer_scans,
         )
+        self._watched = self._stage.robots[WATCHED]
+        body = self._world.rigs[WATCHED].profile
+        outline = Outline(body.length, body.width)
+        self._watched.costmap = FleetCostmap(WATCHED, outline, greenhouse.bounds)
 
     async def play(self, seconds: float) -> VirtualRunResult:
         """Run from the start; yields to other tasks once a virtual second."""
         for number in range(round(seconds / STEP_S)):
             self._stage.step()
             self._mapper.tick(self._iveg.now)
+            self._iveg.parts.peer_scans.tick(self._iveg.now)
             self._report()
             if number % _BELIEVE_EVERY == 1:
                 self._believe()
@@ -101,12 +108,11 @@ class VirtualRun:
             self._result.told.append(picture or Picture(row["robot"], row["at"], ()))
 
     def _believe(self) -> None:
-        evaluator, now = self._iveg.parts.evaluator, self._iveg.now
-        zones = zones_of(evaluator.world, evaluator.people, evaluator.rule, now)
-        own = self._mapper.of(WATCHED, (), now)
-        shared = self._mapper.of(WATCHED, zones, now)
-        if own is not None and shared is not None:
-            self._result.beliefs.append((now.mono, belief_of(own, shared)))
+        """Look into the watched robot's own costmap, beside what its laser found."""
+        now = self._iveg.now
+        own, told = self._mapper.of(WATCHED, (), now), self._watched.believe(now)
+        if own is not None and told is not None:
+            self._result.beliefs.append((now.mono, belief_of(own, told)))
 
     def _touches(self) -> int:
         people = self._world.discs()

@@ -6,6 +6,10 @@ import numpy as np
 import pytest
 
 from iveg.domain.costmap import Grid, InflatedGrid
+from iveg.domain.feedback import Feedback, FeedbackAlert
+from iveg.domain.geometry import Pose2D, Rectangle
+from iveg.domain.observations import Origin
+from iveg.domain.witness import Outline
 from iveg.lab.experiment.beliefs import (
     Belief,
     belief_in,
@@ -16,6 +20,8 @@ from iveg.lab.experiment.beliefs import (
 from iveg.lab.experiment.outcome import slowdowns_of
 from iveg.lab.experiment.recording import picture_of
 from iveg.lab.experiment.scoring import Picture, SeenObject
+from iveg.robot.costmap import FleetCostmap
+from iveg.robot.neighbours import Neighbours
 
 FARMER = SeenObject("person-0", "farmer", 1.0, 1.0)
 
@@ -77,6 +83,22 @@ def test_whom_a_robots_own_laser_found_was_not_injected() -> None:
 
     assert (by_laser["asked"], by_laser["injected"]) == (0, 0)
     assert (by_others["asked"], by_others["injected"]) == (1, 1)
+
+
+@pytest.mark.parametrize("told", [True, False])
+def test_what_the_robot_itself_was_told_is_what_counts(*, told: bool) -> None:
+    known = Neighbours("AGII")
+    if told:
+        person = FeedbackAlert("d", "", "person", "farmer", 0.9, (1, 1, 0.9), 2.0)
+        known.note("AGI", Feedback("AGI", Origin("c", 1), None, (person,)), 0.0)
+    here = Pose2D(8.0, 8.0, 0.0)
+    kept = FleetCostmap("AGII", Outline(2.0, 1.2), Rectangle(0, 0, 10, 10))
+    grid = kept.draw((), known.present(here, 0.1), here, 0.1)
+    belief = belief_of(costmap(taken=False), grid)
+
+    found = injected([look("AGI", FARMER), look("AGII")], [(0.0, belief)])
+
+    assert (found["asked"], found["injected"]) == (1, int(told))
 
 
 @pytest.mark.parametrize(("own_at", "ahead"), [(-1.0, 0), (1.0, 1)])

@@ -9,6 +9,8 @@ from iveg.lab.experiment.outcome import half_of
 from iveg.lab.experiment.plan import ROBOTS, PlannedRun
 from iveg.lab.experiment.scoring import Tally, score
 from iveg.lab.experiment.virtual_run import VirtualRun
+from iveg.robot.costmap import FleetCostmap
+from iveg.robot.neighbours import Neighbours
 
 RULE = DetectionRule()
 
@@ -54,3 +56,16 @@ async def test_a_person_whom_only_agi_sees_stands_in_agiis_costmap() -> None:
     assert told["injection"]["ahead"] == told["injection"]["people"] == 1
     assert told["injection"]["injected"] >= 3
     assert told["slowdowns"]["out_of_sight"] >= 1
+
+
+async def test_a_robot_that_hears_nothing_of_others_has_nobody_injected(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It is the robot's own costmap that counts: iVeg still knows of the person."""
+    monkeypatch.setattr(Neighbours, "present", lambda *_: [])
+    monkeypatch.setattr(FleetCostmap, "hear", lambda *_: None)
+
+    told = await counted(7, "nlos", "perfect", 9.0)
+
+    assert told["injection"]["asked"] >= 3
+    assert told["injection"]["injected"] == 0
