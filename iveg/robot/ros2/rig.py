@@ -119,7 +119,6 @@ class Ros2Robot:
         self._ticks = itertools.count()
         self._open(network)
         self.node = make_node(self._drive, self._on_feedback, self.navigate)
-        self.node = make_node(self._drive, self._on_feedback)
         self._costmap = self._open_costmap(network)
 
     def _open(self, network: Network) -> None:
