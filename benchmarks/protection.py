@@ -33,10 +33,10 @@ from iveg.lab.experiment.stage import STEP_S, Stage
 ROBOTS = ("AGI", "AGII")
 
 
-def run(
-    profile: str, seed: int, seconds: float, rule: DetectionRule, laser: bool = True
-) -> ProtectionScore:
-    """One run of the demo's greenhouse."""
+def staged(
+    profile: str, seed: int, rule: DetectionRule, laser: bool = True
+) -> tuple[Stage, SimulatedWorld, VirtualPipeline]:
+    """The demo's greenhouse before its first step."""
     scenario = scenario_named("demo")
     greenhouse = load_greenhouse(scenario.greenhouse)
     layout = lay_out(scenario, ROBOTS, greenhouse)
@@ -54,6 +54,14 @@ def run(
         scan_every=2 if laser else 0,
         plan=Plan.of(greenhouse),
     )
+    return stage, world, iveg
+
+
+def run(
+    profile: str, seed: int, seconds: float, rule: DetectionRule, laser: bool = True
+) -> ProtectionScore:
+    """One run of the demo's greenhouse."""
+    stage, world, _ = staged(profile, seed, rule, laser)
     score = ProtectionScore(STEP_S)
     for _ in range(round(seconds / STEP_S)):
         stage.step()

@@ -111,8 +111,8 @@ MUTANTS = (
     ),
     Mutant(
         "rule: people are foretold to stay where they are",
-        "return zone.x, zone.y, sighting.vx, sighting.vy, sighting.age_s(now)",
-        "return zone.x, zone.y, 0.0, 0.0, sighting.age_s(now)",
+        "return zone.x, zone.y, sighting.vx, sighting.vy, age, radius",
+        "return zone.x, zone.y, 0.0, 0.0, age, radius",
         ("unit/domain/rule/test_foresight.py",),
     ),
     Mutant(

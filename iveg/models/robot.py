@@ -11,6 +11,7 @@ from iveg.domain.kinds import SENSED, Kind
 from iveg.domain.observations import Instant
 from iveg.domain.quantities import quantities_of, value_of
 from iveg.domain.robot_state import Link, RobotState
+from iveg.domain.rule import foresight
 from iveg.domain.stamps import format_stamp
 from iveg.domain.transports import TransportId
 from iveg.models.base import Model, rounded
@@ -118,6 +119,34 @@ class SpeedLimit(Model):
             distance_m=rounded(limit.distance_m),
             decision_id=limit.decision_id,
             foretold_s=rounded(limit.foretold_s),
+        )
+
+
+class Encounter(Model):
+    """A zone that the robot will reach (docs/safety.md, "Foresight")."""
+
+    cause: str
+    reason: str
+    in_s: float
+    probability: float = Field(
+        description="Share of encounters foretold so far ahead that came true."
+    )
+    place: Point = Field(description="Where the robot will be.")
+    centre: Point = Field(description="Where the zone's centre will be.")
+    radius_m: float
+
+    @classmethod
+    def of(cls, foretold: foresight.Encounter, now: Instant) -> "Encounter":
+        """At this moment."""
+        left_s = foretold.left_s(now)
+        return cls(
+            cause=foretold.zone.cause,
+            reason=foretold.zone.reason,
+            in_s=round(left_s, 1),
+            probability=round(foresight.probability(left_s), 2),
+            place=Point(x=round(foretold.x, 2), y=round(foretold.y, 2)),
+            centre=Point(x=round(foretold.centre_x, 2), y=round(foretold.centre_y, 2)),
+            radius_m=round(foretold.zone.radius_m, 2),
         )
 
 
@@ -242,6 +271,9 @@ class _Robot(Model):
     )
     applied: Applied | None
     speed_limit: SpeedLimit
+    encounters: list[Encounter] = Field(
+        description="Zones that it will reach within three seconds, the soonest first."
+    )
     missing: list[MissingPremise] = Field(
         description='What "clear" lacks, its reason first.'
     )

@@ -15,6 +15,7 @@ from iveg.domain.events import Condition, LogEvent, Slot
 from iveg.domain.feedback import UNSUPERVISED, SpeedLimit
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.kinds import kind
+from iveg.domain.limits import LIMITS
 from iveg.domain.low_values import LowValues
 from iveg.domain.observations import (
     Climate,
@@ -27,6 +28,7 @@ from iveg.domain.observations import (
 )
 from iveg.domain.plausibility import ignores_limit
 from iveg.domain.records import AlertRecord, DecisionRecord
+from iveg.domain.rule.foresight import Encounter
 from iveg.domain.rule.premises import Missing
 from iveg.domain.rule.speed_limits import Crossing, LimitChange, SpeedLimits
 from iveg.domain.tracking.laser_sight import LaserSight, ScanOf
@@ -108,6 +110,12 @@ class Evaluator:
     def crossings(self) -> Iterable[Crossing]:
         """Every robot that is inside a ring now, with the ring."""
         return self._speed_limits.crossings
+
+    def foretold(self, robot_id: str, now: Instant) -> Sequence[Encounter]:
+        """Rings that a robot will reach, the soonest first; forecasts grow old, too."""
+        ahead = self._speed_limits.foretold.get(robot_id, {}).values()
+        young = (one for one in ahead if now.mono - one.at <= LIMITS.silence_s)
+        return sorted(young, key=lambda one: one.in_s)
 
     def missing(self, robot_id: str) -> Sequence[Missing]:
         """What the claim "clear" lacks for a robot now, the reason first."""

@@ -29,6 +29,7 @@ from iveg.models.places import GreenhouseMap, Position
 from iveg.models.robot import (
     Applied,
     Detector,
+    Encounter,
     Hold,
     MissingPremise,
     Mode,
@@ -104,6 +105,10 @@ class Views:
             speed_factor=None if safety is None else safety.speed_factor,
             applied=Applied.of(robot, now),
             speed_limit=SpeedLimit.of(self._evaluator.speed_limits[robot_id]),
+            encounters=[
+                Encounter.of(one, now)
+                for one in self._evaluator.foretold(robot_id, now)
+            ],
             missing=[
                 MissingPremise(premise=one.premise, robot_id=one.robot_id)
                 for one in self._evaluator.missing(robot_id)

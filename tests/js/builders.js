@@ -59,6 +59,7 @@ export function robot(changes = {}) {
     speed_factor: 1,
     applied: null,
     speed_limit: CLEAR,
+    encounters: [],
     missing: [],
     detector: { required: true, missing: false, out_by: null, out_since: null },
     holds: [],

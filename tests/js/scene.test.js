@@ -1,8 +1,15 @@
 import { Store } from "../../iveg/static/js/core/store.js";
+import { borderTowards } from "../../iveg/static/js/map/layers/encounters.js";
 import { isSeenHeld } from "../../iveg/static/js/map/layers/robot.js";
 import { marked, readPerson, readScene } from "../../iveg/static/js/map/scene.js";
 import { command, detection, person, robot, situation, snapshot } from "./builders.js";
 import { equal, near, test } from "./harness.js";
+
+/** @type {import("../../iveg/static/js/core/protocol.js").Encounter} */
+const ENCOUNTER = {
+  ...{ cause: "P1", reason: "person", in_s: 1.8, probability: 0.9, radius_m: 2 },
+  ...{ place: { x: 2, y: 2 }, centre: { x: 4, y: 2 } },
+};
 
 /** @param {Partial<import("./builders.js").Snapshot>} [changes] */
 function storeOf(changes) {
@@ -98,6 +105,18 @@ test("a confirmed stop has no such disc", () => {
   });
   const store = storeOf({ robots: [robot({ stop })], commands: [stop] });
   near(readScene(store, 2000).robots[0].unsureM, 0);
+});
+
+test("an encounter ahead is drawn of a robot that is live alone", () => {
+  const encounters = [ENCOUNTER];
+  const store = storeOf({ robots: [robot({ encounters, age_s: 0 })] });
+  equal(readScene(store, 500).robots[0].encounters, encounters);
+  equal(readScene(store, 1100).robots[0].encounters, []);
+});
+
+test("a line leads from where a zone is met to the zone, and none from inside it", () => {
+  equal(borderTowards({ x: 5, y: 1 }, { x: 1, y: 1 }, 2), { x: 3, y: 1 });
+  equal(borderTowards({ x: 2, y: 1 }, { x: 1, y: 1 }, 2), null);
 });
 
 test("a sweep fades while late and is gone when lost", () => {

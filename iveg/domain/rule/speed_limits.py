@@ -15,13 +15,8 @@ from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
 from iveg.domain.robot_state import RobotState
-from iveg.domain.rule.foresight import (
-    HOLDS_S,
-    Encounter,
-    Foresight,
-    Foretold,
-    slows_within_s,
-)
+from iveg.domain.rule.foresight import Encounter, Foresight, Foretold
+from iveg.domain.rule.paths import HOLDS_S, slows_within_s
 from iveg.domain.rule.premises import Missing, missing_premises
 from iveg.domain.rule.zones import NOT_FAR_M, Zone, ZoneFinder
 from iveg.domain.tracking.people import People
@@ -80,6 +75,7 @@ class SpeedLimits:
     Attributes:
         missing: What the claim "clear" lacks for each robot, since the last judgement.
         limited_since: When each limited robot was first limited (monotonic, s).
+        foretold: Encounters ahead, since the last judgement.
     """
 
     def __init__(self, greenhouse: Greenhouse) -> None:
@@ -90,7 +86,7 @@ class SpeedLimits:
         self.limited_since: dict[str, float] = {}
         self._zones = ZoneFinder()
         self._foresight = Foresight()
-        self._foretold: Foretold = {}
+        self.foretold: Foretold = {}
 
     @property
     def crossings(self) -> Iterable[Crossing]:
@@ -107,13 +103,13 @@ class SpeedLimits:
     ) -> tuple[dict[str, SpeedLimit], list[LimitChange]]:
         """Judge the whole fleet; ``new_id`` begins the ids of new decisions."""
         near = self._zones.near(world, people, rule, now, self._open)
-        self._foretold = (
+        self.foretold = (
             self._foresight.look(world, people, rule, now) if rule.foresight else {}
         )
         changes: list[LimitChange] = []
         for robot in world.robots.values():
             zones = list(near(robot))
-            ahead = self._foretold.get(robot.robot_id, {})
+            ahead = self.foretold.get(robot.robot_id, {})
             if zones or ahead or self._open.get(robot.robot_id):
                 name = f"{new_id}-{len(changes)}"
                 changes += self._cross(robot, zones, ahead, now, name)
@@ -177,7 +173,7 @@ class SpeedLimits:
 
     def _foretold_s(self, robot_id: str, zone: Zone, distance_m: float) -> float | None:
         """When a robot will reach a cause's ring (s); None: it is inside, or leaves."""
-        encounter = self._foretold.get(robot_id, {}).get(zone.cause)
+        encounter = self.foretold.get(robot_id, {}).get(zone.cause)
         is_inside = distance_m <= zone.radius_m
         return None if encounter is None or is_inside else encounter.in_s
 
@@ -237,7 +233,7 @@ def _foreseen(
     if robot.odometry is None:
         return {}
     pose, speed = robot.odometry.pose, robot.odometry.twist.linear_x
-    soon_s = slows_within_s(robot.profile, speed)
+    soon_s = slows_within_s(robot.profile.braking, speed)
     return {
         cause: (0.0, pose.distance_to(one.zone.x, one.zone.y), one.zone)
         for cause, one in ahead.items()

@@ -307,6 +307,20 @@ export type EmailChannel = {
   last: Told[];
 };
 
+/** A zone that the robot will reach (docs/safety.md, "Foresight"). */
+export type Encounter = {
+  cause: string;
+  reason: string;
+  in_s: number;
+  /** Share of encounters foretold so far ahead that came true. */
+  probability: number;
+  /** Where the robot will be. */
+  place: Point;
+  /** Where the zone's centre will be. */
+  centre: Point;
+  radius_m: number;
+};
+
 /** One experiment, on its way or over. */
 export type Experiment = {
   name: string;
@@ -750,6 +764,8 @@ export type Robot = {
   speed_factor: number | null;
   applied: Applied | null;
   speed_limit: SpeedLimit;
+  /** Zones that it will reach within three seconds, the soonest first. */
+  encounters: Encounter[];
   /** What "clear" lacks, its reason first. */
   missing: MissingPremise[];
   detector: Detector;

@@ -10,6 +10,7 @@
  * @typedef {import("../types.js").Pose} Pose
  * @typedef {import("../types.js").Area} Box2D
  * @typedef {Robot["link"]} Link
+ * @typedef {import("../types.js").Encounter} Encounter
  * @typedef {Robot["mode"]} Mode
  * @typedef {import("../types.js").Hold} Hold
  * @typedef {import("../types.js").Margin} Margin

@@ -15,6 +15,7 @@ import { createCostmapLayer } from "./layers/costmap.js";
 import * as coverage from "./layers/coverage.js";
 import * as detections from "./layers/detections.js";
 import * as equipment from "./layers/equipment.js";
+import * as encounters from "./layers/encounters.js";
 import * as greenhouse from "./layers/greenhouse.js";
 import * as grid from "./layers/grid.js";
 import { createGround } from "./layers/ground.js";
@@ -41,6 +42,7 @@ export const LAYERS = [
   "trail",
   "scan",
   "intent",
+  "encounters",
   "links",
   "equipment",
   "detections",
@@ -79,6 +81,7 @@ export function createPicture(canvas, trails) {
     trail: (paint) => trail.draw(paint, trails, chosen.trailS),
     scan: createScanLayer(),
     intent: intent.draw,
+    encounters: encounters.draw,
     links: links.draw,
     equipment: equipment.draw,
     detections: detections.draw,

@@ -17,9 +17,9 @@
  *   ageS: number, situation: import("../core/situation.js").Situation, replay: boolean,
  *   drive: string, length: number, width: number,
  *   task: string | null, goal: Point | null, path: [number, number][],
- *   unsureM: number,
+ *   unsureM: number, encounters: import("../core/protocol.js").Encounter[],
  * }} SceneRobot `slot` 1–8 its hue; `unsureM` how far it may have driven since an
- *   unconfirmed STOP (m), 0 without one
+ *   unconfirmed STOP (m), 0 without one; `encounters` of a robot that is LIVE alone
  *
  * @typedef {{
  *   id: string, peer: boolean, stage: "seen" | "remembered" | "last_seen",
@@ -110,11 +110,12 @@ function readRobots(store, nowMs) {
 function readRobot(robot, pose, store, nowMs) {
   const ageS = ageOf(robot, nowMs);
   const { drive, length, width } = robot.profile ?? PLAIN;
+  const link = linkOf(ageS);
   return {
     id: robot.robot_id,
     slot: store.slotOf(robot.robot_id),
     pose,
-    link: linkOf(ageS),
+    link,
     ageS,
     situation: situationOf(robot, nowMs),
     replay: robot.replay,
@@ -125,6 +126,7 @@ function readRobot(robot, pose, store, nowMs) {
     goal: robot.navigation?.goal ?? null,
     path: robot.navigation?.path ?? [],
     unsureM: unsureDistance(robot, store, nowMs),
+    encounters: link === "LIVE" ? (robot.encounters ?? []) : [],
   };
 }
 

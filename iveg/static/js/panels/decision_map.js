@@ -64,6 +64,7 @@ export function sceneOf({ position, places, rule, ...told }, map) {
       goal: null,
       path: [],
       unsureM: 0,
+      encounters: [],
     })),
     people: [person],
     detections: [],

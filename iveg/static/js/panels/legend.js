@@ -8,6 +8,7 @@ import { createCostmapLayer } from "../map/layers/costmap.js";
 import * as coverage from "../map/layers/coverage.js";
 import * as detections from "../map/layers/detections.js";
 import * as equipment from "../map/layers/equipment.js";
+import * as encounters from "../map/layers/encounters.js";
 import * as greenhouse from "../map/layers/greenhouse.js";
 import * as grid from "../map/layers/grid.js";
 import * as intent from "../map/layers/intent.js";
@@ -48,6 +49,7 @@ const ROBOT = {
   goal: null,
   path: [],
   unsureM: 0,
+  encounters: [],
 };
 const PERSON = {
   id: "",
@@ -227,6 +229,29 @@ export const SIGNS = [
       ],
       goal: { x: 1.4, y: 0 },
     }),
+  },
+  {
+    name: "encounter",
+    layer: "encounters",
+    draw: encounters.draw,
+    scene: {
+      robots: [
+        {
+          ...LEFT,
+          encounters: [
+            {
+              cause: "",
+              reason: "person",
+              in_s: 1.8,
+              probability: 0.9,
+              place: { x: 0, y: 0 },
+              centre: { x: 1.2, y: 0 },
+              radius_m: 1.2,
+            },
+          ],
+        },
+      ],
+    },
   },
   {
     name: "trail",

@@ -8,11 +8,11 @@ import pytest
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import Navigation, Odometry
-from iveg.domain.rule.foresight import Encounter, Foresight
+from iveg.domain.rule.foresight import Encounter, Foresight, probability
 from tests.builders import at, origin, received
 from tests.unit.domain.scene import FIELD, Scene, person
 
-MS_10 = 0.01
+MS_10 = CM = 0.01
 
 
 class Ahead:
@@ -66,6 +66,24 @@ def test_straight_ahead_it_is_the_way_to_the_ring_by_the_speed() -> None:
     found = Ahead(Pose2D(0, 0, 0), Twist2D(0.8, 0.0)).see((3.6, 0.0)).must()
     assert found.in_s == pytest.approx(1.6 / 0.8, abs=MS_10)
     assert found.zone.cause == "P1"
+
+
+def test_it_is_told_where_both_will_be_then() -> None:
+    found = Ahead(Pose2D(0, 0, 0), Twist2D(0.8, 0.0)).see((3.6, 0.0)).must()
+    assert (found.x, found.y) == pytest.approx((1.6, 0.0), abs=CM)
+    assert (found.centre_x, found.centre_y) == pytest.approx((3.6, 0.0), abs=CM)
+    walks = Ahead(Pose2D(0, 0, 0), Twist2D(0.5, 0.0)).walk(5.0, 0.0, -1.0, 0.0).must()
+    assert walks.centre_x - walks.x == pytest.approx(2.0, abs=CM)
+    assert walks.x == pytest.approx(0.5 * walks.in_s, abs=CM)
+
+
+def test_a_forecast_counts_down_and_the_sooner_the_likelier() -> None:
+    found = Ahead(Pose2D(0, 0, 0), Twist2D(0.8, 0.0)).see((3.6, 0.0)).must()
+    lefts = [found.left_s(at(after)) for after in (0.0, 0.5, 9.0)]
+    assert lefts == pytest.approx([found.in_s, found.in_s - 0.5, 0.0])
+    told = [probability(tenth / 10) for tenth in range(31)]
+    assert told == sorted(told, reverse=True)
+    assert 0.0 < told[-1] < told[0] < 1.0
 
 
 def test_reversing_it_is_behind() -> None:

@@ -63,6 +63,31 @@ async def test_a_robot_that_judges_ahead_of_iveg_is_timed_too() -> None:
     assert 0.0 < told["p50_ms"] <= 250.0
 
 
+async def test_an_encounter_is_told_with_its_place_before_the_ring_is_entered() -> None:
+    stage = Stage("nlos")
+
+    def apart() -> float:
+        pose, [someone] = stage.robot("AGII")["pose"], stage.people()
+        place = someone["position"]
+        return math.hypot(pose["x"] - place["x"], pose["y"] - place["y"])
+
+    foretold = await stage.first(
+        lambda: stage.robot("AGII")["encounters"], "an encounter ahead of AGII"
+    )
+    told_at, away = stage.now.mono, apart()
+    await stage.until(lambda: apart() <= foretold["radius_m"], "AGII is there")
+    pose, place = stage.robot("AGII")["pose"], foretold["place"]
+
+    assert away > foretold["radius_m"]
+    assert 1.5 <= stage.now.mono - told_at <= 2 * foretold["in_s"] + 0.5
+    assert math.hypot(pose["x"] - place["x"], pose["y"] - place["y"]) <= 0.3
+    [met] = stage.decisions("AGII", "person")
+    assert met.rule_parameters["foretold_s"] > 0.0
+    await stage.until(
+        lambda: not stage.robot("AGII")["encounters"], "it is no forecast any more", 0.5
+    )
+
+
 async def test_agii_in_the_corridor_looks_away_and_comes_nearer_in_reverse() -> None:
     stage = Stage("nlos-field")
 

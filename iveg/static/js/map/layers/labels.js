@@ -8,8 +8,8 @@
 import { laneName } from "../../core/lanes.js";
 
 /**
- * @param {Translate} [t] of the keys `lane.…`, `task.…`, `map.ghost`, `map.last_seen`,
- *   `map.replay`; without it numbers stand alone
+ * @param {Translate} [t] of the keys `lane.…`, `task.…`, `map.encounter`, `map.ghost`,
+ *   `map.last_seen`, `map.replay`; without it numbers stand alone
  * @param {string} [locale] BCP 47; the page's by default
  */
 export function createLabels(t = untranslated, locale = document.documentElement.lang) {
@@ -57,6 +57,9 @@ export function createLabels(t = untranslated, locale = document.documentElement
     ago: (s) => (Number.isFinite(s) ? t("map.ghost", { age: Math.round(s) }) : "? s"),
     /** @param {number} s */
     lastSeen: (s) => t("map.last_seen", { age: Math.round(s) }),
+    /** How soon a zone is reached, and how sure that is. @param {string} robot
+     * @param {number} seconds @param {number} share 0–1 */
+    encounter: (robot, seconds, share) => t("map.encounter", { robot, seconds, share }),
     replay: () => t("map.replay"),
   };
 }
