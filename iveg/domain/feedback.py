@@ -24,6 +24,8 @@ class FeedbackAlert:
     Attributes:
         position: In ``map`` (m).
         radius_m: The ring at ``stamp``, grown with the age of the sighting.
+        velocity: How it goes on in ``map`` (m/s); None: it was not seen for a second,
+            so nobody knows.
     """
 
     decision_id: str
@@ -34,6 +36,7 @@ class FeedbackAlert:
     position: tuple[float, float, float] | None = None
     radius_m: float | None = None
     observer: str | None = None
+    velocity: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +78,7 @@ class Feedback:
         seen: Newest safety-report ``seq`` that iVeg has of each robot.
         backlog_s: How far Orion is behind (s), at most ``LONGEST_BACKLOG_S``; None
             where nobody knows.
+        foresight: Robots slow before they reach a ring, too: the rule asks for it.
     """
 
     robot_id: str
@@ -87,3 +91,4 @@ class Feedback:
     speed_limits: Mapping[str, SpeedLimit] = field(default_factory=dict)
     seen: Mapping[str, int] = field(default_factory=dict)
     backlog_s: float | None = None
+    foresight: bool = False

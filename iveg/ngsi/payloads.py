@@ -217,6 +217,13 @@ class ClimateValue(Wire):
     co2: Annotated[float, Field(ge=0, le=100_000)] | None = None
 
 
+class VelocityValue(Wire):
+    """In ``map`` (m/s)."""
+
+    x: Speed
+    y: Speed
+
+
 class AlertValue(Wire):
     """One alert inside the feedback."""
 
@@ -228,6 +235,7 @@ class AlertValue(Wire):
     radius_m: Annotated[float, Field(gt=0, le=100)] | None = None
     stamp: Text | None = None
     observer: Text | None = None
+    velocity: VelocityValue | None = None
 
 
 class SpeedLimitValue(Wire):
@@ -261,6 +269,7 @@ class FeedbackValue(OriginFields):
     clear: Annotated[list[Text], Field(max_length=MAX_ROBOTS)] = []
     seen: Annotated[dict[str, int], Field(max_length=MAX_ROBOTS)] = {}
     backlog: object = None
+    foresight: bool = False
 
 
 class MountValue(Wire):

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Mapping
 
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import Feedback, FeedbackAlert, SpeedLimit
+from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant, Origin
 from iveg.domain.robot_state import RobotState
 from iveg.domain.stamps import format_stamp
@@ -75,7 +76,7 @@ class FeedbackPublisher:
         for robot in robots.values():
             self._seq += 1
             self._fleet.publish_feedback(
-                self._feedback(robot, alerts, speed_limits, seen, now)
+                self._feedback(robot, alerts, speed_limits, seen, rule, now)
             )
 
     def _feedback(
@@ -84,6 +85,7 @@ class FeedbackPublisher:
         alerts: tuple[FeedbackAlert, ...],
         speed_limits: Mapping[str, SpeedLimit],
         seen: Mapping[str, int],
+        rule: DetectionRule,
         now: Instant,
     ) -> Feedback:
         mine = [one for one in alerts if one.observer == robot.robot_id]
@@ -103,6 +105,7 @@ class FeedbackPublisher:
             speed_limits,
             seen,
             self._backlog(now),
+            rule.foresight,
         )
 
     def _alerts(self, rule: DetectionRule, now: Instant) -> Iterable[FeedbackAlert]:
@@ -111,6 +114,7 @@ class FeedbackPublisher:
                 # What a recording saw long ago must not slow a robot of today.
                 if self._world.robots[sighting.observer].is_replay:
                     continue
+                is_seen = sighting.age_s(now) <= LIMITS.seen_s
                 yield FeedbackAlert(
                     person.decision_id,
                     format_stamp(sighting.at.wall),
@@ -120,6 +124,7 @@ class FeedbackPublisher:
                     (sighting.x, sighting.y, sighting.z),
                     radius,
                     sighting.observer,
+                    (sighting.vx, sighting.vy) if is_seen else None,
                 )
 
 

@@ -5,15 +5,18 @@ applies, and missing knowledge means slow (docs/safety.md).
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 from iveg.domain.feedback import HALF_SPEED, Feedback
+from iveg.domain.fleet import CAUTIOUS
 from iveg.domain.geometry import REST, Pose2D, Twist2D
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import LaserScan
 from iveg.domain.witness import Outline, Plan, Witness
 from iveg.robot.caps import FREE, AppliedCap, Cap, lowest
+from iveg.robot.lookahead import Lookahead
 from iveg.robot.peer_feedback import PeerFeedback
 from iveg.robot.watchdog import Watchdog
 
@@ -33,6 +36,7 @@ class Limits:
         on_link_loss: ``slow`` stays at half speed however long the silence is.
         outline: The robot's body.
         plan: What stands in the greenhouse; None: nobody drew it.
+        braking: What its brakes can do (m/s²).
     """
 
     max_speed: float = 1.0
@@ -42,6 +46,7 @@ class Limits:
     on_link_loss: OnLinkLoss = "stop"
     outline: Outline = _UNDESCRIBED
     plan: Plan | None = None
+    braking: float = CAUTIOUS.braking
 
 
 DEFAULT_LIMITS = Limits()
@@ -71,6 +76,7 @@ class Judgement:
         self._peer_feedback = PeerFeedback(robot_id)
         self._motion: Motion | None = None
         self._witness = Witness(limits.outline, limits.plan)
+        self._lookahead = Lookahead(limits.braking)
         self._applied = AppliedCap(Cap(0.0, "watchdog"))
         self.watchdog = Watchdog(boot_at, limits.slow_s)
         self.local = FREE
@@ -125,6 +131,10 @@ class Judgement:
             peers = self._peer_feedback.peers(now)
             self._witness.look(scan, motion.pose, motion.twist, peers, now)
 
+    def note_path(self, path: Sequence[tuple[float, float]], now: float) -> None:
+        """Note where the robot's own navigation will drive, in ``map`` (m)."""
+        self._lookahead.note_path(path, now)
+
     def settle(self, now: float) -> None:
         """Evaluate this moment."""
         self.watchdog.tick(now)
@@ -135,6 +145,7 @@ class Judgement:
                 self._pose_cap(now),
                 self._silence_cap(now),
                 self._obstacle_cap(now),
+                self._foreseen_cap(now),
                 *self._peer_feedback.caps(self._own(now), slowed, now),
             )
         )
@@ -160,6 +171,15 @@ class Judgement:
     def _obstacle_cap(self, now: float) -> Cap:
         seen = self._witness.obstacle(now)
         return FREE if seen is None else Cap(HALF_SPEED, "obstacle")
+
+    def _foreseen_cap(self, now: float) -> Cap:
+        motion = self.motion(now)
+        if motion is None or motion.pose is None:
+            self._lookahead.forget()
+        elif self._lookahead.is_due(now):
+            ahead = list(self._peer_feedback.ahead(now))
+            self._lookahead.look(motion.pose, motion.twist, ahead, now)
+        return self._lookahead.cap
 
     def _silence_cap(self, now: float) -> Cap:
         age = self.watchdog.age(now)

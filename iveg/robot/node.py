@@ -27,6 +27,7 @@ from iveg.domain.observations import (
     Hold,
     Instant,
     LaserScan,
+    Navigation,
     Observation,
     Odometry,
     RobotFault,
@@ -149,6 +150,7 @@ class RobotNode:
             settings.on_link_loss,
             Outline(profile.length, profile.width),
             settings.plan,
+            profile.braking,
         )
         self._machine = self._new_machine(hold_file, limits)
 
@@ -247,6 +249,8 @@ class RobotNode:
                 self._perform(self._machine.odometry(one.pose, one.twist, mono), mono)
             elif isinstance(one, LaserScan) and not self._is_replay:
                 self._perform(self._machine.scan(one, mono), mono)
+            elif isinstance(one, Navigation):
+                self._machine.note_path(one.path, mono)
             elif isinstance(one, Unplaced) and one.twist is not None:
                 self._perform(self._machine.odometry(None, one.twist, mono), mono)
         if self._link.connected:

@@ -6,6 +6,7 @@ while its topic is silent (docs/safety.md), a peer known to stand slows nobody,
 and an alert about the robot itself is ignored, or it would slow down for ever.
 """
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
@@ -21,6 +22,7 @@ from iveg.domain.geometry import Pose2D
 from iveg.domain.limits import LIMITS, ring_radius
 from iveg.domain.observations import Origin
 from iveg.robot.caps import FREE, Cap, known_reason, quantised
+from iveg.robot.lookahead import Ahead
 
 MOVED_ON_S = 1.0
 MYSELF_WITHIN_M = 1.0
@@ -52,12 +54,14 @@ class _Peer:
     Attributes:
         stamp: As received; while it stays the same, the pose grows old.
         at: When this stamp was first received (monotonic, s).
+        speed: Forwards (m/s).
     """
 
     pose: Pose2D
     stands: bool
     stamp: str | None
     at: float
+    speed: float = 0.0
 
     def cap(self, name: str, own: Pose2D, beyond: float, now: float) -> Cap:
         """Cap that the peer requires of a robot at ``own``."""
@@ -67,6 +71,14 @@ class _Peer:
         ring = ring_radius(LIMITS.ring_default_m, age) + beyond
         near = own.distance_to(self.pose.x, self.pose.y) <= ring
         return Cap(HALF_SPEED, "robot", name) if near else FREE
+
+    def ahead(self, name: str, now: float) -> Iterator[Ahead]:
+        """Its circle as it goes on, while its pose is young."""
+        age, pose = now - self.at, self.pose
+        if age <= LIMITS.silence_s:
+            goes = self.speed * math.cos(pose.yaw), self.speed * math.sin(pose.yaw)
+            row = pose.x, pose.y, *goes, age, LIMITS.ring_default_m
+            yield row, Cap(HALF_SPEED, "robot", name)
 
 
 @dataclass(slots=True)
@@ -79,6 +91,7 @@ class _Topic:
     peer: _Peer | None = None
     speed_limit: SpeedLimit = UNSUPERVISED
     alerts: dict[_Key, _Kept] = field(default_factory=dict)
+    foresight: bool = False
 
 
 class PeerFeedback:
@@ -110,6 +123,7 @@ class PeerFeedback:
         memory.origin, memory.at = feedback.origin, now
         memory.peer = self._peer(memory.peer, feedback, now)
         memory.speed_limit = feedback.speed_limits.get(self._me, UNSUPERVISED)
+        memory.foresight = feedback.foresight
         self._remember(memory, feedback, own, now)
         return True
 
@@ -142,6 +156,18 @@ class PeerFeedback:
             if topic.peer is not None and own is not None:
                 yield topic.peer.cap(name, own, beyond, now)
 
+    def ahead(self, now: float) -> Iterator[Ahead]:
+        """Circles whose motion is known, where the rule looks ahead."""
+        for name, topic in self._topics.items():
+            if not topic.foresight or now - topic.at > LIMITS.silence_s:
+                continue
+            for kept in topic.alerts.values():
+                if not kept.myself and kept.missing_since is None:
+                    yield from _alert_ahead(kept, now)
+            peer = topic.peer
+            if peer is not None and not peer.stands:
+                yield from peer.ahead(name, now)
+
     def _peer(
         self, before: _Peer | None, feedback: Feedback, now: float
     ) -> _Peer | None:
@@ -154,7 +180,8 @@ class PeerFeedback:
         )
         repeated = before is not None and stamp is not None and before.stamp == stamp
         at = before.at if before is not None and repeated else now
-        return _Peer(feedback.pose, stands, stamp, at)
+        speed = 0.0 if twist is None else twist.linear_x
+        return _Peer(feedback.pose, stands, stamp, at, speed)
 
     def _make_room(self) -> None:
         if len(self._topics) >= _MAX_TOPICS:
@@ -266,6 +293,13 @@ def _inside(
     else:
         return True
     return own is None or own.distance_to(*place) <= ring
+
+
+def _alert_ahead(kept: _Kept, now: float) -> Iterator[Ahead]:
+    alert = kept.alert
+    if alert.position is not None and alert.velocity is not None:
+        (x, y, _), goes = alert.position, alert.velocity
+        yield (x, y, *goes, now - kept.at, _ring(alert, 0.0)), _alerted(alert)
 
 
 def _alerted(alert: FeedbackAlert) -> Cap:

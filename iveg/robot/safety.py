@@ -17,7 +17,7 @@ a resume was accepted.  The paper's Algorithm 3 is in ``peer_feedback``; here si
 added, which the paper treats as permission and iVeg does not.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Literal
 
 from iveg.domain.feedback import Feedback
@@ -147,6 +147,10 @@ class SafetyMachine:
         """Take a sweep of the robot's own laser, the second witness of people."""
         self._judgement.note_scan(scan, now)
         return self.tick(now)
+
+    def note_path(self, path: Sequence[tuple[float, float]], now: float) -> None:
+        """Take the path of the robot's own navigation, in ``map`` (m)."""
+        self._judgement.note_path(path, now)
 
     def limit(self, cap: Cap) -> None:
         """Set the cap of the robot's own software; it holds until the next call."""

@@ -4,7 +4,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iveg.domain.detection_rule import DetectionRule
+from iveg.domain.feedback import CLEAR, Feedback, FeedbackAlert
+from iveg.domain.geometry import Pose2D, Twist2D
+from iveg.domain.observations import Origin
+from iveg.robot.judgement import Judgement, Limits
 from tests.unit.domain.scene import Scene, person
+from tests.unit.robot.rig import person as alert
 
 _SPOT = st.tuples(
     st.sampled_from((-3.0, 1.5, 2.4, 3.0, 4.5, 7.0)),
@@ -36,3 +41,60 @@ def test_no_robot_is_ever_faster_for_it(
         before, after = limits
         for robot_id, limit in before.items():
             assert after[robot_id].speed_factor <= limit.speed_factor
+
+
+_SEEN = st.tuples(
+    st.sampled_from((-3.0, 1.5, 2.4, 3.0, 4.5, 9.0)),
+    st.none() | st.tuples(st.sampled_from((-1.6, 0.0, 1.0)), st.just(0.2)),
+)
+_LEG = st.tuples(
+    st.sampled_from((-1.0, 0.0, 1.0)),
+    st.booleans(),
+    st.lists(_SEEN, max_size=2),
+    st.lists(st.tuples(st.sampled_from((0.0, 2.0, float("nan"), 1e6)), st.just(0.1))),
+)
+
+
+@given(st.lists(_LEG, max_size=10))
+def test_no_robot_makes_itself_faster_by_it(
+    run: list[
+        tuple[
+            float,
+            bool,
+            list[tuple[float, tuple[float, float] | None]],
+            list[tuple[float, float]],
+        ]
+    ],
+) -> None:
+    today, ahead = (Judgement("AGI", 0.0, Limits()) for _ in range(2))
+    seq, now = 0, 0.0
+    for x, speaks, people, path in run:
+        seen = tuple(
+            alert(there, decision_id=f"d-{number}", velocity=goes)
+            for number, (there, goes) in enumerate(people)
+        )
+        for _ in range(8):
+            seq, now = seq + 1, round(now + 0.1, 6)
+            for one, foresight in ((today, False), (ahead, True)):
+                # Whoever is slowed reports at once, which also proves ages sooner.
+                one.watchdog.sent(seq, now)
+                one.note_odometry(Pose2D(x, 0.0, 0.2), Twist2D(0.8, 0.1), now)
+                one.note_path(path, now)
+                if speaks:
+                    one.note_feedback("AGII", _told(seq, seen, foresight), now)
+                one.settle(now)
+            assert ahead.cap.factor <= today.cap.factor
+
+
+def _told(seq: int, seen: tuple[FeedbackAlert, ...], foresight: bool) -> Feedback:
+    return Feedback(
+        "AGII",
+        Origin("cloud", seq),
+        alerts=seen,
+        pose=Pose2D(6.0, 1.0, 3.1),
+        twist=Twist2D(0.7, 0.0),
+        pose_stamp=f"{seq}",
+        speed_limits={"AGI": CLEAR},
+        seen={"AGI": seq},
+        foresight=foresight,
+    )

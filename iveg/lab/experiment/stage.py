@@ -83,6 +83,7 @@ class StagedRobot:
                 rig.profile.max_turn,
                 outline=Outline(rig.profile.length, rig.profile.width),
                 plan=plan,
+                braking=rig.profile.braking,
             ),
         )
         self._perform(self._machine.release_locally(now.mono), now)
@@ -109,7 +110,9 @@ class StagedRobot:
             self._uplink.send(self._rig.detect(into_run, world), now)
             self._looked(self._rig)
         if number % _NAVIGATION_EVERY == 0:
-            self._uplink.send(self._rig.navigation(), now)
+            intent = self._rig.navigation()
+            self._machine.note_path(intent.path, now.mono)
+            self._uplink.send(intent, now)
 
     def _dated(self, now: Instant) -> Instant:
         """Readings of its own clocks."""

@@ -42,6 +42,7 @@ def read_feedback(payload: bytes) -> Feedback:
         _speed_limits(value),
         value.seen,
         _backlog(value.backlog),
+        value.foresight,
     )
 
 
@@ -69,7 +70,7 @@ def _backlog(value: object) -> float | None:
 
 
 def _alert(value: payloads.AlertValue) -> FeedbackAlert:
-    position = value.position
+    position, goes = value.position, value.velocity
     return FeedbackAlert(
         value.decision_id or "",
         value.stamp or "",
@@ -79,6 +80,7 @@ def _alert(value: payloads.AlertValue) -> FeedbackAlert:
         None if position is None else (position.x, position.y, position.z),
         value.radius_m,
         value.observer,
+        None if goes is None else (goes.x, goes.y),
     )
 
 
@@ -116,6 +118,7 @@ def _write(feedback: Feedback, shared: Mapping[str, object]) -> bytes:
             "robot_pose": _write_feedback_pose(feedback),
             **shared,
             **_write_backlog(feedback.backlog_s),
+            **({"foresight": True} if feedback.foresight else {}),
         }
     )
 
@@ -175,6 +178,9 @@ def _write_alert(alert: FeedbackAlert) -> dict[str, object]:
             "radius_m": rounded(alert.radius_m),
             "stamp": alert.stamp,
             "observer": alert.observer,
+            "velocity": None
+            if alert.velocity is None
+            else dict(zip("xy", map(rounded, alert.velocity), strict=True)),
         }
     )
 

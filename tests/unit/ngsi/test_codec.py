@@ -1,6 +1,7 @@
 """What the contract says is read; what iVeg writes is as the contract says."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import orjson
@@ -348,6 +349,20 @@ def test_feedback_with_nothing_to_tell_says_null() -> None:
 
     assert (written["alert"], written["alerts"]) == (None, [])
     assert written["robot_pose"] is None
+
+
+def test_feedback_tells_how_people_go_on_where_the_rule_looks_ahead() -> None:
+    alert = FeedbackAlert("d", "s", "person", position=(1.0, 2.0, 0.0))
+    goes = replace(alert, velocity=(0.5, -1.0))
+    told = Feedback("AGI", Origin(), alerts=(goes, alert), foresight=True)
+    payload = codec.write_feedback(told)
+
+    assert orjson.loads(payload)["alerts"][0]["velocity"] == {"x": 0.5, "y": -1.0}
+    assert codec.read_feedback(payload).alerts == told.alerts
+    assert codec.read_feedback(payload).foresight
+    assert "foresight" not in orjson.loads(
+        codec.write_feedback(Feedback("AGI", Origin()))
+    )
 
 
 def test_a_backlog_that_nobody_knows_is_not_told() -> None:

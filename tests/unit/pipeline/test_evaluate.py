@@ -1,5 +1,7 @@
 """The rule at work: feedback, log, alerts and the heartbeat of the fleet."""
 
+from dataclasses import replace
+
 import pytest
 
 from iveg.domain.detection_rule import DetectionRule
@@ -58,6 +60,20 @@ def test_13_13_a_decision_remembers_where_the_robots_were() -> None:
 
 
 # --- feedback ---------------------------------------------------------------------
+
+
+def test_feedback_tells_how_people_go_on_for_as_long_as_they_are_seen() -> None:
+    desk = watched(Desk())
+    meet(desk)
+    [told] = desk.fleet.told[-1].alerts
+    assert (told.velocity, desk.fleet.told[-1].foresight) == ((0.0, 0.0), True)
+
+    desk.clock.now += 1.5
+    desk.drive("AGI", 0.0)
+    desk.evaluator.rule = replace(desk.evaluator.rule, foresight=False)
+    desk.evaluator.publish(desk.clock())
+    [told] = desk.fleet.told[-1].alerts
+    assert (told.velocity, desk.fleet.told[-1].foresight) == (None, False)
 
 
 def test_a_sighting_is_told_to_the_fleet_at_once() -> None:

@@ -30,9 +30,18 @@ def person(
     class_: str = "person",
     class_id: str = "farmer",
     observer: str = "AGII",
+    velocity: tuple[float, float] | None = None,
 ) -> FeedbackAlert:
     return FeedbackAlert(
-        decision_id, "", class_, class_id, 0.9, (x, y, 0.9), radius_m, observer
+        decision_id,
+        "",
+        class_,
+        class_id,
+        0.9,
+        (x, y, 0.9),
+        radius_m,
+        observer,
+        velocity,
     )
 
 
@@ -74,6 +83,7 @@ class Rig:
     speaks: bool = True
     speed_limits: Mapping[str, SpeedLimit] = field(default_factory=dict)
     alerts: tuple[FeedbackAlert, ...] = ()
+    foresight: bool = False
     log: list[tuple[float, Effect]] = field(default_factory=list)
     report_seq: int = 500
     feedback_seq: int = 0
@@ -139,6 +149,7 @@ class Rig:
             "alerts": self.alerts,
             "speed_limits": {"AGI": CLEAR, **self.speed_limits},
             "seen": {"AGI": self.report_seq},
+            "foresight": self.foresight,
         }
         return Feedback(**(values | parts))  # type: ignore[arg-type]
 
