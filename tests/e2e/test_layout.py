@@ -263,6 +263,8 @@ def _within_reach(page: Page) -> object:
 WITHIN_REACH = """() => {
   const all = document.querySelector('#stops [data-stop="fleet"]');
   const near = new Set();
+  const isNear = ([x, y], box) => x > box.left - 24 && x < box.right + 24
+    && y > box.top - 24 && y < box.bottom + 24;
   for (const stop of document.querySelectorAll('.card .stop')) {
     if (!stop.checkVisibility({visibilityProperty: true})) continue;
     for (const into of [8, 40]) {
@@ -271,7 +273,7 @@ WITHIN_REACH = """() => {
       for (let px = 1; px < 24; px += 2) {
         const side = [box.left - px, stop.getBoundingClientRect().top + 4];
         const above = [stop.getBoundingClientRect().left + 20, box.top - px];
-        for (const [x, y] of [above, side]) {
+        for (const [x, y] of [above, side].filter((it) => isNear(it, box))) {
           const hit = document.elementFromPoint(x, y);
           if (hit && stop.contains(hit)) near.add(`${stop.dataset.stop} ${px}`);
         }

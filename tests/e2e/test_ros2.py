@@ -21,7 +21,7 @@ NOTE_PAINTED = """() => {
   };
 }"""
 HALVED = re.compile(r"50\W?%: .*(?:persona|robot)")
-STANDING = re.compile(r"PARADO \([\d.]+ ms\)")
+STANDING = re.compile(r"PARADO \(hace [\d,]+ s\)")
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,7 @@ from tests.processes import Site, until
 
 pytestmark = pytest.mark.e2e
 
-STANDING = re.compile(r"PARADO \([\d.]+ ms\)")
+STANDING = re.compile(r"PARADO \(hace [\d,]+ s\)")
 _NOTE_WHEN = """([selector]) => {
   const control = document.querySelector(selector);
   const note = () => { window.__changedAt ??= Date.now(); };

@@ -109,7 +109,7 @@ def test_who_signed_out_can_no_longer_stop_and_no_page_looks_as_if_they_could(
 
     control = strip_stop(page, "AGV")
     expect(control).to_have_attribute("data-state", "lost", timeout=WITHIN_MS)
-    expect(control).to_contain_text("SIN ENLACE: use la seta roja del robot")
+    expect(control).to_contain_text("SIN ENLACE — use la seta roja del robot")
 
 
 def _server(stack: Site) -> Program:

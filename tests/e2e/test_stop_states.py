@@ -20,7 +20,7 @@ from tests.processes import EMULATOR, Program, Site, site, until
 
 pytestmark = [pytest.mark.e2e, pytest.mark.slow]
 
-STANDING = re.compile(r"PARADO \([\d.]+ ms\)")
+STANDING = re.compile(r"PARADO \(hace [\d,]+ s\)")
 WITHIN_MS = 30_000
 
 _WATCH = """([robot]) => {
@@ -109,7 +109,7 @@ def test_ready_is_a_red_octagon_that_names_what_it_stops(
     assert "polygon" in _style(agi, "clipPath", "::before")
 
 
-def test_a_late_link_is_outlined_with_its_age_and_a_lost_one_is_hatched_and_crossed(
+def test_a_late_link_has_amber_and_its_age_and_a_lost_one_is_hatched_and_crossed(
     page: Page, agi: Locator, english: Page, stack: Site
 ) -> None:
     in_english = strip_stop(english, "AGI")
@@ -119,8 +119,8 @@ def test_a_late_link_is_outlined_with_its_age_and_a_lost_one_is_hatched_and_cros
         late = [(text, outline) for text, outline in _said(page, "late") if "(" in text]
         assert re.search(r"PARAR AGI\s+\(enlace lento [1-3] s\)", late[0][0])
         assert {outline for _, outline in late} == {"block"}
-        expect(agi).to_contain_text("SIN ENLACE: use la seta roja del robot")
-        expect(in_english).to_contain_text("NO LINK: use the red button on the robot")
+        expect(agi).to_contain_text("SIN ENLACE — use la seta roja del robot")
+        expect(in_english).to_contain_text("NO LINK — use the red button on the robot")
         assert "repeating-linear-gradient" in _style(agi, "backgroundImage", "::before")
         assert "×" in _style(agi.locator(".stop__who"), "content", "::before")
 
@@ -137,9 +137,9 @@ def test_a_lost_control_still_sends_and_says_loudly_what_nobody_confirms(
         expect(agi).to_have_attribute("data-state", "lost", timeout=WITHIN_MS)
         agi.click()
 
-        expect(agi).to_contain_text("PARADA SIN CONFIRMAR: use la seta roja")
+        expect(agi).to_contain_text("PARADA SIN CONFIRMAR — use la seta roja")
         expect(strip_stop(english, "AGI")).to_contain_text(
-            "STOP NOT CONFIRMED: use the red button"
+            "STOP NOT CONFIRMED — use the red button"
         )
         line = page.locator("#p1 .p1__line")
         expect(line).to_contain_text("AGI: PARADA SIN CONFIRMAR: use la seta roja")
@@ -325,7 +325,7 @@ def _listening(page: Page) -> Page:
 
 
 def _said(page: Page, state: str) -> list[tuple[str, str]]:
-    """What a control that is watched said in a state, and whether it was outlined."""
+    """What a control that is watched said in a state, and how its line displays."""
     told: list[list[str]] = page.evaluate("window.__said")
     return [(text, outline) for it, _, text, outline in told if it == state]
 

@@ -11,6 +11,8 @@ function page() {
   for (const [id, tag] of [
     ["p1", "div"],
     ["stops", "section"],
+    ["stops-more", "button"],
+    ["stops-robots", "div"],
   ]) {
     const element = document.createElement(tag);
     element.id = id;
@@ -23,7 +25,8 @@ function page() {
     span.className = part;
     fleet.append(span);
   }
-  document.querySelector("#stops")?.append(fleet);
+  const robots = document.querySelector("#stops-robots") ?? "";
+  document.querySelector("#stops")?.append(robots, fleet);
   sessionStorage.clear();
   /** @type {(() => void)[]} */
   const frames = [];

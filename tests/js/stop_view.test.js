@@ -7,7 +7,7 @@ import {
   viewOfRobot,
 } from "../../iveg/static/js/panels/stop_view.js";
 import { command } from "./builders.js";
-import { equal, test } from "./harness.js";
+import { equal, near, test } from "./harness.js";
 
 /** @typedef {import("../../iveg/static/js/panels/stop_view.js").RobotFacts} RobotFacts */
 /** @typedef {import("../../iveg/static/js/panels/press.js").Pending} Pending */
@@ -132,20 +132,17 @@ test("a robot that moved while held is told apart from one that was asked to sto
   equal(stateOf({ command: standing }), "standing");
 });
 
-test("a standstill says how long it took, when that is known", () => {
-  const timed = command({
-    kind: "stop",
+test("a standstill says how long ago it began, when that is known", () => {
+  const stands = {
+    kind: /** @type {const} */ ("stop"),
     state: "STANDING",
     robot: RESTS,
-    standstill_ms: 412,
-  });
-  const adopted = command({
-    kind: "stop",
-    state: "STANDING",
-    robot: RESTS,
-    standstill_ms: null,
-  });
-  equal(viewOfRobot(facts({ command: timed })).slots, { ms: 412 });
+  };
+  const { times } = command();
+  const standing = new Date(1000 * (facts().serverNowS - 29.7)).toISOString();
+  const timed = command({ ...stands, times: { ...times, standing } });
+  const adopted = command({ ...stands, times: { ...times, standing: null } });
+  near(Number(viewOfRobot(facts({ command: timed })).slots.seconds), 29.7, 0.001);
   equal(viewOfRobot(facts({ command: adopted })).key, "stop.standing_untimed");
 });
 

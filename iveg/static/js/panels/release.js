@@ -44,29 +44,40 @@ export function createRelease(app, card, robotId) {
   /** @param {Robot | undefined} robot */
   function draw(robot) {
     shown = robot;
-    const panel = /** @type {HTMLDialogElement} */ (needPart("panel", card));
-    if (!panel.open) return;
     const facts = factsOf(robot);
     const mayRelease = whyNotRelease(facts);
     const mayResume = whyNotResume(facts);
     releaseButton.disabled = isBusy || mayRelease !== "ok";
     resumeButton.disabled = isBusy || mayResume !== "ok";
-    const why = mayResume === "ok" ? "ok" : mayRelease;
-    setText(
-      needPart("release-why", card),
-      i18n.t(`release.why.${isBusy ? "busy" : why}`),
-    );
-    setText(
-      needPart("release-label", card),
-      i18n.t("release.button", { robot: robotId }),
-    );
-    setText(
-      needPart("resume-label", card),
-      i18n.t("release.resume", { robot: robotId }),
-    );
-    setText(result, outcomeSaid());
+    const named = { robot: robotId };
+    setAttribute(releaseButton, "aria-label", i18n.t("release.button", named));
+    setAttribute(resumeButton, "aria-label", i18n.t("release.resume", named));
+    // What to look for before the robot drives must not be cut short, and of one that
+    // drives the newest order is history.
+    const isTold = isHeld(robot) && mayResume !== "ok";
+    setText(result, isTold ? outcomeSaid() : "");
+    setText(needPart("release-why", card), whySaid(robot, mayRelease, mayResume));
+    const panel = /** @type {HTMLDialogElement} */ (needPart("panel", card));
+    if (!panel.open) return;
     drawFacts(robot);
     drawHolds(robot);
+  }
+
+  /**
+   * The sentence below the two buttons: what a release lifts, or why there is none.
+   *
+   * @param {Robot | undefined} robot
+   * @param {string} mayRelease @param {string} mayResume
+   */
+  function whySaid(robot, mayRelease, mayResume) {
+    if (isBusy) return i18n.t("release.why.busy");
+    // Of a robot that drives there is nothing to say, on every card and all the time.
+    if (!isHeld(robot) && mayRelease !== "signed_out") return "";
+    if (mayResume === "ok") return i18n.t("release.why.ready");
+    if (mayRelease !== "ok") return i18n.t(`release.why.${mayRelease}`);
+    const sources = new Set(robot?.holds.map(({ source }) => source));
+    const holds = [...sources].map((it) => i18n.t(`release.hold_source.${it}`));
+    return i18n.t("release.lifts", { holds: holds.join(", ") });
   }
 
   function outcomeSaid() {
@@ -222,6 +233,9 @@ export function whyNotAtAll({ connection, role, ageS }) {
   if (!RELEASERS.has(role)) return "role";
   return ageS > LIMITS.report_fresh_s ? "not_fresh" : null;
 }
+
+/** @param {Robot | undefined} robot */
+const isHeld = (robot) => robot?.mode === "STOPPED" || Boolean(robot?.holds.length);
 
 /** @param {Facts} facts */
 function isStanding({ robot, command }) {

@@ -49,6 +49,7 @@ export class RobotCard {
     this.#parts = byName("part", card);
     this.#fields = byName("field", card);
     this.#ages = all("[data-age]", card);
+    app.stops.putOn(this.#parts.stop, this.#robotId);
     this.#release = createRelease(app, card, this.#robotId);
     this.#drill = createDrill(app, card, this.#robotId);
     this.#detector = createDetector(app, card, this.#robotId);
@@ -62,6 +63,7 @@ export class RobotCard {
   draw(robot) {
     const { i18n, dialogs } = this.#app;
     const isSmall = this.#card.parentElement?.hasAttribute("data-many") ?? false;
+    this.#putRearm(isSmall);
     this.#drawHead(robot);
     this.#drawMode(robot);
     this.#drawAge(robot, isSmall);
@@ -72,6 +74,13 @@ export class RobotCard {
     this.#drill.draw(this.#release.factsOf(robot));
     this.#detector.draw(robot);
     this.#goal.draw(this.#release.factsOf(robot));
+  }
+
+  /** A small card has no room for Release and Resume: they open its menu. */
+  #putRearm(/** @type {boolean} */ isSmall) {
+    const { rearm, strip, "panel-strip": panelStrip } = this.#parts;
+    const home = isSmall ? panelStrip : strip;
+    if (rearm.parentElement !== home) home.append(rearm);
   }
 
   get element() {
@@ -120,7 +129,6 @@ export class RobotCard {
     setText(this.#fields.mode, capitalised(phrases.said));
     setText(why, [phrases.why, phrases.todo].filter(Boolean).join(" — "));
     const said = robot ? faultsSaid(robot, i18n).join(" · ") : "";
-    setHidden(faults, !said);
     setText(faults, said);
   }
 

@@ -38,7 +38,6 @@ export function createRobotsPanel(app) {
     sight.watch(robotId, element);
     cards.set(robotId, card);
     place.toggleAttribute("data-many", cards.size > ROOMY);
-    app.stops.place();
     return card;
   }
 

@@ -1,10 +1,10 @@
 /**
  * The STOP controls: one for each robot and one for the fleet, on every page.
  *
- * Each control exists once.  On a phone, and in a big fleet, a robot's control stands in
- * its card, else in the strip; it is moved, not copied, so that there is one state to
- * believe.  A panel that opens over the cards of a phone sends them to the strip.
- * `stop_view.js` says what a control shows, `press.js` sends what is pressed.
+ * A robot's control stands in the strip of every page, in the fleet's order, and on its
+ * card.  Neither ever moves, and both are drawn of one view in one go, so that there is
+ * one state to believe.  `stop_view.js` says what a control shows, `press.js` sends what
+ * is pressed.
  */
 
 import { readApi } from "../core/api.js";
@@ -33,9 +33,9 @@ export class StopPanel {
   #app;
   #presser;
   #loud;
-  #strip = need("#stops");
   #stops = new NewestStops();
-  /** @type {Map<string, HTMLElement>} by robot, and `fleet` */
+  #place;
+  /** @type {Map<string, HTMLElement[]>} by robot, and `fleet`: strip first, then card */
   #controls = new Map();
   /** Whether the session is over for watching, though not for stopping. */
   #isBlind = false;
@@ -50,10 +50,9 @@ export class StopPanel {
     this.#app = app;
     this.#presser = createPresser(line, drawAll, send);
     this.#loud = createLoudLines(app);
-    /** To be called when a card is new. */
-    this.place = createPlace(this.#strip, this.#controls);
-    for (const control of all("[data-stop]")) this.#adopt(control);
-    this.place();
+    this.#place = createPlace(() => this.#robotIds().length);
+    for (const control of all("[data-stop]", need("#stops"))) this.#adopt(control);
+    this.#place();
     onFleetKeys(() => this.#press(null));
     store.subscribe("snapshot", (snapshot) => this.#restart(snapshot));
     store.subscribe("commands/", (command) => this.#take(command));
@@ -78,7 +77,7 @@ export class StopPanel {
   /** @param {HTMLElement} control */
   #adopt(control) {
     const id = String(control.dataset.stop);
-    this.#controls.set(id, control);
+    this.#controls.set(id, [...(this.#controls.get(id) ?? []), control]);
     for (const part of all("[data-i18n]", control)) part.removeAttribute("data-i18n");
     onPress(control, () => this.#press(id === "fleet" ? null : id));
   }
@@ -91,14 +90,23 @@ export class StopPanel {
   }
 
   /** @param {string} robotId */
-  #controlOf(robotId) {
+  #controlsOf(robotId) {
     const known = this.#controls.get(robotId);
     if (known) return known;
     const control = makeControl(robotId);
-    this.#strip.insertBefore(control, this.#controls.get("fleet") ?? null);
+    need("#stops-robots").append(control);
     this.#adopt(control);
-    this.place();
-    return control;
+    this.#place();
+    return [control];
+  }
+
+  /** A robot's control on its card. @param {HTMLElement} slot @param {string} robotId */
+  putOn(slot, robotId) {
+    this.#controlsOf(robotId);
+    const control = makeControl(robotId);
+    slot.append(control);
+    this.#adopt(control);
+    this.#drawAll();
   }
 
   #robotIds() {
@@ -125,7 +133,7 @@ export class StopPanel {
   #takeRobot({ robot_id, stop, receivedAtMs }) {
     if (stop) this.#take({ ...stop, receivedAtMs });
     else this.#stops.forget(robot_id);
-    this.#controlOf(robot_id);
+    this.#controlsOf(robot_id);
   }
 
   /** A command answers the press that asked for it. @param {Command} command */
@@ -206,12 +214,14 @@ export class StopPanel {
   /** @param {string} id @param {View} view */
   #draw(id, view) {
     const { i18n } = this.#app;
-    const control = this.#controlOf(id);
-    setAttribute(control, "data-state", view.state);
-    setText(need(".stop__label", control), i18n.t(view.key, view.slots));
-    const who = need(".stop__who", control);
-    setText(who, id === "fleet" ? i18n.t("stop.fleet_name") : id);
-    setHidden(who, view.state === "ready" || view.state === "late");
+    const said = i18n.t(view.key, view.slots);
+    for (const control of this.#controlsOf(id)) {
+      setAttribute(control, "data-state", view.state);
+      setText(need(".stop__label", control), said);
+      const who = need(".stop__who", control);
+      setText(who, id === "fleet" ? i18n.t("stop.fleet_name") : id);
+      setHidden(who, view.state === "ready" || view.state === "late");
+    }
   }
 }
 

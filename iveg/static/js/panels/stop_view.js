@@ -179,10 +179,11 @@ function viewOfCommand(state, command, facts) {
     return { state, key: "stop.resuming", slots: {} };
   }
   if (state === "standing") {
-    if (command.standstill_ms === null) {
+    if (command.times.standing === null) {
       return { state, key: "stop.standing_untimed", slots: {} };
     }
-    return { state, key, slots: { ms: command.standstill_ms } };
+    const seconds = since(command.times.standing, facts.serverNowS);
+    return { state, key, slots: { seconds } };
   }
   if (state === "stale") {
     const seconds = Math.max(aged(facts), reportAge(command, facts.nowMs));
