@@ -4,7 +4,7 @@ from pathlib import Path
 
 from iveg.adapters.mqtt import BrokerAddress
 from iveg.domain.witness import Plan
-from iveg.robot.node import NodeSettings
+from iveg.robot.node_settings import NodeSettings
 from iveg.settings import Settings
 
 

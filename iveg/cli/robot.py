@@ -37,7 +37,8 @@ from iveg.domain.geometry import Twist2D
 from iveg.domain.witness import Outline, Plan
 from iveg.ngsi import names
 from iveg.robot.goals import Navigate
-from iveg.robot.node import NodeSettings, RobotNode
+from iveg.robot.node import RobotNode
+from iveg.robot.node_settings import NodeSettings
 from iveg.robot.ros2.checking import Heard, judge, lines
 from iveg.robot.ros2.config import RobotConfig, read_classes, read_config
 from iveg.robot.ros2.lookout import forms_published

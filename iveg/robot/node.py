@@ -8,13 +8,13 @@ import asyncio
 import logging
 import secrets
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Literal
 
 from iveg.adapters import clock
-from iveg.adapters.mqtt import BrokerAddress, MqttLink
+from iveg.adapters.mqtt import MqttLink
 from iveg.domain.errors import UnreadableError
 from iveg.domain.feedback import Feedback
 from iveg.domain.fleet import RobotProfile
@@ -34,7 +34,7 @@ from iveg.domain.observations import (
     SafetyReport,
     Unplaced,
 )
-from iveg.domain.witness import Outline, Plan
+from iveg.domain.witness import Outline
 from iveg.ngsi import names
 from iveg.ngsi.codec import read_feedback
 from iveg.robot.caps import FREE, Cap
@@ -42,10 +42,11 @@ from iveg.robot.echo import Echo
 from iveg.robot.effects import Answer, Drive, Effect, Persist, Report
 from iveg.robot.goals import Facts, Navigate, RobotGoals, read_goal
 from iveg.robot.hold_file import read_holds, write_holds
-from iveg.robot.judgement import Limits, OnLinkLoss
+from iveg.robot.judgement import Limits
 from iveg.robot.lane import SafetyLane
+from iveg.robot.node_settings import NodeSettings
 from iveg.robot.safety import SafetyMachine, State
-from iveg.robot.uplink import Form, Uplink
+from iveg.robot.uplink import Uplink
 
 _log = logging.getLogger(__name__)
 _GATE_EVERY_S = 0.04
@@ -53,31 +54,6 @@ _GATE_EVERY_S = 0.04
 _PEER_SCAN = names.PEER_SCAN_TOPIC.format(robot_id="")[1:]
 _SAID_WITHIN_S = 0.03
 """Odometry, upstream twist and feedback that arrive together give one drive command."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class NodeSettings:
-    """Settings shared by the safety nodes of a run.
-
-    Attributes:
-        address: The broker.
-        apikey: First part of the measure topics.
-        directory: Where the holds of each robot survive a loss of power.
-        slow_s: Feedback older than this halves the speed (s).
-        stand_s: Feedback older than this stops the robot (s).
-        on_link_loss: ``slow``: it goes on at half speed instead.
-        uplink: One message a topic, or Algorithm 1's single payload.
-        plan: What stands in the greenhouse; None: nobody drew it.
-    """
-
-    address: BrokerAddress
-    apikey: str
-    directory: Path
-    slow_s: float = LIMITS.feedback_slow_s
-    stand_s: float = LIMITS.feedback_stand_s
-    on_link_loss: OnLinkLoss = "stop"
-    uplink: Form = "per-topic"
-    plan: Plan | None = None
 
 
 class RobotNode:

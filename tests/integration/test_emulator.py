@@ -32,7 +32,7 @@ from iveg.lab.emulator.scenarios import scenario_named
 from iveg.lab.emulator.scripts import Incident
 from iveg.lab.emulator.world import SimulatedWorld
 from iveg.ngsi import codec
-from iveg.robot.node import NodeSettings
+from iveg.robot.node_settings import NodeSettings
 from tests.integration.emulator_cloud import Cloud, broker, running, until
 
 TESTBED = load_greenhouse("mvsim-20x20")

@@ -22,7 +22,7 @@ from iveg.domain.observations import (
     SafetyReport,
 )
 from iveg.ngsi import codec
-from iveg.robot.node import NodeSettings
+from iveg.robot.node_settings import NodeSettings
 from iveg.robot.replay.replay import ReplaySettings, run_replay
 from iveg.ros2 import detector_messages as d
 from iveg.ros2 import messages as m

@@ -25,7 +25,8 @@ from iveg.domain.observations import (
     SafetyReport,
 )
 from iveg.ngsi import codec
-from iveg.robot.node import NodeSettings, RobotNode
+from iveg.robot.node import RobotNode
+from iveg.robot.node_settings import NodeSettings
 from tests.brokers import broker_on
 from tests.ports import free_ports
 

@@ -26,7 +26,8 @@ from iveg.domain.observations import (
     Origin,
 )
 from iveg.ngsi import codec, names
-from iveg.robot.node import NodeSettings, RobotNode
+from iveg.robot.node import RobotNode
+from iveg.robot.node_settings import NodeSettings
 from tests.builders import odometry, safety_report
 from tests.unit.pipeline.desk import Desk, settle
 from tests.unit.robot.rig import AHEAD, REST, release, resume, stop

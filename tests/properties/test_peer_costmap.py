@@ -19,7 +19,8 @@ from iveg.domain.peer_scan import peer_scan_of
 from iveg.domain.witness import Outline
 from iveg.ngsi import codec
 from iveg.robot.costmap import FleetCostmap
-from iveg.robot.node import NodeSettings, RobotNode
+from iveg.robot.node import RobotNode
+from iveg.robot.node_settings import NodeSettings
 from tests.builders import AGI, origin, scan
 
 ROOM = Rectangle(-8.0, -8.0, 8.0, 8.0)

@@ -216,7 +216,8 @@ class Tracker:
         )
         later = sighting.at.mono > person.newest.at.mono
         newest = sighting if later else person.newest
-        decision_id = person.decision_id if kept else one.decision_id
+        had_ring = person.age_s(at) <= LIMITS.ring_lasts_s
+        decision_id = person.decision_id if had_ring else one.decision_id
         self.known[track] = person.seen_as(newest, (*kept, sighting), decision_id)
         return track
 

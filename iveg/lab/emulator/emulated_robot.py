@@ -16,7 +16,8 @@ from iveg.lab.emulator.relay import Relay
 from iveg.lab.emulator.sensors import EmulatedSensors
 from iveg.lab.emulator.truth import TruthLog
 from iveg.lab.emulator.world import RobotHardware, SimulatedWorld
-from iveg.robot.node import NodeSettings, RobotNode
+from iveg.robot.node import RobotNode
+from iveg.robot.node_settings import NodeSettings
 from iveg.robot.pacing import LONGEST_STEP_S, SLOTS, in_slots
 
 _NAVIGATION_EVERY_S = 1.0

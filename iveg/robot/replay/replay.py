@@ -23,7 +23,8 @@ from iveg.domain.observations import (
     Odometry,
     Origin,
 )
-from iveg.robot.node import NodeSettings, RobotNode
+from iveg.robot.node import RobotNode
+from iveg.robot.node_settings import NodeSettings
 from iveg.robot.pacing import every
 from iveg.robot.replay.bags import AS_RECORDED, BagOptions
 from iveg.robot.replay.playback import Playback

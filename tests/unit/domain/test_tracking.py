@@ -165,6 +165,19 @@ def test_who_comes_back_from_where_somebody_was_last_seen_is_the_same() -> None:
     assert back.decision_id != first.decision_id, "the alert is a new one"
 
 
+def test_the_alert_of_somebody_who_is_followed_stays_the_same() -> None:
+    scene = Scene()
+    scene.look("AGI", person(3.0))
+    first = scene.everyone[0].decision_id
+    for tenth in range(1, 30):
+        scene.now = tenth / 10
+        scene.look("AGI", person(3.0))
+    scene.now = 12.0
+    scene.look("AGI", person(3.5))
+
+    assert {one.decision_id for one in scene.everyone} == {first}
+
+
 def test_no_start_of_iveg_repeats_an_id() -> None:
     before, after = Tracker(era="-5f0c"), Tracker(era="-a31b")
     seen = Sighting("AGI", 3.0, 0.0, 0.9, at(0), "farmer", 0.94)

@@ -12,6 +12,7 @@ from tests.fakes.records import (
     detection_record,
     latency_record,
     log_record,
+    measurement_record,
     odometry_record,
 )
 
@@ -45,7 +46,8 @@ def test_only_telemetry_may_be_dropped() -> None:
     assert is_telemetry(climate_record())
     assert not any(is_telemetry(record) for record in KEPT)
     assert is_telemetry(latency_record())
-    assert len(RECORD_TYPES) == len(KEPT) + 5
+    assert is_telemetry(measurement_record())
+    assert len(RECORD_TYPES) == len(KEPT) + 6
 
 
 def test_a_full_queue_drops_its_oldest_telemetry_and_counts_it() -> None:

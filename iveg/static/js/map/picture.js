@@ -14,8 +14,8 @@
 import { createCostmapLayer } from "./layers/costmap.js";
 import * as coverage from "./layers/coverage.js";
 import * as detections from "./layers/detections.js";
-import * as equipment from "./layers/equipment.js";
 import * as encounters from "./layers/encounters.js";
+import * as equipment from "./layers/equipment.js";
 import * as greenhouse from "./layers/greenhouse.js";
 import * as grid from "./layers/grid.js";
 import { createGround } from "./layers/ground.js";

@@ -18,7 +18,8 @@ from iveg.domain.goals import Goal
 from iveg.domain.observations import Origin
 from iveg.robot.costmap import FleetCostmap
 from iveg.robot.goals import Navigate
-from iveg.robot.node import NodeSettings, RobotNode
+from iveg.robot.node import RobotNode
+from iveg.robot.node_settings import NodeSettings
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.rig import Ros2Robot
 from iveg.ros2 import detector_messages as d
