@@ -204,7 +204,19 @@ test("every layer shows, and its switch takes it off the picture", async () => {
   const navigation = { task: "", goal: { x: 8, y: 8 }, path: /** @type {any} */ ([]) };
   const acting = [{ robot_id: "AGI", distance_m: 3, in_sight: false }];
   const people = [person({ position: { x: 9, y: 6, z: 1 }, acting })];
-  store.apply("snapshot", snapshot({ robots: [robot({ navigation })], people }));
+  const encounters = [
+    {
+      cause: "P1",
+      reason: "person",
+      in_s: 1.8,
+      probability: 0.9,
+      place: { x: 6, y: 3 },
+      centre: { x: 7, y: 4 },
+      radius_m: 2,
+    },
+  ];
+  const driving = { navigation, encounters };
+  store.apply("snapshot", snapshot({ robots: [robot(driving)], people }));
   store.setConnection("open");
   const faint = detection({ person_id: null, position: { x: 13, y: 2, z: 1 } });
   const look = { robot_id: "AGI", stamp: "s", items: [faint] };
@@ -220,7 +232,7 @@ test("every layer shows, and its switch takes it off the picture", async () => {
   store.apply("equipment", [tile]);
   map.setLayer("costmap", true);
   for (const x of [0, 0.5, 1]) {
-    store.apply("robots/AGI", robot({ navigation, pose: { x, y: 2, yaw: 0 } }));
+    store.apply("robots/AGI", robot({ ...driving, pose: { x, y: 2, yaw: 0 } }));
   }
   /** @type {string[]} */
   const invisible = [];

@@ -25,6 +25,7 @@ async def test_mqtt_and_the_rule_loop_alone_share_the_fate_of_the_process(
         "history",
         "retention",
         "messages",
+        "peer-scans",
         "earlier",
         "loop-watch",
     }
