@@ -5,15 +5,28 @@ import { equal, near, test } from "./harness.js";
 function listened() {
   /** @type {(string | number)[][]} */
   const meant = [];
+  /** @type {string[]} what the page asks for */
+  const asking = [];
   const touch = createTouch({
     pan: (dx, dy) => void meant.push(["pan", dx, dy]),
     zoom: (px, py, factor) => void meant.push(["zoom", px, py, factor]),
     pinch: (...how) => void meant.push(["pinch", ...how]),
-    tap: (px, py) => void meant.push(["tap", px, py]),
+    tapMeans: () => {
+      const asked = [...asking];
+      return (px, py) => void meant.push(["tap", px, py, ...asked]);
+    },
     doubleTap: (px, py) => void meant.push(["doubleTap", px, py]),
     hover: (px, py) => void meant.push(["hover", px, py]),
   });
-  return { touch, meant };
+  return { touch, meant, asking };
+}
+
+/** Waits until something is meant. @param {(string | number)[][]} meant */
+async function something(meant) {
+  const deadline = performance.now() + 2000;
+  while (!meant.length && performance.now() < deadline) {
+    await new Promise((resolve) => setTimeout(resolve, 20));
+  }
 }
 
 test("one finger drags", () => {
@@ -51,11 +64,17 @@ test("a glove that trembles still taps", async () => {
   touch.down(1, { x: 50, y: 50 });
   touch.move(1, { x: 54, y: 51 });
   touch.up(1, { x: 54, y: 51 }, 0);
-  const deadline = performance.now() + 2000;
-  while (!meant.length && performance.now() < deadline) {
-    await new Promise((resolve) => setTimeout(resolve, 20));
-  }
+  await something(meant);
   equal(meant, [["tap", 54, 51]]);
+});
+
+test("a tap does not answer what the page asks for only after it", async () => {
+  const { touch, meant, asking } = listened();
+  touch.down(1, { x: 50, y: 50 });
+  touch.up(1, { x: 50, y: 50 }, 0);
+  asking.push("a place for AGI");
+  await something(meant);
+  equal(meant, [["tap", 50, 50]]);
 });
 
 test("a wheel turned back undoes a wheel turned on, in any unit", () => {

@@ -5,10 +5,11 @@
  *   pan: (dx: number, dy: number) => void,
  *   zoom: (px: number, py: number, factor: number) => void,
  *   pinch: (dx: number, dy: number, px: number, py: number, factor: number) => void,
- *   tap: (px: number, py: number) => void,
+ *   tapMeans: () => (px: number, py: number) => void,
  *   doubleTap: (px: number, py: number) => void,
  *   hover: (px: number, py: number) => void,
- * }} Gestures all in CSS pixels of the element; `pinch` moves and zooms at once
+ * }} Gestures all in CSS pixels of the element; `pinch` moves and zooms at once,
+ *   `tapMeans` is asked when the finger goes down and done when the tap is certain
  * @typedef {{x: number, y: number}} Point
  */
 
@@ -97,6 +98,8 @@ export function wheelFactor({ deltaY, deltaMode, ctrlKey }) {
 /**
  * One finger drags or taps, two pinch.  A tap is reported after the time in which it
  * could still become a double tap, so that following a robot does not open its record.
+ * It means what it meant when the finger went down: what the page asks for meanwhile is
+ * not answered by it.
  *
  * @param {Gestures} gestures
  */
@@ -110,6 +113,7 @@ export function createTouch(gestures) {
   let lastTap = null;
   /** @type {ReturnType<typeof setTimeout> | undefined} */
   let waiting;
+  let meaning = gestures.tapMeans();
 
   /** @param {Point} place @param {number} at (ms) */
   function tap(place, at) {
@@ -120,7 +124,7 @@ export function createTouch(gestures) {
       gap(place, lastTap.place) < DOUBLE_TAP_PX;
     lastTap = isDouble ? null : { place, at };
     if (isDouble) gestures.doubleTap(place.x, place.y);
-    else waiting = setTimeout(() => gestures.tap(place.x, place.y), DOUBLE_TAP_MS);
+    else waiting = setTimeout(meaning, DOUBLE_TAP_MS, place.x, place.y);
   }
 
   /** @param {number} id @param {Point} to */
@@ -146,6 +150,7 @@ export function createTouch(gestures) {
     down(id, place) {
       fingers.set(id, place);
       isTap = fingers.size === 1;
+      if (isTap) meaning = gestures.tapMeans();
       start = place;
     },
     /** @param {number} id @param {Point} place */

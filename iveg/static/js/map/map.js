@@ -76,12 +76,13 @@ export function createMap(canvas, store, options = {}) {
     });
   }
 
-  /** @param {number} px @param {number} py */
-  function mark(px, py) {
-    const view = camera.view();
-    const place = { x: worldX(view, px), y: worldY(view, py) };
-    if (asking.isOn()) asking.take(place);
-    else measuring.mark(place);
+  /** What a mark on the map does from now on: the answer, where one is asked for. */
+  function marking() {
+    const answer = asking.answering();
+    return (/** @type {number} */ px, /** @type {number} */ py) => {
+      const view = camera.view();
+      (answer ?? measuring.mark)({ x: worldX(view, px), y: worldY(view, py) });
+    };
   }
 
   const isMarking = () => asking.isOn() || measuring.isOn();
@@ -93,10 +94,10 @@ export function createMap(canvas, store, options = {}) {
   }
 
   const endings = [
-    wireGestures(canvas, camera, picking, isMarking, mark),
+    wireGestures(canvas, camera, picking, isMarking, marking),
     wireKeys(canvas, camera, store, choices.hasShortcuts, {
       measure: () => measuring.set(!measuring.isOn()),
-      mark: () => mark(camera.view().width / 2, camera.view().height / 2),
+      mark: () => marking()(camera.view().width / 2, camera.view().height / 2),
       legend: () => options.onLegend?.(),
     }),
     store.watch((data, topic) => {
@@ -192,11 +193,15 @@ function createAsking(onChange) {
   return {
     isOn: () => answer !== null,
     ask,
-    /** @param {{x: number, y: number}} place */
-    take(place) {
+    /** The one who is answered from now on, once; null where nobody asks. */
+    answering() {
       const asked = answer;
-      ask(null);
-      asked?.(place);
+      if (!asked) return null;
+      return (/** @type {{x: number, y: number}} */ place) => {
+        if (asked !== answer) return;
+        ask(null);
+        asked(place);
+      };
     },
   };
 }
@@ -265,14 +270,14 @@ function redrawing(camera, invalidate) {
  * @param {Camera} camera
  * @param {ReturnType<typeof createPicking>} picking
  * @param {() => boolean} isMarking
- * @param {(px: number, py: number) => void} mark
+ * @param {() => (px: number, py: number) => void} marking what a mark does from now on
  */
-function wireGestures(canvas, camera, picking, isMarking, mark) {
+function wireGestures(canvas, camera, picking, isMarking, marking) {
   return listen(canvas, {
     pan: camera.pan,
     zoom: camera.zoom,
     pinch: camera.pinch,
-    tap: (px, py) => (isMarking() ? mark(px, py) : picking.tap(px, py)),
+    tapMeans: () => (isMarking() ? marking() : picking.tap),
     doubleTap(px, py) {
       const picked = picking.at(px, py);
       if (picked?.kind === "robot") camera.follow(picked.id);
