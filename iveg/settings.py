@@ -10,96 +10,31 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, get_args, get_type_hints
-from urllib.parse import urlsplit
 
 from annotated_types import Interval
-from pydantic import (
-    AfterValidator,
-    BeforeValidator,
-    ConfigDict,
-    StringConstraints,
-    TypeAdapter,
-    ValidationError,
-)
+from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from iveg.domain.errors import SettingsError
-from iveg.domain.fleet import split_word
 from iveg.domain.limits import LIMITS
+from iveg.domain.recordings import RecordingLimits
 from iveg.domain.retention import Retention
+from iveg.setting_types import (
+    ApiKey,
+    Broker,
+    Database,
+    Days,
+    DirectRead,
+    Gigabytes,
+    Hex,
+    Port,
+    Robots,
+    Service,
+    ServicePath,
+    Switch,
+    Token,
+    Url,
+)
 
-# --- what values may be: a rule, and behind it the same in words ----------------------
-
-
-def _address(*schemes: str) -> AfterValidator:
-    def read(value: str) -> str:
-        parts = urlsplit(value)
-        if parts.scheme not in schemes or not parts.hostname or parts.port == 0:
-            raise ValueError(value)
-        return value.rstrip("/")
-
-    return AfterValidator(read)
-
-
-def _read_robots(text: str) -> tuple[str, ...]:
-    words = tuple(word.strip() for word in text.split(","))
-    names = {read[0] for word in words if (read := split_word(word)) is not None}
-    if len(names) != len(words):
-        raise ValueError(text)
-    return words
-
-
-_Port = Annotated[int, Interval(ge=1, le=65535), "a port from 1 to 65535"]
-_Switch = Annotated[
-    bool,
-    BeforeValidator(lambda text: {"on": True, "off": False}.get(text.lower())),
-    "on or off",
-]
-_Broker = Annotated[
-    str, _address("mqtt", "mqtts"), "an address such as mqtt://host:port"
-]
-_Url = Annotated[str, _address("http", "https"), "an address such as http://host:port"]
-_Hex = Annotated[
-    str,
-    StringConstraints(pattern="^[0-9a-fA-F]{32,128}$"),
-    "32 to 128 hexadecimal digits",
-]
-_Service = Annotated[
-    str, StringConstraints(pattern="^[a-z0-9_]{1,50}$"), "1 to 50 of a-z, 0-9 and _"
-]
-_ServicePath = Annotated[
-    str,
-    StringConstraints(pattern="^(/[A-Za-z0-9_]{1,50}){1,10}$"),
-    "a path such as /greenhouse",
-]
-_ApiKey = Annotated[
-    str,
-    StringConstraints(pattern="^[A-Za-z0-9_-]{1,64}$"),
-    "1 to 64 letters, digits, _ and -",
-]
-_Token = Annotated[
-    str,
-    StringConstraints(pattern=r"^[\x21-\x7e]{16,256}$"),
-    "16 to 256 visible characters",
-]
-_Database = Annotated[
-    str,
-    StringConstraints(pattern=r"^(sqlite|postgresql)(\+\w+)?://.*$"),
-    "an SQLAlchemy address",
-]
-_Robots = Annotated[
-    tuple[str, ...],
-    BeforeValidator(_read_robots),
-    "different names of letters, digits and hyphens, separated by commas, each with "
-    ":recording behind it where a replay plays that robot",
-]
-_DirectRead = Annotated[
-    Literal["all", "safety", "off"],
-    BeforeValidator(lambda text: {"on": "all"}.get(text.lower(), text.lower())),
-    "one of all, safety, off, or on, which means all",
-]
-_Days = Annotated[
-    int, Interval(ge=0, le=36500), "a number of whole days from 0, for ever, to 36500"
-]
 _QUIET: Final = ConfigDict(hide_input_in_errors=True)
 """A secret that cannot be used stands in no traceback either."""
 _SECRETS: Final = frozenset(
@@ -126,49 +61,49 @@ class Settings:
     """All settings of all parts."""
 
     host: str = setting("IVEG_HOST", "127.0.0.1", "Address of the page and API.")
-    port: _Port = setting("IVEG_PORT", 8000, "Port of the page and API.")
-    mqtt_url: _Broker = setting(
+    port: Port = setting("IVEG_PORT", 8000, "Port of the page and API.")
+    mqtt_url: Broker = setting(
         "IVEG_MQTT_URL",
         "mqtt://127.0.0.1:1883",
         "MQTT broker; may carry user and password; `mqtts` for TLS.",
     )
     mqtt_user: str = setting("IVEG_MQTT_USER", "", "User at the broker.")
     mqtt_password: str = setting("IVEG_MQTT_PASSWORD", "", "Password at the broker.")
-    orion_url: _Url = setting(
+    orion_url: Url = setting(
         "IVEG_ORION_URL", "http://127.0.0.1:1026", "Orion Context Broker, NGSI-v2."
     )
-    iota_url: _Url = setting(
+    iota_url: Url = setting(
         "IVEG_IOTA_URL", "http://127.0.0.1:4041", "North port of the IoT Agent JSON."
     )
-    iota_cb_url: _Url = setting(
+    iota_cb_url: Url = setting(
         "IVEG_IOTA_CB_URL",
         "",
         "Orion as the IoT Agent reaches it; empty: `IVEG_ORION_URL`.",
     )
-    notify_url: _Url = setting(
+    notify_url: Url = setting(
         "IVEG_NOTIFY_URL",
         "",
         "Where Orion posts notifications; empty: this host and port, "
         "`/ngsi/notifications`.",
     )
-    notify_token: _Hex = setting(
+    notify_token: Hex = setting(
         "IVEG_NOTIFY_TOKEN",
         "",
         "Secret that notifications must carry; empty: made at each start.",
     )
-    notify_token_previous: _Hex = setting(
+    notify_token_previous: Hex = setting(
         "IVEG_NOTIFY_TOKEN_PREVIOUS",
         "",
         "The secret before, which notifications may carry while it is being changed; "
         "empty: none.",
     )
-    fiware_service: _Service = setting(
+    fiware_service: Service = setting(
         "IVEG_FIWARE_SERVICE", "agroconnect", "Tenant at Orion and the agent."
     )
-    fiware_servicepath: _ServicePath = setting(
+    fiware_servicepath: ServicePath = setting(
         "IVEG_FIWARE_SERVICEPATH", "/greenhouse", "Service path at Orion and the agent."
     )
-    apikey: _ApiKey = setting(
+    apikey: ApiKey = setting(
         "IVEG_APIKEY", "iveg", "First part of every measure topic."
     )
     fleet: str = setting(
@@ -177,13 +112,13 @@ class Settings:
         "File that says what each robot is (docs/robots.md); empty: iVeg's own, which "
         "describes AGI and AGII.",
     )
-    robots: _Robots = setting(
+    robots: Robots = setting(
         "IVEG_ROBOTS",
         (),
         "Who is in the fleet, such as `AGI,AGII`; `D1:recording` for a robot that "
         "`iveg replay` plays. Empty: every robot of `IVEG_FLEET`.",
     )
-    database_url: _Database = setting(
+    database_url: Database = setting(
         "IVEG_DATABASE_URL",
         "",
         "History; empty: an SQLite file in the user's data directory.",
@@ -193,12 +128,12 @@ class Settings:
         "",
         "Where the database and the journals live; empty: the user's data directory.",
     )
-    api_token: _Token = setting(
+    api_token: Token = setting(
         "IVEG_API_TOKEN",
         "",
         "One bearer token for programs: read and STOP; empty: none.",
     )
-    sign_in_token: _Hex = setting(
+    sign_in_token: Hex = setting(
         "IVEG_SIGN_IN_TOKEN",
         "",
         "Token of the link that signs a browser in; empty: made at each start.",
@@ -215,16 +150,16 @@ class Settings:
         LIMITS.ring_default_m,
         "Ring round a person or peer, inclusive (m).",
     )
-    stop_direct: _Switch = setting(
+    stop_direct: Switch = setting(
         "IVEG_STOP_DIRECT", True, "STOP, RELEASE and RESUME also straight over MQTT."
     )
-    orion_throttle: _Switch = setting(
+    orion_throttle: Switch = setting(
         "IVEG_ORION_THROTTLE",
         True,
         "Orion leaves out copies of odometry and scans while they come straight; `off` "
         "measures every message at every hop, as `iveg experiment` does.",
     )
-    direct_read: _DirectRead = setting(
+    direct_read: DirectRead = setting(
         "IVEG_DIRECT_READ",
         "all",
         "What iVeg reads straight from MQTT as well as through FIWARE: `all` that "
@@ -254,26 +189,41 @@ class Settings:
         "Remind of a STOP drill when a robot's last one is older than this (days); "
         "0: never. A robot that was never drilled is not reminded of.",
     )
-    keep_positions_days: _Days = setting(
+    keep_positions_days: Days = setting(
         "IVEG_KEEP_POSITIONS_DAYS",
         Retention.positions,
         "Places of people in detections, decisions and log; the rows stay without them "
         "(days; 0: for ever).",
     )
-    keep_telemetry_days: _Days = setting(
+    keep_telemetry_days: Days = setting(
         "IVEG_KEEP_TELEMETRY_DAYS",
         Retention.telemetry,
         "Odometry, detections, climate and readings of sensors (days; 0: for ever).",
     )
-    keep_decisions_days: _Days = setting(
+    keep_decisions_days: Days = setting(
         "IVEG_KEEP_DECISIONS_DAYS",
         Retention.decisions,
         "Decisions, commands, alerts and log (days; 0: for ever).",
     )
-    keep_audit_days: _Days = setting(
+    keep_audit_days: Days = setting(
         "IVEG_KEEP_AUDIT_DAYS",
         Retention.audit,
         "The audit trail of STOP, release and resume (days; 0: for ever).",
+    )
+    recordings: Switch = setting(
+        "IVEG_RECORDINGS",
+        True,
+        "Keep what comes in, byte for byte (docs/interfaces/recordings.md).",
+    )
+    keep_recordings_days: Days = setting(
+        "IVEG_KEEP_RECORDINGS_DAYS",
+        RecordingLimits.days,
+        "Recordings of what came in (days with one; 0: for ever).",
+    )
+    keep_recordings_gb: Gigabytes = setting(
+        "IVEG_KEEP_RECORDINGS_GB",
+        10,
+        "The same (10^9 bytes of all of them; 0: any).",
     )
     uplink: Literal["per-topic", "single"] = setting(
         "IVEG_UPLINK",
@@ -323,6 +273,13 @@ class Settings:
         if (kept.audit or forever) < (kept.decisions or forever):
             name, value = "IVEG_KEEP_AUDIT_DAYS", str(kept.audit)
             raise SettingsError(name, value, "no shorter than IVEG_KEEP_DECISIONS_DAYS")
+
+    @property
+    def recording_limits(self) -> RecordingLimits:
+        """How many recordings are kept."""
+        return RecordingLimits(
+            self.keep_recordings_days, self.keep_recordings_gb * 10**9
+        )
 
     @property
     def retention(self) -> Retention:

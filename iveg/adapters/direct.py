@@ -12,6 +12,7 @@ from functools import partial
 from iveg.domain.kinds import KINDS, Kind, Scope
 from iveg.domain.observations import (
     Instant,
+    LaserScan,
     Observation,
     Received,
     kind_of,
@@ -20,6 +21,7 @@ from iveg.domain.transports import DIRECT
 from iveg.ngsi import codec, names
 
 PassedOver = Callable[[str, type[Observation], int], None]
+Recorded = Callable[[str, bytes, Instant, bool], None]
 _WIDER: Sequence[Scope] = ("off", "safety", "all")
 
 
@@ -57,6 +59,8 @@ class DirectReader:
         is_past: Tells by its identity what FIWARE has already brought.
         passed_over: Told of a robot's messages of one kind that reached the broker and
             were not read, because a newer one was there.
+        recorded: Told of each message that is read: topic, payload, when, and whether
+            it is a scan.
     """
 
     def __init__(
@@ -69,12 +73,14 @@ class DirectReader:
         scope: Scope = "all",
         is_past: codec.IsPast | None = None,
         passed_over: PassedOver = lambda _robot, _kind, _count: None,
+        recorded: Recorded = lambda *_: None,
     ) -> None:
         self._clock = clock
         self._enqueue = enqueue
         self._reject = reject
         self._is_past = is_past
         self._passed_over = passed_over
+        self._recorded = recorded
         kinds = _read_in(scope)
         self._kinds = tuple(kind.of for kind in kinds)
         self._due: dict[tuple[str, type[Observation]], float] = {}
@@ -126,6 +132,7 @@ class DirectReader:
         if self._is_early(source, at.mono):
             self.pass_over(topic, 1)
             return
+        self._recorded(topic, payload, at, source.kind is LaserScan)
         reading = source.read(payload)
         for problem in reading.problems:
             self._reject(problem.source, problem.reason, problem.detail)

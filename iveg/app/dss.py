@@ -22,6 +22,8 @@ from iveg.adapters.ids import new_id
 from iveg.adapters.loop_watch import LoopWatch
 from iveg.adapters.mail import MailSender
 from iveg.adapters.provisioner import Provisioner
+from iveg.adapters.recordings.recorder import PART as RECORDINGS
+from iveg.adapters.recordings.recorder import RecordedSink
 from iveg.adapters.transports import MqttTransport, OrionTransport
 from iveg.adapters.web_push import PushSender
 from iveg.adapters.webhook import WebhookSender
@@ -114,6 +116,7 @@ class Dss:
             log_filter.counted,
             self.services.messenger.counters,
             self.upkeep.counters,
+            self.stores.inputs.counters,
         ]
         self.worker = Worker(partial(self.pipeline.supervision.failed, "worker"))
         self._attach_reader()
@@ -129,10 +132,12 @@ class Dss:
             mqtt,
             {direct: mqtt, FIWARE: OrionTransport(self.outside.orion)},
             self.stores.journal,
-            self.stores.recorder,
+            RecordedSink(self.stores.recorder, self.stores.inputs.row),
             clock.now,
             new_id,
             self.stores.history_state,
+            self.stores.inputs.observed,
+            self.stores.inputs.tick,
         )
 
     def _senders(self) -> dict[Channel, MessageSender]:
@@ -155,6 +160,7 @@ class Dss:
             self.settings.direct_read,
             ingest.is_past,
             self.pipeline.supervision.guard("latency", watch.passed_over),
+            self.pipeline.supervision.guard(RECORDINGS, self.stores.inputs.measure),
         )
         self.outside.link.attach(
             reader.subscriptions(),
@@ -203,6 +209,7 @@ class Dss:
             self.provisioner.throttle.is_throttled,
             parts.equipment.equipment.entities,
             parts.supervision.guard(EQUIPMENT, parts.equipment.receive),
+            parts.supervision.guard(RECORDINGS, self.stores.inputs.notification),
         )
         site = Site(
             parts.evaluator.greenhouse.name,
@@ -223,6 +230,7 @@ class Dss:
             clock=clock.now,
             new_id=new_id,
             worker=self.worker,
+            recordings=self.stores.inputs,
         )
 
     # --- life ---------------------------------------------------------------------
@@ -267,6 +275,7 @@ class Dss:
             "history": self.stores.recorder.run,
             EQUIPMENT: lambda: self.pipeline.equipment.run(clock.now),
             RETENTION: lambda: self.upkeep.run(clock.now),
+            RECORDINGS: self.stores.inputs.run,
             "messages": beside.messenger.run,
             "earlier": self._remember,
             "loop-watch": LoopWatch(supervision.note_turn).run,

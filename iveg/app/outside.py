@@ -15,6 +15,8 @@ from iveg.adapters.journal import FileJournal
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.adapters.orion import OrionClient
 from iveg.adapters.outbound import OutboundHttp
+from iveg.adapters.recordings.directory import RecordingDirectory
+from iveg.adapters.recordings.recorder import InputRecorder
 from iveg.adapters.rules import FileRules
 from iveg.adapters.sessions import FileSessions
 from iveg.domain.detection_rule import DetectionRule
@@ -41,6 +43,7 @@ class Stores:
     contacts: FileContacts
     detectors: FileDetectors
     sessions: FileSessions
+    inputs: InputRecorder
 
     def history_state(self) -> HopState:
         """State of the history."""
@@ -48,7 +51,12 @@ class Stores:
 
     def retained(self) -> RecordedHistory:
         """The history as its upkeep sees it."""
-        return RecordedHistory(self.recorder, self.queries, self.directory)
+        return RecordedHistory(
+            self.recorder,
+            self.queries,
+            self.directory,
+            drop_recording=self.inputs.drop_oldest,
+        )
 
     def kept_choices(self, first: DetectionRule) -> KeptChoices:
         """Choices of earlier runs; ``first`` is the rule where there is none."""
@@ -63,6 +71,7 @@ class Stores:
 
     async def close(self) -> None:
         """Write what waits, and close files and database."""
+        await self.inputs.close()
         await self.recorder.close()
         self.queries.close()
         self.journal.close()
@@ -124,4 +133,10 @@ def open_stores(settings: Settings, data_directory: Path) -> Stores:
         FileContacts(directory / "contacts.jsonl"),
         FileDetectors(directory / "detectors.jsonl"),
         FileSessions(directory / "sessions.jsonl"),
+        InputRecorder(
+            RecordingDirectory(directory / "recordings"),
+            settings.recording_limits,
+            clock.now,
+            is_on=settings.recordings,
+        ),
     )

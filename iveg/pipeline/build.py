@@ -1,7 +1,7 @@
 """Composition of the pipeline from its ports, for iVeg and for its tests."""
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from iveg.domain.detection_rule import DetectionRule
@@ -49,6 +49,8 @@ from iveg.pipeline.scans import ScanReader
 from iveg.pipeline.slow_time import SlowTime
 from iveg.pipeline.supervision import Supervision
 
+Guard = Callable[[str, Callable[[Instant], None]], Callable[[Instant], None]]
+
 
 @dataclass(frozen=True, slots=True)
 class Ports:
@@ -62,6 +64,8 @@ class Ports:
         clock: Reads both clocks.
         new_id: A new id, sortable by time.
         history_state: State of the history.
+        arrived: Comfort that records: called with each copy of a message of the fleet;
+            ``ticked`` with each tick.
     """
 
     fleet: FleetPort
@@ -71,6 +75,8 @@ class Ports:
     clock: Callable[[], Instant]
     new_id: Callable[[], str]
     history_state: Callable[[], HopState] = lambda: "ok"
+    arrived: Callable[[Received], None] = lambda _: None
+    ticked: Callable[[Instant], None] = lambda _: None
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,7 +170,8 @@ def build(
     world = World(fleet, probe, greenhouse.bounds)
     watch = LatencyWatch(world.robots, world.ledger.composed_at)
     latency = LatencyMonitor(watch, ports.sink, event_log)
-    ingest = _ingest(world, event_log, ports.clock, guard("latency", watch.arrived))
+    watched = guard("latency", watch.arrived), guard("recordings", ports.arrived)
+    ingest = _ingest(world, event_log, ports.clock, watched)
     scans = ScanReader(ingest.reject)
     evaluator = Evaluator(
         world,
@@ -190,7 +197,7 @@ def build(
         ports.clock,
         supervision,
         guard("latency", watch.decided),
-        (guard("latency", latency.tick), *[guard("totals", t.tick) for t in totals]),
+        _ticks(guard, ports, latency, totals),
         (guard("goals", goals.heard), guard("goals", goals.tick)),
     )
     return Pipeline(
@@ -211,6 +218,20 @@ def build(
             Equipment(choices.tiles, start), ports.sink, event_log, supervision
         ),
         PeerScans(world, scans, ports.fleet.publish_peer_scan, choices.boot),
+    )
+
+
+def _ticks(
+    guard: Guard,
+    ports: Ports,
+    latency: LatencyMonitor,
+    totals: Iterable[MarginTotals | SlowTime],
+) -> Sequence[Callable[[Instant], None]]:
+    """Comfort that is called with each tick of the loop."""
+    return (
+        guard("latency", latency.tick),
+        *[guard("totals", one.tick) for one in totals],
+        guard("recordings", ports.ticked),
     )
 
 
@@ -251,13 +272,17 @@ def _ingest(
     world: World,
     event_log: EventLog,
     clock: Clock,
-    arrived: Callable[[Received], None],
+    watched: Sequence[Callable[[Received], None]],
 ) -> Ingest:
     def log_rejected(source: str, reason: str) -> None:
         slots = {"source": source, "reason": reason}
         event_log.log(LogEvent("system", "log.rejected", slots), clock())
 
-    return Ingest(world.robots.__contains__, log_rejected, world.is_past, arrived)
+    def passed(received: Received) -> None:
+        for told in watched:
+            told(received)
+
+    return Ingest(world.robots.__contains__, log_rejected, world.is_past, passed)
 
 
 def build_services(

@@ -2,7 +2,8 @@
 
 Once a minute it looks at the disk, once an hour it takes from the history what is over,
 one small batch after the other: rows that wait to be written go first.  Where the disk
-is low, people are told, and the oldest telemetry goes before its time.
+is low, people are told, and the oldest go before their time: recordings of inputs, then
+telemetry.
 """
 
 import asyncio
@@ -72,6 +73,9 @@ class RetainedHistory(Protocol):
     async def purge(self, step: PurgeStep, before: float) -> PurgeBatch:
         """One batch of a step, of rows older than this (Unix s)."""
 
+    async def drop_recording(self) -> bool:
+        """Delete the oldest recording of inputs; whether there was one."""
+
     async def give_back(self) -> PurgeBatch:
         """One batch of room that is given back to the disk."""
 
@@ -130,7 +134,7 @@ class HistoryUpkeep:
         if self._purges_at is None:
             self._purges_at = now.mono + SETTLES_S
         is_due = now.mono >= self._purges_at
-        squeezes = self._is_low and await self._may_gain()
+        squeezes = self._is_low and await self._squeezes_history()
         if is_due or squeezes:
             await self._purge(now.wall, squeezes=squeezes)
         if is_due:
@@ -142,8 +146,14 @@ class HistoryUpkeep:
         self._supervision.report(PART, space.conditions(was_low=self._is_low))
         self._is_low = space.is_low(was_low=self._is_low)
 
-    async def _may_gain(self) -> bool:
-        """Whether deleting telemetry makes room that is not there already."""
+    async def _squeezes_history(self) -> bool:
+        """Whether deleting telemetry makes room that is not there already.
+
+        Recordings go first, one at each look.
+        """
+        if await self._history.drop_recording():
+            self.counters["recordings_deleted"] += 1
+            return False
         inside = await self._history.room_inside()
         return inside is not None and inside < ENOUGH_INSIDE
 

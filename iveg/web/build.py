@@ -26,6 +26,7 @@ from iveg.web.api import (
     latency,
     messages,
     metrics,
+    recordings,
     robots,
     rule,
 )
@@ -48,6 +49,7 @@ class Face:
         boot: Random, new at each start.
         queues: How full the queues are.
         worker: Where long work is done.
+        recordings: What came in, as files.
     """
 
     pipeline: Pipeline
@@ -61,6 +63,7 @@ class Face:
     clock: Clock
     new_id: Ids
     worker: Apart
+    recordings: recordings.Recordings
 
     def snapshot(self, principal: Principal, now: Instant) -> Snapshot:
         """Everything that is known, for a browser that has just come."""
@@ -101,6 +104,7 @@ def live_routers(face: Face) -> Iterator[APIRouter]:
     yield detectors.router(beside.detectors, clock)
     yield messages.router(messages.Desk(beside.messenger, face.new_id, clock))
     yield latency.router(watch, clock, face.worker)
+    yield recordings.router(face.recordings)
     yield health.router(clock, views.health)
     turns = parts.supervision.longest_turn_s
     yield metrics.router(clock, views.health, watch, face.queues, turns)

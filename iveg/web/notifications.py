@@ -11,9 +11,15 @@ from starlette.routing import Route
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from iveg.domain.errors import UnreadableError
-from iveg.domain.observations import EntityReading, Instant, Received
+from iveg.domain.observations import (
+    EntityReading,
+    Instant,
+    LaserScan,
+    Received,
+    kind_of,
+)
 from iveg.domain.transports import FIWARE
-from iveg.ngsi.codec import UNREAD, read_notification
+from iveg.ngsi.codec import UNREAD, ReadResult, read_notification
 from iveg.pipeline.ingest import Ingest
 from iveg.pipeline.ports import Clock
 from iveg.web.problems import Problem, problem_of
@@ -40,6 +46,8 @@ class NotificationEndpoint:
         is_thinned: Whether Orion leaves out most of what a subscription is about.
         equipment: Id and type of the entities that ``measured`` is told of.
         measured: Told of other equipment; must neither wait nor fail.
+        recorded: Told of each body that is read, and of the subscription where it
+            holds scans alone; likewise.
     """
 
     action: Final[Action] = "open"
@@ -56,6 +64,7 @@ class NotificationEndpoint:
         is_thinned: Callable[[str], bool],
         equipment: Container[tuple[str, str]] = frozenset(),
         measured: Callable[[EntityReading, Instant], None] = lambda *_: None,
+        recorded: Callable[[bytes, Instant, str | None], None] = lambda *_: None,
     ) -> None:
         self._ingest = ingest
         self._secret = secret
@@ -66,6 +75,7 @@ class NotificationEndpoint:
         self._is_thinned = is_thinned
         self._equipment = equipment
         self._measured = measured
+        self._recorded = recorded
 
     def route(self) -> Route:
         """Its place in the application's table of routes."""
@@ -145,6 +155,7 @@ class NotificationEndpoint:
             self._ingest.reject(subscription_id, "unknown_subscription")
             return None
         self._heard(at)
+        self._recorded(body, at, subscription_id if _is_scans(reading) else None)
         for problem in reading.problems:
             self._ingest.reject(problem.source, problem.reason, problem.detail)
         for told in reading.equipment:
@@ -175,6 +186,12 @@ class NotificationsFirst:
             await self._endpoint(scope, receive, send)
         else:
             await self._app(scope, receive, send)
+
+
+def _is_scans(reading: ReadResult) -> bool:
+    """Whether it is of scans alone."""
+    observations = reading.observations
+    return bool(observations) and all(kind_of(one) is LaserScan for one in observations)
 
 
 def _tenant_of(headers: Mapping[bytes, bytes]) -> tuple[str, str]:

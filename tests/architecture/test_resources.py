@@ -11,6 +11,7 @@ from iveg.models.device import Device
 from iveg.models.equipment import Measurement
 from iveg.models.odometry import OdometryRow
 from iveg.models.people import DetectionRow, KeptDetection
+from iveg.models.recordings import Recording
 from iveg.models.typescript import TOLD
 from tests.architecture import documents
 from tests.processes import ROOT
@@ -24,6 +25,7 @@ _SHOWN: tuple[type[Model], ...] = (
     DetectionRow,
     OdometryRow,
     Measurement,
+    Recording,
 )
 _, _DOCUMENT = models_json_schema([(model, "serialization") for model in _SHOWN])
 _SHAPES = _DOCUMENT["$defs"]

@@ -50,6 +50,7 @@ BAD = [
     ("IVEG_KEEP_POSITIONS_DAYS", "366", "no longer than IVEG_KEEP_DECISIONS_DAYS"),
     ("IVEG_KEEP_POSITIONS_DAYS", "0", "no longer than IVEG_KEEP_DECISIONS_DAYS"),
     ("IVEG_KEEP_AUDIT_DAYS", "364", "no shorter than IVEG_KEEP_DECISIONS_DAYS"),
+    ("IVEG_KEEP_RECORDINGS_GB", "2.5", "a whole number of gigabytes from 0"),
     ("IVEG_UPLINK", "both", "one of per-topic, single"),
     ("IVEG_ON_LINK_LOSS", "drive", "one of stop, slow"),
 ]
@@ -174,6 +175,9 @@ GOOD = {
     "IVEG_KEEP_TELEMETRY_DAYS": "0",
     "IVEG_KEEP_DECISIONS_DAYS": "100",
     "IVEG_KEEP_AUDIT_DAYS": "500",
+    "IVEG_RECORDINGS": "off",
+    "IVEG_KEEP_RECORDINGS_DAYS": "3",
+    "IVEG_KEEP_RECORDINGS_GB": "0",
     "IVEG_UPLINK": "single",
     "IVEG_GREENHOUSE": "none",
     "IVEG_EQUIPMENT": "demo",

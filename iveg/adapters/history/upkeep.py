@@ -1,8 +1,9 @@
 """The history as its upkeep sees it: batches of the one writer, and the disk."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from pathlib import Path
+from typing import Any
 
 from iveg.adapters import clock
 from iveg.adapters.disk import disk_space
@@ -20,6 +21,10 @@ from iveg.domain.errors import HopError
 from iveg.domain.retention import PurgeStep
 
 
+async def _no_recording() -> bool:
+    return False
+
+
 class RecordedHistory:
     """Implements ``pipeline.retention.RetainedHistory``.
 
@@ -29,6 +34,7 @@ class RecordedHistory:
         directory: Of the data, whose disk is watched.
         stopwatch: Bounds each batch; monotonic (s).
         read_space: Room on the disk of a directory.
+        drop_recording: Deletes the oldest recording of inputs, if there is one.
     """
 
     def __init__(
@@ -38,6 +44,7 @@ class RecordedHistory:
         directory: Path,
         stopwatch: Callable[[], float] = clock.mono,
         read_space: Callable[[Path], DiskSpace] = disk_space,
+        drop_recording: Callable[[], Coroutine[Any, Any, bool]] = _no_recording,
     ) -> None:
         self._recorder = recorder
         self._directory = directory
@@ -46,6 +53,7 @@ class RecordedHistory:
         self._is_file = sqlite_file(queries.url) is not None
         self.recorded_days = queries.recorded_days
         self.oldest_telemetry = queries.oldest_telemetry
+        self.drop_recording = drop_recording
 
     @property
     def is_busy(self) -> bool:

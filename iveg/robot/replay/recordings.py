@@ -1,4 +1,4 @@
-"""Recordings of any format as entries in time: logs of JSON lines, ROS bags."""
+"""Recordings of any format as entries in time: logs of JSON lines, ROS bags, iVeg's."""
 
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -9,6 +9,7 @@ from iveg.domain.geometry import REST, Pose2D
 from iveg.domain.observations import Odometry, Origin
 from iveg.robot.replay.bags import AS_RECORDED, Bag, BagOptions
 from iveg.robot.replay.logs import LogReader, RecordingEntry
+from iveg.robot.replay.own import OwnRecording, is_own
 
 _LOGS, _BAGS = (".jsonl", ".gz"), (".db3", ".mcap", ".bag")
 
@@ -29,7 +30,8 @@ def open_recording(
     """Open a recording by its file name.
 
     Args:
-        path: ``.jsonl``, ``.jsonl.gz``, ``.db3``, ``.mcap``, ``.bag``, or a directory.
+        path: ``.jsonl``, ``.jsonl.gz``, ``.db3``, ``.mcap``, ``.bag``, or a directory;
+            of iVeg's own recordings also ``FILE.mcap#ROBOT``.
         mount: Pose of a bag's laser in ``base_link``; logs contain it.
         bag: Topics and clock of a bag.
         pose: Fixed pose of a recording without odometry, such as a camera's.
@@ -58,6 +60,10 @@ def _opened(
     *,
     fixed: bool,
 ) -> Recording:
+    stem, _, robot_id = str(path).partition(".mcap#")
+    own = Path(f"{stem}.mcap") if robot_id else path
+    if own.suffix == ".mcap" and is_own(own):
+        return OwnRecording(own, robot_id or None).entries
     if path.is_dir() or path.suffix in _BAGS:
         opened = Bag(path, bag, mount, needs_odometry=not fixed)
         for line in (f"{path}:", *opened.plan.table()):

@@ -35,6 +35,7 @@ class FakeHistory:
         busy: How many more looks find rows that wait.
         away: Whether the database does not answer.
         freed: Batches of room that was given back.
+        recordings: Recordings of inputs.
     """
 
     def __init__(self, today: int) -> None:
@@ -45,6 +46,7 @@ class FakeHistory:
         self.inside: int | None = 0
         self.busy = self.freed = 0
         self.away = False
+        self.recordings = 0
         self.oldest: float | None = None
 
     @property
@@ -65,6 +67,10 @@ class FakeHistory:
         self.due[step] = self.due.get(step, 0) - rows
         self.done.append((step, before))
         return PurgeBatch(rows, is_last=rows < 10)
+
+    async def drop_recording(self) -> bool:
+        self.recordings -= 1
+        return self.recordings >= 0
 
     async def give_back(self) -> PurgeBatch:
         self.freed += 1
@@ -238,3 +244,16 @@ async def test_a_low_disk_takes_nothing_where_that_makes_no_room(
 
     assert upkeep.history.done == []
     assert len(upkeep.alerts()) == 1
+
+
+async def test_a_low_disk_takes_recordings_before_telemetry() -> None:
+    upkeep = await settled()
+    upkeep.history.oldest = START.wall - 20 * DAY_S
+    upkeep.history.space, upkeep.history.recordings = LOW, 2
+
+    for minute in (1.0, 2.0, 3.0):
+        await upkeep.look(minute)
+        left = 0 if minute < 3.0 else 1
+        assert upkeep.history.freed == left
+
+    assert upkeep.part.counters["recordings_deleted"] == 2

@@ -27,6 +27,7 @@ from iveg.web.security.authentication import Authenticator, NotifySecret, Role
 from iveg.web.views import Views
 from tests.fakes.detector_store import FakeDetectorStore
 from tests.fakes.messages import FakeContacts, FakeSender
+from tests.fakes.recordings import FakeRecordings
 from tests.fakes.rule_store import FakeRuleStore
 from tests.fakes.worker import FakeWorker
 from tests.unit.pipeline.desk import FIELD, Desk
@@ -77,6 +78,7 @@ class WebDesk(Desk):
             self.parts.equipment.equipment.entities,
             self.parts.supervision.guard("equipment", self.parts.equipment.receive),
         )
+        self.recordings = FakeRecordings()
         self.face = Face(
             pipeline=self.parts,
             services=self.services,
@@ -89,6 +91,7 @@ class WebDesk(Desk):
             clock=self.clock,
             new_id=self.ids,
             worker=FakeWorker(),
+            recordings=self.recordings,
         )
         self.table = ConnectionTable(lambda: self.clock().mono, ConnectionCaps())
         self.pages = _pages(self.face.site)

@@ -1,0 +1,1 @@
+"""Recordings of what came in, as MCAP (docs/interfaces/recordings.md)."""

@@ -1,0 +1,107 @@
+"""The directory of the recordings: names, sizes, what a crash left, what goes."""
+
+import logging
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+
+from iveg.adapters.recordings.mcap_file import McapFile
+from iveg.adapters.recordings.reading import read_messages
+from iveg.domain.errors import DataFileError, HopError
+from iveg.domain.observations import Instant
+from iveg.domain.recordings import RecordingFile, RecordingLimits, superfluous
+
+_log = logging.getLogger(__name__)
+_ENDS, _OPEN = ".mcap", ".mcap.open"
+_NAME = "%Y-%m-%dT%H-%M-%SZ"
+
+
+class RecordingDirectory:
+    """Recordings by name; blocking, for the thread that writes them.
+
+    Args:
+        path: Made when the first recording is.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+
+    def begin(self, start: Instant) -> McapFile:
+        """A new recording.  Raises OSError."""
+        self._path.mkdir(parents=True, exist_ok=True)
+        return McapFile(self._free_name(start), start)
+
+    def _free_name(self, start: Instant) -> Path:
+        """A name that no file has, open or finished: a clock may have been set back."""
+        wall = start.wall
+        while True:
+            stem = datetime.fromtimestamp(wall, UTC).strftime(_NAME)
+            if not (self._path / (stem + _ENDS)).exists():
+                found = self._path / (stem + _OPEN)
+                if not found.exists():
+                    return found
+            wall += 1.0
+
+    def finish(self, file: McapFile) -> None:
+        """Close a recording, which has its own name from then on.  Raises OSError."""
+        file.finish()
+        file.path.rename(file.path.with_suffix(""))
+
+    def left_open(self) -> Sequence[Path]:
+        """What a crash left; ask before a recording begins."""
+        return sorted(self._path.glob("*" + _OPEN))
+
+    def files(self) -> Sequence[RecordingFile]:
+        """All of them, oldest first."""
+        found = []
+        for path in sorted(self._path.glob("*.mcap*")):
+            name = path.name.removesuffix(".open")
+            status = path.stat()
+            is_open = path.name.endswith(_OPEN)
+            found.append(RecordingFile(name, status.st_size, is_open, status.st_mtime))
+        return found
+
+    def prune(self, limits: RecordingLimits) -> int:
+        """Delete what is over the limits; how many files."""
+        gone = superfluous(self.files(), limits)
+        for one in gone:
+            (self._path / one.name).unlink(missing_ok=True)
+        return len(gone)
+
+    def drop_oldest(self) -> bool:
+        """Delete the oldest that is finished; whether there was one."""
+        for one in self.files():
+            if not one.is_open:
+                (self._path / one.name).unlink(missing_ok=True)
+                return True
+        return False
+
+    def finished(self, name: str) -> Path | None:
+        """The file of a finished recording; None where there is none of this name."""
+        known = {one.name for one in self.files() if not one.is_open}
+        return self._path / name if name in known else None
+
+
+def finish_broken(path: Path) -> None:
+    """Put in the place of a file without an end what can be read of it, with an index.
+
+    Takes minutes for an hour of many robots: not for the server's own process.
+
+    Raises:
+        HopError: the disk is full or away.
+    """
+    rescued = path.with_suffix(".rescued")
+    try:
+        rescued.unlink(missing_ok=True)
+        with read_messages(path) as reading:
+            file = McapFile(rescued, reading.start)
+            for channel, log_time, payload in reading:
+                file.add_at(channel, log_time, payload)
+            file.finish()
+        rescued.rename(path.with_suffix(""))
+    except DataFileError as error:
+        # Not even its beginning was on the disk.
+        _log.info("%s", error)
+    except OSError as error:
+        raise HopError("disk", error.strerror or str(error)) from error
+    path.unlink()

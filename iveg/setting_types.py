@@ -1,0 +1,84 @@
+"""What the values of settings may be: a rule, and behind it the same in words."""
+
+from typing import Annotated, Literal
+from urllib.parse import urlsplit
+
+from annotated_types import Interval
+from pydantic import AfterValidator, BeforeValidator, StringConstraints
+
+from iveg.domain.fleet import split_word
+
+
+def _address(*schemes: str) -> AfterValidator:
+    def read(value: str) -> str:
+        parts = urlsplit(value)
+        if parts.scheme not in schemes or not parts.hostname or parts.port == 0:
+            raise ValueError(value)
+        return value.rstrip("/")
+
+    return AfterValidator(read)
+
+
+def _read_robots(text: str) -> tuple[str, ...]:
+    words = tuple(word.strip() for word in text.split(","))
+    names = {read[0] for word in words if (read := split_word(word)) is not None}
+    if len(names) != len(words):
+        raise ValueError(text)
+    return words
+
+
+Port = Annotated[int, Interval(ge=1, le=65535), "a port from 1 to 65535"]
+Switch = Annotated[
+    bool,
+    BeforeValidator(lambda text: {"on": True, "off": False}.get(text.lower())),
+    "on or off",
+]
+Broker = Annotated[
+    str, _address("mqtt", "mqtts"), "an address such as mqtt://host:port"
+]
+Url = Annotated[str, _address("http", "https"), "an address such as http://host:port"]
+Hex = Annotated[
+    str,
+    StringConstraints(pattern="^[0-9a-fA-F]{32,128}$"),
+    "32 to 128 hexadecimal digits",
+]
+Service = Annotated[
+    str, StringConstraints(pattern="^[a-z0-9_]{1,50}$"), "1 to 50 of a-z, 0-9 and _"
+]
+ServicePath = Annotated[
+    str,
+    StringConstraints(pattern="^(/[A-Za-z0-9_]{1,50}){1,10}$"),
+    "a path such as /greenhouse",
+]
+ApiKey = Annotated[
+    str,
+    StringConstraints(pattern="^[A-Za-z0-9_-]{1,64}$"),
+    "1 to 64 letters, digits, _ and -",
+]
+Token = Annotated[
+    str,
+    StringConstraints(pattern=r"^[\x21-\x7e]{16,256}$"),
+    "16 to 256 visible characters",
+]
+Database = Annotated[
+    str,
+    StringConstraints(pattern=r"^(sqlite|postgresql)(\+\w+)?://.*$"),
+    "an SQLAlchemy address",
+]
+Robots = Annotated[
+    tuple[str, ...],
+    BeforeValidator(_read_robots),
+    "different names of letters, digits and hyphens, separated by commas, each with "
+    ":recording behind it where a replay plays that robot",
+]
+DirectRead = Annotated[
+    Literal["all", "safety", "off"],
+    BeforeValidator(lambda text: {"on": "all"}.get(text.lower(), text.lower())),
+    "one of all, safety, off, or on, which means all",
+]
+Days = Annotated[
+    int, Interval(ge=0, le=36500), "a number of whole days from 0, for ever, to 36500"
+]
+Gigabytes = Annotated[
+    int, Interval(ge=0, le=10**6), "a whole number of gigabytes from 0, any, to 10^6"
+]
