@@ -1,7 +1,8 @@
 """Versions of the rule, in a small file of JSON lines that is replaced as a whole.
 
 The settings make the first version.  A person's change outlives a restart, until the
-settings themselves change: then these are newer, and a version of their own.  A file
+settings themselves change: then these are newer, and a version of their own.  A version
+in which looks did not add up yet stays as it was, and the next one has them.  A file
 with a line that cannot be read is put aside, and the strictest rule of what is left of
 it is in force until a person makes another.
 """
@@ -16,7 +17,14 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from iveg.adapters.files import Form, put_aside, read_lines, write_lines
-from iveg.domain.detection_rule import ALIASES, Class, DetectionRule, strictest
+from iveg.domain.detection_rule import (
+    ALIASES,
+    RECOVERED,
+    UPGRADED,
+    Class,
+    DetectionRule,
+    strictest,
+)
 from iveg.domain.errors import HopError
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
@@ -48,6 +56,7 @@ class FileRules:
         """
         read, damage = self._read()
         versions = _with_settings(read or [settings], settings, now.wall)
+        versions = _with_looks(versions, now.wall)
         if damage:
             self._recover([*versions, strictest(versions, now.wall)], damage, now)
         elif len(versions) > max(1, len(read)):
@@ -110,6 +119,22 @@ def _with_settings(
         radius_m=settings.radius_m,
         version=last.version + 1,
         author=_SETTINGS,
+        since=wall,
+    )
+    return [*versions, changed]
+
+
+def _with_looks(versions: list[DetectionRule], wall: float) -> list[DetectionRule]:
+    """The versions, and one more where looks did not add up in the last."""
+    last = versions[-1]
+    if last.possible_people:
+        return versions
+    changed = replace(
+        last,
+        possible_people=True,
+        version=last.version + 1,
+        # What was recovered stays to be checked.
+        author=RECOVERED if last.author == RECOVERED else UPGRADED,
         since=wall,
     )
     return [*versions, changed]

@@ -15,6 +15,8 @@ Kind = Literal["alert", "faint", "other"]
 
 RECOVERED: Final = "recovered"
 """Author of a version that was made from what could be read of a damaged file."""
+UPGRADED: Final = "upgrade"
+"""Author of a version that was made since its last one lacks what all have now."""
 
 ALIASES: Mapping[str, Class] = {
     "person": "person",
@@ -50,7 +52,8 @@ class DetectionRule:
         threshold: Least confidence, inclusive; ``class_thresholds`` by canonical class.
         radius_m: Ring of a fresh sighting, inclusive (m).
         aliases: Class as a detector names it, in lower case → canonical class.
-        possible_people: Whether a faint person who is seen again and again counts.
+        possible_people: Whether looks add up.  False only in versions that were stored
+            before every one had it; no rule in force lacks it.
         foresight: Whether a robot slows before it reaches a ring, to be slow there.
         author: Who made this version; ``since`` when (Unix s), None for the first.
     """
@@ -112,7 +115,6 @@ def strictest(rules: Iterable[DetectionRule], since: float) -> DetectionRule:
         ),
         radius_m=max(rule.radius_m for rule in every),
         aliases=aliases,
-        possible_people=any(rule.possible_people for rule in every),
         foresight=any(rule.foresight for rule in every),
         author=RECOVERED,
         since=since,

@@ -22,7 +22,7 @@ class Rule(Model):
     aliases: dict[str, Class] = Field(
         description="A detector's word → the class that it stands for."
     )
-    possible_people: bool
+    possible_people: bool = Field(description="True; else of before it was always so.")
     foresight: bool
     author: str
     since: str | None

@@ -10,7 +10,6 @@ const rule = /** @type {import("../../iveg/static/js/core/protocol.js").Rule} */
     radius_m: 2,
     factor: 0.5,
     aliases: { person: "person", farmer: "person", husky: "robot" },
-    possible_people: true,
   })
 );
 
@@ -23,7 +22,6 @@ test("13.14 each way to lower protection is named", () => {
   equal(keys({ radius_m: 1.5 }), ["lowering.radius"]);
   equal(keys({ aliases: { person: "person", husky: "robot" } }), ["lowering.words"]);
   equal(keys({ aliases: { ...rule.aliases, farmer: "robot" } }), ["lowering.words"]);
-  equal(keys({ possible_people: false }), ["lowering.possible"]);
 });
 
 test("13.14 what protects as much or more asks for no second word", () => {

@@ -808,6 +808,7 @@ export type Rule = {
   factor: number;
   /** A detector's word → the class that it stands for. */
   aliases: Record<string, "person" | "robot">;
+  /** True; else of before it was always so. */
   possible_people: boolean;
   foresight: boolean;
   author: string;

@@ -43,6 +43,7 @@ class RuleChange(BaseModel):
         | None
     ) = None
     possible_people: bool | None = None
+    """Of one version ago: looks always add up."""
     foresight: bool | None = None
 
     @field_validator("aliases")
@@ -56,6 +57,13 @@ class RuleChange(BaseModel):
             raise ValueError("names must not be empty; person and robot are themselves")
         return {**cleaned, **own}
 
+    @field_validator("possible_people")
+    @classmethod
+    def _always(cls, possible_people: bool | None) -> bool | None:
+        if possible_people is False:
+            raise ValueError("looks always add up; leave this key out")
+        return possible_people
+
     def applied_to(self, rule: DetectionRule) -> DetectionRule:
         """The rule with these parameters."""
         return DetectionRule(
@@ -65,8 +73,7 @@ class RuleChange(BaseModel):
             _new(self.class_thresholds, dict(rule.class_thresholds)),
             _new(self.radius_m, rule.radius_m),
             _new(self.aliases, dict(rule.aliases)),
-            _new(self.possible_people, rule.possible_people),
-            _new(self.foresight, rule.foresight),
+            foresight=_new(self.foresight, rule.foresight),
         )
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from iveg.adapters.rules import FileRules
-from iveg.domain.detection_rule import RECOVERED, DetectionRule
+from iveg.domain.detection_rule import RECOVERED, UPGRADED, DetectionRule
 from iveg.domain.errors import DataFileError, HopError
 from tests.builders import START
 
@@ -17,7 +17,6 @@ CHANGED = DetectionRule(
     class_thresholds={"robot": 0.9},
     radius_m=3.0,
     aliases={"person": "person", "robot": "robot", "abuela": "person"},
-    possible_people=True,
     author="ana",
     since=START.wall,
 )
@@ -51,7 +50,6 @@ async def test_changed_settings_are_a_newer_version(tmp_path: Path) -> None:
     assert (newest.version, newest.author) == (3, "settings")
     assert (newest.threshold, newest.radius_m) == (0.6, 2.0)
     assert newest.aliases == CHANGED.aliases
-    assert newest.possible_people
 
 
 async def test_the_same_settings_twice_are_no_new_version(tmp_path: Path) -> None:
@@ -64,6 +62,24 @@ async def test_the_same_settings_twice_are_no_new_version(tmp_path: Path) -> Non
     again = FileRules(tmp_path / "rules.jsonl").load(strict, START)
 
     assert list(again) == list(first)
+
+
+@pytest.mark.parametrize(
+    ("author", "next_author"), [("ana", UPGRADED), (RECOVERED, RECOVERED)]
+)
+async def test_a_version_in_which_looks_did_not_add_up_stays_and_the_next_has_them(
+    tmp_path: Path, author: str, next_author: str
+) -> None:
+    single = replace(CHANGED, possible_people=False, author=author)
+    rules = FileRules(tmp_path / "rules.jsonl")
+    rules.load(FIRST, START)
+    await rules.append(single)
+
+    again = FileRules(tmp_path / "rules.jsonl").load(FIRST, START)
+
+    upgraded = replace(single, version=3, possible_people=True, author=next_author)
+    assert list(again) == [FIRST, single, upgraded]
+    assert list(FileRules(tmp_path / "rules.jsonl").load(FIRST, START)) == list(again)
 
 
 def put_aside(directory: Path) -> list[str]:

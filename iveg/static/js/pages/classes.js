@@ -24,7 +24,6 @@ export function createClassForm(store, i18n, guard) {
   const form = /** @type {HTMLFormElement} */ (need("#class-form"));
   const word = /** @type {HTMLInputElement} */ (need("#alias-word"));
   const meaning = /** @type {HTMLSelectElement} */ (need("#alias-class"));
-  const possible = /** @type {HTMLInputElement} */ (need("#class-possible"));
   const foresight = /** @type {HTMLInputElement} */ (need("#class-foresight"));
   /** @type {Rule | null} the version that the person at the form has seen */
   let seen = null;
@@ -50,7 +49,6 @@ export function createClassForm(store, i18n, guard) {
       thresholdOf(name).value =
         share === undefined ? "" : String(Math.round(share * 100));
     }
-    possible.checked = rule.possible_people === true;
     foresight.checked = rule.foresight === true;
     draw();
   }
@@ -70,7 +68,6 @@ export function createClassForm(store, i18n, guard) {
     return {
       class_thresholds: Object.fromEntries(thresholds),
       aliases: Object.fromEntries([...aliases].sort()),
-      possible_people: possible.checked,
       foresight: foresight.checked,
     };
   }
@@ -170,7 +167,7 @@ function thresholdOf(name) {
  * @param {Rule} rule
  */
 export function writtenOf(rule) {
-  const { aliases = {}, class_thresholds = {}, possible_people, foresight } = rule;
+  const { aliases = {}, class_thresholds = {}, foresight } = rule;
   const given = Object.entries(aliases).filter(
     ([name]) => !CLASSES.some((own) => own === name),
   );
@@ -181,7 +178,6 @@ export function writtenOf(rule) {
   return {
     class_thresholds: Object.fromEntries(shares),
     aliases: /** @type {Record<string, Class>} */ (Object.fromEntries(given.sort())),
-    possible_people: possible_people === true,
     foresight: foresight === true,
   };
 }

@@ -85,7 +85,6 @@ export function createGuard(store, i18n) {
     const { confidence_threshold, radius_m, class_thresholds, aliases } = kept.before;
     const { status } = await sendApi("PUT", "rule", {
       ...{ confidence_threshold, radius_m, class_thresholds, aliases },
-      possible_people: kept.before.possible_people === true,
       foresight: kept.before.foresight === true,
       version: store.get("rule")?.version,
     });

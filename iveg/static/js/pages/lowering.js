@@ -3,7 +3,7 @@
  *
  * @typedef {import("../core/protocol.js").Rule} Rule
  * @typedef {Partial<Pick<Rule, "confidence_threshold" | "radius_m" | "class_thresholds" |
- *   "aliases" | "possible_people" | "foresight">>} Change
+ *   "aliases" | "foresight">>} Change
  * @typedef {{key: string, slots: Record<string, string | number>}} Lowering
  */
 
@@ -23,11 +23,6 @@ export function loweringsOf(before, change) {
     ...when(to > from, "lowering.threshold", { from, to }),
     ...when(radius.to < radius.from, "lowering.radius", radius),
     ...when(words.length > 0, "lowering.words", { words: words.join(", ") }),
-    ...when(
-      before.possible_people === true && !after.possible_people,
-      "lowering.possible",
-      {},
-    ),
     ...when(before.foresight === true && !after.foresight, "lowering.foresight", {}),
   ];
 }

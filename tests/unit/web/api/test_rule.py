@@ -40,7 +40,7 @@ async def test_the_first_version_is_that_of_the_settings() -> None:
 async def test_a_change_is_a_new_version_with_author_and_time() -> None:
     desk = WebDesk()
 
-    answer = await put(desk, confidence_threshold=0.6)
+    answer = await put(desk, confidence_threshold=0.6, possible_people=True)
 
     assert answer.status_code == 200
     told = await get(desk)
@@ -169,6 +169,7 @@ async def test_of_two_changes_at_once_one_counts() -> None:
         {"aliases": {" ": "person"}},
         {"aliases": {str(n): "person" for n in range(201)}},
         {"possible_people": "yes"},
+        {"possible_people": False},
         {"factor": 0.9},
     ],
     ids=str,
