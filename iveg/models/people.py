@@ -6,6 +6,7 @@ from iveg.domain.detection_rule import Class
 from iveg.domain.geometry import Box3D
 from iveg.domain.records import DetectionRecord, Json
 from iveg.domain.stamps import format_stamp
+from iveg.domain.tracking.looks import Looks
 from iveg.domain.tracking.people import Placed
 from iveg.domain.tracking.person import Stage
 from iveg.domain.transports import TransportId
@@ -20,6 +21,29 @@ class Acting(Model):
     robot_id: str
     distance_m: float
     in_sight: bool
+
+
+class Evidence(Model):
+    """All looks at somebody, and what they come to."""
+
+    looks: int
+    least: float = Field(description="Confidence of the faintest look (0 to 1).")
+    most: float
+    over_s: float = Field(description="From the first look to the newest.")
+    probability: float
+
+    @classmethod
+    def of(cls, looks: Looks | None) -> "Evidence | None":
+        """What is known; None where nothing adds up."""
+        if looks is None:
+            return None
+        return cls(
+            looks=looks.count,
+            least=looks.least,
+            most=looks.most,
+            over_s=looks.over_s,
+            probability=round(looks.probability, 4),
+        )
 
 
 class Person(Model):
@@ -37,6 +61,9 @@ class Person(Model):
     age_s: float
     observers: list[str]
     possible: bool = Field(description="Below the threshold but seen again and again.")
+    evidence: Evidence | None = Field(
+        description="All looks by the newest detection; None of a robot."
+    )
     doubtful: bool = Field(
         description="Seen beyond the walls: the position is its observer's."
     )

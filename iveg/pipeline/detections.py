@@ -164,7 +164,7 @@ def _line(one: Placed, robot_id: str, subject: str) -> LogEvent:
     key, looks = _KEYS[one.kind], one.looks
     if one.doubtful is not None:
         key = "log.detection_doubtful"
-    elif looks is not None:
+    elif one.possible and looks is not None:
         key = "log.detection_possible"
         slots |= {
             "looks": looks.count,

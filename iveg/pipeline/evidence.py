@@ -79,19 +79,22 @@ def left_behind(record: DecisionRecord, found: float) -> DecisionRecord:
 
 
 def _parameters(rule: DetectionRule, zone: Zone) -> dict[str, object]:
-    looks = None if zone.sighting is None else zone.sighting.looks
+    sighting = zone.sighting
+    looks = None if sighting is None else sighting.looks
     return {
         "threshold": rule.threshold_of(zone.reason),
         "radius_m": rule.radius_m,
         "ring_m": round(zone.radius_m, 3),
         "author": rule.author,
-        "possible": looks is not None,
+        "possible": sighting is not None and sighting.possible,
         "looks": None if looks is None else _looks(looks),
     }
 
 
 def _looks(looks: Looks) -> dict[str, object]:
-    return asdict(looks) | {"probability": round(looks.probability, 4)}
+    told = asdict(looks) | {"probability": round(looks.probability, 4)}
+    del told["confirmed"]
+    return told
 
 
 def _link(link: Link) -> dict[str, object]:

@@ -23,7 +23,7 @@ from iveg.models.goal import Goal
 from iveg.models.health import Health, Safety
 from iveg.models.health import HopHealth as HopModel
 from iveg.models.margin import Margin
-from iveg.models.people import Acting, Detection, DetectionFrame
+from iveg.models.people import Acting, Detection, DetectionFrame, Evidence
 from iveg.models.people import Person as PersonModel
 from iveg.models.places import GreenhouseMap, Position
 from iveg.models.robot import (
@@ -197,7 +197,8 @@ class Views:
             last_seen=format_stamp(newest.at.wall),
             age_s=round(person.age_s(now), 3),
             observers=person.observers(now),
-            possible=newest.looks is not None,
+            possible=newest.possible,
+            evidence=Evidence.of(newest.looks),
             doubtful=newest.reach_m > 0.0,
             decision_id=max((one.decision_id for one in crossings), default=None),
             lane=self._greenhouse.lane_at(newest.x, newest.y),

@@ -103,6 +103,7 @@ export function person(changes = {}) {
     acting: [],
     margin: null,
     possible: false,
+    evidence: null,
     doubtful: false,
     ...changes,
   };

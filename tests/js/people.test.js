@@ -1,4 +1,6 @@
 import { labelled } from "../../iveg/static/js/map/layers/people.js";
+import { linesOf } from "../../iveg/static/js/panels/people.js";
+import { person } from "./builders.js";
 import { equal, test } from "./harness.js";
 
 /** @param {object[]} people @param {number} [scale] */
@@ -31,4 +33,16 @@ test("from near everybody has words", () => {
 
 test("who is seen now needs no age", () => {
   equal(labelled(paint([who(0, 1, "seen")])), []);
+});
+
+test("how sure it is that somebody is a person is told from two looks on", () => {
+  const words = /** @type {any} */ ({
+    t: (/** @type {string} */ key, /** @type {any} */ slots) =>
+      key === "people.evidence" ? `${slots.looks} in ${slots.over} s` : key,
+  });
+  const told = (/** @type {number} */ looks) => {
+    const evidence = { looks, least: 0.68, most: 0.75, over_s: 1.2, probability: 0.93 };
+    return linesOf(person({ evidence }), words).filter((line) => line.includes(" in "));
+  };
+  equal([told(1), told(4)], [[], ["4 in 1.2 s"]]);
 });

@@ -1,4 +1,4 @@
-"""The probability that somebody is a person, from all looks of one robot at them.
+"""The probability that somebody is a person, from all looks at them.
 
 A detector that is 0.72 sure in every picture never reaches a threshold of 0.80, and is
 right nearly every time.  So its looks add up (naive Bayes, even prior)::
@@ -6,9 +6,16 @@ right nearly every time.  So its looks add up (naive Bayes, even prior)::
     log-odds = Σ logit(confidence of a look)        P = 1 / (1 + e^−log-odds)
 
 A detector's mistake lasts from picture to picture, so the pictures of 0.3 s are one
-look, which counts by the surest of them.  A confidence below 0.50 is no look.  Time
-without a look counts against a suspicion, and a second of it ends it.  None of this
-lifts anything: a ring that is drawn goes by time or by an all-clear.
+look, which counts by the surest of them.  A confidence below 0.50 is no look.  Looks of
+other robots at the same place count, too.  Time without a look counts against a
+suspicion, and a second of it ends it::
+
+    suspected ── looks or one box reach the threshold ──> confirmed
+        └── odds below even, or 1 s unseen ──> over <── 1 s unseen ──┘
+
+Whoever is confirmed is kept by any box of 0.25 or more in each second, however unsure
+(as ByteTrack keeps a track), and misses count no more.  None of this lifts anything: a
+ring that is drawn goes by time or by an all-clear.
 """
 
 import math
@@ -19,6 +26,8 @@ from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
 
 FAINT_FROM = 0.50
+KEPT_FROM = 0.25
+"""Where detectors commonly cut what they report."""
 LOOK_S = 0.3
 _SLACK_S = 0.01
 """Pictures at 10 or 30 Hz are a multiple of it apart, nearly."""
@@ -40,6 +49,7 @@ class Looks:
         count: Number of looks; ``least`` and ``most`` sure of them (0 to 1).
         over_s: From the first to the newest (s).
         probability: That it is a person (0 to 1).
+        confirmed: Whether these looks, or a box among them, reached the threshold.
     """
 
     count: int
@@ -47,15 +57,12 @@ class Looks:
     most: float
     over_s: float
     probability: float
-
-    def reach(self, threshold: float) -> bool:
-        """Whether they are enough together; one look alone is a box like any other."""
-        return self.count > 1 and self.probability >= threshold
+    confirmed: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class FaintPerson:
-    """A detection that may be a person: where in ``map`` (m), and how sure."""
+    """A detection that may be a person: where in ``map`` (m), and how sure (0 to 1)."""
 
     x: float
     y: float
@@ -80,6 +87,7 @@ class _Suspect:
     seen_at: float
     judged_at: float
     odds: float = 0.0
+    confirmed: bool = False
     count: int = 1
     least: float = 1.0
     most: float = 0.0
@@ -88,24 +96,26 @@ class _Suspect:
         """It was seen again, or for the first time."""
         self.x, self.y, self.seen_at = one.x, one.y, max(self.seen_at, now)
         self.judged_at = self.seen_at
+        if one.confidence < FAINT_FROM:
+            return
         self.least = min(self.least, one.confidence)
         self.most = max(self.most, one.confidence)
         if now - self.look_at < LOOK_S - _SLACK_S:
             self.look = max(self.look, one.confidence)
             return
-        self.odds = self._log_odds
+        self.odds = self.log_odds
         self.look, self.look_at = one.confidence, now
         self.count += 1
 
     def miss(self, now: float) -> None:
         """It was not in a picture."""
-        if now - self.judged_at >= LOOK_S - _SLACK_S:
+        if not self.confirmed and now - self.judged_at >= LOOK_S - _SLACK_S:
             self.odds -= _MISS
             self.judged_at = now
 
     def is_over(self, now: float) -> bool:
         """Whether nothing is left of it."""
-        return now - self.seen_at > _FORGOTTEN_S or self._log_odds < 0.0
+        return now - self.seen_at > _FORGOTTEN_S or self.log_odds < 0.0
 
     def reaches(self, one: FaintPerson, now: float) -> float | None:
         """How far from it a detection is (m); None: too far to be the same."""
@@ -114,53 +124,100 @@ class _Suspect:
         return apart if apart <= _NEAR_M + walked else None
 
     @property
-    def _log_odds(self) -> float:
+    def log_odds(self) -> float:
+        """As they stand, without other robots' looks."""
         return min(_SUREST, self.odds + _logit(self.look))
-
-    @property
-    def looks(self) -> Looks:
-        """As it stands."""
-        return Looks(
-            self.count,
-            self.least,
-            self.most,
-            round(self.seen_at - self.first_at, 3),
-            1.0 / (1.0 + math.exp(-self._log_odds)),
-        )
 
 
 @dataclass(slots=True)
 class Suspicions:
-    """Everybody whom robots suspect, each from its own pictures alone."""
+    """Everybody whom robots suspect."""
 
-    _of: dict[str, list[_Suspect]] = field(default_factory=dict)
+    _of: dict[tuple[str | None, str], list[_Suspect]] = field(default_factory=dict)
+    """By recording (None: of today) and robot."""
 
     def look(
-        self, observer: str, seen: Sequence[FaintPerson], at: Instant
-    ) -> list[Looks]:
-        """Take one picture of a robot: what is known of each who is in it."""
-        now = at.mono
-        known = _kept(self._of.get(observer, ()), now)
+        self,
+        observer: str,
+        seen: Sequence[FaintPerson],
+        at: Instant,
+        least: float,
+        recording: str | None = None,
+    ) -> list[Looks | None]:
+        """Take one picture of a robot: what is known of each who is in it.
+
+        Args:
+            observer: The robot.
+            seen: Surest first, none below ``KEPT_FROM``.
+            at: When it looked.
+            least: Probability from which on a person counts (0 to 1).
+            recording: Whose looks are no looks of today.
+
+        Returns:
+            None for who is too faint to be suspected and continues nobody.
+        """
+        now, own = at.mono, (recording, observer)
+        known = _kept(self._of.get(own, ()), now)
         free = list(known)
         found = [_match(one, free, known, now) for one in seen]
         for suspect in free:
             suspect.miss(now)
-        self._of[observer] = _kept(known, now)
-        return [suspect.looks for suspect in found]
+        self._of[own] = _kept(known, now)
+        others = [
+            [one for one in theirs if not one.is_over(now)]
+            for key, theirs in self._of.items()
+            if key != own and key[0] == recording
+        ]
+        return [
+            None
+            if suspect is None
+            else _judged(suspect, [_nearest(one, they, now) for they in others], least)
+            for one, suspect in zip(seen, found, strict=True)
+        ]
 
 
 def _match(
     one: FaintPerson, free: list[_Suspect], known: list[_Suspect], now: float
-) -> _Suspect:
+) -> _Suspect | None:
     """The nearest suspect within reach that the picture has not shown yet, or a new."""
-    near = [(far, number) for number, far in _within(one, free, now)]
-    if near:
-        suspect = free.pop(min(near)[1])
-    else:
+    is_look = one.confidence >= FAINT_FROM
+    suspect = _nearest(one, [who for who in free if is_look or who.confirmed], now)
+    if suspect is not None:
+        free.remove(suspect)
+    elif is_look:
         suspect = _Suspect(one.x, one.y, one.confidence, now, now, now, now)
         known.append(suspect)
+    else:
+        return None
     suspect.see(one, now)
     return suspect
+
+
+def _nearest(
+    one: FaintPerson, suspects: Sequence[_Suspect], now: float
+) -> _Suspect | None:
+    near = [(far, number) for number, far in _within(one, suspects, now)]
+    return suspects[min(near)[1]] if near else None
+
+
+def _judged(
+    suspect: _Suspect, others: Sequence[_Suspect | None], least: float
+) -> Looks:
+    """What all who look at a suspect know, which may confirm it."""
+    seen_by = [suspect, *(one for one in others if one is not None)]
+    odds = min(_SUREST, sum(one.log_odds for one in seen_by))
+    count, probability = sum(one.count for one in seen_by), 1 / (1 + math.exp(-odds))
+    # One look alone is a box like any other.
+    is_enough = count > 1 and probability >= least
+    suspect.confirmed |= is_enough or suspect.most >= least
+    return Looks(
+        count,
+        min(one.least for one in seen_by),
+        max(one.most for one in seen_by),
+        round(suspect.seen_at - min(one.first_at for one in seen_by), 3),
+        probability,
+        suspect.confirmed,
+    )
 
 
 def _within(

@@ -17,6 +17,7 @@ from iveg.domain.observations import Detection, DetectionFrame, Instant
 from iveg.domain.robot_state import RobotState
 from iveg.domain.tracking.looks import (
     FAINT_FROM,
+    KEPT_FROM,
     MOST_SUSPECTS,
     FaintPerson,
     Looks,
@@ -43,7 +44,8 @@ class Placed:
         index: Of the detection in its frame.
         person: The person it belongs to; None when faint, another class, or a peer.
         peer: The fleet member that it is a sighting of.
-        looks: Why it counts though it is below the threshold; None: it need not.
+        looks: All looks at this person; None of a robot, and of one who is too faint.
+        possible: Whether it counts by its looks alone, below the threshold.
         doubtful: Outside the greenhouse, so nobody knows where it is: where its
             observer stood, and how far that one sees (m).
     """
@@ -57,6 +59,7 @@ class Placed:
     person: TrackedPerson | None = None
     peer: str | None = None
     looks: Looks | None = None
+    possible: bool = False
     doubtful: tuple[Pose2D, float] | None = None
 
 
@@ -105,12 +108,14 @@ class People:
         pose = observer.pose_at_stamp(frame.origin.own_s)
         placed = self._place(frame, observer, pose, rule)
         if rule.possible_people:
-            placed = self._suspect(placed, frame.robot_id, rule, at)
+            placed = self._suspect(placed, observer, rule, at)
         placed = [
             self._doubt(_match_peer(one, observer, world, at), pose, observer)
             for one in placed
         ]
-        self._faint[frame.robot_id] = [one for one in placed if one.kind == "faint"]
+        self._faint[frame.robot_id] = [
+            one for one in placed if one.kind == "faint" or one.possible
+        ]
         return self._assign(placed, observer, at, new_id)
 
     def _place(
@@ -138,23 +143,25 @@ class People:
         return placed
 
     def _suspect(
-        self, placed: list[Placed], observer: str, rule: DetectionRule, at: Instant
+        self,
+        placed: list[Placed],
+        observer: RobotState,
+        rule: DetectionRule,
+        at: Instant,
     ) -> list[Placed]:
-        """Raise faint people of whom all looks together are sure enough."""
+        """Note all looks at everybody; raise faint people whom these confirm."""
         suspects = sorted(filter(_is_suspect, placed), key=_confidence, reverse=True)
         del suspects[MOST_SUSPECTS:]
         seen = [FaintPerson(*one.position[:2], _confidence(one)) for one in suspects]
-        known = self._suspicions.look(observer, seen, at)
-        least = rule.threshold_of("person")
-        sure = {
-            id(one): looks
-            for one, looks in zip(suspects, known, strict=True)
-            if one.kind == "faint" and looks.reach(least)
-        }
-        return [
-            replace(one, kind="alert", looks=sure[id(one)]) if id(one) in sure else one
-            for one in placed
-        ]
+        known = self._suspicions.look(
+            observer.robot_id,
+            seen,
+            at,
+            rule.threshold_of("person"),
+            observer.recording,
+        )
+        of = {id(one): looks for one, looks in zip(suspects, known, strict=True)}
+        return [_looked_at(one, of.get(id(one))) for one in placed]
 
     def _doubt(self, one: Placed, pose: Pose2D | None, observer: RobotState) -> Placed:
         """Doubt a detection beyond the walls (docs/safety.md, "The rule")."""
@@ -202,6 +209,7 @@ class People:
                     one.class_,
                     self.known[track],
                     looks=one.looks,
+                    possible=one.possible,
                     doubtful=one.doubtful,
                 )
         return out
@@ -239,6 +247,15 @@ def _placed(
         x, y = pose.transform(x, y)
     verdict = rule.judge(detection.class_id, detection.probability)
     return Placed(detection, framed, index, (x, y, z), verdict.kind, verdict.class_)
+
+
+def _looked_at(one: Placed, looks: Looks | None) -> Placed:
+    """The same with all looks at it; a faint one counts if these confirm it."""
+    if looks is None:
+        return one
+    possible = one.kind == "faint" and looks.confirmed
+    kind = "alert" if possible else one.kind
+    return replace(one, kind=kind, looks=looks, possible=possible)
 
 
 def _may_be_somebody(detection: Detection, rule: DetectionRule) -> bool:
@@ -288,11 +305,12 @@ def _sighting(one: Placed, observer: RobotState, at: Instant) -> Sighting:
         one.looks,
         reach,
         recording=observer.recording,
+        possible=one.possible,
     )
 
 
 def _is_suspect(one: Placed) -> bool:
-    return one.class_ == "person" and one.detection.probability >= FAINT_FROM
+    return one.class_ == "person" and one.detection.probability >= KEPT_FROM
 
 
 def _confidence(one: Placed) -> float:

@@ -28,13 +28,15 @@ class Sighting:
 
     Attributes:
         at: Source moment on our clocks.
-        looks: Why it counts though it was below the threshold; None: it need not.
+        looks: All looks at this person by then; None of a robot, and where one box
+            counts that is too faint to be a look.
         reach_m: Where the position is doubtful, x and y are the observer's own, and
             this is how far its camera reaches (m); else 0.
         chain: Number of the chain of sightings whose newest this is; negative: of the
             second place of a box that may be in two (``iveg.domain.frames``).
         recording: The map frame of the recording that saw it; None: a robot of today.
         vx: How its chain goes in ``map`` (m/s); ``vy`` likewise.
+        possible: Whether it counts by its looks alone, below the threshold.
     """
 
     observer: str
@@ -50,6 +52,7 @@ class Sighting:
     recording: str | None = None
     vx: float = 0.0
     vy: float = 0.0
+    possible: bool = False
 
     def age_s(self, now: Instant) -> float:
         """Seconds since the sighting."""
@@ -73,6 +76,7 @@ class Sighting:
             self.recording,
             vx,
             vy,
+            self.possible,
         )
 
     def _going_on(self, before: "Sighting") -> tuple[float, float]:
@@ -113,6 +117,12 @@ class TrackedPerson:
     def is_well_known(self) -> bool:
         """Whether they were seen for longer than a detector's mistake lasts."""
         return self.newest.at.mono - self.first_seen.mono >= _MISTAKEN_S
+
+    @property
+    def is_possible(self) -> bool:
+        """Whether every ring is one of looks alone."""
+        rings = self.sightings
+        return bool(rings) and all(one.possible for one in rings)
 
     def seen_as(
         self,

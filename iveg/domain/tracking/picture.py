@@ -54,13 +54,30 @@ def is_alike(person: TrackedPerson, one: PlacedDetection) -> bool:
 def chain_cost(
     one: PlacedDetection, person: TrackedPerson, earlier: Sighting, at: Instant
 ) -> float:
-    """Distance to the observer's own earlier sighting (m); inf for another person's."""
+    """Distance to the observer's own earlier sighting (m); inf for another person's.
+
+    A sighting that counts by its looks alone replaces none that counts by its box:
+    looks add rings, and take none away.
+    """
     if not is_alike(person, one) or bool(earlier.reach_m) != bool(one.sighting.reach_m):
+        return math.inf
+    if earlier.possible != one.sighting.possible:
         return math.inf
     if earlier.reach_m:
         return 0.0
     distance = distance_between(earlier, one.sighting)
     return distance if distance <= _gate(earlier, at) else math.inf
+
+
+def is_replaced(earlier: Sighting, sighting: Sighting, at: Instant) -> bool:
+    """Whether a box shows where somebody is who counted by the observer's looks."""
+    return (
+        earlier.possible
+        and not sighting.possible
+        and earlier.observer == sighting.observer
+        and not (earlier.reach_m or sighting.reach_m)
+        and distance_between(earlier, sighting) <= _gate(earlier, at)
+    )
 
 
 def live_cost(one: PlacedDetection, person: TrackedPerson, at: Instant) -> float:

@@ -25,11 +25,12 @@ from iveg.domain.tracking.picture import (
     chain_cost,
     distance_between,
     first_places,
+    is_replaced,
     live_cost,
     lost_cost,
 )
 
-MAX_PEOPLE = 256
+MAX_PEOPLE, MAX_POSSIBLE = 256, 64
 MERGE_M = 0.5
 
 
@@ -213,6 +214,7 @@ class Tracker:
             earlier
             for earlier in person.sightings
             if earlier.age_s(at) <= LIMITS.ring_lasts_s
+            and not is_replaced(earlier, sighting, at)
         )
         later = sighting.at.mono > person.newest.at.mono
         newest = sighting if later else person.newest
@@ -224,7 +226,7 @@ class Tracker:
     def _begin(
         self, one: PlacedDetection, sighting: Sighting, at: Instant
     ) -> str | None:
-        if not self._has_room(at):
+        if not self._has_room(at, sighting):
             return None
         self._tracks += 1
         kind = "P" if one.class_ == "person" else "R"
@@ -234,12 +236,16 @@ class Tracker:
         )
         return track
 
-    def _has_room(self, now: Instant) -> bool:
+    def _has_room(self, now: Instant, newest: Sighting) -> bool:
         """Whether one more can be kept, if need be in place of one without a ring.
 
-        Persons with a ring, and persons who were seen twice, stay.
+        Persons with a ring, and persons who were seen twice, stay.  Who counts by looks
+        alone takes no place from one who counts by a box.
         """
-        if len(self.known) < MAX_PEOPLE:
+        possible = sum(person.is_possible for person in self.known.values())
+        if newest.possible:
+            return possible < MAX_POSSIBLE
+        if len(self.known) - possible < MAX_PEOPLE:
             return True
         for person in self.known.values():
             once = person.first_seen == person.newest.at

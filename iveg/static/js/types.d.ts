@@ -321,6 +321,17 @@ export type Encounter = {
   radius_m: number;
 };
 
+/** All looks at somebody, and what they come to. */
+export type Evidence = {
+  looks: number;
+  /** Confidence of the faintest look (0 to 1). */
+  least: number;
+  most: number;
+  /** From the first look to the newest. */
+  over_s: number;
+  probability: number;
+};
+
 /** One experiment, on its way or over. */
 export type Experiment = {
   name: string;
@@ -661,6 +672,8 @@ export type Person = {
   observers: string[];
   /** Below the threshold but seen again and again. */
   possible: boolean;
+  /** All looks by the newest detection; None of a robot. */
+  evidence: Evidence | null;
   /** Seen beyond the walls: the position is its observer's. */
   doubtful: boolean;
   /** Newest open decision about this person. */

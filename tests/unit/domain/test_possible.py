@@ -70,7 +70,7 @@ def test_a_person_who_is_known_is_kept_by_weak_looks() -> None:
 
     (somebody,) = scene.everyone
     assert somebody.newest.confidence == 0.55
-    assert somebody.newest.looks is not None
+    assert somebody.newest.possible
 
 
 def test_faint_looks_at_different_places_are_nobody() -> None:
@@ -94,7 +94,41 @@ def test_a_sure_look_is_possible_no_more() -> None:
     looked(scene, 0.7, 0.7, 0.7, 0.9)
 
     (somebody,) = scene.everyone
-    assert somebody.newest.looks is None
+    assert not somebody.newest.possible
+    assert somebody.newest.looks is not None
+    assert somebody.newest.looks.count == 4
+
+
+def test_a_weak_box_moves_no_ring_of_a_sure_one() -> None:
+    scene = Scene(rule=ON)
+    looked(scene, 0.85)
+    looked(scene, 0.55, x=5.5)
+
+    (somebody,) = scene.everyone
+    assert sorted((one.x, one.possible) for one in somebody.sightings) == [
+        (5.0, False),
+        (5.5, True),
+    ]
+
+
+def test_a_sure_box_takes_the_place_of_weak_ones() -> None:
+    scene = Scene(rule=ON)
+    looked(scene, 0.85, 0.55)
+    looked(scene, 0.9, x=5.5)
+
+    (somebody,) = scene.everyone
+    assert [(one.x, one.possible) for one in somebody.sightings] == [(5.5, False)]
+
+
+def test_where_a_weak_box_stands_no_sure_ring_is_cleared() -> None:
+    scene = Scene(rule=ON)
+    looked(scene, 0.85)
+    for _ in range(30):
+        looked(scene, 0.55, every_s=0.1)
+        scene.sweep()
+
+    (somebody,) = scene.everyone
+    assert {one.possible for one in somebody.sightings} == {False, True}
 
 
 def test_a_possible_person_slows_like_any_other() -> None:

@@ -114,11 +114,13 @@ function dateOf({ started_at }) {
 function makeFacts(decision, i18n) {
   const { x, y } = decision.position ?? { x: null, y: null };
   const { id, version, parameters } = decision.rule;
-  const slots = { ...parameters, ...decision, id, version, x, y };
+  const { looks } = parameters ?? {};
+  const slots = { ...parameters, ...looks, ...decision, id, version, x, y };
   const seen = decision.class_id === null ? "told" : "seen";
   const facts = [
     [`decision.fact.${seen}`, `decision.facts.${seen}`],
     ["decision.fact.obeys", `decision.facts.${sightOf(decision)}`],
+    ...(looks?.count > 1 ? [["decision.fact.looks", "decision.facts.looks"]] : []),
     ["decision.fact.rule", "decision.facts.rule"],
   ];
   const list = make("dl", "facts");

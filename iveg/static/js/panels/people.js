@@ -48,7 +48,7 @@ function makeItem() {
 }
 
 /**
- * One person in sentences: who and where, since when, who acts on it.
+ * One person in sentences: who and where, since when, how sure, who acts on it.
  *
  * @param {Person} person
  * @param {import("../core/i18n.js").I18n} i18n
@@ -73,11 +73,17 @@ export function linesOf(person, i18n) {
       distance: distance_m,
     }),
   );
+  const { evidence } = person;
+  const looks =
+    evidence && evidence.looks > 1
+      ? [i18n.t("people.evidence", { ...evidence, over: evidence.over_s })]
+      : [];
   const who = i18n.t(person.lane ? "people.who" : "people.who_free", slots);
   return [
     `${who[0].toUpperCase()}${who.slice(1)}`,
     i18n.t("people.where", slots),
     i18n.t(`people.${stage}`, slots),
+    ...looks,
     ...acts,
   ];
 }

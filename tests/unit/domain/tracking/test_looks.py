@@ -1,6 +1,7 @@
 """Looks at one person add up to a probability, and their absence counts against it."""
 
 import math
+from collections.abc import Sequence
 
 import pytest
 
@@ -8,6 +9,7 @@ from iveg.domain.tracking.looks import (
     LOOK_S,
     MOST_SUSPECTS,
     FaintPerson,
+    Looks,
     Suspicions,
 )
 from tests.builders import at
@@ -17,6 +19,23 @@ def seen(confidence: float = 0.72, x: float = 5.0) -> FaintPerson:
     return FaintPerson(x, 0.0, confidence)
 
 
+class Robots:
+    """Suspicions of robots that need 0.80, and what each look finds."""
+
+    def __init__(self) -> None:
+        self.suspicions = Suspicions()
+
+    def look(
+        self,
+        seen: Sequence[FaintPerson],
+        moment: float,
+        robot: str = "AGI",
+        recording: str | None = None,
+    ) -> list[Looks]:
+        found = self.suspicions.look(robot, seen, at(moment), 0.8, recording)
+        return [one for one in found if one is not None]
+
+
 def probability(*confidences: float) -> float:
     """What so many independent looks come to, by Bayes' rule with an even prior."""
     odds = math.prod(one / (1.0 - one) for one in confidences)
@@ -24,35 +43,35 @@ def probability(*confidences: float) -> float:
 
 
 def test_one_look_is_as_sure_as_its_box() -> None:
-    (looks,) = Suspicions().look("AGI", [seen(0.72)], at(0.0))
+    (looks,) = Robots().look([seen(0.72)], 0.0)
 
     assert (looks.count, looks.least, looks.most, looks.over_s) == (1, 0.72, 0.72, 0.0)
     assert looks.probability == pytest.approx(0.72)
-    assert not looks.reach(0.7)
+    assert not looks.confirmed
 
 
 def test_two_looks_are_surer_than_either() -> None:
-    suspicions = Suspicions()
-    suspicions.look("AGI", [seen(0.68)], at(0.0))
-    (looks,) = suspicions.look("AGI", [seen(0.75)], at(LOOK_S))
+    robots = Robots()
+    robots.look([seen(0.68)], 0.0)
+    (looks,) = robots.look([seen(0.75)], LOOK_S)
 
     assert (looks.count, looks.least, looks.most, looks.over_s) == (2, 0.68, 0.75, 0.3)
     assert looks.probability == pytest.approx(probability(0.68, 0.75))
 
 
 def test_pictures_of_one_moment_are_one_look_by_the_surest_of_them() -> None:
-    suspicions = Suspicions()
+    robots = Robots()
     for moment, confidence in ((0.0, 0.6), (0.1, 0.72), (0.2, 0.55)):
-        (looks,) = suspicions.look("AGI", [seen(confidence)], at(moment))
+        (looks,) = robots.look([seen(confidence)], moment)
 
     assert looks.count == 1
     assert looks.probability == pytest.approx(0.72)
 
 
 def test_no_number_of_looks_makes_certain() -> None:
-    suspicions = Suspicions()
+    robots = Robots()
     for number in range(100):
-        (looks,) = suspicions.look("AGI", [seen(0.79)], at(number * LOOK_S))
+        (looks,) = robots.look([seen(0.79)], number * LOOK_S)
 
     assert looks.probability == pytest.approx(0.982, abs=1e-4)
 
@@ -60,54 +79,100 @@ def test_no_number_of_looks_makes_certain() -> None:
 def test_time_without_a_look_counts_against_it() -> None:
     told = []
     for pictures_without in (0, 2):
-        suspicions = Suspicions()
-        suspicions.look("AGI", [seen(0.78)], at(0.0))
+        robots = Robots()
+        robots.look([seen(0.78)], 0.0)
         for number in range(pictures_without):
-            suspicions.look("AGI", [], at(0.35 + 0.35 * number))
-        (looks,) = suspicions.look("AGI", [seen(0.6)], at(0.95))
+            robots.look([], 0.35 + 0.35 * number)
+        (looks,) = robots.look([seen(0.6)], 0.95)
         told.append(looks.probability)
 
     assert told[1] < told[0]
 
 
 def test_a_second_without_a_look_ends_a_suspicion() -> None:
-    suspicions = Suspicions()
-    suspicions.look("AGI", [seen(0.78)], at(0.0))
-    suspicions.look("AGI", [], at(1.01))
-    (looks,) = suspicions.look("AGI", [seen(0.6)], at(1.1))
+    robots = Robots()
+    robots.look([seen(0.78)], 0.0)
+    robots.look([], 1.01)
+    (looks,) = robots.look([seen(0.6)], 1.1)
 
     assert looks.count == 1
 
 
 def test_who_walks_on_is_the_same_and_who_stands_elsewhere_another() -> None:
-    suspicions = Suspicions()
-    suspicions.look("AGI", [seen(x=5.0)], at(0.0))
-    walked, other = suspicions.look("AGI", [seen(x=5.5), seen(x=9.0)], at(LOOK_S))
+    robots = Robots()
+    robots.look([seen(x=5.0)], 0.0)
+    walked, other = robots.look([seen(x=5.5), seen(x=9.0)], LOOK_S)
 
     assert (walked.count, other.count) == (2, 1)
 
 
 def test_two_side_by_side_are_two() -> None:
-    suspicions = Suspicions()
+    robots = Robots()
     for number in range(3):
-        pair = suspicions.look("AGI", [seen(x=5.0), seen(x=5.6)], at(number * LOOK_S))
+        pair = robots.look([seen(x=5.0), seen(x=5.6)], number * LOOK_S)
 
     assert [one.count for one in pair] == [3, 3]
 
 
-def test_each_robot_has_its_own_suspicions() -> None:
-    suspicions = Suspicions()
-    suspicions.look("AGI", [seen()], at(0.0))
-    (looks,) = suspicions.look("AGII", [seen()], at(LOOK_S))
+def test_looks_of_robots_at_one_place_count_together() -> None:
+    robots = Robots()
+    robots.look([seen(0.7), seen(0.7, x=9.0)], 0.0)
+    (looks,) = robots.look([seen(0.75, x=5.4)], 0.1, "AGII")
+
+    assert (looks.count, looks.least, looks.most, looks.over_s) == (2, 0.7, 0.75, 0.1)
+    assert looks.probability == pytest.approx(probability(0.7, 0.75))
+    assert looks.confirmed
+
+
+@pytest.mark.parametrize(
+    ("moment", "x", "recording"),
+    [(1.1, 5.0, None), (0.1, 8.0, None), (0.1, 5.0, "D1")],
+    ids=["a second ago", "elsewhere", "of a recording"],
+)
+def test_other_looks_of_other_robots_do_not_count(
+    moment: float, x: float, recording: str | None
+) -> None:
+    robots = Robots()
+    robots.look([seen()], 0.0)
+    (looks,) = robots.look([seen(x=x)], moment, "AGII", recording)
 
     assert looks.count == 1
 
 
+@pytest.mark.parametrize(
+    "first", [(0.85,), (0.72, 0.72)], ids=["one box", "looks together"]
+)
+def test_who_is_confirmed_is_kept_by_weak_boxes_and_misses(
+    first: tuple[float, ...],
+) -> None:
+    robots = Robots()
+    for number, confidence in enumerate(first):
+        robots.look([seen(confidence)], number * LOOK_S)
+    for number in range(10):
+        robots.look([], 0.5 + 0.9 * number)
+        (looks,) = robots.look([seen(0.26)], 0.9 + 0.9 * number)
+
+        assert looks.confirmed
+        assert looks.count == len(first)
+
+
+@pytest.mark.parametrize(
+    ("weak", "moment", "x"),
+    [(0.26, 1.9, 5.0), (0.26, 1.2, 8.0), (0.55, 2.5, 5.0)],
+    ids=["after a second", "elsewhere", "as a new one"],
+)
+def test_a_weak_box_keeps_nobody_else(weak: float, moment: float, x: float) -> None:
+    robots = Robots()
+    robots.look([seen(0.85)], 0.8)
+
+    assert not any(one.confirmed for one in robots.look([seen(weak, x)], moment))
+
+
 def test_a_storm_keeps_the_newest() -> None:
-    suspicions = Suspicions()
+    robots = Robots()
     crowd = [seen(x=3.0 * number) for number in range(MOST_SUSPECTS)]
-    suspicions.look("AGI", crowd, at(0.0))
-    suspicions.look("AGI", [seen(x=-50.0)], at(0.1))
-    (looks,) = suspicions.look("AGI", [seen(x=-50.0)], at(0.1 + LOOK_S))
+    robots.look(crowd, 0.0)
+    robots.look([seen(x=-50.0)], 0.1)
+    (looks,) = robots.look([seen(x=-50.0)], 0.1 + LOOK_S)
 
     assert looks.count == 2
