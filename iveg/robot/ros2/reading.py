@@ -28,7 +28,9 @@ _FARTHEST_M = 1e6
 _FARTHEST_BITS = np.float32(_FARTHEST_M).view(np.uint32)
 """Bits of a float32 are in the order of the numbers; what is negative, infinite or no
 number is above, and one comparison finds it."""
-_NOTHING = np.float32(np.inf)
+_NOTHING, _UNKNOWN = np.float32(np.inf), np.float32(0.0)
+"""Nothing came back; no measurement, which is shorter than any range that counts."""
+_LEAST_RANGE_M = 1e-3
 _TILT = math.radians(10.0)
 _LONGEST_RANGE_M = 1e4
 _FORBIDDEN = str.maketrans(dict.fromkeys(FORBIDDEN))
@@ -93,7 +95,7 @@ def read_scan(scan: m.LaserScan, laser: RigidTransform) -> LaserScan:
         UNKNOWN_ORIGIN,
         scan.angle_min * side,
         scan.angle_increment * side,
-        max(0.0, scan.range_min),
+        max(_LEAST_RANGE_M, scan.range_min),
         min(scan.range_max, _LONGEST_RANGE_M),
         laser.flat(),
         _ranges(scan),
@@ -101,8 +103,14 @@ def read_scan(scan: m.LaserScan, laser: RigidTransform) -> LaserScan:
 
 
 def _ranges(scan: m.LaserScan) -> NDArray[np.float32]:
+    """Ranges as a measure has them (REP-117).
+
+    Only +inf says that nothing came back.  NaN is no measurement and -inf is too near
+    for one: neither shows that the way is free.
+    """
     ranges = scan.ranges.copy()
-    ranges[ranges.view(np.uint32) > _FARTHEST_BITS] = _NOTHING
+    odd = ranges.view(np.uint32) > _FARTHEST_BITS
+    ranges[odd] = np.where(ranges[odd] > 0.0, _NOTHING, _UNKNOWN)
     return ranges
 
 

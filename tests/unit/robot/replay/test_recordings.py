@@ -64,7 +64,7 @@ def test_a_bag_of_each_kind_gives_odometry_and_scans(
     assert scan.observation.mount == MOUNT
     assert (scan.observation.angle_min, scan.observation.range_max) == (-1.5, 20.0)
     assert scan.observation.ranges.tolist() == pytest.approx(
-        [1.0, math.inf, math.inf, math.inf, 0.2]
+        [1.0, math.inf, 0.0, 0.0, 0.2]
     )
 
 

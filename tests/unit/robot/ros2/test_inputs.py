@@ -1,6 +1,7 @@
 """Algorithm 1 on a ROS 2 robot: the newest of each, in map, or named and unplaced."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -313,14 +314,17 @@ def test_a_scan_that_cannot_be_used_is_named(message: m.LaserScan, code: str) ->
     assert code in bench.faults()
 
 
-def test_what_is_no_distance_is_no_return() -> None:
-    message = said.scan((math.nan, -1.0, math.inf, 2.0))
+def test_only_a_beam_that_did_not_come_back_found_nothing() -> None:
+    message = said.scan((math.nan, -1.0, -math.inf, -0.0, math.inf, 1e7, 2.0))
+    message = replace(message, range_min=0.0)
     bench = Bench().hear("odometry", said.odometry()).hear("scan", message)
 
     found = bench.tick()[1]
 
     assert isinstance(found, LaserScan)
-    assert found.ranges.tolist() == [math.inf, math.inf, math.inf, 2.0]
+    unknown, nothing = 0.0, math.inf
+    assert found.ranges.tolist() == [*[unknown] * 4, nothing, nothing, 2.0]
+    assert found.returns().tolist() == [False] * 6 + [True]
 
 
 def test_a_scan_of_a_robot_that_has_no_place_is_unplaced() -> None:
