@@ -15,6 +15,7 @@ from iveg.domain.world import World
 from iveg.pipeline import topics
 from iveg.pipeline.event_log import EventLog
 from iveg.pipeline.kept_detections import KeptDetections
+from iveg.pipeline.newest_detections import NewestDetections
 from iveg.pipeline.ports import Ids
 
 _LOGGED_S = 2.0
@@ -35,6 +36,7 @@ class DetectionTracking:
         placed: What each robot's newest look found, faint ones included.
         other: When the newest confident object of another class came, by robot.
         kept: Chooses the detections that become rows.
+        newest: Each detection of the last moments.
     """
 
     def __init__(
@@ -47,6 +49,7 @@ class DetectionTracking:
         self.placed: dict[str, list[Placed]] = {}
         self.other: dict[str, Instant] = {}
         self.kept = KeptDetections(event_log)
+        self.newest = NewestDetections()
         self._world = world
         self._people = people
         self._event_log = event_log
@@ -130,6 +133,7 @@ class DetectionTracking:
         subject = one.peer or (one.person.person_id if one.person else "")
         subject = subject or f"{one.kind}:{one.detection.class_id}"
         self.kept.look(one, subject, frame, received)
+        self.newest.note(one, frame, received)
         last = self._logged_at.get((robot_id, subject))
         if one.kind == "other":
             self.other[robot_id] = at

@@ -15,7 +15,14 @@ from iveg.domain.alerts.stored import cleared_behind, write_alert
 from iveg.domain.decisions import SlowdownDecision
 from iveg.domain.events import LogEvent
 from iveg.domain.kinds import Kind
-from iveg.domain.observations import Climate, Instant, Observation, Odometry
+from iveg.domain.observations import (
+    Climate,
+    DetectionFrame,
+    Instant,
+    Observation,
+    Odometry,
+    Received,
+)
 from iveg.domain.quantities import value_of
 from iveg.domain.records import (
     AlertRecord,
@@ -137,31 +144,9 @@ class EventLog:
             self._sink.enqueue(cleared_behind(alert, now.wall))
 
     @_guarded
-    def detection(
-        self, one: Placed, robot_id: str, stamp: str | None, at: Instant, transport: str
-    ) -> None:
+    def detection(self, one: Placed, frame: DetectionFrame, received: Received) -> None:
         """Record one detection."""
-        x, y, z = one.position
-        self._sink.enqueue(
-            DetectionRecord(
-                at=at.wall,
-                robot_id=robot_id,
-                class_id=one.detection.class_id,
-                probability=one.detection.probability,
-                x=x,
-                y=y,
-                z=z,
-                confident=one.kind != "faint",
-                transport=transport,
-                stamp=stamp,
-                class_=one.class_,
-                person_id=None if one.person is None else one.person.person_id,
-                box={
-                    **asdict(one.framed.box),
-                    "frame_id": one.framed.frame_id,
-                },
-            )
-        )
+        self._sink.enqueue(detection_of(one, frame, received))
 
     @_guarded
     def odometry(
@@ -319,3 +304,25 @@ class EventLog:
         """Record an alert that was raised, acknowledged or cleared."""
         self._sink.enqueue(write_alert(alert))
         self.changed(topics.ALERTS.name)
+
+
+def detection_of(
+    one: Placed, frame: DetectionFrame, received: Received
+) -> DetectionRecord:
+    """One detection of a frame as a row."""
+    x, y, z = one.position
+    return DetectionRecord(
+        at=received.at.wall,
+        robot_id=frame.robot_id,
+        class_id=one.detection.class_id,
+        probability=one.detection.probability,
+        x=x,
+        y=y,
+        z=z,
+        confident=one.kind != "faint",
+        transport=received.transport,
+        stamp=frame.origin.stamp,
+        class_=one.class_,
+        person_id=None if one.person is None else one.person.person_id,
+        box={**asdict(one.framed.box), "frame_id": one.framed.frame_id},
+    )

@@ -89,14 +89,7 @@ class KeptDetections:
             }
 
     def _record(self, look: _Look) -> None:
-        frame, received = look.frame, look.received
-        self._event_log.detection(
-            look.one,
-            frame.robot_id,
-            frame.origin.stamp,
-            received.at,
-            received.transport,
-        )
+        self._event_log.detection(look.one, look.frame, look.received)
 
 
 def _is_among(look: _Look, sightings: Sequence[Sighting]) -> bool:

@@ -19,6 +19,7 @@ from iveg.web.api import (
     commands,
     costmap,
     coverage,
+    detections,
     detectors,
     equipment,
     goals,
@@ -101,6 +102,7 @@ def live_routers(face: Face) -> Iterator[APIRouter]:
     yield goals.router(parts.goals, clock)
     yield alerts.router(evaluator, clock)
     yield rule.router(beside.rules, clock)
+    yield detections.router(evaluator.tracking.newest, face.worker)
     yield detectors.router(beside.detectors, clock)
     yield messages.router(messages.Desk(beside.messenger, face.new_id, clock))
     yield latency.router(watch, clock, face.worker)

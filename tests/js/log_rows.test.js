@@ -6,7 +6,6 @@ import { equal, test } from "./harness.js";
 
 const i18n = {
   t: (/** @type {string} */ key) => key,
-  time: () => "10:00:00",
   onChange: () => {},
 };
 
@@ -71,11 +70,13 @@ test("another reason, another robot or another kind is never joined", () => {
 });
 
 test("a row is completed in place: what has the focus keeps it", async () => {
-  const places = ["log", "log-empty", "log-clear", "log-chips"].map((id) => {
-    const place = make("div");
-    place.id = id;
-    return place;
-  });
+  const places = ["log", "log-empty", "log-clear", "log-chips", "log-each"].map(
+    (id) => {
+      const place = make("div");
+      place.id = id;
+      return place;
+    },
+  );
   document.body.replaceChildren(...places);
   const store = new Store();
   createLogPanel(/** @type {any} */ ({ store, i18n }), { open: () => {} });
@@ -85,6 +86,7 @@ test("a row is completed in place: what has the focus keeps it", async () => {
   opener.focus();
   store.apply("log", entry(1.5, UP));
   await until(() => opener.textContent?.includes("log.lasted") === true);
+  equal(opener.querySelector("time")?.textContent, "23:13:21.000");
   equal(document.activeElement === opener, true);
   equal(places[0].children.length, 1);
 });

@@ -29,7 +29,7 @@ from iveg.models.people import DetectionRow
 from iveg.models.reading import Reading
 from iveg.pipeline.ports import Clock
 from iveg.web.api import exports, figures
-from iveg.web.api.answers import Apart, Json
+from iveg.web.api.answers import FEW_ROWS, Apart, Json
 from iveg.web.api.exports import MEDIA_TYPES, Form
 from iveg.web.api.history_filters import Filters, filter_of
 from iveg.web.pages.local_time import in_madrid
@@ -39,8 +39,6 @@ from iveg.web.security.authentication import require
 
 R = TypeVar("R", bound=Record)
 _DAY_S = 86_400.0
-_FEW = 200
-"""Rows that cost the loop less than sending them to the worker."""
 _FOR_GOOD = "public, max-age=31536000, immutable"
 _CSV_AND_NDJSON: dict[str, dict[str, str]] = {
     MEDIA_TYPES[form]: {} for form in ("csv", "ndjson")
@@ -225,7 +223,7 @@ def _add_list(routes: APIRouter, one: _List[R], worker: Apart) -> None:
 async def _listing(page: Page[R], one: _List[R], worker: Apart) -> Response:
     after = None if page.next is None else lists.write_cursor(page.next)
     rows = await one.rows(page.items)
-    if len(rows) <= _FEW:
+    if len(rows) <= FEW_ROWS:
         items = [one.model(*row) for row in rows]
         return Json(one.listing(items=items, next=after, **one.more()))
     items_json = Fragment(await worker.run(_write_items, one.model, rows))

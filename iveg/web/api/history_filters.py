@@ -4,6 +4,7 @@ Times are ISO-8601; one without an offset is UTC.  A name that is not a filter i
 refused: a misspelt filter that answers everything would mislead.
 """
 
+from collections.abc import Callable
 from datetime import UTC, date, datetime
 from typing import Annotated, Literal, Self, TypeVar
 
@@ -21,6 +22,7 @@ from iveg.adapters.history import lists
 from iveg.adapters.history.lists import Cursor, Filter, ListOf
 from iveg.domain.errors import UnreadableError
 from iveg.domain.records import Record
+from iveg.pipeline.newest_detections import JudgedDetection
 from iveg.web.api.exports import Form
 
 R = TypeVar("R", bound=Record)
@@ -77,8 +79,8 @@ class Range(Span):
     robot: str | None = Field(None, pattern=_ROBOT_ID, description="Robot id")
 
 
-class Filters(Range):
-    """Filters of every list."""
+class RowFilters(Range):
+    """Filters of lists whose rows are all in memory."""
 
     class_: str | None = Field(
         None,
@@ -99,14 +101,38 @@ class Filters(Range):
     limit: int | None = Field(
         None, ge=1, le=lists.MOST_ROWS, description="Rows of a page; 100 unless told"
     )
+    format: Form | None = Field(None, description="Instead of an `Accept` header")
+
+
+class Filters(RowFilters):
+    """Filters of every list of the history."""
+
     cursor: str | None = Field(
         None, max_length=200, description="`next` of the page before"
     )
-    format: Form | None = Field(None, description="Instead of an `Accept` header")
     language: Literal["es", "en"] | None = Field(
         None,
         description="CSV as that reader's spreadsheet expects it, with sentences",
     )
+
+
+def admitting(asked: RowFilters) -> Callable[[JudgedDetection], bool]:
+    """Whether a detection that is in memory is one of those that are asked for."""
+    since, until = _seconds(asked.since), _seconds(asked.until)
+
+    def admits(judged: JudgedDetection) -> bool:
+        one, frame, received = judged
+        person = None if one.person is None else one.person.person_id
+        return (
+            (since is None or received.at.wall >= since)
+            and (until is None or received.at.wall < until)
+            and asked.robot in (None, frame.robot_id)
+            and asked.class_ in (None, one.class_, one.detection.class_id)
+            and asked.person in (None, person)
+            and one.detection.probability >= (asked.min_probability or 0.0)
+        )
+
+    return admits
 
 
 def filter_of(filters: Filters, of: ListOf[R]) -> Filter:

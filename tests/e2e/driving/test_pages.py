@@ -138,12 +138,12 @@ def test_every_decision_is_listed_and_leads_to_its_own_page(
 ) -> None:
     page = open_page(390, 844, route="/decisions")
     row = page.locator("#decisions-rows tbody tr").first
-    expect(row).to_contain_text("bajó al 50", timeout=60_000)
+    expect(row).to_contain_text("→ 50", timeout=60_000)
     assert evaluate(page, OVERFLOW) <= 0
 
     row.locator("a").click()
 
-    expect(page.locator("#decision-record")).to_contain_text("bajó al 50")
+    expect(page.locator("#decision-record")).to_contain_text("→ 50")
     page.wait_for_url(re.compile(r"/decisions/.+"))
 
 

@@ -3,7 +3,9 @@
  */
 
 import { onBeat } from "../core/beat.js";
+import { millisecondsOf } from "../pages/history/local_time.js";
 import { make, need, needPart, setHidden, setText } from "./dom.js";
+import { createLogEach } from "./log_each.js";
 import { createChosen, createLogChips } from "./log_filter.js";
 import { rowsOf } from "./log_rows.js";
 
@@ -34,6 +36,9 @@ export function createLogPanel(app, decision) {
     robots: () => robots,
     onChange: rebuild,
   });
+  // A reader who has scrolled must not lose the place.
+  const isStill = () => list.scrollTop > 0;
+  const each = createLogEach({ isStill, onChange: rebuild });
 
   /** @param {import("./log_rows.js").Row} row */
   function makeItem(row) {
@@ -43,7 +48,7 @@ export function createLogPanel(app, decision) {
     item.dataset.id = String(entry.id);
     if (entry.robot_id) item.dataset.robot = entry.robot_id;
     const text = make("p");
-    const time = make("time", "", i18n.time(entry.at));
+    const time = make("time", "", millisecondsOf(entry.at));
     time.dateTime = entry.at;
     const place = entry.decision_id ? makeOpener(entry) : text;
     const lasted = make("span");
@@ -75,6 +80,7 @@ export function createLogPanel(app, decision) {
 
   function addFresh() {
     learn(fresh.splice(0));
+    if (each.isOn()) return;
     const shown = newestOf(store.log());
     if (!shown.length) return;
     const rows = new Map(shown.map((row) => [String(row.entry.id), row]));
@@ -111,7 +117,7 @@ export function createLogPanel(app, decision) {
   }
 
   function rebuild() {
-    const entries = store.log();
+    const entries = each.entries(store.log());
     fresh = [];
     learn(entries);
     const shown = newestOf(entries);
@@ -120,13 +126,15 @@ export function createLogPanel(app, decision) {
     const isHidden = entries.length > 0 && shown.length === 0;
     const filters = chips.said().join(" · ");
     const none = store.get("snapshot") ? "logpanel.empty" : "rows.loading";
-    const key = isHidden ? "logpanel.hidden" : none;
+    const nothing = each.isOn() ? each.empty() : none;
+    const key = isHidden ? "logpanel.hidden" : nothing;
     setText(empty, i18n.t(key, { count: entries.length, filters }));
     setHidden(clear, !isHidden);
   }
 
   /** @param {number} atMs Unix time */
   function goTo(atMs) {
+    each.off();
     const wanted = entryAt(store.log().filter(chosen.admits), atMs);
     const opener = need(".drawer-open");
     const isDrawer = opener.offsetParent !== null;

@@ -1,0 +1,110 @@
+"""Each detection of the last moments, which the log sums up and the history thins."""
+
+import csv
+import io
+
+import httpx
+import pytest
+
+from iveg.domain.records import DetectionRecord
+from iveg.pipeline import newest_detections
+from iveg.pipeline.newest_detections import JudgedDetection
+from tests.builders import detection
+from tests.unit.web.desk import WebDesk
+
+LATEST = "/api/v1/detections/latest"
+
+
+@pytest.fixture
+def desk() -> WebDesk:
+    """A farmer whom AGII sees ten times in a second, and a box of no class."""
+    desk = WebDesk()
+    desk.drive("AGI", 0.0)
+    desk.drive("AGII", 50.0)
+    for tenth in range(10):
+        desk.clock.now = round(desk.clock.now + 0.1, 6)
+        farmer = detection("farmer", 20.0, probability=0.8 + 0.01 * tenth)
+        desk.look("AGII", farmer, detection("cat", 22.0, probability=0.3))
+    return desk
+
+
+async def asked(desk: WebDesk, question: str = "") -> httpx.Response:
+    async with desk.program() as program:
+        return await program.get(LATEST + question)
+
+
+async def test_each_detection_is_told_newest_first_with_source_class_and_confidence(
+    desk: WebDesk,
+) -> None:
+    rows = (await asked(desk, "?class=person")).json()["items"]
+
+    assert [one["probability"] for one in rows] == [
+        pytest.approx(0.89 - 0.01 * n) for n in range(10)
+    ]
+    assert {(one["robot_id"], one["class"], one["class_id"]) for one in rows} == {
+        ("AGII", "person", "farmer")
+    }
+    assert len({one["at"] for one in rows}) == 10
+    # What the history keeps of the same second is less.
+    assert len(desk.records(DetectionRecord)) < 10
+
+
+@pytest.mark.parametrize(
+    ("question", "count"),
+    [
+        ("", 20),
+        ("?robot=AGII&limit=3", 3),
+        ("?robot=AGI", 0),
+        ("?class=cat", 10),
+        ("?min_probability=0.875", 2),
+        ("?person=nobody", 0),
+        ("?since=2100-01-01T00:00:00Z", 0),
+        ("?until=1971-01-01T00:00:00Z", 0),
+    ],
+)
+async def test_detections_are_filtered_as_lists_are(
+    desk: WebDesk, question: str, count: int
+) -> None:
+    assert len((await asked(desk, question)).json()["items"]) == count
+
+
+async def test_every_form_has_the_same_rows(desk: WebDesk) -> None:
+    listed = (await asked(desk)).json()["items"]
+    lines = (await asked(desk, "?format=ndjson")).text.splitlines()
+    rows = list(csv.DictReader(io.StringIO((await asked(desk, "?format=csv")).text)))
+
+    assert len(lines) == len(listed) == len(rows) == 20
+    assert [one["at"] for one in rows] == [one["at"] for one in listed]
+    assert set(rows[0]) <= set(listed[0])
+
+
+@pytest.mark.parametrize(
+    "question", ["?limit=0", "?limit=1001", "?cursor=x", "?min_probability=nan", "?x=1"]
+)
+async def test_a_question_that_cannot_be_answered_is_refused(
+    desk: WebDesk, question: str
+) -> None:
+    assert (await asked(desk, question)).status_code == 422
+
+
+async def test_a_stranger_is_told_nothing(desk: WebDesk) -> None:
+    async with desk.stranger() as stranger:
+        assert (await stranger.get(LATEST)).status_code == 401
+
+
+def test_a_crowd_makes_the_oldest_give_way(desk: WebDesk) -> None:
+    held: list[JudgedDetection] = []
+
+    def hold(judged: JudgedDetection) -> bool:
+        held.append(judged)
+        return False
+
+    newest = desk.evaluator.tracking.newest
+    newest.rows(hold, 1)
+    for _ in range(newest_detections.MOST_DETECTIONS):
+        newest.note(*held[0])
+    rows = newest.rows(lambda _: True, 10 * newest_detections.MOST_DETECTIONS)
+
+    assert len(held) == 20
+    assert len(rows) == newest_detections.MOST_DETECTIONS
+    assert {one.at for one in rows} == {held[0].received.at.wall}
