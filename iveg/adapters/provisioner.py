@@ -87,6 +87,8 @@ class Provisioner:
         self._warned: frozenset[str] = frozenset()
         self._gap = asyncio.Event()
         self._subscription_ids: frozenset[str] = frozenset()
+        self._former_ids: frozenset[str] = frozenset()
+        self._former_secrets: frozenset[str] = frozenset()
         self._is_subscribing = False
         self.throttle = Throttle(
             orion,
@@ -113,9 +115,17 @@ class Provisioner:
         return (
             subscription_id in self._subscription_ids
             or subscription_id in self.throttle.ids
+            or subscription_id in self._former_ids
             or self._is_subscribing
             or not self._subscription_ids
         )
+
+    def is_former(self, secret: str) -> bool:
+        """Whether a secret may be that of an earlier start, which Orion still brings.
+
+        Until Orion has said which subscriptions have our name, any may be.
+        """
+        return secret in self._former_secrets or not self._subscription_ids
 
     async def run(self) -> None:
         """Until cancelled."""
@@ -300,6 +310,8 @@ class Provisioner:
             self._is_subscribing = False
         first = not self._subscription_ids
         self._subscription_ids = done.ids
+        self._former_ids |= done.former_ids
+        self._former_secrets |= done.former_secrets
         self.throttle.found(done.copies, switches)
         self._explain(done.mended)
         self._health_monitor.notify_detail = done.failing

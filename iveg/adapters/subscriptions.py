@@ -71,12 +71,16 @@ class Ensured:
         mended: What had to be done, as sentences; empty when all was well.
         failing: Why Orion cannot deliver, in its words; empty when it can.
         copies: Id of each subscription that may be throttled, and whether it is.
+        former_ids: Of those that had our name and are no more.
+        former_secrets: That some with our name brought, of an earlier start.
     """
 
     ids: frozenset[str]
     mended: tuple[str, ...]
     failing: str = ""
     copies: Mapping[WantedSubscription, tuple[str, bool]] = field(default_factory=dict)
+    former_ids: frozenset[str] = frozenset()
+    former_secrets: frozenset[str] = frozenset()
 
 
 ALL_ROBOTS = (("idPattern", ".*"), ("type", names.ROBOT_TYPE))
@@ -170,7 +174,7 @@ async def ensure_subscriptions(
         description = str(one.get("description", ""))
         if description.startswith(PREFIX):
             ours.setdefault(description, []).append(one)
-    failing = _failing(ours)
+    failing, named = _failing(ours), [one for known in ours.values() for one in known]
     ids, mended, copies = [], [], {}
     for want in wanted:
         document = write_subscription(want, notify_url, token)
@@ -185,7 +189,14 @@ async def ensure_subscriptions(
         for one in leftover:
             await orion.delete_subscription(one["id"])
             mended.append(f"Removed {one['description']!r}: it is not wanted any more.")
-    return Ensured(frozenset(ids), tuple(mended), failing, copies)
+    return Ensured(
+        frozenset(ids),
+        tuple(mended),
+        failing,
+        copies,
+        frozenset(str(one["id"]) for one in named).difference(ids),
+        frozenset(map(_secret_of, named)) - {token, ""},
+    )
 
 
 def is_throttled(subscription: Document) -> bool:
@@ -258,6 +269,14 @@ def _differs(kept: Document, wanted: Document) -> str:
     if not _same_receiver(notification, wanted["notification"]):
         return "its address or secret was another"
     return ""
+
+
+def _secret_of(subscription: Document) -> str:
+    """The secret that its notifications bring; empty for none."""
+    custom = subscription.get("notification", {}).get("httpCustom", {})
+    headers = custom.get("headers", {}).items()
+    found = (str(one) for name, one in headers if name.lower() == TOKEN_HEADER.lower())
+    return next(found, "")
 
 
 def _same_receiver(kept: Document, wanted: Document) -> bool:

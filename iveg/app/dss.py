@@ -210,6 +210,7 @@ class Dss:
             parts.equipment.equipment.entities,
             parts.supervision.guard(EQUIPMENT, parts.equipment.receive),
             parts.supervision.guard(RECORDINGS, self.stores.inputs.notification),
+            self.provisioner.is_former,
         )
         site = Site(
             parts.evaluator.greenhouse.name,

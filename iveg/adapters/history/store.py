@@ -20,6 +20,7 @@ from sqlalchemy.exc import (
     StatementError,
 )
 
+from iveg.adapters import clock
 from iveg.adapters.history.engine import writing_engine
 from iveg.adapters.history.migrate import reason_of, upgrade
 from iveg.adapters.history.tables import TABLE_MAPPINGS, TableMapping
@@ -149,9 +150,14 @@ def _insert(connection: Connection, rows: Sequence[Waiting]) -> None:
 def _forget(
     connection: Connection, table: Table, values: list[_Row], keep_s: float
 ) -> None:
-    """Delete rows that are older than the newest of these by more than their time."""
-    newest = max(float(str(one["at"])) for one in values)
-    connection.execute(delete(table).where(table.c.at < newest - keep_s))
+    """Delete rows that are older than all of these by more than their time.
+
+    One row from the future (a clock that was wrong for a moment) deletes nothing: not
+    beside others of its batch, nor by itself, where this machine's clock knows better.
+    """
+    oldest = min(float(str(one["at"])) for one in values)
+    before = min(oldest, clock.wall()) - keep_s
+    connection.execute(delete(table).where(table.c.at < before))
 
 
 def _values(rows: Iterable[Waiting], mapping: TableMapping) -> list[_Row]:

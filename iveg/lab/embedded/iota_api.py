@@ -118,7 +118,9 @@ class IotaApi:
     async def query(self, request: Request) -> Response:
         """``POST /op/query``."""
         tenancy, raw = _tenancy(request), _object(request)
-        names = [name for name in raw.get("attrs", []) if isinstance(name, str)]
+        names = raw.get("attrs", [])
+        if not isinstance(names, list) or not all(isinstance(n, str) for n in names):
+            raise wrong_syntax()
         told = [
             await self.agent.query(tenancy, *_entity_key(entity), names)
             for entity in _listed(request, "entities")

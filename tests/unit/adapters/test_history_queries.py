@@ -1,3 +1,4 @@
+import time
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -377,3 +378,15 @@ async def test_a_day_of_latency_is_kept_and_no_more(
     assert [one.at for one in found] == [NOON + 3600.0 * n for n in range(6, 31)]
     assert found[0] == latency_record(at=NOON + 3600.0 * 6)
     assert await queries.latency_minutes(NOON + 3600.0 * 31) == ()
+
+
+async def test_a_minute_from_the_future_deletes_none_of_the_present(
+    database_url: str, queries: Queries
+) -> None:
+    now = time.time()
+    minutes = [latency_record(at=now - 3600.0 * n) for n in range(20)]
+    remember(database_url, *minutes)
+    remember(database_url, latency_record(at=now + 30 * 86400.0))
+    remember(database_url, latency_record(at=now + 1.0), latency_record(at=now + 1e9))
+
+    assert len(await queries.latency_minutes(0.0)) == len(minutes) + 3

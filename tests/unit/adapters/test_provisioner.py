@@ -14,7 +14,7 @@ from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.adapters.orion import OrionClient
 from iveg.adapters.provisioner import Provisioner
-from iveg.adapters.subscriptions import wanted_for
+from iveg.adapters.subscriptions import ensure_subscriptions, wanted_for
 from iveg.domain.feeds import Feeds
 from iveg.domain.observations import Odometry, Origin, Received
 from iveg.lab.embedded.http_server import Request, Response, http_server
@@ -146,6 +146,21 @@ async def test_until_the_first_are_known_those_of_an_earlier_run_are_ours(
 
     assert before
     assert not site.provisioner.is_ours("of an earlier run")
+
+
+async def test_the_secret_of_an_earlier_start_is_known_and_no_other(
+    fiware: Running,
+) -> None:
+    async with OrionClient(fiware.orion_url, *SERVICE) as orion:
+        url = "http://127.0.0.1:9/ngsi/notifications"
+        await ensure_subscriptions(orion, url, "cd" * 32, wanted_for(["AGI"]))
+    site = Site(fiware)
+    assert site.provisioner.is_former("any, before Orion has said which are ours")
+    async with site.running():
+        await first_ids(site)
+
+    assert site.provisioner.is_former("cd" * 32)
+    assert not site.provisioner.is_former("ef" * 32)
 
 
 async def test_the_probe_goes_the_way_of_every_measure(fiware: Running) -> None:

@@ -219,3 +219,22 @@ async def test_an_update_is_one_request_for_each_subscription_that_is_about_it(
         if "timesSent" in one["notification"]
     }
     assert sent == dict.fromkeys([*told, "climate"], 1)
+
+
+async def test_what_an_earlier_start_left_is_known_by_its_name() -> None:
+    store = FakeStore()
+    old = await ensure_subscriptions(store, URL, "cd" * 32, WANTED)
+    gone = await store.create_subscription(
+        dict(store.named("canary")) | {"description": PREFIX + "of another version"}
+    )
+    stranger = await store.create_subscription(
+        dict(store.named("canary")) | {"description": "somebody's"}
+    )
+    new = await ensure_subscriptions(store, URL, TOKEN, WANTED)
+
+    assert (old.former_secrets, old.former_ids) == (frozenset(), frozenset())
+    assert set(new.former_secrets) == {"cd" * 32}
+    assert set(new.former_ids) == {gone}
+    assert stranger not in new.former_ids | new.ids
+    again = await ensure_subscriptions(store, URL, TOKEN, WANTED)
+    assert (again.former_secrets, again.former_ids) == (frozenset(), frozenset())

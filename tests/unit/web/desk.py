@@ -51,6 +51,7 @@ class WebDesk(Desk):
     ) -> None:
         super().__init__(robots, greenhouse, tiles=tiles)
         self.heard: list[Instant] = []
+        self.former_secrets: set[str] = set()
         self.queues = metrics.Queues({"ingest": 3}, {"history": 2}, {"stop_send": 1})
         self.authenticator = Authenticator(
             sign_in_token="cd" * 32,
@@ -77,6 +78,7 @@ class WebDesk(Desk):
             "thinned".__eq__,
             self.parts.equipment.equipment.entities,
             self.parts.supervision.guard("equipment", self.parts.equipment.receive),
+            self.former_secrets.__contains__,
         )
         self.recordings = FakeRecordings()
         self.face = Face(

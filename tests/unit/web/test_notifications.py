@@ -68,6 +68,31 @@ async def test_f35_a_wrong_secret_is_401_and_counted(secret: str | None) -> None
     assert desk.heard == []
 
 
+@pytest.mark.parametrize(
+    ("secret", "counted"),
+    [
+        ("cd" * 32, "former_secret"),
+        ("ef" * 32, "forged_notification"),
+        (None, "forged_notification"),
+    ],
+)
+async def test_our_own_subscription_of_an_earlier_start_is_no_forgery(
+    caplog: pytest.LogCaptureFixture, secret: str | None, counted: str
+) -> None:
+    desk = WebDesk()
+    desk.former_secrets.add("cd" * 32)
+    given = {} if secret is None else {"X-Iveg-Notify-Token": secret}
+    async with desk.stranger() as stranger:
+        answer = await stranger.post(URL, content=ours(), headers=TENANT | given)
+
+    assert answer.status_code == 401
+    assert list(desk.ingest.drain()) == []
+    assert {n for n in desk.ingest.counters if n.startswith("rejected")} == {
+        f"rejected.{counted}"
+    }
+    assert ("forged" in caplog.text) == (counted == "forged_notification")
+
+
 @pytest.mark.parametrize(("size", "status"), [(1_048_576, 400), (1_048_577, 413)])
 async def test_f26_more_than_a_mebibyte_is_413(size: int, status: int) -> None:
     async with WebDesk().orion() as orion:

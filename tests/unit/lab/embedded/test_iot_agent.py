@@ -2,6 +2,7 @@ import logging
 from collections.abc import AsyncIterator
 
 import aiomqtt
+import httpx
 import orjson
 import pytest
 
@@ -131,3 +132,17 @@ async def test_a_group_that_is_changed_wrongly_stays_as_it_was(up: Running) -> N
             await agent.change_group("iveg", {"entity_type": ["Robot"]})
         (kept,) = await agent.read_groups()
     assert kept["entity_type"] == "Robot"
+
+
+@pytest.mark.parametrize("wrong", [5, None, "lazy", {"a": 1}, [1]])
+async def test_a_query_whose_attributes_are_no_names_is_refused(
+    up: Running, wrong: object
+) -> None:
+    headers = {"Fiware-Service": TENANT[0], "Fiware-ServicePath": TENANT[1]}
+    asked = {"entities": [], "attrs": wrong}
+    async with httpx.AsyncClient(base_url=up.iota_url, headers=headers) as client:
+        refused = await client.post("/op/query", json=asked)
+        well = await client.post("/op/query", json=asked | {"attrs": ["lazy"]})
+
+    assert (refused.status_code, refused.json()["name"]) == (400, "WRONG_SYNTAX")
+    assert (well.status_code, well.json()) == (200, [])
