@@ -294,6 +294,7 @@ class Dss:
         await remember(
             queries,
             parts.commander,
+            parts.goals,
             parts.evaluator,
             parts.event_log,
             parts.health_monitor,

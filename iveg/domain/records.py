@@ -97,11 +97,12 @@ class DetectionRecord:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CommandRecord:
-    """One STOP, release or resume as it stands now.
+    """One STOP, release, resume or goal as it stands now.
 
     Attributes:
         state: One of the nine states of the STOP machine, RUNNING at the end of a
-            STOP, REPLACED or EXPIRED where another command took over.
+            STOP, REPLACED or EXPIRED where another command took over; of a goal one of
+            ``domain.goals``.
         sent_at: When each transport first took it; ``answer_at`` when the robot first
             said by it that it has it.
         standing_at: First standing sample.
@@ -110,11 +111,12 @@ class CommandRecord:
         reason: A code for what is shown beside the state.
         pressed_at: When a finger pressed, by the browser's corrected clock (Unix s).
         drill: Whether it was pressed to prove that STOP works.
+        goal: Of a goal its ``{"kind", "x", "y", "aisle"}``, in ``map`` (m).
     """
 
     command_id: str
     robot_id: str
-    kind: Literal["stop", "release", "resume"]
+    kind: Literal["stop", "release", "resume", "goal"]
     state: str
     requested_by: str
     requested_at: float
@@ -126,6 +128,7 @@ class CommandRecord:
     reason: str | None = None
     pressed_at: float | None = None
     drill: bool = False
+    goal: Json | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -4,13 +4,14 @@ from collections.abc import Iterable, Sequence
 from math import isfinite
 from typing import Literal
 
-from pydantic import Field
+from pydantic import Field, ValidationError
 
 from iveg.domain import stop
+from iveg.domain.goals import GoalKind
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
 from iveg.domain.ranks import nearest_rank
-from iveg.domain.records import ByTransport, CommandEventRecord, CommandRecord
+from iveg.domain.records import ByTransport, CommandEventRecord, CommandRecord, Json
 from iveg.domain.stamps import format_stamp
 from iveg.domain.stop import StopMachine
 from iveg.domain.stop.commands import Times
@@ -82,15 +83,24 @@ class Sentence(Model):
     slots: Slots
 
 
+class CommandGoal(Model):
+    """Where a goal sends a robot, in ``map`` (m)."""
+
+    kind: GoalKind
+    x: float
+    y: float
+    aisle: str | None
+
+
 class Command(Model):
-    """One STOP, release or resume.
+    """One STOP, release, resume or goal.
 
     What only a command that goes on has is null, empty or false in the history.
     """
 
     command_id: str
     robot_id: str
-    kind: Literal["stop", "release", "resume"]
+    kind: Literal["stop", "release", "resume", "goal"]
     drill: bool
     state: str
     requested_by: str
@@ -114,6 +124,9 @@ class Command(Model):
         ),
     )
     was_loud: bool = False
+    goal: CommandGoal | None = Field(
+        default=None, description="Of a goal; on ``/live`` goals are the robot's."
+    )
     steps: list[CommandStep] = Field(
         description=(
             "Steps of the audit trail; empty on ``/live``, which reports each step "
@@ -175,11 +188,20 @@ class Command(Model):
             transports={},
             outcome=outcome_of(record),
             was_loud=was_loud((record.state, *(one.state for one in steps))),
+            goal=_goal(record.goal),
             steps=[
                 CommandStep(at=format_stamp(one.at), state=one.state, why=one.why)
                 for one in steps
             ],
         )
+
+
+def _goal(found: Json | None) -> CommandGoal | None:
+    """A remembered goal; None where a row holds none that is whole."""
+    try:
+        return None if found is None else CommandGoal.model_validate(found)
+    except ValidationError:
+        return None
 
 
 def _times(of: Times) -> CommandTimes:

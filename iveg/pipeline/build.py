@@ -265,7 +265,9 @@ def _goals(
 ) -> GoalDispatcher:
     transports, new_id = ports.transports, ports.new_id
     machines = commander.machines
-    return GoalDispatcher(world, greenhouse, machines, transports, event_log, new_id)
+    return GoalDispatcher(
+        world, greenhouse, machines, transports, event_log, new_id, ports.clock
+    )
 
 
 def _ingest(

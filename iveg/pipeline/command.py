@@ -262,7 +262,7 @@ class Commander:
         row the end is unknown.
         """
         for row in left:
-            if row.command_id in self.commands:
+            if row.command_id in self.commands or row.kind == "goal":
                 continue
             machine = self.machines.get(row.robot_id)
             heir = None

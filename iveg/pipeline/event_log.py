@@ -14,6 +14,7 @@ from iveg.domain.alerts.alert_book import BookedAlert
 from iveg.domain.alerts.stored import cleared_behind, write_alert
 from iveg.domain.decisions import SlowdownDecision
 from iveg.domain.events import LogEvent
+from iveg.domain.goals import FollowedGoal
 from iveg.domain.kinds import Kind
 from iveg.domain.observations import (
     Climate,
@@ -200,6 +201,27 @@ class EventLog:
         if changed is not None:
             self._audit(command, changed.state, changed.why or changed.key, at)
         self._hub.append(topics.COMMAND.of(command.command_id), command)
+
+    @_guarded
+    def goal(self, goal: FollowedGoal, step: str | None, at: Instant) -> None:
+        """Record a goal that is new, has taken a step or came to be known better."""
+        meant = goal.goal
+        record = CommandRecord(
+            command_id=meant.goal_id,
+            robot_id=goal.robot_id,
+            kind="goal",
+            state=goal.state,
+            requested_by=goal.by,
+            requested_at=goal.sent.wall,
+            sent_at={one: at.wall for one, at in goal.left.items()},
+            answer_at={one: at.wall for one, at in goal.words.items()},
+            tries=1,
+            reason=goal.why,
+            goal={"kind": meant.kind, "x": meant.x, "y": meant.y, "aisle": goal.aisle},
+        )
+        self._sink.enqueue(record)
+        if step is not None:
+            self._audit(record, goal.state, step, at)
 
     @_guarded
     def closed(self, closed: Closed, at: Instant) -> None:

@@ -6,7 +6,7 @@ what is open, and nothing here is sent again or reaches a STOP machine.
 
 import asyncio
 import logging
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 from iveg.domain.errors import CommandRefusedError, HopError
@@ -24,12 +24,13 @@ from iveg.domain.goals import (
 )
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import GoalAnswer, Instant
+from iveg.domain.records import CommandRecord
 from iveg.domain.stop import StopMachine
-from iveg.domain.transports import Transport
+from iveg.domain.transports import Transport, TransportId
 from iveg.domain.world import World
 from iveg.pipeline import topics
 from iveg.pipeline.event_log import EventLog
-from iveg.pipeline.ports import GoalPort, Ids
+from iveg.pipeline.ports import Clock, GoalPort, Ids
 
 _log = logging.getLogger(__name__)
 _EVENTS: Mapping[str, GoalEvent] = {
@@ -50,6 +51,7 @@ class GoalDispatcher:
         ports: The transports that carry orders.
         event_log: Tells people and the history.
         new_id: Makes ULIDs.
+        clock: Tells when an order left.
     """
 
     def __init__(
@@ -60,13 +62,17 @@ class GoalDispatcher:
         ports: Mapping[Transport, GoalPort],
         event_log: EventLog,
         new_id: Ids,
+        clock: Clock,
     ) -> None:
         self._world, self._greenhouse = world, greenhouse
         self._machines = machines
-        self._ports = [port for way, port in ports.items() if way.carries("resume")]
+        self._ports = {w.id: port for w, port in ports.items() if w.carries("resume")}
         self._event_log = event_log
         self._new_id = new_id
+        self._clock = clock
         self._goals: dict[str, FollowedGoal] = {}
+        self._given: set[str] = set()
+        """Ids of all goals of this run: what the history has of them is our own."""
         self._tasks: set[asyncio.Task[None]] = set()
 
     # --- people -------------------------------------------------------------------
@@ -91,6 +97,7 @@ class GoalDispatcher:
         self._change(robot_id, "replaced", at)
         followed = FollowedGoal(robot_id, goal, by, at, at, wish.aisle)
         self._goals[robot_id] = followed
+        self._given.add(goal.goal_id)
         self._tell(followed, "sent", at)
         self._send(robot_id, order)
         return followed
@@ -117,17 +124,26 @@ class GoalDispatcher:
 
     # --- what comes back, and time ------------------------------------------------
 
-    def heard(self, answer: GoalAnswer, at: Instant) -> None:
-        """Take a robot's word of its goal."""
+    def heard(self, answer: GoalAnswer, at: Instant, transport: TransportId) -> None:
+        """Take a robot's word of its goal; of a second transport its time alone."""
         goal = self._goals.get(answer.robot_id)
         if goal is None or goal.goal.goal_id != answer.id:
             return
+        if transport not in goal.words:
+            goal = self._goals[answer.robot_id] = goal.heard_by(transport, at)
+            self._event_log.goal(goal, None, at)
         event = _EVENTS[answer.result]
         if event == "dropped" and goal.forgotten is None:
             self._goals[answer.robot_id] = replace(goal, forgotten=at)
         if answer.why == "held" and event == "dropped":
             event = "held"
         self._change(answer.robot_id, event, at, answer.why)
+
+    def close_earlier(self, rows: Iterable[CommandRecord], now: Instant) -> None:
+        """Close goals that an earlier run left open; nobody follows them any more."""
+        for row in rows:
+            if row.kind == "goal" and row.command_id not in self._given:
+                self._event_log.left_over(row, None, now)
 
     def tick(self, now: Instant) -> None:
         """Delete the goals of robots that are held, and end what waits in vain."""
@@ -184,27 +200,45 @@ class GoalDispatcher:
         key = f"sent.{goal.goal.kind}" if event == "sent" else event
         line = LogEvent("command", f"log.goal.{key}", slots, goal.robot_id)
         self._event_log.log(line, at)
+        self._event_log.goal(goal, event, at)
         self._event_log.changed(topics.ROBOT.of(goal.robot_id))
 
     # --- sending ------------------------------------------------------------------
 
     def _send(self, robot_id: str, order: GoalOrder | CancelOrder) -> None:
-        for port in self._ports:
-            work = self._attempt(port, robot_id, order)
+        for transport, port in self._ports.items():
+            work = self._attempt(transport, port, robot_id, order)
             task = asyncio.get_running_loop().create_task(work, name=f"goal-{robot_id}")
             self._tasks.add(task)
             task.add_done_callback(self._tasks.discard)
 
     async def _attempt(
-        self, port: GoalPort, robot_id: str, order: GoalOrder | CancelOrder
+        self,
+        transport: TransportId,
+        port: GoalPort,
+        robot_id: str,
+        order: GoalOrder | CancelOrder,
     ) -> None:
         is_goal = isinstance(order, GoalOrder)
         if is_goal and self._is_held(robot_id):
             return
+        left = self._clock()
         try:
             await port.goal(robot_id, order)
         except HopError as error:
             _log.info("goal of %s: %s", robot_id, error)
+            return
+        if isinstance(order, GoalOrder):
+            self._note_left(robot_id, order.goal.goal_id, transport, left)
+
+    def _note_left(
+        self, robot_id: str, goal_id: str, transport: TransportId, left: Instant
+    ) -> None:
+        """Record when a goal left; one that gave way to another keeps its row."""
+        goal = self._goals[robot_id]
+        if goal.goal.goal_id == goal_id:
+            goal = self._goals[robot_id] = goal.left_by(transport, left)
+            self._event_log.goal(goal, None, left)
 
     async def close(self) -> None:
         """Cancel the sends that are under way."""

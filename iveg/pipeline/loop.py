@@ -17,6 +17,7 @@ from iveg.domain.observations import (
     Received,
     kind_of,
 )
+from iveg.domain.transports import TransportId
 from iveg.pipeline import topics
 from iveg.pipeline.command import Commander
 from iveg.pipeline.evaluate import Evaluator
@@ -27,6 +28,7 @@ from iveg.pipeline.ports import Clock
 from iveg.pipeline.supervision import Supervision
 
 TICK_S = 0.05
+_ANSWERS = (CommandAnswer, GoalAnswer)
 APART_S = 0.0002
 """Least time between two takings for each robot of the fleet: 4 ms with twenty."""
 JUDGED_APART_S = 2 * APART_S
@@ -64,7 +66,10 @@ class RuleLoop:
         supervision: Supervision,
         decided: Callable[[Iterable[Received], Instant], None],
         ticks: Sequence[Callable[[Instant], None]],
-        goals: tuple[Callable[[GoalAnswer, Instant], None], Callable[[Instant], None]],
+        goals: tuple[
+            Callable[[GoalAnswer, Instant, TransportId], None],
+            Callable[[Instant], None],
+        ],
     ) -> None:
         self._ingest = ingest
         self._evaluator = evaluator
@@ -119,7 +124,7 @@ class RuleLoop:
             if isinstance(received.observation, HeartbeatProbe):
                 self._health_monitor.received(received.observation.origin, received.at)
             # The second transport's answer is no news, but its time is kept.
-            if not fresh and not isinstance(received.observation, CommandAnswer):
+            if not fresh and not isinstance(received.observation, _ANSWERS):
                 continue
             if self._evaluator.world.may_act(received):
                 self._act(received)
@@ -142,7 +147,7 @@ class RuleLoop:
         """Hand an observation to whoever follows an order."""
         observation = received.observation
         if isinstance(observation, GoalAnswer):
-            self._goal_heard(observation, received.at)
+            self._goal_heard(observation, received.at, received.transport)
         else:
             age_s = self._evaluator.world.age_then(received)
             self._commander.apply(received, age_s)

@@ -21,6 +21,7 @@ from iveg.domain.records import (
 from iveg.pipeline.command import Commander
 from iveg.pipeline.evaluate import Evaluator
 from iveg.pipeline.event_log import EventLog
+from iveg.pipeline.goals import GoalDispatcher
 from iveg.pipeline.health_monitor import HealthMonitor
 from iveg.pipeline.ports import Clock
 
@@ -54,6 +55,7 @@ class History(Protocol):
 async def remember(
     history: History,
     commander: Commander,
+    goals: GoalDispatcher,
     evaluator: Evaluator,
     event_log: EventLog,
     health_monitor: HealthMonitor,
@@ -73,6 +75,7 @@ async def remember(
             continue
         now = read_clock()
         commander.close_earlier(left_open, now)
+        goals.close_earlier(left_open, now)
         commander.drills.remember(drilled)
         evaluator.close_earlier(decisions, alerted, now)
         evaluator.alerts.remember(read_alert(one, now) for one in unseen)

@@ -69,3 +69,11 @@ def test_a_goal_is_tapped_and_driven_and_a_plain_tap_is_none(
     open_menu(page, "AGI")
     said = card(page, "AGI").locator('[data-part="goal-state"]')
     expect(said).to_contain_text("the robot is there")
+
+    panel = card(page, "AGI").locator("dialog")
+    panel.locator('[data-part="goal-aisle"]').select_option(label="Aisle 3")
+    panel.locator('[data-goal="aisle"]').click()
+    until(lambda: goal()["kind"] == "aisle" or None, 10.0, "AGI is sent to an aisle")
+    orders = open_page(locale="en-GB", route="/commands").locator("#orders-rows")
+    expect(orders).to_contain_text("Goal: Aisle 3")
+    expect(orders).to_contain_text("Is at its goal")

@@ -140,6 +140,7 @@ export function detection(changes = {}) {
 export function command(changes = {}) {
   return {
     command_id: "c1",
+    goal: null,
     robot_id: "AGI",
     kind: "stop",
     state: "SENT",

@@ -1,4 +1,4 @@
-import { goalSaid, whyNotGoal } from "../../iveg/static/js/panels/goal.js";
+import { goalSaid, whyNotGoal, wishOf } from "../../iveg/static/js/panels/goal.js";
 import { command, robot } from "./builders.js";
 import { equal, test } from "./harness.js";
 
@@ -30,6 +30,13 @@ function said(changes) {
   const i18n = /** @type {any} */ ({ t: (/** @type {string} */ key) => key });
   return goalSaid(robot({ goal }), i18n);
 }
+
+test("each button of the menu asks for what it says", () => {
+  equal(wishOf("aisle", "Pasillo 3"), { kind: "aisle", aisle: "Pasillo 3" });
+  equal(wishOf("return", "Pasillo 3"), { kind: "return" });
+  equal(wishOf("pause", "Pasillo 3"), { kind: "pause" });
+  equal(wishOf("cancel", "Pasillo 3"), null);
+});
 
 test("a free robot of an operator may be sent", () => {
   equal(whyNotGoal(facts()), "ok");

@@ -29,6 +29,7 @@ from sqlalchemy import (
 from sqlalchemy.types import TypeEngine
 
 from iveg.adapters.history.json_column import JsonValue
+from iveg.domain.goals import OPEN_STATES
 from iveg.domain.records import (
     AlertRecord,
     ClimateRecord,
@@ -152,6 +153,7 @@ commands = Table(
     _text("reason"),
     _number("pressed_at"),
     Column("drill", Boolean, nullable=False, server_default=false()),
+    _json("goal", null=True),
     _revision(),
     Index(None, "requested_at", "command_id"),
     Index(None, "robot_id", "requested_at"),
@@ -310,8 +312,9 @@ def is_open_command() -> ColumnElement[bool]:
     """Whether the last row of a command says that it still goes on."""
     c = commands.c
     stops = and_(c.kind == "stop", c.state.not_in(("RUNNING", "REPLACED", "EXPIRED")))
+    goals = and_(c.kind == "goal", c.state.in_(OPEN_STATES))
     # A release that was refused or confirmed keeps the state that followed.
-    return or_(stops, and_(c.kind != "stop", c.state == "RELEASING"))
+    return or_(stops, and_(c.kind != "stop", c.state == "RELEASING"), goals)
 
 
 @dataclass(frozen=True, slots=True)

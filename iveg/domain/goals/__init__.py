@@ -2,6 +2,7 @@
 
 from iveg.domain.goals.followed import (
     ANSWERED_WITHIN_S,
+    OPEN_STATES,
     FollowedGoal,
     GoalEvent,
     GoalState,
@@ -12,6 +13,7 @@ from iveg.domain.goals.places import GoalWish, place_of
 
 __all__ = [
     "ANSWERED_WITHIN_S",
+    "OPEN_STATES",
     "CancelOrder",
     "FollowedGoal",
     "Goal",

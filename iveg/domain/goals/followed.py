@@ -12,11 +12,12 @@ A pair without a row changes nothing: what has ended stays ended.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from iveg.domain.goals.orders import Goal
 from iveg.domain.observations import Instant
+from iveg.domain.transports import TransportId
 
 GoalState = Literal[
     "SENT",
@@ -42,7 +43,7 @@ GoalEvent = Literal[
 ANSWERED_WITHIN_S = 10.0
 """An order that the robot has not answered by then is not confirmed (s)."""
 
-_OPEN: tuple[GoalState, ...] = ("SENT", "DRIVING", "UNCONFIRMED", "CANCELLING")
+OPEN_STATES: tuple[GoalState, ...] = ("SENT", "DRIVING", "UNCONFIRMED", "CANCELLING")
 _TABLE: Mapping[tuple[GoalState, GoalEvent], GoalState] = {
     ("SENT", "accepted"): "DRIVING",
     ("SENT", "refused"): "REFUSED",
@@ -53,9 +54,9 @@ _TABLE: Mapping[tuple[GoalState, GoalEvent], GoalState] = {
     ("CANCELLING", "expired"): "UNCONFIRMED",
     **{(one, "reached"): "REACHED" for one in ("SENT", "DRIVING", "UNCONFIRMED")},
     **{(one, "cancel"): "CANCELLING" for one in ("SENT", "DRIVING", "UNCONFIRMED")},
-    **{(one, "dropped"): "CANCELLED" for one in _OPEN},
-    **{(one, "held"): "DELETED" for one in _OPEN},
-    **{(one, "replaced"): "REPLACED" for one in _OPEN},
+    **{(one, "dropped"): "CANCELLED" for one in OPEN_STATES},
+    **{(one, "held"): "DELETED" for one in OPEN_STATES},
+    **{(one, "replaced"): "REPLACED" for one in OPEN_STATES},
 }
 
 
@@ -69,6 +70,7 @@ class FollowedGoal:
         asked: When the robot was last asked something: goal or cancellation.
         why: Code of the robot's refusal.
         forgotten: When the robot itself first said that it drives to it no longer.
+        left: When each transport took it; ``words`` the robot's first word by each.
     """
 
     robot_id: str
@@ -82,11 +84,13 @@ class FollowedGoal:
     answered: Instant | None = None
     ended: Instant | None = None
     forgotten: Instant | None = None
+    left: Mapping[TransportId, Instant] = field(default_factory=dict)
+    words: Mapping[TransportId, Instant] = field(default_factory=dict)
 
     @property
     def is_open(self) -> bool:
         """Whether the robot may be on its way."""
-        return self.state in _OPEN
+        return self.state in OPEN_STATES
 
     def after(
         self, event: GoalEvent, at: Instant, why: str | None = None
@@ -102,8 +106,16 @@ class FollowedGoal:
             why=why,
             asked=at if event == "cancel" else self.asked,
             answered=at if is_word and self.answered is None else self.answered,
-            ended=None if state in _OPEN else at,
+            ended=None if state in OPEN_STATES else at,
         )
+
+    def left_by(self, transport: TransportId, at: Instant) -> "FollowedGoal":
+        """Note that a transport took it."""
+        return replace(self, left={transport: at, **self.left})
+
+    def heard_by(self, transport: TransportId, at: Instant) -> "FollowedGoal":
+        """Note the robot's word by a transport; the first one counts."""
+        return replace(self, words={transport: at, **self.words})
 
     def is_overdue(self, now: Instant) -> bool:
         """Whether what was asked last can be answered no more."""

@@ -4,7 +4,7 @@ A row keeps the state of the machine when the order was no longer followed, and 
 the robot's state: "running" does not say how a STOP ended.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Literal
 
 from iveg.domain.records import CommandRecord
@@ -18,7 +18,16 @@ Outcome = Literal[
     "refused",
     "expired",
     "replaced",
+    "reached",
+    "cancelled",
+    "deleted",
 ]
+_OF_GOALS: Mapping[str, Outcome] = {
+    "REACHED": "reached",
+    "REFUSED": "refused",
+    "CANCELLED": "cancelled",
+    "DELETED": "deleted",
+}
 LOUD = frozenset({"UNCONFIRMED", "STILL_MOVING"})
 
 
@@ -30,6 +39,8 @@ def outcome_of(record: CommandRecord) -> Outcome:
         return "replaced"
     if record.kind == "stop":
         return _of_stop(record)
+    if record.kind == "goal":
+        return _OF_GOALS.get(record.state, "open")
     if record.state == "RELEASING":
         return "open"
     if record.reason is not None:

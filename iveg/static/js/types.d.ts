@@ -99,11 +99,11 @@ export type ClimateReading = {
   at: string;
 };
 
-/** One STOP, release or resume. */
+/** One STOP, release, resume or goal. */
 export type Command = {
   command_id: string;
   robot_id: string;
-  kind: "stop" | "release" | "resume";
+  kind: "stop" | "release" | "resume" | "goal";
   drill: boolean;
   state: string;
   requested_by: string;
@@ -121,10 +121,20 @@ export type Command = {
   robot: CommandRobot | null;
   challenge_fresh: boolean;
   /** How it ended; null on ``/live``, where ``state`` says how it stands. */
-  outcome: "open" | "stood" | "not_seen_standing" | "released" | "resumed" | "refused" | "expired" | "replaced" | null;
+  outcome: "open" | "stood" | "not_seen_standing" | "released" | "resumed" | "refused" | "expired" | "replaced" | "reached" | "cancelled" | "deleted" | null;
   was_loud: boolean;
+  /** Of a goal; on ``/live`` goals are the robot's. */
+  goal: CommandGoal | null;
   /** Steps of the audit trail; empty on ``/live``, which reports each step itself. */
   steps: CommandStep[];
+};
+
+/** Where a goal sends a robot, in ``map`` (m). */
+export type CommandGoal = {
+  kind: "here" | "aisle" | "return" | "pause";
+  x: number;
+  y: number;
+  aisle: string | null;
 };
 
 /** The robot's last word, while a command is open. */

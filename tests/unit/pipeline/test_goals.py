@@ -7,6 +7,8 @@ import pytest
 from iveg.domain.errors import CommandRefusedError, UnknownRobotError
 from iveg.domain.goals import CancelOrder, FollowedGoal, GoalOrder, GoalWish
 from iveg.domain.observations import GoalAnswer, Hold, Origin
+from iveg.domain.records import CommandEventRecord, CommandRecord
+from iveg.domain.stop.outcome import outcome_of
 from tests.builders import odometry, safety_report
 from tests.unit.pipeline.desk import Desk, settle
 
@@ -82,6 +84,76 @@ async def test_answer_and_progress_are_recorded() -> None:
         "reached",
     ]
     assert (lines[0].slots["by"], lines[-1].slots["s"]) == ("ana", 4.0)
+
+
+def row(desk: Desk) -> CommandRecord:
+    """The newest row of the goal, as the history keeps it."""
+    return [one for one in desk.records(CommandRecord) if one.kind == "goal"][-1]
+
+
+async def test_a_goal_is_a_row_of_the_commands_with_answer_and_progress() -> None:
+    desk = await sent(GoalWish("here", 5.0, 6.0))
+    left = desk.clock().wall
+    desk.clock.now += 0.5
+    say(desk, "ACCEPTED")
+    desk.clock.now += 4.0
+    free(desk)
+    say(desk, "REACHED")
+
+    told = row(desk)
+    steps = [one.state for one in desk.records(CommandEventRecord)]
+    assert told.command_id == newest(desk).goal.goal_id
+    assert (told.robot_id, told.state, told.requested_by) == ("AGI", "REACHED", "ana")
+    assert told.goal == {"kind": "here", "x": 5.0, "y": 6.0, "aisle": None}
+    assert told.sent_at == {"direct": left, "fiware": left}
+    assert list(told.answer_at.values()) == [pytest.approx(left + 0.5)]
+    assert steps == ["SENT", "DRIVING", "REACHED"]
+    assert outcome_of(told) == "reached"
+
+
+@pytest.mark.parametrize(
+    ("result", "state", "outcome"),
+    [("REFUSED", "REFUSED", "refused"), ("DROPPED", "CANCELLED", "cancelled")],
+)
+async def test_the_row_of_a_goal_says_how_it_ended(
+    result: str, state: str, outcome: str
+) -> None:
+    desk = await sent()
+    say(desk, result, "no_way")
+
+    assert (row(desk).state, row(desk).reason) == (state, "no_way")
+    assert outcome_of(row(desk)) == outcome
+
+
+async def test_a_goal_that_a_stop_deletes_says_so_in_its_row() -> None:
+    desk = await sent()
+    await desk.commander.stop(["AGI"], "ben", desk.clock())
+    newest(desk)
+
+    assert (row(desk).state, outcome_of(row(desk))) == ("DELETED", "deleted")
+
+
+async def test_a_goal_that_no_transport_took_has_no_time_of_it() -> None:
+    desk = Desk()
+    desk.fleet.fails = True
+    desk.broker.refuse()
+    free(desk)
+    desk.parts.goals.give("AGI", THERE, "ana", desk.clock())
+    await settle()
+
+    assert (row(desk).state, row(desk).sent_at) == ("SENT", {})
+
+
+async def test_goals_of_an_earlier_run_are_closed_and_ours_are_not() -> None:
+    desk = await sent()
+    ours = row(desk)
+    desk.parts.goals.close_earlier(
+        [ours, replace(ours, command_id="01OLD")], desk.clock()
+    )
+
+    rows = {one.command_id: one for one in desk.records(CommandRecord)}
+    assert (rows["01OLD"].state, outcome_of(rows["01OLD"])) == ("EXPIRED", "expired")
+    assert rows[ours.command_id].state == "SENT"
 
 
 async def test_an_unanswered_goal_is_not_confirmed_and_never_sent_again() -> None:

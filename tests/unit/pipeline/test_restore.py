@@ -51,6 +51,7 @@ async def take_up(desk: Desk, left: LeftBehind) -> None:
     await remember(
         cast("History", left),
         desk.commander,
+        desk.parts.goals,
         desk.evaluator,
         desk.event_log,
         desk.health_monitor,

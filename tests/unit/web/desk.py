@@ -78,7 +78,7 @@ class WebDesk(Desk):
             "thinned".__eq__,
             self.parts.equipment.equipment.entities,
             self.parts.supervision.guard("equipment", self.parts.equipment.receive),
-            self.former_secrets.__contains__,
+            is_former=self.former_secrets.__contains__,
         )
         self.recordings = FakeRecordings()
         self.face = Face(

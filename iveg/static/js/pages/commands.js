@@ -30,6 +30,11 @@ export function start({ store, i18n }) {
     drills.load();
   }
   store.subscribe("commands/", soon(load));
+  // Goals have no topic of their own; every step of one is a line of the log.
+  const loadSoon = soon(load);
+  store.subscribe("log", ({ key }) => {
+    if (key.startsWith("log.goal.")) loadSoon();
+  });
   store.subscribe("snapshot", soon(load));
   store.subscribe("alerts", drills.draw);
   i18n.onChange(drills.draw);
@@ -125,7 +130,11 @@ function endOf(command, i18n, opened) {
 }
 
 /** @param {import("./latency.js").Order} command @param {I18n} i18n */
-function orderSaid({ kind, drill }, i18n) {
+function orderSaid({ kind, drill, goal }, i18n) {
+  if (goal) {
+    const place = i18n.t(`goal.kind.${goal.kind}`, { ...goal });
+    return i18n.t("commandspage.goal", { place });
+  }
   return drill ? i18n.t("drill.heading") : i18n.t(`history.kind.${kind}`);
 }
 

@@ -6,14 +6,16 @@
  */
 
 import { sendApi } from "../core/api.js";
-import { all, needPart, setHidden, setText } from "./dom.js";
+import { laneName } from "../core/lanes.js";
+import { all, make, needPart, setHidden, setText } from "./dom.js";
 import { whyNotAtAll } from "./release.js";
 
 /** @typedef {import("../main.js").App} App */
 /** @typedef {import("../core/i18n.js").I18n} I18n */
 /** @typedef {import("../core/protocol.js").Robot} Robot */
 /** @typedef {import("./release.js").Facts} Facts */
-/** @typedef {{kind: "here", x: number, y: number} | {kind: "return" | "pause"}} Wish */
+/** @typedef {{kind: "here", x: number, y: number} | {kind: "aisle", aisle: string}
+ *   | {kind: "return" | "pause"}} Wish */
 
 const OPEN = new Set(["SENT", "DRIVING", "UNCONFIRMED", "CANCELLING", "REACHED"]);
 
@@ -22,11 +24,21 @@ const OPEN = new Set(["SENT", "DRIVING", "UNCONFIRMED", "CANCELLING", "REACHED"]
  * @param {HTMLElement} card
  * @param {string} robotId
  */
-export function createGoal({ i18n, dialogs }, card, robotId) {
+export function createGoal({ i18n, store, dialogs }, card, robotId) {
   const panel = /** @type {HTMLDialogElement} */ (needPart("panel", card));
   const buttons = /** @type {HTMLButtonElement[]} */ (all("[data-goal]", card));
+  const aisle = /** @type {HTMLSelectElement} */ (needPart("goal-aisle", card));
   let isBusy = false;
   let result = "";
+
+  function drawAisles() {
+    const labels = store.map()?.lanes.map(({ label }) => label) ?? [];
+    const said = labels.map((label) => laneName(label, i18n.t));
+    if (String(said) === String([...aisle.options].map(({ text }) => text))) return;
+    const chosen = aisle.value;
+    aisle.replaceChildren(...labels.map((label, i) => optionOf(label, said[i])));
+    if (labels.includes(chosen)) aisle.value = chosen;
+  }
 
   /** @param {Facts} facts */
   function draw(facts) {
@@ -34,6 +46,7 @@ export function createGoal({ i18n, dialogs }, card, robotId) {
       result = "";
       return;
     }
+    drawAisles();
     const why = isBusy ? "busy" : whyNotGoal(facts);
     setText(needPart("goal-state", card), goalSaid(facts.robot, i18n));
     setText(needPart("goal-why", card), i18n.t(`goal.why.${why}`));
@@ -41,7 +54,8 @@ export function createGoal({ i18n, dialogs }, card, robotId) {
     for (const button of buttons) {
       const isCancel = button.dataset.goal === "cancel";
       const may = isCancel ? mayCancel(facts) && !isBusy : why === "ok";
-      button.disabled = !may;
+      const lacksAisle = button.dataset.goal === "aisle" && !aisle.value;
+      button.disabled = !may || lacksAisle;
       setHidden(button, isCancel && !OPEN.has(facts.robot?.goal?.state ?? ""));
     }
   }
@@ -55,8 +69,7 @@ export function createGoal({ i18n, dialogs }, card, robotId) {
       return;
     }
     isBusy = true;
-    const kind = wanted === "return" ? "return" : "pause";
-    result = await sendGoal(robotId, wanted === "cancel" ? null : { kind }, i18n);
+    result = await sendGoal(robotId, wishOf(wanted, aisle.value), i18n);
     isBusy = false;
   }
 
@@ -64,6 +77,21 @@ export function createGoal({ i18n, dialogs }, card, robotId) {
     button.addEventListener("click", () => press(String(button.dataset.goal)));
   }
   return { draw };
+}
+
+/** @param {string} label @param {string} said */
+function optionOf(label, said) {
+  const option = make("option", "", said);
+  option.value = label;
+  return option;
+}
+
+/** What a button of the menu asks for; null takes the goal back.
+ * @param {string} wanted @param {string} aisle @returns {Wish | null} */
+export function wishOf(wanted, aisle) {
+  if (wanted === "cancel") return null;
+  if (wanted === "aisle") return { kind: "aisle", aisle };
+  return { kind: wanted === "return" ? "return" : "pause" };
 }
 
 /**
