@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from math import isfinite
-from typing import Literal
+from typing import Any, Literal
 
 from pydantic import Field, ValidationError
 
@@ -16,7 +16,7 @@ from iveg.domain.stamps import format_stamp
 from iveg.domain.stop import StopMachine
 from iveg.domain.stop.commands import Times
 from iveg.domain.stop.outcome import Outcome, outcome_of, was_loud
-from iveg.domain.transports import DIRECT, TransportId
+from iveg.domain.transports import DIRECT, TRANSPORTS, TransportId
 from iveg.models.base import Model, Slots, rounded, stamp
 
 AGENT_LATE_S = 1.0
@@ -58,6 +58,20 @@ class CommandTimes(Model):
             answer={one: format_stamp(at) for one, at in answer.items()},
             standing=stamp(standing),
         )
+
+    def columns(self) -> dict[str, Any]:
+        """The same under the names that a CSV has."""
+        by_transport = {
+            f"{step}_{one.id}_at": times.get(one.id)
+            for step, times in (("sent", self.sent), ("answer", self.answer))
+            for one in TRANSPORTS
+        }
+        return {
+            "pressed_at": self.pressed,
+            "requested_at": self.requested,
+            "standing_at": self.standing,
+            **by_transport,
+        }
 
 
 class CommandRobot(Model):
@@ -105,6 +119,15 @@ class Command(Model):
     state: str
     requested_by: str
     times: CommandTimes
+    pressed_at: str | None = Field(
+        description="As in ``times``, under the name of the CSV; so the six below."
+    )
+    requested_at: str
+    sent_fiware_at: str | None
+    sent_direct_at: str | None
+    answer_fiware_at: str | None
+    answer_direct_at: str | None
+    standing_at: str | None
     standstill_ms: float | None
     tries: int
     reason: str | None
@@ -139,6 +162,7 @@ class Command(Model):
         cls, of: stop.FollowedCommand, machine: StopMachine, now: Instant
     ) -> "Command":
         """One command with the robot's last word."""
+        times = _times(of.times)
         return cls(
             command_id=of.command_id,
             robot_id=of.robot_id,
@@ -146,7 +170,8 @@ class Command(Model):
             drill=of.drill,
             state=of.state,
             requested_by=of.requesters[0],
-            times=_times(of.times),
+            times=times,
+            **times.columns(),
             standstill_ms=rounded(of.standstill_ms),
             tries=of.tries,
             reason=of.reason,
@@ -167,6 +192,13 @@ class Command(Model):
         cls, record: CommandRecord, steps: Sequence[CommandEventRecord] = ()
     ) -> "Command":
         """One command as it is remembered, with each of its steps."""
+        times = CommandTimes.of(
+            record.pressed_at,
+            record.requested_at,
+            record.sent_at,
+            record.answer_at,
+            record.standing_at,
+        )
         return cls(
             command_id=record.command_id,
             robot_id=record.robot_id,
@@ -174,13 +206,8 @@ class Command(Model):
             drill=record.drill,
             state=record.state,
             requested_by=record.requested_by,
-            times=CommandTimes.of(
-                record.pressed_at,
-                record.requested_at,
-                record.sent_at,
-                record.answer_at,
-                record.standing_at,
-            ),
+            times=times,
+            **times.columns(),
             standstill_ms=record.standstill_ms,
             tries=record.tries,
             reason=record.reason,

@@ -49,12 +49,24 @@ class Decision(Model):
     class_id: str | None
     confidence: float | None
     position: Position | None
+    x: float | None = Field(
+        description="As in ``position``, under the name of the CSV; so ``y``, ``z``."
+    )
+    y: float | None
+    z: float | None
     distance_m: float | None = Field(
         description="From the robot to the centre of the ring."
     )
     speed_factor: float | None
     reason: str | None
     rule: DecisionRule
+    rule_id: str | None = Field(
+        description="As in ``rule``, under the name of the CSV; so the two below."
+    )
+    rule_version: str | None
+    rule_parameters: JsonValue = Field(
+        description="With ``places``, as they are stored."
+    )
     in_sight: bool | None
     started_at: str
     feedback_at: str | None
@@ -89,6 +101,9 @@ class Decision(Model):
             class_id=record.class_id,
             confidence=record.confidence,
             position=_position(record),
+            x=record.x,
+            y=record.y,
+            z=record.z,
             distance_m=record.distance_m,
             speed_factor=record.speed_factor,
             reason=record.reason,
@@ -97,6 +112,9 @@ class Decision(Model):
                 version=record.rule_version,
                 parameters=parameters,
             ),
+            rule_id=record.rule_id,
+            rule_version=record.rule_version,
+            rule_parameters=dict(record.rule_parameters),
             in_sight=record.in_sight,
             started_at=format_stamp(record.started_at),
             feedback_at=stamp(record.feedback_at),

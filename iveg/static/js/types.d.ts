@@ -108,6 +108,14 @@ export type Command = {
   state: string;
   requested_by: string;
   times: CommandTimes;
+  /** As in ``times``, under the name of the CSV; so the six below. */
+  pressed_at: string | null;
+  requested_at: string;
+  sent_fiware_at: string | null;
+  sent_direct_at: string | null;
+  answer_fiware_at: string | null;
+  answer_direct_at: string | null;
+  standing_at: string | null;
   standstill_ms: number | null;
   tries: number;
   reason: string | null;
@@ -198,11 +206,20 @@ export type Decision = {
   class_id: string | null;
   confidence: number | null;
   position: Position | null;
+  /** As in ``position``, under the name of the CSV; so ``y``, ``z``. */
+  x: number | null;
+  y: number | null;
+  z: number | null;
   /** From the robot to the centre of the ring. */
   distance_m: number | null;
   speed_factor: number | null;
   reason: string | null;
   rule: DecisionRule;
+  /** As in ``rule``, under the name of the CSV; so the two below. */
+  rule_id: string | null;
+  rule_version: string | null;
+  /** With ``places``, as they are stored. */
+  rule_parameters: JsonValue;
   in_sight: boolean | null;
   started_at: string;
   feedback_at: string | null;
