@@ -1,4 +1,3 @@
-import { delaysOf } from "../../iveg/static/js/panels/decision.js";
 import { drawDecision, sceneOf } from "../../iveg/static/js/panels/decision_map.js";
 import { equal, test } from "./harness.js";
 
@@ -34,11 +33,4 @@ test("13.13: the picture shows who was where, by the record alone", () => {
 test("13.13: a decision without a place has no picture, one with a place has one", () => {
   equal(drawDecision({ ...decision, position: null }, null, words), null);
   equal(drawDecision(decision, null, words)?.width !== 0, true);
-});
-
-test("13.13: each link tells how long it took after the one before", () => {
-  const at = (/** @type {string | null} */ text) =>
-    /** @type {any} */ ({ at: text && `2026-11-20T12:00:${text}Z` });
-  const links = [at("00.100"), at("00.100"), at(null), at("00.350"), at("00.330")];
-  equal(delaysOf(links), [null, 0, null, 250, -20]);
 });

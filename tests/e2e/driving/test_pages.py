@@ -145,6 +145,8 @@ def test_every_decision_is_listed_and_leads_to_its_own_page(
 
     expect(page.locator("#decision-record")).to_contain_text("→ 50")
     page.wait_for_url(re.compile(r"/decisions/.+"))
+    speed = page.locator(".plot__area [data-kind=speed]")
+    expect(speed).to_have_attribute("d", re.compile(r"^M[\d.]+ [\d.]+h0"))
 
 
 def test_paper_gets_the_table_and_no_stop(open_page: OpenPage, shown: Site) -> None:

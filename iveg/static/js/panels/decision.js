@@ -7,6 +7,9 @@ import { readApi } from "../core/api.js";
 import { dayAndTime, millisecondsOf } from "../pages/history/local_time.js";
 import { drawDecision } from "./decision_map.js";
 import { make, need } from "./dom.js";
+import { readPast, spanOf } from "./past.js";
+import { makePlots } from "./record_plots.js";
+import { makeTimeline } from "./timeline.js";
 
 /**
  * @typedef {{link: string, at: string | number | null,
@@ -15,6 +18,7 @@ import { make, need } from "./dom.js";
  * @typedef {{decision_id: string, kind: string, robot_id: string | null,
  *   person_id: string | null, started_at: string | null, ended_at: string | null,
  *   class_id: string | null, speed_factor: number | null,
+ *   speed_before: number | null, speed_after: number | null,
  *   rule: {id: string | null, version: string | null, parameters: any},
  *   links: Link[], sentence: {key: string, slots: Record<string, any>} | null}
  *   & import("./decision_map.js").Drawn} Decision
@@ -43,6 +47,8 @@ export function createRecord(place, i18n) {
   let shown = null;
   /** @type {import("../core/protocol.js").GreenhouseMap | null} */
   let map = null;
+  /** @type {import("./past.js").Past | null} */
+  let past = null;
   let asked = "";
 
   /** @param {string} decisionId */
@@ -57,7 +63,10 @@ export function createRecord(place, i18n) {
     ]);
     if (asked !== decisionId) return;
     if (greenhouse?.status === 200) map = greenhouse.body;
+    const found = status === 200 ? await pastOf(body) : null;
+    if (asked !== decisionId) return;
     shown = status === 200 ? body : null;
+    past = found;
     place.setAttribute("aria-busy", "false");
     if (shown) draw();
     else
@@ -68,11 +77,8 @@ export function createRecord(place, i18n) {
     if (!shown) return;
     const { sentence } = shown;
     const head = sentence ? i18n.t(sentence.key, sentence.slots) : shown.kind;
-    const chain = make("ol", "chain");
-    const delays = delaysOf(shown.links ?? []);
-    chain.append(
-      ...(shown.links ?? []).map((link, i) => makeLink(link, delays[i], i18n)),
-    );
+    const steps = (shown.links ?? []).map((link) => stepOf(link, i18n));
+    const plots = past && makePlots(past, aboutOf(shown, i18n), i18n);
     const began = momentSaid(shown.started_at);
     const ended = shown.ended_at
       ? `${i18n.t("decision.ended")} ${momentSaid(shown.ended_at)}`
@@ -83,7 +89,8 @@ export function createRecord(place, i18n) {
       make("small", "", `${i18n.t("decision.started")} ${began} · ${ended}`),
       ...(picture ? [picture] : []),
       makeFacts(shown, i18n),
-      chain,
+      ...(plots ? [plots] : []),
+      makeTimeline(steps, (ms) => delaySaid(ms, i18n)),
       make("small", "", `${i18n.t("decision.id")} ${shown.decision_id}`),
       makeShare(shown.decision_id, i18n),
     );
@@ -130,27 +137,32 @@ function makeFacts(decision, i18n) {
   return list;
 }
 
+/**
+ * The robot's speed and its distance about that time; null where no robot is told.
+ *
+ * @param {Decision} decision
+ */
+async function pastOf({ robot_id, person_id, started_at, ended_at }) {
+  if (!robot_id || !started_at) return null;
+  return readPast(spanOf(started_at, ended_at), robot_id, person_id);
+}
+
+/** @param {Decision} decision @param {import("../core/i18n.js").I18n} i18n */
+function aboutOf({ started_at, ended_at, rule, ...told }, i18n) {
+  const { speed_before: before, speed_after: after } = told;
+  const known = [before, after].every((speed) => speed !== null);
+  const since = Date.parse(String(started_at));
+  const until = ended_at === null ? Number.POSITIVE_INFINITY : Date.parse(ended_at);
+  return {
+    shade: { since, until, name: i18n.t("plot.key.decision") },
+    radiusM: rule.parameters?.radius_m ?? null,
+    speedSaid: known ? i18n.t("plot.before_after", { before, after }) : "",
+  };
+}
+
 /** @param {Decision} decision */
 function sightOf({ in_sight }) {
   return in_sight === false ? "obeys_blind" : "obeys";
-}
-
-/**
- * How long each link took after the one before it that is known (ms); null for the first.
- *
- * @param {Link[]} links
- * @returns {(number | null)[]}
- */
-export function delaysOf(links) {
-  /** @type {number | null} */
-  let before = null;
-  return links.map(({ at }) => {
-    if (at === null) return null;
-    const now = new Date(at).getTime();
-    const took = before === null ? null : now - before;
-    before = now;
-    return took;
-  });
 }
 
 /** @param {string} decisionId @param {import("../core/i18n.js").I18n} i18n */
@@ -174,25 +186,18 @@ function makeShare(decisionId, i18n) {
 
 /**
  * @param {Link} link
- * @param {number | null} delayMs
  * @param {import("../core/i18n.js").I18n} i18n
+ * @returns {import("./timeline.js").Step}
  */
-function makeLink(link, delayMs, i18n) {
-  const item = make("li");
-  item.dataset.verdict = link.verdict;
-  const name = i18n.has(`decision.link.${link.link}`)
-    ? i18n.t(`decision.link.${link.link}`)
-    : link.link;
-  const verdict = i18n.t(`decision.verdict.${link.verdict}`);
-  const when = link.at === null ? "" : ` ${millisecondsOf(link.at)}`;
-  const delay = delayMs === null ? "" : ` ${delaySaid(delayMs, i18n)}`;
-  item.append(
-    make("span", "shape"),
-    make("b", "", name),
-    make("small", "", `${verdict}${when}${delay}`),
-    make("p", "", saidOf(link, i18n)),
-  );
-  return item;
+function stepOf(link, i18n) {
+  const key = `decision.link.${link.link}`;
+  return {
+    name: i18n.has(key) ? i18n.t(key) : link.link,
+    at: link.at,
+    verdict: link.verdict,
+    state: i18n.t(`decision.verdict.${link.verdict}`),
+    said: saidOf(link, i18n),
+  };
 }
 
 /** A robot may have known before it was told. @param {number} ms

@@ -1,0 +1,91 @@
+import {
+  distancesOf,
+  limitsOf,
+  ringsOf,
+  spanOf,
+} from "../../iveg/static/js/panels/past.js";
+import { makePlot, pathOf, rangeOf } from "../../iveg/static/js/panels/plot.js";
+import { barsOf, delaysOf } from "../../iveg/static/js/panels/timeline.js";
+import { equal, near, test } from "./harness.js";
+
+const T0 = Date.parse("2026-11-20T12:00:00.000Z");
+/** @param {number} s */
+const at = (s) => new Date(T0 + 1000 * s).toISOString();
+/** @param {number} s @param {number} x */
+const pose = (s, x) => ({ at: at(s), x, y: 0, linear: 0.8, limit_factor: 0.5 });
+/** @param {number} s @param {number | null} x */
+const seen = (s, x) => ({ at: at(s), x, y: x === null ? null : 0 });
+/** @param {Partial<import("../../iveg/static/js/panels/past.js").Past>} differs */
+const past = (differs) => ({
+  span: { since: T0, until: T0 + 4000 },
+  poses: [pose(0, 0), pose(1, 1), pose(4, 4)],
+  sightings: [],
+  fastest: 0.8,
+  ...differs,
+});
+const place = (/** @type {{at: number, value: number}} */ one) =>
+  /** @type {[number, number]} */ ([one.at, one.value]);
+
+test("13.13: each step tells how long it took after the one before", () => {
+  const links = [0.1, 0.1, null, 0.35, 0.33].map((s) => ({ at: s && at(s) }));
+  equal(delaysOf(links), [null, 0, null, 250, -20]);
+});
+
+test("28.6: each bar reaches from the moment before to its own, on one scale", () => {
+  const bars = barsOf([0, 1, null, 4, 3].map((s) => ({ at: s === null ? s : at(s) })));
+  equal(bars, [
+    { from: 0, to: 0 },
+    { from: 0, to: 25 },
+    null,
+    { from: 25, to: 100 },
+    { from: 75, to: 100 },
+  ]);
+});
+
+test("28.6: a distance is told between two poses, and nowhere else", () => {
+  const sightings = [seen(-1, 3), seen(0.5, 3), seen(0.6, null), seen(2.5, 3)];
+  const values = distancesOf(past({ sightings })).map(({ value }) => value);
+  equal(values, [null, 2.5, null, null]);
+});
+
+test("28.6: the zone is that of somebody just seen, and grows while nobody looks", () => {
+  const rings = ringsOf(past({ sightings: [seen(0, 3), seen(3, 3)] }), 2);
+  const radius = (/** @type {number} */ s) =>
+    rings.find((one) => one.at === T0 + 1000 * s)?.value ?? Number.NaN;
+  near(radius(0), 2);
+  equal(radius(2.75) > 5, true);
+  near(radius(3), 2);
+  equal(ringsOf(past({}), 2), []);
+});
+
+test("28.6: a limit in m/s is told where the robot's greatest speed is known", () => {
+  equal(limitsOf(past({}))[0].value, 0.4);
+  equal(limitsOf(past({ fastest: null })), []);
+});
+
+test("28.6: of what goes on for long the beginning is told, with what was before", () => {
+  equal(spanOf(at(0), at(10)), { since: T0 - 3000, until: T0 + 13_000 });
+  equal(spanOf(at(0), at(600)).until, T0 + 63_000);
+});
+
+test("28.6: a line breaks where nothing was heard, and steps where it is a limit", () => {
+  const samples = [0, 1, 9, null, 10].map((t, i) => ({
+    at: 1000 * (t ?? 9.5),
+    value: t === null ? null : i,
+  }));
+  const line = { kind: "", name: "", samples };
+  equal(pathOf(line, place), "M0 0h0L1000 1M9000 2h0M10000 4h0");
+  equal(pathOf({ ...line, isStep: true }, place), "M0 0h0H1000V1M9000 2h0M10000 4h0");
+});
+
+test("28.6: a scale holds zero and all values; without any there is no plot", () => {
+  const line = (/** @type {number[]} */ ...values) => ({
+    ...{ kind: "a", name: "a" },
+    samples: values.map((value) => ({ at: 0, value })),
+  });
+  equal(rangeOf([line(0.3, 0.8)]), { top: 1, bottom: 0 });
+  equal(rangeOf([line(-2.6, 1.2)]), { top: 2, bottom: -3 });
+  equal(rangeOf([line()]), null);
+  const plot = { title: "", says: "", span: { since: 0, until: 1 }, lines: [line()] };
+  equal(makePlot(plot, /** @type {any} */ ({})), null);
+});
