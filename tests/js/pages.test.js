@@ -1,3 +1,4 @@
+import { stepsOf } from "../../iveg/static/js/pages/command.js";
 import {
   judgeDataPath,
   ORDER,
@@ -153,5 +154,29 @@ test("13.5 a chain that nobody has heard of, or without robots, is not said to w
   equal(
     [late.key, late.state, late.slots.robots],
     ["fleet.late_robots", "late", "AGII"],
+  );
+});
+
+test("28.6: the moments of an order stand in time from the press; one that is missing, last", () => {
+  const words = /** @type {any} */ ({
+    t: (/** @type {string} */ key, /** @type {any} */ slots) =>
+      slots ? String(slots.ms) : key.split(".").pop(),
+  });
+  const steps = stepsOf(order(), ["direct", "fiware"], words);
+  equal(
+    steps.map(({ name, took, verdict }) => `${name} ${took} ${verdict}`),
+    [
+      "accepted 0 ok",
+      "sent_direct 2 ok",
+      "sent_fiware 4 ok",
+      "fiware 50 ok",
+      "standing 412 ok",
+      "direct  missing",
+    ],
+  );
+  const release = stepsOf(order({ kind: "release" }), ["direct"], words);
+  equal(
+    release.map(({ name }) => name),
+    ["accepted", "sent_direct"],
   );
 });

@@ -11,6 +11,7 @@ from fastapi import APIRouter, Depends, HTTPException, Path, Query, Response
 
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.series import CommandLatency
+from iveg.domain.errors import HopError
 from iveg.domain.observations import Instant
 from iveg.domain.records import ByTransport, CommandRecord
 from iveg.domain.stamps import format_stamp
@@ -59,15 +60,17 @@ def router(
     async def command(
         command_id: Annotated[str, Path(pattern=r"^[ -~]{1,64}$")],
     ) -> Response:
-        """One command: as it stands, or as the history knows it."""
+        """One command: as it stands, with what the history knows of it."""
         followed = find(command_id, clock())
-        if followed is not None:
-            return Json(followed)
-        found = await queries.command(command_id)
-        if found is None:
+        try:
+            kept = await _kept(queries, command_id)
+        except HopError:
+            if followed is None:
+                raise
+            kept = None
+        if followed is None and kept is None:
             raise HTTPException(404, "There is no such command.")
-        steps = await queries.command_events(command_id)
-        return Json(Command.of_record(found, steps))
+        return Json(_told(followed, kept))
 
     @routes.get("/drills", response_model=Listing[Drill])
     async def drills(robot: str | None = None) -> Response:
@@ -77,6 +80,21 @@ def router(
         return Json(Listing(items=[_drill(one, now) for one in found]))
 
     return routes
+
+
+async def _kept(queries: Queries, command_id: str) -> Command | None:
+    found = await queries.command(command_id)
+    if found is None:
+        return None
+    return Command.of_record(found, await queries.command_events(command_id))
+
+
+def _told(followed: Command | None, kept: Command | None) -> Command | None:
+    """What goes on, beside what only the history tells: how it ended, and its steps."""
+    if followed is None or kept is None:
+        return followed or kept
+    ended = {"outcome": kept.outcome, "was_loud": kept.was_loud, "steps": kept.steps}
+    return followed.model_copy(update=ended)
 
 
 def _by_robot(found: Iterable[CommandLatency]) -> list[RobotLatency]:

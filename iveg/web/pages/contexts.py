@@ -75,14 +75,14 @@ class Page:
 
 
 @dataclass(frozen=True, slots=True)
-class DecisionPage(Page):
-    """``decision.html``: one decision by its own address, to share and to print.
+class RecordPage(Page):
+    """``decision.html``, ``command.html``: a record to share and to print.
 
     Attributes:
-        decision_id: As asked for; whether it exists is said by the API.
+        record_id: As asked for; whether it exists is said by the API.
     """
 
-    decision_id: str
+    record_id: str
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,11 +23,11 @@ from iveg.web.pages.contexts import (
     THEMES,
     AboutPage,
     Appearance,
-    DecisionPage,
     DocsPage,
     ErrorPage,
     Page,
     PageFrame,
+    RecordPage,
     SignInPage,
     Site,
 )
@@ -48,7 +48,7 @@ LANGUAGE_COOKIE = "iveg_language"
 THEME_COOKIE = "iveg_theme"
 PALETTE_COOKIE = "iveg_palette"
 
-_DECISION_ID = r"^[ -~]{1,64}$"
+_RECORD_ID = Annotated[str, Path(pattern=r"^[ -~]{1,64}$")]
 _EXPLAINED = (400, 401, 403, 404, 405, 429, 500, 503)
 _SCRIPTED: Final = {
     "live": "/",
@@ -156,10 +156,19 @@ def router(
     async def decision(
         request: Request,
         visitor: _Reader,
-        decision_id: Annotated[str, Path(pattern=_DECISION_ID)],
+        decision_id: _RECORD_ID,
     ) -> Response:
         frame = pages.frame(request, "decision", visitor)
-        return pages.draw(DecisionPage(frame, decision_id))
+        return pages.draw(RecordPage(frame, decision_id))
+
+    @routes.get("/commands/{command_id}", response_model=None)
+    async def command(
+        request: Request,
+        visitor: _Reader,
+        command_id: _RECORD_ID,
+    ) -> Response:
+        frame = pages.frame(request, "command", visitor)
+        return pages.draw(RecordPage(frame, command_id))
 
     @routes.get("/docs", response_model=None)
     async def docs(request: Request, visitor: _Reader) -> Response:

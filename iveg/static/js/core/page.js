@@ -27,6 +27,7 @@ import { createWakeLock } from "./wakelock.js";
 const ROUTES = {
   alerts: () => import("../pages/alerts.js"),
   commands: () => import("../pages/commands.js"),
+  command: () => import("../pages/command.js"),
   fleet: () => import("../pages/fleet.js"),
   climate: () => import("../pages/climate.js"),
   latency: () => import("../pages/hops.js"),

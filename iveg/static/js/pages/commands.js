@@ -96,7 +96,7 @@ function cellsOf(command, transports, i18n, opened) {
   return [
     make("td", "time", dayAndTime(zeroOf(command.times))),
     make("td", "", command.robot_id),
-    make("td", "", orderSaid(command, i18n)),
+    orderOf(command, i18n),
     endOf(command, i18n, opened),
     make("td", "", command.requested_by),
     number(took.accepted),
@@ -104,6 +104,16 @@ function cellsOf(command, transports, i18n, opened) {
     number(took.standing),
     number(command.tries),
   ];
+}
+
+/** What was asked, which leads to its page. @param {import("./latency.js").Order} command
+ * @param {I18n} i18n */
+function orderOf(command, i18n) {
+  const link = make("a", "verdict", orderSaid(command, i18n));
+  link.href = `/commands/${encodeURIComponent(command.command_id)}`;
+  const cell = make("td");
+  cell.append(link);
+  return cell;
 }
 
 /**
@@ -115,7 +125,19 @@ function cellsOf(command, transports, i18n, opened) {
  */
 function endOf(command, i18n, opened) {
   const cell = make("td", "what", endSaid(command, i18n));
-  if (!command.steps?.length) return cell;
+  cell.append(...makeSteps(command, i18n, opened));
+  return cell;
+}
+
+/**
+ * The audit trail, to unfold; nothing where there is none.
+ *
+ * @param {import("./latency.js").Order} command
+ * @param {I18n} i18n
+ * @param {Set<string>} opened orders whose steps somebody reads
+ */
+export function makeSteps(command, i18n, opened) {
+  if (!command.steps?.length) return [];
   const steps = make("details", "members");
   keepOpen(steps, opened, command.command_id);
   const list = make("ol");
@@ -125,12 +147,11 @@ function endOf(command, i18n, opened) {
     list.append(line);
   }
   steps.append(make("summary", "", i18n.t("commandspage.steps")), list);
-  cell.append(steps);
-  return cell;
+  return [steps];
 }
 
 /** @param {import("./latency.js").Order} command @param {I18n} i18n */
-function orderSaid({ kind, drill, goal }, i18n) {
+export function orderSaid({ kind, drill, goal }, i18n) {
   if (goal) {
     const place = i18n.t(`goal.kind.${goal.kind}`, { ...goal });
     return i18n.t("commandspage.goal", { place });

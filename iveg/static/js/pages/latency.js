@@ -43,7 +43,8 @@ export function tookOf({ times, standstill_ms }, transports) {
  * @param {Order} order
  * @param {import("../core/i18n.js").I18n} i18n
  */
-export function endSaid({ state, reason, outcome = "open", was_loud }, i18n) {
+export function endSaid({ state, reason, was_loud, ...told }, i18n) {
+  const outcome = told.outcome ?? "open";
   const slots = { state: i18n.t(`history.state.${state}`), why: reason ?? "" };
   const said = i18n.t(`commandspage.end.${outcome}`, slots);
   const isLoudNow = outcome === "open" && LOUD.has(state);

@@ -9,7 +9,8 @@ import { drawDecision } from "./decision_map.js";
 import { make, need } from "./dom.js";
 import { readPast, spanOf } from "./past.js";
 import { makePlots } from "./record_plots.js";
-import { makeTimeline } from "./timeline.js";
+import { makeShare } from "./share.js";
+import { delaysOf, makeTimeline } from "./timeline.js";
 
 /**
  * @typedef {{link: string, at: string | number | null,
@@ -77,7 +78,9 @@ export function createRecord(place, i18n) {
     if (!shown) return;
     const { sentence } = shown;
     const head = sentence ? i18n.t(sentence.key, sentence.slots) : shown.kind;
-    const steps = (shown.links ?? []).map((link) => stepOf(link, i18n));
+    const links = shown.links ?? [];
+    const delays = delaysOf(links);
+    const steps = links.map((link, i) => stepOf(link, delays[i], i18n));
     const plots = past && makePlots(past, aboutOf(shown, i18n), i18n);
     const began = momentSaid(shown.started_at);
     const ended = shown.ended_at
@@ -90,9 +93,13 @@ export function createRecord(place, i18n) {
       ...(picture ? [picture] : []),
       makeFacts(shown, i18n),
       ...(plots ? [plots] : []),
-      makeTimeline(steps, (ms) => delaySaid(ms, i18n)),
+      makeTimeline(steps),
       make("small", "", `${i18n.t("decision.id")} ${shown.decision_id}`),
-      makeShare(shown.decision_id, i18n),
+      makeShare(
+        `/decisions/${encodeURIComponent(shown.decision_id)}`,
+        i18n.t("record.link_to"),
+        i18n,
+      ),
     );
   }
 
@@ -165,37 +172,20 @@ function sightOf({ in_sight }) {
   return in_sight === false ? "obeys_blind" : "obeys";
 }
 
-/** @param {string} decisionId @param {import("../core/i18n.js").I18n} i18n */
-function makeShare(decisionId, i18n) {
-  const line = make("p", "record__link");
-  const link = make("a", "", i18n.t("decision.link_to"));
-  // In full: on paper an address without its server leads nowhere.
-  const path = `/decisions/${encodeURIComponent(decisionId)}`;
-  link.setAttribute("href", new URL(path, location.href).href);
-  const copy = make("button", "button no-print", i18n.t("decision.copy"));
-  copy.type = "button";
-  // The clipboard needs HTTPS or localhost; the link can be copied by hand.
-  copy.hidden = !navigator.clipboard;
-  copy.addEventListener("click", async () => {
-    await navigator.clipboard.writeText(link.href);
-    copy.textContent = i18n.t("decision.copied");
-  });
-  line.append(link, copy);
-  return line;
-}
-
 /**
  * @param {Link} link
+ * @param {number | null} delayMs
  * @param {import("../core/i18n.js").I18n} i18n
  * @returns {import("./timeline.js").Step}
  */
-function stepOf(link, i18n) {
+function stepOf(link, delayMs, i18n) {
   const key = `decision.link.${link.link}`;
   return {
     name: i18n.has(key) ? i18n.t(key) : link.link,
     at: link.at,
     verdict: link.verdict,
     state: i18n.t(`decision.verdict.${link.verdict}`),
+    took: delayMs === null ? "" : delaySaid(delayMs, i18n),
     said: saidOf(link, i18n),
   };
 }

@@ -3,7 +3,8 @@
  * before, that is known, to its own.
  *
  * @typedef {{name: string, at: string | number | null, verdict: string, state: string,
- *   said: string}} Step `state` is what the verdict says, `said` what was found
+ *   took: string, said: string}} Step `state` is what the verdict says, `said` what was
+ *   found
  */
 
 import { millisecondsOf } from "../pages/history/local_time.js";
@@ -13,20 +14,11 @@ const LONG = 100;
 /** What took no time is seen nevertheless. */
 const LEAST = 0.6;
 
-/**
- * @param {Step[]} steps
- * @param {(ms: number) => string} saidDelay how long a step took
- */
-export function makeTimeline(steps, saidDelay) {
+/** @param {Step[]} steps */
+export function makeTimeline(steps) {
   const chain = make("ol", "chain");
   const bars = barsOf(steps);
-  const delays = delaysOf(steps);
-  chain.append(
-    ...steps.map((step, i) => {
-      const delay = delays[i];
-      return makeStep(step, bars[i], delay === null ? "" : ` ${saidDelay(delay)}`);
-    }),
-  );
+  chain.append(...steps.map((step, i) => makeStep(step, bars[i])));
   return chain;
 }
 
@@ -69,15 +61,15 @@ export function barsOf(steps) {
   });
 }
 
-/** @param {Step} step @param {{from: number, to: number} | null} bar @param {string} delay */
-function makeStep({ name, at, verdict, state, said }, bar, delay) {
+/** @param {Step} step @param {{from: number, to: number} | null} bar */
+function makeStep({ name, at, verdict, state, took, said }, bar) {
   const item = make("li");
   item.dataset.verdict = verdict;
-  const when = at === null ? "" : ` ${millisecondsOf(at)}`;
+  const when = at === null ? "" : millisecondsOf(at);
   item.append(
     make("span", "shape"),
     make("b", "", name),
-    make("small", "", `${state}${when}${delay}`),
+    make("small", "", `${state} ${when} ${took}`.trim()),
     make("p", "", said),
   );
   if (bar) item.append(drawBar(bar));

@@ -8,8 +8,8 @@ import pytest
 
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.recorder import Recorder, journal_file
-from iveg.domain.records import CommandRecord
-from iveg.models.command import LatencySpread
+from iveg.domain.records import CommandEventRecord, CommandRecord
+from iveg.models.command import Command, LatencySpread
 from iveg.web.api import stop_records
 from tests.builders import START
 from tests.unit.web.desk import WebDesk
@@ -96,6 +96,34 @@ async def test_a_command_of_an_earlier_run_is_found_in_the_history(
 
     assert found.json()["times"]["pressed"] is not None
     assert missing.status_code == 404
+
+
+async def test_a_command_of_this_run_is_told_with_its_steps_while_the_history_answers(
+    tmp_path: Path,
+) -> None:
+    url = f"sqlite:///{tmp_path / 'history.sqlite'}"
+    recorder = Recorder(url, journal_file(url, tmp_path))
+    recorder.enqueue(record(1, state="RUNNING"))
+    recorder.enqueue(
+        CommandEventRecord(command_id="C1", robot_id="AGI", at=T, state="UNCONFIRMED")
+    )
+    await recorder.close()
+    desk, queries = WebDesk(), Queries(url)
+    followed = Command.of_record(record(1)).model_copy(update={"outcome": None})
+
+    desk.app.include_router(
+        stop_records.router(queries, desk.clock, lambda *_: followed)
+    )
+    async with desk.browser() as browser:
+        whole = (await browser.get("/api/v1/commands/C1")).json()
+        (tmp_path / "history.sqlite").write_bytes(b"no database")
+        alone = await browser.get("/api/v1/commands/C1")
+    queries.close()
+
+    assert (whole["state"], whole["outcome"]) == ("STANDING", "stood")
+    assert [one["state"] for one in whole["steps"]] == ["UNCONFIRMED"]
+    assert whole["was_loud"] is True
+    assert (alone.status_code, alone.json()["outcome"]) == (200, None)
 
 
 def test_a_spread_is_of_what_was_measured() -> None:

@@ -37,6 +37,7 @@ ROUTES = (
     "/settings",
     "/decisions",
     "/decisions/d-1",
+    "/commands/c-1",
     "/docs",
     "/about",
 )
@@ -261,20 +262,22 @@ async def test_every_page_can_be_reached_from_every_other(
     html = (await browser.get("/about")).text
     menu = html[html.index('id="menu"') :]
     linked = set(re.findall(r'href="(/\w*)"', menu))
-    assert linked >= {path for path in ROUTES if "decisions" not in path}
+    assert linked >= {path for path in ROUTES if path.count("/") == 1}
 
 
-async def test_a_decision_has_an_address_and_its_id_is_text(
-    browser: httpx.AsyncClient,
+@pytest.mark.parametrize("kind", ["decision", "command"])
+async def test_a_record_has_an_address_and_its_id_is_text(
+    browser: httpx.AsyncClient, kind: str
 ) -> None:
-    html = (await browser.get('/decisions/"><img src=x>')).text
-    assert 'data-decision="&#34;&gt;&lt;img src=x&gt;"' in html
+    html = (await browser.get(f'/{kind}s/"><img src=x>')).text
+    assert f'data-{kind}="&#34;&gt;&lt;img src=x&gt;"' in html
 
 
-async def test_an_address_that_is_no_decision_is_refused(
-    browser: httpx.AsyncClient,
+@pytest.mark.parametrize("kind", ["decision", "command"])
+async def test_an_address_that_is_no_record_is_refused(
+    browser: httpx.AsyncClient, kind: str
 ) -> None:
-    assert (await browser.get("/decisions/" + "x" * 65)).status_code == 422
+    assert (await browser.get(f"/{kind}s/" + "x" * 65)).status_code == 422
 
 
 async def test_signing_out_ends_the_session_and_goes_to_the_way_in(
