@@ -1,5 +1,6 @@
 /**
- * The Latency page: the paper's table and figure with live values, beside the printed ones.
+ * The Latency page: each hop at a glance, one message's path, and the paper's table with
+ * live values beside the printed ones.
  *
  * @typedef {import("../types.js").SegmentSpread} Spread
  * @typedef {import("../types.js").LatencyStream} Stream
@@ -13,6 +14,7 @@ import { readApi } from "../core/api.js";
 import { all, make, need, setAttribute, setHidden, setText } from "../panels/dom.js";
 import { onThemeChange } from "../panels/theme.js";
 import { drawHopFigure } from "./hop_figures.js";
+import { drawMultiples } from "./hop_multiples.js";
 
 const EVERY_MS = 2000;
 /** Figures cost the server more than numbers: every fifth time. */
@@ -24,7 +26,7 @@ const HOPS = /** @type {Hop[]} */ ([
   "iveg",
   "screen",
 ]);
-const FIGURES = ["bars", "cdf", "trace"];
+const FIGURES = ["trace", "cdf"];
 const NOTHING = "—";
 /** The paper's name of each hop; it has none for the hops after Orion. */
 const PRINTED = /** @type {Record<string, string>} */ ({
@@ -59,6 +61,7 @@ export function start({ i18n }) {
     setText(failed, i18n.t(status ? "rows.failed" : "rows.offline", { status }));
     if (told === null) return;
     drawRemarks(told, i18n);
+    drawMultiples(need("#hops-glance"), told.rows, i18n);
     drawTable(told, i18n);
     drawClocks(told, i18n);
     drawStreams(told, i18n);
@@ -85,9 +88,6 @@ export function start({ i18n }) {
     load();
   }
 
-  // The tables are long where there is no room for columns.
-  if (matchMedia("(max-width: 567px)").matches)
-    for (const fold of all(".fold")) fold.removeAttribute("open");
   for (const chip of all("[data-window]")) {
     chip.addEventListener("click", () => ask({ window: chip.dataset.window }));
   }
