@@ -1,6 +1,7 @@
 /**
- * The bar under the map: the greenhouse's clock and what happened in the last minutes; a
- * press on it, or the arrow keys, jump to the log at that time.
+ * The bar under the map: the greenhouse's clock and what happened in the last minutes,
+ * with times; orders are octagons and alerts triangles.  A press on it, or the arrow
+ * keys, jump to the log at that time.
  */
 
 import { onBeat } from "../core/beat.js";
@@ -23,11 +24,22 @@ const MARK_S = (MINUTES * 60 * MARK_WIDTH) / WIDTH;
 /** What is newer than the page's clock says stands at the end (marks). */
 const AHEAD = -3;
 /** Detections come by the dozen: their marks are low, those of changes are high. */
-const HEIGHTS = { detection: 5, link: 9, system: 9, speed: 14, command: 20, alert: 20 };
+const HEIGHTS = { detection: 5, link: 9, system: 9, speed: 14 };
+const FLOOR = 22;
+const SHAPES = {
+  command: "M3 0h6l3 3v6l-3 3h-6l-3 -3v-6z",
+  alert: "M6 0l6 12h-12z",
+};
+const SHAPE_WIDTH = 12;
+const TICK_MIN = 2;
+/** Labels nearer to an end than this would be cut (share of the strip). */
+const EDGE = 0.04;
 
 /** @param {import("../main.js").App} app */
 export function createTimebar({ store, i18n, line }) {
   const strip = need("#time-strip");
+  const [ticks, marks] = [makeSvg("g"), makeSvg("g")];
+  strip.append(ticks, marks);
   let minutesAgo = 0;
 
   /** @param {number} minutes ago */
@@ -54,12 +66,11 @@ export function createTimebar({ store, i18n, line }) {
     const nowS = line.serverNow();
     setText(need("#clock"), i18n.time(nowS));
     setAttribute(strip, "aria-label", i18n.t("time.strip", { minutes: MINUTES }));
-    fill(
-      strip,
-      marksOf(nowS),
-      () => makeSvg("rect"),
-      (rect, { x, kind }) => drawMark(rect, x, kind),
-    );
+    fill(marks, marksOf(nowS), makeMark, drawMark);
+    fill(ticks, ticksOf(nowS), makeTick, (tick, { share, at }) => {
+      setAttribute(tick, "x", percent(share));
+      setText(tick.children[1], i18n.time(at).slice(0, 5));
+    });
   }
 
   /**
@@ -68,16 +79,18 @@ export function createTimebar({ store, i18n, line }) {
    * @param {number} nowS Unix time
    */
   function marksOf(nowS) {
-    /** @type {Map<string, {x: number, kind: string}>} one a kind and place */
-    const marks = new Map();
+    /** @type {Map<string, Mark>} one a kind and place */
+    const found = new Map();
     const now = Math.round(nowS / MARK_S);
     for (const { at, kind } of store.log()) {
       const ago = now - Math.round(Date.parse(at) / 1000 / MARK_S);
       const x = WIDTH - MARK_WIDTH * (1 + Math.max(0, ago));
       if (ago < AHEAD || x < 0) continue;
-      marks.set(`${kind}:${x}`, { x, kind });
+      // One shape where several would lie on each other.
+      const place = kind in SHAPES ? Math.floor(x / SHAPE_WIDTH) : x;
+      found.set(`${kind}:${place}`, { share: x / WIDTH, kind });
     }
-    return [...marks.values()];
+    return [...found.values()];
   }
 
   i18n.onChange(draw);
@@ -85,12 +98,46 @@ export function createTimebar({ store, i18n, line }) {
   draw();
 }
 
-/** @param {Element} mark @param {number} x @param {string} kind */
-function drawMark(mark, x, kind) {
+/** @typedef {{share: number, kind: string}} Mark `share` of the strip, from the left */
+
+/** A place that a path alone lacks. */
+function makeMark() {
+  const mark = makeSvg("svg", { overflow: "visible" });
+  mark.append(makeSvg("path"));
+  return mark;
+}
+
+/** @param {Element} mark @param {Mark} told */
+function drawMark(mark, { share, kind }) {
+  const shape = SHAPES[/** @type {keyof typeof SHAPES} */ (kind)];
   const height = HEIGHTS[/** @type {keyof typeof HEIGHTS} */ (kind)] ?? 9;
   setAttribute(mark, "data-kind", kind);
-  setAttribute(mark, "x", String(x));
-  setAttribute(mark, "y", String(20 - height));
-  setAttribute(mark, "width", String(MARK_WIDTH));
-  setAttribute(mark, "height", String(height));
+  setAttribute(mark, "x", percent(share));
+  const bar = `M0 ${FLOOR - height}h${MARK_WIDTH}V${FLOOR}h-${MARK_WIDTH}z`;
+  setAttribute(mark.children[0], "d", shape ?? bar);
 }
+
+function makeTick() {
+  const tick = makeSvg("svg", { overflow: "visible", "aria-hidden": "true" });
+  const label = makeSvg("text", { y: FLOOR + 10 });
+  tick.append(makeSvg("path", { d: `M0 0V${FLOOR}` }), label);
+  return tick;
+}
+
+/**
+ * Full minutes on the strip, and how far from the left each stands.
+ *
+ * @param {number} nowS Unix time
+ */
+export function ticksOf(nowS) {
+  const [stepS, longS] = [60 * TICK_MIN, 60 * MINUTES];
+  const ticks = [];
+  for (let at = stepS * Math.ceil((nowS - longS) / stepS); at <= nowS; at += stepS) {
+    const share = 1 - (nowS - at) / longS;
+    if (share >= EDGE && share <= 1 - EDGE) ticks.push({ share, at });
+  }
+  return ticks;
+}
+
+/** @param {number} share */
+const percent = (share) => `${(100 * share).toFixed(2)}%`;
