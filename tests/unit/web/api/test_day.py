@@ -1,5 +1,6 @@
 """Issue 13.22: the evening sheet as numbers and on paper, in both languages."""
 
+import re
 from collections.abc import AsyncIterator
 from datetime import date
 from pathlib import Path
@@ -148,3 +149,26 @@ async def test_the_sheet_is_one_page_in_the_readers_language(
     assert sheet.status_code == 200
     assert sentence in sheet.text
     assert 'class="sheet__map"' in sheet.text
+
+
+async def test_28_6_the_sheet_begins_with_the_day_in_a_sentence_and_on_a_plan(
+    browser: httpx.AsyncClient,
+) -> None:
+    asked = {"day": "2026-11-20"}, {"Accept-Language": "en"}
+    html = (await browser.get("/day", params=asked[0], headers=asked[1])).text
+    plan = html[html.index("sheet__plan") : html.index("</figure>")]
+
+    assert "worked 2 min in all in the aisles and drove slowly for 2 min" in html
+    assert "Nearest to a person: 1.0 m" in html
+    # The lane lies along the house, 20 m of it: 2 of 2 minutes, and 1.5 of 2.
+    bars = re.findall(r'sheet__(\w+)" x="0.0" y="[\d.]+" width="([\d.]+)"', plan)
+    assert bars == [("worked", "20.0"), ("slowed", "15.0")]
+    assert re.search(r'cx="6.0" cy="18.0".*?>1</text>', plan, re.DOTALL)
+
+
+async def test_28_6_a_day_of_which_nothing_is_known_has_no_plan(
+    browser: httpx.AsyncClient,
+) -> None:
+    html = (await browser.get("/day", params={"day": "2026-11-19"})).text
+
+    assert "sheet__plan" not in html
