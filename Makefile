@@ -19,7 +19,7 @@ export PYTHONPATH := $(CURDIR)
 export PYTHONDONTWRITEBYTECODE :=
 
 .NOTPARALLEL:
-.PHONY: test-needs check-needs demo demo-ros2 test quick setup format check bench deep chaos mutants experiment soak migration lock clean
+.PHONY: test-needs check-needs demo demo-ros2 test quick setup format check bench deep chaos pictures mutants experiment soak migration lock clean
 
 demo: $(RUN) ; @exec $(BIN)/python -m iveg demo
 demo-ros2: $(DEV) ; @exec $(BIN)/python -m iveg demo --ros2
@@ -31,6 +31,7 @@ check: check-needs $(DEV) node_modules ; $(BIN)/ruff format --check . && $(BIN)/
 bench: test-needs $(BENCH) ; $(BIN)/python -m benchmarks
 deep: $(DEV) ; IVEG_STOP_EXAMPLES=20000 IVEG_LIAR_STEPS=100000 $(BIN)/python -m pytest $(FOR_HOURS) tests/properties/test_stop.py tests/liar
 chaos: test-needs $(DEV) ; IVEG_CHAOS_RECORDER_KILLS=$(or $(KILLS),50) IVEG_CHAOS_SEED=$(or $(SEED),1) IVEG_CHAOS_KILLS=$(or $(KILLS),200) IVEG_CHAOS_TIMES=$(or $(TIMES),20) $(BIN)/python -m pytest $(FOR_HOURS) tests/chaos/test_kills.py tests/chaos/test_backlog.py tests/chaos/test_ros2_kills.py tests/chaos/test_recording_kills.py
+pictures: $(DEV) ; $(BIN)/python -m tests.pictures
 mutants: $(DEV) ; $(BIN)/python -m tests.mutants
 experiment: $(RUN) ; @exec $(BIN)/python -m iveg experiment run --$(or $(SIZE),quick)
 soak: $(DEV) ; $(BIN)/python -m benchmarks.soak

@@ -41,9 +41,9 @@ def frozen() -> Frozen:
 
 
 @contextmanager
-def past_site(directory: Path) -> Iterator[Site]:
+def past_site(directory: Path, **settings: str) -> Iterator[Site]:
     """A server over a history that never changes; no robot is there."""
-    with site(directory) as place:
+    with site(directory, **settings) as place:
         store = Store(place.settings["IVEG_DATABASE_URL"])
         rows = enumerate(_history(), 1)
         store.write([Waiting(record, n, 0.0) for n, record in rows])
