@@ -1,5 +1,5 @@
 /**
- * The service worker: one sentence in place of the browser's error when there is no
+ * The service worker: a page of our own in place of the browser's error when there is no
  * connection, and push messages of the server while no page is open.
  *
  * A fallback for navigation and nothing else: API, live line, sign-in and all requests of
@@ -7,8 +7,12 @@
  * need not even be awake for them: a STOP waits for nothing.
  */
 
-const CACHE = "iveg-offline-1";
+/** Named by what is in it, so that a change of any part reaches every device. */
+const CACHE = "iveg-offline-5b53a0e7";
 const OFFLINE = "/static/offline.html";
+/** What the offline page alone asks for in this way: answered from the cache. */
+const OF_OFFLINE = "?offline";
+const PARTS = ["css/tokens.css", "css/offline.css", "js/offline.js"];
 const NEVER = ["/api/", "/live", "/signin", "/signout", "/ngsi/", "/static/", "/docs"];
 const NOT_NAVIGATIONS = ["cors", "no-cors", "same-origin"];
 
@@ -24,16 +28,25 @@ function isFallback({ mode, method, url }) {
   );
 }
 
+/** Whether a request is for a part of the offline page. @param {Request} request */
+function isOfOffline({ url }) {
+  const { origin, search } = new URL(url);
+  return origin === location.origin && search === OF_OFFLINE;
+}
+
 self.ivegIsFallback = isFallback;
+self.ivegIsOfOffline = isOfOffline;
 
 self.addEventListener("install", (event) => {
-  event.addRoutes?.(
-    NOT_NAVIGATIONS.map((requestMode) => ({
+  event.addRoutes?.([
+    { condition: { urlPattern: { search: "offline" } }, source: "fetch-event" },
+    ...NOT_NAVIGATIONS.map((requestMode) => ({
       condition: { requestMode },
       source: "network",
     })),
-  );
-  const filled = caches.open(CACHE).then((cache) => cache.add(OFFLINE));
+  ]);
+  const parts = PARTS.map((part) => `/static/${part}${OF_OFFLINE}`);
+  const filled = caches.open(CACHE).then((cache) => cache.addAll([OFFLINE, ...parts]));
   event.waitUntil(filled.then(() => self.skipWaiting()));
 });
 
@@ -46,8 +59,12 @@ self.addEventListener("activate", (event) => {
 });
 
 self.addEventListener("fetch", (event) => {
-  if (!isFallback(event.request)) return;
-  event.respondWith(fetch(event.request).catch(() => caches.match(OFFLINE)));
+  const { request } = event;
+  if (isOfOffline(request)) {
+    event.respondWith(caches.match(request).then((kept) => kept ?? fetch(request)));
+  } else if (isFallback(request)) {
+    event.respondWith(fetch(request).catch(() => caches.match(OFFLINE)));
+  }
 });
 
 self.addEventListener("push", (event) => {

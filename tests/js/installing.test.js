@@ -17,6 +17,12 @@ test("13.23: the offline sentence never stands for API, live line or sign-in", a
     never.map(() => false),
   );
   equal([asked("/", "cors"), asked("/", "navigate", "POST")], [false, false]);
+  const isPart = /** @type {any} */ (self).ivegIsOfOffline;
+  const parts = ["/static/css/tokens.css", "/static/css/tokens.css?offline", "/live"];
+  equal(
+    parts.map((path) => isPart({ url: new URL(path, location.href).href })),
+    [false, true, false],
+  );
 });
 
 test("13.23: recipients are typed as people write them, one a line", () => {

@@ -51,7 +51,7 @@ FACTORS = {
     "situation": tuple(SITUATIONS),
 }
 READY = {
-    "live": "#map-fit:enabled",
+    **dict.fromkeys(("live", "live-robots", "live-log"), "#map-fit:enabled"),
     "alerts": "#past-rows tbody tr",
     "commands": "#orders-rows tbody tr",
     "decision": ".chain li",
@@ -61,8 +61,8 @@ READY = {
 """What a page is about; of the others their frame will do."""
 _LOST_MS = 4000
 """How long the server has been away on pictures without it."""
-_REST_MS = 1500
-"""Until cards have found their order and the status line says what is better."""
+_REST_MS = 1600
+"""Until cards have found their order, and the status line says what got better."""
 
 
 def main(folder: Path) -> None:
@@ -113,12 +113,11 @@ def _take(browser: Browser, past: Site, case: Case, folder: Path, n: int) -> Pic
 
 
 def _rest(page: Page, line: WebSocketRoute, told: Frozen) -> None:
-    """Time passes until nothing moves, and every robot is heard again."""
-    page.clock.run_for(_REST_MS)
-    for robot in told["snapshot"]["robots"]:
-        said = {"topic": f"robots/{robot['robot_id']}", "data": robot}
-        line.send(json.dumps(said))
-    for _ in range(3):
+    """Time passes until nothing moves, and every robot goes on talking."""
+    for _ in range(0, _REST_MS, 200):
+        for robot in told["snapshot"]["robots"]:
+            said = {"topic": f"robots/{robot['robot_id']}", "data": robot}
+            line.send(json.dumps(said))
         page.evaluate("() => fetch('/healthz')")
         page.clock.run_for(200)
 

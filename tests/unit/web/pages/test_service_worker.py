@@ -1,8 +1,11 @@
 """Issue 13.23: installable, and one honest sentence without a connection."""
 
 import json
+import re
 from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import partial
+from hashlib import sha256
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from threading import Thread
@@ -11,13 +14,15 @@ from typing import Any
 import httpx
 import pytest
 from fastapi import FastAPI
-from playwright.sync_api import Browser
+from playwright.sync_api import Browser, expect
 
+from iveg.domain.limits import LIMITS
 from iveg.web.pages import service_worker
 from iveg.web.security.authentication import Authenticator
 from iveg.web.security.headers import CONTENT_SECURITY_POLICY
 from tests.browsers import running_browser
 from tests.builders import START
+from tests.e2e.reading import serious
 
 STATIC = Path(__file__).parents[4] / "iveg" / "static"
 _PAGE = (
@@ -35,6 +40,7 @@ class Served(SimpleHTTPRequestHandler):
         made = {
             "/": (_PAGE, "text/html"),
             "/settings": (_PAGE, "text/html"),
+            "/healthz": (b"ok", "text/plain"),
             "/static/js/register.js": (_REGISTER, "text/javascript"),
             "/sw.js": ((STATIC / "sw.js").read_bytes(), "text/javascript"),
         }
@@ -85,23 +91,65 @@ def browser() -> Iterator[Browser]:
         yield found
 
 
-def test_without_a_server_a_page_says_use_the_red_button_and_api_fails_as_ever(
-    browser: Browser,
-) -> None:
-    handler = partial(Served, directory=str(STATIC))
-    server = ThreadingHTTPServer(("127.0.0.1", 0), handler)
-    Thread(target=server.serve_forever, daemon=True).start()
-    url = f"http://127.0.0.1:{server.server_port}"
+@pytest.fixture
+def server() -> Iterator[ThreadingHTTPServer]:
+    with _serving(0) as found:
+        yield found
 
+
+@contextmanager
+def _serving(port: int) -> Iterator[ThreadingHTTPServer]:
+    handler = partial(Served, directory=str(STATIC))
+    with ThreadingHTTPServer(("127.0.0.1", port), handler) as found:
+        Thread(target=found.serve_forever, daemon=True).start()
+        yield found
+        found.shutdown()
+
+
+def test_without_a_server_a_page_says_so_in_the_house_s_type_until_it_is_back(
+    browser: Browser, server: ThreadingHTTPServer
+) -> None:
+    url = f"http://127.0.0.1:{server.server_port}"
     page = browser.new_page()
     page.goto(f"{url}/")
     page.evaluate("() => navigator.serviceWorker.ready.then(() => true)")
+    page.context.add_cookies(
+        [{"name": "iveg_language", "value": "en", "url": url}],
+    )
     server.shutdown()
     server.server_close()
     page.goto(f"{url}/settings")
-    said = page.inner_text("body")
-    api = page.evaluate("() => fetch('/api/v1/robots').catch((e) => e.name)")
 
-    assert "use la seta roja" in said
+    said = page.inner_text("body")
     assert "use the red button" in said
+    assert "use la seta roja" not in said
+    limits = [LIMITS.feedback_slow_s, LIMITS.feedback_stand_s]
+    told = re.findall(r"after ([\d.]+) s", said)
+    assert [float(seconds) for seconds in told] == limits
+    ground = page.locator("h1:visible").evaluate(_GROUND)
+    assert ground == page.evaluate(_ALERT_1)
+    api = page.evaluate("() => fetch('/api/v1/robots').catch((e) => e.name)")
     assert api == "TypeError"
+    assert serious(page) == []
+
+    with _serving(server.server_port):
+        expect(page.get_by_text("open", exact=True)).to_be_visible()
+
+
+def test_a_changed_part_of_the_offline_page_reaches_every_device() -> None:
+    """Devices fetch the parts anew when the worker itself has changed."""
+    worker = (STATIC / "sw.js").read_text()
+    parts = ("offline.html", "css/tokens.css", "css/offline.css", "js/offline.js")
+    digest = sha256(b"".join((STATIC / part).read_bytes() for part in parts))
+
+    assert f'"iveg-offline-{digest.hexdigest()[:8]}"' in worker
+
+
+_GROUND = "(one) => getComputedStyle(one).backgroundColor"
+_ALERT_1 = """() => {
+  const one = document.createElement('i');
+  one.style.background = 'var(--alert-1)';
+  document.body.append(one);
+  return getComputedStyle(one).backgroundColor;
+}"""
+"""The red of alarms, as the house's tokens say it."""
