@@ -65,7 +65,8 @@ def visit(page: Page, route: str) -> None:
 COVERED_STOPS = """() => [...document.querySelectorAll('[data-stop]')]
   .filter((stop) => stop.checkVisibility({visibilityProperty: true}))
   .map((stop) => {
-    if (!stop.closest('#stops')) stop.scrollIntoView({block: 'center'});
+    if (!stop.closest('#stops'))
+      stop.scrollIntoView({block: 'center', inline: 'center'});
     const box = stop.getBoundingClientRect();
     const x = box.x + box.width / 2, y = box.y + box.height / 2;
     const hit = document.elementFromPoint(x, y);

@@ -111,7 +111,7 @@ def test_13_4_the_navigation_has_every_entry_on_every_desktop(fleet: Fleet) -> N
 def test_13_4_the_user_opens_a_menu_with_a_way_out(fleet: Fleet) -> None:
     for size in ((1920, 1080), (1024, 768), (844, 390)):
         page = fleet.at(size)
-        page.locator(".user").click()
+        page.locator(".header [data-opens=menu]:visible").first.click()
 
         page.locator("#sign-out").scroll_into_view_if_needed()
         expect(page.locator("#sign-out")).to_be_in_viewport(ratio=1)
@@ -311,3 +311,36 @@ COLLISIONS = """() => {
     .map(([name]) => name);
 }"""
 """Parts of the header that lie on the one before."""
+
+
+@pytest.mark.parametrize("fleet", [2, 6], indirect=True)
+def test_a_phone_has_one_card_a_swipe_the_worst_first_and_none_moves_once_swiped(
+    fleet: Fleet,
+) -> None:
+    told = frozen()["snapshot"]["robots"][0]
+    page = fleet.at((390, 844))
+    row = page.locator("#robots")
+    row.evaluate("(row) => { scrollTo(0, 0); row.scrollLeft = 0; }")
+    last = page.locator(".card").last
+    danger = {**told["situation"], "level": "danger", "state": "unconfirmed"}
+    worst = {**told, "robot_id": last.get_attribute("data-robot"), "situation": danger}
+
+    fleet.tell({**worst, "age_s": 0.0})
+    page.clock.run_for(1500)
+    first = page.locator(".card").first
+    expect(first).to_have_attribute("data-robot", worst["robot_id"])
+    expect(first.locator(".stop")).to_be_in_viewport(ratio=1)
+    assert row.evaluate("(row) => row.scrollLeft") == 0
+
+    page.locator(".card .card__menu").last.focus()
+    expect(page.locator(".card .card__menu").last).to_be_in_viewport(ratio=1)
+    page.locator(".card .card__menu").last.blur()
+    swiped = row.evaluate("(row) => row.scrollLeft")
+    assert swiped > 0
+    fleet.tell({**told, "age_s": 0.0})
+    page.clock.run_for(1500)
+    expect(page.locator(".card").first).to_have_attribute(
+        "data-robot", worst["robot_id"]
+    )
+    assert row.evaluate("(row) => row.scrollLeft") == swiped
+    row.evaluate("(row) => { row.scrollLeft = 0; }")

@@ -52,7 +52,8 @@ function wireLanguage() {
     button.addEventListener("click", () => {
       switchLanguage(/** @type {"es" | "en"} */ (button.dataset.language));
       for (const other of buttons) {
-        setAttribute(other, "aria-pressed", String(other === button));
+        const isIts = other.dataset.language === button.dataset.language;
+        setAttribute(other, "aria-pressed", String(isIts));
       }
     });
   }

@@ -26,10 +26,11 @@ export function createCardOrder(place) {
   listen("pointerup", ({ pointerId }) => fingers.delete(pointerId));
   listen("pointercancel", ({ pointerId }) => fingers.delete(pointerId));
 
-  /** Whether somebody presses, points at a card or is in it. */
+  /** Whether somebody presses, points at a card, is in it or has swiped to one. */
   function isBusy() {
     return (
       fingers.size > 0 ||
+      place.scrollLeft > 0 ||
       place.contains(document.activeElement) ||
       place.querySelector("dialog[open]") !== null ||
       (HOVERS.matches && place.matches(":hover"))
@@ -49,6 +50,8 @@ export function createCardOrder(place) {
     order.forEach(({ card }, i) => {
       if (place.children[i] !== card) place.insertBefore(card, place.children[i]);
     });
+    // A row that snaps would go along with the card that was the worst.
+    place.scrollLeft = 0;
   }
 
   return { sort };

@@ -101,6 +101,11 @@ export function createRobotsPanel(app) {
     if (sight.isSeen(robot.robot_id)) card.draw(robot);
   }
 
+  /** A row that snaps may leave what has just got the focus out of sight. */
+  place.addEventListener("focusin", ({ target }) => {
+    const card = /** @type {HTMLElement} */ (target).closest(".card");
+    if (card) place.scrollLeft = /** @type {HTMLElement} */ (card).offsetLeft;
+  });
   for (const card of all(".card", place)) cardOf(String(card.dataset.robot));
   store.subscribe("robots/", take);
   store.subscribe("snapshot", drawAll);
