@@ -1,5 +1,6 @@
 import { ageOf } from "../../iveg/static/js/core/clock.js";
 import { matches } from "../../iveg/static/js/core/hub.js";
+import { HUES, slotOf } from "../../iveg/static/js/core/slots.js";
 import { COMMANDS_SIZE, LOG_SIZE, Store } from "../../iveg/static/js/core/store.js";
 import { command, entry, person, robot, snapshot } from "./builders.js";
 import { equal, near, test } from "./harness.js";
@@ -223,12 +224,12 @@ test("who unsubscribed hears nothing any more", () => {
   equal(heard, []);
 });
 
-test("a robot keeps its hue when the fleet changes", () => {
-  const { store } = storeByHand();
-  const [agi, agii] = [robot(), robot({ robot_id: "AGII" })];
-  store.apply("snapshot", snapshot({ robots: [agi, agii] }), 0);
-  store.apply("snapshot", snapshot({ robots: [agii] }), 1);
-  equal([store.slotOf("AGI"), store.slotOf("AGII"), store.slotOf("X")], [1, 2, 3]);
+test("a robot keeps its hue, and ten robots have ten", () => {
+  const ten = Array.from({ length: 10 }, (_, i) => `R${i}`);
+  const slots = ten.map(slotOf);
+  equal(new Set(slots).size, HUES);
+  equal([Math.min(...slots), Math.max(...slots)], [1, HUES]);
+  equal(ten.map(slotOf), slots);
 });
 
 test("a line's state is told when it changes and keeps since when", () => {

@@ -21,6 +21,7 @@ _POLICY = (
 )
 _PAGE = (
     "<!doctype html><html lang=en><link rel=icon href=data:,>"
+    "<link rel=stylesheet href=/static/css/tokens.css>"
     f"<body data-limits='{limits_text()}'></body></html>"
 ).encode()
 

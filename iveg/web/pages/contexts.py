@@ -14,6 +14,8 @@ from iveg.models.day import Day
 from iveg.web.pages.openapi import ApiDoc
 
 Theme = Literal["auto", "light", "dark", "sunlight"]
+HUES = 10
+"""How many robots have a hue of their own."""
 THEMES: dict[str, Theme] = {theme: theme for theme in get_args(Theme)}
 
 
@@ -35,6 +37,11 @@ class Site:
     demo: bool
     laboratory: bool = False
     transports: tuple[str, ...] = tuple(one.id for one in TRANSPORTS)
+
+    @property
+    def slots(self) -> dict[str, int]:
+        """Which of the hues in ``css/tokens.css`` is each robot's own, from 1."""
+        return {robot: n % HUES + 1 for n, robot in enumerate(self.robots)}
 
 
 @dataclass(frozen=True, slots=True)

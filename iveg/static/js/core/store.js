@@ -33,9 +33,6 @@ export const LOG_SIZE = 500;
 /** Commands that a browser keeps, closed ones among them. */
 export const COMMANDS_SIZE = 200;
 
-/** Hues that the design has for robots (`--robot-1` … `--robot-8`). */
-const ROBOT_HUES = 8;
-
 /** What the newest snapshot and the messages since then have brought. */
 class Known {
   /** @type {Map<string, any>} newest value by topic */
@@ -58,8 +55,6 @@ export class Store {
   #now;
   #hub;
   #known = new Known();
-  /** @type {Map<string, number>} */
-  #slots = new Map();
   /** @type {Connection} */
   #connection;
 
@@ -151,18 +146,6 @@ export class Store {
     return this.#known.log;
   }
 
-  /**
-   * Which `--robot-n` is a robot's own (1–8), the same on map and cards.
-   *
-   * @param {string} robotId
-   * @returns {number}
-   */
-  slotOf(robotId) {
-    const slot = this.#slots.get(robotId) ?? this.#slots.size;
-    this.#slots.set(robotId, slot);
-    return (slot % ROBOT_HUES) + 1;
-  }
-
   /** @returns {Connection} */
   get connection() {
     return this.#connection;
@@ -217,7 +200,6 @@ export class Store {
     const known = this.#known.robots.get(robot.robot_id);
     if (known && isOlder(robot, known)) return false;
     this.#setRobot(robot.robot_id, robot);
-    this.slotOf(robot.robot_id);
     return true;
   }
 

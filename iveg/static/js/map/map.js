@@ -155,13 +155,9 @@ function createLooks(canvas, onChange) {
   return {
     theme: () => theme,
     labels: () => labels,
-    /**
-     * Reads the page's colours again; call it after the theme has changed.
-     *
-     * @param {Record<string, string>} [overrides] custom property → colour
-     */
-    setTheme(overrides) {
-      theme = readTheme(canvas, overrides);
+    /** Reads the page's colours again; call it after the theme has changed. */
+    setTheme() {
+      theme = readTheme(canvas);
       onChange();
     },
     /**

@@ -48,6 +48,7 @@
 import { ageOf, linkOf } from "../core/clock.js";
 import { LIMITS, ringRadius } from "../core/limits.js";
 import { situationOf } from "../core/situation.js";
+import { slotOf } from "../core/slots.js";
 
 /** The server is silent for two seconds when the line is called lost; one more. */
 const VEIL_AFTER_MS = 1000;
@@ -113,7 +114,7 @@ function readRobot(robot, pose, store, nowMs) {
   const link = linkOf(ageS);
   return {
     id: robot.robot_id,
-    slot: store.slotOf(robot.robot_id),
+    slot: slotOf(robot.robot_id),
     pose,
     link,
     ageS,
@@ -230,7 +231,7 @@ function readDetections(store, nowMs) {
   for (const [robotId, frame] of store.detections()) {
     if (ageOf(frame, nowMs) > LIMITS.live_s) continue;
     const yaw = store.robots().get(robotId)?.pose?.yaw ?? 0;
-    const slot = store.slotOf(robotId);
+    const slot = slotOf(robotId);
     frame.items.forEach((item, i) => {
       detections.push(readDetection(item, `${robotId}/${i}`, slot, yaw));
     });
@@ -270,7 +271,7 @@ function readScans(store, nowMs) {
   for (const [robotId, { points, ...scan }] of store.scans()) {
     const strength = strengthAt(ageOf(scan, nowMs));
     if (!strength) continue;
-    scans.push({ robotId, slot: store.slotOf(robotId), strength, points });
+    scans.push({ robotId, slot: slotOf(robotId), strength, points });
   }
   return scans;
 }

@@ -11,6 +11,7 @@
  */
 
 import { UNHEARD } from "../core/situation.js";
+import { slotOf } from "../core/slots.js";
 import * as greenhouse from "../map/layers/greenhouse.js";
 import * as grid from "../map/layers/grid.js";
 import { createLabels } from "../map/layers/labels.js";
@@ -18,8 +19,9 @@ import * as links from "../map/layers/links.js";
 import * as people from "../map/layers/people.js";
 import * as robots from "../map/layers/robot.js";
 import * as scalebar from "../map/layers/scalebar.js";
-import { PAPER, readTheme } from "../map/layers/theme.js";
+import { readTheme } from "../map/layers/theme.js";
 import { createViewport, fitTo } from "../map/viewport.js";
+import { make } from "./dom.js";
 
 const WIDTH = 360;
 const HEIGHT = 260;
@@ -51,10 +53,10 @@ export function sceneOf({ position, places, rule, ...told }, map) {
     nowMs: 0,
     map,
     isVeiled: false,
-    robots: places.map(({ robot_id, ...pose }, i) => ({
+    robots: places.map(({ robot_id, ...pose }) => ({
       ...BODY,
       id: robot_id,
-      slot: i + 1,
+      slot: slotOf(robot_id),
       pose,
       link: /** @type {const} */ ("LIVE"),
       ageS: 0,
@@ -92,7 +94,7 @@ export function drawDecision(decision, map, i18n) {
   canvas.setAttribute("aria-label", i18n.t("decision.picture"));
   const ctx = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
   ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
-  const theme = { ...readTheme(document.body, PAPER) };
+  const theme = paperTheme();
   ctx.fillStyle = theme.bg;
   ctx.fillRect(0, 0, WIDTH, HEIGHT);
   const paint = {
@@ -108,6 +110,14 @@ export function drawDecision(decision, map, i18n) {
     layer.draw(paint);
   }
   return canvas;
+}
+
+function paperTheme() {
+  const probe = make("i", "on-paper");
+  document.body.append(probe);
+  const theme = readTheme(probe);
+  probe.remove();
+  return theme;
 }
 
 /** All that the picture is about (m). @param {NonNullable<ReturnType<typeof sceneOf>>} s */

@@ -6,6 +6,7 @@
 
 import { aboutAge, ageOf, linkOfRobot } from "../core/clock.js";
 import { capitalised, phrasesOf, situationOf } from "../core/situation.js";
+import { slotOf } from "../core/slots.js";
 import { createDetector } from "./detector.js";
 import { all, setAttribute, setHidden, setText } from "./dom.js";
 import { createDrill } from "./drill.js";
@@ -107,14 +108,14 @@ export class RobotCard {
 
   /** @param {Robot | undefined} robot */
   #drawHead(robot) {
-    const { store, i18n } = this.#app;
+    const { i18n } = this.#app;
     const { menu, shape, replay } = this.#parts;
     const link = linkOfRobot(robot);
     setAttribute(this.#card, "data-link", link);
     setAttribute(this.#card, "data-mode", robot?.mode ?? "UNKNOWN");
     setAttribute(menu, "aria-label", i18n.t("release.open", { robot: this.#robotId }));
     setText(this.#fields.link, i18n.t(`robot.link.${link}`));
-    setAttribute(shape, "data-slot", String(store.slotOf(this.#robotId)));
+    setAttribute(shape, "data-slot", String(slotOf(this.#robotId)));
     setAttribute(shape, "data-drive", robot?.profile?.drive ?? "differential");
     setHidden(replay, !robot?.replay);
   }

@@ -2,11 +2,13 @@
  * Robots: to scale, with their heading, and never shown as fresher than they are.
  *
  * Live is filled; late has an amber outline and its age; lost is a dashed ghost at its
- * last pose.  Each kind of drive has its own body, so hue never carries identity alone.
+ * last pose.  Each kind of drive has its own body and the later hues a stripe,
+ * so hue never carries identity alone.
  */
 
 import { isSilent } from "../../core/clock.js";
 import { LIMITS } from "../../core/limits.js";
+import { isStriped } from "../../core/slots.js";
 import { screenX, screenY } from "../viewport.js";
 import { claim } from "./claims.js";
 import { circle, isolated, label, pill, widthOf, widthOfPill } from "./paint.js";
@@ -106,6 +108,7 @@ function drawBody({ ctx, theme }, robot, length, width) {
   ctx.fillStyle = hue;
   ctx.fill();
   ctx.globalAlpha = 1;
+  if (isStriped(robot.slot)) drawStripe(ctx, length, width, isLost ? hue : theme.bg);
   if (isLost) ghost(ctx, hue);
   drawHeading(ctx, length, width, hue, isLost ? hue : theme.bg);
 }
@@ -181,6 +184,19 @@ function drawWheels(ctx, robot, length, width, colour) {
       ctx.fillRect(x, y, long, thick);
     }
   }
+}
+
+/**
+ * Across the body, behind its middle: the later half of the hues.
+ *
+ * @param {Context} ctx
+ * @param {number} length
+ * @param {number} width
+ * @param {string} colour
+ */
+function drawStripe(ctx, length, width, colour) {
+  ctx.fillStyle = colour;
+  ctx.fillRect(-0.3 * length, -width / 2, 0.16 * length, width);
 }
 
 /**

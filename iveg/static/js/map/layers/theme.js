@@ -8,34 +8,10 @@
  * }} Theme `robots[slot - 1]` is a robot's hue
  */
 
-/**
- * Used on paper, and where a page defines no token, so that a map is never painted
- * invisible.
- */
-export const PAPER = {
-  "--map-bg": "#eceff1",
-  "--map-lane": "#f8f9fa",
-  "--map-crop": "#b7c4b1",
-  "--map-post": "#78828a",
-  "--map-text": "#22292f",
-  "--map-grid": "#dde2e6",
-  "--person": "#5b2a86",
-  "--peer": "#3b5b7a",
-  "--ring": "#5b2a86",
-  "--muted": "#77818a",
-  "--alert-1": "#c62828",
-  "--alert-2": "#b26a00",
-  "--alert-3": "#51708a",
-  "--on-alert-2": "#ffffff",
-  "--robot-1": "#0b6fa4",
-  "--robot-2": "#8a3f9e",
-  "--robot-3": "#00796b",
-  "--robot-4": "#5c6bc0",
-  "--robot-5": "#00838f",
-  "--robot-6": "#7b5ea7",
-  "--robot-7": "#33691e",
-  "--robot-8": "#37474f",
-};
+import { HUES } from "../../core/slots.js";
+
+/** Where the page has no token the system's own colours show it, never nothing. */
+const GROUNDS = new Set(["--map-bg", "--map-lane", "--map-grid", "--on-alert-2"]);
 
 /**
  * Reads the theme in force where the canvas stands.
@@ -44,16 +20,16 @@ export const PAPER = {
  * written in any CSS colour syntax, `light-dark()` and `var()` included.
  *
  * @param {HTMLElement} element
- * @param {Record<string, string>} [overrides] token name → colour
  * @returns {Theme}
  */
-export function readTheme(element, overrides = {}) {
+export function readTheme(element) {
   const before = element.style.color;
   const computed = getComputedStyle(element);
-  /** @param {keyof typeof PAPER} token */
+  /** @param {string} token */
   const colour = (token) => {
-    element.style.color = `var(${token}, ${PAPER[token]})`;
-    return overrides[token] ?? computed.color;
+    const plain = GROUNDS.has(token) ? "Canvas" : "CanvasText";
+    element.style.color = `var(${token}, ${plain})`;
+    return computed.color;
   };
   const theme = build(colour, computed.fontFamily || "sans-serif");
   element.style.color = before;
@@ -61,14 +37,12 @@ export function readTheme(element, overrides = {}) {
 }
 
 /**
- * @param {(token: keyof typeof PAPER) => string} colour
+ * @param {(token: string) => string} colour
  * @param {string} font
  * @returns {Theme}
  */
 function build(colour, font) {
-  const robots = Array.from({ length: 8 }, (_, i) =>
-    colour(/** @type {keyof typeof PAPER} */ (`--robot-${i + 1}`)),
-  );
+  const robots = Array.from({ length: HUES }, (_, i) => colour(`--robot-${i + 1}`));
   return {
     bg: colour("--map-bg"),
     lane: colour("--map-lane"),
