@@ -197,6 +197,28 @@ def test_the_status_line_is_first_and_largest_and_nothing_moves(fleet: Fleet) ->
         assert len(places) == 1, size
 
 
+@pytest.mark.parametrize("fleet", [2], indirect=True)
+def test_the_status_line_shows_its_robot_on_the_map_by_tap_and_by_key(
+    fleet: Fleet,
+) -> None:
+    first = frozen()["snapshot"]["robots"][0]
+    situation = {**first["situation"], "why": None, "slots": {}, **LEVELS[1]}
+    fleet.tell({**first, "situation": situation, "age_s": 0.0})
+    page = fleet.at((1440, 900))
+    following = page.locator("#following")
+
+    for _ in range(2):
+        page.locator("#map-fit").click()
+        expect(following).to_be_hidden()
+        page.locator("#status").click()
+        expect(following).to_contain_text("AGI")
+        assert page.url.endswith("/")
+    page.locator("#map-fit").click()
+    page.locator("#status").press("Enter")
+    expect(following).to_contain_text("AGI")
+    fleet.tell({**first, "situation": situation | LEVELS[0] | {"action": "none"}})
+
+
 HELD = {"mode": "STOPPED", "holds": [{"id": "x", "source": "hw", "ack": "local"}]}
 SILENT = {"pose": None, "twist": None, "applied": None, "age_s": None}
 STATES: tuple[dict[str, Any], ...] = (

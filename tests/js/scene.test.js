@@ -1,3 +1,4 @@
+import { LIMITS } from "../../iveg/static/js/core/limits.js";
 import { Store } from "../../iveg/static/js/core/store.js";
 import { borderTowards } from "../../iveg/static/js/map/layers/encounters.js";
 import { isSeenHeld } from "../../iveg/static/js/map/layers/robot.js";
@@ -98,13 +99,31 @@ test("I12 a padlock is drawn from what a robot said just now alone", () => {
   equal(isSeenHeld({ situation: standing, ageS }), false);
 });
 
+test("a moving robot that is not heard has one at once, growing at its last speed", () => {
+  const store = storeOf({
+    robots: [robot({ twist: { linear: -0.8, angular: 0 }, age_s: 0 })],
+  });
+  const seen = [900, 1100, 4000, 60_000].map(
+    (ms) => readScene(store, ms).robots[0].unsureM,
+  );
+  for (const [i, wanted] of [0, 0.88, 3.2, 0.8 * LIMITS.ring_lasts_s].entries())
+    near(seen[i], wanted);
+});
+
+test("a robot that stood, and one of a recording, have none", () => {
+  const still = { twist: { linear: 0.01, angular: 0 }, age_s: 0 };
+  const played = { twist: { linear: 0.8, angular: 0 }, age_s: 0, replay: true };
+  for (const one of [still, played])
+    equal(readScene(storeOf({ robots: [robot(one)] }), 4000).robots[0].unsureM, 0);
+});
+
 test("a confirmed stop has no such disc", () => {
   const stop = command({
     state: "STANDING",
     robot: { v: 0, report_age_s: 0.1, moved_m: 0.4 },
   });
   const store = storeOf({ robots: [robot({ stop })], commands: [stop] });
-  near(readScene(store, 2000).robots[0].unsureM, 0);
+  near(readScene(store, 900).robots[0].unsureM, 0);
 });
 
 test("an encounter ahead is drawn of a robot that is live alone", () => {

@@ -160,7 +160,7 @@ test("without the server the line says so, in red", () => {
 });
 
 /** @param {import("../../iveg/static/js/core/situation.js").Level} level */
-const told = (level) => ({ level, said: level, about: level });
+const told = (level) => ({ level, said: level, about: level, robotId: null });
 
 test("what is worse shows at once, what is better once it has lasted", () => {
   const calm = createCalm();

@@ -18,8 +18,8 @@
  *   drive: string, length: number, width: number,
  *   task: string | null, goal: Point | null, path: [number, number][],
  *   unsureM: number, encounters: import("../core/protocol.js").Encounter[],
- * }} SceneRobot `slot` 1–8 its hue; `unsureM` how far it may have driven since an
- *   unconfirmed STOP (m), 0 without one; `encounters` of a robot that is LIVE alone
+ * }} SceneRobot `slot` names its hue; `unsureM` how far it may have driven unseen (m):
+ *   since an unconfirmed STOP, or since it was heard; `encounters` of a LIVE one alone
  *
  * @typedef {{
  *   id: string, peer: boolean, stage: "seen" | "remembered" | "last_seen",
@@ -126,7 +126,7 @@ function readRobot(robot, pose, store, nowMs) {
     task: robot.navigation?.task ?? null,
     goal: robot.navigation?.goal ?? null,
     path: robot.navigation?.path ?? [],
-    unsureM: unsureDistance(robot, store, nowMs),
+    unsureM: Math.max(unsureOfStop(robot, store, nowMs), unheard(robot, ageS)),
     encounters: link === "LIVE" ? (robot.encounters ?? []) : [],
   };
 }
@@ -139,7 +139,7 @@ function readRobot(robot, pose, store, nowMs) {
  * @param {Store} store
  * @param {number} nowMs
  */
-function unsureDistance(robot, store, nowMs) {
+function unsureOfStop(robot, store, nowMs) {
   const heardMs = robot.receivedAtMs ?? nowMs;
   const step = robot.stop && store.get(`commands/${robot.stop.command_id}`);
   // A step comes on its own topic; each try and each report on the robot's.
@@ -149,6 +149,19 @@ function unsureDistance(robot, store, nowMs) {
   const saidMs = isStepNewer ? step.receivedAtMs : heardMs;
   const waitedS = Math.max(0, nowMs - saidMs) / 1000;
   return (stop.robot.moved_m ?? 0) + Math.abs(stop.robot.v ?? 0) * waitedS;
+}
+
+/**
+ * How far a robot that is not heard may have driven at its last speed (m).  As with
+ * people, the disc grows for so long; nothing is known of the place after that.
+ *
+ * @param {Robot} robot
+ * @param {number} ageS
+ */
+function unheard({ twist, replay }, ageS) {
+  const speed = Math.abs(twist?.linear ?? 0);
+  if (replay || linkOf(ageS) === "LIVE" || speed < LIMITS.standing_speed) return 0;
+  return speed * Math.min(ageS, LIMITS.ring_lasts_s);
 }
 
 /**

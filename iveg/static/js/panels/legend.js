@@ -93,6 +93,7 @@ const GREENHOUSE = {
   obstacles: [],
 };
 const HALF_SPEED = { ...UNHEARD, state: "half", slots: { factor: LIMITS.slow_factor } };
+const IN_DANGER = { ...UNHEARD, level: "danger" };
 const LOCKED = { ...UNHEARD, level: "locked" };
 const LEFT = { ...ROBOT, pose: { x: -1.3, y: 0, yaw: 0 } };
 const RIGHT = { ...PERSON, x: 1.3, ringM: 0 };
@@ -153,7 +154,7 @@ export const SIGNS = [
     name: "unsure",
     layer: "robot",
     draw: robots.draw,
-    scene: oneRobot({ unsureM: 0.6 }),
+    scene: oneRobot({ unsureM: 0.6, situation: IN_DANGER }),
   },
   { name: "seen", layer: "people", draw: people.draw, scene: onePerson() },
   {

@@ -5,6 +5,7 @@
  */
 
 import { installPaintHook } from "../core/painthook.js";
+import { takeAsked } from "../core/showing.js";
 import { followCostmap, followCoverage } from "../map/costmap.js";
 import { hears } from "../map/layers/belief.js";
 import { createMap } from "../map/map.js";
@@ -49,6 +50,14 @@ export function createMapbox(app, decision) {
     const said = metres === null ? i18n.t(asks) : i18n.t("map.measured", { metres });
     setHidden(need("#measured"), !on);
     setText(need("#measured"), on ? said : "");
+  }
+
+  /** A link to a robot: the status line's, on this page or another. */
+  function showAsked() {
+    const robotId = store.get("snapshot") ? takeAsked() : null;
+    if (robotId === null || !store.robots().has(robotId)) return;
+    map.follow(robotId);
+    need("#map-panel").scrollIntoView({ block: "nearest" });
   }
 
   function showBeliever() {
@@ -105,6 +114,7 @@ export function createMapbox(app, decision) {
   document.addEventListener("keydown", onKey, { capture: true });
   need("#layers").addEventListener("change", showHidden);
   wireZoom(map);
+  addEventListener("hashchange", showAsked);
   document.addEventListener("iveg:follow", (event) => {
     map.follow(/** @type {CustomEvent<string>} */ (event).detail);
   });
@@ -121,6 +131,8 @@ export function createMapbox(app, decision) {
   store.subscribe("snapshot", drawTexts);
   i18n.onChange(drawTexts);
   drawTexts();
+  store.subscribe("snapshot", showAsked);
+  showAsked();
   for (const tool of all(".map-tools [disabled]")) tool.removeAttribute("disabled");
 }
 

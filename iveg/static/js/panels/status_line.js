@@ -2,16 +2,18 @@
  * The status line: the worst that holds now in one sentence, the first thing on every page.
  *
  * Without the server nothing is known of any robot, and that is what it says.  What is
- * worse shows at once; what is better, and what is read aloud, has to last first.
+ * worse shows at once; what is better, and what is read aloud, has to last first.  The robot
+ * that it names is one tap away on the map, from every page.
  */
 
 import { onBeat } from "../core/beat.js";
+import { addressOf } from "../core/showing.js";
 import { fleetSaid, LEVELS } from "../core/situation.js";
 import { need, setAttribute, setText } from "./dom.js";
 
 /** @typedef {import("../core/situation.js").Level} Level */
-/** @typedef {{level: Level, said: string, about: string}} Told `about`: the same while
- *   only its numbers change */
+/** @typedef {{level: Level, said: string, about: string, robotId: string | null}} Told
+ *   `about`: the same while only its numbers change */
 /** @typedef {import("../core/store.js").ConnectionState} ConnectionState */
 
 const TICK_MS = 200;
@@ -50,6 +52,8 @@ export function createStatusLine({ store, i18n }) {
     setAttribute(place, "data-level", shown.level);
     place.toggleAttribute("data-long", shown.said.length > LONG);
     setText(need("#status-said"), shown.said);
+    if (shown.robotId) setAttribute(place, "href", addressOf(shown.robotId));
+    else place.removeAttribute("href");
     if (aloud) setText(need("#status-told"), aloud.said);
   }
 
@@ -115,6 +119,7 @@ const told = (level, key, i18n, slots) => ({
   level,
   said: i18n.t(key, slots),
   about: key,
+  robotId: null,
 });
 
 /**
@@ -126,7 +131,7 @@ const told = (level, key, i18n, slots) => ({
 function ofFleet(store, i18n, nowMs) {
   const { level, said, robotId } = fleetSaid(store.robots().values(), i18n, nowMs);
   const { state, why } = store.robots().get(robotId ?? "")?.situation ?? {};
-  return { level, said, about: [level, robotId, state, why].join(" ") };
+  return { level, said, about: [level, robotId, state, why].join(" "), robotId };
 }
 
 /**

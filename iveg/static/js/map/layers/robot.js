@@ -61,19 +61,20 @@ function drawRobot(paint, robot) {
 }
 
 /**
- * An unconfirmed STOP: the disc in which the robot may be by now.
+ * The disc in which the robot may be by now: red for a danger, else amber.
  *
  * @param {Paint} paint
  * @param {SceneRobot} robot
  * @param {number} length
  */
 function drawUnsure({ ctx, view, theme }, robot, length) {
+  const colour = theme.alert[robot.situation.level === "danger" ? 0 : 1];
   circle(ctx, 0, 0, robot.unsureM * view.scale + length / 2);
   ctx.globalAlpha = 0.12;
-  ctx.fillStyle = theme.alert[0];
+  ctx.fillStyle = colour;
   ctx.fill();
   ctx.globalAlpha = 1;
-  ctx.strokeStyle = theme.alert[0];
+  ctx.strokeStyle = colour;
   ctx.lineWidth = 2;
   ctx.stroke();
 }
