@@ -8,8 +8,6 @@ stands, by detector profile; the same seed gives the same numbers on any machine
 """
 
 import argparse
-from collections.abc import Iterator
-from math import hypot
 
 from benchmarks.process import print_table
 from iveg.adapters.fleet_files import load_fleet
@@ -17,18 +15,17 @@ from iveg.adapters.greenhouses import load_greenhouse
 from iveg.app.virtual import VirtualPipeline
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.witness import Plan
-from iveg.lab.emulator.camera import DETECTORS, PERSON
+from iveg.lab.emulator.camera import DETECTORS
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.scenarios import scenario_named
-from iveg.lab.emulator.truth import in_view
+from iveg.lab.emulator.truth import true_picture
 from iveg.lab.emulator.world import SimulatedWorld
-from iveg.lab.experiment.protection import (
-    Moment,
-    NearPerson,
-    ProtectionScore,
-    whole,
-)
+from iveg.lab.experiment import tables
+from iveg.lab.experiment.moments import moments_of
+from iveg.lab.experiment.protection import Protection, protection_of, whole
+from iveg.lab.experiment.recording import Row
 from iveg.lab.experiment.stage import STEP_S, Stage
+from iveg.lab.experiment.virtual_run import foretold_row
 
 ROBOTS = ("AGI", "AGII")
 
@@ -59,37 +56,18 @@ def staged(
 
 def run(
     profile: str, seed: int, seconds: float, rule: DetectionRule, laser: bool = True
-) -> ProtectionScore:
-    """One run of the demo's greenhouse."""
-    stage, world, _ = staged(profile, seed, rule, laser)
-    score = ProtectionScore(STEP_S)
+) -> Protection:
+    """One run of the demo's greenhouse, scored at each step."""
+    stage, world, iveg = staged(profile, seed, rule, laser)
+    truth: list[Row] = []
+    told: list[Row] = []
     for _ in range(round(seconds / STEP_S)):
         stage.step()
-        for moment in moments_of(stage, world):
-            score.add(moment)
-    return score
-
-
-def moments_of(stage: Stage, world: SimulatedWorld) -> Iterator[Moment]:
-    """Every robot as it really is now."""
-    seen = {
-        target.key
-        for rig in world.rigs.values()
-        for target, _ in in_view(rig, world)
-        if target.class_id == PERSON
-    }
-    for robot_id, rig in world.rigs.items():
-        pose, robot = rig.vehicle.pose, stage.robots[robot_id]
-        people = tuple(
-            NearPerson(
-                f"person-{number}",
-                hypot(one.x - pose.x, one.y - pose.y),
-                f"person-{number}" in seen,
-            )
-            for number, one in enumerate(world.discs())
-        )
-        at = stage.now.mono
-        yield Moment(robot_id, at, robot.speed, robot.wanted, robot.factor, people)
+        for robot_id, rig in world.rigs.items():
+            driving = stage.robots[robot_id].driving
+            truth.append(true_picture(rig, world, stage.now.mono, driving))
+            told.append(foretold_row(iveg, truth[-1]))
+    return protection_of(moments_of(truth, told))
 
 
 def main() -> None:
@@ -105,16 +83,19 @@ def main() -> None:
     rule = DetectionRule(
         possible_people=not asked.single_boxes, foresight=not asked.no_foresight
     )
+    seeds = [int(one) for one in asked.seeds.split(",")]
     rows = []
     for profile in asked.profiles.split(","):
-        seeds = [int(one) for one in asked.seeds.split(",")]
-        row = whole(
-            run(profile, one, asked.seconds, rule, not asked.no_laser) for one in seeds
-        ).row()
-        rows.append(
-            [profile, *("–" if one is None else f"{one:g}" for one in row.values())]
-        )
-    print_table(f"Protection, seeds {asked.seeds}", ["profile", *row], rows)
+        runs = (run(profile, n, asked.seconds, rule, not asked.no_laser) for n in seeds)
+        chosen = {"where": "demo", "profile": profile, "rule": "as asked"}
+        rows.append({**chosen, **whole(runs).row()})
+    result = {"protection": rows}
+    for head, cells in (
+        (tables.PROTECTION, tables.protection(result)),
+        (tables.ENTRIES, tables.entries(result)),
+    ):
+        told = [[str(one) for one in row] for row in cells]
+        print_table(f"Protection, seeds {asked.seeds}", [*head], told)
 
 
 if __name__ == "__main__":

@@ -12,7 +12,9 @@ import json
 import math
 import sys
 from collections import Counter, defaultdict
+from itertools import groupby
 from pathlib import Path
+from statistics import quantiles
 
 CLASSES = ("farmer", "AGI", "AGII")
 DATA = ("odometry", "detections", "lidar")
@@ -235,6 +237,162 @@ def sight(halves):
     return [found[name] for name in (*names, "asked", "injected", "people", "ahead")]
 
 
+# --- protection -----------------------------------------------------------------------
+
+NEAR_M, FAR_M, MOVES_M_S, PAUSE_S = 2.0, (2.3, 4.0), 0.05, 1.0
+STILL_S, KNOWN_S, AHEAD_S, SLOW = 0.25, 2.0, 1.5, 0.55
+SIGHTS = ("in view", "behind plants", "unseen")
+ENTERED = ("in view for 2 s", "stepped into view later", "in no camera's view")
+
+
+def at(row):
+    return row["at"]
+
+
+def distance(one, other):
+    return math.dist((one["x"], one["y"]), (other["x"], other["y"]))
+
+
+def told_of(half):
+    """Who iVeg says a robot will meet: function of a row of the truth."""
+    told = {(one["robot"], one["at"]): one for one in rows(half / "encounters.ndjson")}
+
+    def whom(row):
+        for place in told.get((row["robot"], row["at"]), {"people": ()})["people"]:
+            nearest = min(row["people"], key=lambda one: distance(one, place))
+            if distance(nearest, place) <= 1.0:
+                yield nearest["key"]
+
+    return whom
+
+
+def moments(half, measured):
+    """Each row of the truth, how long it counts, and whom some camera has in view."""
+    truth, newest = rows(half / "truth.ndjson"), {}
+    if measured is not None:
+        began, ended = measured["began"], measured["ended"]
+        truth = [one for one in truth if began <= one["at"] <= ended]
+    for now, group in groupby(sorted(truth, key=at), at):
+        same, last = list(group), dict(newest)
+        newest.update({row["robot"]: row for row in same})
+        young = [row for row in newest.values() if now - row["at"] <= STILL_S]
+        seen = {one["key"] for row in young for one in row["visible"]}
+        for row in same:
+            yield row, min(now - last.get(row["robot"], row)["at"], STILL_S), seen
+
+
+class Guarded:
+    """Protection in some runs together."""
+
+    def __init__(self):
+        self.near, self.slowed, self.needless = Counter(), Counter(), Counter()
+        self.driven_s = self.driven_m = 0.0
+        self.delays, self.entries = [], []
+
+    def add(self, half, measured):
+        """One run: pairs of a robot and a person, moment by moment."""
+        whom, pairs, met = told_of(half), defaultdict(dict), []
+        for row, lasts, seen in moments(half, measured):
+            told, slowed = set(whom(row)), row["factor"] <= 0.5
+            moves = abs(row["speed"]) >= MOVES_M_S
+            away = {one["key"]: distance(row["pose"], one) for one in row["people"]}
+            for one in row["people"]:
+                key = one["key"]
+                pair, near = pairs[row["robot"], key], away[key] <= NEAR_M
+                self.enter(row, pair, near, key in seen, key in told)
+                if near and moves:
+                    hidden = "behind plants" if one["hidden"] else "unseen"
+                    sight = "in view" if key in seen else hidden
+                    self.near[sight] += lasts
+                    self.slowed[sight] += lasts * slowed
+                    if key in seen:
+                        meet(row["at"], pair, met, slowed)
+            self.driven_s += lasts * moves
+            self.driven_m += abs(row["speed"]) * lasts * moves
+            for far in FAR_M:
+                if moves and slowed and min(away.values(), default=math.inf) > far:
+                    self.needless[far] += lasts
+        self.delays += [one.get("delay") for one in met]
+
+    def enter(self, row, pair, near, is_seen, is_told):
+        """Note a ring that is entered, and what was known of the person."""
+        now = row["at"]
+        pair["seen"] = pair.get("seen", now) if is_seen else None
+        if pair["seen"] is None:
+            del pair["seen"]
+        if pair.get("outside") and near and row["wanted"] > MOVES_M_S:
+            ahead = 0.0
+            if now - pair.get("told at", -math.inf) <= PAUSE_S:
+                ahead = round(now - pair["told"], 3)
+            seen_s = now - pair.get("seen", math.inf)
+            known = (seen_s < KNOWN_S - 1e-6) if is_seen else 2
+            share = round(abs(row["speed"]) / row["wanted"], 4)
+            self.entries.append((ENTERED[known], ahead, share))
+        pair["outside"] = not near
+        if is_told:
+            if now - pair.get("told at", -math.inf) > PAUSE_S:
+                pair["told"] = now
+            pair["told at"] = now
+
+    def rows(self, where, foresees):
+        """Its row of the first table, and its rows of the second."""
+        cells = []
+        for sight in SIGHTS:
+            share = of(self.slowed[sight], self.near[sight])
+            cells += [f"{round(self.near[sight], 2):.1f}", share]
+        delays = [one for one in self.delays if one is not None]
+        cells += [len(self.delays), self.delays.count(None), *spread_of(delays)]
+        cells += [of(self.needless[far], self.driven_s) for far in FAR_M]
+        first = ("protection", *where, *cells, f"{round(self.driven_m, 1):.1f}")
+        entries = []
+        for known in ENTERED:
+            own = [one for one in self.entries if one[0] == known]
+            ahead = of(sum(told >= AHEAD_S - 1e-6 for _, told, _ in own), len(own))
+            slow = of(sum(share <= SLOW for _, _, share in own), len(own))
+            told = ahead if foresees else "–"
+            entries.append(("entries", *where, known, len(own), told, slow))
+        return first, entries
+
+
+def meet(now, pair, met, slowed):
+    """An encounter goes on, or begins after a pause."""
+    if now - pair.get("met at", -math.inf) > PAUSE_S:
+        pair["met"] = {"began": now}
+        met.append(pair["met"])
+    pair["met at"] = now
+    if slowed:
+        pair["met"].setdefault("delay", round(now - pair["met"]["began"], 3))
+
+
+def of(part, whole):
+    return "–" if whole == 0.0 else f"{round(part / whole, 4):.1%}"
+
+
+def spread_of(delays):
+    """Median and 95th percentile (s)."""
+    if len(delays) < 2:
+        return [f"{delays[0]:.2f}" if delays else "–"] * 2
+    parts = quantiles(delays, n=100, method="inclusive")
+    return [f"{round(parts[n - 1], 3):.2f}" for n in (50, 95)]
+
+
+def protection(places):
+    """Rows of both tables: scenarios, their real half, then each profile and rule."""
+    groups = defaultdict(Guarded)
+    for place_of, run in sorted(
+        places, key=lambda one: "real" not in one[1]["completed"]
+    ):
+        chosen = run["profile"], run["rule"]
+        timed = "real" in run["completed"]
+        where = "scenarios" if timed else run["family"]
+        groups[where, *chosen].add(place_of / "virtual", None)
+        if timed:
+            groups["real time", *chosen].add(place_of / "real", run["measured"])
+    told = [one.rows(where, where[0] != "real time") for where, one in groups.items()]
+    yield from (first for first, _ in told)
+    yield from (row for _, entries in told for row in entries)
+
+
 # --- messages -------------------------------------------------------------------------
 
 _GAMMA = 1.01 / 0.99
@@ -318,8 +476,9 @@ def tables(directory):
     places = {}
     for place_of in (directory / "raw").iterdir():
         run = json.loads((place_of / "run.json").read_text("utf-8"))
-        places[run["number"], run["seed"]] = place_of, run
-    places = [places[key] for key in sorted(places)]
+        places[run["number"], run["seed"], run["profile"], run["rule"]] = place_of, run
+    every = [places[key] for key in sorted(places)]
+    places = [one for one in every if "real" in one[1]["completed"]]
     runs = [run for _, run in places]
     halves = [[of / half for of, _ in places] for half in HALVES]
     (here, seen), (through, seen_through) = map(count, halves)
@@ -328,6 +487,7 @@ def tables(directory):
     yield "place", place(here, through)
     yield "claims", ((one,) for one in claims(runs, halves[1], here, took))
     yield "sight", zip(*map(sight, halves))
+    yield "", protection(every)
     yield "latency", took
     yield (
         "stops",
@@ -358,4 +518,4 @@ def ms(spread_of):
 if __name__ == "__main__":
     for name, lines in tables(Path(sys.argv[1])):
         for line in lines:
-            print(name, *line, sep="\t")
+            print(*(name,) if name else (), *line, sep="\t")

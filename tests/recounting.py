@@ -36,6 +36,10 @@ def _rows(result: Mapping[str, Any]) -> Iterator[Sequence[object]]:
         yield "claims", row[1]
     for row in tables.out_of_sight(result):
         yield "sight", *row[1:]
+    for row in tables.protection(result):
+        yield "protection", *row
+    for row in tables.entries(result):
+        yield "entries", *row
     yield from _named("latency", tables.latency(result), own)
     for name, rows in (("stops", tables.stops(result)), ("runs", tables.runs(result))):
         for row in rows:

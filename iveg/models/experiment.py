@@ -1,10 +1,33 @@
 """The paper's evaluation as a page sees it (docs/experiment.md)."""
 
-from typing import Literal
+from collections.abc import Mapping
+from typing import Any, Literal
 
 from pydantic import Field
 
 from iveg.models.base import Model
+
+
+class Protected(Model):
+    """People near moving robots, all runs together (docs/experiment.md, Protection)."""
+
+    slowed: float | None = Field(
+        description=(
+            "Of the time within 2 m of a moving robot in some camera's view, the share "
+            "(0 to 1) in which it was limited to half speed; null: nobody was near."
+        )
+    )
+    encounters: int
+    never_slowed: int = Field(
+        description="Encounters in which the robot never was limited."
+    )
+
+    @classmethod
+    def of(cls, numbers: Mapping[str, Any]) -> "Protected":
+        """From the numbers of a result."""
+        slowed = numbers["slowed"]["in_view"]
+        counts = numbers["encounters"], numbers["never_slowed"]
+        return cls(slowed=slowed, encounters=counts[0], never_slowed=counts[1])
 
 
 class Experiment(Model):
@@ -33,6 +56,9 @@ class Experiment(Model):
     )
     load: float | None = Field(
         default=None, description="Of the machine, mean of the last minute of it."
+    )
+    protected: Protected | None = Field(
+        default=None, description="As far as it was scored; null: not yet."
     )
     began_at: str
     report: bool = Field(

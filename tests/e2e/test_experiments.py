@@ -34,11 +34,10 @@ def test_an_operator_starts_watches_ends_and_opens_an_experiment(
 
     page.locator("#experiment-start").click()
 
-    # The half of a run on the virtual clock may end before the page asks again.
     expect(says).to_have_text(
         re.compile(
-            r"quick-001: 0 de 5 pasadas hechas; ahora viewpoints-1 "
-            r"\((reloj virtual|tiempo real)\)\. Quedan unos 2:\d\d\."
+            r"quick-001: 0 de 7 pasadas hechas; ahora demo-field-iveg-1 "
+            r"\(reloj virtual\)\. Quedan unos 2:\d\d\."
         ),
         timeout=30_000,
     )

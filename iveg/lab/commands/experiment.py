@@ -73,7 +73,6 @@ def experiment(call: Call) -> int:
     )
     lab = Lab(
         RunStore(plan, directory),
-        plan.profile,
         placed,
         embedded=embedded,
         keep_raw=options.keep_raw or plan.size == "full",
@@ -127,7 +126,6 @@ class Lab:
     """
 
     notebook: RunStore
-    profile: str
     settings: Settings
     embedded: bool = True
     keep_raw: bool = False
@@ -175,24 +173,32 @@ class Lab:
 
     async def _step(self, step: PlannedRun, parts: Parts, progress: Progress) -> None:
         progress.begin(step, "counting", clock.mono())
-        rehearsal = VirtualRun(step, self.profile, self._rule)
-        virtual = await parts.outlast(rehearsal.play(step.counted_s))
-        progress.begin(step, "running", clock.mono())
+        rehearsal = VirtualRun(step, self._rule)
         before = os.getloadavg()[0]
-        truth = self.notebook.directory / f"{step.name}.truth.jsonl"
-        started = len(parts.running)
-        try:
-            real = await self._real(step, parts, truth)
-        finally:
-            if len(parts.running) > started:
-                await parts.stop_newest()
-            truth.unlink(missing_ok=True)
+        virtual = await parts.outlast(rehearsal.play(step.counted_s))
+        real = None
+        if step.is_timed:
+            progress.begin(step, "running", clock.mono())
+            before = os.getloadavg()[0]
+            real = await self._timed(step, parts)
         load = before, os.getloadavg()[0]
-        outcome = outcome_of(step, half_of(virtual), stack_of(real), load)
+        stack = None if real is None else stack_of(real)
+        outcome = outcome_of(step, half_of(virtual), stack, load)
         if self.keep_raw:
             write_raw(self.notebook.raw(step), outcome, virtual, real, self._chosen())
         self.notebook.keep(step, outcome)
         progress.end(step, clock.mono())
+
+    async def _timed(self, step: PlannedRun, parts: Parts) -> ObservedRun:
+        """The half in real time, whose emulator ends with it."""
+        truth = self.notebook.directory / f"{step.name}.truth.jsonl"
+        started = len(parts.running)
+        try:
+            return await self._real(step, parts, truth)
+        finally:
+            if len(parts.running) > started:
+                await parts.stop_newest()
+            truth.unlink(missing_ok=True)
 
     @property
     def _rule(self) -> DetectionRule:
@@ -205,7 +211,7 @@ class Lab:
     async def _real(self, step: PlannedRun, parts: Parts, truth: Path) -> ObservedRun:
         """The same run by all programs, any of which may end early."""
         words = ["--scenario", step.family, "--seed", str(step.seed)]
-        words += ["--profile", self.profile, "--truth", str(truth)]
+        words += ["--profile", step.profile, "--truth", str(truth)]
         since = format_stamp(clock.wall())
         url, token = self._url, self.settings.api_token
         async with recorder(self.settings) as recorded:

@@ -14,7 +14,7 @@ from iveg.domain.observations import Instant
 from iveg.lab.emulator.orders import FaultOrder
 from iveg.lab.emulator.relay import Relay
 from iveg.lab.emulator.sensors import EmulatedSensors
-from iveg.lab.emulator.truth import TruthLog
+from iveg.lab.emulator.truth import Driving, TruthLog
 from iveg.lab.emulator.world import RobotHardware, SimulatedWorld
 from iveg.robot.node import RobotNode
 from iveg.robot.node_settings import NodeSettings
@@ -139,8 +139,10 @@ class EmulatedRobot:
             return
         self._node.sense(self._rig.detect(self._now(), self._world))
         if self._settings.truth is not None:
+            factor = self._node.speed_factor if self._node.may_drive else 0.0
+            driving = Driving(abs(self._requested.linear_x), factor)
             at = self._read_clock().wall
-            self._settings.truth.record(self._rig, self._world, at)
+            self._settings.truth.record(self._rig, self._world, at, driving)
 
     def _obey_gate(self, command: Twist2D) -> None:
         """Apply the gate's command; with the fault ``deaf`` only a halt."""

@@ -1,6 +1,7 @@
-"""Ground truth for the evaluation of detectors: targets in view of each camera."""
+"""Ground truth: where everybody is, who is in view, and how robots may drive."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TextIO
 
@@ -10,6 +11,19 @@ from iveg.domain.geometry import Pose2D
 from iveg.lab.emulator.camera import Target
 from iveg.lab.emulator.greenhouse import Disc
 from iveg.lab.emulator.world import RobotHardware, SimulatedWorld
+
+
+@dataclass(frozen=True, slots=True)
+class Driving:
+    """How a robot may drive.
+
+    Attributes:
+        wanted: Speed that its navigation asks for (m/s); 0 while it is held.
+        factor: Greatest share of it that its own safety machine allows (0 to 1).
+    """
+
+    wanted: float
+    factor: float
 
 
 def in_view(
@@ -23,26 +37,32 @@ def in_view(
 
 
 def true_picture(
-    rig: RobotHardware, world: SimulatedWorld, at: float
+    rig: RobotHardware, world: SimulatedWorld, at: float, driving: Driving
 ) -> dict[str, object]:
     """The truth of one picture.
 
-    ``{"robot", "at": Unix s, "pose": {"x", "y", "yaw"}, "speed", "visible": [{"key",
-    "class", "x", "y", "part"}], "people": [{"key", "x", "y"}], "robots": [{"key", "x",
-    "y", "yaw"}]}``: the robot's true pose in ``map`` (m, rad) and speed (m/s), all
-    targets of which a part (0 to 1) is in its view, and every person and robot in the
-    greenhouse, by their true positions, whatever the detector reports.
+    ``{"robot", "at": Unix s, "pose": {"x", "y", "yaw"}, "speed", "wanted", "factor",
+    "visible": [{"key", "class", "x", "y", "part"}], "people": [{"key", "x", "y",
+    "hidden"}], "robots": [{"key", "x", "y", "yaw"}]}``: the robot's true pose in
+    ``map`` (m, rad) and speed (m/s), ``Driving``, all targets of which a part (0 to 1)
+    is in its view, and every person and robot in the greenhouse, by their true
+    positions, whatever the detector reports; ``hidden``: crop or crates are between
+    this robot's ``base_link`` and the person.
 
     Args:
         rig: The robot whose picture it is.
         world: Everybody.
         at: When the picture was taken (Unix s, by the robot's own clock).
+        driving: How it may drive then.
     """
+    pose = rig.vehicle.pose
     return {
         "robot": rig.robot_id,
         "at": at,
-        "pose": _pose(rig.vehicle.pose),
+        "pose": _pose(pose),
         "speed": round(rig.vehicle.twist.linear_x, 3),
+        "wanted": round(driving.wanted, 3),
+        "factor": driving.factor,
         "visible": [
             {
                 "key": target.key,
@@ -53,7 +73,11 @@ def true_picture(
             for target, part in in_view(rig, world)
         ],
         "people": [
-            {"key": f"person-{number}", **_place(one)}
+            {
+                "key": f"person-{number}",
+                **_place(one),
+                "hidden": world.scenery.hides(pose.x, pose.y, one.x, one.y),
+            }
             for number, one in enumerate(world.discs())
         ],
         "robots": [
@@ -77,9 +101,12 @@ class TruthLog:
     def __init__(self, file: Path) -> None:
         self._file: TextIO = file.open("w", encoding="utf-8", buffering=1)
 
-    def record(self, rig: RobotHardware, world: SimulatedWorld, at: float) -> None:
-        """Record a robot's view at its picture (``at`` Unix s, by its own clock)."""
-        self._file.write(orjson.dumps(true_picture(rig, world, at)).decode() + "\n")
+    def record(
+        self, rig: RobotHardware, world: SimulatedWorld, at: float, driving: Driving
+    ) -> None:
+        """Record a robot's view at its picture; arguments are ``true_picture``'s."""
+        row = true_picture(rig, world, at, driving)
+        self._file.write(orjson.dumps(row).decode() + "\n")
 
     def close(self) -> None:
         """Close the file."""

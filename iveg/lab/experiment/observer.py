@@ -46,6 +46,12 @@ class ObservedRun(Recording):
     settled: bool = True
     stops: list[Row] = field(default_factory=list)
 
+    @property
+    def measured(self) -> list[Row]:
+        """The truth between the first edge and the last."""
+        begin, end = self.edges[0], self.edges[-1]
+        return [row for row in self.truth if begin <= row["at"] <= end]
+
 
 async def watch(url: str, token: str, seconds: float, robot_id: str) -> ObservedRun:
     """Record for ``seconds``; an error ends the recording with what it has.

@@ -15,9 +15,12 @@ from iveg.domain.latency.segments import DATA
 from iveg.domain.latency.sketch import Sketch
 from iveg.lab.experiment.beliefs import injections
 from iveg.lab.experiment.message_times import counts_of
+from iveg.lab.experiment.moments import moments_of
 from iveg.lab.experiment.observer import ObservedRun
 from iveg.lab.experiment.paper_tables import CLASSES
 from iveg.lab.experiment.plan import FORMAT, Plan, PlannedRun
+from iveg.lab.experiment.protection import Protection, protection_of
+from iveg.lab.experiment.protection import whole as all_protection
 from iveg.lab.experiment.recording import Recording
 from iveg.lab.experiment.scoring import Tally, score, tally
 from iveg.lab.experiment.slices import HOPS, Slice, whole, with_messages
@@ -35,6 +38,7 @@ def half_of(run: Recording) -> Outcome:
         "classes": {name: asdict(one) for name, one in tally(pairs).items()},
         "slowdowns": slowdowns_of(run.decisions),
         "injection": injections(run.asked),
+        "protection": asdict(protection_of(moments_of(run.measured, run.foretold))),
     }
 
 
@@ -66,9 +70,9 @@ def slowdowns_of(decisions: Sequence[Mapping[str, object]]) -> dict[str, int]:
 
 
 def outcome_of(
-    step: PlannedRun, counted: Outcome, stack: Outcome, load: Sequence[float]
+    step: PlannedRun, counted: Outcome, stack: Outcome | None, load: Sequence[float]
 ) -> Outcome:
-    """One run as stored; ``load`` of the machine before and after its second half."""
+    """One run as stored; ``load`` of the machine before and after its last half."""
     told = {"counted": counted, "stack": stack}
     return {**asdict(step), **told, "load": [round(one, 1) for one in load]}
 
@@ -80,7 +84,8 @@ def result_of(
     why: str = "",
 ) -> dict[str, object]:
     """The whole experiment; ``why`` is the reason of an early end, or empty."""
-    stack = [one["stack"] for one in outcomes]
+    timed = [one for one in outcomes if one["stack"] is not None]
+    stack = [one["stack"] for one in timed]
     slices = [piece for one in stack for piece in one["slices"]]
     return {
         "format": FORMAT,
@@ -89,7 +94,9 @@ def result_of(
         "version": __version__,
         "machine": machine(),
         "configuration": dict(chosen),
-        **_summed(plan, [one["counted"] for one in outcomes]),
+        **_summed(plan, [one["counted"] for one in timed]),
+        "protected": _protected(plan, outcomes),
+        "protection": [*_protection(outcomes)],
         "stack": {
             **_summed(plan, stack),
             "read": _sum(one["read"] for one in stack),
@@ -112,11 +119,17 @@ def machine() -> dict[str, object]:
 
 def slices_of(result: Mapping[str, Any]) -> list[Slice]:
     """All slices of all runs."""
-    return [piece for one in result["runs"] for piece in one["stack"]["slices"]]
+    stacks = (one["stack"] for one in result["runs"])
+    return [piece for one in stacks if one is not None for piece in one["slices"]]
+
+
+def timed_runs(result: Mapping[str, Any]) -> list[Outcome]:
+    """Its runs of the paper's scenarios, which have both halves."""
+    return [one for one in result["runs"] if one["stack"] is not None]
 
 
 def _summed(plan: Plan, runs: Sequence[Outcome]) -> dict[str, object]:
-    planned = len(list(plan.steps()))
+    planned = sum(step.is_timed for step in plan.steps())
     done = sum(one["completed"] for one in runs)
     return {
         "completion": {"runs": len(runs), "completed": done, "planned": planned},
@@ -125,6 +138,33 @@ def _summed(plan: Plan, runs: Sequence[Outcome]) -> dict[str, object]:
         "slowdowns": _sum(one["slowdowns"] for one in runs),
         "injection": _sum(one["injection"] for one in runs),
     }
+
+
+def _protected(plan: Plan, outcomes: Sequence[Outcome]) -> dict[str, object] | None:
+    """All virtual runs with the experiment's own detector and the rule as it stands."""
+    own = {"profile": plan.profile, "rule": "iveg"}
+    runs = [one["counted"] for one in outcomes if own.items() <= one.items()]
+    scored = (Protection.read(one["protection"]) for one in runs)
+    return all_protection(scored).row() if runs else None
+
+
+def _protection(outcomes: Sequence[Outcome]) -> Iterator[dict[str, object]]:
+    """Numbers of the scenarios, of their real half, and of each profile and rule."""
+    groups: dict[tuple[str, str, str], list[Protection]] = {}
+    for one in sorted(outcomes, key=lambda run: run["stack"] is None):
+        chosen = one["profile"], one["rule"]
+        halves = [("scenarios", one["counted"]), ("real time", one["stack"])]
+        if one["stack"] is None:
+            halves = [(one["family"], one["counted"])]
+        for where, half in halves:
+            read = Protection.read(half["protection"])
+            groups.setdefault((where, *chosen), []).append(read)
+    for (where, profile, rule), runs in groups.items():
+        numbers = all_protection(runs).row()
+        if where == "real time":
+            for entries in numbers["entries"].values():
+                entries["foretold"] = None
+        yield {"where": where, "profile": profile, "rule": rule, **numbers}
 
 
 def scored(classes: Sequence[str], runs: Sequence[Outcome]) -> dict[str, object]:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, get_args
 
 import orjson
 
@@ -11,6 +11,8 @@ from iveg import __version__
 from iveg.domain.errors import DataFileError
 
 Size = Literal["minimal", "quick", "full"]
+RuleName = Literal["iveg", "paper"]
+"""The rule as it stands, or Algorithm 2 alone: single boxes, no laser, no foresight."""
 FAMILIES: Final = ("viewpoints", "peers", "together", "occluded", "nlos")
 """The paper's four scenarios and its test without a line of sight."""
 ROBOTS: Final = ("AGI", "AGII")
@@ -19,9 +21,11 @@ WATCHED: Final = "AGII"
 """Robot whose costmap is examined: the one without sight in the paper's test."""
 GREENHOUSE: Final = "mvsim-20x20"
 SEED: Final = 2026
+PEOPLED: Final = "demo"
+"""Scenario of the runs that only protection is scored on: four people at work."""
 _STARTS_S: Final = 8.0
 """Time to start and end the programs of one run (s)."""
-_COUNTED_SHARE: Final = 0.15
+_COUNTED_SHARE: Final = 0.1
 """Approximate real time of a virtual second (s)."""
 
 
@@ -30,9 +34,10 @@ class PlannedRun:
     """One run of one scenario.
 
     Attributes:
-        seconds: Duration in real time, through all programs (s).
+        seconds: Duration in real time, through all programs (s); 0: not at all.
         counted_s: Duration on the virtual clock, which gives the counts (s).
         seed: Random seed of its people and its detector's noise.
+        profile: Of the emulated detector; ``rule`` that robots are slowed by.
     """
 
     family: str
@@ -40,16 +45,25 @@ class PlannedRun:
     seconds: float
     seed: int
     counted_s: float = 60.0
+    profile: str = "field"
+    rule: RuleName = "iveg"
+
+    @property
+    def is_timed(self) -> bool:
+        """Whether it has a half in real time."""
+        return self.seconds > 0.0
 
     @property
     def name(self) -> str:
         """Name of its file."""
-        return f"{self.family}-{self.number}"
+        compared = "" if self.is_timed else f"{self.profile}-{self.rule}-"
+        return f"{self.family}-{compared}{self.number}"
 
 
 def expected_s(step: PlannedRun) -> float:
     """Estimated duration of a run (s)."""
-    return step.seconds + _STARTS_S + _COUNTED_SHARE * step.counted_s
+    timed_s = step.seconds + _STARTS_S if step.is_timed else 0.0
+    return timed_s + _COUNTED_SHARE * step.counted_s
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +74,8 @@ class Plan:
         seconds: Duration of each run in real time; ``runs`` of each family.
         counted_s: Duration of each run on the virtual clock (s).
         profile: Detector profile of the emulator: ``simulation`` or ``field``.
+        protected_s: Duration of each run for protection alone (s), on the virtual
+            clock, one for each rule; ``profiles`` of them beside ``profile``.
     """
 
     size: Size
@@ -69,25 +85,36 @@ class Plan:
     seed: int = SEED
     profile: str = "field"
     counted_s: float = 60.0
+    protected_s: float = 120.0
+    profiles: tuple[str, ...] = ()
 
     def steps(self) -> Iterator[PlannedRun]:
         """All runs in order; every family's first run precedes any second one."""
         for number in range(1, self.runs + 1):
+            yield from self._compared(number)
             for place, family in enumerate(self.families):
                 seed = self.seed + 100 * place + number
-                yield PlannedRun(family, number, self.seconds, seed, self.counted_s)
+                times = self.seconds, seed, self.counted_s
+                yield PlannedRun(family, number, *times, self.profile)
+
+    def _compared(self, number: int) -> Iterator[PlannedRun]:
+        """Runs of one seed that differ in profile and rule alone."""
+        times = 0.0, self.seed + 100 * len(FAMILIES) + number, self.protected_s
+        for profile in sorted({self.profile, *self.profiles}):
+            for rule in get_args(RuleName):
+                yield PlannedRun(PEOPLED, number, *times, profile, rule)
 
 
 PLANS: Final[dict[Size, Plan]] = {
-    "minimal": Plan("minimal", 1, 5.0, ("together",), counted_s=5.0),
-    "quick": Plan("quick", 1, 18.0),
-    "full": Plan("full", 5, 28.0),
+    "minimal": Plan("minimal", 1, 5.0, ("together",), counted_s=5.0, protected_s=5.0),
+    "quick": Plan("quick", 1, 17.0),
+    "full": Plan("full", 5, 28.0, profiles=("field", "simulation")),
 }
-"""Two robots send about 180 messages a second: quick has 16,000, full 126,000.  Five
+"""Two robots send about 180 messages a second: quick has 15,000, full 126,000.  Five
 runs of each are the paper's own number in simulation."""
 
 
-FORMAT: Final = 3
+FORMAT: Final = 4
 """Of results and runs; those of another are not mixed with these."""
 PROGRESS: Final = "progress.json"
 RAW: Final = "raw"

@@ -2,21 +2,29 @@
 
 It looks from outside: where robots and people really are, what a camera really has in
 view, how fast a robot may drive by its own safety machine.  What iVeg believed, decided
-or told does not count.
+or told does not count, except for when it told of an encounter.
 
 *Near* is within two metres of a robot that moves; an *encounter* is one robot near one
 person in view of some camera, without a pause of a second; its *delay* is the time
 from there until the robot is limited to half speed.  An *entry* is a ring that a robot
-reaches, or is reached by, around somebody who has been in view for two seconds: whoever
-steps out from behind plants gives nobody the time to slow before.
+reaches, or is reached by, around somebody who has been in view for two seconds, who has
+stepped into view since, which leaves nobody the time to slow before, or who is in no
+camera's view.
 """
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from statistics import quantiles
+from typing import Any, Final, Literal
 
 from iveg.domain.feedback import HALF_SPEED
 
+Sight = Literal["in_view", "behind_plants", "unseen"]
+"""In view of some camera; hidden from the robot that is near; neither."""
+SIGHTS: Final[tuple[Sight, ...]] = ("in_view", "behind_plants", "unseen")
+Known = Literal["in_view", "stepped_out", "unseen"]
+"""In view for two seconds, for less, not at all."""
+KNOWN: Final[tuple[Known, ...]] = ("in_view", "stepped_out", "unseen")
 NEAR_M = 2.0
 """The ring of the rule (m)."""
 AWAY_M = (2.3, 4.0)
@@ -26,6 +34,9 @@ _PAUSE_S = 1.0
 _IN_VIEW_S = 2.0
 SLOW_SHARE = 0.55
 """Of the speed that a robot wants: half, and what noise adds."""
+AHEAD_S = 1.5
+"""So long before its entry an encounter should be told (s)."""
+_ROUNDING_S = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,12 +45,13 @@ class NearPerson:
 
     Attributes:
         distance_m: From the robot's ``base_link`` to the person.
-        in_view: Some robot's camera has a part of the person in view.
+        foretold: iVeg tells an encounter of this robot with the person.
     """
 
     name: str
     distance_m: float
-    in_view: bool
+    sight: Sight
+    foretold: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +59,7 @@ class Moment:
     """One robot at one moment.
 
     Attributes:
-        at: (s).
+        at: (s); ``lasts_s`` for how long it counts.
         speed: True speed (m/s).
         wanted: Speed that it would drive if nothing limited it (m/s).
         factor: Greatest speed factor that its own safety machine allows.
@@ -56,20 +68,128 @@ class Moment:
 
     robot_id: str
     at: float
+    lasts_s: float
     speed: float
     wanted: float
     factor: float
     people: tuple[NearPerson, ...]
 
 
-@dataclass(slots=True)
-class Encounter:
-    """One robot near one person in view.
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A robot and a person came within two metres.
 
     Attributes:
-        began: (s); ``last`` the newest moment of it.
-        slowed_at: When the robot was limited first (s); None: not yet.
+        speed_share: Of its wanted speed that the robot drove.
+        foretold_s: For how long iVeg had told of it (s); None: it had not.
+        known: How well cameras had the person in view.
     """
+
+    speed_share: float
+    foretold_s: float | None
+    known: Known
+
+
+def _nothing() -> dict[str, float]:
+    return dict.fromkeys(SIGHTS, 0.0)
+
+
+@dataclass(slots=True)
+class Protection:
+    """Sums over a run, or over several.
+
+    Attributes:
+        driven_s: Robots moved; ``driven_m`` so far.
+        near_s: Person-seconds near a moving robot, by ``Sight``; ``slowed_s`` of them
+            while it was limited.
+        needless_s: A moving robot was limited with nobody within so many metres.
+        delays_s: Of each encounter; None: the robot was never limited.
+        entries: Each as ``Entry`` has it.
+    """
+
+    driven_s: float = 0.0
+    driven_m: float = 0.0
+    near_s: dict[str, float] = field(default_factory=_nothing)
+    slowed_s: dict[str, float] = field(default_factory=_nothing)
+    needless_s: dict[str, float] = field(
+        default_factory=lambda: {f"{away_m:g}": 0.0 for away_m in AWAY_M}
+    )
+    delays_s: list[float | None] = field(default_factory=list)
+    entries: list[Entry] = field(default_factory=list)
+
+    @classmethod
+    def read(cls, stored: Mapping[str, Any]) -> "Protection":
+        """What a result file has of it."""
+        entries = [Entry(**one) for one in stored["entries"]]
+        return cls(**{**stored, "entries": entries})
+
+    def row(self) -> dict[str, Any]:
+        """The numbers by name; None where there was nothing to count."""
+        near, slowed = sum(self.near_s.values()), sum(self.slowed_s.values())
+        delays = [one for one in self.delays_s if one is not None]
+        return {
+            "near_s": {one: round(self.near_s[one], 2) for one in SIGHTS},
+            "slowed": {
+                **{one: share(self.slowed_s[one], self.near_s[one]) for one in SIGHTS},
+                "all": share(slowed, near),
+            },
+            "encounters": len(self.delays_s),
+            "never_slowed": self.delays_s.count(None),
+            "delay_p50_s": _quantile(delays, 50),
+            "delay_p95_s": _quantile(delays, 95),
+            "needless": {
+                away_m: share(spent_s, self.driven_s)
+                for away_m, spent_s in self.needless_s.items()
+            },
+            "driven_m": round(self.driven_m, 1),
+            "entries": {
+                known: _entered([one for one in self.entries if one.known == known])
+                for known in KNOWN
+            },
+        }
+
+
+def _entered(entries: list[Entry]) -> dict[str, Any]:
+    told = sum((one.foretold_s or 0.0) >= AHEAD_S - _ROUNDING_S for one in entries)
+    slow = sum(one.speed_share <= SLOW_SHARE for one in entries)
+    return {
+        "count": len(entries),
+        "foretold": share(told, len(entries)),
+        "slow": share(slow, len(entries)),
+    }
+
+
+def whole(runs: Iterable[Protection]) -> Protection:
+    """The sum of several runs."""
+    total = Protection()
+    for one in runs:
+        total.driven_s += one.driven_s
+        total.driven_m += one.driven_m
+        for sums, more in (
+            (total.near_s, one.near_s),
+            (total.slowed_s, one.slowed_s),
+            (total.needless_s, one.needless_s),
+        ):
+            for key, spent_s in more.items():
+                sums[key] += spent_s
+        total.delays_s += one.delays_s
+        total.entries += one.entries
+    return total
+
+
+def protection_of(moments: Iterable[Moment]) -> Protection:
+    """The sums of one run, whose moments come in the order of time."""
+    score = _Score()
+    for moment in moments:
+        score.add(moment)
+    delays = [one.delay_s for one in score.encounters]
+    score.sums.delays_s = [None if s is None else round(s, 3) for s in delays]
+    return score.sums
+
+
+@dataclass(slots=True)
+class _Encounter:
+    """One robot near one person in view, all in s."""
 
     began: float
     last: float
@@ -82,46 +202,30 @@ class Encounter:
 
 
 @dataclass(slots=True)
-class _Seen:
+class _Pair:
     """One person as one robot had them before.
 
     Attributes:
-        since: Since when in view without a break (s); None: not in view.
+        seen_since: Since when in view without a break (s); None: not in view.
+        told_since: Since when iVeg tells of them, without a break of a second (s);
+            ``told_at`` when it did last.
         outside: Whether the ring lay between them.
     """
 
-    since: float | None = None
+    seen_since: float | None = None
+    told_since: float | None = None
+    told_at: float = float("-inf")
     outside: bool = False
+    encounter: _Encounter | None = None
 
 
 @dataclass(slots=True)
-class ProtectionScore:
-    """Sums over the moments of a run, each of ``step_s`` seconds.
+class _Score:
+    """Counts moment by moment."""
 
-    Attributes:
-        driven_s: Robots moved; ``driven_m`` so far.
-        near_s: Person-seconds near a moving robot; ``near_slowed_s`` of them while it
-            was limited.
-        view_s: Of these the person was in some camera's view; ``view_slowed_s`` too.
-        needless_s: A moving robot was limited with nobody within so many metres.
-        encounters: All that have begun, in their order.
-        entries: Of each entry the share of its wanted speed that the robot drove.
-    """
-
-    step_s: float
-    driven_s: float = 0.0
-    driven_m: float = 0.0
-    near_s: float = 0.0
-    near_slowed_s: float = 0.0
-    view_s: float = 0.0
-    view_slowed_s: float = 0.0
-    needless_s: dict[float, float] = field(
-        default_factory=lambda: dict.fromkeys(AWAY_M, 0.0)
-    )
-    encounters: list[Encounter] = field(default_factory=list)
-    entries: list[float] = field(default_factory=list)
-    _seen: dict[tuple[str, str], _Seen] = field(default_factory=dict)
-    _open: dict[tuple[str, str], Encounter] = field(default_factory=dict)
+    sums: Protection = field(default_factory=Protection)
+    encounters: list[_Encounter] = field(default_factory=list)
+    _pairs: dict[tuple[str, str], _Pair] = field(default_factory=dict)
 
     def add(self, moment: Moment) -> None:
         """Count one moment of one robot."""
@@ -130,97 +234,67 @@ class ProtectionScore:
         if moment.speed < MOVES_M_S:
             return
         slowed = moment.factor <= HALF_SPEED
-        self.driven_s += self.step_s
-        self.driven_m += moment.speed * self.step_s
+        self.sums.driven_s += moment.lasts_s
+        self.sums.driven_m += moment.speed * moment.lasts_s
         nearest = min((one.distance_m for one in moment.people), default=float("inf"))
         for away_m in AWAY_M:
             if slowed and nearest > away_m:
-                self.needless_s[away_m] += self.step_s
+                self.sums.needless_s[f"{away_m:g}"] += moment.lasts_s
         for person in moment.people:
             if person.distance_m <= NEAR_M:
                 self._add_near(moment, person, slowed=slowed)
 
     def _note_entry(self, moment: Moment, person: NearPerson) -> None:
-        seen = self._seen.setdefault((moment.robot_id, person.name), _Seen())
+        pair = self._pairs.setdefault((moment.robot_id, person.name), _Pair())
+        if person.sight != "in_view":
+            pair.seen_since = None
+        elif pair.seen_since is None:
+            pair.seen_since = moment.at
         outside = person.distance_m > NEAR_M
-        known = seen.since is not None and moment.at - seen.since >= _IN_VIEW_S - 1e-9
-        if seen.outside and not outside and known and moment.wanted > MOVES_M_S:
-            self.entries.append(moment.speed / moment.wanted)
-        seen.outside = outside
-        if not person.in_view:
-            seen.since = None
-        elif seen.since is None:
-            seen.since = moment.at
+        if pair.outside and not outside and moment.wanted > MOVES_M_S:
+            share_ = round(moment.speed / moment.wanted, 4)
+            known = _known(pair, moment.at)
+            self.sums.entries.append(Entry(share_, _told_s(pair, moment.at), known))
+        pair.outside = outside
+        if person.foretold:
+            if moment.at - pair.told_at > _PAUSE_S:
+                pair.told_since = moment.at
+            pair.told_at = moment.at
 
     def _add_near(self, moment: Moment, person: NearPerson, *, slowed: bool) -> None:
-        self.near_s += self.step_s
-        self.near_slowed_s += self.step_s * slowed
-        if not person.in_view:
+        self.sums.near_s[person.sight] += moment.lasts_s
+        self.sums.slowed_s[person.sight] += moment.lasts_s * slowed
+        if person.sight != "in_view":
             return
-        self.view_s += self.step_s
-        self.view_slowed_s += self.step_s * slowed
         encounter = self._encounter(moment.robot_id, person.name, moment.at)
         if slowed and encounter.slowed_at is None:
             encounter.slowed_at = moment.at
 
-    def _encounter(self, robot_id: str, person: str, at: float) -> Encounter:
-        found = self._open.get((robot_id, person))
-        if found is None or at - found.last > _PAUSE_S:
-            found = self._open[robot_id, person] = Encounter(at, at)
-            self.encounters.append(found)
-        found.last = at
-        return found
-
-    # --- the numbers --------------------------------------------------------------
-
-    @property
-    def never_slowed(self) -> int:
-        """Encounters in which the robot was never limited."""
-        return sum(one.slowed_at is None for one in self.encounters)
-
-    def row(self) -> Mapping[str, float | None]:
-        """The numbers by name; None where there was nothing to count."""
-        delays = [one.delay_s for one in self.encounters if one.delay_s is not None]
-        return {
-            "slowed, in view": _share(self.view_slowed_s, self.view_s),
-            "slowed, all": _share(self.near_slowed_s, self.near_s),
-            "encounters": len(self.encounters),
-            "never slowed": self.never_slowed,
-            "delay P50 s": _quantile(delays, 50),
-            "delay P95 s": _quantile(delays, 95),
-            **{
-                f"needless > {away_m:g} m": _share(spent_s, self.driven_s)
-                for away_m, spent_s in self.needless_s.items()
-            },
-            "driven m": round(self.driven_m, 1),
-            "entries": len(self.entries),
-            "slow at the ring": _share(
-                sum(one <= SLOW_SHARE for one in self.entries), len(self.entries)
-            ),
-        }
+    def _encounter(self, robot_id: str, person: str, at: float) -> _Encounter:
+        pair = self._pairs[robot_id, person]
+        if pair.encounter is None or at - pair.encounter.last > _PAUSE_S:
+            pair.encounter = _Encounter(at, at)
+            self.encounters.append(pair.encounter)
+        pair.encounter.last = at
+        return pair.encounter
 
 
-def whole(scores: Iterable[ProtectionScore]) -> ProtectionScore:
-    """The sum of several runs."""
-    scores = list(scores)
-    total = ProtectionScore(scores[0].step_s)
-    for one in scores:
-        for name in _SUMS:
-            setattr(total, name, getattr(total, name) + getattr(one, name))
-        for away_m, spent_s in one.needless_s.items():
-            total.needless_s[away_m] += spent_s
-        total.encounters += one.encounters
-        total.entries += one.entries
-    return total
+def _known(pair: _Pair, at: float) -> Known:
+    if pair.seen_since is None:
+        return "unseen"
+    is_long = at - pair.seen_since >= _IN_VIEW_S - _ROUNDING_S
+    return "in_view" if is_long else "stepped_out"
 
 
-_SUMS = (
-    *("driven_s", "driven_m", "near_s"),
-    *("near_slowed_s", "view_s", "view_slowed_s"),
-)
+def _told_s(pair: _Pair, at: float) -> float | None:
+    """For how long iVeg has told of an encounter that is about to begin (s)."""
+    if pair.told_since is None or at - pair.told_at > _PAUSE_S:
+        return None
+    return round(at - pair.told_since, 3)
 
 
-def _share(part: float, of: float) -> float | None:
+def share(part: float, of: float) -> float | None:
+    """A share to four digits; None of nothing."""
     return None if of == 0.0 else round(part / of, 4)
 
 

@@ -3,8 +3,9 @@
 One file for each kind of row, one JSON object a line::
 
     raw/together-1/run.json           scenario, seed, ends of both halves, STOPs
-    raw/together-1/virtual/…          truth, told, costmap, decisions
+    raw/together-1/virtual/…          truth, told, encounters, costmap, decisions
     raw/together-1/real/…             the same, and messages and hops
+    raw/demo-field-paper-1/…          a run for protection: the virtual half alone
 
 docs/experiment.md, "Raw data", has the columns; ``docs/recount.py`` reads them.
 """
@@ -27,28 +28,36 @@ def write_raw(
     directory: Path,
     outcome: Outcome,
     virtual: Recording,
-    real: ObservedRun,
+    real: ObservedRun | None,
     configuration: Mapping[str, object],
 ) -> None:
     """Write the raw data of one run into a directory of its own."""
-    for half, name in ((virtual, "virtual"), (real, "real")):
-        place = directory / name
-        place.mkdir(parents=True, exist_ok=True)
-        _write_rows(place / "truth.ndjson", half.truth)
-        _write_rows(place / "told.ndjson", half.told)
-        _write_rows(place / "costmap.ndjson", half.asked)
-        _write_rows(place / "decisions.ndjson", half.decisions)
-    _write_rows(directory / "real" / "messages.ndjson", real.times)
-    _write_rows(directory / "real" / "hops.ndjson", _decided(real))
-    kept = ("family", "number", "seed", "load")
-    told = {
-        "completed": {"virtual": virtual.completed, "real": real.completed},
-        "configuration": configuration,
-        "read": real.read,
-        "settled": real.settled,
-        "stops": real.stops,
-    }
-    write_json(directory / "run.json", {**{k: outcome[k] for k in kept}, **told})
+    _write_half(directory / "virtual", virtual)
+    kept = ("family", "number", "seed", "profile", "rule", "load")
+    told: dict[str, object] = {one: outcome[one] for one in kept}
+    told["configuration"] = configuration
+    told["completed"] = {"virtual": virtual.completed}
+    if real is not None:
+        _write_half(directory / "real", real)
+        _write_rows(directory / "real" / "messages.ndjson", real.times)
+        _write_rows(directory / "real" / "hops.ndjson", _decided(real))
+        told |= {
+            "completed": {"virtual": virtual.completed, "real": real.completed},
+            "measured": {"began": real.edges[0], "ended": real.edges[-1]},
+            "read": real.read,
+            "settled": real.settled,
+            "stops": real.stops,
+        }
+    write_json(directory / "run.json", told)
+
+
+def _write_half(place: Path, half: Recording) -> None:
+    place.mkdir(parents=True, exist_ok=True)
+    _write_rows(place / "truth.ndjson", half.truth)
+    _write_rows(place / "told.ndjson", half.told)
+    _write_rows(place / "encounters.ndjson", half.foretold)
+    _write_rows(place / "costmap.ndjson", half.asked)
+    _write_rows(place / "decisions.ndjson", half.decisions)
 
 
 def _write_rows(file: Path, rows: Iterable[object]) -> None:

@@ -24,6 +24,8 @@ class Recording:
     Attributes:
         truth: The emulator's rows, one a picture (``emulator.truth.true_picture``).
         told: Detection frames as iVeg told them.
+        foretold: Encounters with people as iVeg told them at each picture
+            (``moments.moments_of``); the virtual half alone has them.
         beliefs: Content of a robot's costmap at some moments (s, by the clock of the
             pictures).
         decisions: Each with ``reason``, ``applied_at``, ``observed_at``, ``in_sight``.
@@ -32,9 +34,15 @@ class Recording:
 
     truth: list[Row] = field(default_factory=list)
     told: list[Picture] = field(default_factory=list)
+    foretold: list[Row] = field(default_factory=list)
     beliefs: list[tuple[float, Belief]] = field(default_factory=list)
     decisions: list[Row] = field(default_factory=list)
     completed: bool = False
+
+    @property
+    def measured(self) -> list[Row]:
+        """The truth while it was measured."""
+        return self.truth
 
     @property
     def views(self) -> list[Picture]:

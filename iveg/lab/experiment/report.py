@@ -52,6 +52,25 @@ _TIMED = (
 )
 
 
+_PROTECTED = (
+    "Was anybody near a moving robot unprotected? Seconds are of a person within 2 m "
+    "of a robot that moves, and the share of them in which it was limited to half "
+    "speed: people in view of some camera, people behind plants (as the robot that is "
+    "near sees them), and people who are neither. An encounter is one robot near one "
+    "person in view; its delay counts from in view and near. Needless: limited with "
+    "nobody within so many metres, of the driving time. “Scenarios” are the runs of "
+    "this experiment; the others, with two robots among four people at work, differ "
+    "in detector and rule alone: “iveg” as it stands, “paper” Algorithm 2 alone "
+    "(single boxes, no laser, no foresight)."
+)
+_ENTERED = (
+    "How robots reached the ring of 2 m around somebody: foretold so long before, and "
+    "at what share of the speed that they wanted. Who stepped out from behind plants "
+    "less than two seconds before, and who is in no camera's view, are told apart. In "
+    "real time nobody notes what was foretold."
+)
+
+
 def write_report(result: Result) -> str:
     """The whole file."""
     parts = [
@@ -64,6 +83,11 @@ def write_report(result: Result) -> str:
         _table(tables.PLACE, tables.place(result)),
         "<h2>What the text says</h2>",
         _table(tables.CLAIMS, tables.claims(result)),
+        "<h2>Protection</h2>",
+        f"<p>{_PROTECTED}</p>",
+        _table(tables.PROTECTION, tables.protection(result)),
+        f"<p>{_ENTERED}</p>",
+        _table(tables.ENTRIES, tables.entries(result)),
         "<h2>Slow-downs, and who was not in sight</h2>",
         _table(tables.SIGHT, tables.out_of_sight(result)),
         "<h2>Latency (ms)</h2>",
@@ -100,9 +124,24 @@ def _head(result: Result) -> Iterator[str]:
         f"{runs['planned']} runs, each {plan['counted_s']:g} s on the virtual clock "
         f"and {plan['seconds']:g} s in real time.</p>"
     )
+    if result["protected"] is not None:
+        yield f"<p><b>{escape(_said(result['protected']))}</b></p>"
     chosen = ", ".join(f"{k} {v}" for k, v in result["configuration"].items())
     yield f"<p>Configuration: {escape(chosen)}.</p>"
     yield f"<p>{_EMULATED}</p>"
+
+
+def _said(protected: Mapping[str, Any]) -> str:
+    """Protection in a sentence."""
+    met, never = protected["encounters"], protected["never_slowed"]
+    if not met:
+        return "Nobody in a camera's view came within 2 m of a moving robot."
+    shares = [tables.percent(protected["slowed"][one]) for one in ("in_view", "all")]
+    return (
+        f"With a person in some camera's view within 2 m, robots drove at no more than "
+        f"half speed for {shares[0]} of the time ({shares[1]} with everybody within "
+        f"2 m); in {never} of {met} encounters never. Virtual clock, rule as it stands."
+    )
 
 
 # --- figures --------------------------------------------------------------------------

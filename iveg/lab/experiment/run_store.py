@@ -16,7 +16,7 @@ Progress is reported in that file, on a terminal, and elsewhere in plain lines::
 
 import contextlib
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Final, Literal, TextIO
 
@@ -49,13 +49,13 @@ class RunStore:
 
     def steps_left(self) -> list[PlannedRun]:
         """Steps that no earlier start has finished."""
-        known = {(one["family"], one["number"]) for one in self._outcomes()}
-        return [s for s in self._plan.steps() if (s.family, s.number) not in known]
+        known = {name for name, _ in self._outcomes()}
+        return [step for step in self._plan.steps() if step.name not in known]
 
     @property
     def done(self) -> int:
         """Number of finished runs."""
-        return len(self._outcomes())
+        return len(list(self._outcomes()))
 
     def is_last(self, step: PlannedRun) -> bool:
         """Whether no step follows."""
@@ -82,19 +82,18 @@ class RunStore:
         for file in self.directory.glob("partial.*"):
             file.unlink()
         name = "partial" if why else "result"
-        result = result_of(self._plan, self._outcomes(), chosen, why)
+        outcomes = [outcome for _, outcome in self._outcomes()]
+        result = result_of(self._plan, outcomes, chosen, why)
         write_json(self.directory / f"{name}.json", result)
         report = self.directory / f"{name}.html"
         report.write_text(write_report(result), encoding="utf-8")
         return report
 
-    def _outcomes(self) -> list[Outcome]:
-        found = []
+    def _outcomes(self) -> Iterator[tuple[str, Outcome]]:
         for step in self._plan.steps():
             # A run with an unreadable file counts as not done.
             with contextlib.suppress(DataFileError):
-                found.append(read_json(self._file(step)))
-        return found
+                yield step.name, read_json(self._file(step))
 
     def _file(self, step: PlannedRun) -> Path:
         return self.directory / f"{step.name}.json"

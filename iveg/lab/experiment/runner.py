@@ -15,6 +15,7 @@ import contextlib
 import os
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
 
@@ -30,7 +31,7 @@ from iveg.lab.experiment.plan import (
     read_json,
     write_json,
 )
-from iveg.models.experiment import Experiment, Experiments
+from iveg.models.experiment import Experiment, Experiments, Protected
 
 _KEPT: Final = ("IVEG_CONFIDENCE_THRESHOLD", "IVEG_SAFETY_RADIUS_M")
 """Settings of iVeg that an experiment inherits: it follows the same rule."""
@@ -182,6 +183,7 @@ class ExperimentRunner:
             size=directory.name.partition("-")[0],
             **known,
             **_chosen(directory),
+            protected=_protected(self.file(directory.name, "json")),
             began_at=format_stamp(_began(directory)),
             report=self.file(directory.name, "html") is not None,
         )
@@ -200,6 +202,23 @@ def _chosen(directory: Path) -> dict[str, Any]:
     except (DataFileError, KeyError):
         return {}
     return {key: plan.get(key) for key in ("profile", "seed")}
+
+
+def _protected(result: Path | None) -> Protected | None:
+    """Protection of a result; None: there is none, or of another version."""
+    if result is None:
+        return None
+    try:
+        return _read_protected(result, result.stat().st_mtime_ns)
+    except (OSError, DataFileError, KeyError):
+        return None
+
+
+@lru_cache(maxsize=64)
+def _read_protected(result: Path, _written_ns: int) -> Protected | None:
+    """Read once; a page asks every two seconds, and a result has megabytes."""
+    numbers = read_json(result)["protected"]
+    return None if numbers is None else Protected.of(numbers)
 
 
 def _progress(directory: Path) -> dict[str, Any]:

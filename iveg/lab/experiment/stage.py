@@ -18,6 +18,7 @@ from iveg.domain.peer_scan import PeerScan
 from iveg.domain.witness import Outline, Plan
 from iveg.lab.emulator.orders import FaultOrder
 from iveg.lab.emulator.scripts import Incident
+from iveg.lab.emulator.truth import Driving
 from iveg.lab.emulator.world import RobotHardware, SimulatedWorld
 from iveg.ngsi import codec, names
 from iveg.pipeline.ingest import Ingest
@@ -49,7 +50,6 @@ class StagedRobot:
 
     Attributes:
         costmap: Its picture of the fleet; None: it asks for no scans of peers.
-        wanted: Speed that it would drive if nothing limited it (m/s).
     """
 
     def __init__(
@@ -68,7 +68,7 @@ class StagedRobot:
         self._looked = looked
         self._scan_every = scan_every
         self.costmap: FleetCostmap | None = None
-        self.wanted = 0.0
+        self._wanted = 0.0
         self._neighbours = Neighbours(rig.robot_id)
         self._echo = Echo()
         self._uplink = Uplink(rig.robot_id, "iveg", "b1", self._say, echo=self._echo)
@@ -93,7 +93,7 @@ class StagedRobot:
         into_run = number * STEP_S
         free = self._machine.may_drive
         requested = self._rig.requested_twist(into_run, world) if free else REST
-        self.wanted = abs(requested.linear_x)
+        self._wanted = abs(requested.linear_x)
         self._perform(self._machine.request_twist(requested, now.mono), now)
         if self._faults.deaf and free:
             self._rig.drive(requested)
@@ -158,9 +158,10 @@ class StagedRobot:
         return abs(self._rig.vehicle.twist.linear_x)
 
     @property
-    def factor(self) -> float:
-        """Greatest share of its speed that its safety machine allows now."""
-        return self._machine.cap.factor if self._machine.may_drive else 0.0
+    def driving(self) -> Driving:
+        """How it may drive now."""
+        factor = self._machine.cap.factor if self._machine.may_drive else 0.0
+        return Driving(self._wanted, factor)
 
     def _perform(self, effects: Sequence[Effect], now: Instant) -> None:
         for effect in effects:

@@ -6,6 +6,7 @@ from typing import Any, Final
 
 from iveg.domain.latency.paper import PAPER, Place
 from iveg.domain.latency.segments import Data
+from iveg.lab.experiment.outcome import timed_runs
 from iveg.lab.experiment.paper_tables import (
     CLASSES,
     COMPLETION,
@@ -17,6 +18,7 @@ from iveg.lab.experiment.paper_tables import (
     PaperScore,
     disagreements,
 )
+from iveg.lab.experiment.protection import AHEAD_S, AWAY_M, SIGHTS, SLOW_SHARE
 from iveg.lab.experiment.slices import HOPS
 
 Result = Mapping[str, Any]
@@ -129,7 +131,7 @@ def claims(result: Result) -> Rows:
 
 def _confident(result: Result) -> str:
     threshold = result["configuration"].get("confidence_threshold")
-    tallies = (one["counted"]["classes"].values() for one in result["runs"])
+    tallies = (one["counted"]["classes"].values() for one in timed_runs(result))
     found = [sure for each in tallies for one in each for sure in one["found"]]
     if threshold is None or not found:
         return "–"
@@ -167,6 +169,52 @@ def _both(result: Result, what: str, names: Mapping[str, str]) -> Rows:
     """Counts of both halves of the runs, one row for each key of ``names``."""
     for key, name in names.items():
         yield name, *(half[what].get(key, 0) for half in (result, result["stack"]))
+
+
+PROTECTION: Final = (
+    *("where", "detector", "rule", "in view (s)", "slowed", "behind plants (s)"),
+    *("slowed", "unseen (s)", "slowed", "encounters", "never slowed", "delay P50 (s)"),
+    *("P95", *(f"needless > {away_m:g} m" for away_m in AWAY_M), "driven (m)"),
+)
+ENTRIES: Final = (
+    *("where", "detector", "rule", "person", "entries"),
+    *(f"foretold ≥ {AHEAD_S:g} s", f"at ≤ {SLOW_SHARE:.0%} of the speed"),
+)
+_ENTERED: Final = {
+    "in_view": "in view for 2 s",
+    "stepped_out": "stepped into view later",
+    "unseen": "in no camera's view",
+}
+
+
+def protection(result: Result) -> Rows:
+    """Seconds with a person near a moving robot, encounters, and needless slowing."""
+    for one in result["protection"]:
+        near = (
+            cell
+            for sight in SIGHTS
+            for cell in (
+                f"{one['near_s'][sight]:.1f}",
+                percent(one["slowed"][sight]),
+            )
+        )
+        delays = (seconds(one[name]) for name in ("delay_p50_s", "delay_p95_s"))
+        yield (
+            *(one["where"], one["profile"], one["rule"], *near),
+            *(one["encounters"], one["never_slowed"], *delays),
+            *map(percent, one["needless"].values()),
+            f"{one['driven_m']:.1f}",
+        )
+
+
+def entries(result: Result) -> Rows:
+    """How rings around people were entered."""
+    for one in result["protection"]:
+        for kind, name in _ENTERED.items():
+            told = one["entries"][kind]
+            rates = percent(told["foretold"]), percent(told["slow"])
+            chosen = one["where"], one["profile"], one["rule"]
+            yield *chosen, name, told["count"], *rates
 
 
 STOPS: Final = ("robot", "robot's answer", "standing")
@@ -218,7 +266,7 @@ RUNS: Final = (
 
 def runs(result: Result) -> Rows:
     """One line per run."""
-    for one in result["runs"]:
+    for one in timed_runs(result):
         cells = [
             cell
             for half in (one["counted"], one["stack"])
@@ -233,6 +281,16 @@ def _interval(told: Mapping[str, float] | None) -> str:
         return "–"
     share, low, high = (100.0 * told[name] for name in ("share", "low", "high"))
     return f"{share:.1f} % [{low:.1f}, {high:.1f}]"
+
+
+def percent(share: float | None) -> str:
+    """One share in a table."""
+    return "–" if share is None else f"{share:.1%}"
+
+
+def seconds(value: float | None) -> str:
+    """One delay in a table (s)."""
+    return "–" if value is None else f"{value:.2f}"
 
 
 def ms(value: float | None) -> str:

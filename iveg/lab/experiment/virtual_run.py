@@ -5,13 +5,13 @@ runs of one seed give the same counts on any machine.
 """
 
 import asyncio
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.app.virtual import VirtualPipeline
 from iveg.domain.detection_rule import DetectionRule
-from iveg.domain.witness import Outline
+from iveg.domain.witness import Outline, Plan
 from iveg.lab.emulator.camera import DETECTORS
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.scenarios import scenario_named
@@ -26,7 +26,7 @@ from iveg.pipeline.mapping import Mapper
 from iveg.robot.costmap import FleetCostmap
 from iveg.web.views import Views
 
-_SCAN_EVERY, _BELIEVE_EVERY, _REST_EVERY = 6, 20, 20
+_SCAN_EVERY, _BELIEVE_EVERY, _REST_EVERY = 2, 20, 20
 """Steps between two sweeps, two looks into a costmap, and two rests for others."""
 
 
@@ -44,18 +44,26 @@ class VirtualRunResult(Recording):
 
 
 class VirtualRun:
-    """One scenario in a pipeline of its own."""
+    """One scenario in a pipeline of its own.
 
-    def __init__(self, step: PlannedRun, profile: str, rule: DetectionRule) -> None:
+    Args:
+        step: The run.
+        rule: The rule as it stands; that of a run by the paper's rule is made of it.
+    """
+
+    def __init__(self, step: PlannedRun, rule: DetectionRule) -> None:
         scenario = scenario_named(step.family)
         greenhouse = load_greenhouse(scenario.greenhouse)
         layout = lay_out(scenario, ROBOTS, greenhouse)
         self._result = VirtualRunResult()
         self._looks: list[Row] = []
+        by_paper = step.rule == "paper"
+        if by_paper:
+            rule = replace(rule, possible_people=False, foresight=False)
         self._iveg = iveg = VirtualPipeline(load_fleet(words=ROBOTS), greenhouse, rule)
         self._mapper = Mapper(iveg.parts.world, greenhouse.bounds)
         self._views = Views(iveg.parts)
-        detector = DETECTORS[layout.detector or profile]
+        detector = DETECTORS[layout.detector or step.profile]
         self._world = SimulatedWorld(greenhouse, layout, detector, step.seed)
         self._stage = Stage(
             self._world,
@@ -66,7 +74,8 @@ class VirtualRun:
             iveg.move,
             iveg.hear,
             looked=self._looked,
-            scan_every=_SCAN_EVERY,
+            scan_every=0 if by_paper else _SCAN_EVERY,
+            plan=Plan.of(greenhouse),
             peer_scans=iveg.peer_scans,
         )
         self._watched = self._stage.robots[WATCHED]
@@ -95,7 +104,9 @@ class VirtualRun:
 
     def _looked(self, rig: RobotHardware) -> None:
         """The truth at the moment of the picture."""
-        self._looks.append(true_picture(rig, self._world, self._iveg.now.mono))
+        driving = self._stage.robots[rig.robot_id].driving
+        now = self._iveg.now.mono
+        self._looks.append(true_picture(rig, self._world, now, driving))
 
     def _report(self) -> None:
         """Keep what iVeg reports for the frames of this step, beside the truth."""
@@ -105,6 +116,7 @@ class VirtualRun:
             told = {} if frame is None else frame.model_dump(mode="json")
             picture = picture_of(told, row["at"]) if told else None
             self._result.truth.append(row)
+            self._result.foretold.append(foretold_row(self._iveg, row))
             self._result.told.append(picture or Picture(row["robot"], row["at"], ()))
 
     def _believe(self) -> None:
@@ -121,3 +133,13 @@ class VirtualRun:
             for body in self._world.bodies()
             for one in people
         )
+
+
+def foretold_row(iveg: VirtualPipeline, truth: Row) -> Row:
+    """Encounters with people that iVeg tells now of the robot of a row of the truth."""
+    people = [
+        {"x": round(one.zone.x, 3), "y": round(one.zone.y, 3)}
+        for one in iveg.parts.evaluator.foretold(truth["robot"], iveg.now)
+        if one.zone.reason == "person"
+    ]
+    return {"robot": truth["robot"], "at": truth["at"], "people": people}

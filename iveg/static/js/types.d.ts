@@ -380,6 +380,8 @@ export type Experiment = {
   seed: number | null;
   /** Of the machine, mean of the last minute of it. */
   load: number | null;
+  /** As far as it was scored; null: not yet. */
+  protected: Protected | null;
   began_at: string;
   /** Whether there is something to open: the report, or what a break left. */
   report: boolean;
@@ -751,6 +753,15 @@ export type Profile = {
   width: number;
   max_speed: number;
   turning_radius: number;
+};
+
+/** People near moving robots, all runs together (docs/experiment.md, Protection). */
+export type Protected = {
+  /** Of the time within 2 m of a moving robot in some camera's view, the share (0 to 1) in which it was limited to half speed; null: nobody was near. */
+  slowed: number | null;
+  encounters: number;
+  /** Encounters in which the robot never was limited. */
+  never_slowed: number;
 };
 
 /** Web push; ``public_key`` is null until it was on once. */

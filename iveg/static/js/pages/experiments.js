@@ -107,7 +107,8 @@ function rowOf(one, i18n) {
   row.append(head, make("td", "", dayAndTime(one.began_at)));
   row.append(make("td", "", stateOf(one, i18n)));
   row.append(make("td", "number", `${one.done}/${one.of}`));
-  row.append(make("td", "", withOf(one, i18n)), filesOf(one, i18n));
+  row.append(make("td", "", withOf(one, i18n)));
+  row.append(make("td", "", protectedOf(one, i18n)), filesOf(one, i18n));
   return row;
 }
 
@@ -117,6 +118,16 @@ function withOf({ profile, seed, load }, i18n) {
   const told = i18n.t(`experiments.profile.${profile}`);
   const said = i18n.t("experiments.with", { profile: told, seed: String(seed) });
   return load === null ? said : `${said} ${i18n.t("experiments.load", { load })}`;
+}
+
+/** @param {Experiment} one @param {import("../core/i18n.js").I18n} i18n */
+function protectedOf({ protected: told }, i18n) {
+  if (told === null) return "";
+  const { slowed, encounters, never_slowed: never } = told;
+  if (slowed === null) return i18n.t("experiments.nobody_near");
+  // Never rounded up to all of it.
+  const percent = Math.floor(slowed * 1000) / 10;
+  return i18n.t("experiments.protected", { slowed: percent, encounters, never });
 }
 
 /** @param {Experiment} one @param {import("../core/i18n.js").I18n} i18n */

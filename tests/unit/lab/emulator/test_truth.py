@@ -10,7 +10,7 @@ from iveg.adapters.greenhouses import load_greenhouse
 from iveg.lab.emulator.camera import Counts, DetectorModel
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.scenarios import scenario_named
-from iveg.lab.emulator.truth import TruthLog
+from iveg.lab.emulator.truth import Driving, TruthLog
 from iveg.lab.emulator.world import SimulatedWorld
 from iveg.lab.experiment.recording import picture_of_truth, read_truth
 
@@ -25,7 +25,7 @@ def test_a_person_whom_the_detector_misses_is_in_the_truth(tmp_path: Path) -> No
 
     with closing(TruthLog(tmp_path / "truth.jsonl")) as log:
         told = rig.detect(0.0, world)
-        log.record(rig, world, 1000.5)
+        log.record(rig, world, 1000.5, Driving(0.6, 0.5))
 
     [row] = read_truth(tmp_path / "truth.jsonl")
     picture = picture_of_truth(row)
@@ -46,7 +46,7 @@ def test_everybody_is_in_the_truth_with_the_robot_s_true_pose(tmp_path: Path) ->
     world = SimulatedWorld(greenhouse, layout, BLIND, seed=1)
 
     with closing(TruthLog(tmp_path / "truth.jsonl")) as log:
-        log.record(world.rigs["AGI"], world, 1000.5)
+        log.record(world.rigs["AGI"], world, 1000.5, Driving(0.6, 0.5))
 
     told = orjson.loads((tmp_path / "truth.jsonl").read_bytes())
     pose = world.rigs["AGI"].vehicle.pose
@@ -55,5 +55,8 @@ def test_everybody_is_in_the_truth_with_the_robot_s_true_pose(tmp_path: Path) ->
         round(one.x, 3) for one in world.discs()
     ]
     assert (told["pose"]["x"], told["speed"]) == (round(pose.x, 3), 0.0)
+    assert (told["wanted"], told["factor"]) == (0.6, 0.5)
+    # Two rows of crop are between AGI and the picker in the last corridor.
+    assert [one["hidden"] for one in told["people"]] == [False, False, True, False]
     assert [one["key"] for one in told["robots"]] == ["AGI", "AGII"]
     assert told["robots"][0] == {"key": "AGI", **told["pose"]}

@@ -1,22 +1,28 @@
 """Protection on worlds made by hand: who was near, in view, slowed, and how late."""
 
+from collections.abc import Iterable
+from dataclasses import asdict
+from typing import Any
+
+import orjson
 import pytest
 
+from iveg.lab.experiment.moments import moments_of
 from iveg.lab.experiment.protection import (
+    Entry,
     Moment,
     NearPerson,
-    ProtectionScore,
+    Protection,
+    Sight,
+    protection_of,
     whole,
 )
 
 STEP_S = 0.5
 
 
-def score_of(*moments: Moment) -> ProtectionScore:
-    score = ProtectionScore(STEP_S)
-    for moment in moments:
-        score.add(moment)
-    return score
+def score_of(*moments: Moment) -> Protection:
+    return protection_of(moments)
 
 
 def moment(
@@ -26,52 +32,61 @@ def moment(
     factor: float = 1.0,
     speed: float = 0.6,
     wanted: float = 0.8,
-    in_view: bool = True,
+    sight: Sight = "in_view",
+    foretold: bool = False,
     robot_id: str = "AGI",
 ) -> Moment:
-    person = NearPerson("p", distance_m, in_view)
-    return Moment(robot_id, step * STEP_S, speed, wanted, factor, (person,))
+    people = (NearPerson("p", distance_m, sight, foretold),)
+    at = step * STEP_S
+    return Moment(robot_id, at, STEP_S, speed, wanted, factor, people)
 
 
 def test_a_person_in_the_ring_of_a_robot_at_half_speed_is_protected() -> None:
     score = score_of(moment(0, factor=0.5), moment(1, factor=0.0))
 
-    assert (score.view_s, score.view_slowed_s, score.never_slowed) == (1.0, 1.0, 0)
-    assert score.row()["slowed, in view"] == 1.0
+    assert (score.near_s["in_view"], score.slowed_s["in_view"]) == (1.0, 1.0)
+    assert score.row()["slowed"]["in_view"] == 1.0
+    assert score.row()["never_slowed"] == 0
 
 
 def test_a_robot_at_full_speed_protects_nobody() -> None:
     score = score_of(moment(0), moment(1), moment(2))
 
-    assert score.row()["slowed, in view"] == 0.0
-    assert (len(score.encounters), score.never_slowed) == (1, 1)
+    assert score.row()["slowed"]["in_view"] == 0.0
+    assert score.delays_s == [None]
+    assert score.row()["never_slowed"] == 1
 
 
 def test_the_delay_is_from_the_ring_and_the_view_to_the_limit() -> None:
     score = score_of(
         moment(0, 3.0),
-        moment(1, 1.9, in_view=False),
+        moment(1, 1.9, sight="unseen"),
         moment(2, 1.8),
         moment(3, 1.7),
         moment(4, 1.6, factor=0.5),
     )
 
-    assert [one.delay_s for one in score.encounters] == [1.0]
-    assert (score.near_s, score.view_s) == (2.0, 1.5)
+    assert score.delays_s == [1.0]
+    assert score.near_s == {"in_view": 1.5, "behind_plants": 0.0, "unseen": 0.5}
 
 
-def test_whom_no_camera_has_counts_among_all_and_is_no_encounter() -> None:
-    score = score_of(moment(0, in_view=False), moment(1, in_view=False, factor=0.5))
+@pytest.mark.parametrize("sight", ["behind_plants", "unseen"])
+def test_whom_no_camera_has_counts_apart_and_is_no_encounter(sight: Sight) -> None:
+    score = score_of(moment(0, sight=sight), moment(1, sight=sight, factor=0.5))
 
-    assert score.row()["slowed, all"] == 0.5
-    assert score.row()["slowed, in view"] is None
-    assert score.encounters == []
+    told = score.row()["slowed"]
+    assert (told[sight], told["all"], told["in_view"]) == (0.5, 0.5, None)
+    assert score.delays_s == []
 
 
 def test_a_robot_that_stands_endangers_nobody() -> None:
     score = score_of(moment(0, speed=0.0), moment(1, speed=0.04))
 
-    assert (score.driven_s, score.near_s, score.encounters) == (0.0, 0.0, [])
+    assert (score.driven_s, sum(score.near_s.values()), score.delays_s) == (
+        0.0,
+        0.0,
+        [],
+    )
 
 
 @pytest.mark.parametrize(
@@ -83,31 +98,40 @@ def test_slow_with_nobody_near_is_needless(
 ) -> None:
     row = score_of(moment(0, distance_m, factor=0.5)).row()
 
-    assert (row["needless > 2.3 m"], row["needless > 4 m"]) == (at_the_ring, far)
+    assert row["needless"] == {"2.3": at_the_ring, "4": far}
 
 
 def test_an_encounter_goes_on_through_a_second_and_begins_anew_after_it() -> None:
-    score = score_of(moment(0), moment(2), moment(5))
+    score = score_of(moment(0), moment(2), moment(5), moment(6, factor=0.5))
 
-    assert [one.began for one in score.encounters] == [0.0, 2.5]
+    assert score.delays_s == [None, 0.5]
 
 
 def test_two_robots_near_one_person_are_two_encounters() -> None:
     score = score_of(moment(0), moment(0, robot_id="AGII", factor=0.5))
 
-    assert (len(score.encounters), score.never_slowed) == (2, 1)
+    assert sorted(score.delays_s, key=str) == [0.0, None]
 
 
-def test_metres_and_delays_of_several_runs_add_up() -> None:
+def test_metres_and_delays_of_several_runs_add_up_as_files_have_them() -> None:
     one = score_of(moment(0), moment(1, factor=0.5))
     other = score_of(moment(0, factor=0.5))
+    stored = [orjson.loads(orjson.dumps(asdict(run))) for run in (one, other)]
 
-    total = whole([one, other]).row()
+    total = whole(map(Protection.read, stored)).row()
 
-    assert total["driven m"] == pytest.approx(0.9)
+    assert total["driven_m"] == pytest.approx(0.9)
     assert total["encounters"] == 2
-    assert total["slowed, all"] == pytest.approx(2 / 3, 1e-3)
-    assert (total["delay P50 s"], total["delay P95 s"]) == (0.25, 0.475)
+    assert total["slowed"]["all"] == pytest.approx(2 / 3, 1e-3)
+    assert (total["delay_p50_s"], total["delay_p95_s"]) == (0.25, 0.475)
+
+
+# --- entries --------------------------------------------------------------------------
+
+
+def entered(moments: Iterable[Moment], known: str = "in_view") -> Any:
+    """Numbers of the entries around people who are known so well."""
+    return score_of(*moments).row()["entries"][known]
 
 
 @pytest.mark.parametrize(
@@ -116,24 +140,111 @@ def test_metres_and_delays_of_several_runs_add_up() -> None:
 def test_a_ring_is_entered_slowly_at_half_of_the_wanted_speed(
     speed: float, wanted: float, share: float
 ) -> None:
-    score = score_of(
-        *(moment(step, 3.0) for step in range(4)),
-        moment(4, 1.9, speed=speed, wanted=wanted),
-        moment(5, 1.0),
-    )
+    before = [moment(step, 3.0) for step in range(4)]
+    into = moment(4, 1.9, speed=speed, wanted=wanted)
 
-    row = score.row()
-    assert (row["entries"], row["slow at the ring"]) == (1, share)
+    told = entered([*before, into, moment(5, 1.0)])
+    assert (told["count"], told["slow"]) == (1, share)
 
 
-def test_who_steps_out_or_was_inside_already_is_no_entry() -> None:
-    hidden = [moment(step, 3.0, in_view=step == 3) for step in range(4)]
-    for before in (hidden, [moment(step, 1.9) for step in range(4)]):
-        assert score_of(*before, moment(4, 1.5)).row()["entries"] == 0
+@pytest.mark.parametrize(
+    ("told_at", "foretold_s"),
+    [
+        ((1, 2, 3), 1.5),
+        ((2, 3), 1.0),
+        ((), None),
+        # A gap of a second is none; a longer one begins anew, or ends it.
+        ((0, 2), 2.0),
+        ((0, 3), 0.5),
+        ((0, 1), None),
+    ],
+)
+def test_an_entry_was_foretold_since_iveg_told_of_it_without_a_break(
+    told_at: tuple[int, ...], foretold_s: float | None
+) -> None:
+    before = [moment(step, 3.0, foretold=step in told_at) for step in range(4)]
+
+    [entry] = score_of(*before, moment(4, 1.9, foretold=True)).entries
+
+    assert entry == Entry(0.75, foretold_s, "in_view")
+    told = entered([*before, moment(4, 1.9)])
+    assert told["foretold"] == float((foretold_s or 0.0) >= 1.5)
+
+
+def test_who_steps_out_and_who_is_unseen_are_told_apart() -> None:
+    hidden = [moment(step, 3.0, sight="behind_plants") for step in range(3)]
+    late = [*hidden, moment(3, 3.0), moment(4, 1.9)]
+    unseen = [*hidden, moment(3, 3.0), moment(4, 1.9, sight="unseen")]
+
+    for moments, known in ((late, "stepped_out"), (unseen, "unseen")):
+        assert entered(moments, known)["count"] == 1
+        assert entered(moments)["count"] == 0
+
+
+def test_who_was_inside_already_is_no_entry() -> None:
+    assert score_of(*(moment(step, 1.9) for step in range(5))).entries == []
 
 
 def test_a_robot_that_wants_to_stand_enters_nothing() -> None:
-    score = score_of(
-        *(moment(step, 3.0) for step in range(5)), moment(5, 1.5, wanted=0)
-    )
-    assert score.row()["entries"] == 0
+    outside = [moment(step, 3.0) for step in range(5)]
+    assert score_of(*outside, moment(5, 1.5, wanted=0)).entries == []
+
+
+# --- worlds as files have them --------------------------------------------------------
+
+
+def row(
+    robot: str, at: float, x: float, seen: tuple[str, ...] = (), **more: Any
+) -> Any:
+    """A robot at (x, 0) among p at (0, 0) and, behind plants, q at (0, 1)."""
+    return {
+        "robot": robot,
+        "at": at,
+        "pose": {"x": x, "y": 0.0, "yaw": 0.0},
+        "speed": -0.5,
+        "wanted": 1.0,
+        "factor": 0.5,
+        "visible": [{"key": key} for key in seen],
+        "people": [
+            {"key": "p", "x": 0.0, "y": 0.0, "hidden": False},
+            {"key": "q", "x": 0.0, "y": 1.0, "hidden": True},
+        ],
+        **more,
+    }
+
+
+def test_rows_of_the_truth_become_moments_with_what_any_camera_sees() -> None:
+    truth = [row("AGII", 0.1, 9.0, ("q",)), row("AGI", 0.1, 1.0), row("AGI", 0.2, 1.0)]
+
+    last = list(moments_of(truth))[-1]
+
+    assert (last.robot_id, last.at, last.speed, last.wanted) == ("AGI", 0.2, 0.5, 1.0)
+    assert last.lasts_s == pytest.approx(0.1)
+    assert [(one.name, one.sight) for one in last.people] == [
+        ("p", "unseen"),
+        ("q", "in_view"),
+    ]
+    assert [one.distance_m for one in last.people] == pytest.approx([1.0, 2**0.5])
+
+
+def test_a_picture_and_a_gap_count_for_a_quarter_of_a_second() -> None:
+    truth = [row("AGII", 0.0, 9.0, ("p",)), row("AGI", 0.0, 1.0), row("AGI", 0.9, 1.0)]
+
+    first, _, last = moments_of(truth)
+
+    assert (first.lasts_s, last.lasts_s) == (0.0, 0.25)
+    assert [one.sight for one in last.people] == ["unseen", "behind_plants"]
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "foretold"), [(0.3, 0.1, ["p"]), (0.3, 0.9, ["q"]), (3.0, 0.0, [])]
+)
+def test_what_was_foretold_is_of_the_person_who_really_is_there(
+    x: float, y: float, foretold: list[str]
+) -> None:
+    told = [{"robot": "AGI", "at": 0.1, "people": [{"x": x, "y": y}]}]
+
+    here, there = moments_of([row("AGI", 0.1, 5.0), row("AGII", 0.1, 5.0)], told)
+
+    assert [one.name for one in here.people if one.foretold] == foretold
+    assert not any(one.foretold for one in there.people)

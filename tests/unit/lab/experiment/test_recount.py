@@ -3,6 +3,7 @@
 import asyncio
 import random
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -43,20 +44,24 @@ def messages(seed: int) -> list[MessageTimes]:
 async def run(directory: Path, step: PlannedRun) -> Any:
     """One run whose real half is played, too."""
     rule = DetectionRule()
-    virtual = await VirtualRun(step, "field", rule).play(SECONDS)
-    told = await VirtualRun(step, "simulation", rule).play(SECONDS)
+    virtual = await VirtualRun(step, rule).play(SECONDS)
+    if not step.is_timed:
+        outcome = outcome_of(step, half_of(virtual), None, (0.5, 0.5))
+        write_raw(directory / "raw" / step.name, outcome, virtual, None, CHOSEN)
+        return outcome
+    told = await VirtualRun(replace(step, profile="simulation"), rule).play(SECONDS)
     decided: Bins = {"edges_ms": [4.0, 40.0], "counts": [70, 9], "total_ms": 512.3}
     real = ObservedRun(
         told.truth,
         told.told[7:],
-        told.beliefs,
-        told.decisions,
+        beliefs=told.beliefs,
+        decisions=told.decisions,
         completed=step.number == 1,
         slices=[{"lidar": {"iveg": decided}}, {}],
-        edges=[0.0, SECONDS / 2, SECONDS],
+        edges=[1.0, SECONDS / 2, SECONDS],
         settled=step.number == 2,
         read={"passed": 1000, "skipped": 377},
-        times=[one for one in messages(step.seed) if one.broker < SECONDS],
+        times=[one for one in messages(step.seed) if 1.0 <= one.broker < SECONDS],
         stops=[
             {
                 "robot_id": "AGI",
@@ -72,9 +77,14 @@ async def run(directory: Path, step: PlannedRun) -> Any:
 
 @pytest.fixture(scope="module")
 def experiment(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Any]:
-    """Raw data of two runs, and their result."""
+    """Raw data of two runs and of two for protection, and their result."""
     directory = tmp_path_factory.mktemp("experiment")
-    steps = [PlannedRun("together", 1, 6.0, 7), PlannedRun("nlos", 2, 6.0, 8)]
+    steps = [
+        PlannedRun("together", 1, 6.0, 7),
+        PlannedRun("nlos", 2, 6.0, 8),
+        PlannedRun("demo", 1, 0.0, 9, profile="simulation"),
+        PlannedRun("demo", 1, 0.0, 9, profile="simulation", rule="paper"),
+    ]
     outcomes = [asyncio.run(run(directory, step)) for step in steps]
     return directory, result_of(PLANS["quick"], outcomes, CHOSEN)
 
@@ -87,7 +97,7 @@ def test_the_script_gives_the_reports_tables_to_the_last_digit(
     expected = reported(result)
 
     assert recounted(directory) == expected
-    assert len(expected) == 37
+    assert len(expected) == 53
 
 
 @pytest.mark.parametrize(
@@ -97,6 +107,9 @@ def test_the_script_gives_the_reports_tables_to_the_last_digit(
         ("virtual/truth.ndjson", "place"),
         ("real/costmap.ndjson", "sight"),
         ("virtual/decisions.ndjson", "sight"),
+        ("virtual/truth.ndjson", "protection"),
+        ("real/truth.ndjson", "protection"),
+        ("virtual/encounters.ndjson", "entries"),
         ("real/messages.ndjson", "latency"),
         ("real/hops.ndjson", "latency"),
     ],

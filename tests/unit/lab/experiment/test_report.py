@@ -19,12 +19,25 @@ from iveg.lab.experiment.plan import (
     read_json,
     write_json,
 )
+from iveg.lab.experiment.protection import Entry, Protection
 from iveg.lab.experiment.recording import read_truth
 from iveg.lab.experiment.report import write_report
 from iveg.lab.experiment.run_store import RunStore
 from iveg.lab.experiment.scoring import Tally
 
 CHOSEN = {"fiware": "embedded", "confidence_threshold": 0.8}
+
+
+GUARDED = Protection(
+    100.0,
+    42.0,
+    {"in_view": 8.0, "behind_plants": 4.0, "unseen": 0.0},
+    {"in_view": 7.0, "behind_plants": 1.0, "unseen": 0.0},
+    {"2.3": 30.0, "4": 10.0},
+    [0.0, 0.4, None],
+    [Entry(0.5, 2.0, "in_view"), Entry(0.9, None, "in_view")],
+)
+"""Eight seconds near people in view, seven of them slowed."""
 
 
 def bins(of_ms: float, n: int = 100) -> dict[str, Any]:
@@ -45,6 +58,7 @@ def half(farmer: Tally | None = None, slices: list[Any] | None = None) -> Any:
         "classes": {} if farmer is None else {"farmer": asdict(farmer)},
         "slowdowns": {"decided": 4, "applied": 4, "observed": 3, "out_of_sight": 2},
         "injection": {"asked": 5, "injected": 5, "people": 1, "ahead": 1},
+        "protection": asdict(GUARDED),
     }
     if slices is None:
         return told
@@ -57,6 +71,12 @@ def half(farmer: Tally | None = None, slices: list[Any] | None = None) -> Any:
         "settled": False,
         "stops": [],
     }
+
+
+def guarded(rule: Any) -> Any:
+    """A run for protection alone."""
+    step = PlannedRun("demo", 1, 0.0, 9, rule=rule)
+    return outcome_of(step, half(), None, (1.0, 1.0))
 
 
 def result(
@@ -74,7 +94,7 @@ def result(
     step = PlannedRun("together", 1, 6.0, 7)
     stack = half(farmer, [piece(one) for one in took_ms])
     outcome = outcome_of(step, half(farmer), stack, (1.24, 3.0))
-    return result_of(PLANS["minimal"], [outcome], CHOSEN, why)
+    return result_of(PLANS["minimal"], [guarded("paper"), outcome], CHOSEN, why)
 
 
 def test_the_report_sets_the_papers_counts_beside_what_was_counted() -> None:
@@ -111,6 +131,27 @@ def test_the_report_says_who_was_told_of_whom() -> None:
 
     assert "robot could not see</td><td>2</td><td>2</td>" in page
     assert "in AGII&#x27;s costmap</td><td>5</td><td>5</td>" in page
+
+
+def test_the_report_says_who_was_protected_by_detector_and_rule() -> None:
+    page = write_report(result())
+
+    # The scenarios' own run; that by the paper's rule is for comparison.
+    assert "for 87.5% of the time (66.7% with" in page
+    assert "in 1 of 3 encounters never" in page
+    near = "<td>8.0</td><td>87.5%</td><td>4.0</td><td>25.0%</td><td>0.0</td><td>–</td>"
+    delays = "<td>3</td><td>1</td><td>0.20</td><td>0.38</td>"
+    needless = "<td>30.0%</td><td>10.0%</td><td>42.0</td>"
+    for where, rule in (
+        ("scenarios", "iveg"),
+        ("real time", "iveg"),
+        ("demo", "paper"),
+    ):
+        chosen = f"<td>{where}</td><td>field</td><td>{rule}</td>"
+        assert f"{chosen}{near}{delays}{needless}" in page
+        told = "–" if where == "real time" else "50.0%"
+        entered = f"<td>2</td><td>{told}</td><td>50.0%</td>"
+        assert f"{chosen}<td>in view for 2 s</td>{entered}" in page
 
 
 def test_the_report_needs_no_network() -> None:
@@ -173,6 +214,11 @@ def test_results_come_back_as_they_were_written(tmp_path: Path) -> None:
     write_json(file, result())
 
     assert read_json(file)["detection"]["farmer"]["tp"] == 36
+    assert [one["where"] for one in read_json(file)["protection"]] == [
+        "scenarios",
+        "real time",
+        "demo",
+    ]
     assert [one.name for one in tmp_path.iterdir()] == ["result.json"]
 
 
@@ -198,12 +244,35 @@ def test_a_truth_that_broke_off_in_a_line_keeps_the_others(tmp_path: Path) -> No
 def test_every_run_has_a_seed_of_its_own(size: Any) -> None:
     steps = list(PLANS[size].steps())
 
-    assert len({one.seed for one in steps}) == len(steps)
-    assert {one.family for one in steps} <= set(FAMILIES)
+    timed = [one for one in steps if one.is_timed]
+    assert len({one.seed for one in timed}) == len(timed)
+    assert {one.family for one in timed} <= set(FAMILIES)
+    assert len({one.name for one in steps}) == len(steps)
+
+
+def test_runs_for_protection_differ_in_detector_and_rule_alone() -> None:
+    steps = [*replace(PLANS["quick"], profile="simulation", runs=2).steps()]
+    compared = [one for one in steps if not one.is_timed]
+
+    assert [one.name for one in compared] == [
+        "demo-simulation-iveg-1",
+        "demo-simulation-paper-1",
+        "demo-simulation-iveg-2",
+        "demo-simulation-paper-2",
+    ]
+    seeds = [one.seed for one in compared]
+    assert seeds[0] == seeds[1] != seeds[2] == seeds[3]
+    assert not set(seeds) & {one.seed for one in steps if one.is_timed}
+    full = [one for one in PLANS["full"].steps() if not one.is_timed]
+    assert {(one.profile, one.rule) for one in full} == {
+        (profile, rule)
+        for profile in ("field", "simulation")
+        for rule in ("iveg", "paper")
+    }
 
 
 def test_quick_stays_under_three_minutes_and_full_has_enough_messages() -> None:
-    quick, full = (list(PLANS[size].steps()) for size in ("quick", "full"))
+    quick, full = ([*PLANS[size].steps()] for size in ("quick", "full"))
 
     assert sum(expected_s(one) for one in quick) < 180.0
     assert sum(180.0 * one.seconds for one in quick) > 5_000
@@ -215,7 +284,8 @@ def test_quick_stays_under_three_minutes_and_full_has_enough_messages() -> None:
 
 def finished(step: PlannedRun) -> Any:
     farmer = Tally((0.9,), 0, (), 1, 1)
-    return outcome_of(step, half(farmer), half(farmer, []), (0.0, 0.0))
+    stack = half(farmer, []) if step.is_timed else None
+    return outcome_of(step, half(farmer), stack, (0.0, 0.0))
 
 
 def test_an_experiment_that_broke_off_keeps_what_it_has_and_goes_on(
@@ -223,7 +293,7 @@ def test_an_experiment_that_broke_off_keeps_what_it_has_and_goes_on(
 ) -> None:
     first = RunStore(PLANS["quick"], tmp_path)
     steps = first.steps_left()
-    for step in steps[:2]:
+    for step in steps[:4]:
         first.keep(step, finished(step))
     first.finish(CHOSEN, "iveg: did not answer")
 
@@ -232,8 +302,8 @@ def test_an_experiment_that_broke_off_keeps_what_it_has_and_goes_on(
     partial = read_json(tmp_path / "partial.json")
     assert partial["completion"] == {"runs": 2, "completed": 2, "planned": 5}
     assert partial["detection"]["farmer"]["tp"] == 2
-    assert second.done == 2
-    assert second.steps_left() == steps[2:]
+    assert second.done == 4
+    assert second.steps_left() == steps[4:]
 
 
 def test_a_run_that_a_crash_left_half_written_is_run_again(tmp_path: Path) -> None:
@@ -250,8 +320,8 @@ def test_an_experiment_that_is_whole_leaves_nothing_of_its_breaks(
 ) -> None:
     notebook = RunStore(PLANS["minimal"], tmp_path)
     notebook.finish(CHOSEN, "interrupted")
-    [step] = notebook.steps_left()
-    notebook.keep(step, finished(step))
+    for step in notebook.steps_left():
+        notebook.keep(step, finished(step))
 
     report = notebook.finish(CHOSEN, "")
 

@@ -13,7 +13,7 @@ import pytest
 from iveg.domain.errors import ExperimentRefusedError
 from iveg.lab.experiment.plan import PLANS, claim, expected_s, read_json, write_json
 from iveg.lab.experiment.runner import ExperimentRunner
-from iveg.models.experiment import Experiment
+from iveg.models.experiment import Experiment, Protected
 from tests.processes import is_alive
 
 PROGRAM = """
@@ -34,6 +34,8 @@ write()
 WAITS = PROGRAM + "signal.pause()"
 FINISHES = PROGRAM + (
     '(place / "result.html").write_text("<h1>whole</h1>")\n'
+    'near = {"slowed": {"in_view": 0.9876}, "encounters": 12, "never_slowed": 1}\n'
+    '(place / "result.json").write_text(json.dumps({"protected": near}))\n'
     'write(state="done", run=None, phase=None, done=5, left_s=0)'
 )
 DIES = PROGRAM + 'sys.exit("iveg: the sky has fallen")'
@@ -69,12 +71,24 @@ async def test_one_that_runs_is_watched_and_its_end_is_told(tmp_path: Path) -> N
         claim(tmp_path / "experiments" / begun.name, PLANS["quick"])
         ended = await until(bench, lambda one: one.state == "done")
 
-    assert (begun.name, begun.state, begun.of) == ("quick-001", "running", 5)
+    assert (begun.name, begun.state, begun.of) == ("quick-001", "running", 7)
     assert begun.left_s == round(sum(map(expected_s, PLANS["quick"].steps())))
     assert (ended.done, ended.why, ended.report) == (5, "", True)
     assert (begun.profile, begun.seed, begun.load) == (None, None, None)
     assert (ended.profile, ended.seed, ended.load) == ("field", 2026, 6.5)
+    assert begun.protected is None
+    assert ended.protected == Protected(slowed=0.9876, encounters=12, never_slowed=1)
     assert bench.file("quick-001", "html") is not None
+
+
+def test_a_result_of_another_version_leaves_protection_out(tmp_path: Path) -> None:
+    place = tmp_path / "quick-001"
+    place.mkdir()
+    bench = ExperimentRunner(tmp_path, lambda: False)
+    for written in ({"format": 3}, {"protected": None}):
+        write_json(place / "result.json", written)
+        [listed] = bench.list().items
+        assert listed.protected is None
 
 
 async def test_two_never_run_at_once(tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ async def counted(
     profile: str = "field",
     seconds: float = 5.0,
 ) -> Any:
-    rehearsal = VirtualRun(PlannedRun(family, 1, 6.0, seed), profile, RULE)
+    rehearsal = VirtualRun(PlannedRun(family, 1, 6.0, seed, profile=profile), RULE)
     return half_of(await rehearsal.play(seconds))
 
 
