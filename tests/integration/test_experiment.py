@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from iveg.adapters.orion import OrionClient
-from iveg.lab.experiment.desired_states import refuse_held_robots
+from iveg.lab.experiment.desired_states import read_free_robots
 from iveg.lab.experiment.message_recorder import DESCRIPTION
 from iveg.lab.experiment.plan import ROBOTS
 from iveg.lab.experiment.slices import HOPS
@@ -115,7 +115,7 @@ def test_an_experiment_survives_a_death_and_ctrl_c_and_ends_on_a_named_fiware(
         assert subscriptions(place) == []
         # No robot of the site finds the experiment's STOP at its next start.
         broker = Settings(mqtt_url=place.settings["IVEG_MQTT_URL"])
-        asyncio.run(refuse_held_robots(broker, ROBOTS))
+        asyncio.run(read_free_robots(broker, ROBOTS))
 
     told = read(out / "result.json")
     assert told["completion"] == {"runs": 1, "completed": 1, "planned": 1}

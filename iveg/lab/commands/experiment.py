@@ -27,7 +27,7 @@ from iveg.domain.stamps import format_stamp
 from iveg.lab.commands.demo import on_free_ports
 from iveg.lab.commands.processes import Parts
 from iveg.lab.experiment import compare
-from iveg.lab.experiment.desired_states import forget_stops, refuse_held_robots
+from iveg.lab.experiment.desired_states import give_back, read_free_robots
 from iveg.lab.experiment.message_recorder import LAST_COPIES_S, recorder
 from iveg.lab.experiment.observer import ObservedRun, watch
 from iveg.lab.experiment.outcome import (
@@ -130,8 +130,10 @@ class Lab:
     embedded: bool = True
     keep_raw: bool = False
     exit_code: int = 1
-    _stops: list[str] = field(default_factory=list)
-    """Ids of the STOPs that it sent."""
+    _stops: list[str] | None = None
+    """Ids of the STOPs that it sent; None: none was sent, empty: it does not know."""
+    _retained: Mapping[str, bytes] = field(default_factory=dict)
+    """Desired states of the site's robots before."""
 
     async def run(self, environment: Mapping[str, str]) -> None:
         """Run every step that is not done yet, then write the report."""
@@ -145,7 +147,7 @@ class Lab:
         try:
             if not self.embedded:
                 await refuse_live_robots(self.settings)
-                await refuse_held_robots(self.settings, ROBOTS)
+                self._retained = await read_free_robots(self.settings, ROBOTS)
             async with Parts(surroundings) as parts:
                 if self.embedded:
                     await parts.start("fiware")
@@ -163,10 +165,12 @@ class Lab:
 
     async def _give_back(self) -> str:
         """Leave a site's robots as they were; why not, or empty."""
-        if self.embedded or not self._stops:
+        if self.embedded or self._stops is None:
             return ""
+        if not self._stops:
+            return "its STOP was not answered and may be retained at the broker"
         try:
-            await forget_stops(self.settings, ROBOTS, self._stops)
+            await give_back(self.settings, ROBOTS, self._stops, self._retained)
         except HopError as error:
             return f"its STOP is still retained at the broker: {error}"
         return ""
@@ -243,6 +247,7 @@ class Lab:
 
     async def _stop(self) -> Any:
         """Stop the fleet; time until each robot stood (ms)."""
+        self._stops = []
         pressed = await self._ask("fleet/stop", "POST")
         self._stops = [one["command_id"] for one in pressed["commands"]]
         deadline = clock.mono() + _STOPS_WITHIN_S

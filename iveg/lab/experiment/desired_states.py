@@ -22,29 +22,40 @@ _RETAINED_WITHIN_S = 1.0
 """A broker sends what is retained as soon as it is asked."""
 
 
-async def refuse_held_robots(settings: Settings, robots: Collection[str]) -> None:
-    """Refuse to start while a STOP of the site holds one of these robots.
+async def read_free_robots(
+    settings: Settings, robots: Collection[str]
+) -> Mapping[str, bytes]:
+    """What is retained of these robots, of which no STOP of the site may hold one.
+
+    Returns:
+        Desired state by robot, for those that have one.
 
     Raises:
         DataFileError: one is held.
         HopError: the broker does not answer.
     """
     async with _broker(settings) as client:
-        for robot_id, payload in (await _desired(client, robots)).items():
-            if read_desired_state(payload) is not None:
-                reason = f"{robot_id} is held there by a STOP; release it first"
-                raise DataFileError("--fiware", settings.mqtt_url, reason)
+        found = await _desired(client, robots)
+    for robot_id, payload in found.items():
+        if read_desired_state(payload) is not None:
+            reason = f"{robot_id} is held there by a STOP; release it first"
+            raise DataFileError("--fiware", settings.mqtt_url, reason)
+    return found
 
 
-async def forget_stops(
-    settings: Settings, robots: Collection[str], ids: Collection[str]
+async def give_back(
+    settings: Settings,
+    robots: Collection[str],
+    ids: Collection[str],
+    before: Mapping[str, bytes],
 ) -> None:
-    """Clear what is retained of these STOPs, and of no other.
+    """Retain what was retained before these STOPs, and touch no other.
 
     Args:
         settings: Where the broker is.
         robots: Whose desired states are looked at.
         ids: The experiment's own STOPs; a state that names another one stays.
+        before: As ``read_free_robots`` found it.
 
     Raises:
         HopError: the broker does not answer.
@@ -54,7 +65,8 @@ async def forget_stops(
             held = read_desired_state(payload)
             if held and set(held) <= set(ids):
                 topic = names.DESIRED_TOPIC.format(robot_id=robot_id)
-                await client.publish(topic, b"", qos=1, retain=True)
+                was = before.get(robot_id, b"")
+                await client.publish(topic, was, qos=1, retain=True)
 
 
 async def _desired(
