@@ -120,9 +120,10 @@ def _add_experiment(experiment: argparse.ArgumentParser) -> None:
         help="keep truth, frames and times of every message (always with --full)",
     )
     add_end(run)
-    compare = words.add_parser("compare", help="two results beside each other")
-    compare.add_argument("before", type=Path, metavar="A")
-    compare.add_argument("after", type=Path, metavar="B")
+    compare = words.add_parser("compare", help="two experiments beside each other")
+    for name, word in (("before", "A"), ("after", "B")):
+        where = "folder of an experiment, or its result.json"
+        compare.add_argument(name, type=Path, metavar=word, help=where)
 
 
 def _positive(text: str) -> int:

@@ -42,7 +42,6 @@ from iveg.lab.experiment.plan import (
     WATCHED,
     PlannedRun,
     directory_of,
-    read_json,
 )
 from iveg.lab.experiment.raw import write_raw
 from iveg.lab.experiment.recording import read_truth
@@ -59,8 +58,8 @@ def experiment(call: Call) -> int:
     """Run or compare; returns the exit code."""
     options, settings, environment = call.options, call.settings, call.environment
     if options.word == "compare":
-        before, after = read_json(options.before), read_json(options.after)
-        print(compare.write_comparison(before, after), end="")
+        results = map(compare.read_result, (options.before, options.after))
+        print(compare.write_comparison(*results), end="")
         return 0
     plan = replace(PLANS[options.size], profile=options.profile)
     if options.seed is not None:

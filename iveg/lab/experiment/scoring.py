@@ -14,6 +14,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
+import numpy as np
+
 OVERLAP: Final = 0.5
 """Least intersection over union of a correct box, as in AP@0.5."""
 SIZE_M: Final = {"farmer": 0.5}
@@ -195,28 +197,24 @@ def score(tallies: Iterable[Tally]) -> Score:
     found = [one for each in all_of for one in each.found]
     ghosts = [one for each in all_of for one in each.ghosts]
     missed = sum(each.missed for each in all_of)
-    ap = _average_precision(found, ghosts, len(found) + missed)
+    ap = average_precision(found, ghosts, len(found) + missed)
     looks = sum(each.looks for each in all_of)
     claims = sum(each.claims for each in all_of)
     return Score(len(found), len(ghosts), missed, ap, looks, claims)
 
 
-def _average_precision(
+def average_precision(
     found: Sequence[float], ghosts: Sequence[float], targets: int
 ) -> float | None:
     """Area under the precision envelope over recall (all points, as VOC since 2010)."""
     if targets == 0:
         return None
-    ranked = sorted([(-one, 1) for one in found] + [(-one, 0) for one in ghosts])
-    hits, precisions = 0, []
-    for rank, (_, hit) in enumerate(ranked, 1):
-        hits += hit
-        precisions.append((hits / rank, hit))
-    area, best = 0.0, 0.0
-    for precision, hit in reversed(precisions):
-        best = max(best, precision)
-        area += best * hit / targets
-    return area
+    is_hit = np.repeat((1, 0), (len(found), len(ghosts)))
+    # Of equally sure ones those of nothing rank first.
+    is_hit = is_hit[np.lexsort((is_hit, -np.array([*found, *ghosts])))]
+    precision = np.cumsum(is_hit) / np.arange(1, len(is_hit) + 1)
+    envelope = np.maximum.accumulate(precision[::-1])[::-1]
+    return float((envelope * is_hit).sum() / targets)
 
 
 def _by_robot(pictures: Iterable[Picture]) -> dict[str, list[Picture]]:

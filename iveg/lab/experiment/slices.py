@@ -17,7 +17,7 @@ from iveg.domain.latency.account import Cell
 from iveg.domain.latency.segments import DATA, SEGMENTS, Segment
 from iveg.domain.latency.sketch import Sketch, from_bins, merged, sketch_of
 from iveg.lab.experiment.message_times import MessageTimes
-from iveg.lab.experiment.statistics import Interval
+from iveg.lab.experiment.statistics import FEWEST_RUNS, Interval
 
 
 class Bins(TypedDict):
@@ -32,10 +32,10 @@ Slice = dict[str, dict[str, Bins]]
 """By kind of data and hop; empty cells are left out."""
 HOPS: Final[tuple[Segment, ...]] = SEGMENTS[:4]
 """All but the last: no page is open."""
+_FEWEST_SLICES: Final = 4
+"""For an interval."""
 _EMPTY: Final[Bins] = {"edges_ms": [], "counts": [], "total_ms": 0.0}
 _DRAWS: Final = 1000
-_FEWEST: Final = 4
-"""Least number of slices for an interval."""
 _SEED: Final = 14
 
 
@@ -104,14 +104,20 @@ def whole(slices: Sequence[Slice]) -> dict[Cell, Sketch]:
 
 
 def latency_changes(
-    before: Sequence[Slice], after: Sequence[Slice], cell: Cell
+    before: Sequence[Sequence[Slice]], after: Sequence[Sequence[Slice]], cell: Cell
 ) -> Iterator[tuple[str, Interval]]:
     """Increase of a hop's mean and P95 (ms), with bootstrapped intervals.
 
-    Slices are drawn with replacement (Efron 1979), a thousand times, seeded.
+    Runs are drawn with replacement (Efron 1979), a thousand times, seeded; slices,
+    where there are fewer than five runs.
+
+    Args:
+        before: Slices of each run of one experiment.
+        after: Slices of each run of the other.
+        cell: Kind of data, and hop.
     """
-    old, new = sketches_of(before, cell), sketches_of(after, cell)
-    if min(_filled(old), _filled(new)) < _FEWEST:
+    old, new = _drawable(before, cell), _drawable(after, cell)
+    if min(_filled(old), _filled(new)) < _FEWEST_SLICES:
         return
     drawn = _drawn(old, _SEED), _drawn(new, _SEED + 1)
     now = _numbers(merged(old)), _numbers(merged(new))
@@ -120,6 +126,14 @@ def latency_changes(
         low, high = np.percentile(differences, (2.5, 97.5))
         middle = now[1][place] - now[0][place]
         yield name, Interval(middle, float(low), float(high))
+
+
+def _drawable(runs: Sequence[Sequence[Slice]], cell: Cell) -> list[Sketch]:
+    """What is drawn: messages of one run have its load of the machine in common."""
+    by_run = [merged(sketches_of(slices, cell)) for slices in runs]
+    if _filled(by_run) >= FEWEST_RUNS:
+        return by_run
+    return [one for slices in runs for one in sketches_of(slices, cell)]
 
 
 def _filled(sketches: Iterable[Sketch]) -> int:

@@ -6,6 +6,8 @@ from typing import Final, Literal
 
 _Z: Final = 1.959964
 """Normal quantile for 95 %."""
+FEWEST_RUNS: Final = 5
+"""For a bootstrapped interval; five may all change one way by chance, 1 in 16."""
 Verdict = Literal["better", "worse", "cannot tell"]
 
 
