@@ -11,7 +11,7 @@ from starlette.staticfiles import StaticFiles
 from iveg import __version__
 from iveg.app.dss import Dss
 from iveg.app.laboratory import find_laboratory
-from iveg.web.api import day, history, sign_in_code, stop_records
+from iveg.web.api import day, history, incidents, sign_in_code, stop_records
 from iveg.web.api.answers import Json
 from iveg.web.build import build_app, live_routers
 from iveg.web.pages import openapi, routes, service_worker
@@ -63,6 +63,18 @@ def _past_routers(dss: Dss, pages: routes.Pages) -> Iterator[APIRouter]:
         present=evaluator.decision_record,
         flood=views.flood,
         fleet=dss.fleet,
+    )
+    yield incidents.router(
+        incidents.Sources(
+            queries,
+            dss.stores.inputs,
+            worker,
+            lambda: dss.services.rules.versions,
+            dss.settings.told(),
+            dss.pipeline.event_log.log,
+            clock,
+            __version__,
+        )
     )
     yield sign_in_code.router(dss.sign_in_token)
     yield service_worker.router()

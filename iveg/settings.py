@@ -297,6 +297,13 @@ class Settings:
         own = f"http://{self.host}:{self.port}/ngsi/notifications"
         return self.notify_url or own
 
+    def told(self) -> dict[str, str]:
+        """All of them by variable; of secrets and logins nothing."""
+        values = self.to_environment()
+        shown = {name: _without_login(text) for name, text in values.items()}
+        hidden = {name: "(hidden)" for name in _SECRETS if values[name]}
+        return {**shown, **hidden}
+
     def to_environment(self) -> dict[str, str]:
         """The environment that gives the same settings to a child process."""
         return {

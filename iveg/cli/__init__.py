@@ -11,6 +11,7 @@ from iveg.cli.arguments import (
     Call,
     Command,
     add_db,
+    add_incident,
     add_replay,
     add_robot,
     add_serve,
@@ -108,6 +109,12 @@ def _db(call: Call) -> int:
     return run_db(call.options, call.settings, call.data)
 
 
+def _incident(call: Call) -> int:
+    from iveg.cli.incident import run_incident
+
+    return run_incident(call.options)
+
+
 COMMANDS = (
     Command("serve", "the DSS and its page", _serve, add_serve),
     Command("replay", "recorded logs as robots", _replay, add_replay),
@@ -116,4 +123,5 @@ COMMANDS = (
     Command("doctor", "try every hop once and say what is broken", _doctor),
     Command("settings", "print docs/settings.md", _settings),
     Command("db", "the history's database", _db, add_db),
+    Command("incident", "verify an incident pack", _incident, add_incident),
 )

@@ -80,6 +80,13 @@ def add_db(database: argparse.ArgumentParser) -> None:
     actions.add_parser("vacuum", help="give the room of deleted rows back")
 
 
+def add_incident(incident: argparse.ArgumentParser) -> None:
+    """Arguments of ``iveg incident``."""
+    actions = incident.add_subparsers(dest="action", required=True)
+    verify = actions.add_parser("verify", help="whether a pack is as it was made")
+    verify.add_argument("file", type=Path, metavar="FILE")
+
+
 def add_replay(replay: argparse.ArgumentParser) -> None:
     """Arguments of ``iveg replay``."""
     replay.add_argument("files", nargs="+", type=Path, metavar="FILE")

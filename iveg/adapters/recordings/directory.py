@@ -24,11 +24,11 @@ class RecordingDirectory:
     """
 
     def __init__(self, path: Path) -> None:
-        self._path = path
+        self.path = path
 
     def begin(self, start: Instant) -> McapFile:
         """A new recording.  Raises OSError."""
-        self._path.mkdir(parents=True, exist_ok=True)
+        self.path.mkdir(parents=True, exist_ok=True)
         return McapFile(self._free_name(start), start)
 
     def _free_name(self, start: Instant) -> Path:
@@ -36,8 +36,8 @@ class RecordingDirectory:
         wall = start.wall
         while True:
             stem = datetime.fromtimestamp(wall, UTC).strftime(_NAME)
-            if not (self._path / (stem + _ENDS)).exists():
-                found = self._path / (stem + _OPEN)
+            if not (self.path / (stem + _ENDS)).exists():
+                found = self.path / (stem + _OPEN)
                 if not found.exists():
                     return found
             wall += 1.0
@@ -49,12 +49,12 @@ class RecordingDirectory:
 
     def left_open(self) -> Sequence[Path]:
         """What a crash left; ask before a recording begins."""
-        return sorted(self._path.glob("*" + _OPEN))
+        return sorted(self.path.glob("*" + _OPEN))
 
     def files(self) -> Sequence[RecordingFile]:
         """All of them, oldest first."""
         found = []
-        for path in sorted(self._path.glob("*.mcap*")):
+        for path in sorted(self.path.glob("*.mcap*")):
             name = path.name.removesuffix(".open")
             status = path.stat()
             is_open = path.name.endswith(_OPEN)
@@ -65,21 +65,21 @@ class RecordingDirectory:
         """Delete what is over the limits; how many files."""
         gone = superfluous(self.files(), limits)
         for one in gone:
-            (self._path / one.name).unlink(missing_ok=True)
+            (self.path / one.name).unlink(missing_ok=True)
         return len(gone)
 
     def drop_oldest(self) -> bool:
         """Delete the oldest that is finished; whether there was one."""
         for one in self.files():
             if not one.is_open:
-                (self._path / one.name).unlink(missing_ok=True)
+                (self.path / one.name).unlink(missing_ok=True)
                 return True
         return False
 
     def finished(self, name: str) -> Path | None:
         """The file of a finished recording; None where there is none of this name."""
         known = {one.name for one in self.files() if not one.is_open}
-        return self._path / name if name in known else None
+        return self.path / name if name in known else None
 
 
 def finish_broken(path: Path) -> None:

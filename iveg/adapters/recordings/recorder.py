@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from iveg.adapters.recordings.directory import RecordingDirectory, finish_broken
+from iveg.adapters.recordings.excerpt import write_excerpt
 from iveg.adapters.recordings.incoming import (
     NOTIFICATIONS,
     Drawn,
@@ -190,6 +191,15 @@ class InputRecorder:
     async def finished(self, name: str) -> Path | None:
         """The file of a finished recording."""
         return await self._in_thread(partial(self._directory.finished, name))
+
+    async def excerpt(self, target: Path, since: float, until: float) -> int:
+        """Write what came in between two moments (Unix s) as one recording.
+
+        Returns:
+            How many messages.  What came in the last two seconds may be missing.
+        """
+        folder = self._directory.path
+        return await self._apart.run(write_excerpt, folder, target, since, until)
 
     async def _rescue(self, left: Sequence[Path]) -> None:
         for path in left:

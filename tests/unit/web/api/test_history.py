@@ -734,8 +734,13 @@ async def test_each_column_of_what_was_decided_is_a_key_of_its_json(
 ) -> None:
     goal = {"kind": "aisle", "x": 1.0, "y": 2.0, "aisle": "3"}
     occurrence = {
-        "priority": "P1", "raised_at": NOON, "cleared_at": NOON + 1.5,
-        "acknowledged_at": None, "acknowledged_by": None, "note": None, "told": [],
+        "priority": "P1",
+        "raised_at": NOON,
+        "cleared_at": NOON + 1.5,
+        "acknowledged_at": None,
+        "acknowledged_by": None,
+        "note": None,
+        "told": [],
     }
     sent, answered = (
         {"direct": NOON + 0.1, "fiware": NOON + 0.2},

@@ -1,0 +1,209 @@
+"""Incident packs over HTTP: all that is known of some minutes, as one ZIP.
+
+The page in both languages, the recording, the rows of the history, every version of the
+rule and the settings without secrets, under a manifest that one changed byte breaks
+(docs/interfaces/recordings.md, "Incident packs").
+"""
+
+import asyncio
+import shutil
+import tempfile
+from collections.abc import Awaitable, Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Annotated, Any, Protocol
+
+import orjson
+from fastapi import APIRouter, Depends, HTTPException, Query
+from fastapi.responses import FileResponse
+from pydantic import Field
+from starlette.background import BackgroundTask
+
+from iveg.adapters.history.lists import MOST_ROWS, Filter, Page
+from iveg.adapters.history.queries import Queries
+from iveg.adapters.incident_files import write_pack
+from iveg.domain.detection_rule import DetectionRule
+from iveg.domain.errors import HopError
+from iveg.domain.events import LogEvent
+from iveg.domain.observations import Instant
+from iveg.domain.records import Record
+from iveg.domain.stamps import format_stamp
+from iveg.models.rule import Rule
+from iveg.pipeline.ports import Clock
+from iveg.web.api.answers import Apart
+from iveg.web.api.history_filters import Span
+from iveg.web.pages.incident_report import write_report
+from iveg.web.security.authentication import Principal, require
+
+MEDIA_TYPE = "application/zip"
+LONGEST_S, BEFORE_S, AFTER_S = 3600.0, 30.0, 30.0
+_LANGUAGES = ("es", "en")
+
+
+class Recordings(Protocol):
+    """What came in."""
+
+    async def excerpt(self, target: Path, since: float, until: float) -> int:
+        """Write what came in between two moments (Unix s).  Raises HopError."""
+
+
+class About(Span):
+    """What a pack is about: a range, or a decision or command with its surroundings."""
+
+    decision: str | None = Field(None, pattern=r"^[ -~]{1,64}$")
+    command: str | None = Field(None, pattern=r"^[ -~]{1,64}$")
+
+
+@dataclass(frozen=True, slots=True)
+class Sources:
+    """Where the parts of a pack come from.
+
+    Attributes:
+        rules: Every version of the rule, oldest first.
+        settings: Those that hold no secret, by variable.
+        log: Takes a line of the log.
+        version: Of iVeg.
+    """
+
+    queries: Queries
+    recordings: Recordings
+    worker: Apart
+    rules: Callable[[], Sequence[DetectionRule]]
+    settings: Mapping[str, str]
+    log: Callable[[LogEvent, Instant], None]
+    clock: Clock
+    version: str
+
+
+def router(sources: Sources) -> APIRouter:
+    """The route of incident packs."""
+    routes = APIRouter(prefix="/api/v1", tags=["history"])
+
+    @routes.get("/incident", response_class=FileResponse)
+    async def incident(
+        asked: Annotated[About, Query()],
+        principal: Annotated[Principal, Depends(require("release"))],
+    ) -> FileResponse:
+        """Everything about some minutes as a ZIP, at most an hour."""
+        since, until, said = await _range(asked, sources)
+        folder = Path(await asyncio.to_thread(tempfile.mkdtemp, prefix="iveg-pack-"))
+        clear = BackgroundTask(shutil.rmtree, folder, ignore_errors=True)
+        try:
+            end = await _pack(sources, folder, since, until, said)
+        except BaseException:
+            shutil.rmtree(folder, ignore_errors=True)
+            raise
+        slots = {"by": principal.name, "about": said, "chain": end}
+        sources.log(LogEvent("system", "log.incident_packed", slots), sources.clock())
+        name = f"incident-{format_stamp(since)[:19].replace(':', '-')}Z.zip"
+        return FileResponse(
+            folder / "pack.zip", media_type=MEDIA_TYPE, filename=name, background=clear
+        )
+
+    return routes
+
+
+async def _range(asked: About, sources: Sources) -> tuple[float, float, str]:
+    """Since, until (Unix s), and what it is about."""
+    if asked.decision is not None:
+        decision = await sources.queries.decision(asked.decision)
+        if decision is None:
+            raise HTTPException(404, "There is no such decision.")
+        began, ended = decision.started_at, decision.ended_at or decision.started_at
+        said = f"decision {decision.decision_id}"
+    elif asked.command is not None:
+        command = await sources.queries.command(asked.command)
+        if command is None:
+            raise HTTPException(404, "There is no such command.")
+        began = command.requested_at
+        ended = command.standing_at or began
+        said = f"command {command.command_id}"
+    elif asked.since is not None and asked.until is not None:
+        began = asked.since.timestamp() + BEFORE_S
+        ended, said = asked.until.timestamp() - AFTER_S, "range"
+    else:
+        raise HTTPException(422, "Name a decision, a command, or since and until.")
+    if ended - began > LONGEST_S - BEFORE_S - AFTER_S:
+        if said == "range":
+            raise HTTPException(422, "A pack holds an hour at most.")
+        ended = began + LONGEST_S - BEFORE_S - AFTER_S
+    return began - BEFORE_S, ended + AFTER_S, said
+
+
+async def _pack(
+    sources: Sources, folder: Path, since: float, until: float, said: str
+) -> str:
+    """Write ``pack.zip``; returns the end of its chain."""
+    recording = folder / "recording.mcap"
+    messages = await sources.recordings.excerpt(recording, since, until)
+    rows = await _rows(sources.queries, since, until)
+    rules = [Rule.of(one).model_dump(mode="json") for one in sources.rules()]
+    facts = {
+        "iveg": sources.version,
+        "made_at": format_stamp(sources.clock().wall),
+        "about": said,
+        "since": format_stamp(since),
+        "until": format_stamp(until),
+        "messages": messages,
+    }
+    kept = {"rules.json": rules, "settings.json": dict(sources.settings)}
+    return await sources.worker.run(
+        _write, folder, (since, until, said), facts, rows, kept
+    )
+
+
+async def _rows(
+    queries: Queries, since: float, until: float
+) -> dict[str, list[Record]]:
+    """Rows of the history by list, oldest first."""
+    lists: dict[str, Callable[[Filter], Awaitable[Page[Any]]]] = {
+        "decisions": queries.decisions,
+        "commands": queries.commands,
+        "alerts": queries.alerts,
+        "log": queries.log,
+        "detections": queries.detections,
+        "odometry": queries.odometry,
+    }
+    found = {}
+    for name, ask in lists.items():
+        asked = Filter(since=since, until=until, limit=MOST_ROWS)
+        page = await ask(asked)
+        rows = [*page.items]
+        while page.next is not None:
+            page = await ask(replace(asked, cursor=page.next))
+            rows += page.items
+        found[name] = rows[::-1]
+    return found
+
+
+def _write(
+    folder: Path,
+    about: tuple[float, float, str],
+    facts: Mapping[str, object],
+    rows: Mapping[str, Sequence[Record]],
+    kept: Mapping[str, object],
+) -> str:
+    """The pack, where nothing waits for it."""
+    since, until, said = about
+    events = [
+        row for name in ("decisions", "commands", "alerts", "log") for row in rows[name]
+    ]
+    reports = {
+        f"report.{language}.html": write_report(language, since, until, events, said)
+        for language in _LANGUAGES
+    }
+    lines = {
+        f"rows/{name}.ndjson": b"".join(orjson.dumps(asdict(one)) + b"\n" for one in of)
+        for name, of in rows.items()
+    }
+    written = {
+        name: orjson.dumps(value, option=orjson.OPT_INDENT_2)
+        for name, value in kept.items()
+    }
+    parts: list[tuple[str, bytes | Path]] = [*reports.items(), *lines.items()]
+    parts += written.items()
+    try:
+        recording = ("recording.mcap", folder / "recording.mcap")
+        return write_pack(folder / "pack.zip", facts, [*parts, recording])
+    except OSError as error:
+        raise HopError("disk", error.strerror or str(error)) from error
