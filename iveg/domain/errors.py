@@ -68,10 +68,16 @@ class UnknownRobotError(IvegError):
 
 
 class CommandRefusedError(IvegError):
-    """A release or resume is refused; STOP never is."""
+    """A release, resume or goal is refused; STOP never is.
 
-    def __init__(self, robot_id: str, asked: str, why: str) -> None:
-        super().__init__(f"{asked} of {robot_id} refused: {why}.")
+    Args:
+        why: Code of the reason, and what is told unless a sentence is (``because``).
+    """
+
+    def __init__(
+        self, robot_id: str, asked: str, why: str, because: str | None = None
+    ) -> None:
+        super().__init__(f"{asked} of {robot_id} refused: {because or why}.")
         self.why = why
 
 

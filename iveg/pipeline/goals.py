@@ -9,7 +9,7 @@ import logging
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
-from iveg.domain.errors import CommandRefusedError, HopError
+from iveg.domain.errors import HopError
 from iveg.domain.events import LogEvent, Slot
 from iveg.domain.geometry import Pose2D
 from iveg.domain.goals import (
@@ -21,6 +21,7 @@ from iveg.domain.goals import (
     GoalWish,
     permit,
     place_of,
+    refusal,
 )
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import GoalAnswer, Instant
@@ -93,7 +94,7 @@ class GoalDispatcher:
         goal = Goal(self._new_id(), wish.kind, round(here[0], 3), round(here[1], 3))
         order = permit(robot, self._machines[robot_id].state, goal, at)
         if isinstance(place, str):
-            raise CommandRefusedError(robot_id, "goal", place)
+            raise refusal(robot_id, place)
         self._change(robot_id, "replaced", at)
         followed = FollowedGoal(robot_id, goal, by, at, at, wish.aisle)
         self._goals[robot_id] = followed
@@ -112,7 +113,7 @@ class GoalDispatcher:
         self._world.robot(robot_id)
         goal = self.newest(robot_id, at)
         if goal is None or not (goal.is_open or goal.state == "REACHED"):
-            raise CommandRefusedError(robot_id, "goal", "no_goal")
+            raise refusal(robot_id, "no_goal")
         cancelled = self._change(robot_id, "cancel", at, by=by) or goal
         self._send(robot_id, CancelOrder(goal.goal.goal_id))
         return cancelled

@@ -10,10 +10,12 @@ from iveg.domain.goals.followed import (
 from iveg.domain.goals.orders import CancelOrder, Goal, GoalKind, GoalOrder
 from iveg.domain.goals.permission import permit
 from iveg.domain.goals.places import GoalWish, place_of
+from iveg.domain.goals.refusals import REASONS, refusal
 
 __all__ = [
     "ANSWERED_WITHIN_S",
     "OPEN_STATES",
+    "REASONS",
     "CancelOrder",
     "FollowedGoal",
     "Goal",
@@ -24,4 +26,5 @@ __all__ = [
     "GoalWish",
     "permit",
     "place_of",
+    "refusal",
 ]

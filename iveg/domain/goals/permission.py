@@ -1,8 +1,8 @@
 """Whether a robot may be given a goal now, by all that iVeg knows of it."""
 
-from iveg.domain.errors import CommandRefusedError
 from iveg.domain.goals.followed import ANSWERED_WITHIN_S
 from iveg.domain.goals.orders import Goal, GoalOrder
+from iveg.domain.goals.refusals import refusal
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant, SafetyReport
 from iveg.domain.robot_state import RobotState
@@ -26,7 +26,7 @@ def permit(robot: RobotState, stop_state: str, goal: Goal, now: Instant) -> Goal
         if report.challenge is not None and until_s is not None:
             return GoalOrder(goal, report.challenge, until_s + ANSWERED_WITHIN_S)
         why = "no_clock"
-    raise CommandRefusedError(robot.robot_id, "goal", why or "no_report")
+    raise refusal(robot.robot_id, why or "no_report")
 
 
 def _why_not(robot: RobotState, stop_state: str, now: Instant) -> str | None:

@@ -231,5 +231,5 @@ def test_a_robot_in_doubt_gets_no_goal() -> None:
     for moment in (0.1, 0.7):
         robot.doubts.contradicted("jumped", at(moment))
 
-    with pytest.raises(CommandRefusedError, match="doubt"):
+    with pytest.raises(CommandRefusedError, match="contradict"):
         permit(robot, "RUNNING", GOAL, at(0.8))

@@ -1,9 +1,15 @@
 """Goals by REST: who may send one, and one clear problem for each that is refused."""
 
+import re
+from importlib.resources import files
+
+import orjson
 import pytest
 
+from iveg.domain.goals import REASONS
 from iveg.domain.observations import Hold
 from iveg.web.security.authentication import Role
+from tests.architecture import documents
 from tests.unit.pipeline.desk import settle
 from tests.unit.pipeline.test_goals import free, say
 from tests.unit.web.desk import WebDesk
@@ -95,5 +101,20 @@ async def test_a_held_robot_an_unheard_one_and_a_stranger_are_problems() -> None
         (409, "held"),
         (409, "no_pose"),
     ]
+    assert held.json()["detail"] == (
+        "goal of AGI refused: a STOP or another hold keeps it where it is."
+    )
     assert stranger.status_code == 404
     assert (none.status_code, none.json()["why"]) == (409, "no_goal")
+
+
+def test_every_reason_of_the_contract_has_a_sentence_and_a_text_of_the_page() -> None:
+    section = documents.section(
+        (documents.INTERFACES / "http.md").read_text(), "`POST /robots/{id}/goal`"
+    )
+    told = section.partition("409 with `why`:")[2]
+    codes = set(re.findall(r"`(\w+)`", told)) - {"mono"}
+    page = orjson.loads(files("iveg").joinpath("static/i18n/en.json").read_bytes())
+
+    assert codes | {"no_goal"} == set(REASONS)
+    assert set(REASONS) - set(page["goal"]["refused"]) == set()
