@@ -15,7 +15,7 @@ def test_formats_are_those_of_the_page() -> None:
     slots = {"robot": "AGII", "factor": 0.5, "reason": "person"}
 
     assert EN.say("log.speed_down.default", slots) == (
-        "AGII: Speed → 50% (person near)"
+        "AGII · Speed → 50% (person near)"
     )
     assert ES.translations.decimal("1.43") == "1,43"
     assert ES.lane("Cabecera norte") == "Cabecera norte"
