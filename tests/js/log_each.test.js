@@ -52,7 +52,7 @@ test("looks at one person that the log sums up are rows of their own, oldest fir
     [0.8, 0.9],
   );
   equal(new Set(each.entries([]).map(({ id }) => id)).size, 2);
-  equal(asked, ["detections/latest?limit=200"]);
+  equal(asked, ["detections/latest?limit=100"]);
   equal(button.getAttribute("aria-pressed"), "true");
   each.off();
   equal([each.isOn(), each.entries([]).length], [false, 0]);

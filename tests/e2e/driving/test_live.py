@@ -68,6 +68,11 @@ def test_a_person_in_the_ring_halves_the_speed_and_the_log_says_why(
     page.locator('#log [data-kind="speed"]', has_text=because).first.wait_for(
         timeout=90_000
     )
+    each = page.locator("#log-each")
+    each.click()
+    told = re.compile(r"\d\d:\d\d:\d\d\.\d{3} AGI+ vio .+ \(\w+, \d+\W?%\)")
+    expect(page.locator("#log li").first).to_contain_text(told, timeout=30_000)
+    each.click()
 
     with stack.api() as api:
 

@@ -11,8 +11,8 @@ import { readApi } from "../core/api.js";
 import { need, setAttribute } from "./dom.js";
 
 const PERIOD_MS = 1000;
-/** Rows that are read at once; the log shows as many. */
-const ROWS = 200;
+/** Rows that are read at once: half a second of two robots with three people each. */
+const ROWS = 100;
 
 /**
  * @param {{read?: typeof readApi, isStill: () => boolean, onChange: () => void}} options
