@@ -33,13 +33,17 @@ from iveg.domain.feedback import Feedback
 from iveg.domain.observations import Instant, Received
 from iveg.domain.peer_scan import PeerScan
 from iveg.domain.records import Record
+from iveg.domain.rule.obstacles import Obstacles
 from iveg.domain.tracking.people import People
+from iveg.domain.witness import Plan
 from iveg.domain.world import World
 from iveg.ngsi import codec
 from iveg.pipeline.evaluate import Evaluator
 from iveg.pipeline.event_log import EventLog
 from iveg.pipeline.mapping import Mapper
 from iveg.pipeline.publish import Hub
+from iveg.pipeline.scans import ScanReader
+from iveg.pipeline.second_witness import SecondWitness
 from iveg.pipeline.supervision import Supervision
 
 BEAMS = 720
@@ -106,20 +110,26 @@ class Telling:
         """Nor held."""
 
 
-def assessor_of(robots: tuple[str, ...], fleet: Telling) -> Evaluator:
+def assessor_of(
+    robots: tuple[str, ...], fleet: Telling
+) -> tuple[Evaluator, SecondWitness]:
     """The rule with everything round it but the network and the disk."""
     numbers = itertools.count()
     start, greenhouse = Instant(0.0, WALL), load_greenhouse("agroconnect")
-    return Evaluator(
-        World(load_fleet(words=robots)),
+    world, people = World(load_fleet(words=robots)), People(greenhouse.bounds)
+    obstacles = Obstacles(world, people, Plan.of(greenhouse))
+    evaluator = Evaluator(
+        world,
         greenhouse,
-        People(greenhouse.bounds),
+        people,
         DetectionRule(),
         fleet,
         EventLog(Hub(), Sink(), start, Supervision(lambda: start)),
         lambda: f"{next(numbers):026d}",
         "bench",
+        obstacle=obstacles.seen,
     )
+    return evaluator, SecondWitness(world, ScanReader(), obstacles)
 
 
 def record(robots: tuple[str, ...], seconds: float) -> list[Recorded]:
@@ -209,7 +219,7 @@ def read(body: bytes, at: Instant) -> Iterator[Received]:
 def cost(robots: int, seconds: float) -> dict[str, list[float]]:
     """How long each notification took, by kind (ms of CPU), one after the other."""
     names = tuple(f"R{number}" for number in range(robots))
-    evaluator = assessor_of(names, Telling())
+    evaluator, _ = assessor_of(names, Telling())
     took: dict[str, list[float]] = {}
     ticked = 0.0
     for one in record(names, seconds):
@@ -234,9 +244,10 @@ async def latency(robots: int, seconds: float) -> list[float]:
     """
     names = tuple(f"R{number}" for number in range(robots))
     fleet = Telling()
-    evaluator = assessor_of(names, fleet)
+    evaluator, witness = assessor_of(names, fleet)
     mapper = Mapper(evaluator.world, evaluator.greenhouse.bounds)
     drawing = asyncio.create_task(mapper.run(clock.now))
+    looking = asyncio.create_task(witness.run(clock.now))
     recorded, took = record(names, seconds), []
     start = time.perf_counter()
     ticked = float("-inf")
@@ -256,7 +267,8 @@ async def latency(robots: int, seconds: float) -> list[float]:
             ticked = now.mono
             evaluator.tick(now)
     drawing.cancel()
-    await asyncio.gather(drawing, return_exceptions=True)
+    looking.cancel()
+    await asyncio.gather(drawing, looking, return_exceptions=True)
     return took
 
 

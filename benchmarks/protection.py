@@ -5,6 +5,7 @@ stands, by detector profile; the same seed gives the same numbers on any machine
 
     python -m benchmarks.protection --profiles field,simulation --seeds 11,12,13
     python -m benchmarks.protection --single-boxes
+    python -m benchmarks.protection --no-own-laser   # the server's witness alone
 """
 
 import argparse
@@ -31,7 +32,7 @@ ROBOTS = ("AGI", "AGII")
 
 
 def staged(
-    profile: str, seed: int, rule: DetectionRule, laser: bool = True
+    profile: str, seed: int, rule: DetectionRule, laser: bool = True, own: bool = True
 ) -> tuple[Stage, SimulatedWorld, VirtualPipeline]:
     """The demo's greenhouse before its first step."""
     scenario = scenario_named("demo")
@@ -50,15 +51,21 @@ def staged(
         iveg.hear,
         scan_every=2 if laser else 0,
         plan=Plan.of(greenhouse),
+        is_witness=own,
     )
     return stage, world, iveg
 
 
 def run(
-    profile: str, seed: int, seconds: float, rule: DetectionRule, laser: bool = True
+    profile: str,
+    seed: int,
+    seconds: float,
+    rule: DetectionRule,
+    laser: bool = True,
+    own: bool = True,
 ) -> Protection:
-    """One run of the demo's greenhouse, scored at each step."""
-    stage, world, iveg = staged(profile, seed, rule, laser)
+    """One run of the demo's greenhouse; ``own``: robots read their own lasers."""
+    stage, world, iveg = staged(profile, seed, rule, laser, own)
     truth: list[Row] = []
     told: list[Row] = []
     for _ in range(round(seconds / STEP_S)):
@@ -78,6 +85,7 @@ def main() -> None:
     options.add_argument("--seconds", type=float, default=600.0)
     options.add_argument("--single-boxes", action="store_true")
     options.add_argument("--no-laser", action="store_true")
+    options.add_argument("--no-own-laser", action="store_true")
     options.add_argument("--no-foresight", action="store_true")
     asked = options.parse_args()
     rule = DetectionRule(
@@ -86,7 +94,8 @@ def main() -> None:
     seeds = [int(one) for one in asked.seeds.split(",")]
     rows = []
     for profile in asked.profiles.split(","):
-        runs = (run(profile, n, asked.seconds, rule, not asked.no_laser) for n in seeds)
+        lasers = not asked.no_laser, not asked.no_own_laser
+        runs = (run(profile, n, asked.seconds, rule, *lasers) for n in seeds)
         chosen = {"where": "demo", "profile": profile, "rule": "as asked"}
         rows.append({**chosen, **whole(runs).row()})
     result = {"protection": rows}

@@ -270,6 +270,7 @@ class Dss:
         beside, supervision = self.services, self.pipeline.supervision
         return {
             "costmap": lambda: beside.mapper.run(clock.now),
+            "second-witness": lambda: self.pipeline.second_witness.run(clock.now),
             "peer-scans": lambda: self.pipeline.peer_scans.run(clock.now),
             "coverage": lambda: beside.coverage.run(clock.now),
             "provisioner": self.provisioner.run,

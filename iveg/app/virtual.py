@@ -50,6 +50,8 @@ class VirtualPipeline:
     def move(self, seconds: float) -> Instant:
         """Set the clock to ``seconds`` after the start."""
         self.now = START.later(seconds)
+        while self.parts.second_witness.tick(self.now):
+            pass
         return self.now
 
     def hear(self, topic: str, payload: bytes) -> None:

@@ -167,7 +167,7 @@ class SlowdownDecision:
         sighting = crossing.zone.sighting
         entered = crossing.entered.wall
         seen = (
-            Link("detection", "n/a", None, "odometry")
+            _unseen(crossing)
             if sighting is None
             else Link("detection", "ok", sighting.at.wall, sighting.class_id)
         )
@@ -203,6 +203,13 @@ class SlowdownDecision:
         if self.ended is None:
             return Link(name, "open")
         return Link(name, "unknown" if self.interrupted else "missing")
+
+
+def _unseen(crossing: Crossing) -> Link:
+    """The first link of whom no camera saw: a laser, or a peer's own word."""
+    if crossing.zone.obstacle is None:
+        return Link("detection", "n/a", None, "odometry")
+    return Link("detection", "ok", crossing.entered.wall, "laser")
 
 
 class Decisions:

@@ -45,9 +45,9 @@ class SpeedLimit:
 
     Attributes:
         speed_factor: 0, 0.5 or 1.
-        reason: ``clear``, ``person``, ``robot``, ``stale``, ``doubt`` or
-            ``unsupervised``.
-        cause: The person or robot that it is for.
+        reason: ``clear``, ``person``, ``robot``, ``obstacle``, ``stale``, ``doubt``
+            or ``unsupervised``.
+        cause: The person or robot that it is for; None of what only a laser sees.
         distance_m: From ``base_link`` to the centre of the cause (m).
         foretold_s: When it will reach the ring of the cause (s); None: it is inside.
     """

@@ -2,9 +2,10 @@
 
 A camera sees less than half of the people beside a robot; its laser sees most of the
 others.  Of a scan those returns count that are within two metres of the robot's outline
-and that neither the plan of the greenhouse nor a peer explains.  Together they must be
-of a person's size, or have moved, and last for 0.2 s.  Without a plan only the robot's
-own path counts, or every row would slow it.
+and that neither the plan of the greenhouse nor somebody who is known explains.
+Together they must be of a person's size, or have moved, and last for 0.2 s.  Where no
+plan draws what stands there only the robot's own path counts, or every row would slow
+it.
 
 A witness only adds: it lifts no limit, and finds no spot empty.
 """
@@ -25,7 +26,7 @@ from iveg.domain.observations import LaserScan
 _Floats = NDArray[np.float64]
 LASTS_S = 0.2
 """What is shorter is noise, or an insect."""
-_GONE_S = 0.5
+GONE_S = 0.5
 """Without a return for so long it is gone."""
 PLAN_M = 0.4
 """The plan is off by 0.2 m, or plants lean out so far; a pose is off by the rest."""
@@ -70,6 +71,11 @@ class Plan:
             np.array(sides, np.float64).reshape(-1, 4),
             np.array(posts, np.float64).reshape(-1, 3),
         )
+
+    @property
+    def is_drawn(self) -> bool:
+        """Whether it shows more than the outer wall."""
+        return len(self.rectangles) + len(self.posts) > 0
 
     def distance_to(self, x: _Floats, y: _Floats) -> _Floats:
         """How far points, shape (n,), are from the nearest thing drawn (m)."""
@@ -126,6 +132,20 @@ class Outline:
 
 
 @dataclass(frozen=True, slots=True)
+class KnownBody:
+    """Somebody who is known, in ``map``: what a return there is explained by (m)."""
+
+    x: float
+    y: float
+    radius: float
+
+    @classmethod
+    def of_peer(cls, pose: Pose2D) -> "KnownBody":
+        """A peer, where it told that it is."""
+        return cls(pose.x, pose.y, _PEER_M)
+
+
+@dataclass(frozen=True, slots=True)
 class Obstacle:
     """Something of a person's size near a robot that nobody explained.
 
@@ -133,6 +153,7 @@ class Obstacle:
         x: Its middle in ``map`` (m); ``y`` likewise.
         first_x: Where it was when it was seen first; ``first_y`` likewise.
         size_m: From its first return to its last.
+        gap_m: From the robot's outline to its nearest return.
         since: When it was seen first; ``at`` newest (monotonic, s).
     """
 
@@ -141,6 +162,7 @@ class Obstacle:
     first_x: float
     first_y: float
     size_m: float
+    gap_m: float
     since: float
     at: float
 
@@ -151,10 +173,14 @@ class Obstacle:
         return way > _MOVED_M
 
     @property
+    def fits(self) -> bool:
+        """Whether it is or moves like somebody."""
+        return self.size_m <= _LARGEST_M or self.has_moved
+
+    @property
     def counts(self) -> bool:
-        """Whether it is there for long enough, and is or moves like somebody."""
-        fits = self.size_m <= _LARGEST_M or self.has_moved
-        return fits and self.at - self.since >= LASTS_S
+        """Whether it is there for long enough, too."""
+        return self.fits and self.at - self.since >= LASTS_S - 1e-6
 
 
 class Witness:
@@ -163,11 +189,15 @@ class Witness:
     Args:
         outline: The robot's body.
         plan: None: nobody drew the place.
+        ahead_s: It looks farther by how far the robot drives in this time (s).
     """
 
-    def __init__(self, outline: Outline, plan: Plan | None) -> None:
+    def __init__(
+        self, outline: Outline, plan: Plan | None, ahead_s: float = 0.0
+    ) -> None:
         self._outline = outline
         self._plan = plan
+        self._ahead_s = ahead_s
         self._known: tuple[Obstacle, ...] = ()
         self._looked_at = -math.inf
 
@@ -176,32 +206,41 @@ class Witness:
         scan: LaserScan,
         pose: Pose2D,
         twist: Twist2D,
-        peers: Iterable[Pose2D],
+        known: Iterable[KnownBody],
         now: float,
     ) -> None:
         """Take a scan, made at ``pose`` in ``map`` (monotonic, s)."""
         if now - self._looked_at < _EVERY_S:
             return
         self._looked_at = now
-        bodies = _bodies(self._unexplained(scan, pose, twist, peers))
-        if self._plan is None:
+        bodies = _bodies(self._unexplained(scan, pose, twist, known))
+        if self._plan is None or not self._plan.is_drawn:
             bodies = [one for one in bodies if self._is_ahead(one, pose, twist)]
-        known = [one for one in self._known if now - one.at <= _GONE_S]
-        seen = [_joined(body, known, now) for body in bodies]
-        self._known = (*seen, *known)
+        earlier = [one for one in self._known if now - one.at <= GONE_S]
+        seen = [self._joined(body, earlier, pose, now) for body in bodies]
+        self._known = (*seen, *earlier)
+
+    @property
+    def is_unsure(self) -> bool:
+        """Whether the next look may make something count."""
+        return any(one.fits and not one.counts for one in self._known)
+
+    def present(self, now: float) -> list[Obstacle]:
+        """What counts and was there within the last half second."""
+        return [one for one in self._known if one.counts and now - one.at <= GONE_S]
 
     def obstacle(self, now: float) -> Obstacle | None:
-        """What counts and was there within the last half second; the oldest."""
-        present = [one for one in self._known if one.counts and now - one.at <= _GONE_S]
-        return min(present, key=lambda one: one.since, default=None)
+        """The oldest of them."""
+        return min(self.present(now), key=lambda one: one.since, default=None)
 
     def _unexplained(
-        self, scan: LaserScan, pose: Pose2D, twist: Twist2D, peers: Iterable[Pose2D]
+        self, scan: LaserScan, pose: Pose2D, twist: Twist2D, known: Iterable[KnownBody]
     ) -> _Floats:
         """Returns near the robot that nothing explains; shape (n, 2), in ``map``."""
         x, y = scan.points(Pose2D(0.0, 0.0, 0.0)).astype(np.float64).T
         gap = self._outline.gap_to(x, y)
-        near = (gap > 0.0) & (gap <= LIMITS.ring_default_m)
+        reach = LIMITS.ring_default_m + self._ahead_s * abs(twist.linear_x)
+        near = (gap > 0.0) & (gap <= reach)
         away = np.hypot(x, y)[near]
         x, y = _moved(x[near], y[near], pose)
         left = np.ones(x.shape, np.bool_)
@@ -209,23 +248,49 @@ class Witness:
             blurred = PLAN_M + abs(twist.angular_z) * _TURN_S * away
             plan = self._plan.about(pose, float(away.max(initial=0.0)) + 2 * PLAN_M)
             left = plan.distance_to(x, y) > blurred
-        for peer in peers:
-            left &= np.hypot(x - peer.x, y - peer.y) > _PEER_M
+        for one in known:
+            left &= np.hypot(x - one.x, y - one.y) > one.radius
         return np.column_stack((x[left], y[left]))
 
     def _is_ahead(self, body: _Floats, pose: Pose2D, twist: Twist2D) -> bool:
         """Whether a part of a body lies where the robot is driving."""
-        c, s = math.cos(pose.yaw), math.sin(pose.yaw)
-        x, y = body[:, 0] - pose.x, body[:, 1] - pose.y
-        x, y = c * x + s * y, c * y - s * x
+        x, y = _seen_from(pose, body)
         ahead = (x > 0.0) == (twist.linear_x >= 0.0)
         return bool(np.any(ahead & (np.abs(y) <= self._outline.width / 2 + _BESIDE_M)))
+
+    def _joined(
+        self, body: _Floats, earlier: list[Obstacle], pose: Pose2D, now: float
+    ) -> Obstacle:
+        """A body as the nearest earlier obstacle that it may be, or a new one.
+
+        That one is taken out of ``earlier``.
+        """
+        x, y = (float(one) for one in body.mean(0))
+        size = float(np.hypot(*np.ptp(body, axis=0)))
+        gap = float(self._outline.gap_to(*_seen_from(pose, body)).min())
+        near = min(
+            earlier, key=lambda one: math.hypot(one.x - x, one.y - y), default=None
+        )
+        if near is not None:
+            reach = _APART_M + LIMITS.walking_m_s * (now - near.at)
+            if math.hypot(near.x - x, near.y - y) <= reach:
+                earlier.remove(near)
+                first = near.first_x, near.first_y
+                return Obstacle(x, y, *first, size, gap, near.since, now)
+        return Obstacle(x, y, x, y, size, gap, now, now)
 
 
 def _moved(x: _Floats, y: _Floats, frame: Pose2D) -> tuple[_Floats, _Floats]:
     """Points of a frame with this pose, in ``map``."""
     c, s = math.cos(frame.yaw), math.sin(frame.yaw)
     return frame.x + c * x - s * y, frame.y + s * x + c * y
+
+
+def _seen_from(pose: Pose2D, points: _Floats) -> tuple[_Floats, _Floats]:
+    """Points of ``map``, shape (n, 2), in the frame with this pose: x and y."""
+    c, s = math.cos(pose.yaw), math.sin(pose.yaw)
+    x, y = points[:, 0] - pose.x, points[:, 1] - pose.y
+    return c * x + s * y, c * y - s * x
 
 
 def _bodies(points: _Floats) -> Sequence[_Floats]:
@@ -235,16 +300,3 @@ def _bodies(points: _Floats) -> Sequence[_Floats]:
     steps = np.hypot(*np.diff(points, axis=0).T)
     parts = np.split(points, np.flatnonzero(steps > _APART_M) + 1)
     return [one for one in parts if len(one) >= _LEAST_RETURNS]
-
-
-def _joined(body: _Floats, known: list[Obstacle], now: float) -> Obstacle:
-    """A body as the nearest known obstacle that it may be, taken out, or a new one."""
-    x, y = (float(one) for one in body.mean(0))
-    size = float(np.hypot(*np.ptp(body, axis=0)))
-    near = min(known, key=lambda one: math.hypot(one.x - x, one.y - y), default=None)
-    if near is not None:
-        reach = _APART_M + LIMITS.walking_m_s * (now - near.at)
-        if math.hypot(near.x - x, near.y - y) <= reach:
-            known.remove(near)
-            return Obstacle(x, y, near.first_x, near.first_y, size, near.since, now)
-    return Obstacle(x, y, x, y, size, now, now)

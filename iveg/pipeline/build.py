@@ -13,9 +13,11 @@ from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.latency.watch import LatencyWatch
 from iveg.domain.messages import Channel, Contacts
 from iveg.domain.observations import Instant, Received
+from iveg.domain.rule.obstacles import Obstacles
 from iveg.domain.stop.drills import Drills
 from iveg.domain.tracking.people import People
 from iveg.domain.transports import FIWARE, Transport
+from iveg.domain.witness import Plan
 from iveg.domain.world import World
 from iveg.pipeline.command import Commander
 from iveg.pipeline.coverage import CoverageMonitor
@@ -46,6 +48,7 @@ from iveg.pipeline.publish import Hub
 from iveg.pipeline.record import RecordSink
 from iveg.pipeline.rules import Rules
 from iveg.pipeline.scans import ScanReader
+from iveg.pipeline.second_witness import SecondWitness
 from iveg.pipeline.slow_time import SlowTime
 from iveg.pipeline.supervision import Supervision
 
@@ -116,6 +119,7 @@ class Pipeline:
     goals: GoalDispatcher
     equipment: EquipmentMonitor
     peer_scans: PeerScans
+    second_witness: SecondWitness
 
     def counters(self) -> Counter[str]:
         """Everything that is counted in it."""
@@ -172,11 +176,12 @@ def build(
     latency = LatencyMonitor(watch, ports.sink, event_log)
     watched = guard("latency", watch.arrived), guard("recordings", ports.arrived)
     ingest = _ingest(world, event_log, ports.clock, watched)
-    scans = ScanReader(ingest.reject)
+    scans, people = ScanReader(ingest.reject), People(greenhouse.bounds, choices.era)
+    obstacles = Obstacles(world, people, Plan.of(greenhouse))
     evaluator = Evaluator(
         world,
         greenhouse,
-        People(greenhouse.bounds, choices.era),
+        people,
         choices.rule,
         ports.fleet,
         event_log,
@@ -184,6 +189,7 @@ def build(
         choices.boot,
         probe.lag,
         scans.newest,
+        obstacles.seen,
     )
     commander = _commander(fleet.ids, ports, choices, event_log, health_monitor)
     goals = _goals(world, greenhouse, commander, ports, event_log)
@@ -214,10 +220,9 @@ def build(
         *totals,
         scans,
         goals,
-        EquipmentMonitor(
-            Equipment(choices.tiles, start), ports.sink, event_log, supervision
-        ),
+        _equipment(choices.tiles, start, ports, event_log, supervision),
         PeerScans(world, scans, ports.fleet.publish_peer_scan, choices.boot),
+        SecondWitness(world, scans, obstacles),
     )
 
 
@@ -233,6 +238,17 @@ def _ticks(
         *[guard("totals", one.tick) for one in totals],
         guard("recordings", ports.ticked),
     )
+
+
+def _equipment(
+    tiles: Sequence[Tile],
+    start: Instant,
+    ports: Ports,
+    event_log: EventLog,
+    supervision: Supervision,
+) -> EquipmentMonitor:
+    equipment = Equipment(tiles, start)
+    return EquipmentMonitor(equipment, ports.sink, event_log, supervision)
 
 
 def _commander(

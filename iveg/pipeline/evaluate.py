@@ -29,6 +29,7 @@ from iveg.domain.observations import (
 from iveg.domain.plausibility import ignores_limit
 from iveg.domain.records import AlertRecord, DecisionRecord
 from iveg.domain.rule.foresight import Encounter
+from iveg.domain.rule.obstacles import SeenBy
 from iveg.domain.rule.premises import Missing
 from iveg.domain.rule.speed_limits import Crossing, LimitChange, SpeedLimits
 from iveg.domain.tracking.laser_sight import LaserSight, ScanOf
@@ -61,6 +62,7 @@ class Evaluator:
     Args:
         boot: Random, new at each start: identity of our feedback.
         newest_scan: Reads a robot's newest scan.
+        obstacle: What a robot's laser sees near it that nobody explains.
 
     Attributes:
         rule: The version in force; a new one counts from the next judgement on.
@@ -78,6 +80,7 @@ class Evaluator:
         boot: str,
         backlog: Callable[[Instant], float | None] = lambda _: None,
         newest_scan: ScanOf = lambda _: None,
+        obstacle: SeenBy = lambda *_: None,
     ) -> None:
         self.world = world
         self.greenhouse = greenhouse
@@ -90,7 +93,7 @@ class Evaluator:
         )
         self.protected_unseen = 0
         """How often a robot slowed for a person or peer out of its own sight."""
-        self._speed_limits = SpeedLimits(greenhouse)
+        self._speed_limits = SpeedLimits(greenhouse, obstacle)
         self.tracking = DetectionTracking(world, self.people, event_log, new_id)
         swept = LaserSight(Plan.of(greenhouse), newest_scan).swept
         self._staleness = Staleness(world, self.people, greenhouse, event_log, swept)

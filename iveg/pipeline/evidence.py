@@ -11,6 +11,7 @@ from iveg.domain.rule.speed_limits import Crossing
 from iveg.domain.rule.zones import Zone
 from iveg.domain.stamps import wall_of
 from iveg.domain.tracking.looks import Looks
+from iveg.domain.witness import Obstacle
 from iveg.domain.world import World
 
 
@@ -23,7 +24,7 @@ def record_of(decision: SlowdownDecision) -> DecisionRecord:
         kind="mandate",
         robot_id=crossing.robot_id,
         started_at=crossing.entered.wall,
-        person_id=zone.cause,
+        person_id=None if zone.obstacle is not None else zone.cause,
         observer=zone.observer,
         class_=zone.reason,
         class_id=None if sighting is None else sighting.class_id,
@@ -39,6 +40,7 @@ def record_of(decision: SlowdownDecision) -> DecisionRecord:
         rule_parameters={
             **_parameters(decision.rule, zone),
             "foretold_s": crossing.foretold_s,
+            "obstacle": _obstacle(zone.obstacle, crossing.entered.mono),
             "places": [asdict(one) for one in decision.places],
         },
         in_sight=crossing.in_sight,
@@ -82,12 +84,26 @@ def _parameters(rule: DetectionRule, zone: Zone) -> dict[str, object]:
     sighting = zone.sighting
     looks = None if sighting is None else sighting.looks
     return {
-        "threshold": rule.threshold_of(zone.reason),
+        "threshold": None
+        if zone.reason == "obstacle"
+        else rule.threshold_of(zone.reason),
         "radius_m": rule.radius_m,
         "ring_m": round(zone.radius_m, 3),
         "author": rule.author,
         "possible": sighting is not None and sighting.possible,
         "looks": None if looks is None else _looks(looks),
+    }
+
+
+def _obstacle(seen: Obstacle | None, at: float) -> dict[str, object] | None:
+    """What a laser saw, and for how long by ``at`` (monotonic, s)."""
+    if seen is None:
+        return None
+    return {
+        "size_m": round(seen.size_m, 2),
+        "gap_m": round(seen.gap_m, 2),
+        "moved": seen.has_moved,
+        "over_s": round(max(0.0, at - seen.since), 1),
     }
 
 

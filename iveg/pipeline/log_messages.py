@@ -51,11 +51,13 @@ def evidence_of(
     A robot judges alerts by its own pose, too, and may be ahead of our decision; it
     then names the alert, and that person's data are the evidence.
     """
-    if report.reason not in ("person", "robot"):
+    if report.reason not in ("person", "robot", "obstacle"):
         return None
     decision = decisions.get(report.decision_id or "")
     if decision is not None:
         return _of_crossing(decision.crossing)
+    if report.reason == "obstacle":
+        return None
     robot = world.robots[report.robot_id]
     found = _without_decision(report, robot, people, world, greenhouse)
     if found is None:

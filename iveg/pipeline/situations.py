@@ -10,7 +10,7 @@ from iveg.domain.margins import SafetyMargin
 from iveg.domain.observations import Instant, SafetyReport
 from iveg.domain.robot_state import RobotState
 from iveg.domain.situation.facts import Near, RobotFacts, Situation
-from iveg.domain.situation.judge import gravest, situation_of
+from iveg.domain.situation.judge import HAZARDS, gravest, situation_of
 from iveg.domain.stop.machine import StopMachine
 from iveg.domain.tracking.person import TrackedPerson
 from iveg.pipeline.evaluate import Evaluator
@@ -92,7 +92,7 @@ class Situations:
         It judges alerts by its own pose, too, and may be ahead of our speed limit; it
         then names the alert.
         """
-        if report.reason not in ("person", "robot"):
+        if report.reason not in HAZARDS:
             return None
         if report.reason == limit.reason and report.cause in (None, limit.cause):
             return self._told(robot, limit, now)
@@ -107,7 +107,7 @@ class Situations:
 
     def _told(self, robot: RobotState, limit: SpeedLimit, now: Instant) -> Near | None:
         """Whom our speed limit is for."""
-        if limit.reason not in ("person", "robot"):
+        if limit.reason not in HAZARDS:
             return None
         found = self._near(robot, limit.cause, now)
         return replace(

@@ -27,8 +27,9 @@ class Cap:
     cause: str | None = None
     decision_id: str | None = None
 
-    def _order(self) -> tuple[float, int, bool]:
-        return self.factor, -_REASONS.index(self.reason), self.cause is None
+    def _order(self) -> tuple[float, int, bool, bool]:
+        reason = -_REASONS.index(self.reason)
+        return self.factor, reason, self.cause is None, self.decision_id is None
 
 
 FREE = Cap(FULL_SPEED, "clear")

@@ -14,7 +14,7 @@ from iveg.domain.fleet import CAUTIOUS
 from iveg.domain.geometry import REST, Pose2D, Twist2D
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import LaserScan
-from iveg.domain.witness import Outline, Plan, Witness
+from iveg.domain.witness import KnownBody, Outline, Plan, Witness
 from iveg.robot.caps import FREE, AppliedCap, Cap, lowest
 from iveg.robot.lookahead import Lookahead
 from iveg.robot.peer_feedback import PeerFeedback
@@ -128,7 +128,7 @@ class Judgement:
         """Note what the laser sees; nothing of it without a young pose."""
         motion = self.motion(now)
         if motion is not None and motion.pose is not None:
-            peers = self._peer_feedback.peers(now)
+            peers = map(KnownBody.of_peer, self._peer_feedback.peers(now))
             self._witness.look(scan, motion.pose, motion.twist, peers, now)
 
     def note_path(self, path: Sequence[tuple[float, float]], now: float) -> None:

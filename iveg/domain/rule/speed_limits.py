@@ -16,6 +16,7 @@ from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
 from iveg.domain.robot_state import RobotState
 from iveg.domain.rule.foresight import Encounter, Foresight, Foretold
+from iveg.domain.rule.obstacles import CAUSE, SeenBy, SeenObstacle
 from iveg.domain.rule.paths import HOLDS_S, slows_within_s
 from iveg.domain.rule.premises import Missing, missing_premises
 from iveg.domain.rule.zones import NOT_FAR_M, Zone, ZoneFinder
@@ -24,6 +25,7 @@ from iveg.domain.world import World
 
 SPEEDING_UP = 0.05
 """Faster than in the mean of its last second by more than this (m/s)."""
+_GRAVEST = ("person", "robot", "obstacle")
 _FREED_S = 1.0
 """So long after it was let go a robot may still be about as slow as before."""
 
@@ -76,10 +78,14 @@ class SpeedLimits:
         missing: What the claim "clear" lacks for each robot, since the last judgement.
         limited_since: When each limited robot was first limited (monotonic, s).
         foretold: Encounters ahead, since the last judgement.
+
+    Args:
+        seen: What a robot's laser sees near it that nobody explains.
     """
 
-    def __init__(self, greenhouse: Greenhouse) -> None:
+    def __init__(self, greenhouse: Greenhouse, seen: SeenBy = lambda *_: None) -> None:
         self._greenhouse = greenhouse
+        self._seen = seen
         self._open: dict[str, dict[str, Crossing]] = {}
         """By robot and cause."""
         self.missing: Mapping[str, tuple[Missing, ...]] = {}
@@ -103,16 +109,26 @@ class SpeedLimits:
     ) -> tuple[dict[str, SpeedLimit], list[LimitChange]]:
         """Judge the whole fleet; ``new_id`` begins the ids of new decisions."""
         near = self._zones.near(world, people, rule, now, self._open)
+        seen = {
+            name: one
+            for name in world.robots
+            if (one := self._seen(name, now)) is not None
+        }
         self.foretold = (
-            self._foresight.look(world, people, rule, now) if rule.foresight else {}
+            _with_obstacles(self._foresight.look(world, people, rule, now), seen)
+            if rule.foresight
+            else {}
         )
         changes: list[LimitChange] = []
         for robot in world.robots.values():
-            zones = list(near(robot))
+            nearest = {
+                **_nearest(robot, near(robot), self._open.get(robot.robot_id, {})),
+                **_beside(robot, seen.get(robot.robot_id)),
+            }
             ahead = self.foretold.get(robot.robot_id, {})
-            if zones or ahead or self._open.get(robot.robot_id):
+            if nearest or ahead or self._open.get(robot.robot_id):
                 name = f"{new_id}-{len(changes)}"
-                changes += self._cross(robot, zones, ahead, now, name)
+                changes += self._cross(robot, nearest, ahead, now, name)
         self.missing = missing_premises(world, now)
         limits = {name: self._speed_limit(name) for name in world.robots}
         for name, limit in limits.items():
@@ -125,13 +141,13 @@ class SpeedLimits:
     def _cross(
         self,
         robot: RobotState,
-        zones: Iterable[Zone],
+        inside: "_Found",
         ahead: Mapping[str, Encounter],
         now: Instant,
         new_id: str,
     ) -> Iterator[LimitChange]:
         mine = self._open.setdefault(robot.robot_id, {})
-        nearest = _nearest(robot, zones, mine) | _foreseen(robot, ahead, mine)
+        nearest = {**inside, **_foreseen(robot, ahead, mine)}
         for number, (cause, (depth, distance, zone)) in enumerate(nearest.items()):
             crossing = mine.get(cause)
             if crossing is not None:
@@ -178,17 +194,18 @@ class SpeedLimits:
         return None if encounter is None or is_inside else encounter.in_s
 
     def _speed_limit(self, robot_id: str) -> SpeedLimit:
-        """The most specific reason wins: a person, a peer, then what is missing."""
+        """The most specific reason wins: what is missing comes last."""
         mine = self._open.get(robot_id)
         if mine:
             worst = min(
                 mine.values(),
-                key=lambda one: (one.zone.reason != "person", one.distance_m),
+                key=lambda one: (_GRAVEST.index(one.zone.reason), one.distance_m),
             )
             return SpeedLimit(
                 HALF_SPEED,
                 worst.zone.reason,
-                worst.zone.cause,
+                # A laser knows no names.
+                None if worst.zone.reason == "obstacle" else worst.zone.cause,
                 worst.distance_m,
                 worst.decision_id,
                 self._foretold_s(robot_id, worst.zone, worst.distance_m),
@@ -196,6 +213,27 @@ class SpeedLimits:
         for first in self.missing[robot_id]:
             return SpeedLimit(HALF_SPEED, first.reason, first.robot_id)
         return CLEAR
+
+
+_Found = Mapping[str, tuple[float, float, Zone]]
+"""Cause → the deepest of its circles: how far outside (m), distance (m), the circle."""
+
+
+def _beside(robot: RobotState, seen: SeenObstacle | None) -> _Found:
+    """What its laser sees within two metres of a robot's outline."""
+    if seen is None or seen.ahead is not None or robot.odometry is None:
+        return {}
+    return {CAUSE: (0.0, seen.distance_m, seen.zone)}
+
+
+def _with_obstacles(foretold: Foretold, seen: Mapping[str, SeenObstacle]) -> Foretold:
+    """Encounters with those whom lasers see before robots, too."""
+    met = {
+        name: {**foretold.get(name, {}), CAUSE: one.ahead}
+        for name, one in seen.items()
+        if one.ahead is not None
+    }
+    return {**foretold, **met} if met else foretold
 
 
 def _nearest(
@@ -288,6 +326,8 @@ def _is_ahead(robot: RobotState, zone: Zone) -> bool:
     report = robot.safety
     if report is None or report.speed_factor > HALF_SPEED:
         return False
+    if zone.reason == report.reason == "obstacle":
+        return True
     # A peer's own ring has no alert, and a robot may name none: that is no match.
     ours = {zone.alert_id, zone.cause} - {None}
     return report.decision_id in ours or report.cause in ours

@@ -19,6 +19,7 @@ from iveg.domain.observations import Instant
 from iveg.domain.robot_state import RobotState
 from iveg.domain.tracking.people import People
 from iveg.domain.tracking.person import Sighting, TrackedPerson
+from iveg.domain.witness import Obstacle
 from iveg.domain.world import World
 
 _Floats = NDArray[np.float64]
@@ -35,16 +36,17 @@ class Zone:
     """A circle that slows every robot inside it.
 
     Attributes:
-        cause: The person or robot at its centre.
+        cause: The person, robot or obstacle at its centre.
         observer: Who saw it; the peer itself for a peer's own odometry.
         x: Centre in ``map`` (m); ``y`` likewise.
         sighting: What was seen; None for a peer's own odometry.
         recording: The map frame of the recording that saw it, which slows recordings
             of that frame alone; None: a live robot saw it.
         alert_id: Of the alert that robots hear of it.
+        obstacle: What the observer's laser saw, where that is all.
     """
 
-    reason: Literal["person", "robot"]
+    reason: Literal["person", "robot", "obstacle"]
     cause: str
     observer: str
     x: float
@@ -53,6 +55,7 @@ class Zone:
     sighting: Sighting | None = None
     recording: str | None = None
     alert_id: str | None = None
+    obstacle: Obstacle | None = None
 
 
 def zones_of(

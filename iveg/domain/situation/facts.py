@@ -33,7 +33,7 @@ Action = Literal[
 
 @dataclass(frozen=True, slots=True)
 class Near:
-    """The person or robot that a situation is about.
+    """The person, robot or obstacle that a situation is about.
 
     Attributes:
         about: Its id, where it is known.

@@ -18,7 +18,8 @@ from iveg.domain.situation.facts import Action, Level, Near, RobotFacts, Situati
 from iveg.domain.stop.commands import State
 
 _WORST_FIRST = get_args(Level)
-_HAZARDS = ("person", "robot", "obstacle")
+HAZARDS = ("person", "robot", "obstacle")
+"""Reasons that are about somebody or something near."""
 
 
 def situation_of(facts: RobotFacts) -> Situation:
@@ -175,9 +176,9 @@ def _limited(facts: RobotFacts) -> Iterator[Situation]:
 def _slow(
     state: str, factor: float, reason: str, near: Near | None, facts: RobotFacts
 ) -> Situation:
-    level: Level = "caution" if reason in _HAZARDS else "doubt"
+    level: Level = "caution" if reason in HAZARDS else "doubt"
     slow = Situation(level, state, reason, slots={"factor": factor})
-    if near is not None and near.kind in ("person", "robot"):
+    if near is not None and near.kind in HAZARDS:
         return _because(slow, near)
     lacks = next((one for one in facts.missing if one.reason == reason), None)
     if lacks is not None:

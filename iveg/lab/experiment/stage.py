@@ -47,6 +47,7 @@ class StagedRobot:
         looked: Called when its camera has taken a picture.
         scan_every: Steps between two sweeps of its laser; 0: none.
         plan: What stands in the greenhouse.
+        is_witness: Its own software reads its laser, too.
 
     Attributes:
         costmap: Its picture of the fleet; None: it asks for no scans of peers.
@@ -60,6 +61,8 @@ class StagedRobot:
         looked: Looked = lambda _: None,
         scan_every: int = 0,
         plan: Plan | None = None,
+        *,
+        is_witness: bool = True,
     ) -> None:
         texts = count(1)
         self._faults = FaultOrder(robot=rig.robot_id)
@@ -67,6 +70,7 @@ class StagedRobot:
         self._hear = hear
         self._looked = looked
         self._scan_every = scan_every
+        self._is_witness = is_witness
         self.costmap: FleetCostmap | None = None
         self._wanted = 0.0
         self._neighbours = Neighbours(rig.robot_id)
@@ -104,7 +108,8 @@ class StagedRobot:
         self._uplink.send(moved, now)
         if self._scan_every and number % self._scan_every == 0:
             scan = self._rig.scan(world)
-            self._perform(self._machine.scan(scan, now.mono), now)
+            if self._is_witness:
+                self._perform(self._machine.scan(scan, now.mono), now)
             self._uplink.send(scan, now)
         if number % _LOOK_EVERY == 1:
             self._uplink.send(self._rig.detect(into_run, world), now)
@@ -190,7 +195,7 @@ class Stage:
         feedback: Feedback that iVeg has published; it grows.
         move_clock: Advances the clock by seconds; returns the time.
         hear: Called with each message of a robot, from its creation on.
-        looked, scan_every, plan: As for ``StagedRobot``.
+        looked, scan_every, plan, is_witness: As for ``StagedRobot``.
         peer_scans: Scans for peers that iVeg has published; it grows.
 
     Attributes:
@@ -211,6 +216,7 @@ class Stage:
         scan_every: int = 0,
         plan: Plan | None = None,
         peer_scans: Sequence[PeerScan] = (),
+        is_witness: bool = True,
     ) -> None:
         self._world = world
         self._incidents = [(one.at_s, one.order) for one in incidents]
@@ -218,7 +224,9 @@ class Stage:
         self._move_clock = move_clock
         self.now = move_clock(0.0)
         self.robots = {
-            robot_id: StagedRobot(rig, self.now, hear, looked, scan_every, plan)
+            robot_id: StagedRobot(
+                rig, self.now, hear, looked, scan_every, plan, is_witness=is_witness
+            )
             for robot_id, rig in world.rigs.items()
         }
         self._scans = peer_scans

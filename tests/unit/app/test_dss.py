@@ -26,6 +26,7 @@ async def test_mqtt_and_the_rule_loop_alone_share_the_fate_of_the_process(
         "retention",
         "messages",
         "peer-scans",
+        "second-witness",
         "earlier",
         "loop-watch",
         "recordings",

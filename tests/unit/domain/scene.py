@@ -10,14 +10,17 @@ from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import (
     Detection,
     DetectionFrame,
+    LaserScan,
     Navigation,
     Origin,
     Received,
 )
+from iveg.domain.rule.obstacles import Obstacles
 from iveg.domain.rule.speed_limits import LimitChange, SpeedLimits
 from iveg.domain.tracking.people import People, Placed
 from iveg.domain.tracking.person import TrackedPerson
 from iveg.domain.tracking.sight import AllClear
+from iveg.domain.witness import Plan
 from iveg.domain.world import World
 from tests.builders import (
     at,
@@ -56,7 +59,9 @@ class Scene:
     def __post_init__(self) -> None:
         self.world = World(fleet_of(*self.robots))
         self.people = People()
-        self.speed_limits = SpeedLimits(self.greenhouse)
+        plan = Plan.of(self.greenhouse)
+        self.obstacles = Obstacles(self.world, self.people, plan)
+        self.speed_limits = SpeedLimits(self.greenhouse, self.obstacles.seen)
         self.all_clear = AllClear()
         self._seq = 0
 
@@ -96,6 +101,14 @@ class Scene:
         return self.people.sight(
             frame, self.world, self.rule, at(self.now), f"look{self._seq}"
         )
+
+    def scan(self, robot_id: str, said: LaserScan) -> None:
+        """A robot says what its laser measures."""
+        self._seq += 1
+        self._apply(received(replace(said, robot_id=robot_id, origin=self._origin())))
+        robot = self.world.robot(robot_id)
+        if isinstance(robot.scan, LaserScan):
+            self.obstacles.look(robot, robot.scan, at(self.now))
 
     def report(
         self,

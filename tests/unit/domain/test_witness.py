@@ -8,7 +8,7 @@ import pytest
 from iveg.domain.geometry import REST, Pose2D, Rectangle, Twist2D
 from iveg.domain.greenhouse import Greenhouse, PlacedObstacle, StructuralPost
 from iveg.domain.observations import LaserScan, Origin
-from iveg.domain.witness import Outline, Plan, Witness
+from iveg.domain.witness import KnownBody, Outline, Plan, Witness
 from iveg.lab.emulator.greenhouse import Body, Disc, Scenery
 from iveg.lab.emulator.lidar import LaserModel, sweep
 
@@ -65,7 +65,7 @@ class Beside:
         scan = LaserScan(
             "R", Origin(), -math.pi, MODEL.angle_increment, 0.1, 30.0, HERE, ranges
         )
-        self.witness.look(scan, pose, twist, peers, self.now)
+        self.witness.look(scan, pose, twist, map(KnownBody.of_peer, peers), self.now)
 
 
 @pytest.mark.parametrize("place", [(2.4, 0.0), (0.0, 0.65), (-1.5, 0.5), (2.2, -0.6)])

@@ -22,7 +22,7 @@
  *   since an unconfirmed STOP, or since it was heard; `encounters` of a LIVE one alone
  *
  * @typedef {{
- *   id: string, peer: boolean, stage: "seen" | "remembered" | "last_seen",
+ *   id: string, peer: boolean, unknown?: boolean, stage: "seen" | "remembered" | "last_seen",
  *   x: number, y: number, ageS: number, ringM: number, confidence: number,
  *   observers: string[], acting: Person["acting"], decisionId: string | null,
  * }} ScenePerson

@@ -128,14 +128,14 @@ function dateOf({ started_at }) {
 function makeFacts(decision, i18n) {
   const { x, y } = decision.position ?? { x: null, y: null };
   const { id, version, parameters } = decision.rule;
-  const { looks } = parameters ?? {};
-  const slots = { ...parameters, ...looks, ...decision, id, version, x, y };
+  const { looks, obstacle: laser } = parameters ?? {};
+  const slots = { ...parameters, ...looks, ...laser, ...decision, id, version, x, y };
   const seen = decision.class_id === null ? "told" : "seen";
   const facts = [
-    [`decision.fact.${seen}`, `decision.facts.${seen}`],
+    [`decision.fact.${seen}`, `decision.facts.${laser ? "laser" : seen}`],
     ["decision.fact.obeys", `decision.facts.${sightOf(decision)}`],
     ...(looks?.count > 1 ? [["decision.fact.looks", "decision.facts.looks"]] : []),
-    ["decision.fact.rule", "decision.facts.rule"],
+    ["decision.fact.rule", `decision.facts.${laser ? "laser_rule" : "rule"}`],
   ];
   const list = make("dl", "facts");
   for (const [name, said] of facts) {

@@ -40,6 +40,7 @@ export function sceneOf({ position, places, rule, ...told }, map) {
   const person = {
     id: "",
     peer: told.class === "robot",
+    unknown: told.class === "obstacle",
     stage: /** @type {const} */ ("seen"),
     ...position,
     ageS: 0,

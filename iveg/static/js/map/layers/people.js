@@ -72,9 +72,10 @@ function drawPerson(paint, person) {
   }
   isolated(ctx, () => {
     ctx.globalAlpha = strengthOf(person);
-    const name = `${person.peer ? "peer" : "person"} ${person.stage === "last_seen"}`;
+    const kind = person.unknown ? "unknown" : person.peer ? "peer" : "person";
+    const name = `${kind} ${person.stage === "last_seen"}`;
     const sign = { name, reach: FIGURE_PX, ...place };
-    const drawn = person.peer ? drawPeer : drawFigure;
+    const drawn = FIGURES[kind];
     drawSign(paint, paint.sprites, sign, (there) => drawn(there, person));
   });
 }
@@ -146,6 +147,21 @@ function drawFigure({ ctx, theme }, person) {
   ctx.fill();
 }
 
+/** Who or what only a laser sees. @param {Paint} paint */
+function drawUnknown({ ctx, theme }) {
+  circle(ctx, 0, 0, 9);
+  ctx.fillStyle = theme.person;
+  ctx.strokeStyle = theme.bg;
+  ctx.lineWidth = 2;
+  ctx.fill();
+  ctx.stroke();
+  ctx.fillStyle = theme.bg;
+  ctx.font = "700 13px system-ui, sans-serif";
+  ctx.textAlign = "center";
+  ctx.textBaseline = "middle";
+  ctx.fillText("?", 0, 1);
+}
+
 /** A diamond: a machine that is not controlled from here. @param {Paint} paint
  * @param {ScenePerson} person */
 function drawPeer({ ctx, theme }, person) {
@@ -164,3 +180,5 @@ function drawPeer({ ctx, theme }, person) {
   ctx.stroke();
   ctx.fill();
 }
+
+const FIGURES = { person: drawFigure, peer: drawPeer, unknown: drawUnknown };

@@ -1,0 +1,137 @@
+"""What lasers see near robots and nobody explains: the second witness on the server.
+
+It reads the scans that come anyway, with the same eye as the safety node on a robot
+(``iveg.domain.witness``), for robots whose own software has none.  Here it also knows
+everybody whom cameras see, and how far ahead a robot will be: what it will be within
+two metres of is an encounter like any other (docs/safety.md, "The laser").
+
+It only adds: nothing that it finds or misses lifts a limit (``tests/properties``).
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+from iveg.domain.limits import LIMITS
+from iveg.domain.observations import Instant, LaserScan
+from iveg.domain.robot_state import RobotState
+from iveg.domain.rule.foresight import Encounter, path_of
+from iveg.domain.rule.paths import HORIZON_S, MOVES_M_S, Circles
+from iveg.domain.rule.zones import Zone
+from iveg.domain.tracking.people import People
+from iveg.domain.witness import GONE_S, KnownBody, Obstacle, Outline, Plan, Witness
+from iveg.domain.world import World
+
+CAUSE = "obstacle"
+"""Stands for the id of a cause: a laser knows no names."""
+_PERSON_M = 0.6
+"""About the centre of a person's box: half of a person, and the error of the box."""
+_YOUNG_S = 0.5
+"""An older sighting says too little of where somebody is to explain a return."""
+
+
+@dataclass(frozen=True, slots=True)
+class SeenObstacle:
+    """The obstacle that a robot is slowed for first.
+
+    Attributes:
+        zone: About it, two metres wide.
+        distance_m: From ``base_link`` to its middle (m).
+        ahead: Where the robot reaches the zone; None: it is within two metres of the
+            robot's outline.
+        at: When it was seen (monotonic, s).
+    """
+
+    zone: Zone
+    distance_m: float
+    ahead: Encounter | None
+    at: float
+
+
+SeenBy = Callable[[str, Instant], SeenObstacle | None]
+"""Robot, now → what its laser sees near it."""
+
+
+class Obstacles:
+    """What each robot's laser sees that nobody explains.
+
+    Args:
+        plan: What stands in the greenhouse.
+    """
+
+    def __init__(self, world: World, people: People, plan: Plan) -> None:
+        self._world, self._people, self._plan = world, people, plan
+        self._witnesses: dict[str, Witness] = {}
+        self._seen: dict[str, SeenObstacle | None] = {}
+
+    def look(self, robot: RobotState, scan: LaserScan, now: Instant) -> None:
+        """Take a robot's scan, made where it was when that came."""
+        pose, odometry, profile = robot.scan_pose, robot.odometry, robot.profile
+        if pose is None or odometry is None:
+            return
+        outline = Outline(profile.length, profile.width)
+        witness = self._witnesses.setdefault(
+            robot.robot_id, Witness(outline, self._plan, HORIZON_S)
+        )
+        known = (*self._peers(robot, now), *self._sighted(now))
+        witness.look(scan, pose, odometry.twist, known, now.mono)
+        self._seen[robot.robot_id] = _first(robot, witness, now)
+
+    def is_unsure(self, robot_id: str) -> bool:
+        """Whether the next scan of a robot may show that somebody is there."""
+        witness = self._witnesses.get(robot_id)
+        return witness is not None and witness.is_unsure
+
+    def seen(self, robot_id: str, now: Instant) -> SeenObstacle | None:
+        """What a robot's laser saw near it within the last half second."""
+        seen = self._seen.get(robot_id)
+        return seen if seen and 0.0 <= now.mono - seen.at <= GONE_S else None
+
+    def _peers(self, robot: RobotState, now: Instant) -> Iterator[KnownBody]:
+        """Where peers told within a second that they are."""
+        for peer in self._world.live_robots():
+            age, odometry = peer.age_s(now), peer.odometry
+            if peer is robot or odometry is None or age is None:
+                continue
+            if age <= LIMITS.silence_s:
+                yield KnownBody.of_peer(odometry.pose)
+
+    def _sighted(self, now: Instant) -> Iterator[KnownBody]:
+        """Where cameras see people, who have rings of their own."""
+        for person in self._people.known.values():
+            if person.age_s(now) > _YOUNG_S or person.newest.recording is not None:
+                continue
+            for one in person.sightings:
+                age = one.age_s(now)
+                if age <= _YOUNG_S and not one.reach_m:
+                    yield KnownBody(one.x, one.y, _PERSON_M + LIMITS.walking_m_s * age)
+
+
+def _first(robot: RobotState, witness: Witness, now: Instant) -> SeenObstacle | None:
+    """The nearest within two metres of the outline, else the first one to be met."""
+    found = [_seen(robot, one, now) for one in witness.present(now.mono)]
+    known = [one for one in found if one is not None]
+    return min(known, key=_soonness, default=None)
+
+
+def _soonness(seen: SeenObstacle) -> tuple[float, float]:
+    return (0.0 if seen.ahead is None else seen.ahead.in_s), seen.distance_m
+
+
+def _seen(robot: RobotState, one: Obstacle, now: Instant) -> SeenObstacle | None:
+    """An obstacle as a zone; None for one that the robot will not come near."""
+    odometry, ring = robot.odometry, LIMITS.ring_default_m
+    assert odometry is not None  # noqa: S101 - its scan was placed by it
+    zone = Zone("obstacle", CAUSE, robot.robot_id, one.x, one.y, ring, obstacle=one)
+    distance = odometry.pose.distance_to(one.x, one.y)
+    if one.gap_m <= ring:
+        return SeenObstacle(zone, distance, None, now.mono)
+    if abs(odometry.twist.linear_x) < MOVES_M_S:
+        return None
+    _, meetings = Circles([(one.x, one.y, 0.0, 0.0, 0.0, ring)]).met_by(
+        path_of(robot, now)
+    )
+    for met in meetings:
+        places = met.x, met.y, met.centre_x, met.centre_y
+        ahead = Encounter(zone, met.in_s, now.mono, *places)
+        return SeenObstacle(zone, distance, ahead, now.mono)
+    return None

@@ -1,0 +1,134 @@
+"""The server's own witness: what lasers see that nobody explains."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from iveg.domain.detection_rule import DetectionRule
+from iveg.domain.feedback import SpeedLimit
+from iveg.domain.geometry import Pose2D, Rectangle
+from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.observations import LaserScan
+from iveg.domain.rule.obstacles import CAUSE
+from iveg.lab.emulator.greenhouse import Body, Disc, Scenery
+from iveg.lab.emulator.lidar import LaserModel, sweep
+from tests.builders import scan
+from tests.unit.domain.scene import FIELD, Scene, person
+
+AISLE = Greenhouse(
+    "aisle",
+    Rectangle(-40.0, -40.0, 40.0, 40.0),
+    rows=(Rectangle(-30.0, 1.0, 30.0, 1.4), Rectangle(-30.0, -1.4, 30.0, -1.0)),
+)
+_MODEL = LaserModel()
+
+
+class Aisle(Scene):
+    """AGI drives along an aisle with its laser; AGII stands far away."""
+
+    def step(
+        self,
+        *people: tuple[float, float],
+        x: float = 0.0,
+        linear: float = 0.5,
+        peer: tuple[float, float] = (-25.0, 0.0),
+        seen: tuple[tuple[float, float], ...] = (),
+    ) -> SpeedLimit:
+        """A tenth of a second later, with everybody at their places."""
+        self.now = round(self.now + 0.1, 6)
+        self.drive("AGI", x, linear=linear)
+        self.drive("AGII", *peer, linear=0.0)
+        self.look("AGI", *(person(*one) for one in seen))
+        self.look("AGII")
+        self.scan("AGI", self.swept(x, people, peer))
+        return self.judge()["AGI"]
+
+    def swept(
+        self,
+        x: float,
+        people: tuple[tuple[float, float], ...],
+        peer: tuple[float, float],
+    ) -> LaserScan:
+        ranges = sweep(
+            Pose2D(x, 0.0, 0.0),
+            _MODEL,
+            Scenery.of(AISLE),
+            [Disc(*one, 0.25) for one in people],
+            [Body("AGII", Pose2D(*peer, 0.0), 1.0, 0.6)],
+            np.random.default_rng(1),
+        )
+        said = scan("AGI", ranges, angle_min=-math.pi)
+        return replace(said, angle_increment=_MODEL.angle_increment)
+
+
+@pytest.fixture
+def aisle() -> Aisle:
+    return Aisle(greenhouse=AISLE)
+
+
+def test_whom_only_a_laser_sees_slows_the_robot_after_a_fifth_of_a_second(
+    aisle: Aisle,
+) -> None:
+    limits = [aisle.step((-1.8, 0.3)) for _ in range(4)]
+    assert [one.speed_factor for one in limits] == [1.0, 1.0, 0.5, 0.5]
+    assert (limits[-1].reason, limits[-1].cause) == ("obstacle", None)
+    assert limits[-1].distance_m == pytest.approx(1.6, abs=0.1), "to its near side"
+    (began,) = aisle.changes
+    assert began.crossing.decision_id == limits[-1].decision_id
+    assert began.crossing.in_sight
+
+
+def test_it_is_let_go_a_second_after_the_laser_lost_it(aisle: Aisle) -> None:
+    for _ in range(4):
+        aisle.step((-1.8, 0.3))
+    limits = [aisle.step().speed_factor for _ in range(16)]
+    assert limits == [0.5] * 15 + [1.0]
+    assert [one.began for one in aisle.changes] == [True, False]
+
+
+def test_whom_a_camera_sees_has_a_ring_and_is_no_obstacle(aisle: Aisle) -> None:
+    there = (-2.3, 0.2)
+    limits = [aisle.step(there, seen=(there,)) for _ in range(5)]
+    assert {one.reason for one in limits} == {"clear"}, "2.3 m behind base_link"
+    for _ in range(3):
+        limit = aisle.step(there, (1.9, 0.0), seen=(there,))
+    assert limit.reason == "obstacle", "somebody else"
+
+
+def test_a_peer_is_none(aisle: Aisle) -> None:
+    assert {aisle.step(peer=(1.9, 0.0)).reason for _ in range(6)} == {"clear"}
+
+
+def test_what_a_robot_will_reach_is_an_encounter_like_any_other(aisle: Aisle) -> None:
+    blind = Aisle(greenhouse=AISLE, rule=DetectionRule(foresight=False))
+    slow_at = [
+        next(
+            one
+            for one in (0.08 * n for n in range(60))
+            if scene.step((6.0, 0.0), x=one, linear=0.8).speed_factor < 1.0
+        )
+        for scene in (aisle, blind)
+    ]
+    ring_m = 6.0 - 0.25 - 2.0
+    assert ring_m - slow_at[0] == pytest.approx(0.8 * 1.2, abs=0.2)
+    assert slow_at[1] >= ring_m - 0.5 - 0.1, "from the outline of AGI on"
+    foretold = aisle.speed_limits.foretold["AGI"][CAUSE]
+    assert foretold.zone.reason == "obstacle"
+    assert aisle.changes[0].crossing.foretold_s == pytest.approx(1.2, abs=0.1)
+
+
+def test_where_no_plan_draws_what_stands_there_only_its_own_path_counts() -> None:
+    bare = Aisle(greenhouse=FIELD)
+    assert {bare.step().reason for _ in range(10)} == {"clear"}, "rows beside it"
+    for _ in range(3):
+        limit = bare.step((1.8, 0.0))
+    assert limit.reason == "obstacle"
+
+
+def test_a_person_is_a_graver_reason_than_an_obstacle(aisle: Aisle) -> None:
+    for _ in range(4):
+        limit = aisle.step((1.5, 0.0), (-1.6, 0.0), seen=((1.5, 0.0),))
+    assert limit.reason == "person"
+    assert len(aisle.changes) == 2
