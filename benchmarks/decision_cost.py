@@ -127,7 +127,7 @@ def assessor_of(
         EventLog(Hub(), Sink(), start, Supervision(lambda: start)),
         lambda: f"{next(numbers):026d}",
         "bench",
-        obstacle=obstacles.seen,
+        obstacles=obstacles,
     )
     return evaluator, SecondWitness(world, ScanReader(), obstacles)
 

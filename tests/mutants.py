@@ -99,9 +99,21 @@ MUTANTS = (
     ),
     Mutant(
         "rule: what the laser sees near a robot slows nobody",
-        "fits = self.size_m <= _LARGEST_M or self.has_moved",
-        "fits = False",
+        "return self.size_m <= _LARGEST_M or self.has_moved",
+        "return False",
         ("unit/domain/test_witness.py", "unit/robot/test_safety.py"),
+    ),
+    Mutant(
+        "rule: what the server reads of lasers slows nobody",
+        "return {CAUSE: (0.0, seen.distance_m, seen.zone)}",
+        "return {}",
+        ("unit/domain/rule/test_obstacles.py",),
+    ),
+    Mutant(
+        "rule: what a laser sees moves the circle of what a camera saw",
+        "if earlier.laser != one.sighting.laser:",
+        "if False:",
+        ("unit/domain/rule/test_obstacles.py",),
     ),
     Mutant(
         "rule: an encounter that is foretold slows nobody",

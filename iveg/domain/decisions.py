@@ -173,7 +173,7 @@ class SlowdownDecision:
         )
         passed = (
             Link("filter", "n/a")
-            if sighting is None
+            if sighting is None or sighting.laser
             else Link("filter", "ok", sighting.at.wall, sighting.confidence)
         )
         return (

@@ -12,7 +12,7 @@ A witness only adds: it lifts no limit, and finds no spot empty.
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +40,11 @@ _LARGEST_M = 1.0
 """Two people side by side; what is larger is counted once it moves."""
 _LEAST_RETURNS = 2
 _MOVED_M = 0.4
+_SMOOTHED_S = 0.4
+_WALKED_M, _WALKED_S, _PASSED_M = 0.5, 0.5, 0.3
+"""Who walks goes so far, for so long, and so far as seen from the robot: not so what it
+tows, nor the part of a wall that it sees as it passes."""
+_WALKS_M_S = (0.3, 2.5)
 _BESIDE_M = 0.2
 """Of the robot's own path, where there is no plan."""
 _EVERY_S = 0.09
@@ -154,7 +159,10 @@ class Obstacle:
         first_x: Where it was when it was seen first; ``first_y`` likewise.
         size_m: From its first return to its last.
         gap_m: From the robot's outline to its nearest return.
+        first_seen: Where that was in the robot's ``base_link`` (m).
         since: When it was seen first; ``at`` newest (monotonic, s).
+        vx: How it goes in ``map`` (m/s), smoothed over 0.4 s; ``vy`` likewise.
+        passed_m: How far from where the robot saw it first, as seen from the robot (m).
     """
 
     x: float
@@ -165,12 +173,56 @@ class Obstacle:
     gap_m: float
     since: float
     at: float
+    first_seen: tuple[float, float]
+    vx: float = 0.0
+    vy: float = 0.0
+    passed_m: float = 0.0
+
+    @property
+    def way_m(self) -> float:
+        """How far it is from where it was first (m)."""
+        return math.hypot(self.x - self.first_x, self.y - self.first_y)
 
     @property
     def has_moved(self) -> bool:
         """Whether it went farther than noise does."""
-        way = math.hypot(self.x - self.first_x, self.y - self.first_y)
-        return way > _MOVED_M
+        return self.way_m > _MOVED_M
+
+    @property
+    def walks(self) -> bool:
+        """Whether it moves like somebody who walks."""
+        least, most = _WALKS_M_S
+        return (
+            self.size_m <= _LARGEST_M
+            and self.at - self.since >= _WALKED_S - 1e-6
+            and self.way_m >= _WALKED_M
+            and self.passed_m >= _PASSED_M
+            and least <= math.hypot(self.vx, self.vy) <= most
+        )
+
+    def seen_at(
+        self,
+        x: float,
+        y: float,
+        beside: tuple[float, float],
+        size: float,
+        gap: float,
+        now: float,
+    ) -> "Obstacle":
+        """The same, seen again; ``beside``: where in ``base_link``."""
+        gain = (now - self.at) / (_SMOOTHED_S + now - self.at)
+        after_s = max(now - self.at, 1e-3)
+        return replace(
+            self,
+            x=x,
+            y=y,
+            size_m=size,
+            gap_m=gap,
+            at=now,
+            vx=self.vx + gain * ((x - self.x) / after_s - self.vx),
+            vy=self.vy + gain * ((y - self.y) / after_s - self.vy),
+            passed_m=math.dist(beside, self.first_seen),
+        )
 
     @property
     def fits(self) -> bool:
@@ -199,6 +251,8 @@ class Witness:
         self._plan = plan
         self._ahead_s = ahead_s
         self._known: tuple[Obstacle, ...] = ()
+        self.walkers: tuple[Obstacle, ...] = ()
+        """Of the last scan, those that move like somebody who walks."""
         self._looked_at = -math.inf
 
     def look(
@@ -219,6 +273,7 @@ class Witness:
         earlier = [one for one in self._known if now - one.at <= GONE_S]
         seen = [self._joined(body, earlier, pose, now) for body in bodies]
         self._known = (*seen, *earlier)
+        self.walkers = tuple(one for one in seen if one.walks)
 
     @property
     def is_unsure(self) -> bool:
@@ -267,7 +322,9 @@ class Witness:
         """
         x, y = (float(one) for one in body.mean(0))
         size = float(np.hypot(*np.ptp(body, axis=0)))
-        gap = float(self._outline.gap_to(*_seen_from(pose, body)).min())
+        ahead, aside = _seen_from(pose, body)
+        gap = float(self._outline.gap_to(ahead, aside).min())
+        beside = float(ahead.mean()), float(aside.mean())
         near = min(
             earlier, key=lambda one: math.hypot(one.x - x, one.y - y), default=None
         )
@@ -275,9 +332,8 @@ class Witness:
             reach = _APART_M + LIMITS.walking_m_s * (now - near.at)
             if math.hypot(near.x - x, near.y - y) <= reach:
                 earlier.remove(near)
-                first = near.first_x, near.first_y
-                return Obstacle(x, y, *first, size, gap, near.since, now)
-        return Obstacle(x, y, x, y, size, gap, now, now)
+                return near.seen_at(x, y, beside, size, gap, now)
+        return Obstacle(x, y, x, y, size, gap, now, now, beside)
 
 
 def _moved(x: _Floats, y: _Floats, frame: Pose2D) -> tuple[_Floats, _Floats]:
@@ -299,4 +355,7 @@ def _bodies(points: _Floats) -> Sequence[_Floats]:
         return ()
     steps = np.hypot(*np.diff(points, axis=0).T)
     parts = np.split(points, np.flatnonzero(steps > _APART_M) + 1)
+    # A sweep may begin in the middle of a body.
+    if len(parts) > 1 and math.dist(points[-1], points[0]) <= _APART_M:
+        parts = [np.concatenate((parts[-1], parts[0])), *parts[1:-1]]
     return [one for one in parts if len(one) >= _LEAST_RETURNS]

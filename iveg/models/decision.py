@@ -137,12 +137,14 @@ def _position(record: DecisionRecord) -> Position | None:
 
 def sentence_of(record: DecisionRecord) -> Sentence:
     """The same sentence that the log used when it happened."""
+    is_walker = record.reason == "person" and record.confidence is None
+    reason = "walker" if is_walker else record.reason or "default"
     if record.kind == "alert":
         key = "log.person_seen"
     elif record.in_sight is False:
-        key = f"log.speed_down.{record.reason}_nlos"
+        key = f"log.speed_down.{reason}_nlos"
     else:
-        key = f"log.speed_down.{record.reason or 'default'}"
+        key = f"log.speed_down.{reason}"
     return Sentence(
         key=key,
         slots={

@@ -189,7 +189,7 @@ def build(
         choices.boot,
         probe.lag,
         scans.newest,
-        obstacles.seen,
+        obstacles,
     )
     commander = _commander(fleet.ids, ports, choices, event_log, health_monitor)
     goals = _goals(world, greenhouse, commander, ports, event_log)

@@ -4,13 +4,17 @@ A sighting is logged at its start, so that a person who stands before a camera f
 hour does not fill the log.
 """
 
+from collections.abc import Iterable
+
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.detector import flaw_of
 from iveg.domain.events import LogEvent, Slot
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import DetectionFrame, Instant, Received
+from iveg.domain.rule.obstacles import Walkers
 from iveg.domain.stream_order import OrderVerdict
 from iveg.domain.tracking.people import People, Placed
+from iveg.domain.tracking.person import TrackedPerson
 from iveg.domain.world import World
 from iveg.pipeline import topics
 from iveg.pipeline.event_log import EventLog
@@ -143,6 +147,15 @@ class DetectionTracking:
         if last is None or at.mono - last >= 2 * _LOGGED_S:
             self._event_log.log(_line(one, robot_id, subject), at)
 
+    def witness(self, seen: Iterable[Walkers]) -> None:
+        """Track who walks near robots by their lasers alone."""
+        for robot_id, at, spots in seen:
+            robot = self._world.robot(robot_id)
+            for one in self._people.witness(robot, spots, at, self._new_id()):
+                if one.first_seen == at:
+                    self._event_log.log(_walker_line(one, robot_id), at)
+            self._event_log.changed(topics.PEOPLE.name)
+
     def forget(self, now: Instant) -> None:
         """Forget log lines and rows about persons who are gone."""
         self.kept.forget(now)
@@ -152,6 +165,16 @@ class DetectionTracking:
                 for key, at in self._logged_at.items()
                 if now.mono - at < LIMITS.ring_lasts_s
             }
+
+
+def _walker_line(one: TrackedPerson, robot_id: str) -> LogEvent:
+    slots: dict[str, Slot] = {
+        "robot": robot_id,
+        "person": one.person_id,
+        "x": round(one.newest.x, 2),
+        "y": round(one.newest.y, 2),
+    }
+    return LogEvent("detection", "log.walker", slots, robot_id, one.class_)
 
 
 def _line(one: Placed, robot_id: str, subject: str) -> LogEvent:

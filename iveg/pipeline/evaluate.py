@@ -29,7 +29,7 @@ from iveg.domain.observations import (
 from iveg.domain.plausibility import ignores_limit
 from iveg.domain.records import AlertRecord, DecisionRecord
 from iveg.domain.rule.foresight import Encounter
-from iveg.domain.rule.obstacles import SeenBy
+from iveg.domain.rule.obstacles import Obstacles
 from iveg.domain.rule.premises import Missing
 from iveg.domain.rule.speed_limits import Crossing, LimitChange, SpeedLimits
 from iveg.domain.tracking.laser_sight import LaserSight, ScanOf
@@ -62,7 +62,7 @@ class Evaluator:
     Args:
         boot: Random, new at each start: identity of our feedback.
         newest_scan: Reads a robot's newest scan.
-        obstacle: What a robot's laser sees near it that nobody explains.
+        obstacles: What lasers see that nobody explains; None: nobody looks.
 
     Attributes:
         rule: The version in force; a new one counts from the next judgement on.
@@ -80,7 +80,7 @@ class Evaluator:
         boot: str,
         backlog: Callable[[Instant], float | None] = lambda _: None,
         newest_scan: ScanOf = lambda _: None,
-        obstacle: SeenBy = lambda *_: None,
+        obstacles: Obstacles | None = None,
     ) -> None:
         self.world = world
         self.greenhouse = greenhouse
@@ -93,7 +93,8 @@ class Evaluator:
         )
         self.protected_unseen = 0
         """How often a robot slowed for a person or peer out of its own sight."""
-        self._speed_limits = SpeedLimits(greenhouse, obstacle)
+        self._obstacles = obstacles or Obstacles(world, people, Plan.of(greenhouse))
+        self._speed_limits = SpeedLimits(greenhouse, self._obstacles.seen)
         self.tracking = DetectionTracking(world, self.people, event_log, new_id)
         swept = LaserSight(Plan.of(greenhouse), newest_scan).swept
         self._staleness = Staleness(world, self.people, greenhouse, event_log, swept)
@@ -280,6 +281,7 @@ class Evaluator:
         self._staleness.tick(now)
         self._log_returned_detectors(now)
         self.tracking.forget(now)
+        self.tracking.witness(self._obstacles.walkers())
         self.settle()
         self._judge(now)
         if now.mono - self._feedback_publisher.published_at >= HEARTBEAT_S - 1e-3:

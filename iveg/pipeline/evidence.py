@@ -28,7 +28,7 @@ def record_of(decision: SlowdownDecision) -> DecisionRecord:
         observer=zone.observer,
         class_=zone.reason,
         class_id=None if sighting is None else sighting.class_id,
-        confidence=None if sighting is None else sighting.confidence,
+        confidence=None if sighting is None or sighting.laser else sighting.confidence,
         x=zone.x,
         y=zone.y,
         z=None if sighting is None else sighting.z,
@@ -90,7 +90,7 @@ def _parameters(rule: DetectionRule, zone: Zone) -> dict[str, object]:
         "radius_m": rule.radius_m,
         "ring_m": round(zone.radius_m, 3),
         "author": rule.author,
-        "possible": sighting is not None and sighting.possible,
+        "possible": sighting is not None and (sighting.possible or sighting.laser),
         "looks": None if looks is None else _looks(looks),
     }
 

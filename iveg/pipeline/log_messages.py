@@ -81,7 +81,8 @@ def _without_decision(
     for person in people.known.values():
         if report.decision_id == person.decision_id:
             look = person.newest
-            facts = look.x, look.y, look.observer, look.confidence
+            sure = None if look.laser else look.confidence
+            facts = look.x, look.y, look.observer, sure
             name, class_ = person.person_id, person.class_
             return _seen_by(robot, greenhouse, name, class_, *facts)
     peer = world.robots.get(report.cause or "")
@@ -93,7 +94,9 @@ def _without_decision(
 
 def _of_crossing(crossing: Crossing) -> SlowdownCauses:
     zone, sighting = crossing.zone, crossing.zone.sighting
-    confidence = None if sighting is None else sighting.confidence
+    confidence = None
+    if sighting is not None and not sighting.laser:
+        confidence = sighting.confidence
     unseen = None if sighting is None else sighting.age_s(crossing.entered)
     grown = unseen is not None and unseen > LIMITS.growth_grace_s
     return SlowdownCauses(
@@ -159,6 +162,8 @@ def speed_line(
             key = f"log.speed_down.{lacks.premise}"
             slots["observer"] = lacks.robot_id
         if evidence is not None:
+            if evidence.class_ == "person" and evidence.confidence is None:
+                key = "log.speed_down.walker"
             key += "" if evidence.in_sight else "_nlos"
             slots |= {
                 "distance": round(evidence.distance_m, 2),

@@ -197,7 +197,7 @@ class Views:
             last_seen=format_stamp(newest.at.wall),
             age_s=round(person.age_s(now), 3),
             observers=person.observers(now),
-            possible=newest.possible,
+            possible=newest.possible or newest.laser,
             evidence=Evidence.of(newest.looks),
             doubtful=newest.reach_m > 0.0,
             decision_id=max((one.decision_id for one in crossings), default=None),

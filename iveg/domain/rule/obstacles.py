@@ -8,7 +8,7 @@ two metres of is an encounter like any other (docs/safety.md, "The laser").
 It only adds: nothing that it finds or misses lifts a limit (``tests/properties``).
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from iveg.domain.limits import LIMITS
@@ -51,6 +51,10 @@ SeenBy = Callable[[str, Instant], SeenObstacle | None]
 """Robot, now → what its laser sees near it."""
 
 
+Walkers = tuple[str, Instant, Sequence[tuple[float, float]]]
+"""A robot, when its laser saw them, and where each is in ``map`` (m)."""
+
+
 class Obstacles:
     """What each robot's laser sees that nobody explains.
 
@@ -62,6 +66,7 @@ class Obstacles:
         self._world, self._people, self._plan = world, people, plan
         self._witnesses: dict[str, Witness] = {}
         self._seen: dict[str, SeenObstacle | None] = {}
+        self._walkers: dict[str, tuple[Instant, Sequence[Obstacle]]] = {}
 
     def look(self, robot: RobotState, scan: LaserScan, now: Instant) -> None:
         """Take a robot's scan, made where it was when that came."""
@@ -75,6 +80,7 @@ class Obstacles:
         known = (*self._peers(robot, now), *self._sighted(now))
         witness.look(scan, pose, odometry.twist, known, now.mono)
         self._seen[robot.robot_id] = _first(robot, witness, now)
+        self._walkers[robot.robot_id] = now, witness.walkers
 
     def is_unsure(self, robot_id: str) -> bool:
         """Whether the next scan of a robot may show that somebody is there."""
@@ -85,6 +91,13 @@ class Obstacles:
         """What a robot's laser saw near it within the last half second."""
         seen = self._seen.get(robot_id)
         return seen if seen and 0.0 <= now.mono - seen.at <= GONE_S else None
+
+    def walkers(self) -> Iterator[Walkers]:
+        """Who walks by the newest scan of each robot, since the last time of asking."""
+        waiting, self._walkers = self._walkers, {}
+        for robot_id, (at, seen) in waiting.items():
+            if seen:
+                yield robot_id, at, [(one.x, one.y) for one in seen]
 
     def _peers(self, robot: RobotState, now: Instant) -> Iterator[KnownBody]:
         """Where peers told within a second that they are."""
@@ -102,7 +115,7 @@ class Obstacles:
                 continue
             for one in person.sightings:
                 age = one.age_s(now)
-                if age <= _YOUNG_S and not one.reach_m:
+                if age <= _YOUNG_S and not one.reach_m and not one.laser:
                     yield KnownBody(one.x, one.y, _PERSON_M + LIMITS.walking_m_s * age)
 
 

@@ -28,6 +28,11 @@ from iveg.domain.tracking.picture import PlacedDetection
 from iveg.domain.tracking.tracker import Tracker
 from iveg.domain.world import World
 
+LASER = "laser"
+"""Stands where a detector's class stands."""
+EVEN = 0.5
+"""Confidence of what a laser sees walk: it may be a person as well as not."""
+_HEIGHT_M = 0.9
 _SUSPECT_M = 1.0
 _PEER_GATE_M = 1.0
 _BEYOND_WALL_M = 2.0
@@ -213,6 +218,29 @@ class People:
                     doubtful=one.doubtful,
                 )
         return out
+
+    def witness(
+        self,
+        observer: RobotState,
+        spots: Sequence[tuple[float, float]],
+        at: Instant,
+        new_id: str,
+    ) -> list[TrackedPerson]:
+        """Take in who walks near a robot by its laser alone; x, y in ``map`` (m)."""
+        seen = [
+            Sighting(
+                observer.robot_id, x, y, _HEIGHT_M, at, LASER, EVEN, None, laser=True
+            )
+            for x, y in spots
+        ]
+        tracks = self._tracker.track_picture(
+            [
+                PlacedDetection("person", one, f"{new_id}-{number}")
+                for number, one in enumerate(seen)
+            ],
+            at,
+        )
+        return [self.known[track] for track in tracks if track is not None]
 
     def drop_sighting(self, person_id: str, sighting: Sighting) -> TrackedPerson:
         """Drop a sighting whose place was seen to be empty."""

@@ -19,6 +19,9 @@ from iveg.domain.tracking.looks import Looks
 _SMOOTHED_S = 0.4
 _MISTAKEN_S = 2.5
 """What is seen for longer is no mistake of a detector, of which most last 2 s."""
+LASER_LASTS_S = 3.0
+"""So long somebody whom only a laser saw is remembered: who or what it was is a guess,
+and beside a robot that passes, a ring that grows for longer slows it for nothing."""
 Stage = Literal["seen", "remembered", "last_seen", "gone"]
 
 
@@ -37,6 +40,7 @@ class Sighting:
         recording: The map frame of the recording that saw it; None: a robot of today.
         vx: How its chain goes in ``map`` (m/s); ``vy`` likewise.
         possible: Whether it counts by its looks alone, below the threshold.
+        laser: Only the observer's laser saw it: it moves like somebody who walks.
     """
 
     observer: str
@@ -53,6 +57,12 @@ class Sighting:
     vx: float = 0.0
     vy: float = 0.0
     possible: bool = False
+    laser: bool = False
+
+    @property
+    def lasts_s(self) -> float:
+        """Age up to which it has a ring (s)."""
+        return LASER_LASTS_S if self.laser else LIMITS.ring_lasts_s
 
     def age_s(self, now: Instant) -> float:
         """Seconds since the sighting."""
@@ -77,6 +87,7 @@ class Sighting:
             vx,
             vy,
             self.possible,
+            self.laser,
         )
 
     def _going_on(self, before: "Sighting") -> tuple[float, float]:
@@ -146,7 +157,9 @@ class TrackedPerson:
         age = self.age_s(now)
         if age <= LIMITS.seen_s:
             return "seen"
-        if age <= LIMITS.ring_lasts_s:
+        if age <= self.newest.lasts_s or any(
+            one.age_s(now) <= one.lasts_s for one in self.sightings
+        ):
             return "remembered"
         lasts_s = LIMITS.last_seen_s if self.is_well_known else LIMITS.glimpsed_s
         return "last_seen" if age <= lasts_s else "gone"
@@ -167,5 +180,5 @@ class TrackedPerson:
         """Every circle that protects this person, with its radius now (m)."""
         for sighting in self.sightings:
             age = sighting.age_s(now)
-            if age <= LIMITS.ring_lasts_s:
+            if age <= sighting.lasts_s:
                 yield sighting, max(sighting.reach_m, rule.radius_at(age))

@@ -61,7 +61,8 @@ def chain_cost(
     """
     if not is_alike(person, one) or bool(earlier.reach_m) != bool(one.sighting.reach_m):
         return math.inf
-    if earlier.possible != one.sighting.possible:
+    # A laser may see another one: what a camera saw stays.
+    if (earlier.possible, earlier.laser) != (one.sighting.possible, one.sighting.laser):
         return math.inf
     if earlier.reach_m:
         return 0.0

@@ -30,7 +30,8 @@ from iveg.domain.tracking.picture import (
     lost_cost,
 )
 
-MAX_PEOPLE, MAX_POSSIBLE = 256, 64
+MAX_PEOPLE, MAX_POSSIBLE, MAX_WALKERS = 256, 64, 32
+"""Who counts by looks, and whom only lasers saw, take no place of others."""
 MERGE_M = 0.5
 
 
@@ -240,12 +241,15 @@ class Tracker:
         """Whether one more can be kept, if need be in place of one without a ring.
 
         Persons with a ring, and persons who were seen twice, stay.  Who counts by looks
-        alone takes no place from one who counts by a box.
+        or a laser alone takes no place from one who counts by a box.
         """
+        walkers = sum(person.newest.laser for person in self.known.values())
+        if newest.laser:
+            return walkers < MAX_WALKERS
         possible = sum(person.is_possible for person in self.known.values())
         if newest.possible:
             return possible < MAX_POSSIBLE
-        if len(self.known) - possible < MAX_PEOPLE:
+        if len(self.known) - possible - walkers < MAX_PEOPLE:
             return True
         for person in self.known.values():
             once = person.first_seen == person.newest.at

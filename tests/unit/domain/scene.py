@@ -109,6 +109,9 @@ class Scene:
         robot = self.world.robot(robot_id)
         if isinstance(robot.scan, LaserScan):
             self.obstacles.look(robot, robot.scan, at(self.now))
+        for name, when, spots in self.obstacles.walkers():
+            seer = self.world.robot(name)
+            self.people.witness(seer, spots, when, f"laser{self._seq}")
 
     def report(
         self,

@@ -131,8 +131,9 @@ function makeFacts(decision, i18n) {
   const { looks, obstacle: laser } = parameters ?? {};
   const slots = { ...parameters, ...looks, ...laser, ...decision, id, version, x, y };
   const seen = decision.class_id === null ? "told" : "seen";
+  const walker = decision.class_id === "laser" ? "walker" : seen;
   const facts = [
-    [`decision.fact.${seen}`, `decision.facts.${laser ? "laser" : seen}`],
+    [`decision.fact.${seen}`, `decision.facts.${laser ? "laser" : walker}`],
     ["decision.fact.obeys", `decision.facts.${sightOf(decision)}`],
     ...(looks?.count > 1 ? [["decision.fact.looks", "decision.facts.looks"]] : []),
     ["decision.fact.rule", `decision.facts.${laser ? "laser_rule" : "rule"}`],

@@ -78,11 +78,12 @@ export function linesOf(person, i18n) {
     evidence && evidence.looks > 1
       ? [i18n.t("people.evidence", { ...evidence, over: evidence.over_s })]
       : [];
+  const isWalker = stage === "seen" && person.class_id === "laser";
   const who = i18n.t(person.lane ? "people.who" : "people.who_free", slots);
   return [
     `${who[0].toUpperCase()}${who.slice(1)}`,
     i18n.t("people.where", slots),
-    i18n.t(`people.${stage}`, slots),
+    i18n.t(`people.${isWalker ? "walks" : stage}`, slots),
     ...looks,
     ...acts,
   ];

@@ -12,9 +12,10 @@ from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import LaserScan
 from iveg.domain.rule.obstacles import CAUSE
+from iveg.domain.tracking.tracker import MAX_PEOPLE, MAX_WALKERS
 from iveg.lab.emulator.greenhouse import Body, Disc, Scenery
 from iveg.lab.emulator.lidar import LaserModel, sweep
-from tests.builders import scan
+from tests.builders import at, scan
 from tests.unit.domain.scene import FIELD, Scene, person
 
 AISLE = Greenhouse(
@@ -23,6 +24,7 @@ AISLE = Greenhouse(
     rows=(Rectangle(-30.0, 1.0, 30.0, 1.4), Rectangle(-30.0, -1.4, 30.0, -1.0)),
 )
 _MODEL = LaserModel()
+_BEARINGS = -math.pi + _MODEL.angle_increment * np.arange(_MODEL.beams)
 
 
 class Aisle(Scene):
@@ -35,6 +37,7 @@ class Aisle(Scene):
         linear: float = 0.5,
         peer: tuple[float, float] = (-25.0, 0.0),
         seen: tuple[tuple[float, float], ...] = (),
+        undrawn: tuple[Rectangle, ...] = (),
     ) -> SpeedLimit:
         """A tenth of a second later, with everybody at their places."""
         self.now = round(self.now + 0.1, 6)
@@ -42,7 +45,7 @@ class Aisle(Scene):
         self.drive("AGII", *peer, linear=0.0)
         self.look("AGI", *(person(*one) for one in seen))
         self.look("AGII")
-        self.scan("AGI", self.swept(x, people, peer))
+        self.scan("AGI", self.swept(x, people, peer, undrawn))
         return self.judge()["AGI"]
 
     def swept(
@@ -50,11 +53,13 @@ class Aisle(Scene):
         x: float,
         people: tuple[tuple[float, float], ...],
         peer: tuple[float, float],
+        undrawn: tuple[Rectangle, ...],
     ) -> LaserScan:
+        room = replace(AISLE, rows=(*AISLE.rows, *undrawn))
         ranges = sweep(
             Pose2D(x, 0.0, 0.0),
             _MODEL,
-            Scenery.of(AISLE),
+            Scenery.of(room),
             [Disc(*one, 0.25) for one in people],
             [Body("AGII", Pose2D(*peer, 0.0), 1.0, 0.6)],
             np.random.default_rng(1),
@@ -132,3 +137,104 @@ def test_a_person_is_a_graver_reason_than_an_obstacle(aisle: Aisle) -> None:
         limit = aisle.step((1.5, 0.0), (-1.6, 0.0), seen=((1.5, 0.0),))
     assert limit.reason == "person"
     assert len(aisle.changes) == 2
+
+
+# --- who walks ------------------------------------------------------------------------
+
+
+def walk(aisle: Aisle, steps: int, *, seen: bool = False) -> tuple[float, float]:
+    """Somebody walks towards AGI from behind at 1 m/s; returns where they end."""
+    place = (-2.3, 0.2)
+    for _ in range(steps):
+        place = (place[0] + 0.1, 0.2)
+        aisle.step(place, linear=0.0, seen=(place,) if seen else ())
+    return place
+
+
+def test_who_walks_near_a_robot_is_possibly_a_person_whose_ring_others_get(
+    aisle: Aisle,
+) -> None:
+    x, _ = walk(aisle, 8)
+    (one,) = aisle.everyone
+    assert (one.class_, one.newest.class_id, one.newest.laser) == (
+        "person",
+        "laser",
+        True,
+    )
+    assert one.newest.x == pytest.approx(x, abs=0.3)
+    assert one.newest.vx > 0.1
+    aisle.drive("AGII", x - 1.5, linear=0.5)
+    limit = aisle.judge()["AGII"]
+    assert (limit.speed_factor, limit.reason, limit.cause) == (
+        0.5,
+        "person",
+        one.person_id,
+    )
+
+
+def test_whom_a_camera_then_confirms_keeps_the_name_and_has_no_second_one(
+    aisle: Aisle,
+) -> None:
+    walk(aisle, 8)
+    (before,) = aisle.everyone
+    place = (-1.4, 0.2)
+    for _ in range(5):
+        aisle.step(place, linear=0.0, seen=(place,))
+    (after,) = aisle.everyone
+    assert after.person_id == before.person_id
+    assert after.newest.class_id == "farmer"
+    assert len(after.sightings) == 2, "what a camera sees is a chain of its own"
+    aisle.now += 3.0
+    (ring,) = after.rings(aisle.rule, at(aisle.now))
+    assert not ring[0].laser, "what only a laser saw is forgotten sooner"
+
+
+def test_whom_a_camera_saw_first_is_no_second_person_to_the_laser(aisle: Aisle) -> None:
+    walk(aisle, 12, seen=True)
+    (one,) = aisle.everyone
+    assert {look.laser for look in one.sightings} == {False}
+
+
+def test_what_goes_with_the_robot_or_stands_is_no_person(aisle: Aisle) -> None:
+    for step in range(40):
+        x = 0.06 * step
+        aisle.step((x - 1.4, 0.0), (4.0, 0.3), x=x, linear=0.6)
+    assert aisle.everyone == []
+    assert aisle.judge()["AGI"].reason == "obstacle"
+
+
+def test_what_sways_is_no_person(aisle: Aisle) -> None:
+    for step in range(40):
+        aisle.step((-1.6 + 0.4 * (step // 4 % 2), 0.0), linear=0.0)
+    assert aisle.everyone == []
+
+
+def test_what_a_robot_swings_round_as_it_turns_is_no_person() -> None:
+    field = Aisle(greenhouse=AISLE)
+    for step in range(30):
+        field.now = round(field.now + 0.1, 6)
+        yaw = 0.1 * step
+        field.drive("AGI", 0.0, 20.0, yaw, linear=0.0)
+        ranges = np.where(np.abs(_BEARINGS - 0.5) < 0.2, 1.2, np.inf)
+        said = scan("AGI", ranges, angle_min=-math.pi)
+        field.scan("AGI", replace(said, angle_increment=_MODEL.angle_increment))
+    assert field.everyone == []
+    assert field.judge()["AGI"].reason != "clear"
+
+
+def test_a_wall_that_nobody_drew_does_not_walk(aisle: Aisle) -> None:
+    wall = Rectangle(1.0, 0.5, 9.0, 0.55)
+    for step in range(80):
+        aisle.step(x=0.08 * step, linear=0.8, undrawn=(wall,))
+    assert aisle.everyone == []
+
+
+def test_no_more_than_32_are_kept_beside_those_whom_cameras_see() -> None:
+    scene = Scene()
+    scene.drive("AGI", 0.0)
+    robot = scene.world.robot("AGI")
+    for number in range(40):
+        scene.people.witness(robot, [(7.0 * number, 0.0)], at(0.0), f"w{number}")
+    assert len(scene.everyone) == MAX_WALKERS
+    scene.look("AGI", *(person(7.0 * n, 50.0) for n in range(MAX_PEOPLE)))
+    assert len(scene.everyone) == MAX_WALKERS + MAX_PEOPLE
