@@ -12,7 +12,7 @@ A witness only adds: it lifts no limit, and finds no spot empty.
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,10 +22,9 @@ from iveg.domain.geometry import Pose2D, Rectangle, Twist2D
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import LaserScan
+from iveg.domain.obstacle import Obstacle
 
 _Floats = NDArray[np.float64]
-LASTS_S = 0.2
-"""What is shorter is noise, or an insect."""
 GONE_S = 0.5
 """Without a return for so long it is gone."""
 PLAN_M = 0.4
@@ -36,15 +35,7 @@ _PEER_M = 1.0
 """About a peer's ``base_link``: half of its body, and how far it went since it told."""
 _APART_M = 0.3
 """Returns of one body are not farther apart."""
-_LARGEST_M = 1.0
-"""Two people side by side; what is larger is counted once it moves."""
 _LEAST_RETURNS = 2
-_MOVED_M = 0.4
-_SMOOTHED_S = 0.4
-_WALKED_M, _WALKED_S, _PASSED_M = 0.5, 0.5, 0.3
-"""Who walks goes so far, for so long, and so far as seen from the robot: not so what it
-tows, nor the part of a wall that it sees as it passes."""
-_WALKS_M_S = (0.3, 2.5)
 _BESIDE_M = 0.2
 """Of the robot's own path, where there is no plan."""
 _EVERY_S = 0.09
@@ -148,91 +139,6 @@ class KnownBody:
     def of_peer(cls, pose: Pose2D) -> "KnownBody":
         """A peer, where it told that it is."""
         return cls(pose.x, pose.y, _PEER_M)
-
-
-@dataclass(frozen=True, slots=True)
-class Obstacle:
-    """Something of a person's size near a robot that nobody explained.
-
-    Attributes:
-        x: Its middle in ``map`` (m); ``y`` likewise.
-        first_x: Where it was when it was seen first; ``first_y`` likewise.
-        size_m: From its first return to its last.
-        gap_m: From the robot's outline to its nearest return.
-        first_seen: Where that was in the robot's ``base_link`` (m).
-        since: When it was seen first; ``at`` newest (monotonic, s).
-        vx: How it goes in ``map`` (m/s), smoothed over 0.4 s; ``vy`` likewise.
-        passed_m: How far from where the robot saw it first, as seen from the robot (m).
-    """
-
-    x: float
-    y: float
-    first_x: float
-    first_y: float
-    size_m: float
-    gap_m: float
-    since: float
-    at: float
-    first_seen: tuple[float, float]
-    vx: float = 0.0
-    vy: float = 0.0
-    passed_m: float = 0.0
-
-    @property
-    def way_m(self) -> float:
-        """How far it is from where it was first (m)."""
-        return math.hypot(self.x - self.first_x, self.y - self.first_y)
-
-    @property
-    def has_moved(self) -> bool:
-        """Whether it went farther than noise does."""
-        return self.way_m > _MOVED_M
-
-    @property
-    def walks(self) -> bool:
-        """Whether it moves like somebody who walks."""
-        least, most = _WALKS_M_S
-        return (
-            self.size_m <= _LARGEST_M
-            and self.at - self.since >= _WALKED_S - 1e-6
-            and self.way_m >= _WALKED_M
-            and self.passed_m >= _PASSED_M
-            and least <= math.hypot(self.vx, self.vy) <= most
-        )
-
-    def seen_at(
-        self,
-        x: float,
-        y: float,
-        beside: tuple[float, float],
-        size: float,
-        gap: float,
-        now: float,
-    ) -> "Obstacle":
-        """The same, seen again; ``beside``: where in ``base_link``."""
-        gain = (now - self.at) / (_SMOOTHED_S + now - self.at)
-        after_s = max(now - self.at, 1e-3)
-        return replace(
-            self,
-            x=x,
-            y=y,
-            size_m=size,
-            gap_m=gap,
-            at=now,
-            vx=self.vx + gain * ((x - self.x) / after_s - self.vx),
-            vy=self.vy + gain * ((y - self.y) / after_s - self.vy),
-            passed_m=math.dist(beside, self.first_seen),
-        )
-
-    @property
-    def fits(self) -> bool:
-        """Whether it is or moves like somebody."""
-        return self.size_m <= _LARGEST_M or self.has_moved
-
-    @property
-    def counts(self) -> bool:
-        """Whether it is there for long enough, too."""
-        return self.fits and self.at - self.since >= LASTS_S - 1e-6
 
 
 class Witness:

@@ -303,6 +303,8 @@ class Evaluator:
             yield from conditions.of_decision(decision)
         for robot in self.world.live_robots():
             yield from conditions.of_robot(robot, now)
+            fault = self._obstacles.fault(robot.robot_id, now)
+            yield from conditions.of_laser(robot.robot_id, fault)
             yield from conditions.of_detector(robot, now, started=self._started or now)
             yield from self._low.conditions(robot)
             yield from conditions.of_kind(robot, now)

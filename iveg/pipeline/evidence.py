@@ -6,12 +6,12 @@ from dataclasses import asdict, replace
 from iveg.domain.decisions import Link, Place, SlowdownDecision
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import HALF_SPEED
+from iveg.domain.obstacle import Obstacle
 from iveg.domain.records import DecisionRecord
 from iveg.domain.rule.speed_limits import Crossing
 from iveg.domain.rule.zones import Zone
 from iveg.domain.stamps import wall_of
 from iveg.domain.tracking.looks import Looks
-from iveg.domain.witness import Obstacle
 from iveg.domain.world import World
 
 

@@ -56,6 +56,12 @@ def of_robot(robot: RobotState, now: Instant) -> Iterable[Condition]:
         yield Condition.of_robot("P2", "alert.doubt", name, code=code)
 
 
+def of_laser(robot_id: str, fault: str | None) -> Iterable[Condition]:
+    """A laser that is no witness: told, and everything else goes on."""
+    if fault is not None:
+        yield Condition.of_robot("P3", f"alert.laser_{fault}", robot_id)
+
+
 def of_detector(
     robot: RobotState, now: Instant, *, started: Instant
 ) -> Iterable[Condition]:

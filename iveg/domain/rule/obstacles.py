@@ -10,21 +10,36 @@ It only adds: nothing that it finds or misses lifts a limit (``tests/properties`
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
+import numpy as np
+
+from iveg.domain.geometry import Pose2D
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant, LaserScan
+from iveg.domain.obstacle import Obstacle
 from iveg.domain.robot_state import RobotState
 from iveg.domain.rule.foresight import Encounter, path_of
 from iveg.domain.rule.paths import HORIZON_S, MOVES_M_S, Circles
 from iveg.domain.rule.zones import Zone
 from iveg.domain.tracking.people import People
-from iveg.domain.witness import GONE_S, KnownBody, Obstacle, Outline, Plan, Witness
+from iveg.domain.witness import (
+    GONE_S,
+    PLAN_M,
+    KnownBody,
+    Outline,
+    Plan,
+    Witness,
+)
 from iveg.domain.world import World
 
 CAUSE = "obstacle"
 """Stands for the id of a cause: a laser knows no names."""
 _PERSON_M = 0.6
 """About the centre of a person's box: half of a person, and the error of the box."""
+_CHECKED_S, _FAULTY_S = 1.0, 5.0
+_LEAST_RETURNS, _STRANGE = 0.05, 0.5
+"""Shares of the beams that come back at least, and of those that the plan explains."""
 _YOUNG_S = 0.5
 """An older sighting says too little of where somebody is to explain a return."""
 
@@ -51,6 +66,31 @@ SeenBy = Callable[[str, Instant], SeenObstacle | None]
 """Robot, now → what its laser sees near it."""
 
 
+Fault = Literal["blind", "unfit"]
+"""Next to nothing comes back; most of what does is nowhere in the plan."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Fit:
+    """How a laser fits the plan; since when, and by which scan (monotonic, s)."""
+
+    fault: Fault | None
+    since: float
+    at: float
+
+
+def fault_of(scan: LaserScan, pose: Pose2D, plan: Plan) -> Fault | None:
+    """What is wrong with a laser by one scan, made at ``pose`` in ``map``.
+
+    A wrong mount or pose draws walls where none are; zeros, and a cover, draw none.
+    """
+    x, y = scan.points(pose).astype(np.float64).T
+    if len(x) < _LEAST_RETURNS * len(scan.ranges):
+        return "blind"
+    strange = np.count_nonzero(plan.distance_to(x, y) > PLAN_M)
+    return "unfit" if strange > _STRANGE * len(x) else None
+
+
 Walkers = tuple[str, Instant, Sequence[tuple[float, float]]]
 """A robot, when its laser saw them, and where each is in ``map`` (m)."""
 
@@ -67,6 +107,7 @@ class Obstacles:
         self._witnesses: dict[str, Witness] = {}
         self._seen: dict[str, SeenObstacle | None] = {}
         self._walkers: dict[str, tuple[Instant, Sequence[Obstacle]]] = {}
+        self._fits: dict[str, _Fit] = {}
 
     def look(self, robot: RobotState, scan: LaserScan, now: Instant) -> None:
         """Take a robot's scan, made where it was when that came."""
@@ -81,6 +122,24 @@ class Obstacles:
         witness.look(scan, pose, odometry.twist, known, now.mono)
         self._seen[robot.robot_id] = _first(robot, witness, now)
         self._walkers[robot.robot_id] = now, witness.walkers
+        if self._plan.is_drawn:
+            self._check(scan, pose, now)
+
+    def _check(self, scan: LaserScan, pose: Pose2D, now: Instant) -> None:
+        """Compare a whole scan with the plan, once a second."""
+        before = self._fits.get(scan.robot_id)
+        if before is None or now.mono - before.at >= _CHECKED_S:
+            fault = fault_of(scan, pose, self._plan)
+            goes_on = before is not None and before.fault == fault
+            since = before.since if before is not None and goes_on else now.mono
+            self._fits[scan.robot_id] = _Fit(fault, since, now.mono)
+
+    def fault(self, robot_id: str, now: Instant) -> Fault | None:
+        """What is wrong with a robot's laser, if it is so for some seconds."""
+        fit = self._fits.get(robot_id)
+        if fit is None or now.mono - fit.at > _FAULTY_S:
+            return None
+        return fit.fault if fit.at - fit.since >= _FAULTY_S else None
 
     def is_unsure(self, robot_id: str) -> bool:
         """Whether the next scan of a robot may show that somebody is there."""

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.limits import LIMITS, ring_radius
 from iveg.domain.observations import Instant
+from iveg.domain.obstacle import Obstacle
 from iveg.domain.robot_state import RobotState
 from iveg.domain.tracking.people import People
 from iveg.domain.tracking.person import Sighting, TrackedPerson
-from iveg.domain.witness import Obstacle
 from iveg.domain.world import World
 
 _Floats = NDArray[np.float64]

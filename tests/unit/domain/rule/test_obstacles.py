@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from iveg.domain.alerts import conditions
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import SpeedLimit
 from iveg.domain.geometry import Pose2D, Rectangle
@@ -238,3 +239,38 @@ def test_no_more_than_32_are_kept_beside_those_whom_cameras_see() -> None:
     assert len(scene.everyone) == MAX_WALKERS
     scene.look("AGI", *(person(7.0 * n, 50.0) for n in range(MAX_PEOPLE)))
     assert len(scene.everyone) == MAX_WALKERS + MAX_PEOPLE
+
+
+# --- lasers that are no witness -------------------------------------------------------
+
+
+def faults(mount_yaw: float, ranges: float | None, seconds: int) -> list[str]:
+    """The alerts of a laser that sweeps an aisle, or always measures the same."""
+    aisle, here = Aisle(greenhouse=AISLE), Pose2D(0.0, 0.0, mount_yaw)
+    far_away = (-25.0, 0.0)
+    for _ in range(10 * seconds):
+        aisle.now = round(aisle.now + 0.1, 6)
+        aisle.drive("AGI", 0.0)
+        said = aisle.swept(0.0, (), far_away, ())
+        if ranges is not None:
+            said = replace(said, ranges=np.full_like(said.ranges, ranges))
+        aisle.scan("AGI", replace(said, mount=here))
+    fault = aisle.obstacles.fault("AGI", at(aisle.now))
+    return [one.key for one in conditions.of_laser("AGI", fault)]
+
+
+@pytest.mark.parametrize(
+    ("mount_yaw", "ranges", "told"),
+    [
+        (0.0, None, []),
+        (math.pi / 2, None, ["alert.laser_unfit"]),
+        (0.0, 0.0, ["alert.laser_blind"]),
+        (0.0, math.inf, ["alert.laser_blind"]),
+        (0.0, 0.7, ["alert.laser_unfit"]),
+    ],
+)
+def test_a_laser_that_is_no_witness_is_told(
+    mount_yaw: float, ranges: float | None, told: list[str]
+) -> None:
+    assert faults(mount_yaw, ranges, 8) == told
+    assert faults(mount_yaw, ranges, 4) == [], "not for a moment"
