@@ -15,26 +15,45 @@ _SPOT = st.tuples(
     st.sampled_from((-3.0, 1.5, 2.4, 3.0, 4.5, 7.0)),
     st.sampled_from((-2.0, 0.0, 0.5, 2.5)),
 )
+_LONG = tuple((0.05 * n, 0.0) for n in range(100_000))
+_ODD_PATHS = (
+    (),
+    ((0.0, 0.0), (6.0, 0.0)),
+    ((0.0, 0.0), (1.0, 0.0), (900.0, -700.0), (1.1, 0.0)),
+    ((5000.0, 5000.0), (5001.0, 5000.0)),
+    ((2.0, 0.0),) * 50,
+    _LONG,
+)
 _STEP = st.tuples(
-    st.sampled_from((0.1, 0.4, 1.2)),
-    st.sampled_from((-1.0, 0.0, 0.4, 1.0)),
+    st.sampled_from((0.1, 0.4, 1.2, 10.0)),
+    st.sampled_from((-1.0, 0.0, 0.4, 1.0, 40.0)),
     st.lists(_SPOT, max_size=2),
+    st.none() | st.sampled_from(_ODD_PATHS),
 )
 
 
 @given(st.lists(_STEP, max_size=15))
 def test_no_robot_is_ever_faster_for_it(
-    run: list[tuple[float, float, list[tuple[float, float]]]],
+    run: list[
+        tuple[
+            float,
+            float,
+            list[tuple[float, float]],
+            tuple[tuple[float, float], ...] | None,
+        ]
+    ],
 ) -> None:
     scenes = [Scene(rule=DetectionRule(foresight=one)) for one in (False, True)]
     x = 0.0
-    for after_s, speed, people in run:
-        x += speed * after_s
+    for after_s, speed, people, path in run:
+        x += min(speed, 1.0) * after_s
         limits = []
         for scene in scenes:
             scene.now = round(scene.now + after_s, 6)
             scene.drive("AGI", x, linear=speed)
             scene.drive("AGII", 3.0, 1.0, linear=-speed)
+            if path is not None:
+                scene.navigate("AGI", "work", path)
             scene.look("AGI", *(person(*spot) for spot in people))
             scene.look("AGII")
             limits.append(scene.judge())

@@ -134,10 +134,13 @@ class Scene:
         )
         self._apply(received(said, after=self.now))
 
-    def navigate(self, robot_id: str, task: str) -> None:
-        """A robot says what it is about."""
+    def navigate(
+        self, robot_id: str, task: str, path: tuple[tuple[float, float], ...] = ()
+    ) -> None:
+        """A robot says what it is about, and where it will drive."""
         self._seq += 1
-        self._apply(received(Navigation(robot_id, self._origin(), task)))
+        said = Navigation(robot_id, self._origin(), task, None, path)
+        self._apply(received(said))
 
     def _origin(self) -> Origin:
         return replace(origin(self._seq, after=self.now), replay=self.replay)
