@@ -6,6 +6,8 @@ IvegError
 ├── MissingExtraError       a library that was not installed; stops the command
 ├── UnreadableError         bytes that the contract does not describe (HTTP 400)
 ├── UnknownRobotError       a robot id that is not in the fleet (HTTP 404)
+├── UnknownNameError        an id of anything else that is not known (HTTP 404)
+├── MarkRefusedError        a mark "not a person here" on somebody (HTTP 409)
 ├── CommandRefusedError     a release or resume that must not happen (HTTP 409)
 ├── OutdatedError           a change of something that has changed since (HTTP 409)
 ├── VersionMissingError     a change that does not say of what (HTTP 428)
@@ -65,6 +67,25 @@ class UnknownRobotError(IvegError):
 
     def __init__(self, robot_id: str) -> None:
         super().__init__(f"There is no robot {robot_id!r} in this fleet.")
+
+
+class UnknownNameError(IvegError):
+    """Nothing of a kind has this id."""
+
+    def __init__(self, kind: str, name: str) -> None:
+        super().__init__(f"There is no {kind} {name!r}.")
+
+
+class MarkRefusedError(IvegError):
+    """Nothing may be marked as "not a person here" there.
+
+    Attributes:
+        why: ``somebody`` or ``too_many``.
+    """
+
+    def __init__(self, why: str) -> None:
+        super().__init__(f"It may not be marked as no person: {why}.")
+        self.why = why
 
 
 class CommandRefusedError(IvegError):

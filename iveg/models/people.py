@@ -73,6 +73,9 @@ class Person(Model):
     lane: str | None
     acting: list[Acting]
     margin: Margin | None
+    thing_id: str | None = Field(
+        description="The mark by which it is no person and has no ring."
+    )
 
 
 class DetectionBox(Model):

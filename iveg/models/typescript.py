@@ -27,6 +27,7 @@ from iveg.models.places import Costmap, Coverage, Scan
 from iveg.models.reading import Reading
 from iveg.models.signing_in import SignInCode
 from iveg.models.snapshot import Snapshot
+from iveg.models.thing import Thing
 
 TOLD: tuple[type[Model], ...] = (
     Snapshot,
@@ -45,6 +46,7 @@ TOLD: tuple[type[Model], ...] = (
     Messages,
     MessageTest,
     SignInCode,
+    Thing,
 )
 """All that a page reads; what they are made of comes with them."""
 _PLAIN = {

@@ -51,6 +51,7 @@ from iveg.pipeline.scans import ScanReader
 from iveg.pipeline.second_witness import SecondWitness
 from iveg.pipeline.slow_time import SlowTime
 from iveg.pipeline.supervision import Supervision
+from iveg.pipeline.things import ThingMarks
 
 Guard = Callable[[str, Callable[[Instant], None]], Callable[[Instant], None]]
 
@@ -158,6 +159,7 @@ class Services:
 
     rules: Rules
     detectors: Detectors
+    things: ThingMarks
     messenger: Messenger
     mapper: Mapper
     coverage: CoverageMonitor
@@ -319,6 +321,7 @@ def build_services(
     return Services(
         Rules(evaluator, kept.rule_store, event_log, kept.rules),
         Detectors(parts.world, kept.detector_store, event_log, kept.out_of_service),
+        ThingMarks(evaluator.people, event_log),
         messenger,
         Mapper(parts.world, greenhouse.bounds, parts.scans),
         CoverageMonitor(parts.world, greenhouse),

@@ -311,6 +311,7 @@ class Evaluator:
         yield from conditions.of_fleet(self.world.live_robots(), now)
         yield from conditions.of_overload(self.world.robots.values(), now)
         yield from conditions.of_rule(self.rule)
+        yield from conditions.of_things(self.people.things.known.values())
 
     def _heard_s(self, crossing: Crossing) -> float:
         robot = self.world.robot(crossing.robot_id)

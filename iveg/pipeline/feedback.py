@@ -110,7 +110,7 @@ class FeedbackPublisher:
 
     def _alerts(self, rule: DetectionRule, now: Instant) -> Iterable[FeedbackAlert]:
         for person in self._people.known.values():
-            for sighting, radius in person.rings(rule, now):
+            for sighting, radius in self._people.rings(person, rule, now):
                 # What a recording saw long ago must not slow a robot of today.
                 if self._world.robots[sighting.observer].is_replay:
                     continue

@@ -63,6 +63,7 @@ class SlowTime:
             one.class_ == "person"
             and one.age_s(now) <= LIMITS.seen_s
             and distance_to(one.newest.x, one.newest.y) <= LIMITS.ring_default_m
+            and self._people.things.explain(one, now) is None
             for one in self._people.known.values()
         )
 

@@ -10,6 +10,7 @@ from iveg.domain.tracking.sight import AllClear, Swept
 from iveg.domain.world import World
 from iveg.pipeline import topics
 from iveg.pipeline.event_log import EventLog
+from iveg.pipeline.things import thing_line
 
 _STAGE_KEYS = {
     "seen": "log.person_seen",
@@ -47,6 +48,9 @@ class Staleness:
         empty = self._all_clear.sweep(people, self._world, self._greenhouse, now)
         for person in empty:
             self._log_clear(person, now)
+        for thing in people.things.end(now):
+            self._event_log.log(thing_line("log.thing_over", thing, thing.by), now)
+            self._event_log.changed(topics.PEOPLE.name)
         for person in people.forget(now):
             self._stages.pop(person.person_id, None)
             self._event_log.changed(topics.PEOPLE.name)

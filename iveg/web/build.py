@@ -30,6 +30,7 @@ from iveg.web.api import (
     recordings,
     robots,
     rule,
+    things,
 )
 from iveg.web.api.answers import Apart
 from iveg.web.live import socket
@@ -104,6 +105,7 @@ def live_routers(face: Face) -> Iterator[APIRouter]:
     yield rule.router(beside.rules, clock)
     yield detections.router(evaluator.tracking.newest, face.worker)
     yield detectors.router(beside.detectors, clock)
+    yield things.router(beside.things, clock)
     yield messages.router(messages.Desk(beside.messenger, face.new_id, clock))
     yield latency.router(watch, clock, face.worker)
     yield recordings.router(face.recordings)

@@ -26,8 +26,10 @@ from iveg.domain.errors import (
     ExperimentRefusedError,
     HopError,
     IvegError,
+    MarkRefusedError,
     NotAllowedError,
     OutdatedError,
+    UnknownNameError,
     UnknownRobotError,
     UnreadableError,
     VersionMissingError,
@@ -120,10 +122,8 @@ def problem_of(error: Exception) -> Problem:
             return Problem(
                 error.status_code, str(error.detail), headers=error.headers or {}
             )
-        case CommandRefusedError():
-            return Problem(409, str(error), "command-refused", {"why": error.why})
-        case ExperimentRefusedError():
-            return Problem(409, str(error), "experiment-refused", {"why": error.why})
+        case CommandRefusedError() | ExperimentRefusedError() | MarkRefusedError():
+            return Problem(409, str(error), _REFUSED[type(error)], {"why": error.why})
         case UnreadableError():
             return Problem(400, str(error), "unreadable", {"reason": error.reason})
         case HopError():
@@ -141,8 +141,14 @@ def problem_of(error: Exception) -> Problem:
     return Problem(500, "Something failed inside iVeg; its log says what.")
 
 
+_REFUSED: Mapping[type[IvegError], str] = {
+    CommandRefusedError: "command-refused",
+    ExperimentRefusedError: "experiment-refused",
+    MarkRefusedError: "mark-refused",
+}
 _PLAIN: tuple[tuple[type[IvegError], int, str], ...] = (
     (UnknownRobotError, 404, "unknown-robot"),
+    (UnknownNameError, 404, "unknown-name"),
     (NotAllowedError, 403, "not-allowed"),
     (OutdatedError, 409, "outdated"),
     (VersionMissingError, 428, "version-missing"),

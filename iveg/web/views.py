@@ -184,7 +184,8 @@ class Views:
             for one in self._evaluator.crossings
             if one.zone.cause == person.person_id
         ]
-        rings = person.rings(rule, now)
+        rings = self._people.rings(person, rule, now)
+        thing = self._people.things.explain(person, now)
         return PersonModel(
             person_id=person.person_id,
             class_=person.class_,
@@ -204,6 +205,7 @@ class Views:
             lane=self._greenhouse.lane_at(newest.x, newest.y),
             acting=[_acting(one) for one in crossings],
             margin=Margin.of(margins.of_person(person.person_id)),
+            thing_id=None if thing is None else thing.thing_id,
         )
 
     def frame(self, robot_id: str, now: Instant) -> DetectionFrame | None:

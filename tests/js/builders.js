@@ -111,6 +111,7 @@ export function person(changes = {}) {
     margin: null,
     possible: false,
     evidence: null,
+    thing_id: null,
     doubtful: false,
     ...changes,
   };

@@ -10,6 +10,7 @@ from iveg.domain.limits import LIMITS
 from iveg.domain.messages import Priority
 from iveg.domain.observations import Instant
 from iveg.domain.robot_state import RobotState
+from iveg.domain.tracking.things import Thing
 
 ESTIMATED_SHOWN_AFTER_S = 5.0
 """Time that a robot may take to receive its first feedback (s)."""
@@ -80,6 +81,14 @@ def of_detector(
     if detector.out_of_service is not None:
         by = detector.out_of_service.by
         yield Condition.of_robot("P3", "alert.detector_out_of_service", name, by=by)
+
+
+def of_things(things: Iterable[Thing]) -> Iterable[Condition]:
+    """Places where an operator said that nobody is."""
+    for one in things:
+        slots: dict[str, Slot] = {"x": round(one.x, 2), "y": round(one.y, 2)}
+        slots["by"] = one.by
+        yield Condition("P3", "alert.thing_marked", one.thing_id, None, slots)
 
 
 def _is_unplaced(robot: RobotState, now: Instant, started: Instant) -> bool:

@@ -172,6 +172,8 @@ class Obstacles:
         for person in self._people.known.values():
             if person.age_s(now) > _YOUNG_S or person.newest.recording is not None:
                 continue
+            if self._people.things.explain(person, now) is not None:
+                continue
             for one in person.sightings:
                 age = one.age_s(now)
                 if age <= _YOUNG_S and not one.reach_m and not one.laser:

@@ -63,15 +63,19 @@ def zones_of(
 ) -> Iterator[Zone]:
     """Every circle that slows robots now."""
     for person in people.known.values():
-        yield from _zones_of(person, world, rule, now)
+        yield from _zones_of(person, people, world, rule, now)
     for peer in world.robots.values():
         yield from _circle_of(peer, rule, now)
 
 
 def _zones_of(
-    person: TrackedPerson, world: World, rule: DetectionRule, now: Instant
+    person: TrackedPerson,
+    people: People,
+    world: World,
+    rule: DetectionRule,
+    now: Instant,
 ) -> Iterator[Zone]:
-    for sighting, radius in person.rings(rule, now):
+    for sighting, radius in people.rings(person, rule, now):
         yield Zone(
             person.class_,
             person.person_id,
@@ -157,7 +161,7 @@ def _near(
     here = [known[one] for one in persons if one in known]
     for person in sorted(here, key=lambda one: one.number):
         if person.person_id not in made:
-            circles = _zones_of(person, world, rule, now)
+            circles = _zones_of(person, people, world, rule, now)
             made[person.person_id] = list(circles)
         yield from made[person.person_id]
     peers = neighbours.peers.get(robot.robot_id, _NOBODY) | mine

@@ -5,7 +5,7 @@ one stands there, and else handed to the tracker.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -25,6 +25,7 @@ from iveg.domain.tracking.looks import (
 )
 from iveg.domain.tracking.person import Sighting, TrackedPerson
 from iveg.domain.tracking.picture import PlacedDetection
+from iveg.domain.tracking.things import Things
 from iveg.domain.tracking.tracker import Tracker
 from iveg.domain.world import World
 
@@ -81,6 +82,7 @@ class People:
         self._suspicions = Suspicions()
         self._tracker = Tracker(era=era)
         self._faint: dict[str, list[Placed]] = {}
+        self.things = Things()
         self.turned_away = 0
         """Detections of the last frame without room."""
         self.unplaced = 0
@@ -241,6 +243,17 @@ class People:
             at,
         )
         return [self.known[track] for track in tracks if track is not None]
+
+    def rings(
+        self, person: TrackedPerson, rule: DetectionRule, now: Instant
+    ) -> Iterable[tuple[Sighting, float]]:
+        """Every circle that protects somebody, with its radius now (m); a thing: none.
+
+        The only way to a person's rings, so that all who ask leave the same ones out.
+        """
+        if self.things.explain(person, now) is not None:
+            return ()
+        return person.rings(rule, now)
 
     def drop_sighting(self, person_id: str, sighting: Sighting) -> TrackedPerson:
         """Drop a sighting whose place was seen to be empty."""

@@ -8,12 +8,13 @@
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from iveg.domain.detection_rule import Class, DetectionRule
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
+from iveg.domain.tracking.extent import Extent
 from iveg.domain.tracking.looks import Looks
 
 _SMOOTHED_S = 0.4
@@ -41,6 +42,8 @@ class Sighting:
         vx: How its chain goes in ``map`` (m/s); ``vy`` likewise.
         possible: Whether it counts by its looks alone, below the threshold.
         laser: Only the observer's laser saw it: it moves like somebody who walks.
+        extent: Of its chain, and of all that this was ever taken to continue; None
+            before it is part of a chain.
     """
 
     observer: str
@@ -58,6 +61,7 @@ class Sighting:
     vy: float = 0.0
     possible: bool = False
     laser: bool = False
+    extent: Extent | None = None
 
     @property
     def lasts_s(self) -> float:
@@ -71,6 +75,8 @@ class Sighting:
     def in_chain(self, chain: int, before: "Sighting | None" = None) -> "Sighting":
         """The same sighting as the newest of a chain, after the one ``before``."""
         vx, vy = (0.0, 0.0) if before is None else self._going_on(before)
+        x, y = self.x, self.y
+        extent = Extent(x, x, y, y, self.confidence, math.hypot(vx, vy))
         # Made for each box of each picture: ``replace`` takes three times as long.
         return Sighting(
             self.observer,
@@ -88,7 +94,16 @@ class Sighting:
             vy,
             self.possible,
             self.laser,
+            extent if before is None else extent.joined(before.extent),
         )
+
+    def in_track(self, person: "TrackedPerson") -> "Sighting":
+        """The same, of a chain that begins in a track that is known."""
+        extent = self.extent
+        if extent is not None:
+            for earlier in (person.newest, *person.sightings):
+                extent = extent.joined(earlier.extent)
+        return replace(self, extent=extent)
 
     def _going_on(self, before: "Sighting") -> tuple[float, float]:
         """The velocity of the chain (m/s), smoothed over 0.4 s, of a walker at most."""
@@ -128,6 +143,14 @@ class TrackedPerson:
     def is_well_known(self) -> bool:
         """Whether they were seen for longer than a detector's mistake lasts."""
         return self.newest.at.mono - self.first_seen.mono >= _MISTAKEN_S
+
+    @property
+    def middle(self) -> tuple[float, float]:
+        """Of the places where it has been, in ``map`` (m)."""
+        extent = self.newest.extent
+        if extent is None:
+            return self.newest.x, self.newest.y
+        return (extent.xmin + extent.xmax) / 2, (extent.ymin + extent.ymax) / 2
 
     @property
     def is_possible(self) -> bool:

@@ -211,6 +211,8 @@ class Tracker:
         if track is None:
             return self._begin(one, sighting, at)
         person = self.known[track]
+        if old is None or old[0] != track:
+            sighting = sighting.in_track(person)
         kept = tuple(
             earlier
             for earlier in person.sightings

@@ -710,6 +710,8 @@ export type Person = {
   lane: string | null;
   acting: Acting[];
   margin: Margin | null;
+  /** The mark by which it is no person and has no ring. */
+  thing_id: string | null;
 };
 
 /** A place in ``map`` (m). */
@@ -999,6 +1001,19 @@ export type SpeedLimit = {
   decision_id: string | null;
   /** Until it reaches the ring of the cause; null: it is inside. */
   foretold_s: number | null;
+};
+
+/** One mark: who is born inside its circle and stays there slows nobody. */
+export type Thing = {
+  thing_id: string;
+  /** Of its middle in ``map``. */
+  x: number;
+  y: number;
+  radius_m: number;
+  by: string;
+  since: string;
+  /** When it ends at the latest. */
+  until: string;
 };
 
 /** One attribute of one entity, with its newest number. */

@@ -25,6 +25,7 @@
  *   id: string, peer: boolean, unknown?: boolean, stage: "seen" | "remembered" | "last_seen",
  *   x: number, y: number, ageS: number, ringM: number, confidence: number,
  *   observers: string[], acting: Person["acting"], decisionId: string | null,
+ *   isThing: boolean,
  * }} ScenePerson
  *
  * @typedef {{
@@ -175,6 +176,7 @@ export function readPerson(person, nowMs) {
   return {
     id: person.person_id,
     peer: person.class === "robot",
+    isThing: Boolean(person.thing_id),
     stage,
     x: person.position.x,
     y: person.position.y,

@@ -41,6 +41,7 @@ export function sceneOf({ position, places, rule, ...told }, map) {
     id: "",
     peer: told.class === "robot",
     unknown: told.class === "obstacle",
+    isThing: false,
     stage: /** @type {const} */ ("seen"),
     ...position,
     ageS: 0,

@@ -5,7 +5,8 @@
 import { onBeat } from "../core/beat.js";
 import { ageOf } from "../core/clock.js";
 import { readPerson } from "../map/scene.js";
-import { fill, make, need, setHidden, setText } from "./dom.js";
+import { fill, need, setHidden, setText } from "./dom.js";
+import { createThings } from "./things.js";
 
 /** @typedef {import("../core/protocol.js").Person} Person */
 
@@ -15,15 +16,18 @@ const TICK_MS = 1000;
 /** @param {import("../main.js").App} app */
 export function createPeoplePanel({ store, i18n }) {
   const list = need("#people-list");
+  const things = createThings(i18n);
 
   function draw() {
     if (!(/** @type {HTMLDialogElement} */ (need("#people-panel")).open)) return;
     const people = store.people();
-    fill(list, people, makeItem, (item, person) => {
+    things.keep(people);
+    fill(list, people, things.makeItem, (item, person) => {
       const [who, where, ...rest] = linesOf(person, i18n);
       setText(need("b", item), who);
       setText(need("small", item), where);
       setText(need("p", item), rest.join(". "));
+      things.write(item, person);
     });
     setHidden(need("#people-none"), people.length > 0);
     const acting = people.flatMap((person) => person.acting);
@@ -36,15 +40,10 @@ export function createPeoplePanel({ store, i18n }) {
   }
 
   document.addEventListener("iveg:panel", draw);
+  document.addEventListener("iveg:panel", things.renew);
   i18n.onChange(draw);
   setInterval(onBeat, TICK_MS, draw);
   draw();
-}
-
-function makeItem() {
-  const item = make("li");
-  item.append(make("b"), make("small"), make("p"));
-  return item;
 }
 
 /**
@@ -85,6 +84,7 @@ export function linesOf(person, i18n) {
     i18n.t("people.where", slots),
     i18n.t(`people.${isWalker ? "walks" : stage}`, slots),
     ...looks,
+    ...(person.thing_id ? [i18n.t("things.is")] : []),
     ...acts,
   ];
 }

@@ -3,7 +3,8 @@
  *
  * *Seen* is solid; *remembered* is dashed and grows at walking speed; *last seen* is a
  * marker alone, which fades and is removed after a minute: the person's place is unknown by
- * then, and the marks of a morning would hide people who are there.
+ * then, and the marks of a morning would hide people who are there.  What is marked as no
+ * person has no ring, and a line through it.
  */
 
 import { MARK_LIMIT_S } from "../scene.js";
@@ -66,13 +67,14 @@ function drawPerson(paint, person) {
   const ring = Math.round(person.ringM * view.scale);
   // A ring that grows is like no other.
   const kept = person.stage === "seen" ? paint.sprites : undefined;
-  if (person.stage !== "last_seen") {
+  if (person.stage !== "last_seen" && !person.isThing) {
     const sign = { name: `ring ${ring}`, reach: ring + RING_PX, ...place };
     drawSign(paint, kept, sign, (there) => drawRing(there, person));
   }
   isolated(ctx, () => {
     ctx.globalAlpha = strengthOf(person);
-    const kind = person.unknown ? "unknown" : person.peer ? "peer" : "person";
+    const known = person.unknown ? "unknown" : person.peer ? "peer" : "person";
+    const kind = person.isThing ? "thing" : known;
     const name = `${kind} ${person.stage === "last_seen"}`;
     const sign = { name, reach: FIGURE_PX, ...place };
     const drawn = FIGURES[kind];
@@ -135,7 +137,8 @@ function drawRing({ ctx, view, theme }, person) {
 /** Head and shoulders. @param {Paint} paint @param {ScenePerson} person */
 function drawFigure({ ctx, theme }, person) {
   ctx.strokeStyle = theme.bg;
-  ctx.fillStyle = person.stage === "last_seen" ? theme.muted : theme.person;
+  const isFaded = person.isThing || person.stage === "last_seen";
+  ctx.fillStyle = isFaded ? theme.muted : theme.person;
   ctx.lineWidth = 2;
   ctx.beginPath();
   ctx.ellipse(0, 6, 9, 7, 0, Math.PI, 2 * Math.PI);
@@ -145,6 +148,12 @@ function drawFigure({ ctx, theme }, person) {
   circle(ctx, 0, -5, 5);
   ctx.stroke();
   ctx.fill();
+  if (!person.isThing) return;
+  ctx.strokeStyle = theme.text;
+  ctx.beginPath();
+  ctx.moveTo(-FIGURE_PX + 3, FIGURE_PX - 3);
+  ctx.lineTo(FIGURE_PX - 3, -FIGURE_PX + 3);
+  ctx.stroke();
 }
 
 /** Who or what only a laser sees. @param {Paint} paint */
