@@ -14,6 +14,7 @@ from iveg.lab.emulator.scenarios import scenario_named
 from iveg.lab.emulator.world import SimulatedWorld
 from iveg.lab.experiment import stage as staging
 from iveg.lab.experiment.stage import STEP_S
+from iveg.pipeline.things import ThingMarks
 from iveg.web.views import Views
 from tests.unit.pipeline.desk import Desk, settle
 
@@ -92,6 +93,11 @@ class Stage:
         """Let a twentieth of a second pass for everybody."""
         self._stage.step()
         await settle()
+
+    def mark(self, person_id: str) -> None:
+        """An operator says that somebody is no person, for the rest of the day."""
+        marks = ThingMarks(self._desk.evaluator.people, self._desk.parts.event_log)
+        marks.mark(person_id, "ana", self.now.wall + 3600.0, self.now)
 
     # --- what iVeg says ---------------------------------------------------------------
 

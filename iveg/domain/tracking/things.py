@@ -15,7 +15,8 @@ from iveg.domain.tracking.person import Sighting, TrackedPerson
 
 RADIUS_M = 0.5
 SURELY_FROM = 0.95
-MOVES_FROM_M_S = 0.3
+MOVES_FROM_M_S = 0.8
+"""Half of a walker's speed: a box that jumps by 0.2 m is noise."""
 MOST_THINGS = 32
 LONGEST_S = 86_400.0
 

@@ -12,7 +12,7 @@ encounter, that false boxes are less sure than true ones.
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -32,6 +32,7 @@ ROBOT_HEIGHT_M = 1.2
 _NEAREST_M = 0.3
 _LONGEST_S, _SHORTEST_S = 2.0, 0.5
 _GHOST_NEAR_M, _GHOST_FAR_M = 2.0, 6.0
+_THING_RADIUS_M = 0.2
 _HIDDEN_LOSS = 0.15
 """Loss of confidence for a target that is almost fully hidden."""
 
@@ -122,6 +123,11 @@ def person_target(number: int, person: Disc) -> Target:
     pose, size = Pose2D(person.x, person.y, 0.0), 2 * person.radius
     body = Body(f"person-{number}", pose, size, size)
     return Target(body.robot_id, PERSON, body, PERSON_HEIGHT_M)
+
+
+def thing_target(x: float, y: float) -> Target:
+    """A post or coat at a position in ``map`` (m), which is taken for a person."""
+    return replace(person_target(0, Disc(x, y, _THING_RADIUS_M)), key="thing")
 
 
 def robot_target(body: Body) -> Target:

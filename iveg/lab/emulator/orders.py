@@ -68,6 +68,8 @@ class FaultOrder(LinkFaults):
         release_locally: The crew lifts local holds and the boot hold.
         kill: Its software ends; ``revive`` starts it again, held.
         false_person: Its camera detects a person there; null ends that.
+        thing: Something there is taken for a person where its camera has it in view, as
+            surely and seldom as a person; null ends that.
         hide_people: Its camera detects no person.
     """
 
@@ -79,6 +81,7 @@ class FaultOrder(LinkFaults):
     kill: bool = False
     revive: bool = False
     false_person: OrderPlace | None = None
+    thing: OrderPlace | None = None
     hide_people: bool | None = None
 
     def changed_by(self, order: "FaultOrder") -> "FaultOrder":

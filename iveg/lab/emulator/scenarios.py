@@ -10,7 +10,7 @@ from collections.abc import Mapping
 
 from iveg.domain.errors import DataFileError
 from iveg.domain.geometry import Pose2D
-from iveg.lab.emulator.orders import FaultOrder
+from iveg.lab.emulator.orders import FaultOrder, OrderPlace
 from iveg.lab.emulator.people import WalkStop
 from iveg.lab.emulator.scripts import Incident, RobotScript, Scenario, Station
 
@@ -132,6 +132,9 @@ _FACES_AWAY = RobotScript(
 grower it never looks at."""
 _GROWER_IN_6 = (WalkStop(24.3, 25.5, 60.0, 60.0),)
 
+_COAT = OrderPlace(x=11.5, y=9.0)
+"""Hangs where the worker of corridor 3 stands in other scenarios."""
+
 _SCENARIOS = (
     Scenario(
         "demo",
@@ -155,6 +158,14 @@ _SCENARIOS = (
         {"AGI": _FACES_GROWER, "AGII": _FACES_AWAY},
         (_GROWER_IN_6,),
         greenhouse="agroconnect",
+    ),
+    Scenario(
+        "coat",
+        "AGI takes a coat in corridor 3 for a person; nobody is there.",
+        "AGII slows for it, until somebody marks it as no person.",
+        {"AGI": _WATCH, "AGII": _HAUL_ON},
+        incidents=(Incident(0.1, FaultOrder(robot="AGI", thing=_COAT)),),
+        detector="simulation",
     ),
     Scenario(
         "viewpoints",

@@ -29,6 +29,7 @@ from iveg.lab.emulator.camera import (
     Target,
     person_target,
     robot_target,
+    thing_target,
     upright_box,
 )
 from iveg.lab.emulator.greenhouse import Body, Disc, Scenery
@@ -52,6 +53,7 @@ class RobotHardware:
     Attributes:
         command: Last command of the drive.
         false_person: Fault: a position in ``map`` where the camera detects a person.
+        thing: Fault: one where it takes a thing for a person when it is in view.
         hides_people: Fault: the camera detects no person.
     """
 
@@ -68,6 +70,7 @@ class RobotHardware:
         self.profile = profile
         self.command = REST
         self.false_person: tuple[float, float] | None = None
+        self.thing: tuple[float, float] | None = None
         self.hides_people = False
         self._rng = rng
         self._odometer = Odometer(rng)
@@ -96,6 +99,9 @@ class RobotHardware:
         if "false_person" in order.model_fields_set:
             place = order.false_person
             self.false_person = None if place is None else (place.x, place.y)
+        if "thing" in order.model_fields_set:
+            place = order.thing
+            self.thing = None if place is None else (place.x, place.y)
 
     def requested_twist(self, now: float, around: "SimulatedWorld") -> Twist2D:
         """Twist that navigation requests; ``now`` in seconds into the run."""
@@ -138,6 +144,8 @@ class RobotHardware:
         targets = around.targets_for(self.robot_id)
         if self.hides_people:
             targets = [target for target in targets if target.class_id != PERSON]
+        if self.thing is not None:
+            targets = [*targets, thing_target(*self.thing)]
         found = self._detector.detect(now, pose, targets, around.scenery)
         if self.false_person is not None:
             x, y = self.false_person

@@ -2,6 +2,7 @@
 
 import pytest
 
+from iveg.domain.observations import Instant
 from iveg.domain.tracking.things import Thing
 from tests.builders import at
 from tests.unit.domain.scene import Scene, machine, person
@@ -106,8 +107,7 @@ def test_a_robot_and_somebody_beyond_the_walls_are_no_things() -> None:
 )
 def test_a_mark_ends_when_either_clock_says_so(mono: float, wall: float) -> None:
     scene = marked()
-    began = at(0.0)
-    now = began.__class__(began.wall + wall, began.mono + mono)
+    now = Instant(mono=at(mono).mono, wall=at(wall).wall)
 
     see(scene, (1.5, 0.85))
     (coat,) = scene.everyone

@@ -5,6 +5,7 @@ running stack: ``tests/integration/test_scenarios.py``.
 """
 
 import math
+from functools import partial
 from typing import Any
 
 import pytest
@@ -20,12 +21,18 @@ CROWD = ("AGI", "AGII", "AG3")
 LINKS = ["detection", "filter", "geometry", "rule", "feedback", "applied", "observed"]
 PLAYED = (
     *("nlos", "nlos-field", "link-loss", "deaf", "viewpoints", "noisy-crossing"),
-    *("occluded", "peers", "together", "many", "demo"),
+    *("occluded", "peers", "together", "many", "demo", "coat"),
 )
 
 
 def near(position: Json, x: float, y: float, within_m: float = 0.6) -> bool:
     return math.dist((position["x"], position["y"]), (x, y)) <= within_m
+
+
+def near_robot(stage: Stage, robot_id: str, x: float, y: float) -> bool:
+    """Whether a robot is inside a ring around a place."""
+    pose = stage.robot(robot_id)["pose"]
+    return pose is not None and math.dist((pose["x"], pose["y"]), (x, y)) <= 2.0
 
 
 def test_every_scenario_is_held_to_its_outcome() -> None:
@@ -50,6 +57,25 @@ async def test_agii_slows_for_a_person_whom_only_agi_sees(scenario: str) -> None
     assert (decision.observer, decision.in_sight) == ("AGI", False)
     assert line["key"] == "log.speed_down.person_nlos"
     assert (line["slots"]["observer"], line["slots"]["in_sight"]) == ("AGI", False)
+
+
+async def test_a_coat_slows_agii_each_round_until_it_is_marked_as_no_person() -> None:
+    stage = Stage("coat")
+    at_coat = partial(near_robot, stage, "AGII", 11.5, 9.0)
+    await stage.until(lambda: stage.decisions("AGII", "person"), "AGII slows for it")
+    (coat,) = {one["person_id"] for one in stage.people()}
+    await stage.until(at_coat, "AGII passes it")
+    await stage.until(lambda: not at_coat(), "AGII drives on")
+
+    stage.mark(coat)
+    await stage.until(at_coat, "AGII passes it again", 200.0)
+    await stage.until(lambda: not at_coat(), "AGII drives on")
+
+    about_it = [
+        one for one in stage.decisions("AGII", "person") if one.person_id == coat
+    ]
+    assert len(about_it) == 1
+    assert coat in {one["person_id"] for one in stage.people()}
 
 
 async def test_a_robot_that_judges_ahead_of_iveg_is_timed_too() -> None:
