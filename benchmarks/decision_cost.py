@@ -116,7 +116,7 @@ def assessor_of(
     """The rule with everything round it but the network and the disk."""
     numbers = itertools.count()
     start, greenhouse = Instant(0.0, WALL), load_greenhouse("agroconnect")
-    world, people = World(load_fleet(words=robots)), People(greenhouse.bounds)
+    world, people = World(load_fleet(words=robots)), People(greenhouse)
     obstacles = Obstacles(world, people, Plan.of(greenhouse))
     evaluator = Evaluator(
         world,

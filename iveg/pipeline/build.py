@@ -178,7 +178,7 @@ def build(
     latency = LatencyMonitor(watch, ports.sink, event_log)
     watched = guard("latency", watch.arrived), guard("recordings", ports.arrived)
     ingest = _ingest(world, event_log, ports.clock, watched)
-    scans, people = ScanReader(ingest.reject), People(greenhouse.bounds, choices.era)
+    scans, people = ScanReader(ingest.reject), People(greenhouse, choices.era)
     obstacles = Obstacles(world, people, Plan.of(greenhouse))
     evaluator = Evaluator(
         world,

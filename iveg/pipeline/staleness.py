@@ -96,7 +96,7 @@ class Staleness:
     def _log_clear(self, person: TrackedPerson, now: Instant) -> None:
         self._event_log.changed(topics.PEOPLE.name)
         newest = person.newest
-        if person.sightings or person.stage(now) != "remembered":
+        if person.sightings or person.stage(now) == "seen":
             return
         slots: dict[str, Slot] = {
             "person": person.person_id,

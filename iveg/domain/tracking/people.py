@@ -11,7 +11,8 @@ from typing import Literal
 
 from iveg.domain.detection_rule import Class, DetectionRule
 from iveg.domain.frames import FramedBox, resolve_box
-from iveg.domain.geometry import Pose2D, Rectangle
+from iveg.domain.geometry import Pose2D
+from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Detection, DetectionFrame, Instant
 from iveg.domain.robot_state import RobotState
@@ -25,8 +26,10 @@ from iveg.domain.tracking.looks import (
 )
 from iveg.domain.tracking.person import Sighting, TrackedPerson
 from iveg.domain.tracking.picture import PlacedDetection
+from iveg.domain.tracking.recognition import straight
 from iveg.domain.tracking.things import Things
 from iveg.domain.tracking.tracker import Tracker
+from iveg.domain.tracking.ways import Ways
 from iveg.domain.world import World
 
 LASER = "laser"
@@ -73,14 +76,16 @@ class People:
     """Every known person, in the order of appearance.
 
     Args:
-        bounds: The outer wall; what is seen beyond it is of doubtful position.
+        greenhouse: What is seen beyond its outer wall is of doubtful position, and
+            nobody walks through its crop.
         era: Ends every id.
     """
 
-    def __init__(self, bounds: Rectangle | None = None, era: str = "") -> None:
-        self._bounds = bounds
+    def __init__(self, greenhouse: Greenhouse | None = None, era: str = "") -> None:
+        self._bounds = None if greenhouse is None else greenhouse.bounds
         self._suspicions = Suspicions()
-        self._tracker = Tracker(era=era)
+        way = straight if greenhouse is None else Ways(greenhouse).between
+        self._tracker = Tracker(era=era, way=way)
         self._faint: dict[str, list[Placed]] = {}
         self.things = Things()
         self.turned_away = 0

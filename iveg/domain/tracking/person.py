@@ -4,6 +4,8 @@
 
     seen (<= 1 s) ──> remembered (<= 10 s, ring grows) ──> last seen (<= 600 s, no ring)
       ^________________________|                                 └──> gone
+
+Who was only glimpsed is gone sooner, and as soon as the place was seen to be empty.
 """
 
 import math
@@ -18,11 +20,12 @@ from iveg.domain.tracking.extent import Extent
 from iveg.domain.tracking.looks import Looks
 
 _SMOOTHED_S = 0.4
-_MISTAKEN_S = 2.5
+MISTAKEN_S = 2.5
 """What is seen for longer is no mistake of a detector, of which most last 2 s."""
 LASER_LASTS_S = 3.0
 """So long somebody whom only a laser saw is remembered: who or what it was is a guess,
 and beside a robot that passes, a ring that grows for longer slows it for nothing."""
+_MOST_PLACES = 16
 Stage = Literal["seen", "remembered", "last_seen", "gone"]
 
 
@@ -124,7 +127,10 @@ class TrackedPerson:
     Attributes:
         person_id: Of the track: the same person as long as iVeg can tell.
         sightings: The newest of each chain of sightings; each has a ring of its own.
+        began: The first sighting since they were last out of sight for a second.
         number: Counts tracks in the order of their appearance.
+        places: Where they appeared and were lost each time that they were followed, the
+            newest last: a glimpse, which may be a mistake, is none of them.
     """
 
     person_id: str
@@ -133,7 +139,9 @@ class TrackedPerson:
     first_seen: Instant
     newest: Sighting
     sightings: tuple[Sighting, ...]
+    began: Sighting
     number: int = 0
+    places: tuple[Sighting, ...] = ()
 
     def age_s(self, now: Instant) -> float:
         """Seconds since the newest sighting by any robot."""
@@ -141,8 +149,25 @@ class TrackedPerson:
 
     @property
     def is_well_known(self) -> bool:
-        """Whether they were seen for longer than a detector's mistake lasts."""
-        return self.newest.at.mono - self.first_seen.mono >= _MISTAKEN_S
+        """Whether they were followed, now or before."""
+        return bool(self.places) or self.is_followed
+
+    @property
+    def followed_s(self) -> float:
+        """For how long they have been in sight, faint looks among it (s)."""
+        looked = 0.0 if self.began.looks is None else self.began.looks.over_s
+        return looked + self.newest.at.mono - self.began.at.mono
+
+    @property
+    def is_followed(self) -> bool:
+        """Whether they have been in sight for longer than a detector's mistake."""
+        return self.followed_s >= MISTAKEN_S
+
+    @property
+    def last_places(self) -> tuple[Sighting, ...]:
+        """Where they may have been lost: the last of all, or before a glimpse."""
+        is_glimpse = self.places and not self.is_followed
+        return (self.newest, self.places[-1]) if is_glimpse else (self.newest,)
 
     @property
     def middle(self) -> tuple[float, float]:
@@ -163,8 +188,17 @@ class TrackedPerson:
         newest: Sighting,
         sightings: tuple[Sighting, ...],
         decision_id: str | None = None,
+        began: Sighting | None = None,
     ) -> "TrackedPerson":
-        """The same person, seen otherwise; ``decision_id`` of a new alert, if any."""
+        """The same person, seen otherwise.
+
+        Args:
+            newest: The newest sighting.
+            sightings: The newest of each chain.
+            decision_id: Of a new alert, if any.
+            began: Where they appeared again, if that was before ``newest``.
+        """
+        is_back = newest.at.mono - self.newest.at.mono > LIMITS.seen_s
         return TrackedPerson(
             self.person_id,
             self.class_,
@@ -172,14 +206,22 @@ class TrackedPerson:
             self.first_seen,
             newest,
             sightings,
+            (began or newest) if is_back else self.began,
             self.number,
+            self._places_now if is_back and self.is_followed else self.places,
         )
+
+    @property
+    def _places_now(self) -> tuple[Sighting, ...]:
+        return (*self.places, self.began, self.newest)[-_MOST_PLACES:]
 
     def stage(self, now: Instant) -> Stage:
         """The stage of life of the newest sighting."""
         age = self.age_s(now)
         if age <= LIMITS.seen_s:
             return "seen"
+        if not self.sightings and not self.is_well_known:
+            return "gone"
         if age <= self.newest.lasts_s or any(
             one.age_s(now) <= one.lasts_s for one in self.sightings
         ):

@@ -8,14 +8,9 @@ from iveg.domain.detection_rule import Class
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
 from iveg.domain.tracking.person import Sighting, TrackedPerson
+from iveg.domain.tracking.recognition import Way
 
 GATE_M, GATE_CAP_M = 1.0, 2.0
-LOST_CAP_M = 6.0
-"""So far from where somebody was lost the same one may appear: farther away it is as
-often another person (``benchmarks/tracking.py``)."""
-_LOST_M, _LOST_M_S, _LOST_MOST_M = 0.8, 0.3, 6.0
-"""Spread of where somebody is who was lost, how it grows and how far: people stay at
-their work, so it grows slower than they walk (``benchmarks/tracking.py``; m, m/s)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,20 +97,25 @@ def live_cost(one: PlacedDetection, person: TrackedPerson, at: Instant) -> float
     )
 
 
-def lost_cost(one: PlacedDetection, person: TrackedPerson, at: Instant) -> float:
-    """How unlikely it is that a lost person has come here; inf beyond their walk.
+def lost_cost(
+    one: PlacedDetection, person: TrackedPerson, at: Instant, way: Way
+) -> float:
+    """How far from where somebody was lost (m); inf beyond its gate.
 
-    The negative log-likelihood of the distance under a normal distribution around the
-    last sighting, whose spread grows with its age; 0 for the best there is.
+    So near, and by a way so short, it is taken for the same one at once; who comes from
+    farther is known again when they have been in sight for a while (``recognition``).
     """
-    last = person.newest
-    if not is_alike(person, one) or one.sighting.reach_m or last.reach_m:
+    if not is_alike(person, one) or one.sighting.reach_m:
         return math.inf
-    distance, age = distance_between(last, one.sighting), last.age_s(at)
-    if distance > min(LOST_CAP_M, GATE_M + LIMITS.walking_m_s * age):
+    return min(_near(one.sighting, last, at, way) for last in person.last_places)
+
+
+def _near(here: Sighting, last: Sighting, at: Instant, way: Way) -> float:
+    gate = _gate(last, at)
+    if last.reach_m or distance_between(last, here) > gate:
         return math.inf
-    spread = min(_LOST_MOST_M, _LOST_M + _LOST_M_S * age)
-    return (distance / spread) ** 2 / 2 + 2 * math.log(spread / _LOST_M)
+    distance = way(last.x, last.y, here.x, here.y)
+    return distance if distance <= gate else math.inf
 
 
 def distance_between(one: Sighting, other: Sighting) -> float:

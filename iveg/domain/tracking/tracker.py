@@ -8,13 +8,15 @@ time or an all-clear ends a chain's ring.  Tracks play no part in it.
 
 *Tracks* (names).  A chain that goes on keeps its track.  One that begins, or comes back
 after a second, joins the nearest live track first (global assignment over the whole
-picture), else the lost track that most likely walked there, for as long as its mark
-stays on the map, else it begins a track.  Live tracks closer than half a metre become
-one unless one picture ever showed both.
+picture), else the track that was lost where it appears, for as long as its mark stays
+on the map, else it begins a track.  While that one is new it becomes the lost one that
+most likely walked there (``recognition``).  Live tracks closer than half a metre become
+one.  Two that were ever seen apart at once never do.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
@@ -29,10 +31,14 @@ from iveg.domain.tracking.picture import (
     live_cost,
     lost_cost,
 )
+from iveg.domain.tracking.recognition import Way, recognised, straight
 
 MAX_PEOPLE, MAX_POSSIBLE, MAX_WALKERS = 256, 64, 32
 """Who counts by looks, and whom only lasers saw, take no place of others."""
 MERGE_M = 0.5
+_APART_M = 3.0
+"""Farther from each other, at once, are two: beyond noise and a second's walk."""
+_DAY_S = 86400.0
 
 
 @dataclass
@@ -41,14 +47,20 @@ class Tracker:
 
     Attributes:
         merge_m: Live tracks this near become one (m); below zero none do.
-        era: Ends every id, so that no later start of iVeg makes the same one.
+        era: Ends every id, with the day, so that no later start makes the same one.
+        way: How far it is on foot.
     """
 
     merge_m: float = MERGE_M
     era: str = ""
+    way: Way = straight
     known: dict[str, TrackedPerson] = field(default_factory=dict)
     _chains: int = 0
     _tracks: int = 0
+    _day: int = -1
+    _shown: int = 0
+    _new: set[str] = field(default_factory=set)
+    """Tracks that may yet turn out to be one of the lost."""
     _together: dict[str, set[str]] = field(default_factory=dict)
 
     def track_picture(
@@ -71,6 +83,7 @@ class Tracker:
         named = [track for track in tracks if track is not None]
         self._remember_together(named)
         merged = dict(self._merge(dict.fromkeys(named), at))
+        merged |= dict(self._recognise(dict.fromkeys(named), at))
         return [_name_now(track, merged) for track in tracks]
 
     def drop(self, person_id: str, sighting: Sighting) -> TrackedPerson:
@@ -162,8 +175,8 @@ class Tracker:
         self._assign_tracks(picture, tracks, at, is_live=True)
         taken = set(tracks)
         for index in firsts:
-            old = chains[index]
-            if tracks[index] is None and old is not None and old[0] not in taken:
+            old, of_no_place = chains[index], picture[index].sighting.reach_m
+            if of_no_place and old is not None and old[0] not in taken:
                 tracks[index] = old[0]
                 taken.add(old[0])
         self._assign_tracks(picture, tracks, at, is_live=False)
@@ -189,7 +202,7 @@ class Tracker:
             and (person.age_s(at) <= LIMITS.seen_s) is is_live
             and person.stage(at) != "gone"
         ]
-        cost = live_cost if is_live else lost_cost
+        cost = live_cost if is_live else partial(lost_cost, way=self.way)
         costs = [[cost(picture[i], person, at) for person in offered] for i in wanting]
         for row, column in assign(costs):
             tracks[wanting[row]] = offered[column].person_id
@@ -211,6 +224,8 @@ class Tracker:
         if track is None:
             return self._begin(one, sighting, at)
         person = self.known[track]
+        if person.age_s(at) > LIMITS.seen_s:
+            self._remember_apart(track, sighting, at)
         if old is None or old[0] != track:
             sighting = sighting.in_track(person)
         kept = tuple(
@@ -232,12 +247,31 @@ class Tracker:
         if not self._has_room(at, sighting):
             return None
         self._tracks += 1
-        kind = "P" if one.class_ == "person" else "R"
-        track = f"{kind}{self._tracks}{self.era}"
+        track = self._new_id("P" if one.class_ == "person" else "R", at)
         self.known[track] = TrackedPerson(
-            track, one.class_, one.decision_id, at, sighting, (sighting,), self._tracks
+            track,
+            one.class_,
+            one.decision_id,
+            at,
+            sighting,
+            (sighting,),
+            sighting,
+            self._tracks,
         )
+        self._new.add(track)
+        self._remember_apart(track, sighting, at)
         return track
+
+    def _new_id(self, kind: str, at: Instant) -> str:
+        """An id that never comes again; its number starts anew each day (UTC)."""
+        day = int(at.wall // _DAY_S)
+        if day != self._day:
+            self._day, self._shown = day, 0
+        in_use = {known.partition("-")[0] for known in self.known}
+        self._shown += 1
+        while f"{kind}{self._shown}" in in_use:
+            self._shown += 1
+        return f"{kind}{self._shown}" + (self.era and f"{self.era}{day:x}")
 
     def _has_room(self, now: Instant, newest: Sighting) -> bool:
         """Whether one more can be kept, if need be in place of one without a ring.
@@ -262,6 +296,7 @@ class Tracker:
 
     def _remove(self, track: str) -> None:
         del self.known[track]
+        self._new.discard(track)
         for other in self._together.pop(track, ()):
             self._together[other].discard(track)
 
@@ -273,6 +308,20 @@ class Tracker:
         for track in shown:
             self._together.setdefault(track, set()).update(shown - {track})
 
+    def _remember_apart(self, track: str, here: Sighting, at: Instant) -> None:
+        """Remember who is in sight elsewhere as this one appears: they never merge."""
+        for other in self.known.values():
+            seen = other.newest
+            if (
+                other.age_s(at) <= LIMITS.seen_s
+                and other.person_id != track
+                and not (seen.reach_m or here.reach_m)
+                and seen.recording == here.recording
+                and distance_between(seen, here) > _APART_M
+            ):
+                self._together.setdefault(track, set()).add(other.person_id)
+                self._together.setdefault(other.person_id, set()).add(track)
+
     def _merge(self, touched: Iterable[str], at: Instant) -> Iterator[tuple[str, str]]:
         """Join live tracks that stand at one spot; yields the changed names."""
         for track in touched:
@@ -282,6 +331,34 @@ class Tracker:
                 )
                 self._join(first, second)
                 yield second, first
+
+    def _recognise(
+        self, touched: Iterable[str], at: Instant
+    ) -> Iterator[tuple[str, str]]:
+        """Join new tracks to the lost ones that they are; yields the changed names."""
+        for track in touched:
+            if track not in self._new or self.known[track].age_s(at) > LIMITS.seen_s:
+                continue
+            person = self.known[track]
+            found = recognised(person, self._lost_before(person), self.way)
+            if found is not None:
+                self._join(found.person_id, track, person.began)
+                yield track, found.person_id
+            elif person.is_followed:
+                self._new.discard(track)
+
+    def _lost_before(self, person: TrackedPerson) -> Iterator[TrackedPerson]:
+        """Who may be this one: well known, and in no picture since it appeared."""
+        apart = self._together.get(person.person_id, set())
+        for other in self.known.values():
+            if (
+                other.newest.at.mono < person.began.at.mono
+                and other.is_well_known
+                and other.class_ == person.class_
+                and other.newest.recording == person.newest.recording
+                and other.person_id not in apart
+            ):
+                yield other
 
     def _twin_of(self, track: str, at: Instant) -> str | None:
         person = self.known[track]
@@ -304,13 +381,17 @@ class Tracker:
                 return other.person_id
         return None
 
-    def _join(self, first: str, second: str) -> None:
-        """Every sighting of both is kept: names change, rings do not."""
+    def _join(self, first: str, second: str, began: Sighting | None = None) -> None:
+        """Every sighting of both is kept: names change, rings do not.
+
+        ``began``: where the second appeared, who is in sight, and the first was lost.
+        """
         older, younger = self.known[first], self.known[second]
-        self.known[first] = older.seen_as(
-            max(older.newest, younger.newest, key=lambda sighting: sighting.at.mono),
-            (*older.sightings, *younger.sightings),
-        )
+        # What one of them knows of how far and fast they went, both know.
+        found = [one.in_track(older) for one in (younger.newest, *younger.sightings)]
+        newest = max(older.newest, found[0], key=lambda sighting: sighting.at.mono)
+        sightings = (*older.sightings, *found[1:])
+        self.known[first] = older.seen_as(newest, sightings, began=began)
         apart = self._together.get(second, set()) - {first}
         self._remove(second)
         self._together.setdefault(first, set()).update(apart)

@@ -58,7 +58,7 @@ class Scene:
 
     def __post_init__(self) -> None:
         self.world = World(fleet_of(*self.robots))
-        self.people = People()
+        self.people = People(self.greenhouse)
         plan = Plan.of(self.greenhouse)
         self.obstacles = Obstacles(self.world, self.people, plan)
         self.speed_limits = SpeedLimits(self.greenhouse, self.obstacles.seen)

@@ -6,6 +6,7 @@ import pytest
 
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.geometry import Rectangle
+from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import Instant
 from iveg.domain.tracking.people import People
 from tests.builders import detection
@@ -147,7 +148,7 @@ class Walled(Scene):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.people = People(Rectangle(0, 0, 20, 20))
+        self.people = People(Greenhouse("walled", Rectangle(0, 0, 20, 20)))
         self.drive("AGI", 10.0, 10.0)
         self.drive("AGII", 17.0, 10.0)
 

@@ -11,8 +11,8 @@ from iveg.domain.tracking.assignment import assign
 from iveg.domain.tracking.person import Sighting
 from iveg.domain.tracking.picture import PlacedDetection
 from iveg.domain.tracking.tracker import Tracker
-from tests.builders import at
-from tests.unit.domain.scene import Scene, person
+from tests.builders import START, at
+from tests.unit.domain.scene import FIELD, HEDGE, Scene, person
 
 # --- global assignment ------------------------------------------------------------
 
@@ -114,24 +114,92 @@ def test_two_who_were_in_one_picture_never_become_one() -> None:
     assert scene.everyone[1].newest.x - scene.everyone[0].newest.x < 0.5
 
 
+def follow(
+    scene: Scene, *places: tuple[float, float], seconds: float = 2.6, by: str = "AGI"
+) -> None:
+    """A robot sees people stand there for so long."""
+    began = scene.now
+    for tenth in range(round(seconds * 10) + 1):
+        scene.now = began + tenth / 10
+        scene.look(by, *(person(x, y) for x, y in places))
+
+
+def names(scene: Scene) -> list[str]:
+    return [one.person_id for one in scene.everyone]
+
+
 def test_who_walked_behind_crop_comes_out_as_the_same_person() -> None:
     scene = Scene()
-    scene.look("AGI", person(3.0))
-    scene.now = 4.0
+    follow(scene, (3.0, 0.0))
+    scene.now += 4.0
 
     scene.look("AGI", person(7.0))
+    assert names(scene) == ["P1", "P2"], "a glimpse takes nobody's name"
 
-    assert [one.person_id for one in scene.everyone] == ["P1"]
+    follow(scene, (7.0, 0.0))
+    assert names(scene) == ["P1"]
 
 
 def test_the_circle_at_the_spot_where_somebody_was_lost_stays() -> None:
     scene = Scene()
-    scene.look("AGI", person(3.0))
-    scene.now = 4.0
-    scene.look("AGI", person(7.0))
+    follow(scene, (3.0, 0.0))
+    scene.now += 4.0
+    follow(scene, (7.0, 0.0))
 
-    rings = scene.everyone[0].rings(scene.rule, at(scene.now))
+    (known,) = scene.everyone
+    rings = known.rings(scene.rule, at(scene.now))
     assert sorted(look.x for look, _ in rings) == [3.0, 7.0]
+
+
+def test_nobody_walks_through_a_row_of_crop() -> None:
+    across, beside = Scene(greenhouse=HEDGE), Scene(greenhouse=FIELD)
+    for scene in (across, beside):
+        follow(scene, (2.5, 0.0))
+        scene.now += 5.0
+        follow(scene, (3.5, 0.0))
+
+    assert names(across) == ["P1", "P2"], "the way round is 100 m"
+    assert names(beside) == ["P1"]
+
+
+def test_a_mistake_of_a_detector_moves_nobody() -> None:
+    scene = Scene()
+    follow(scene, (3.0, 0.0), (30.0, 0.0))
+    scene.now += 5.0
+    follow(scene, (4.5, 0.0), seconds=1.0)
+    scene.now += 5.0
+    assert scene.everyone[0].newest.x == 4.5
+
+    follow(scene, (1.5, 0.0), seconds=0.0)
+
+    assert names(scene) == ["P1", "P2"], "near where P1 was known, not the glimpse"
+    assert scene.everyone[0].newest.x == 1.5
+
+
+def test_people_come_back_to_where_they_worked() -> None:
+    scene = Scene()
+    follow(scene, (3.0, 0.0))
+    scene.now += 15.0
+    follow(scene, (9.0, 0.0))
+    follow(scene, (3.0, 6.0))
+    assert len(scene.everyone) == 2
+    scene.now += 15.0
+
+    follow(scene, (3.0, 0.5))
+
+    # The other was lost nearer to it, but never stood there.
+    assert [one.person_id for one in scene.everyone if one.newest.y == 0.5] == ["P1"]
+
+
+def test_two_who_were_seen_apart_at_once_by_two_robots_never_become_one() -> None:
+    scene = Scene()
+    for tenth in range(41):
+        scene.now = tenth / 10
+        scene.look("AGI", person(3.0))
+        scene.look("AGII", person(7.0 - 0.1 * tenth))
+
+    assert names(scene) == ["P1", "P2"]
+    assert scene.everyone[1].newest.x == 3.0, "at one spot"
 
 
 def test_a_live_track_is_joined_before_a_lost_one_is_revived() -> None:
@@ -158,7 +226,7 @@ def test_who_comes_back_from_where_somebody_was_last_seen_is_the_same() -> None:
     first = scene.everyone[0]
     scene.now = 50.0
 
-    scene.look("AGI", person(7.0))
+    scene.look("AGI", person(4.9))
 
     (back,) = scene.everyone
     assert back.person_id == first.person_id
@@ -185,7 +253,20 @@ def test_no_start_of_iveg_repeats_an_id() -> None:
 
     ids = {*before.track_picture([one], at(0)), *after.track_picture([one], at(0))}
 
-    assert ids == {"P1-5f0c", "P1-a31b"}
+    assert ids == {"P1-5f0c4cdb", "P1-a31b4cdb"}
+
+
+def test_numbers_begin_anew_each_day_and_ids_never_come_again() -> None:
+    tracker, midnight = Tracker(era="-5f0c"), 86400.0 - START.wall % 86400.0
+    ids: list[str | None] = []
+    for after, x in ((0.0, 0.0), (1.0, 50.0), (midnight - 1.0, 0.0), (midnight, 50.0)):
+        now = at(after)
+        seen = Sighting("AGI", x, 0.0, 0.9, now, "farmer", 0.94)
+        tracker.forget(now)
+        ids += tracker.track_picture([PlacedDetection("person", seen, "d")], now)
+
+    assert [str(one).partition("-")[0] for one in ids] == ["P1", "P2", "P3", "P1"]
+    assert len(set(ids)) == 4
 
 
 def test_whoever_appears_far_from_every_mark_is_somebody_else() -> None:
@@ -200,26 +281,34 @@ def test_whoever_appears_far_from_every_mark_is_somebody_else() -> None:
 
 def test_of_two_who_are_lost_the_likelier_one_comes_back() -> None:
     scene = Scene()
-    scene.look("AGI", person(3.0), person(8.0))
-    scene.now = 40.0
-    scene.look("AGI", person(8.0))
-    scene.now = 55.0
+    follow(scene, (3.0, 0.0), (9.0, 0.0))
+    scene.now += 15.0
 
-    scene.look("AGI", person(6.0))
+    follow(scene, (6.5, 0.0))
 
-    # P1 was lost 55 s ago and 3 m away, P2 15 s ago and 2 m away.
-    assert [one.person_id for one in scene.everyone if one.newest.x == 6.0] == ["P2"]
+    assert [one.person_id for one in scene.everyone if one.newest.x == 6.5] == ["P2"]
 
 
 def test_the_mark_of_who_was_seen_shortly_goes_sooner() -> None:
     scene = Scene()
     scene.look("AGI", person(3.0), person(8.0))
-    scene.now = 3.0
-    scene.look("AGI", person(8.0))
+    follow(scene, (8.0, 0.0))
 
     stages = [one.stage(at(scene.now + 62.0)) for one in scene.everyone]
 
     assert stages == ["gone", "last_seen"]
+
+
+def test_a_glimpse_ends_when_its_place_was_seen_empty_and_a_name_does_not() -> None:
+    scene = Scene()
+    scene.look("AGI", person(3.0))
+    follow(scene, (8.0, 0.0))
+    for one in scene.everyone:
+        scene.people.drop_sighting(one.person_id, one.sightings[0])
+
+    gone = scene.people.forget(at(scene.now + 1.5))
+
+    assert [one.person_id for one in gone] == ["P1"]
 
 
 # --- a name protects nobody -------------------------------------------------------
