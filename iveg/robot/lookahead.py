@@ -11,12 +11,14 @@ from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.rule.paths import (
     EVERY_S,
     HOLDS_S,
+    HORIZON_S,
     MOVES_M_S,
     PLAN_LASTS_S,
     Circles,
     Plan,
     path_ahead,
     slows_within_s,
+    sped_up,
 )
 from iveg.robot.caps import Cap, lowest
 
@@ -36,6 +38,7 @@ class Lookahead:
         self._plan: Plan | None = None
         self._plan_at = self._at = -math.inf
         self._caps: tuple[Cap, ...] = ()
+        self._speed_before = 0.0
 
     def note_path(self, path: Plan, now: float) -> None:
         """Note the robot's own plan (monotonic, s); one that is no number is none."""
@@ -55,15 +58,20 @@ class Lookahead:
             self._caps = ()
             return
         plan = self._plan if now - self._plan_at <= PLAN_LASTS_S else None
-        soon_s = slows_within_s(self._braking, twist.linear_x)
-        _, meetings = Circles([row for row, _ in ahead]).met_by(
-            path_ahead(pose, twist, plan)
-        )
-        met = [(ahead[one.circle][1], one.in_s) for one in meetings]
+        circles, speed = Circles([row for row, _ in ahead]), abs(twist.linear_x)
+        self._speed_before = max(self._speed_before, speed) if self._caps else speed
+
+        def met(speed: float, within_s: float) -> set[Cap]:
+            """Caps of the circles that it reaches so soon at this speed (m/s)."""
+            _, meetings = circles.met_by(path_ahead(pose, sped_up(twist, speed), plan))
+            return {ahead[one.circle][1] for one in meetings if one.in_s <= within_s}
+
+        due, held = met(speed, slows_within_s(self._braking, speed)), set[Cap]()
+        if self._caps:
+            # What lies ahead again at the speed of before is no reason to speed up.
+            held = met(speed, HOLDS_S) | met(self._speed_before, HORIZON_S)
         self._caps = tuple(
-            cap
-            for cap, in_s in met
-            if in_s <= (HOLDS_S if cap in self._caps else soon_s)
+            cap for _, cap in ahead if cap in due or (cap in held and cap in self._caps)
         )
 
     def forget(self) -> None:

@@ -10,6 +10,7 @@ as before (docs/safety.md, "Foresight").
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from iveg.domain.rule.paths import (
     Circles,
     Path,
     path_ahead,
+    sped_up,
 )
 from iveg.domain.rule.zones import Zone, zones_of
 from iveg.domain.tracking.people import People
@@ -67,24 +69,43 @@ Foretold = Mapping[str, Mapping[str, Encounter]]
 
 
 class Foresight:
-    """Keeps what was foretold last."""
+    """Keeps what was foretold last.
+
+    Attributes:
+        if_released: What would be foretold of slowed robots at the speed that they had
+            before: who would have to slow again at once is better not let go.
+    """
 
     def __init__(self) -> None:
         self._foretold: Foretold = {}
+        self.if_released: Foretold = {}
         self._at = -math.inf
 
     def look(
-        self, world: World, people: People, rule: DetectionRule, now: Instant
+        self,
+        world: World,
+        people: People,
+        rule: DetectionRule,
+        now: Instant,
+        speeds_before: Mapping[str, float] = MappingProxyType({}),
     ) -> Foretold:
-        """The encounters of the fleet, looked for anew every fifth of a second."""
+        """The encounters of the fleet, looked for anew every fifth of a second.
+
+        ``speeds_before``: of the robots that are slow now (m/s).
+        """
         if not 0.0 <= now.mono - self._at < EVERY_S - 1e-6:
             self._at = now.mono
             zones = [z for z in zones_of(world, people, rule, now) if _is_seen(z, now)]
             circles = Circles([_circle(zone, world, now) for zone in zones])
+            drive = [one for one in world.live_robots() if zones and _drives(one)]
             self._foretold = {
-                robot.robot_id: _first(robot, zones, circles, now)
-                for robot in world.live_robots()
-                if zones and _drives(robot)
+                one.robot_id: _first(path_of(one, now), zones, circles, now)
+                for one in drive
+            }
+            self.if_released = {
+                one.robot_id: _first(path_of(one, now, speed), zones, circles, now)
+                for one in drive
+                if (speed := speeds_before.get(one.robot_id)) is not None
             }
         return self._foretold
 
@@ -119,10 +140,10 @@ def _circle(zone: Zone, world: World, now: Instant) -> tuple[float, ...]:
 
 
 def _first(
-    robot: RobotState, zones: Sequence[Zone], circles: Circles, now: Instant
+    path: Path, zones: Sequence[Zone], circles: Circles, now: Instant
 ) -> Mapping[str, Encounter]:
-    """The first encounter of a robot with each cause in whose rings it is not yet."""
-    inside, meetings = circles.met_by(path_of(robot, now))
+    """A path's first encounter with each cause in whose rings it does not begin."""
+    inside, meetings = circles.met_by(path)
     with_it = {zones[one].cause for one in inside}
     found: dict[str, Encounter] = {}
     for met in meetings:
@@ -136,11 +157,11 @@ def _first(
     return found
 
 
-def path_of(robot: RobotState, now: Instant) -> Path:
-    """Where a robot will be in the next three seconds."""
+def path_of(robot: RobotState, now: Instant, at_least: float = 0.0) -> Path:
+    """Where a robot will be in the next three seconds, at least so fast (m/s)."""
     odometry, navigation = robot.odometry, robot.navigation
     assert odometry is not None  # noqa: S101 - only who drives has a path
     since = robot.navigation_received
     is_young = since is not None and now.mono - since.mono <= PLAN_LASTS_S
     plan = navigation.path if navigation is not None and is_young else None
-    return path_ahead(odometry.pose, odometry.twist, plan)
+    return path_ahead(odometry.pose, sped_up(odometry.twist, at_least), plan)

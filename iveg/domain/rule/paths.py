@@ -51,6 +51,12 @@ def slows_within_s(braking: float, speed: float) -> float:
     return _REACTION_S + abs(speed) * (1 - HALF_SPEED) / (_COMFORT * braking)
 
 
+def sped_up(twist: Twist2D, to: float) -> Twist2D:
+    """The same arc, driven at least so fast (m/s)."""
+    faster = max(1.0, to / max(abs(twist.linear_x), MOVES_M_S))
+    return Twist2D(twist.linear_x * faster, twist.angular_z * faster)
+
+
 @dataclass(frozen=True, slots=True)
 class Meeting:
     """A path reaches a circle.

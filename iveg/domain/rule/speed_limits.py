@@ -114,11 +114,7 @@ class SpeedLimits:
             for name in world.robots
             if (one := self._seen(name, now)) is not None
         }
-        self.foretold = (
-            _with_obstacles(self._foresight.look(world, people, rule, now), seen)
-            if rule.foresight
-            else {}
-        )
+        self.foretold = self._foretell(world, people, rule, seen, now)
         changes: list[LimitChange] = []
         for robot in world.robots.values():
             nearest = {
@@ -138,6 +134,25 @@ class SpeedLimits:
                 self.limited_since.setdefault(name, now.mono)
         return limits, changes
 
+    def _foretell(
+        self,
+        world: World,
+        people: People,
+        rule: DetectionRule,
+        seen: Mapping[str, SeenObstacle],
+        now: Instant,
+    ) -> Foretold:
+        if not rule.foresight:
+            self._foresight = Foresight()
+            return {}
+        before = {
+            robot_id: max(one.speed_before for one in mine.values())
+            for robot_id, mine in self._open.items()
+            if mine
+        }
+        ahead = self._foresight.look(world, people, rule, now, before)
+        return _with_obstacles(ahead, seen)
+
     def _cross(
         self,
         robot: RobotState,
@@ -147,7 +162,8 @@ class SpeedLimits:
         new_id: str,
     ) -> Iterator[LimitChange]:
         mine = self._open.setdefault(robot.robot_id, {})
-        nearest = {**inside, **_foreseen(robot, ahead, mine)}
+        again = self._foresight.if_released.get(robot.robot_id, {})
+        nearest = {**inside, **_foreseen(robot, ahead, again, mine)}
         for number, (cause, (depth, distance, zone)) in enumerate(nearest.items()):
             crossing = mine.get(cause)
             if crossing is not None:
@@ -262,20 +278,29 @@ def _nearest(
 
 
 def _foreseen(
-    robot: RobotState, ahead: Mapping[str, Encounter], mine: Mapping[str, Crossing]
+    robot: RobotState,
+    ahead: Mapping[str, Encounter],
+    again: Mapping[str, Encounter],
+    mine: Mapping[str, Crossing],
 ) -> dict[str, tuple[float, float, Zone]]:
     """Rings that a robot will reach, as if it were at their border now.
 
-    In time to be slow there; who is slow for one already stays so while it lies ahead.
+    In time to be slow there.  Who is slow for one already stays so while it lies ahead,
+    or would lie ahead ``again`` at the speed of before: it shall not speed up for that.
     """
     if robot.odometry is None:
         return {}
     pose, speed = robot.odometry.pose, robot.odometry.twist.linear_x
     soon_s = slows_within_s(robot.profile.braking, speed)
+    held = {cause: one for cause, one in again.items() if cause in mine}
+    near = {
+        cause: one
+        for cause, one in ahead.items()
+        if one.in_s <= (max(HOLDS_S, soon_s) if cause in mine else soon_s)
+    }
     return {
         cause: (0.0, pose.distance_to(one.zone.x, one.zone.y), one.zone)
-        for cause, one in ahead.items()
-        if one.in_s <= (HOLDS_S if cause in mine else soon_s)
+        for cause, one in (held | near).items()
     }
 
 

@@ -1,11 +1,16 @@
 """A robot slows by its own odometry before it reaches somebody's ring."""
 
+from itertools import pairwise
+
 import pytest
 
 from iveg.domain.feedback import FeedbackAlert
 from iveg.domain.fleet import CAUTIOUS
 from iveg.domain.geometry import Pose2D, Twist2D
+from iveg.domain.limits import LIMITS
 from iveg.domain.rule.paths import slows_within_s
+from iveg.robot.caps import Cap
+from iveg.robot.lookahead import Lookahead
 from tests.unit.robot.rig import STEP_S, Rig, person
 
 STILL = (0.0, 0.0)
@@ -103,3 +108,22 @@ def test_a_robot_without_a_place_foresees_nothing_and_stands() -> None:
     rig.odometry = False
     rig.run(1.0)
     assert (rig.factor, rig.reason) == (0.0, "stale")
+
+
+def test_behind_somebody_who_walks_ahead_it_does_not_speed_up_and_brake_in_turns() -> (
+    None
+):
+    lookahead, cap = Lookahead(braking=1.0), Cap(0.5, "person")
+    gap, drives, last, factor, changes = 6.0, 1.0, -9.0, 1.0, []
+    for step in range(200):
+        now, before = 0.2 * step, factor
+        ahead = (gap, 0.0, 0.7, 0.0, 0.0, 2.0), cap
+        lookahead.look(Pose2D(0.0, 0.0, 0.0), Twist2D(drives, 0.0), [ahead], now)
+        last = now if lookahead.cap.factor < 1.0 else last
+        factor = 0.5 if now - last < LIMITS.release_after_s else 1.0
+        changes += [now] if factor != before else []
+        drives += min(0.1, max(-0.1, factor - drives))
+        gap += (0.7 - drives) * 0.2
+
+    assert len(changes) > 3
+    assert min(after - before for before, after in pairwise(changes)) > 2.5

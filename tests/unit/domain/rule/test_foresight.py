@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 
 import pytest
 
@@ -203,3 +204,27 @@ def test_a_robot_is_slowed_in_time_to_be_slow_at_the_ring_and_told_how_soon() ->
 
 def test_inside_the_ring_nothing_is_foretold_any_more() -> None:
     assert {told for x, _, told in _drive_towards(True) if x >= 4.0} == {None}
+
+
+@pytest.mark.parametrize(("braking", "speed"), [(0.5, 1.0), (0.5, 1.5), (1.0, 1.0)])
+def test_behind_somebody_who_walks_ahead_a_robot_slows_once(
+    braking: float, speed: float
+) -> None:
+    scene, x, drives = Scene(), 0.0, speed
+    robot = scene.world.robot("AGI")
+    profile = replace(robot.profile, braking=braking, max_speed=speed)
+    robot.description = replace(robot.description, profile=profile)
+    factors = []
+    for tenth in range(200):
+        scene.now = tenth / 10
+        scene.drive("AGI", x, linear=drives)
+        scene.drive("AGII", 50.0)
+        scene.look("AGII")
+        scene.look("AGI", person(8.0 + 0.9 * speed * scene.now - x))
+        factors.append(scene.judge()["AGI"].speed_factor)
+        gap = factors[-1] * speed - drives
+        drives += min(0.05, max(-0.05 * braking, gap))
+        x += drives * 0.1
+
+    changes = [after for before, after in pairwise(factors) if before != after]
+    assert changes == [0.5]
