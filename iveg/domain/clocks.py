@@ -35,6 +35,8 @@ _DIRECT_FRESH_S = 10.0
 _HEARD_S = 2.0
 """Orion may be told to send one pose a second."""
 _TOLERANCE_S = 0.25
+_APART_S = 2.0
+"""For so long a detector has to be apart before its clock is accused."""
 OFFSET_WARN_S, _WARNED_S = 0.25, 60.0
 _MAX_FILTERS = 16
 
@@ -133,9 +135,13 @@ class RobotClock:
     Attributes:
         detector_apart_at: When a detection frame was last stamped by another clock than
             odometry (monotonic, s).
+        detector_accused_at: When it last had been so for two seconds.
     """
 
     detector_apart_at: float | None = None
+    detector_accused_at: float | None = None
+    _apart: tuple[float, float] | None = None
+    """Since when frames are apart, and by what (s)."""
     _filters: dict[_Sender, ClockFilter] = field(default_factory=dict)
     _warned: tuple[float, float] = (float("-inf"), 0.0)
 
@@ -157,8 +163,9 @@ class RobotClock:
             beyond = self._beyond_odometry(transport, origin, at.mono)
             if beyond is None:
                 if self._hears_odometry(transport, origin, at.mono):
-                    self.detector_apart_at = at.mono
+                    self._note_apart(origin, at.mono)
                 return None
+            self._apart = None
             own = None if own is None else max(own, beyond)
         if transport != FIWARE.id:
             return own
@@ -194,6 +201,18 @@ class RobotClock:
         return max(
             0.0, transit - (transit if odometry.least is None else odometry.least)
         )
+
+    def _note_apart(self, origin: Origin, now: float) -> None:
+        """Note a frame of another clock, unless it is of a backlog.
+
+        A backlog is worked off: its frames are less late from one to the next.
+        """
+        assert origin.stamp_s is not None  # noqa: S101 - else nothing is apart
+        self.detector_apart_at, transit = now, now - origin.stamp_s
+        if self._apart is None or transit < self._apart[1] - STEP_S:
+            self._apart = now, transit
+        elif now - self._apart[0] >= _APART_S:
+            self.detector_accused_at = now
 
     def _hears_odometry(
         self, transport: TransportId, origin: Origin, now: float

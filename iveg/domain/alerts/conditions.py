@@ -74,7 +74,7 @@ def of_detector(
         robot, now, started
     ):
         yield Condition.of_robot("P2", "alert.unreadable_detection", name)
-    if _is_recent(robot.clock.detector_apart_at, now):
+    if _is_recent(robot.clock.detector_accused_at, now):
         yield Condition.of_robot("P2", "alert.detector_clock", name)
     if _is_silent(robot, now, started):
         yield Condition.of_robot("P2", "alert.detector_silent", name)

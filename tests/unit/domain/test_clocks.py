@@ -249,15 +249,30 @@ def test_a_frame_that_is_stamped_by_another_clock_is_of_unknown_age(
     assert robot.estimate.detector_apart_at == at(0.1).mono
 
 
-def test_the_first_frame_behind_a_gap_accuses_no_clock() -> None:
+def test_a_clock_that_stays_apart_is_accused() -> None:
+    robot, accused = Robot(), []
+    for tenth in range(30):
+        robot.ahead_s = 0.0
+        robot.send(0.1 * tenth)
+        robot.ahead_s = -600.0
+        robot.send(0.1 * tenth, kind=DetectionFrame)
+        accused.append(robot.estimate.detector_accused_at is not None)
+
+    assert accused == [tenth >= 20 for tenth in range(30)]
+
+
+def test_frames_behind_a_gap_accuse_no_clock() -> None:
     robot = Robot()
     robot.send(0.0)
 
     assert robot.send(1.0, 80.0, kind=DetectionFrame) is None
-    assert robot.estimate.detector_apart_at is None
-    robot.send(1.0, 80.1)
-    robot.send(1.1, 80.1, kind=DetectionFrame)
-    assert robot.estimate.detector_apart_at is None
+    # Odometry is young again at once, and 80 s of frames are worked off in eight.
+    for tenth in range(80):
+        robot.send(80.0 + 0.1 * tenth)
+        robot.send(1.0 + 1.1 * tenth, 79.0 - tenth, kind=DetectionFrame)
+
+    assert robot.estimate.detector_apart_at is not None
+    assert robot.estimate.detector_accused_at is None
 
 
 def test_a_detectors_clock_makes_no_pose_old() -> None:
