@@ -181,11 +181,13 @@ def detection(here, real):
     yield "mean", "here", "", "", "", *shown, "–" if ap is None else f"{ap:.2f}"
 
 
-def claims(runs, halves, here, took):
+def claims(runs, fields, halves, here, took):
     """Numbers of the paper's text: completion, confidence, delivery, worst P95."""
     done = [sum(run["completed"][half] for run in runs) for half in HALVES]
     of = len(runs)
     yield f"{done[0]} of {of}; through all programs {done[1]} of {of}"
+    completed = sum(run["completed"]["virtual"] for run in fields)
+    yield f"{completed} of {len(fields)}"
     found = [sure for one in here.values() for sure in one.found]
     threshold = runs[0]["configuration"]["confidence_threshold"]
     yield f"{mean(found):.0%}" if found else "–"
@@ -485,7 +487,8 @@ def tables(directory):
     took = list(latency(halves[1]))
     yield "detection", detection(here, through)
     yield "place", place(here, through)
-    yield "claims", ((one,) for one in claims(runs, halves[1], here, took))
+    fields = [run for _, run in every if run["fails"]]
+    yield "claims", ((one,) for one in claims(runs, fields, halves[1], here, took))
     yield "sight", zip(*map(sight, halves))
     yield "", protection(every)
     yield "latency", took
@@ -507,6 +510,16 @@ def tables(directory):
                 *(yes(run["settled"]), *run["load"]),
             )
             for n, run in enumerate(runs)
+        ),
+    )
+    yield (
+        "field",
+        (
+            (
+                *(run["number"], run["profile"], run["seed"]),
+                *(yes(run["completed"]["virtual"]), ", ".join(run["failures"]) or "–"),
+            )
+            for run in fields
         ),
     )
 

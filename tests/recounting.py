@@ -41,7 +41,11 @@ def _rows(result: Mapping[str, Any]) -> Iterator[Sequence[object]]:
     for row in tables.entries(result):
         yield "entries", *row
     yield from _named("latency", tables.latency(result), own)
-    for name, rows in (("stops", tables.stops(result)), ("runs", tables.runs(result))):
+    for name, rows in (
+        ("stops", tables.stops(result)),
+        ("runs", tables.runs(result)),
+        ("field", tables.field_tests(result)),
+    ):
         for row in rows:
             yield name, *row
 

@@ -36,7 +36,7 @@ def test_an_operator_starts_watches_ends_and_opens_an_experiment(
 
     expect(says).to_have_text(
         re.compile(
-            r"quick-001: 0 de 7 pasadas hechas; ahora demo-field-iveg-1 "
+            r"quick-001: 0 de 8 pasadas hechas; ahora demo-field-iveg-1 "
             r"\(reloj virtual\)\. Quedan unos 2:\d\d\."
         ),
         timeout=30_000,

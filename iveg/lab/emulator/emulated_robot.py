@@ -162,7 +162,7 @@ class EmulatedRobot:
         self._faults = self._faults.changed_by(order)
         if self._relay is not None:
             self._relay.radio.faults = self._faults
-        self._rig.blind(order)
+        self._rig.obey(order)
         if order.local_hold is not None:
             node.add_local_hold(order.local_hold)
         if order.release_locally:

@@ -71,6 +71,7 @@ class FaultOrder(LinkFaults):
         thing: Something there is taken for a person where its camera has it in view, as
             surely and seldom as a person; null ends that.
         hide_people: Its camera detects no person.
+        stuck: Its navigation has given up and asks for no speed.
     """
 
     robot: str
@@ -83,6 +84,7 @@ class FaultOrder(LinkFaults):
     false_person: OrderPlace | None = None
     thing: OrderPlace | None = None
     hide_people: bool | None = None
+    stuck: bool | None = None
 
     def changed_by(self, order: "FaultOrder") -> "FaultOrder":
         """The faults in force after another order."""

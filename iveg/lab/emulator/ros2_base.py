@@ -149,7 +149,7 @@ class Ros2Base:
         """Execute the sensor faults of an order; the others concern its software."""
         if order.freeze_odometry is not None:
             self._is_odometry_frozen = bool(order.freeze_odometry)
-        self._rig.blind(order)
+        self._rig.obey(order)
 
     # --- the slots ----------------------------------------------------------------
 

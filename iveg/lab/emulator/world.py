@@ -55,6 +55,7 @@ class RobotHardware:
         false_person: Fault: a position in ``map`` where the camera detects a person.
         thing: Fault: one where it takes a thing for a person when it is in view.
         hides_people: Fault: the camera detects no person.
+        is_stuck: Fault: navigation has given up.
     """
 
     def __init__(
@@ -72,6 +73,7 @@ class RobotHardware:
         self.false_person: tuple[float, float] | None = None
         self.thing: tuple[float, float] | None = None
         self.hides_people = False
+        self.is_stuck = False
         self._rng = rng
         self._odometer = Odometer(rng)
         place = None
@@ -92,8 +94,10 @@ class RobotHardware:
         truth, twist = self.vehicle.pose, self.vehicle.twist
         self._believed = self._odometer.measure(truth, twist, dt)
 
-    def blind(self, order: FaultOrder) -> None:
-        """Set the camera faults of an order."""
+    def obey(self, order: FaultOrder) -> None:
+        """Set the faults of camera and navigation of an order."""
+        if order.stuck is not None:
+            self.is_stuck = order.stuck
         if order.hide_people is not None:
             self.hides_people = order.hide_people
         if "false_person" in order.model_fields_set:
@@ -105,6 +109,8 @@ class RobotHardware:
 
     def requested_twist(self, now: float, around: "SimulatedWorld") -> Twist2D:
         """Twist that navigation requests; ``now`` in seconds into the run."""
+        if self.is_stuck:
+            return REST
         discs = around.discs()
         for body in around.bodies_but(self.robot_id):
             discs.extend(body.discs())

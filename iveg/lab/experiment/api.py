@@ -46,7 +46,7 @@ class Wanted(BaseModel):
     model_config = ConfigDict(strict=True, extra="forbid")
 
     size: Size = "quick"
-    """`quick` takes three minutes, `full` about twenty, `minimal` some seconds."""
+    """`quick` takes three minutes, `full` about 25, `minimal` some seconds."""
 
 
 def router(bench: ExperimentRunner) -> APIRouter:

@@ -83,7 +83,7 @@ def _counted(before: Result, after: Result) -> Iterator[str]:
 
 def _guarded(result: Result) -> list[Run]:
     """Virtual halves by the rule as it stands, with the experiment's own detector."""
-    own = {"profile": result["plan"]["profile"], "rule": "iveg"}
+    own = {"profile": result["plan"]["profile"], "rule": "iveg", "fails": False}
     return [run["counted"] for run in result["runs"] if own.items() <= run.items()]
 
 

@@ -34,6 +34,7 @@ def half_of(run: Recording) -> Outcome:
     pairs = run.pairs
     return {
         "completed": run.completed,
+        "failures": run.failures,
         "pictures": len(pairs),
         "classes": {name: asdict(one) for name, one in tally(pairs).items()},
         "slowdowns": slowdowns_of(run.decisions),
@@ -95,6 +96,7 @@ def result_of(
         "machine": machine(),
         "configuration": dict(chosen),
         **_summed(plan, [one["counted"] for one in timed]),
+        "field": _fields(outcomes),
         "protected": _protected(plan, outcomes),
         "protection": [*_protection(outcomes)],
         "stack": {
@@ -140,9 +142,19 @@ def _summed(plan: Plan, runs: Sequence[Outcome]) -> dict[str, object]:
     }
 
 
+def _fields(outcomes: Sequence[Outcome]) -> dict[str, object]:
+    """Field tests: completed ones, and why the others were not."""
+    runs = [one["counted"] for one in outcomes if one["fails"]]
+    return {
+        "runs": len(runs),
+        "completed": sum(one["completed"] for one in runs),
+        "failures": _sum(dict.fromkeys(one["failures"], 1) for one in runs),
+    }
+
+
 def _protected(plan: Plan, outcomes: Sequence[Outcome]) -> dict[str, object] | None:
     """All virtual runs with the experiment's own detector and the rule as it stands."""
-    own = {"profile": plan.profile, "rule": "iveg"}
+    own = {"profile": plan.profile, "rule": "iveg", "fails": False}
     runs = [one["counted"] for one in outcomes if own.items() <= one.items()]
     scored = (Protection.read(one["protection"]) for one in runs)
     return all_protection(scored).row() if runs else None

@@ -21,6 +21,8 @@ WATCHED: Final = "AGII"
 """Robot whose costmap is examined: the one without sight in the paper's test."""
 GREENHOUSE: Final = "mvsim-20x20"
 SEED: Final = 2026
+FIELD: Final = "nlos-field"
+"""The test without a line of sight on the plan of AgroConnect, with failures."""
 PEOPLED: Final = "demo"
 """Scenario of the runs that only protection is scored on: four people at work."""
 _STARTS_S: Final = 8.0
@@ -38,6 +40,7 @@ class PlannedRun:
         counted_s: Duration on the virtual clock, which gives the counts (s).
         seed: Random seed of its people and its detector's noise.
         profile: Of the emulated detector; ``rule`` that robots are slowed by.
+        fails: Navigation and links fail as in the field (``failures``).
     """
 
     family: str
@@ -47,6 +50,7 @@ class PlannedRun:
     counted_s: float = 60.0
     profile: str = "field"
     rule: RuleName = "iveg"
+    fails: bool = False
 
     @property
     def is_timed(self) -> bool:
@@ -76,6 +80,7 @@ class Plan:
         profile: Detector profile of the emulator: ``simulation`` or ``field``.
         protected_s: Duration of each run for protection alone (s), on the virtual
             clock, one for each rule; ``profiles`` of them beside ``profile``.
+        fields: Field tests for each of the others' ``runs``, likewise.
     """
 
     size: Size
@@ -87,15 +92,23 @@ class Plan:
     counted_s: float = 60.0
     protected_s: float = 120.0
     profiles: tuple[str, ...] = ()
+    fields: int = 1
 
     def steps(self) -> Iterator[PlannedRun]:
         """All runs in order; every family's first run precedes any second one."""
         for number in range(1, self.runs + 1):
             yield from self._compared(number)
+            yield from self._fields(number)
             for place, family in enumerate(self.families):
                 seed = self.seed + 100 * place + number
                 times = self.seconds, seed, self.counted_s
                 yield PlannedRun(family, number, *times, self.profile)
+
+    def _fields(self, of: int) -> Iterator[PlannedRun]:
+        """Field tests, which can fail."""
+        for number in range((of - 1) * self.fields + 1, of * self.fields + 1):
+            times = 0.0, self.seed + 100 * (len(FAMILIES) + 1) + number, self.counted_s
+            yield PlannedRun(FIELD, number, *times, self.profile, fails=True)
 
     def _compared(self, number: int) -> Iterator[PlannedRun]:
         """Runs of one seed that differ in profile and rule alone."""
@@ -107,8 +120,8 @@ class Plan:
 
 PLANS: Final[dict[Size, Plan]] = {
     "minimal": Plan("minimal", 1, 5.0, ("together",), counted_s=5.0, protected_s=5.0),
-    "quick": Plan("quick", 1, 17.0),
-    "full": Plan("full", 5, 28.0, profiles=("field", "simulation")),
+    "quick": Plan("quick", 1, 17.0, protected_s=90.0),
+    "full": Plan("full", 5, 28.0, profiles=("field", "simulation"), fields=5),
 }
 """Two robots send about 180 messages a second: quick has 15,000, full 126,000.  Five
 runs of each are the paper's own number in simulation."""

@@ -33,10 +33,11 @@ def write_raw(
 ) -> None:
     """Write the raw data of one run into a directory of its own."""
     _write_half(directory / "virtual", virtual)
-    kept = ("family", "number", "seed", "profile", "rule", "load")
+    kept = ("family", "number", "seed", "profile", "rule", "fails", "load")
     told: dict[str, object] = {one: outcome[one] for one in kept}
     told["configuration"] = configuration
     told["completed"] = {"virtual": virtual.completed}
+    told["failures"] = virtual.failures
     if real is not None:
         _write_half(directory / "real", real)
         _write_rows(directory / "real" / "messages.ndjson", real.times)

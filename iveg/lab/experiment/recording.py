@@ -30,6 +30,7 @@ class Recording:
             pictures).
         decisions: Each with ``reason``, ``applied_at``, ``observed_at``, ``in_sight``.
         completed: Whether it reached its end with all robots live and unharmed.
+        failures: Why not, in a word each; the virtual half alone has them.
     """
 
     truth: list[Row] = field(default_factory=list)
@@ -38,6 +39,7 @@ class Recording:
     beliefs: list[tuple[float, Belief]] = field(default_factory=list)
     decisions: list[Row] = field(default_factory=list)
     completed: bool = False
+    failures: list[str] = field(default_factory=list)
 
     @property
     def measured(self) -> list[Row]:

@@ -71,6 +71,15 @@ _ENTERED = (
 )
 
 
+_FAILING = (
+    "The test without a line of sight on the plan of AgroConnect, on the virtual "
+    "clock. Navigation gives up and links have gaps at rates that are set by us; who "
+    "is missed near a robot is measured. A run fails by navigation, by a robot that "
+    "iVeg did not hear for five seconds or at the end (link), by touching somebody, or "
+    "by an encounter in which a robot was never slowed (missed)."
+)
+
+
 def write_report(result: Result) -> str:
     """The whole file."""
     parts = [
@@ -103,6 +112,9 @@ def write_report(result: Result) -> str:
         + "</ul>",
         "<h2>Runs</h2>",
         _table(tables.RUNS, tables.runs(result)),
+        "<h2>Field tests with failures</h2>",
+        f"<p>{_FAILING}</p>",
+        _table(tables.FIELD_TESTS, tables.field_tests(result)),
     ]
     body = "\n".join(parts)
     head = (

@@ -124,13 +124,13 @@ class StagedRobot:
         return Instant(now.mono, now.wall + (self._faults.clock_offset_s or 0.0))
 
     def obey(self, order: FaultOrder) -> None:
-        """Take what an order has of ``mute``, ``deaf``, ``clock_offset_s``, camera.
+        """Take faults of camera and navigation, ``mute``, ``deaf``, ``clock_offset_s``.
 
         A mute robot's messages do not arrive; a deaf one ignores iVeg's speed limits,
         but not holds.
         """
         self._faults = self._faults.changed_by(order)
-        self._rig.blind(order)
+        self._rig.obey(order)
 
     def listen(self, topic: str, payload: bytes, now: Instant) -> None:
         """Take iVeg's feedback to a robot of the fleet."""

@@ -111,6 +111,9 @@ def claims(result: Result) -> Rows:
     through = f"{real['completed']} of {real['runs']}"
     shares = [f"{COMPLETION[place]:.0%}" for place in PRINTED]
     yield "runs completed", f"{here}; through all programs {through}", *shares
+    field = result["field"]
+    tested = f"{field['completed']} of {field['runs']}"
+    yield "runs completed of the field test with failures", tested, *shares
     told = result["global"]["confidence"]
     sure = [f"{CONFIDENCE[place]:.0%}" for place in PRINTED]
     yield "mean confidence", "–" if told is None else f"{told:.0%}", *sure
@@ -274,6 +277,19 @@ def runs(result: Result) -> Rows:
         ]
         kept_up = "yes" if one["stack"]["settled"] else "no"
         yield one["number"], one["family"], one["seed"], *cells, kept_up, *one["load"]
+
+
+FIELD_TESTS: Final = ("run", "detector", "seed", "completed", "failed by")
+
+
+def field_tests(result: Result) -> Rows:
+    """One line per field test."""
+    for one in result["runs"]:
+        if one["fails"]:
+            half = one["counted"]
+            done = "yes" if half["completed"] else "no"
+            why = ", ".join(half["failures"]) or "–"
+            yield one["number"], one["profile"], one["seed"], done, why
 
 
 def _interval(told: Mapping[str, float] | None) -> str:

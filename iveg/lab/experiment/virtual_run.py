@@ -5,6 +5,7 @@ runs of one seed give the same counts on any machine.
 """
 
 import asyncio
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 
 from iveg.adapters.fleet_files import load_fleet
@@ -15,10 +16,14 @@ from iveg.domain.witness import Outline, Plan
 from iveg.lab.emulator.camera import DETECTORS
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.scenarios import scenario_named
+from iveg.lab.emulator.scripts import Incident
 from iveg.lab.emulator.truth import true_picture
 from iveg.lab.emulator.world import RobotHardware, SimulatedWorld
 from iveg.lab.experiment.beliefs import belief_of
+from iveg.lab.experiment.failures import FAILURES, LINK_LOST_S, drawn
+from iveg.lab.experiment.moments import moments_of
 from iveg.lab.experiment.plan import ROBOTS, WATCHED, PlannedRun
+from iveg.lab.experiment.protection import protection_of
 from iveg.lab.experiment.recording import Recording, Row, picture_of
 from iveg.lab.experiment.scoring import Picture
 from iveg.lab.experiment.stage import STEP_S, Stage
@@ -36,11 +41,11 @@ class VirtualRunResult(Recording):
 
     Attributes:
         touched: Moments at which a robot touched a person.
-        lost: Robots that were not live at the end.
+        unheard_s: Longest time in which iVeg did not hear a robot that it had heard.
     """
 
     touched: int = 0
-    lost: int = 0
+    unheard_s: float = 0.0
 
 
 class VirtualRun:
@@ -57,6 +62,7 @@ class VirtualRun:
         layout = lay_out(scenario, ROBOTS, greenhouse)
         self._result = VirtualRunResult()
         self._looks: list[Row] = []
+        self._heard_at: dict[str, float] = {}
         by_paper = step.rule == "paper"
         if by_paper:
             rule = replace(rule, possible_people=False, foresight=False)
@@ -67,7 +73,7 @@ class VirtualRun:
         self._world = SimulatedWorld(greenhouse, layout, detector, step.seed)
         self._stage = Stage(
             self._world,
-            layout.incidents,
+            (*layout.incidents, *_failures(step)),
             iveg.parts.ingest,
             iveg.parts.loop,
             iveg.feedback,
@@ -79,6 +85,7 @@ class VirtualRun:
             peer_scans=iveg.peer_scans,
         )
         self._watched = self._stage.robots[WATCHED]
+        self.happen = self._stage.happen
         body = self._world.rigs[WATCHED].profile
         outline = Outline(body.length, body.width)
         self._watched.costmap = FleetCostmap(WATCHED, outline, greenhouse.bounds)
@@ -93,14 +100,37 @@ class VirtualRun:
             if number % _BELIEVE_EVERY == 1:
                 self._believe()
             self._result.touched += self._touches()
+            self._listen()
             if number % _REST_EVERY == 0:
                 await asyncio.sleep(0)
         self._result.decisions = [asdict(one) for one in self._iveg.decisions.values()]
-        live = (self._views.robot(one, self._iveg.now).link for one in ROBOTS)
         result = self._result
-        result.lost = sum(link != "LIVE" for link in live)
-        result.completed = bool(result.told) and not result.touched and not result.lost
+        result.failures = [*self._failed()]
+        result.completed = bool(result.told) and not result.failures
         return result
+
+    def _failed(self) -> Iterator[str]:
+        """Why the run is none that was completed."""
+        result, robots = self._result, self._iveg.parts.world.robots
+        if any(rig.is_stuck for rig in self._world.rigs.values()):
+            yield "navigation"
+        ends_live = all(robots[one].link(self._iveg.now) == "LIVE" for one in ROBOTS)
+        if not ends_live or result.unheard_s > LINK_LOST_S:
+            yield "link"
+        if result.touched:
+            yield "touched"
+        met = protection_of(moments_of(result.truth)).delays_s
+        if None in met:
+            yield "missed"
+
+    def _listen(self) -> None:
+        """How long robots are not heard."""
+        now = self._iveg.now
+        for robot_id in ROBOTS:
+            if self._iveg.parts.world.robots[robot_id].link(now) == "LIVE":
+                self._heard_at[robot_id] = now.mono
+            unheard_s = now.mono - self._heard_at.get(robot_id, now.mono)
+            self._result.unheard_s = max(self._result.unheard_s, unheard_s)
 
     def _looked(self, rig: RobotHardware) -> None:
         """The truth at the moment of the picture."""
@@ -133,6 +163,12 @@ class VirtualRun:
             for body in self._world.bodies()
             for one in people
         )
+
+
+def _failures(step: PlannedRun) -> tuple[Incident, ...]:
+    if not step.fails:
+        return ()
+    return drawn(FAILURES[step.profile], ROBOTS, step.counted_s, step.seed)
 
 
 def foretold_row(iveg: VirtualPipeline, truth: Row) -> Row:

@@ -77,13 +77,15 @@ async def run(directory: Path, step: PlannedRun) -> Any:
 
 @pytest.fixture(scope="module")
 def experiment(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Any]:
-    """Raw data of two runs and of two for protection, and their result."""
+    """Raw data and result of two runs, two for protection, and two field tests."""
     directory = tmp_path_factory.mktemp("experiment")
     steps = [
         PlannedRun("together", 1, 6.0, 7),
         PlannedRun("nlos", 2, 6.0, 8),
         PlannedRun("demo", 1, 0.0, 9, profile="simulation"),
         PlannedRun("demo", 1, 0.0, 9, profile="simulation", rule="paper"),
+        PlannedRun("nlos-field", 1, 0.0, 10, fails=True),
+        PlannedRun("nlos-field", 2, 0.0, 11, fails=True),
     ]
     outcomes = [asyncio.run(run(directory, step)) for step in steps]
     return directory, result_of(PLANS["quick"], outcomes, CHOSEN)
@@ -97,7 +99,7 @@ def test_the_script_gives_the_reports_tables_to_the_last_digit(
     expected = reported(result)
 
     assert recounted(directory) == expected
-    assert len(expected) == 53
+    assert len(expected) == 60
 
 
 @pytest.mark.parametrize(

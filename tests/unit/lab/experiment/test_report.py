@@ -54,6 +54,7 @@ def half(farmer: Tally | None = None, slices: list[Any] | None = None) -> Any:
     """One of a run's halves; the second one has been timed, too."""
     told = {
         "completed": True,
+        "failures": [],
         "pictures": 99,
         "classes": {} if farmer is None else {"farmer": asdict(farmer)},
         "slowdowns": {"decided": 4, "applied": 4, "observed": 3, "out_of_sight": 2},
@@ -79,6 +80,13 @@ def guarded(rule: Any) -> Any:
     return outcome_of(step, half(), None, (1.0, 1.0))
 
 
+def field_test(number: int, *failures: str) -> Any:
+    """One that failed, or did not."""
+    step = PlannedRun("nlos-field", number, 0.0, 600 + number, fails=True)
+    counted = {**half(), "completed": not failures, "failures": [*failures]}
+    return outcome_of(step, counted, None, (1.0, 1.0))
+
+
 def result(
     found: int = 36,
     missed: int = 3,
@@ -94,7 +102,8 @@ def result(
     step = PlannedRun("together", 1, 6.0, 7)
     stack = half(farmer, [piece(one) for one in took_ms])
     outcome = outcome_of(step, half(farmer), stack, (1.24, 3.0))
-    return result_of(PLANS["minimal"], [guarded("paper"), outcome], CHOSEN, why)
+    outcomes = [guarded("paper"), field_test(1), field_test(2, "link"), outcome]
+    return result_of(PLANS["minimal"], outcomes, CHOSEN, why)
 
 
 def test_the_report_sets_the_papers_counts_beside_what_was_counted() -> None:
@@ -152,6 +161,17 @@ def test_the_report_says_who_was_protected_by_detector_and_rule() -> None:
         told = "–" if where == "real time" else "50.0%"
         entered = f"<td>2</td><td>{told}</td><td>50.0%</td>"
         assert f"{chosen}<td>in view for 2 s</td>{entered}" in page
+
+
+def test_field_tests_that_failed_are_counted_with_their_reasons() -> None:
+    told = result()
+    page = write_report(told)
+
+    assert told["completion"] == {"runs": 1, "completed": 1, "planned": 1}
+    assert told["field"] == {"runs": 2, "completed": 1, "failures": {"link": 1}}
+    assert "with failures</td><td>1 of 2</td><td>92%</td><td>82%</td>" in page
+    assert "<td>2</td><td>field</td><td>602</td><td>no</td><td>link</td>" in page
+    assert "<td>1</td><td>field</td><td>601</td><td>yes</td><td>–</td>" in page
 
 
 def test_the_report_needs_no_network() -> None:
@@ -214,6 +234,7 @@ def test_results_come_back_as_they_were_written(tmp_path: Path) -> None:
         "scenarios",
         "real time",
         "demo",
+        "nlos-field",
     ]
     assert [one.name for one in tmp_path.iterdir()] == ["result.json"]
 
@@ -241,14 +262,15 @@ def test_every_run_has_a_seed_of_its_own(size: Any) -> None:
     steps = list(PLANS[size].steps())
 
     timed = [one for one in steps if one.is_timed]
-    assert len({one.seed for one in timed}) == len(timed)
+    own = [one for one in steps if one.is_timed or one.fails]
+    assert len({one.seed for one in own}) == len(own)
     assert {one.family for one in timed} <= set(FAMILIES)
     assert len({one.name for one in steps}) == len(steps)
 
 
 def test_runs_for_protection_differ_in_detector_and_rule_alone() -> None:
     steps = [*replace(PLANS["quick"], profile="simulation", runs=2).steps()]
-    compared = [one for one in steps if not one.is_timed]
+    compared = [one for one in steps if one.family == "demo"]
 
     assert [one.name for one in compared] == [
         "demo-simulation-iveg-1",
@@ -258,8 +280,8 @@ def test_runs_for_protection_differ_in_detector_and_rule_alone() -> None:
     ]
     seeds = [one.seed for one in compared]
     assert seeds[0] == seeds[1] != seeds[2] == seeds[3]
-    assert not set(seeds) & {one.seed for one in steps if one.is_timed}
-    full = [one for one in PLANS["full"].steps() if not one.is_timed]
+    assert not set(seeds) & {one.seed for one in steps if one.family != "demo"}
+    full = [one for one in PLANS["full"].steps() if one.family == "demo"]
     assert {(one.profile, one.rule) for one in full} == {
         (profile, rule)
         for profile in ("field", "simulation")
@@ -289,7 +311,7 @@ def test_an_experiment_that_broke_off_keeps_what_it_has_and_goes_on(
 ) -> None:
     first = RunStore(PLANS["quick"], tmp_path)
     steps = first.steps_left()
-    for step in steps[:4]:
+    for step in steps[:5]:
         first.keep(step, finished(step))
     first.finish(CHOSEN, "iveg: did not answer")
 
@@ -298,8 +320,8 @@ def test_an_experiment_that_broke_off_keeps_what_it_has_and_goes_on(
     partial = read_json(tmp_path / "partial.json")
     assert partial["completion"] == {"runs": 2, "completed": 2, "planned": 5}
     assert partial["detection"]["farmer"]["tp"] == 2
-    assert second.done == 4
-    assert second.steps_left() == steps[4:]
+    assert second.done == 5
+    assert second.steps_left() == steps[5:]
 
 
 def test_a_run_that_a_crash_left_half_written_is_run_again(tmp_path: Path) -> None:

@@ -71,7 +71,7 @@ async def test_one_that_runs_is_watched_and_its_end_is_told(tmp_path: Path) -> N
         claim(tmp_path / "experiments" / begun.name, PLANS["quick"])
         ended = await until(bench, lambda one: one.state == "done")
 
-    assert (begun.name, begun.state, begun.of) == ("quick-001", "running", 7)
+    assert (begun.name, begun.state, begun.of) == ("quick-001", "running", 8)
     assert begun.left_s == round(sum(map(expected_s, PLANS["quick"].steps())))
     assert (ended.done, ended.why, ended.report) == (5, "", True)
     assert (begun.profile, begun.seed, begun.load) == (None, None, None)
