@@ -140,7 +140,8 @@ def test_a_tablet_shows_the_strip_of_time_above_the_stops(fleet: Fleet) -> None:
 
 SAID = """() => {
   const said = document.querySelector('#status-said');
-  const size = (of) => parseFloat(getComputedStyle(of).fontSize);
+  const size = (of) => parseFloat(getComputedStyle(of).fontSize)
+    * (of.getScreenCTM?.().a ?? 1);
   const words = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
   const larger = [];
   while (words.nextNode()) {
@@ -242,6 +243,23 @@ def test_13_19_a_card_is_as_high_whatever_it_says(fleet: Fleet) -> None:
 
 
 @pytest.mark.parametrize("fleet", [2], indirect=True)
+def test_two_cards_are_whole_on_a_desktop_and_have_no_second_stop(fleet: Fleet) -> None:
+    page = fleet.at((1440, 900))
+
+    for robot in ("AGI", "AGII"):
+        last = page.locator(f'[data-robot="{robot}"] [data-part="margin"]')
+        expect(last).to_be_in_viewport(ratio=1)
+        expect(page.locator(f'[data-stop="{robot}"]:visible')).to_have_count(1)
+
+
+@pytest.mark.parametrize("fleet", [2, 6], indirect=True)
+def test_a_card_has_three_sizes_of_letters(fleet: Fleet) -> None:
+    for size in SIZES:
+        found = evaluate(fleet.at(size), LETTERS)
+        assert len(found) <= 3, (size, found)
+
+
+@pytest.mark.parametrize("fleet", [2], indirect=True)
 def test_the_menu_of_a_recorded_robot_is_on_its_card(fleet: Fleet) -> None:
     first = frozen()["snapshot"]["robots"][0]
     fleet.tell({**first, "replay": True})
@@ -306,10 +324,24 @@ WITHIN_REACH = """() => {
   return [...near];
 }"""
 """STOPs of cards that a finger finds within 24 px of that of all, when scrolled."""
+LETTERS = """() => {
+  const words = document.createTreeWalker(
+    document.querySelector('#robots'), NodeFilter.SHOW_TEXT);
+  const sizes = new Set();
+  while (words.nextNode()) {
+    const of = words.currentNode.parentElement;
+    if (!words.currentNode.data.trim() || !of.checkVisibility()) continue;
+    if (!of.closest('.stop, svg, dialog')) sizes.add(getComputedStyle(of).fontSize);
+  }
+  return [...sizes];
+}"""
+"""Sizes of the letters on cards, but those of STOP and of the gauge, which scales."""
 CARD_HEIGHT = """() => {
   const box = (part) => document.querySelector(`[data-robot="AGI"] ${part}`)
     .getBoundingClientRect();
-  return Math.round(box('[data-part="task"]').bottom - box('.card__head').top);
+  const bottom = (part) => box(`[data-part="${part}"]`).bottom;
+  const last = Math.max(bottom('task'), bottom('margin'));
+  return Math.round(last - box('.card__head').top);
 }"""
 """From the head of a card to its last line (px); a phone has a STOP below."""
 NEAREST_STOP = """() => {

@@ -80,7 +80,7 @@ test("13.17: the costmap is off until somebody switches it on", () => {
 });
 
 test("13.21: the longer nobody has looked, the denser; never is densest", () => {
-  equal([9, 10, 59, 60, 599, 600].map(hatchAt), [0, 0.2, 0.2, 0.38, 0.38, 0.6]);
+  equal([9, 10, 59, 60, 599, 600].map(hatchAt), [0, 0.16, 0.16, 0.28, 0.28, 0.42]);
   equal(hatchAt(null), hatchAt(600));
 });
 

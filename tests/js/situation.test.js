@@ -1,8 +1,10 @@
 import { createI18n } from "../../iveg/static/js/core/i18n.js";
 import {
   fleetSaid,
+  markOf,
   sentenceOf,
   situationOf,
+  UNHEARD,
 } from "../../iveg/static/js/core/situation.js";
 import { createCardOrder, sorted } from "../../iveg/static/js/panels/card_order.js";
 import { peopleSaid } from "../../iveg/static/js/panels/map_facts.js";
@@ -148,6 +150,19 @@ test("a card moves once its order has lasted, and never under a finger or in use
   equal(shown(CLEAR, 5200), "BA");
   equal([shown(NOT_SLOWING, 5300), shown(CLEAR, 5900)], ["BA", "BA"]);
   equal([shown(NOT_SLOWING, 6000), shown(NOT_SLOWING, 7000)], ["BA", "AB"]);
+});
+
+test("each cause has its drawing, and a robot at work none", () => {
+  const marks = (/** @type {any[]} */ of) =>
+    of.map((it) => markOf({ ...UNHEARD, ...it }));
+  equal(
+    marks([
+      ...[{ why: "person_in" }, { why: "robot_at" }, { why: "obstacle" }],
+      ...[{ why: "no_detector_own" }, { why: "held_hw", cause: "hold" }],
+      ...[{ cause: "link" }, { cause: "clear" }, { cause: "stop" }],
+    ]),
+    ["person", "robot", "obstacle", "camera", "lock", "link", null, null],
+  );
 });
 
 test("without the server the line says so, in red", () => {

@@ -105,6 +105,20 @@ export function sentenceOf(situation, i18n) {
   return todo ? `${fact} — ${todo}` : fact;
 }
 
+/** The drawings of causes, and the names that each is of. @type {[string, RegExp][]} */
+const MARKS = [
+  ["person", /^person/],
+  ["robot", /^robot/],
+  ["obstacle", /^obstacle/],
+  ["lock", /^hold$|^held_/],
+  ["camera", /^no_detector/],
+  ["link", /^(link|watchdog|stale|no_pose)/],
+];
+
+/** The drawing of what a situation is because of. @param {Situation} situation */
+export const markOf = ({ why, cause }) =>
+  MARKS.find(([, names]) => names.test(why ?? cause))?.[0] ?? null;
+
 /** A phrase that begins a line. @param {string} said */
 export const capitalised = (said) => said.slice(0, 1).toUpperCase() + said.slice(1);
 

@@ -55,8 +55,8 @@ export function createGauge() {
   });
   const text = makeSvg("text", { class: "gauge__text", x: 100, y: 86 });
   const limitText = makeSvg("text", { class: "gauge__small", x: 100, y: 106 });
-  const maxText = makeSvg("text", { class: "gauge__small", x: 176, y: 108 });
-  const zero = makeSvg("text", { class: "gauge__small", x: 24, y: 108 });
+  const maxText = makeSvg("text", { class: "gauge__small gauge__end", x: 176, y: 108 });
+  const zero = makeSvg("text", { class: "gauge__small gauge__end", x: 24, y: 108 });
   zero.textContent = "0";
   const track = makeSvg("path", { class: "gauge__track" });
   svg.append(

@@ -5,7 +5,7 @@
  */
 
 import { aboutAge, ageOf, linkOfRobot } from "../core/clock.js";
-import { capitalised, phrasesOf, situationOf } from "../core/situation.js";
+import { capitalised, markOf, phrasesOf, situationOf } from "../core/situation.js";
 import { slotOf } from "../core/slots.js";
 import { createDetector } from "./detector.js";
 import { all, setAttribute, setHidden, setText } from "./dom.js";
@@ -123,11 +123,14 @@ export class RobotCard {
   /** @param {Robot | undefined} robot */
   #drawMode(robot) {
     const { i18n } = this.#app;
-    const { why, faults } = this.#parts;
+    const { why, causes, faults } = this.#parts;
     const situation = situationOf(robot);
     const phrases = phrasesOf(situation, i18n);
     setAttribute(this.#card, "data-level", situation.level);
     setText(this.#fields.mode, capitalised(phrases.said));
+    const mark = markOf(situation);
+    if (mark) setAttribute(causes, "data-cause", mark);
+    else causes.removeAttribute("data-cause");
     setText(why, [phrases.why, phrases.todo].filter(Boolean).join(" — "));
     const said = robot ? faultsSaid(robot, i18n).join(" · ") : "";
     setText(faults, said);

@@ -1,6 +1,7 @@
 /**
  * Areas without coverage: the longer no camera has seen a spot of a lane, the denser its
- * hatching.  A hatched spot without a person drawn in it may have one.
+ * hatching.  A hatched spot without a person drawn in it may have one; it is quiet all
+ * the same, for what is seen has to stand out.
  *
  * @typedef {import("../../core/protocol.js").Coverage} Coverage
  * @typedef {import("./paint.js").Paint} Paint
@@ -11,11 +12,11 @@ import { isolated } from "./paint.js";
 
 /** Age from which a cell is hatched (s), and how strongly; the last is for never seen. */
 const STEPS = [
-  { fromS: 10, alpha: 0.2 },
-  { fromS: 60, alpha: 0.38 },
-  { fromS: 600, alpha: 0.6 },
+  { fromS: 10, alpha: 0.16 },
+  { fromS: 60, alpha: 0.28 },
+  { fromS: 600, alpha: 0.42 },
 ];
-const HATCH_PX = 7;
+const HATCH_PX = 9;
 
 /**
  * Strength of a cell's hatching, 0–1.
