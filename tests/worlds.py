@@ -51,14 +51,20 @@ days = st.lists(_step, min_size=3, max_size=14)
 
 
 class Moment(NamedTuple):
-    """The fleet as it was told, with the P1 alerts that were active.
+    """The fleet as it was told, with everybody in it and the P1 alerts that held.
 
     Attributes:
-        alarmed: Robots of which a P1 held.
+        alarms: Robot and key of each.
     """
 
     robots: list[dict[str, Any]]
-    alarmed: set[str]
+    people: list[dict[str, Any]]
+    alarms: list[tuple[str, str]]
+
+    @property
+    def alarmed(self) -> set[str]:
+        """Robots of which a P1 held."""
+        return {robot for robot, _ in self.alarms}
 
 
 def told(day: list[tuple[Any, ...]]) -> list[Moment]:
@@ -76,13 +82,14 @@ async def _live(day: list[tuple[Any, ...]]) -> list[Moment]:
         desk.loop.step([], desk.clock())
         now = desk.clock()
         active = (one for one in desk.evaluator.alerts.waiting if not one.cleared)
-        alarmed = {
-            str(one.condition.robot_id)
+        alarms = [
+            (str(one.condition.robot_id), one.condition.key)
             for one in active
             if one.condition.priority == "P1"
-        }
+        ]
         robots = [one.model_dump(mode="json") for one in views.robots(now)]
-        moments.append(Moment(robots, alarmed))
+        people = [one.model_dump(mode="json") for one in views.people(now)]
+        moments.append(Moment(robots, people, alarms))
     return moments
 
 

@@ -16,6 +16,7 @@ import { isSeenHeld, tagsOf } from "../../iveg/static/js/map/layers/robot.js";
 import { statusOf } from "../../iveg/static/js/pages/fleet.js";
 import { heardOf, judgeDataPath } from "../../iveg/static/js/pages/health_sentence.js";
 import { readingOf } from "../../iveg/static/js/panels/gauge.js";
+import { peopleSaid } from "../../iveg/static/js/panels/map_facts.js";
 import { marginSaid } from "../../iveg/static/js/panels/robot_texts.js";
 
 /** @typedef {import("./builders.js").Robot} Robot */
@@ -43,13 +44,18 @@ async function wordsOf(language) {
  * @param {Robot[]} robots as the server told them
  * @param {number} waitedS ago
  * @param {string} language
+ * @param {import("./builders.js").Person[]} people
  */
-export async function all(robots, waitedS, language) {
+export async function all(robots, waitedS, language, people = []) {
   const i18n = await wordsOf(language);
   const [nowMs, read] = [performance.now(), performance.now];
   performance.now = () => nowMs; // one moment for all surfaces
   try {
-    return surfaces(robots, nowMs - waitedS * 1000, i18n);
+    const receivedAtMs = nowMs - waitedS * 1000;
+    return {
+      ...surfaces(robots, receivedAtMs, i18n),
+      ...counted(people, receivedAtMs, i18n),
+    };
   } finally {
     performance.now = read;
   }
@@ -69,6 +75,23 @@ function surfaces(robots, receivedAtMs, i18n) {
   };
 }
 
+/**
+ * Who is there: with cameras, without any, and without the server.
+ *
+ * @param {import("./builders.js").Person[]} people
+ * @param {number} receivedAtMs @param {I18n} i18n
+ */
+function counted(people, receivedAtMs, i18n) {
+  const known = /** @type {any[]} */ (people.map((one) => ({ ...one, receivedAtMs })));
+  const looking = (/** @type {number} */ cameras) =>
+    /** @type {any} */ ({ cameras, share: 0.5, receivedAtMs: performance.now() });
+  return {
+    people: peopleSaid(known, looking(2), true, i18n),
+    blind: peopleSaid(known, looking(0), true, i18n),
+    gone: peopleSaid(known, looking(2), false, i18n),
+  };
+}
+
 /** @param {Robot} robot @param {I18n} i18n */
 function ofRobot(robot, i18n) {
   const situation = situationOf(robot);
@@ -82,6 +105,7 @@ function ofRobot(robot, i18n) {
   const theme = /** @type {any} */ ({ alert: [] });
   const said = phrasesOf(situation, i18n);
   return {
+    robot: robot.robot_id,
     link,
     level: situation.level,
     said: said.said,

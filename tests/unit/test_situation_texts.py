@@ -4,6 +4,7 @@ The page's own pure functions write the texts, in a browser, of robots as the se
 told them; ``tests.worlds`` lives the days, and the page also grows old by itself.
 """
 
+import re
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -16,20 +17,22 @@ from playwright.sync_api import Browser, Page
 
 from iveg.domain.events import Condition
 from iveg.domain.feedback import CLEAR, SpeedLimit
+from iveg.domain.limits import LIMITS
 from iveg.domain.margins import SafetyMargin
 from iveg.domain.observations import Hold
 from iveg.domain.situation.facts import Near, RobotFacts
-from iveg.domain.situation.judge import situation_of
+from iveg.domain.situation.judge import ALARMS, situation_of
 from iveg.models.situation import Situation
+from iveg.web.pages.translations import read_translations
 from tests.builders import safety_report
 from tests.unit.test_js_modules import browser, files
 from tests.worlds import days, told
 
 __all__ = ["browser", "files"]
 
-SAY = """async ([robots, waitedS, language]) => {
+SAY = """async ([robots, waitedS, language, people]) => {
   const {all} = await import('/tests/js/surfaces.js');
-  return all(robots, waitedS, language);
+  return all(robots, waitedS, language, people);
 }"""
 
 
@@ -63,6 +66,38 @@ def contradictions(one: dict[str, Any]) -> dict[str, bool]:
     }
 
 
+def of_people(
+    fleet: dict[str, Any], people: list[dict[str, Any]], waited_s: float
+) -> dict[str, bool]:
+    """The same of the people over the map."""
+    seen = [
+        one
+        for one in people
+        if (one["class"], one["stage"]) == ("person", "seen")
+        and one["age_s"] + waited_s <= LIMITS.seen_s
+    ]
+    counted = re.match(r"map\.people_(?:one|count) (\d+)", fleet["people"])
+    return {
+        "seen, and nobody sees them": int(counted[1] if counted else 0) != len(seen),
+        "seen, and no camera": bool(re.search(r"people_(one|count)", fleet["blind"])),
+        "people, and no server": fleet["gone"] != "map.people_no_link",
+    }
+
+
+def of_alarms(fleet: dict[str, Any], alarms: list[tuple[str, str]]) -> dict[str, bool]:
+    """The same of the active P1 alerts; one of silence ends with the next tick."""
+    found = {}
+    for robot, one in ((one["robot"], one) for one in fleet["robots"]):
+        states = {ALARMS[key][0] for name, key in alarms if name == robot}
+        if one["link"] == "LIVE":
+            states.discard("lost_moving")
+        said = one["said"].removeprefix("situation.is.").split(" ")[0]
+        found[f"an alert, and {robot} says something else"] = (
+            bool(states) and said not in states
+        )
+    return found
+
+
 def of_fleet(fleet: dict[str, Any]) -> dict[str, bool]:
     """The same of the status line, the chip and the health sentence."""
     robots = fleet["robots"]
@@ -92,11 +127,48 @@ def test_no_two_texts_of_one_robot_contradict(
     with ThreadPoolExecutor(1) as aside:  # the browser's loop runs in this one
         moments = aside.submit(told, day).result()
     for moment in moments:
-        fleet = page.evaluate(SAY, [moment.robots, waited_s, ""])
+        told_now = [moment.robots, waited_s, "", moment.people]
+        fleet = page.evaluate(SAY, told_now)
         for one in fleet["robots"]:
             found = [name for name, holds in contradictions(one).items() if holds]
             assert found == [], one
-        assert [name for name, holds in of_fleet(fleet).items() if holds] == [], fleet
+        others = {
+            **of_fleet(fleet),
+            **of_people(fleet, moment.people, waited_s),
+            **of_alarms(fleet, moment.alarms),
+        }
+        assert [name for name, holds in others.items() if holds] == [], fleet
+
+
+# --- one wording ----------------------------------------------------------------------
+
+OF_STOP = {
+    "sent": "stopping",
+    "delivered": "braking",
+    "still_moving": "still_moving",
+    "moved": "moved",
+    "stale": "stood",
+    "ready": "ready",
+}
+OF_SPEED = {
+    **{reason: reason for reason in ("stale", "watchdog", "obstacle", "unsupervised")},
+    "doubt": "no_doubt",
+    "detector": "no_detector",
+}
+
+
+@pytest.mark.parametrize("language", ["es", "en"])
+def test_alerts_and_the_log_have_the_words_of_the_situation(language: str) -> None:
+    said = read_translations(language).sentences
+    for key, (state, _) in ALARMS.items():
+        plain = re.sub(r" \w+ {age:span}", "", said[f"situation.is.{state}"])
+        assert said[key].casefold().startswith(f"{{robot}}: {plain}".casefold())
+    for step, state in OF_STOP.items():
+        whole = f"{{robot}}: {said[f'situation.is.{state}']}"
+        assert said[f"log.stop.{step}"].casefold() == whole.casefold()
+    for reason, why in OF_SPEED.items():
+        cause = said[f"situation.why.{why}"].replace("{about}", "{observer}")
+        assert said[f"log.speed_down.{reason}"].endswith(f": {cause}")
 
 
 # --- ten seconds ----------------------------------------------------------------------
@@ -149,8 +221,8 @@ STAGED = {
     "STOP not obeyed": (
         facts(alarm=p1("alert.stop_still_moving"), stop="STILL_MOVING"),
         "danger",
-        ("recibió la parada y se mueve", "use la seta roja"),
-        ("received STOP and still moves", "use the red button"),
+        ("parada recibida pero se mueve", "use la seta roja"),
+        ("STOP received but still moving", "use the red button"),
     ),
     "half speed": (
         facts(report=HALF, near=AISLE_3, limit=TOLD, told_near=AISLE_3),

@@ -49,7 +49,7 @@ def _heard(facts: RobotFacts) -> Iterator[Situation]:
 
 # --- danger ---------------------------------------------------------------------------
 
-_ALARMS: Mapping[str, tuple[str, Action]] = {
+ALARMS: Mapping[str, tuple[str, Action]] = {
     "alert.stop_unconfirmed": ("unconfirmed", "red_button"),
     "alert.stop_still_moving": ("still_moving", "red_button"),
     "alert.stop_moved": ("moved", "red_button"),
@@ -63,15 +63,15 @@ _ALARMS: Mapping[str, tuple[str, Action]] = {
 
 def gravest(alarms: Iterable[Condition]) -> Condition | None:
     """The P1 that a situation names, of those that hold for a robot."""
-    order = list(_ALARMS)
-    known = (one for one in alarms if one.key in _ALARMS and one.priority == "P1")
+    order = list(ALARMS)
+    known = (one for one in alarms if one.key in ALARMS and one.priority == "P1")
     return min(known, key=lambda one: order.index(one.key), default=None)
 
 
 def _alarmed(facts: RobotFacts) -> Iterator[Situation]:
     if facts.alarm is None:
         return
-    state, action = _ALARMS[facts.alarm.key]
+    state, action = ALARMS[facts.alarm.key]
     if state == "lost_moving" and not _is_silent(facts):
         return  # It is heard again; the alert clears with the next tick.
     danger = Situation("danger", state, "alarm", action=action)
