@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Page, WebSocketRoute, expect
 
+from tests import staged
 from tests.e2e.frozen import Frozen, frozen, frozen_page, past_site, settle
 from tests.e2e.reading import (
     COVERED_STOPS,
@@ -21,6 +22,7 @@ from tests.e2e.reading import (
     strip_stop,
 )
 from tests.processes import Site
+from tests.staged import STAGED
 
 pytestmark = pytest.mark.e2e
 
@@ -158,44 +160,27 @@ SAID = """() => {
   };
 }"""
 """The status line: where it stands, whether it fits, and whether no text is larger."""
-LEVELS: tuple[dict[str, Any], ...] = (
-    {"level": "working", "state": "clear"},
-    {"level": "danger", "state": "unconfirmed", "action": "red_button"},
-    {
-        "level": "danger",
-        "state": "not_slowing",
-        "action": "press_stop",
-        "why": "person_in",
-        "slots": {"lane": "Pasillo 3", "distance": 1.4},
-    },
-    {
-        "level": "caution",
-        "state": "close",
-        "why": "person_in",
-        "slots": {"lane": "Pasillo 3", "distance": 1.4, "short": 2.3},
-    },
-)
 
 
 @pytest.mark.parametrize("fleet", [2], indirect=True)
 def test_the_status_line_is_first_and_largest_and_nothing_moves(fleet: Fleet) -> None:
-    told = frozen()["snapshot"]["robots"]
-    for size in SIZES:
-        places = set()
-        for level in LEVELS:
-            for robot in told:
-                situation = {**robot["situation"], "why": None, "slots": {}, **level}
-                fleet.tell({**robot, "situation": situation, "age_s": 0.0})
+    first = frozen()["snapshot"]["robots"][0]
+    places: dict[tuple[int, int], set[tuple[float, ...]]] = {
+        one: set() for one in SIZES
+    }
+    for name, (known, *_) in STAGED.items():
+        fleet.tell({**first, "situation": staged.told(known), "age_s": known.age_s})
+        fleet.page.clock.run_for(1500)
+        for size in SIZES:
             page = fleet.at(size)
-            page.clock.run_for(1500)
             found = evaluate(page, SAID)
-            assert (found["first"], found["whole"]) == (True, True), (size, level)
+            assert (found["first"], found["whole"]) == (True, True), (size, name)
             is_small = size[0] < 400 and found["long"]
-            assert found["larger"] == [] or is_small, (size, level)
+            assert found["larger"] == [] or is_small, (size, name)
             stop = strip_stop(page, "fleet").bounding_box()
             assert stop is not None
-            places.add((found["high"], stop["x"], stop["y"]))
-        assert len(places) == 1, size
+            places[size].add((found["high"], stop["x"], stop["y"]))
+    assert [size for size in SIZES if len(places[size]) != 1] == []
 
 
 @pytest.mark.parametrize("fleet", [2], indirect=True)
@@ -203,8 +188,8 @@ def test_the_status_line_shows_its_robot_on_the_map_by_tap_and_by_key(
     fleet: Fleet,
 ) -> None:
     first = frozen()["snapshot"]["robots"][0]
-    situation = {**first["situation"], "why": None, "slots": {}, **LEVELS[1]}
-    fleet.tell({**first, "situation": situation, "age_s": 0.0})
+    danger = staged.told(STAGED["STOP not confirmed"][0])
+    fleet.tell({**first, "situation": danger, "age_s": 0.0})
     page = fleet.at((1440, 900))
     following = page.locator("#following")
 
@@ -217,7 +202,7 @@ def test_the_status_line_shows_its_robot_on_the_map_by_tap_and_by_key(
     page.locator("#map-fit").click()
     page.locator("#status").press("Enter")
     expect(following).to_contain_text("AGI")
-    fleet.tell({**first, "situation": situation | LEVELS[0] | {"action": "none"}})
+    fleet.tell({**first, "situation": staged.told(staged.facts()), "age_s": 0.0})
 
 
 HELD = {"mode": "STOPPED", "holds": [{"id": "x", "source": "hw", "ack": "local"}]}

@@ -1,0 +1,126 @@
+"""Situations as a day brings them, and what the status line must say of each."""
+
+from dataclasses import replace
+from typing import Any
+
+from iveg.domain.events import Condition
+from iveg.domain.feedback import CLEAR, SpeedLimit
+from iveg.domain.margins import SafetyMargin
+from iveg.domain.observations import Hold
+from iveg.domain.situation.facts import Near, RobotFacts
+from iveg.domain.situation.judge import situation_of
+from iveg.models.situation import Situation
+from tests.builders import safety_report
+
+
+def facts(**differs: Any) -> RobotFacts:
+    """AGI at work, all clear; a test says what differs."""
+    clear = safety_report("AGI", speed_factor=1.0, reason="clear")
+    plain: dict[str, Any] = {
+        "robot_id": "AGI",
+        "link": "LIVE",
+        "age_s": 0.1,
+        "stands": False,
+        "report": clear,
+        "limit": CLEAR,
+    }
+    return RobotFacts(**{**plain, **differs})
+
+
+def p1(key: str) -> Condition:
+    return Condition.of_robot("P1", key, "AGI")
+
+
+AISLE_3 = Near("person", "P1", 1.4, "Pasillo 3")
+UNSEEN = replace(AISLE_3, unseen_s=4.1)
+HALF = safety_report("AGI", speed_factor=0.5, reason="person")
+TOLD = SpeedLimit(0.5, "person", "P1", 1.4)
+LOCKED = safety_report("AGI", Hold("x", "hw", "local"))
+MARGIN = SafetyMargin("AGI", "P1", 1.4, 1.3, 0.8, 1.2, 0.1, 0.5)
+
+STAGED = {
+    "does not slow": (
+        facts(alarm=p1("alert.person_not_slowing"), alarmed_by=AISLE_3),
+        "danger",
+        ("no frena", "persona en el pasillo 3", "pulse PARAR"),
+        ("does not slow down", "person in aisle 3", "press STOP"),
+    ),
+    "lost while moving": (
+        facts(link="LOST", age_s=4.0, alarm=p1("alert.moving_robot_lost")),
+        "danger",
+        ("sin contacto hace 4 s", "aléjese"),
+        ("no contact for 4 s while moving", "keep away; it should stop by itself"),
+    ),
+    "STOP not confirmed": (
+        facts(alarm=p1("alert.stop_unconfirmed"), stop="UNCONFIRMED"),
+        "danger",
+        ("parada sin confirmar", "use la seta roja"),
+        ("STOP not confirmed", "use the red button"),
+    ),
+    "STOP not obeyed": (
+        facts(alarm=p1("alert.stop_still_moving"), stop="STILL_MOVING"),
+        "danger",
+        ("parada recibida pero se mueve", "use la seta roja"),
+        ("STOP received but still moving", "use the red button"),
+    ),
+    "half speed": (
+        facts(report=HALF, near=AISLE_3, limit=TOLD, told_near=AISLE_3),
+        "caution",
+        ("a media velocidad", "persona en el pasillo 3 a 1,4 m"),
+        ("at half speed", "person in aisle 3 at 1.4 m"),
+    ),
+    "half speed for a memory": (
+        facts(report=HALF, near=UNSEEN, limit=TOLD, told_near=UNSEEN),
+        "caution",
+        ("a media velocidad", "hubo una persona en el pasillo 3", "hace 4 s"),
+        ("at half speed", "a person was in aisle 3", "unseen for 4 s"),
+    ),
+    "too close to stop": (
+        facts(margin=MARGIN, margin_near=AISLE_3),
+        "caution",
+        ("faltan 2,3 m para parar a tiempo", "persona en el pasillo 3"),
+        ("2.3 m short of a safe stop", "person in aisle 3"),
+    ),
+    "stopping": (
+        facts(stop="SENT"),
+        "caution",
+        ("parada enviada", "trátelo como en movimiento"),
+        ("STOP sent, not confirmed yet", "treat it as moving"),
+    ),
+    "late": (
+        facts(link="LATE", age_s=1.8),
+        "doubt",
+        ("última noticia hace 1,8 s", "trátelo como en movimiento"),
+        ("last news 1.8 s ago", "treat it as moving"),
+    ),
+    "contradicts itself": (
+        facts(doubts=("jumped",)),
+        "doubt",
+        ("salta de un lugar a otro", "revise el robot"),
+        ("jumps from place to place", "check the robot"),
+    ),
+    "red button": (
+        facts(report=LOCKED, stands=True),
+        "locked",
+        ("bloqueado: seta roja del robot", "desbloquéelo en el robot"),
+        ("locked: red button on the robot", "unlock it at the robot"),
+    ),
+    "stopped from a page": (
+        facts(stop="STANDING", stands=True, report=LOCKED),
+        "locked",
+        ("bloqueado por la parada", "rearme cuando la vía esté libre"),
+        ("locked by STOP", "release it when the way is free"),
+    ),
+    "all clear": (
+        facts(),
+        "working",
+        ("en marcha, vía libre",),
+        ("at work, all clear",),
+    ),
+}
+"""Facts, level, and what the status line says besides the robot's name."""
+
+
+def told(known: RobotFacts) -> dict[str, Any]:
+    """The situation as a page hears it."""
+    return Situation.of(situation_of(known)).model_dump(mode="json")
