@@ -133,6 +133,15 @@ class AlertListing(Listing[Alert]):
     flood: Flood
 
 
+class AcknowledgedAlerts(Model):
+    """What became of alerts that somebody acknowledged together."""
+
+    items: list[Alert]
+    left: list[str] = Field(
+        description="Ids that were left: P1s, seen ones, and what is no longer there."
+    )
+
+
 class LogEntry(Model):
     """One line of the action and inference log."""
 

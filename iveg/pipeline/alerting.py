@@ -84,6 +84,22 @@ class Alerting:
             self._event_log.log(LogEvent("alert", "log.alert.acknowledged", slots), now)
         return alert
 
+    def acknowledge_together(
+        self, alert_ids: Iterable[str], by: str, note: str, now: Instant
+    ) -> list[BookedAlert]:
+        """A person acknowledges all of a flood but its P1s; those that are now.
+
+        Each P1 is about somebody in danger: it sounds until it was read by itself.
+        """
+        found = (self._book.find(one) for one in alert_ids)
+        lesser = [
+            one.alert_id
+            for one in found
+            if one is not None and one.priority != "P1" and not one.last.acknowledged
+        ]
+        seen = (self.acknowledge(one, by, note, now) for one in lesser)
+        return [one for one in seen if one is not None]
+
     def _watch_flood(self, raised: int, now: Instant) -> None:
         before = self.flood
         after = self._gauge.count(raised, now)

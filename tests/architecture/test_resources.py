@@ -5,6 +5,7 @@ import re
 import pytest
 from pydantic.json_schema import models_json_schema
 
+from iveg.models.alert import AcknowledgedAlerts
 from iveg.models.base import Model
 from iveg.models.day import Day
 from iveg.models.device import Device
@@ -19,6 +20,7 @@ from tests.processes import ROOT
 PAGE = (documents.INTERFACES / "resources.md").read_text()
 _SHOWN: tuple[type[Model], ...] = (
     *TOLD,
+    AcknowledgedAlerts,
     Day,
     Device,
     KeptDetection,

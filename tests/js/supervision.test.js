@@ -2,6 +2,7 @@ import { Store } from "../../iveg/static/js/core/store.js";
 import { createWakeLock } from "../../iveg/static/js/core/wakelock.js";
 import { believedBy, hears } from "../../iveg/static/js/map/layers/belief.js";
 import { laidTo, lengthOf } from "../../iveg/static/js/map/layers/measure.js";
+import { createTogether, lesser } from "../../iveg/static/js/pages/alerts_together.js";
 import { soon } from "../../iveg/static/js/pages/rows.js";
 import { tilesOf } from "../../iveg/static/js/pages/tiles.js";
 import { createAlertList } from "../../iveg/static/js/panels/alert_list.js";
@@ -193,6 +194,30 @@ test("only who may acknowledge is asked to", () => {
   document.body.dataset.role = "operator";
   draw([alert()]);
   equal(list.querySelector("form")?.hidden, false);
+});
+
+test("a flood is acknowledged by one press by who may, and never a P1 with it", () => {
+  const said = document.createElement("p");
+  said.id = "acknowledged-together";
+  const button = document.createElement("button");
+  button.id = "acknowledge-together";
+  document.body.append(button, said);
+  const seen = { acknowledged_at: "2026-11-20T12:00:00Z" };
+  const flood = ["P1", "P2", "P3", "P2"].map((priority) => alert({ priority }));
+  equal(
+    lesser([...flood, alert({ priority: "P2", ...seen })]).map((one) => one.priority),
+    ["P2", "P3", "P2"],
+  );
+  const { draw } = createTogether(i18n);
+  const isHidden = (/** @type {string} */ role, /** @type {number} */ count) => {
+    document.body.dataset.role = role;
+    draw(flood.slice(0, count));
+    return button.hidden;
+  };
+  equal(
+    [isHidden("viewer", 4), isHidden("operator", 3), isHidden("operator", 4)],
+    [true, true, false],
+  );
 });
 
 test("an alert that did not change is not drawn again when another did", () => {

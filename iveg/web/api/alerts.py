@@ -1,16 +1,19 @@
-"""Acknowledgement of alerts: by whom, when, and with which note."""
+"""Acknowledgement of alerts, one or a list: by whom, when, and with which note."""
 
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, HTTPException, Response
 from pydantic import BaseModel, ConfigDict, Field
 
-from iveg.models.alert import Alert
+from iveg.models.alert import AcknowledgedAlerts, Alert
 from iveg.ngsi.payloads import clean_text
 from iveg.pipeline.evaluate import Evaluator
 from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.security.authentication import Principal, require
+
+MOST_TOGETHER = 200
+"""More alerts at once nobody has read."""
 
 
 class Acknowledgement(BaseModel):
@@ -19,6 +22,14 @@ class Acknowledgement(BaseModel):
     model_config = ConfigDict(strict=True, extra="ignore")
 
     note: Annotated[str, Field(max_length=200)] = ""
+
+
+class AcknowledgementTogether(Acknowledgement):
+    """The alerts that the person saw in a list, and the note on all of them."""
+
+    alert_ids: Annotated[
+        list[Annotated[str, Field(max_length=64)]], Field(max_length=MOST_TOGETHER)
+    ]
 
 
 def router(evaluator: Evaluator, clock: Clock) -> APIRouter:
@@ -37,5 +48,20 @@ def router(evaluator: Evaluator, clock: Clock) -> APIRouter:
         if found is None:
             raise HTTPException(404, "There is no such alert.")
         return Json(Alert.of(found))
+
+    @routes.post("/alerts/acknowledge", response_model=AcknowledgedAlerts)
+    async def acknowledge_together(
+        body: AcknowledgementTogether,
+        who: Annotated[Principal, Depends(require("release"))],
+    ) -> Response:
+        """Say that somebody has seen a list; a P1 is left to be seen by itself."""
+        note = clean_text(body.note)
+        seen = evaluator.alerts.acknowledge_together(
+            body.alert_ids, who.name, note, clock()
+        )
+        ids = {one.alert_id for one in seen}
+        left = [one for one in body.alert_ids if one not in ids]
+        items = [Alert.of(one) for one in seen]
+        return Json(AcknowledgedAlerts(items=items, left=left))
 
     return routes

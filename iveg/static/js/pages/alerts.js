@@ -8,6 +8,7 @@ import { earlierUnknown, isKnown } from "../panels/alerts.js";
 import { make, need, setHidden } from "../panels/dom.js";
 import { createSoundPanel } from "../panels/sound.js";
 import { toldSaid } from "../panels/told.js";
+import { createTogether } from "./alerts_together.js";
 import { dayAndTime } from "./history/local_time.js";
 import { createChips, createRows, keepOpen, soon } from "./rows.js";
 
@@ -16,6 +17,7 @@ import { createChips, createRows, keepOpen, soon } from "./rows.js";
 /** @param {import("../core/page.js").Page} page */
 export function start({ store, i18n, tone }) {
   const list = createAlertList(need("#active-alerts"), i18n);
+  const together = createTogether(i18n);
   /** @type {Set<string>} alerts whose occurrences somebody reads */
   const opened = new Set();
   const isChosen = createChips("data-priority-chip", () => rows.draw());
@@ -32,6 +34,7 @@ export function start({ store, i18n, tone }) {
     /** @type {Alert[]} */
     const alerts = store.get("alerts") ?? [];
     list.draw(alerts);
+    together.draw(alerts);
     const isUnknown = earlierUnknown(store);
     setHidden(need("#active-empty"), alerts.length > 0 || !isKnown(store));
     setHidden(need("#earlier-unknown"), !isUnknown);

@@ -2,6 +2,8 @@
 
 import pytest
 
+from iveg.domain.events import Condition
+from iveg.domain.records import AlertRecord
 from iveg.web.security.authentication import Role
 from tests.unit.pipeline.desk import settle
 from tests.unit.web.desk import WebDesk
@@ -223,5 +225,50 @@ async def test_an_alert_nobody_knows_is_404_for_who_may_ask(
 ) -> None:
     async with WebDesk().browser(role) as browser:
         answer = await browser.post("/api/v1/alerts/none/acknowledge", json={})
+
+    assert answer.status_code == status
+
+
+async def test_a_flood_is_acknowledged_together_but_none_of_its_p1s() -> None:
+    desk = WebDesk()
+    alerts = desk.evaluator.alerts
+    flood = [
+        Condition("P1", "alert.moving_robot_lost", "AGI", "AGI"),
+        Condition("P2", "alert.robot_lost", "AGII", "AGII"),
+        Condition("P3", "alert.battery_low", "AGII", "AGII"),
+    ]
+    alerts.sync(flood, desk.clock())
+    asked = [one.alert_id for one in alerts.waiting]
+    by_priority = {one.priority: one.alert_id for one in alerts.waiting}
+    body = {"alert_ids": [*asked, "gone"], "note": "seen"}
+    async with desk.browser() as browser:
+        told = (await browser.post("/api/v1/alerts/acknowledge", json=body)).json()
+        again = (await browser.post("/api/v1/alerts/acknowledge", json=body)).json()
+
+    assert {one["priority"] for one in told["items"]} == {"P2", "P3"}
+    assert {(one["acknowledged_by"], one["note"]) for one in told["items"]} == {
+        ("ana", "seen")
+    }
+    assert told["left"] == [by_priority["P1"], "gone"]
+    assert again["items"] == []
+    assert desk.sentences().count("log.alert.acknowledged") == 2
+    stored = {one.alert_id: one.acknowledged_by for one in desk.records(AlertRecord)}
+    assert stored == {
+        by_priority["P1"]: None,
+        by_priority["P2"]: "ana",
+        by_priority["P3"]: "ana",
+    }
+
+
+@pytest.mark.parametrize(
+    ("role", "count", "status"),
+    [("viewer", 1, 403), ("operator", 201, 422), ("operator", 200, 200)],
+)
+async def test_who_may_acknowledge_a_list_and_how_long_it_may_be(
+    role: Role, count: int, status: int
+) -> None:
+    body = {"alert_ids": ["none"] * count}
+    async with WebDesk().browser(role) as browser:
+        answer = await browser.post("/api/v1/alerts/acknowledge", json=body)
 
     assert answer.status_code == status
