@@ -383,3 +383,45 @@ def test_a_phone_has_one_card_a_swipe_the_worst_first_and_none_moves_once_swiped
     )
     assert row.evaluate("(row) => row.scrollLeft") == swiped
     row.evaluate("(row) => { row.scrollLeft = 0; }")
+
+
+def test_the_screen_of_a_wall_looks_and_stops_and_frees_nothing(
+    browser: Browser, past: Site
+) -> None:
+    with frozen_page(browser, past, (1440, 900), language="en") as page:
+        page.goto(past.url)
+        settle(page, "#map-fit:enabled")
+        page.locator(".user").click()
+        page.get_by_role("button", name="Wall display").click()
+        page.get_by_role("button", name="Begin").click()
+        page.wait_for_selector("body[data-wall]:not([data-panel])")
+
+        page.reload()
+        settle(page, "body[data-wall] #map-fit:enabled")
+        page.clock.run_for(4000)
+        gone = page.locator(".nav, .rearm .button, .card__menu, .user")
+        assert gone.count() > 0
+        assert [one for one in gone.all() if one.is_visible()] == []
+        expect(page.locator("body")).to_have_css("cursor", "none")
+        expect(strip_stop(page, "fleet")).to_be_in_viewport(ratio=1)
+        assert evaluate(page, COVERED_STOPS) == []
+        answers = {
+            path: _posted(page, path)
+            for path in ("fleet/stop", "robots/AGI/release", "alerts/x/acknowledge")
+        }
+        assert answers == {
+            "fleet/stop": 202,
+            "robots/AGI/release": 403,
+            "alerts/x/acknowledge": 403,
+        }
+
+
+def _posted(page: Page, path: str) -> object:
+    """The status of a request that changes something, sent by the page itself."""
+    return evaluate(page, _POST, f"/api/v1/{path}")
+
+
+_POST = """async ([path]) => {
+  const headers = {'X-IVEG': '1', 'Content-Type': 'application/json'};
+  return (await fetch(path, {method: 'POST', headers, body: '{}'})).status;
+}"""

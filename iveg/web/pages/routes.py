@@ -195,6 +195,11 @@ def router(
     async def sign_out(request: Request, _: _Reader) -> Response:
         return _authenticator(request).sign_out(request)
 
+    @routes.post("/wall", status_code=204)
+    async def wall(request: Request, visitor: _Reader) -> None:
+        # A screen on a wall is everybody's: it looks and stops, and frees nothing.
+        _authenticator(request).sessions.lower(visitor)
+
     return routes
 
 

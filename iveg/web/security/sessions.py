@@ -80,6 +80,15 @@ class Sessions:
             self._sessions.pop(principal.session, None)
             self._keep()
 
+    def lower(self, principal: Principal) -> None:
+        """Leave a session what a viewer may do, until somebody signs in anew."""
+        session = self._sessions.get(principal.session or b"")
+        if session is not None:
+            self._sessions[bytes.fromhex(session.digest)] = replace(
+                session, role="viewer"
+            )
+            self._keep()
+
     def _principal(self, digest: bytes, *, touch: bool) -> Principal | None:
         session = self._sessions.get(digest)
         if session is None:

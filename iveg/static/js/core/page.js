@@ -10,6 +10,7 @@ import { createHealthPanel } from "../panels/health.js";
 import { createSignOut } from "../panels/signout.js";
 import { labelTables } from "../panels/tables.js";
 import { createTone } from "../panels/tone.js";
+import { createWall } from "../panels/wall.js";
 import { guarded } from "./hub.js";
 import { createInstalling, registerWorker } from "./install.js";
 import { createWakeLock } from "./wakelock.js";
@@ -47,6 +48,7 @@ export async function startPage(app) {
   guarded(() => createAlertsPanel(app, page.tone));
   guarded(() => createHealthPanel(app));
   guarded(() => createSignOut(app));
+  guarded(() => createWall(app));
   guarded(wirePrinting);
   registerWorker();
   guarded(() => labelTables(app));

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from iveg.adapters.sessions import FileSessions, Session
+from iveg.web.security.roles import Principal
 from iveg.web.security.sessions import Sessions
 from tests.fakes.clock import FakeClock
 
@@ -186,3 +187,21 @@ def test_a_disk_that_fails_is_told_once_and_signs_nobody_out(
 
     assert all(sessions.find(token) is not None for token in tokens)
     assert caplog.text.count("could not be written") == 1
+
+
+def test_a_session_that_was_lowered_is_a_viewers_and_stays_one(
+    path: Path, clock: FakeClock, store: FileSessions
+) -> None:
+    sessions = Sessions(clock, store)
+    token, other = sessions.open("Ana", "operator"), sessions.open("Eva", "operator")
+    before = sessions.find(token)
+    assert before is not None
+
+    sessions.lower(before)
+    sessions.lower(Principal("program", "program"))
+    store.close()
+
+    assert sessions.current(before) == Principal("Ana", "viewer", before.session)
+    again = restarted(path, clock)
+    roles = [found.role for one in (token, other) if (found := again.find(one))]
+    assert roles == ["viewer", "operator"]
