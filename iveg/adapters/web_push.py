@@ -145,11 +145,13 @@ def encrypted(
 def signed(endpoint: str, push: Push, wall: float) -> str:
     """The header by which a push service knows this server (RFC 8292)."""
     parts = urlsplit(endpoint)
-    claims = {
+    claims: dict[str, str | int] = {
         "aud": f"{parts.scheme}://{parts.netloc}",
         "exp": int(wall) + _TOKEN_LIVES_S,
-        "sub": f"mailto:{push.contact}",
     }
+    # Optional (RFC 8292, 2.1); a service that wants one says so in its answer.
+    if push.contact:
+        claims["sub"] = f"mailto:{push.contact}"
     head = encode(orjson.dumps({"typ": "JWT", "alg": "ES256"}))
     text = f"{head}.{encode(orjson.dumps(claims))}"
     made = _private(push.key).sign(text.encode(), ec.ECDSA(hashes.SHA256()))

@@ -126,10 +126,10 @@ class WebhookBody(_Body):
 
 
 class PushBody(_Body):
-    """`contact`: where push services find whoever runs this server."""
+    """`contact`: where push services find whoever runs this server; empty: nowhere."""
 
     on: bool
-    contact: _Address
+    contact: _Address | Literal[""] = ""
 
 
 class KeysBody(_Body):

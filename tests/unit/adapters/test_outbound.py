@@ -283,6 +283,13 @@ async def test_a_push_is_signed_for_the_service_that_carries_it() -> None:
     assert [(one.to, one.failed) for one in told] == [("ana", None)]
 
 
+def test_without_a_contact_a_push_names_none() -> None:
+    header = web_push.signed("https://push.coop.es/1", Push(True, key=new_key()), 0.0)
+
+    claims = orjson.loads(decode(header.removeprefix("vapid t=").split(".")[1]))
+    assert claims.keys() == {"aud", "exp"}
+
+
 async def test_a_browser_that_its_service_forgot_is_gone() -> None:
     stand = HttpsStand(410)
     async with standing(stand):

@@ -12,7 +12,7 @@
 import { readApi, sendApi } from "../core/api.js";
 import { make, need, setHidden, setText } from "../panels/dom.js";
 import { toldSaid } from "../panels/told.js";
-import { pushState, subscribe } from "./subscribing.js";
+import { mayNotify, pushState, subscribe } from "./subscribing.js";
 
 const READERS = new Set(["operator", "admin"]);
 /** @type {Channel[]} */
@@ -92,16 +92,26 @@ export function createMessagesForm(i18n) {
     else say(channel, "messages.test_refused", { why: whyOf(body) ?? status });
   }
 
+  /** One tap: switches push on where nobody has, and tells this browser. */
   async function join() {
     const state = pushState();
     if (state !== "ready") return say("push", `messages.push.${state}`);
-    if (!known?.push.public_key) return say("push", "messages.push.first");
+    // Some browsers ask only while the tap lasts, so before the server is asked.
+    if (!(await mayNotify())) return say("push", "messages.push.denied");
+    if (!known?.push.on || !known.push.public_key) {
+      const contact = known?.push.contact ?? "";
+      take("push", await sendApi("PUT", "messages/push", { on: true, contact }));
+    }
+    if (!known?.push.on || !known.push.public_key) return undefined;
     const subscription = await subscribe(known.push.public_key);
     if (!subscription) return say("push", "messages.push.denied");
     const { endpoint, keys } = subscription.toJSON();
     const who = input("push-who").value.trim() || navigator.platform || "—";
     const body = { who, endpoint, keys, language: i18n.language() };
-    return take("push", await sendApi("POST", "messages/devices", body));
+    take("push", await sendApi("POST", "messages/devices", body));
+    const isApple = new URL(String(endpoint)).host.endsWith(".push.apple.com");
+    if (isApple && !known.push.contact) say("push", "messages.push.apple");
+    return undefined;
   }
 
   /** @param {string} id */

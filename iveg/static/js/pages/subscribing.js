@@ -10,12 +10,16 @@ export function pushState() {
   return Notification.permission === "denied" ? "denied" : "ready";
 }
 
+/** Asks the person, once. */
+export async function mayNotify() {
+  return (await Notification.requestPermission()) === "granted";
+}
+
 /**
  * @param {string} key this server's public key, base64url
- * @returns {Promise<PushSubscription | null>} null where the browser or person refuses
+ * @returns {Promise<PushSubscription | null>} null where the browser refuses
  */
 export async function subscribe(key) {
-  if ((await Notification.requestPermission()) !== "granted") return null;
   const { pushManager } = await navigator.serviceWorker.ready;
   try {
     return await pushManager.subscribe({

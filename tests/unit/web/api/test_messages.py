@@ -153,6 +153,15 @@ async def test_what_cannot_be_told_is_refused(path: str, body: object) -> None:
     assert desk.contact_store.saved == []
 
 
+async def test_push_is_switched_on_without_an_address() -> None:
+    desk = WebDesk()
+
+    told = (await ask(desk, "PUT", "/push", {"on": True})).json()["push"]
+
+    assert (told["on"], told["contact"]) == (True, "")
+    assert told["public_key"]
+
+
 async def test_the_same_browser_again_takes_its_own_place() -> None:
     desk = WebDesk()
     await ask(desk, "PUT", "/push", PUSH)
