@@ -73,6 +73,7 @@ def frozen_page(
         locale="es-ES",
         reduced_motion="reduce",
     )
+    context.add_init_script("localStorage.setItem('iveg.hints', '3')")
     page = context.new_page()
     page.goto(f"{past.sign_in_link}", wait_until="commit")
     looks = {"iveg_theme": theme, "iveg_language": language}

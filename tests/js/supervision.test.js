@@ -8,6 +8,7 @@ import { tilesOf } from "../../iveg/static/js/pages/tiles.js";
 import { createAlertList } from "../../iveg/static/js/panels/alert_list.js";
 import { floodSaid } from "../../iveg/static/js/panels/alert_members.js";
 import { createAlertsPanel } from "../../iveg/static/js/panels/alerts.js";
+import { createHints } from "../../iveg/static/js/panels/hints.js";
 import { faultsSaid } from "../../iveg/static/js/panels/robot_texts.js";
 import { createTone } from "../../iveg/static/js/panels/tone.js";
 import { equal, near, test } from "./harness.js";
@@ -53,6 +54,7 @@ const i18n = /** @type {import("../../iveg/static/js/core/i18n.js").I18n} */ (
     t: (/** @type {string} */ key, /** @type {object} */ slots = {}) =>
       [key, ...Object.values(slots)].join(" "),
     language: () => "es",
+    onChange: () => undefined,
   })
 );
 
@@ -536,4 +538,29 @@ test("several events at once are one reading, and one more for what came after",
   await until(() => reads === 1);
   for (let i = 0; i < 9; i += 1) ask();
   await until(() => reads === 3);
+});
+
+test("hints come one after the other, end where somebody says so, and stay away", () => {
+  const box = document.createElement("div");
+  box.id = "hints";
+  const parts = ["said", "next", "end"].map((name) => {
+    const part = document.createElement("button");
+    part.id = `hints-${name}`;
+    return part;
+  });
+  box.append(...parts);
+  document.body.append(box);
+  const [said, next, end] = parts;
+  const seen = () => (box.hidden ? null : said.textContent?.split(" ").pop());
+  const kept = memory();
+  createHints({ i18n }, kept);
+  const first = seen();
+  next.click();
+  equal([first, seen()], ["hints.stop", "hints.line"]);
+  createHints({ i18n }, kept);
+  equal(seen(), "hints.line");
+  end.click();
+  equal(seen(), null);
+  createHints({ i18n }, kept);
+  equal(seen(), null);
 });

@@ -7,6 +7,7 @@
 import { createAlertsPanel } from "../panels/alerts.js";
 import { createDecisionPanel } from "../panels/decision.js";
 import { createHealthPanel } from "../panels/health.js";
+import { createHints } from "../panels/hints.js";
 import { createSignOut } from "../panels/signout.js";
 import { labelTables } from "../panels/tables.js";
 import { createTone } from "../panels/tone.js";
@@ -56,6 +57,7 @@ export async function startPage(app) {
   if (route) (await route()).start(page);
   if (!document.querySelector("#map")) return;
   guarded(() => page.wake.supervise());
+  guarded(() => createHints(app));
   const parts = await Promise.allSettled([
     import("../panels/mapbox.js").then(({ createMapbox }) =>
       createMapbox(app, decision),
