@@ -275,7 +275,7 @@ def test_nothing_is_released_on_old_news(
     with _frozen(stack, "emulator"):
         expect(release).to_be_disabled(timeout=WITHIN_MS)
         expect(card(page, "AGI").locator('[data-part="release-why"]')).to_have_text(
-            "El informe del robot no es reciente."
+            "Sin datos recientes del robot."
         )
         # The page counts the way of a report, too, and may call it old a little sooner.
         until(lambda: _report_age(page, stack) > 1.5, 30.0, "the server's is old, too")

@@ -7,6 +7,8 @@ const BLOCKS = {
     nav: { live: "En directo" },
     d: "a {distance:1} m ({confidence:percent}), {class:a}, {at:time}",
     plain: "{a} y {b}",
+    by: "{by:who}",
+    who: { operator: "operador" },
     log: { down: { default: "bajó", person: "bajó por una persona" } },
     class: { a: { person: "una persona" } },
     alert: { lost: "{robot} perdido" },
@@ -34,6 +36,11 @@ test("numbers, shares, classes and times are written as Spaniards do", async () 
     t("d", slots).replaceAll("\u00a0", " "),
     "a 1,4 m (94 %), una persona, 13:04:11",
   );
+});
+
+test("a role is told in the reader's language, a name as it is", async () => {
+  const { t } = await words("es");
+  equal([t("by", { by: "operator" }), t("by", { by: "Ana" })], ["operador", "Ana"]);
 });
 
 test("numbers are written as the English do after a switch", async () => {

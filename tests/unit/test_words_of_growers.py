@@ -43,6 +43,13 @@ def test_13_20_in_spanish_the_button_is_parar_and_what_it_does_a_parada() -> Non
         ("es", "aparato", r"este (?:equipo|dispositivo)|Según el equipo"),
         ("es", "certeza", r"\bconfianza\b"),
         ("en", "certainty", r"\bconfidence\b"),
+        ("es", "alerta", r"\b[Aa]larma"),
+        ("en", "alert", r"\b[Aa]larm"),
+        ("es", "archivo", r"\bfichero"),
+        ("es", "destino", r"\bmeta\b"),
+        ("es", "datos recientes", r"\binforme\b.* no es reciente"),
+        ("en", "recent data", r"\bnot fresh\b"),
+        ("en", "orders", r"\bCommands\b"),
     ],
 )
 def test_13_20_one_thing_has_one_word(language: str, one: str, others: str) -> None:
@@ -51,3 +58,16 @@ def test_13_20_one_thing_has_one_word(language: str, one: str, others: str) -> N
 
     assert [key for key, text in known.items() if re.search(others, text)] == []
     assert any(one in text.lower() for text in known.values())
+
+
+@pytest.mark.parametrize("language", ["es", "en"])
+def test_28_10_whoever_did_something_and_what_was_seen_are_translated(
+    language: str,
+) -> None:
+    raw = re.compile(r"\{(?:by|who|class|class_id|requested_by)\}")
+    # Recipients, as somebody typed them; and a label that nothing translates.
+    names = ("messages.", "log.detection_unmapped")
+
+    told = sentences(language).items()
+
+    assert [k for k, t in told if raw.search(t) and not k.startswith(names)] == []

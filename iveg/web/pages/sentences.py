@@ -16,6 +16,7 @@ _NOTHING: Final = "—"
 _NAMED: Final = {
     "class": "class",
     "a": "class.a",
+    "who": "who",
     "why": "why",
     "hop": "hop",
     "part": "part",

@@ -1,8 +1,8 @@
 """Texts of the page on the server: the same templates that the browser reads.
 
 ``iveg/static/i18n/{es,en}.json`` hold nested blocks; a key such as ``nav.live`` walks
-down them.  Holes are ``{name}``, ``{name:2}`` (decimals) and ``{name:percent}``; the
-browser knows further formats, for values that only it ever shows.
+down them.  Holes are ``{name}``, ``{name:2}`` (decimals), ``{name:percent}`` and
+``{name:who}``; the browser knows further formats, for values that only it ever shows.
 """
 
 import json
@@ -40,6 +40,8 @@ class Translations:
         return HOLE.sub(fill, self.sentences[key])
 
     def _write(self, value: Slot, form: str | None) -> str:
+        if form == "who":
+            return self.sentences.get(f"who.{value}", str(value))
         if isinstance(value, str) or form is None:
             return str(value)
         if form == "percent":

@@ -109,7 +109,7 @@ def test_a_new_stop_appears_on_the_commands_page_by_itself(
 
     strip_stop(page, "fleet").click()
 
-    expect(rows.first).to_contain_text("operator", timeout=30_000)
+    expect(rows.first).to_contain_text("operador", timeout=30_000)
     assert rows.count() > before
     assert evaluate(page, RUN_OVER) == []
 

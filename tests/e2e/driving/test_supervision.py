@@ -305,7 +305,7 @@ def test_markup_in_a_note_is_text_on_every_page(
         page.locator("#noted button").click()
 
         page.locator("#active-alerts", has_text=PROBE).wait_for()
-    noted = page.locator("#past-rows td", has_text="operator")
+    noted = page.locator("#past-rows td", has_text="operador")
     expect(noted.first).to_be_visible(timeout=30_000)
     assert page.locator("img[src=x]").count() == 0
     assert evaluate(page, "() => window.probed ?? null") is None

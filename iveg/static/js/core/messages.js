@@ -29,6 +29,7 @@ const FORMATS = {
   time: (value, messages) => messages.time(value),
   class: (value, messages) => messages.named("class", value),
   a: (value, messages) => messages.named("class.a", value),
+  who: (value, messages) => messages.named("who", value),
   why: (value, messages) => messages.named("why", value),
   hop: (value, messages) => messages.named("hop", value),
   part: (value, messages) => messages.named("part", value),

@@ -98,6 +98,6 @@ function whatOf(alert, i18n, opened) {
  * @param {import("../core/i18n.js").I18n} i18n */
 function seenBy({ acknowledged_at, acknowledged_by, note }, i18n) {
   if (!acknowledged_at) return "—";
-  const who = `${acknowledged_by} ${i18n.time(acknowledged_at)}`;
+  const who = `${i18n.t("rows.by", { by: acknowledged_by })} ${i18n.time(acknowledged_at)}`;
   return note ? `${who}: ${note}` : who;
 }

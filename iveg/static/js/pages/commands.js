@@ -60,7 +60,7 @@ function createDrills(store, i18n) {
       status === 200 ? i18n.t("drill.never") : i18n.t("drill.unread", { status });
     const result = last ? verdictSaid(last, i18n) : missing;
     setText(needPart("at", line), dayAndTime(last?.drilled_at ?? null));
-    setText(needPart("by", line), last?.by ?? "—");
+    setText(needPart("by", line), i18n.t("rows.by", { by: last?.by ?? null }));
     setText(needPart("result", line), read.has(line) ? result : "—");
     drawDue(needPart("due", line), String(line.dataset.drillsOf), store, i18n);
   }
@@ -98,7 +98,7 @@ function cellsOf(command, transports, i18n, opened) {
     make("td", "", command.robot_id),
     orderOf(command, i18n),
     endOf(command, i18n, opened),
-    make("td", "", command.requested_by),
+    make("td", "", i18n.t("rows.by", { by: command.requested_by })),
     number(took.accepted),
     ...transports.flatMap((_, i) => [number(took.sent[i]), number(took.answer[i])]),
     number(took.standing),

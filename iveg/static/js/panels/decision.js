@@ -203,7 +203,6 @@ function delaySaid(ms, i18n) {
 function saidOf({ link, value }, i18n) {
   if (value === null || value === undefined) return "";
   const key = `decision.said.${link}`;
-  return typeof value === "number" && i18n.has(key)
-    ? i18n.t(key, { value })
-    : String(value);
+  const isMeasured = link === "detection" || typeof value === "number";
+  return isMeasured && i18n.has(key) ? i18n.t(key, { value }) : String(value);
 }

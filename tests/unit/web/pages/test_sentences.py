@@ -18,6 +18,9 @@ def test_formats_are_those_of_the_page() -> None:
         "AGII · Speed → 50% (person near)"
     )
     assert ES.translations.decimal("1.43") == "1,43"
+    assert ES.say("rows.by", {"by": "operator"}) == "operador"
+    assert ES.translations.say("rows.by", by="operator") == "operador"
+    assert EN.say("rows.by", {"by": "Ana"}) == "Ana"
     assert ES.lane("Cabecera norte") == "Cabecera norte"
     assert EN.lane("Pasillo 3") == "Aisle 3"
     assert EN.lane("Tomates de Ana") == "Tomates de Ana"

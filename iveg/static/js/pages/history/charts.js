@@ -129,7 +129,9 @@ async function summon(source) {
 function dressed(trace, index, i18n) {
   const { kind, robot, class_id } = trace.meta;
   const colour = colourOf(kind, robot ?? class_id, index);
-  const name = class_id ?? i18n.t(`history.trace.${kind}`, { robot });
+  const name = class_id
+    ? i18n.t("history.trace.class", { class: class_id })
+    : i18n.t(`history.trace.${kind}`, { robot });
   if (trace.type === "bar") return { ...trace, name, marker: { color: colour } };
   const x = trace.x.map((at) => (at === null ? null : wallText(at)));
   const line = { ...trace.line, color: colour, width: 2 };

@@ -92,7 +92,7 @@ export function commandCells(item, i18n) {
     make("td", "", item.robot_id),
     make("td", "", i18n.t(`history.kind.${item.kind}`)),
     make("td", "rows__what", endSaid(item, i18n)),
-    make("td", "", item.requested_by),
+    make("td", "", i18n.t("rows.by", { by: item.requested_by })),
     ...took.answer.map((one) => numberCell(one, 0, i18n)),
     numberCell(item.standstill_ms, 0, i18n),
     numberCell(item.tries, 0, i18n),
