@@ -2,11 +2,10 @@
  * Other equipment on the Climate page: its tiles, and the last 24 hours of each.
  *
  * @typedef {import("../core/protocol.js").Tile} Tile
- * @typedef {import("./history/charts.js").Source & {since: string, until: string,
- *   figures: Record<string, import("./history/charts.js").Figure>}} Day by tile
+ * @typedef {import("./history/charts.js").Figure} Figure
+ * @typedef {import("./trends.js").Day & {figures: Record<string, Figure>}} Day by tile
  */
 
-import { readApi } from "../core/api.js";
 import { ageOf } from "../core/clock.js";
 import { climateAgo } from "../panels/climate_texts.js";
 import {
@@ -18,12 +17,9 @@ import {
   setHidden,
   setText,
 } from "../panels/dom.js";
-import { onThemeChange } from "../panels/theme.js";
-import { drawFigure } from "./history/charts.js";
+import { createTrends, spreadSaid } from "./trends.js";
 
 const TICK_MS = 1000;
-/** As often as the history keeps a number. */
-const DAY_MS = 60_000;
 const UNKNOWN = new Set(["waiting", "silent", "unreadable"]);
 
 /** @param {import("../core/page.js").Page} page */
@@ -91,80 +87,47 @@ function stateOf(tile, i18n) {
 }
 
 /**
- * The last 24 hours, asked for again each minute while the page is visible.
- *
  * @param {() => Tile[]} tiles
  * @param {import("../core/i18n.js").I18n} i18n
  */
 function createDay(tiles, i18n) {
-  /** @type {Day | null} */
-  let day = null;
-  let status = 200;
-
-  async function load() {
-    if (document.hidden || tiles().length === 0) return;
-    const answer = await readApi("history/equipment");
-    status = answer.status;
-    // The figures stay when the server is gone: the past stays true.
-    if (status === 200) day = answer.body;
-    await draw();
-  }
-
-  async function draw() {
-    setHidden(need("#equipment-error"), status === 200);
-    const wrong = status ? "rows.failed" : "rows.offline";
-    setText(need("#equipment-error"), i18n.t(wrong, { status }));
-    if (day === null) return;
-    const { figures } = day;
+  /** @param {Day} day */
+  function show({ figures }) {
     const drawn = tiles().filter(({ trend, key }) => trend && figures[key]);
     setHidden(need("#equipment-day"), drawn.length === 0);
     const place = need("#equipment-trends");
     fill(place, drawn, makeTrend, (child, tile) =>
-      setText(needPart("name", child), tile.name[i18n.language()]),
+      writeTrend(child, tile, figures[tile.key], i18n),
     );
-    for (const [index, tile] of drawn.entries())
-      await drawTrend(place.children[index], tile, day);
+    return drawn.map((tile, index) => ({
+      place: needPart("figure", place.children[index]),
+      figure: inUnit(figures[tile.key], shown(tile.unit)),
+    }));
   }
+  const isAsked = () => tiles().length > 0;
+  return createTrends(
+    { path: "history/equipment", error: "#equipment-error", isAsked, show },
+    i18n,
+  );
+}
 
-  /** @param {Element} child @param {Tile} tile @param {Day} shownDay */
-  async function drawTrend(child, tile, shownDay) {
-    const figure = shownDay.figures[tile.key];
-    const place = needPart("figure", child);
-    const spread = spreadOf(tile, figure);
-    setText(needPart("says", child), spread);
-    setAttribute(place, "aria-label", `${tile.name[i18n.language()]}. ${spread}`);
-    const span = {
-      since: Date.parse(shownDay.since),
-      until: Date.parse(shownDay.until),
-    };
-    const unit = { title: { text: shown(tile.unit), standoff: 8 } };
-    const yaxis = { ...figure.layout.yaxis, ...unit };
-    const own = { ...figure, layout: { ...figure.layout, yaxis } };
-    try {
-      await drawFigure(place, own, shownDay, span, i18n);
-    } catch {
-      setHidden(need("#equipment-error"), false);
-      setText(need("#equipment-error"), i18n.t("history.error.library"));
-    }
-  }
+/**
+ * @param {Element} child @param {Tile} tile @param {Figure} figure
+ * @param {import("../core/i18n.js").I18n} i18n
+ */
+function writeTrend(child, tile, figure, i18n) {
+  const name = tile.name[i18n.language()];
+  const say = (/** @type {number} */ value) => numberSaid({ ...tile, value }, i18n);
+  const spread = spreadSaid(figure, say, i18n);
+  setText(needPart("name", child), name);
+  setText(needPart("says", child), spread);
+  setAttribute(needPart("figure", child), "aria-label", `${name}. ${spread}`);
+}
 
-  /**
-   * Least and greatest of the day: the text alternative of the line.
-   *
-   * @param {Tile} tile @param {import("./history/charts.js").Figure} figure
-   */
-  function spreadOf(tile, { data }) {
-    const values = data[0].y.filter((value) => value !== null);
-    const say = (/** @type {number} */ value) => numberSaid({ ...tile, value }, i18n);
-    const [least, most] = [Math.min(...values), Math.max(...values)];
-    return i18n.t("climate.spread", { least: say(least), most: say(most) });
-  }
-
-  setInterval(load, DAY_MS);
-  document.addEventListener("visibilitychange", load);
-  i18n.onChange(draw);
-  onThemeChange(draw);
-  return { load };
+/** With the unit on the axis. @param {Figure} figure @param {string} unit */
+function inUnit(figure, unit) {
+  const yaxis = { ...figure.layout.yaxis, title: { text: unit, standoff: 8 } };
+  return { ...figure, layout: { ...figure.layout, yaxis } };
 }
 
 function makeTrend() {
