@@ -160,6 +160,50 @@ def test_paper_gets_the_table_and_no_stop(open_page: OpenPage, shown: Site) -> N
     assert page.locator("button:visible").count() == 0
 
 
+PAPER = """() => {
+  document.body.style.width = '640px';
+  dispatchEvent(new Event('beforeprint'));
+  return [...document.querySelectorAll('.chart__place .main-svg')].map((svg) => {
+    const place = svg.closest('.chart__place').getBoundingClientRect();
+    const drawn = svg.getBoundingClientRect();
+    return [drawn.right - place.right, svg.classList.contains('main-svg--dark')];
+  });
+}"""
+"""How far each figure sticks out of its place on paper (px), and whether it is dark."""
+
+
+def test_charts_are_whole_on_paper_and_stop_is_alive_after_print_and_export(
+    open_page: OpenPage, shown: Site
+) -> None:
+    with shown.api() as api:
+
+        def is_kept() -> bool:
+            charts = api.get("history/charts").json()
+            return all(charts[one]["data"] for one in ("speed", "stops"))
+
+        until(is_kept, 30.0, "speeds and a STOP in the history")
+    page = open_page(route="/history")
+    page.locator("#chart-speed .main-svg").first.wait_for(state="attached")
+    page.locator("#chart-stops .main-svg").first.wait_for(state="attached")
+    page.evaluate("document.documentElement.dataset.theme = 'dark'")
+
+    page.emulate_media(media="print")
+    figures = evaluate(page, PAPER)
+
+    assert len(figures) >= 4
+    assert [one for one in figures if one[0] > 1 or not one[1]] == []
+    assert page.locator("[data-stop]:visible, .button:visible").count() == 0
+
+    page.emulate_media(media="screen")
+    page.evaluate("dispatchEvent(new Event('afterprint'))")
+    assert page.locator(".main-svg[viewBox], .main-svg--dark").count() == 0
+    with page.expect_download() as download:
+        page.click('[data-export="commands"][data-format="csv"]')
+    assert "AGI" in download.value.path().read_text()
+    expect(page.locator("#mark")).to_have_attribute("data-state", "open")
+    expect(strip_stop(page, "AGI")).to_have_attribute("data-state", "standing")
+
+
 def test_the_fleet_page_draws_the_whole_chain_and_each_device(
     open_page: OpenPage,
 ) -> None:

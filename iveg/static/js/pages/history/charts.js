@@ -20,6 +20,7 @@
 import { whenResting } from "../../core/rest.js";
 import { all, make, need, setHidden, setText } from "../../panels/dom.js";
 import { wallText } from "./local_time.js";
+import { fitPaper } from "./paper.js";
 import { keepInStep, placesIn, stripsOf } from "./strips.js";
 
 /** @type {readonly ChartName[]} */
@@ -115,6 +116,7 @@ async function summon(source) {
     keeper.hidden = true;
     document.body.append(keeper);
   }
+  fitPaper();
   await whenResting();
   await import(source.library);
   return /** @type {any} */ (globalThis).Plotly;
