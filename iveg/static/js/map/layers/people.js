@@ -73,9 +73,8 @@ function drawPerson(paint, person) {
   }
   isolated(ctx, () => {
     ctx.globalAlpha = strengthOf(person);
-    const known = person.unknown ? "unknown" : person.peer ? "peer" : "person";
-    const kind = person.isThing ? "thing" : known;
-    const name = `${kind} ${person.stage === "last_seen"}`;
+    const kind = person.unknown ? "unknown" : person.peer ? "peer" : "person";
+    const name = `${kind} ${person.isThing} ${person.stage === "last_seen"}`;
     const sign = { name, reach: FIGURE_PX, ...place };
     const drawn = FIGURES[kind];
     drawSign(paint, paint.sprites, sign, (there) => drawn(there, person));
