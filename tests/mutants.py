@@ -117,8 +117,8 @@ MUTANTS = (
     ),
     Mutant(
         "rule: an encounter that is foretold slows nobody",
-        "if one.in_s <= (HOLDS_S if cause in mine else soon_s)",
-        "if one.in_s < 0.0",
+        "one.in_s <= (max(HOLDS_S, soon_s) if cause in mine else soon_s)",
+        "one.in_s < 0.0",
         ("unit/domain/rule/test_foresight.py",),
     ),
     Mutant(

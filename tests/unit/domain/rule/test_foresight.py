@@ -207,7 +207,7 @@ def test_inside_the_ring_nothing_is_foretold_any_more() -> None:
 
 
 @pytest.mark.parametrize(("braking", "speed"), [(0.5, 1.0), (0.5, 1.5), (1.0, 1.0)])
-def test_behind_somebody_who_walks_ahead_a_robot_slows_once(
+def test_behind_somebody_who_walks_ahead_no_factor_lasts_less_than_two_seconds(
     braking: float, speed: float
 ) -> None:
     scene, x, drives = Scene(), 0.0, speed
@@ -220,11 +220,12 @@ def test_behind_somebody_who_walks_ahead_a_robot_slows_once(
         scene.drive("AGI", x, linear=drives)
         scene.drive("AGII", 50.0)
         scene.look("AGII")
-        scene.look("AGI", person(8.0 + 0.9 * speed * scene.now - x))
+        scene.look("AGI", person(4.5 + 0.7 * speed * scene.now))
         factors.append(scene.judge()["AGI"].speed_factor)
         gap = factors[-1] * speed - drives
         drives += min(0.05, max(-0.05 * braking, gap))
         x += drives * 0.1
 
-    changes = [after for before, after in pairwise(factors) if before != after]
-    assert changes == [0.5]
+    tenths = [n for n, (one, two) in enumerate(pairwise(factors)) if one != two]
+    assert len(tenths) >= 2
+    assert min(after - before for before, after in pairwise(tenths)) >= 20
