@@ -19,7 +19,7 @@ ring that is drawn goes by time or by an all-clear.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from iveg.domain.limits import LIMITS
@@ -37,6 +37,7 @@ _MISS = 1.0
 _SUREST = 4.0
 """Bound of the log-odds: no number of looks makes certain (0.982)."""
 _NEAR_M = 1.0
+_FARTHEST_M = _NEAR_M + LIMITS.walking_m_s * _FORGOTTEN_S
 MOST_SUSPECTS = 64
 """Of each robot; the one not seen for longest gives way."""
 
@@ -164,7 +165,7 @@ class Suspicions:
             suspect.miss(now)
         self._of[own] = _kept(known, now)
         others = [
-            [one for one in theirs if not one.is_over(now)]
+            theirs
             for key, theirs in self._of.items()
             if key != own and key[0] == recording
         ]
@@ -196,8 +197,14 @@ def _match(
 def _nearest(
     one: FaintPerson, suspects: Sequence[_Suspect], now: float
 ) -> _Suspect | None:
-    near = [(far, number) for number, far in _within(one, suspects, now)]
-    return suspects[min(near)[1]] if near else None
+    found, least = None, math.inf
+    for suspect in suspects:
+        # First what nearly all fail: every box asks every other robot's suspects.
+        if abs(suspect.x - one.x) <= _FARTHEST_M and not suspect.is_over(now):
+            apart = suspect.reaches(one, now)
+            if apart is not None and apart < least:
+                found, least = suspect, apart
+    return found
 
 
 def _judged(
@@ -218,15 +225,6 @@ def _judged(
         probability,
         suspect.confirmed,
     )
-
-
-def _within(
-    one: FaintPerson, free: Sequence[_Suspect], now: float
-) -> Iterator[tuple[int, float]]:
-    for number, suspect in enumerate(free):
-        far = suspect.reaches(one, now)
-        if far is not None:
-            yield number, far
 
 
 def _kept(known: Sequence[_Suspect], now: float) -> list[_Suspect]:

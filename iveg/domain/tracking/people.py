@@ -301,7 +301,17 @@ def _looked_at(one: Placed, looks: Looks | None) -> Placed:
         return one
     possible = one.kind == "faint" and looks.confirmed
     kind = "alert" if possible else one.kind
-    return replace(one, kind=kind, looks=looks, possible=possible)
+    # For each person of each picture: ``replace`` takes twice as long.
+    return Placed(
+        one.detection,
+        one.framed,
+        one.index,
+        one.position,
+        kind,
+        one.class_,
+        looks=looks,
+        possible=possible,
+    )
 
 
 def _may_be_somebody(detection: Detection, rule: DetectionRule) -> bool:
