@@ -1,4 +1,8 @@
-import { loweringsOf, sightingsLost } from "../../iveg/static/js/pages/lowering.js";
+import {
+  foreseen,
+  loweringsOf,
+  sightingsLost,
+} from "../../iveg/static/js/pages/lowering.js";
 import { equal, test } from "./harness.js";
 
 const rule = /** @type {import("../../iveg/static/js/core/protocol.js").Rule} */ (
@@ -40,4 +44,11 @@ test("13.14 of today's sightings it is told how many would no longer count", () 
     probability,
   }));
   equal(sightingsLost(seen, 0.8, 0.9), { count: 3, total: 5 });
+});
+
+test("what foresight did is told of the encounters of the day", () => {
+  const met = { count: 6, slowed: 6, foretold: 4, foretold_s: 1.25 };
+  equal(foreseen(met), { count: 4, total: 6, seconds: 1.25 });
+  const none = { count: 2, slowed: 1, foretold: 0, foretold_s: null };
+  equal(foreseen(none), { count: 0, total: 2, seconds: 0 });
 });

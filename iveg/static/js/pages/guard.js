@@ -5,7 +5,7 @@
 
 import { readApi, sendApi } from "../core/api.js";
 import { need, setHidden, setText } from "../panels/dom.js";
-import { loweringsOf, personShare, sightingsLost } from "./lowering.js";
+import { foreseen, loweringsOf, personShare, sightingsLost } from "./lowering.js";
 
 /** @typedef {import("../core/protocol.js").Rule} Rule */
 /** @typedef {import("./lowering.js").Change} Change */
@@ -32,8 +32,11 @@ export function createGuard(store, i18n) {
     const lowerings = loweringsOf(before, change);
     if (!lowerings.length) return true;
     const told = lowerings.map(({ key, slots }) => i18n.t(key, slots));
-    const count = await countSaid(change, before);
-    setText(need("#guard-says"), [...told, count].filter(Boolean).join(" "));
+    const counts = await Promise.all([
+      countSaid(change, before),
+      before.foresight && change.foresight === false ? encountersSaid() : "",
+    ]);
+    setText(need("#guard-says"), [...told, ...counts].filter(Boolean).join(" "));
     setHidden(box, false);
     need("#guard-no").focus();
     return new Promise((resolve) => {
@@ -52,6 +55,15 @@ export function createGuard(store, i18n) {
     const { status, body } = await readApi(`detections?${query}`);
     if (status !== 200 || !body?.items.length) return i18n.t("lowering.uncounted");
     return i18n.t("lowering.sightings", sightingsLost(body.items, from, to));
+  }
+
+  /** What foresight did today, which a rule without it would not have. */
+  async function encountersSaid() {
+    const { status, body } = await readApi("day");
+    const met = status === 200 ? body?.encounters : null;
+    return met?.count
+      ? i18n.t("lowering.encounters", foreseen(met))
+      : i18n.t("lowering.uncounted");
   }
 
   /** @param {boolean} isYes */

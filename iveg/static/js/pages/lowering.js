@@ -45,6 +45,15 @@ export function sightingsLost(seen, from, to) {
   return { count, total: counted.length };
 }
 
+/**
+ * How many of a day's encounters were foretold, and how long before on average (s).
+ *
+ * @param {{count: number, foretold: number, foretold_s: number | null}} met
+ */
+export function foreseen({ count, foretold, foretold_s }) {
+  return { count: foretold, total: count, seconds: foretold_s ?? 0 };
+}
+
 /** @param {Record<string, string>} before @param {Record<string, string>} after */
 function lostWords(before, after) {
   return Object.keys(before)
