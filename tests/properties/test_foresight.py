@@ -62,6 +62,33 @@ def test_no_robot_is_ever_faster_for_it(
             assert after[robot_id].speed_factor <= limit.speed_factor
 
 
+_TASK = st.sampled_from((None, "waiting", "scouting", "hauling", "sowing"))
+
+
+@given(st.lists(st.tuples(_STEP, _TASK, _TASK), max_size=15))
+def test_no_robot_is_ever_faster_for_a_task(
+    run: list[
+        tuple[tuple[float, float, list[tuple[float, float]]], str | None, str | None]
+    ],
+) -> None:
+    scenes, x = [Scene(), Scene()], 0.0
+    for (after_s, speed, people), *tasks in run:
+        x += speed * after_s
+        limits = []
+        for scene in scenes:
+            scene.now = round(scene.now + after_s, 6)
+            scene.drive("AGI", x, linear=speed)
+            scene.drive("AGII", 6.0 - x, 1.0, linear=-speed)
+            for robot_id, task in zip(("AGI", "AGII"), tasks, strict=True):
+                if task and scene is scenes[1]:
+                    scene.navigate(robot_id, task)
+            scene.look("AGI", *(person(*spot) for spot in people))
+            scene.look("AGII")
+            limits.append(scene.judge())
+        for robot_id, limit in limits[0].items():
+            assert limits[1][robot_id].speed_factor <= limit.speed_factor
+
+
 _SEEN = st.tuples(
     st.sampled_from((-3.0, 1.5, 2.4, 3.0, 4.5, 9.0)),
     st.none() | st.tuples(st.sampled_from((-1.6, 0.0, 1.0)), st.just(0.2)),

@@ -6,7 +6,7 @@ it is let go 0.3 m outside the ring and 1.0 s later, so that noise does not flap
 rings a robot is clear only while every premise of that claim holds (``premises``).
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from iveg.domain.detection_rule import DetectionRule
@@ -19,6 +19,7 @@ from iveg.domain.rule.foresight import Encounter, Foresight, Foretold
 from iveg.domain.rule.obstacles import CAUSE, SeenBy, SeenObstacle
 from iveg.domain.rule.paths import HOLDS_S, slows_within_s
 from iveg.domain.rule.premises import Missing, missing_premises
+from iveg.domain.rule.right_of_way import gives_way_to
 from iveg.domain.rule.zones import NOT_FAR_M, Zone, ZoneFinder
 from iveg.domain.tracking.people import People
 from iveg.domain.world import World
@@ -124,7 +125,8 @@ class SpeedLimits:
             ahead = self.foretold.get(robot.robot_id, {})
             if nearest or ahead or self._open.get(robot.robot_id):
                 name = f"{new_id}-{len(changes)}"
-                changes += self._cross(robot, nearest, ahead, now, name)
+                yields_to = self._yields_to(robot, ahead, world, now)
+                changes += self._cross(robot, nearest, ahead, yields_to, now, name)
         self.missing = missing_premises(world, now)
         limits = {name: self._speed_limit(name) for name in world.robots}
         for name, limit in limits.items():
@@ -153,17 +155,33 @@ class SpeedLimits:
         ahead = self._foresight.look(world, people, rule, now, before)
         return _with_obstacles(ahead, seen)
 
+    def _yields_to(
+        self,
+        robot: RobotState,
+        ahead: Mapping[str, Encounter],
+        world: World,
+        now: Instant,
+    ) -> Collection[str]:
+        """Peers that a robot gives way to by their tasks: nobody if people are near."""
+        near = self._open.get(robot.robot_id, {}).values()
+        zones = [*(one.zone for one in ahead.values()), *(one.zone for one in near)]
+        if not ahead or any(zone.reason == "person" for zone in zones):
+            return ()
+        return gives_way_to(robot, ahead, world, now)
+
     def _cross(
         self,
         robot: RobotState,
         inside: "_Found",
         ahead: Mapping[str, Encounter],
+        yields_to: Collection[str],
         now: Instant,
         new_id: str,
     ) -> Iterator[LimitChange]:
         mine = self._open.setdefault(robot.robot_id, {})
         again = self._foresight.if_released.get(robot.robot_id, {})
-        nearest = {**inside, **_foreseen(robot, ahead, again, mine)}
+        foreseen = _foreseen(robot, ahead, again, yields_to, mine)
+        nearest = {**inside, **foreseen}
         for number, (cause, (depth, distance, zone)) in enumerate(nearest.items()):
             crossing = mine.get(cause)
             if crossing is not None:
@@ -281,12 +299,14 @@ def _foreseen(
     robot: RobotState,
     ahead: Mapping[str, Encounter],
     again: Mapping[str, Encounter],
+    yields_to: Collection[str],
     mine: Mapping[str, Crossing],
 ) -> dict[str, tuple[float, float, Zone]]:
     """Rings that a robot will reach, as if it were at their border now.
 
-    In time to be slow there.  Who is slow for one already stays so while it lies ahead,
-    or would lie ahead ``again`` at the speed of before: it shall not speed up for that.
+    In time to be slow there; who gives way does not wait for that.  Who is slow for one
+    already stays so while it lies ahead, or would lie ahead ``again`` at the speed of
+    before: it shall not speed up for that.
     """
     if robot.odometry is None:
         return {}
@@ -296,7 +316,8 @@ def _foreseen(
     near = {
         cause: one
         for cause, one in ahead.items()
-        if one.in_s <= (max(HOLDS_S, soon_s) if cause in mine else soon_s)
+        if cause in yields_to
+        or one.in_s <= (max(HOLDS_S, soon_s) if cause in mine else soon_s)
     }
     return {
         cause: (0.0, pose.distance_to(one.zone.x, one.zone.y), one.zone)

@@ -1,0 +1,62 @@
+"""Who gives way to whom, where two robots will meet and no person is near."""
+
+import math
+
+import pytest
+
+from tests.unit.domain.scene import Scene, person
+
+
+def first_slow(
+    agi: str | None, agii: str | None, *, is_old: bool = False, somebody: bool = False
+) -> tuple[float | None, float | None]:
+    """When AGI and AGII are halved for each other, which meet at 0.4 m/s each (s).
+
+    Each tells its task all the time, or, ``is_old``, only at the start.
+    """
+    scene, slow = Scene(), dict[str, float]()
+    for tenth in range(100):
+        scene.now = tenth / 10
+        way = 0.04 * tenth
+        scene.drive("AGI", way, linear=0.4)
+        scene.drive("AGII", 8.0 - way, yaw=math.pi, linear=0.4)
+        for robot_id, task in (("AGI", agi), ("AGII", agii)):
+            if task and not (is_old and tenth):
+                scene.navigate(robot_id, task)
+        scene.look("AGI", *([person(way - 1.5)] if somebody else []))
+        scene.look("AGII")
+        scene.judge()
+        for crossing in scene.speed_limits.crossings:
+            if crossing.zone.reason == "robot":
+                slow.setdefault(crossing.robot_id, scene.now)
+    return slow.get("AGI"), slow.get("AGII")
+
+
+def test_the_lesser_task_slows_early_and_the_greater_as_today() -> None:
+    today, also = first_slow(None, None)
+    scouting, hauling = first_slow("scouting", "hauling")
+
+    assert today is not None
+    assert today == also == hauling
+    assert scouting is not None
+    assert scouting <= today - 1.0
+
+
+@pytest.mark.parametrize(
+    ("agi", "agii"),
+    [("scouting", "watching"), ("sowing", "hauling"), (None, "hauling")],
+    ids=["equal", "unknown", "none"],
+)
+def test_without_a_lesser_task_today_s_rule_stays(
+    agi: str | None, agii: str | None
+) -> None:
+    assert first_slow(agi, agii) == first_slow(None, None)
+
+
+def test_an_old_task_gives_no_right() -> None:
+    assert first_slow("scouting", "hauling", is_old=True) == first_slow(None, None)
+
+
+def test_near_a_person_tasks_decide_nothing() -> None:
+    with_tasks = first_slow("scouting", "hauling", somebody=True)
+    assert with_tasks == first_slow(None, None, somebody=True)
