@@ -385,6 +385,19 @@ def test_a_phone_has_one_card_a_swipe_the_worst_first_and_none_moves_once_swiped
     row.evaluate("(row) => { row.scrollLeft = 0; }")
 
 
+def test_the_tab_of_the_log_leads_to_it_from_another_page(
+    browser: Browser, past: Site
+) -> None:
+    with frozen_page(browser, past, (390, 844)) as page:
+        page.goto(f"{past.url}/about")
+        page.locator('.tabbar a[href="/#log-panel"]').click()
+        settle(page, "#log li")
+        page.clock.run_for(500)
+
+        expect(page.locator("#log li").first).to_be_in_viewport()
+        assert evaluate(page, COVERED_STOPS) == []
+
+
 def test_the_screen_of_a_wall_looks_and_stops_and_frees_nothing(
     browser: Browser, past: Site
 ) -> None:

@@ -74,6 +74,29 @@ export async function startPage(app) {
     ),
   ]);
   for (const part of parts) if (part.status === "rejected") reportError(part.reason);
+  guarded(() => goToAsked(app));
+}
+
+/**
+ * Goes to the part that the address names once it has its height: when the browser went
+ * there it was empty.  Whoever has touched the page by then stays where they are.
+ *
+ * @param {App} app
+ */
+function goToAsked({ store }) {
+  const asked = location.hash && document.getElementById(location.hash.slice(1));
+  if (!asked) return;
+  const touched = new AbortController();
+  const { signal } = touched;
+  for (const name of ["pointerdown", "wheel", "keydown"]) {
+    addEventListener(name, () => touched.abort(), { signal });
+  }
+  const go = () => {
+    if (!signal.aborted) asked.scrollIntoView();
+    touched.abort();
+  };
+  if (store.get("snapshot")) requestAnimationFrame(go);
+  else store.subscribe("snapshot", () => requestAnimationFrame(go));
 }
 
 function wirePrinting() {
