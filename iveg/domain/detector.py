@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 from operator import is_
 from typing import Literal
 
+from iveg.domain.camera_bias import PeerLooks
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Detection, DetectionFrame, Instant
@@ -80,6 +81,7 @@ class DetectorEvidence:
         worked: Whether it was ever proven to work.
         out_of_service: None: it is required.
         class_names: Names that it gave to what is neither a person nor a robot.
+        peer_looks: How far off it places other robots.
     """
 
     whole_at: float | None = None
@@ -87,6 +89,7 @@ class DetectorEvidence:
     worked: bool = False
     out_of_service: OutOfService | None = None
     class_names: set[str] = field(default_factory=set)
+    peer_looks: PeerLooks = field(default_factory=PeerLooks)
     _allowance: float = FRAMES_HZ
     _counted_at: float | None = None
 

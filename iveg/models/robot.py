@@ -15,6 +15,7 @@ from iveg.domain.rule import foresight
 from iveg.domain.stamps import format_stamp
 from iveg.domain.transports import TransportId
 from iveg.models.base import Model, rounded
+from iveg.models.camera_bias import CameraBias
 from iveg.models.command import Command
 from iveg.models.goal import Goal
 from iveg.models.margin import Margin
@@ -164,6 +165,7 @@ class Detector(Model):
     missing: bool
     out_by: str | None = Field(description="Who took it out of service.")
     out_since: str | None
+    bias: CameraBias | None
 
     @classmethod
     def of(cls, robot: RobotState, now: Instant) -> "Detector":
@@ -174,6 +176,7 @@ class Detector(Model):
             missing=robot.detector.is_missing(now),
             out_by=None if out is None else out.by,
             out_since=None if out is None else format_stamp(out.since),
+            bias=CameraBias.of(robot.detector.peer_looks, now),
         )
 
 

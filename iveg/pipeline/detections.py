@@ -6,9 +6,11 @@ hour does not fill the log.
 
 from collections.abc import Iterable
 
+from iveg.domain.camera_bias import peer_error
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.detector import flaw_of
 from iveg.domain.events import LogEvent, Slot
+from iveg.domain.geometry import Pose2D
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import DetectionFrame, Instant, Received
 from iveg.domain.rule.obstacles import Walkers
@@ -115,11 +117,27 @@ class DetectionTracking:
         placed = self._people.sight(frame, self._world, rule, seen_at, self._new_id())
         for name in self._people.unknown_frames:
             self._name_unknown_frame(frame.robot_id, name, received.at)
+        pose = self._world.robot(frame.robot_id).pose_at_stamp(frame.origin.own_s)
         for one in placed:
             self._describe(one, frame, received)
+            self._note_peer(one, frame.robot_id, pose, seen_at)
         if any(one.person is not None for one in placed):
             self._event_log.changed(topics.PEOPLE.name)
         return placed
+
+    def _note_peer(
+        self, one: Placed, robot_id: str, pose: Pose2D | None, at: Instant
+    ) -> None:
+        """Compare the place of a peer with its own pose at that moment."""
+        if one.peer is None or pose is None:
+            return
+        peer = self._world.robot(one.peer)
+        offset_s = peer.clock.offset_s(at) or 0.0
+        itself = peer.pose_at_stamp(at.wall - offset_s)
+        if itself is not None and peer.link(at) == "LIVE":
+            seen, half = one.position[:2], peer.profile.length / 2
+            error = peer_error(seen, pose, itself, half)
+            self._world.robot(robot_id).detector.peer_looks.note(at.mono, error)
 
     def _name_unknown_frame(self, robot_id: str, frame_id: str, at: Instant) -> None:
         """Count a frame that nobody described; log it once for each robot."""

@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from math import inf
 
+from iveg.domain.camera_bias import WARN_M
 from iveg.domain.decisions import SlowdownDecision
 from iveg.domain.detection_rule import RECOVERED, DetectionRule
 from iveg.domain.events import Condition, Slot
@@ -81,6 +82,10 @@ def of_detector(
     if detector.out_of_service is not None:
         by = detector.out_of_service.by
         yield Condition.of_robot("P3", "alert.detector_out_of_service", name, by=by)
+    bias = detector.peer_looks.bias(now)
+    if bias is not None and bias.off_m > WARN_M:
+        off = round(bias.off_m, 2)
+        yield Condition.of_robot("P3", "alert.camera_bias", name, off=off)
 
 
 def of_things(things: Iterable[Thing]) -> Iterable[Condition]:

@@ -76,6 +76,18 @@ export type Battery = {
   voltage: number | null;
 };
 
+/** Median error of its detections of other robots, by their own poses. */
+export type CameraBias = {
+  off_m: number;
+  /** Seen farther ahead than they are. */
+  ahead_m: number;
+  /** Seen farther to the left than they are. */
+  left_m: number;
+  looks: number;
+  /** When it saw another robot last. */
+  last_at: string;
+};
+
 /** The newest reading. */
 export type Climate = {
   /** °C. */
@@ -305,6 +317,7 @@ export type Detector = {
   /** Who took it out of service. */
   out_by: string | null;
   out_since: string | null;
+  bias: CameraBias | null;
 };
 
 /** One drill and its verdict. */

@@ -1,11 +1,14 @@
 """Detectors out of service: who may say so, what it changes, when it ends."""
 
+from typing import Any
+
 import httpx
+import pytest
 
 from iveg.domain.detector import OutOfService
 from iveg.domain.records import LogRecord
 from iveg.web.security.authentication import Role
-from tests.builders import odometry, origin
+from tests.builders import detection, odometry, origin
 from tests.unit.pipeline.desk import conditions_of
 from tests.unit.web.desk import WebDesk
 
@@ -49,6 +52,7 @@ async def test_out_of_service_nobody_waits_for_its_pictures() -> None:
         "missing": False,
         "out_by": "ana",
         "out_since": "2023-11-14T22:13:20.000Z",
+        "bias": None,
     }
 
 
@@ -134,3 +138,47 @@ async def test_a_robot_tells_what_it_lacks() -> None:
     assert told["missing"] == [{"premise": "detector", "robot_id": "AGI"}]
     assert told["speed_limit"]["reason"] == "stale"
     assert told["detector"]["missing"] is False
+
+
+# --- its mount ------------------------------------------------------------------------
+
+
+async def bias_of(desk: WebDesk) -> Any:
+    async with desk.browser() as browser:
+        answer = await browser.get("/api/v1/robots/AGI")
+    return answer.json()["detector"]["bias"]
+
+
+@pytest.mark.parametrize(("off_m", "is_told"), [(0.25, False), (0.35, True)])
+async def test_a_camera_that_sees_peers_beside_themselves_is_a_p3(
+    off_m: float, is_told: bool
+) -> None:
+    """AGII backs away from AGI, whose camera has it too far to the left."""
+    desk, told = WebDesk(), []
+    for number in range(12):
+        x = 5.0 + 0.1 * number
+        desk.drive("AGI", linear=0.0)
+        desk.drive("AGII", x, linear=-0.2)
+        # One that is not sure of it counts as well.
+        desk.look("AGI", detection("AGII", x, off_m, probability=0.7))
+        desk.look("AGII")
+        told.append(await bias_of(desk))
+        await desk.wait(0.5)
+
+    bias = await bias_of(desk)
+    assert told[:9] == [None] * 9
+    assert (bias["off_m"], bias["ahead_m"], bias["left_m"]) == (off_m, 0.0, off_m)
+    assert bias["looks"] >= 10
+    assert bias["last_at"].startswith("2023-11-14T22:13:2")
+    assert ("alert.camera_bias" in conditions_of(desk)) is is_told
+
+
+async def test_somebody_who_is_no_peer_says_nothing_of_a_mount() -> None:
+    desk = WebDesk()
+    for _ in range(12):
+        desk.drive("AGI", linear=0.0)
+        desk.drive("AGII", 5.0, linear=0.0)
+        desk.look("AGI", detection("farmer", 5.0, 0.4), detection("AGII", 9.0))
+        await desk.wait(0.5)
+
+    assert await bias_of(desk) is None
