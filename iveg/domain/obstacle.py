@@ -13,6 +13,8 @@ _WALKED_M, _WALKED_S, _PASSED_M = 0.5, 0.5, 0.3
 """Who walks goes so far, for so long, and so far as seen from the robot: not so what it
 tows, nor the part of a wall that it sees as it passes."""
 _WALKS_M_S = (0.3, 2.5)
+_STANDS_S = 10.0
+"""Who walked and stands since is still somebody, for as long as a ring lasts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +30,7 @@ class Obstacle:
         since: When it was seen first; ``at`` newest (monotonic, s).
         vx: How it goes in ``map`` (m/s), smoothed over 0.4 s; ``vy`` likewise.
         passed_m: How far from where the robot saw it first, as seen from the robot (m).
+        walked_at: When it last moved like somebody who walks (monotonic, s).
     """
 
     x: float
@@ -42,6 +45,7 @@ class Obstacle:
     vx: float = 0.0
     vy: float = 0.0
     passed_m: float = 0.0
+    walked_at: float = -math.inf
 
     @property
     def way_m(self) -> float:
@@ -52,6 +56,11 @@ class Obstacle:
     def has_moved(self) -> bool:
         """Whether it went farther than noise does."""
         return self.way_m > _MOVED_M
+
+    @property
+    def is_somebody(self) -> bool:
+        """Whether it walks, or walked just now."""
+        return self.at - self.walked_at <= _STANDS_S
 
     @property
     def walks(self) -> bool:
@@ -77,7 +86,7 @@ class Obstacle:
         """The same, seen again; ``beside``: where in ``base_link``."""
         gain = (now - self.at) / (_SMOOTHED_S + now - self.at)
         after_s = max(now - self.at, 1e-3)
-        return replace(
+        seen = replace(
             self,
             x=x,
             y=y,
@@ -88,6 +97,7 @@ class Obstacle:
             vy=self.vy + gain * ((y - self.y) / after_s - self.vy),
             passed_m=math.dist(beside, self.first_seen),
         )
+        return replace(seen, walked_at=now) if seen.walks else seen
 
     @property
     def fits(self) -> bool:

@@ -158,7 +158,7 @@ class Witness:
         self._ahead_s = ahead_s
         self._known: tuple[Obstacle, ...] = ()
         self.walkers: tuple[Obstacle, ...] = ()
-        """Of the last scan, those that move like somebody who walks."""
+        """Of the last scan, those who walk, or walked just now."""
         self._looked_at = -math.inf
 
     def look(
@@ -179,7 +179,7 @@ class Witness:
         earlier = [one for one in self._known if now - one.at <= GONE_S]
         seen = [self._joined(body, earlier, pose, now) for body in bodies]
         self._known = (*seen, *earlier)
-        self.walkers = tuple(one for one in seen if one.walks)
+        self.walkers = tuple(one for one in seen if one.is_somebody)
 
     @property
     def is_unsure(self) -> bool:

@@ -130,10 +130,9 @@ function makeFacts(decision, i18n) {
   const { id, version, parameters } = decision.rule;
   const { looks, obstacle: laser } = parameters ?? {};
   const slots = { ...parameters, ...looks, ...laser, ...decision, id, version, x, y };
-  const seen = decision.class_id === null ? "told" : "seen";
-  const walker = decision.class_id === "laser" ? "walker" : seen;
+  const seen = sourceOf(decision);
   const facts = [
-    [`decision.fact.${seen}`, `decision.facts.${laser ? "laser" : walker}`],
+    [`decision.fact.${seen === "told" ? "told" : "seen"}`, `decision.facts.${seen}`],
     ["decision.fact.obeys", `decision.facts.${sightOf(decision)}`],
     ...(looks?.count > 1 ? [["decision.fact.looks", "decision.facts.looks"]] : []),
     ["decision.fact.rule", `decision.facts.${laser ? "laser_rule" : "rule"}`],
@@ -166,6 +165,13 @@ function aboutOf({ started_at, ended_at, rule, ...told }, i18n) {
     radiusM: rule.parameters?.radius_m ?? null,
     speedSaid: known ? i18n.t("plot.before_after", { before, after }) : "",
   };
+}
+
+/** How its cause is known. @param {Decision} decision */
+function sourceOf({ class_id, rule }) {
+  if (rule.parameters?.obstacle) return "laser";
+  if (class_id === null) return "told";
+  return class_id === "laser" ? "walker" : "seen";
 }
 
 /** @param {Decision} decision */

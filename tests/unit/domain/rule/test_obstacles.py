@@ -173,6 +173,20 @@ def test_who_walks_near_a_robot_is_possibly_a_person_whose_ring_others_get(
     )
 
 
+def test_who_stops_before_the_laser_is_still_somebody_for_ten_seconds(
+    aisle: Aisle,
+) -> None:
+    place = walk(aisle, 8)
+    seen = list[float]()
+    for _ in range(120):
+        aisle.step(place, linear=0.0)
+        (one,) = aisle.everyone
+        seen.append(one.age_s(at(aisle.now)))
+    assert max(seen[:95]) < 0.2
+    assert seen[-1] > 1.0
+    assert aisle.judge()["AGI"].reason == "person", "its ring lasts a little longer"
+
+
 def test_whom_a_camera_then_confirms_keeps_the_name_and_has_no_second_one(
     aisle: Aisle,
 ) -> None:
