@@ -111,8 +111,8 @@ MUTANTS = (
     ),
     Mutant(
         "rule: what a laser sees moves the circle of what a camera saw",
-        "if earlier.laser != one.sighting.laser:",
-        "if False:",
+        "(earlier.possible, earlier.laser) != (one.sighting.possible, one.sighting.laser)",
+        "earlier.possible != one.sighting.possible",
         ("unit/domain/rule/test_obstacles.py",),
     ),
     Mutant(

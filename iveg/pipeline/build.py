@@ -176,8 +176,7 @@ def build(
     world = World(fleet, probe, greenhouse.bounds)
     watch = LatencyWatch(world.robots, world.ledger.composed_at)
     latency = LatencyMonitor(watch, ports.sink, event_log)
-    watched = guard("latency", watch.arrived), guard("recordings", ports.arrived)
-    ingest = _ingest(world, event_log, ports.clock, watched)
+    ingest = _ingest(world, event_log, ports, supervision, watch)
     scans, people = ScanReader(ingest.reject), People(greenhouse, choices.era)
     obstacles = Obstacles(world, people, Plan.of(greenhouse))
     evaluator = Evaluator(
@@ -291,10 +290,25 @@ def _goals(
 def _ingest(
     world: World,
     event_log: EventLog,
-    clock: Clock,
-    watched: Sequence[Callable[[Received], None]],
+    ports: Ports,
+    supervision: Supervision,
+    watch: LatencyWatch,
 ) -> Ingest:
+    note_latency = supervision.guard("latency", watch.arrived)
+    record = supervision.guard("recordings", ports.arrived)
+
     def log_rejected(source: str, reason: str) -> None:
+        slots = {"source": source, "reason": reason}
+        event_log.log(LogEvent("system", "log.rejected", slots), ports.clock())
+
+    def passed(received: Received) -> None:
+        note_latency(received)
+        record(received)
+
+    return Ingest(world.robots.__contains__, log_rejected, world.is_past, passed)
+
+
+def log_rejected(source: str, reason: str) -> None:
         slots = {"source": source, "reason": reason}
         event_log.log(LogEvent("system", "log.rejected", slots), clock())
 

@@ -24,6 +24,7 @@ from iveg.domain.tracking.looks import (
     Looks,
     Suspicions,
 )
+from iveg.domain.tracking.numbers import TrackNumbers
 from iveg.domain.tracking.person import Sighting, TrackedPerson
 from iveg.domain.tracking.picture import PlacedDetection
 from iveg.domain.tracking.recognition import straight
@@ -85,7 +86,7 @@ class People:
         self._bounds = None if greenhouse is None else greenhouse.bounds
         self._suspicions = Suspicions()
         way = straight if greenhouse is None else Ways(greenhouse).between
-        self._tracker = Tracker(era=era, way=way)
+        self._tracker = Tracker(numbers=TrackNumbers(era), way=way)
         self._faint: dict[str, list[Placed]] = {}
         self.things = Things()
         self.turned_away = 0

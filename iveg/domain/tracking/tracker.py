@@ -21,6 +21,7 @@ from functools import partial
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
 from iveg.domain.tracking.assignment import assign
+from iveg.domain.tracking.numbers import TrackNumbers
 from iveg.domain.tracking.person import Sighting, TrackedPerson
 from iveg.domain.tracking.picture import (
     PlacedDetection,
@@ -38,7 +39,6 @@ MAX_PEOPLE, MAX_POSSIBLE, MAX_WALKERS = 256, 64, 32
 MERGE_M = 0.5
 _APART_M = 3.0
 """Farther from each other, at once, are two: beyond noise and a second's walk."""
-_DAY_S = 86400.0
 
 
 @dataclass
@@ -47,18 +47,16 @@ class Tracker:
 
     Attributes:
         merge_m: Live tracks this near become one (m); below zero none do.
-        era: Ends every id, with the day, so that no later start makes the same one.
+        numbers: Gives out ids.
         way: How far it is on foot.
     """
 
     merge_m: float = MERGE_M
-    era: str = ""
+    numbers: TrackNumbers = field(default_factory=TrackNumbers)
     way: Way = straight
     known: dict[str, TrackedPerson] = field(default_factory=dict)
     _chains: int = 0
     _tracks: int = 0
-    _day: int = -1
-    _shown: int = 0
     _new: set[str] = field(default_factory=set)
     """Tracks that may yet turn out to be one of the lost."""
     _together: dict[str, set[str]] = field(default_factory=dict)
@@ -247,7 +245,8 @@ class Tracker:
         if not self._has_room(at, sighting):
             return None
         self._tracks += 1
-        track = self._new_id("P" if one.class_ == "person" else "R", at)
+        kind = "P" if one.class_ == "person" else "R"
+        track = self.numbers.next_id(kind, at, self.known)
         self.known[track] = TrackedPerson(
             track,
             one.class_,
@@ -261,17 +260,6 @@ class Tracker:
         self._new.add(track)
         self._remember_apart(track, sighting, at)
         return track
-
-    def _new_id(self, kind: str, at: Instant) -> str:
-        """An id that never comes again; its number starts anew each day (UTC)."""
-        day = int(at.wall // _DAY_S)
-        if day != self._day:
-            self._day, self._shown = day, 0
-        in_use = {known.partition("-")[0] for known in self.known}
-        self._shown += 1
-        while f"{kind}{self._shown}" in in_use:
-            self._shown += 1
-        return f"{kind}{self._shown}" + (self.era and f"{self.era}{day:x}")
 
     def _has_room(self, now: Instant, newest: Sighting) -> bool:
         """Whether one more can be kept, if need be in place of one without a ring.

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.observations import Instant
 from iveg.domain.tracking.assignment import assign
+from iveg.domain.tracking.numbers import TrackNumbers
 from iveg.domain.tracking.person import Sighting
 from iveg.domain.tracking.picture import PlacedDetection
 from iveg.domain.tracking.tracker import Tracker
@@ -247,7 +248,10 @@ def test_the_alert_of_somebody_who_is_followed_stays_the_same() -> None:
 
 
 def test_no_start_of_iveg_repeats_an_id() -> None:
-    before, after = Tracker(era="-5f0c"), Tracker(era="-a31b")
+    before, after = (
+        Tracker(numbers=TrackNumbers("-5f0c")),
+        Tracker(numbers=TrackNumbers("-a31b")),
+    )
     seen = Sighting("AGI", 3.0, 0.0, 0.9, at(0), "farmer", 0.94)
     one = PlacedDetection("person", seen, "d1")
 
@@ -257,7 +261,10 @@ def test_no_start_of_iveg_repeats_an_id() -> None:
 
 
 def test_numbers_begin_anew_each_day_and_ids_never_come_again() -> None:
-    tracker, midnight = Tracker(era="-5f0c"), 86400.0 - START.wall % 86400.0
+    tracker, midnight = (
+        Tracker(numbers=TrackNumbers("-5f0c")),
+        86400.0 - START.wall % 86400.0,
+    )
     ids: list[str | None] = []
     for after, x in ((0.0, 0.0), (1.0, 50.0), (midnight - 1.0, 0.0), (midnight, 50.0)):
         now = at(after)
