@@ -308,17 +308,6 @@ def _ingest(
     return Ingest(world.robots.__contains__, log_rejected, world.is_past, passed)
 
 
-def log_rejected(source: str, reason: str) -> None:
-        slots = {"source": source, "reason": reason}
-        event_log.log(LogEvent("system", "log.rejected", slots), clock())
-
-    def passed(received: Received) -> None:
-        for told in watched:
-            told(received)
-
-    return Ingest(world.robots.__contains__, log_rejected, world.is_past, passed)
-
-
 def build_services(
     parts: Pipeline,
     kept: KeptChoices,
