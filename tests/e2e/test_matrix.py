@@ -11,9 +11,9 @@ from typing import Any
 
 import pytest
 from playwright import sync_api
-from playwright.sync_api import Browser, Locator, Page, expect
+from playwright.sync_api import Browser, Page, expect
 
-from tests.e2e.hands import press_open
+from tests.e2e.hands import in_header_or_menu, press_open
 from tests.e2e.reading import (
     COVERED_STOPS,
     ON_SCREEN,
@@ -139,7 +139,7 @@ def test_the_language_changes_and_nothing_grows_too_wide(live: Page) -> None:
     ("theme", "width"), [*zip(GROUNDS, SIZES, strict=False)], indirect=["width"]
 )
 def test_a_theme_is_worn_at_once_and_kept(live: Page, theme: str) -> None:
-    _in_header_or_menu(live, "[data-opens=theme-panel]").click()
+    in_header_or_menu(live, "[data-opens=theme-panel]").click()
     live.locator(f"input[name=theme][value={theme}]").check()
 
     expect(live.locator("html")).to_have_attribute("data-theme", theme)
@@ -239,16 +239,8 @@ def test_without_the_server_the_page_says_so_and_draws_a_veil(
 
 
 def _choose_language(page: Page, language: str) -> None:
-    _in_header_or_menu(page, f"button[data-language={language}]").click()
+    in_header_or_menu(page, f"button[data-language={language}]").click()
     page.keyboard.press("Escape")
-
-
-def _in_header_or_menu(page: Page, selector: str) -> Locator:
-    """Where a button is seen: a phone has it in the menu."""
-    shown = page.locator(f"{selector}:visible")
-    if shown.count() == 0:
-        page.locator("[data-opens=menu]:visible").first.click()
-    return shown.first
 
 
 def _covered(page: Page, route: str) -> list[Any]:

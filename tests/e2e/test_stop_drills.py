@@ -71,7 +71,7 @@ def test_a_drill_is_one_tap_and_ends_with_its_time_in_the_history(
     )
     expect(why).to_have_text("Ya tiene una parada: primero rearme y reanude.")
     expect(panel.locator('[data-part="drill-last"]')).to_have_text(
-        re.compile(r"El último: [\d/]+ [\d:]+, por operator\. Superado"),
+        re.compile(r"El último: [\d/]+ [\d:]+, por operador\. Superado"),
         timeout=WITHIN_MS,
     )
     assert agv.holds == [look(page, stack, "AGV")["stop"]["command_id"]]
@@ -105,7 +105,7 @@ def test_a_robot_that_does_not_brake_fails_its_drill(page: Page, agv: Puppet) ->
         "Fallido: en 5 s no se comprobó que se parase.", timeout=WITHIN_MS
     )
     expect(card(page, "AGV").locator('[data-field="mode"]')).to_have_text(
-        "Recibió la parada y se mueve"
+        "Parada recibida pero se mueve"
     )
     agv.brakes = True
     expect(strip_stop(page, "AGV")).to_have_attribute(

@@ -143,7 +143,7 @@ def test_a_lost_control_still_sends_and_says_loudly_what_nobody_confirms(
         )
         line = page.locator("#p1 .p1__line")
         expect(line).to_contain_text("AGI: PARADA SIN CONFIRMAR: use la seta roja")
-        expect(line).to_contain_text(re.compile(r"Pulsado hace \d+ s por operator"))
+        expect(line).to_contain_text(re.compile(r"Pulsado hace \d+ s por operador"))
         expect(line).to_contain_text(re.compile(r"Último informe hace [\d,]+ s, a"))
         expect(line).to_contain_text("Vías: directa enviada, FIWARE en curso")
         expect(english.locator("#p1 .p1__line")).to_contain_text(

@@ -68,11 +68,15 @@ _TASK = st.sampled_from((None, "waiting", "scouting", "hauling", "sowing"))
 @given(st.lists(st.tuples(_STEP, _TASK, _TASK), max_size=15))
 def test_no_robot_is_ever_faster_for_a_task(
     run: list[
-        tuple[tuple[float, float, list[tuple[float, float]]], str | None, str | None]
+        tuple[
+            tuple[float, float, list[tuple[float, float]], object],
+            str | None,
+            str | None,
+        ]
     ],
 ) -> None:
     scenes, x = [Scene(), Scene()], 0.0
-    for (after_s, speed, people), *tasks in run:
+    for (after_s, speed, people, _), *tasks in run:
         x += speed * after_s
         limits = []
         for scene in scenes:

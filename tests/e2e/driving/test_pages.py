@@ -9,6 +9,7 @@ import pytest
 from playwright.sync_api import Page, Route, expect
 
 from tests.e2e.conftest import OpenPage
+from tests.e2e.hands import in_header_or_menu
 from tests.e2e.reading import (
     OVERFLOW,
     RUN_OVER,
@@ -259,7 +260,7 @@ def test_a_day_of_the_climate_is_drawn_in_the_readers_words(
     assert evaluate(page, OVERFLOW) <= 0
     assert _seriously_wrong_in_any_theme(page) == []
 
-    page.click('[data-language="en"]')
+    in_header_or_menu(page, '[data-language="en"]').click()
     expect(page.locator("#trend-temperature")).to_contain_text("21.5")
     page.unroute_all(behavior="wait")
 

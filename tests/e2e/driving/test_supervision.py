@@ -178,7 +178,7 @@ def test_an_operator_changes_the_rule_and_sees_its_version(
 
     expect(page.locator("#rule-radius")).to_have_text("2,5 m")
     expect(page.locator("#rule-version")).to_have_text(str(before + 1))
-    expect(page.locator("#rule-note")).to_contain_text("por operator")
+    expect(page.locator("#rule-note")).to_contain_text("por operador")
     with stack.api() as api:
         assert api.get("rule").json()["radius_m"] == 2.5
 

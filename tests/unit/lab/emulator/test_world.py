@@ -242,7 +242,7 @@ def test_a_robot_that_is_not_commanded_stands() -> None:
 
 
 def test_an_unknown_scenario_is_refused_with_the_known_ones() -> None:
-    with pytest.raises(DataFileError, match="demo, nlos, nlos-field, viewpoints"):
+    with pytest.raises(DataFileError, match="demo, nlos, nlos-field, coat, viewpoints"):
         scenario_named("nothing")
 
 
