@@ -163,9 +163,11 @@ class SpeedLimits:
         now: Instant,
     ) -> Collection[str]:
         """Peers that a robot gives way to by their tasks: nobody if people are near."""
+        if world.robots.keys().isdisjoint(ahead):
+            return ()
         near = self._open.get(robot.robot_id, {}).values()
         zones = [*(one.zone for one in ahead.values()), *(one.zone for one in near)]
-        if not ahead or any(zone.reason == "person" for zone in zones):
+        if any(zone.reason == "person" for zone in zones):
             return ()
         return gives_way_to(robot, ahead, world, now)
 
