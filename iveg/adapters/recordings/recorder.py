@@ -115,16 +115,22 @@ class InputRecorder:
 
     def measure(self, topic: str, payload: bytes, at: Instant, is_scan: bool) -> None:
         """A robot's own message, read from the broker."""
+        if not self._is_on:
+            return
         if not is_scan or self._is_due(topic, None, SCANS_APART_S, at):
             self._queue(Raw(measure(topic), at, payload), len(payload))
 
     def notification(self, body: bytes, at: Instant, subject: str | None) -> None:
         """A notification of Orion's; ``subject``: the subscription of one of scans."""
+        if not self._is_on:
+            return
         if subject is None or self._is_due(subject, None, SCANS_APART_S, at):
             self._queue(Raw(NOTIFICATIONS, at, body), len(body))
 
     def observed(self, received: Received) -> None:
         """An observation of a robot, in whichever copy."""
+        if not self._is_on:
+            return
         observation = received.observation
         apart_s = DRAWN_APART_S.get(kind_of(observation))
         if apart_s is None or not isinstance(observation, _DRAWN):
@@ -135,12 +141,13 @@ class InputRecorder:
 
     def row(self, record: Record) -> None:
         """A row of the history; telemetry is here already, as it came."""
-        if not is_telemetry(record):
+        if self._is_on and not is_telemetry(record):
             self._queue(Row(record, self._clock()), 0)
 
     def tick(self, at: Instant) -> None:
         """The loop lets time pass."""
-        self._queue(Tick(at), 0)
+        if self._is_on:
+            self._queue(Tick(at), 0)
 
     def _is_due(self, of: str, kind: object, apart_s: float, at: Instant) -> bool:
         if at.mono < self._due.get((of, kind), float("-inf")):
@@ -149,8 +156,6 @@ class InputRecorder:
         return True
 
     def _queue(self, incoming: Incoming, size: int) -> None:
-        if not self._is_on:
-            return
         if len(self._waiting) >= MOST_WAITING or self._bytes + size > MOST_BYTES:
             self.counters["recordings_dropped"] += 1
             return
@@ -165,7 +170,7 @@ class InputRecorder:
         rescue = asyncio.create_task(self._rescue(left), name="recordings-rescue")
         try:
             while True:
-                await asyncio.sleep(WRITE_S)
+                await asyncio.sleep(WRITE_S if self._is_on else PRUNE_S)
                 await self.write()
         finally:
             rescue.cancel()
