@@ -5,7 +5,7 @@ import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict
-from hashlib import sha256
+from hashlib import file_digest, sha256
 from io import BytesIO, RawIOBase
 from pathlib import Path
 from typing import IO
@@ -99,7 +99,10 @@ def verify_pack(path: Path) -> tuple[str, list[str]]:
     if (manifest[-1].chain if manifest else "") != end:
         wrong.append("The manifest itself was changed: its end is another.")
     with path.open("rb") as stream:
-        if not wrong and _look(stream).digest != again.digest.hexdigest():
+        if (
+            not wrong
+            and file_digest(stream, sha256).hexdigest() != again.digest.hexdigest()
+        ):
             wrong.append("Bytes between its files were changed.")
     return end, wrong
 
@@ -129,12 +132,4 @@ def _add(pack: zipfile.ZipFile, name: str, stream: IO[bytes]) -> FoundFile:
         while block := stream.read(_BLOCK):
             digest.update(block)
             size += target.write(block)
-    return FoundFile(size, digest.hexdigest())
-
-
-def _look(stream: IO[bytes]) -> FoundFile:
-    digest, size = sha256(), 0
-    while block := stream.read(_BLOCK):
-        digest.update(block)
-        size += len(block)
     return FoundFile(size, digest.hexdigest())

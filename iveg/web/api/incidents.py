@@ -109,25 +109,28 @@ async def _range(asked: About, sources: Sources) -> tuple[float, float, str]:
         decision = await sources.queries.decision(asked.decision)
         if decision is None:
             raise HTTPException(404, "There is no such decision.")
-        began, ended = decision.started_at, decision.ended_at or decision.started_at
-        said = f"decision {decision.decision_id}"
-    elif asked.command is not None:
+        began = decision.started_at
+        span = _around(began, decision.ended_at or began)
+        return *span, f"decision {decision.decision_id}"
+    if asked.command is not None:
         command = await sources.queries.command(asked.command)
         if command is None:
             raise HTTPException(404, "There is no such command.")
         began = command.requested_at
-        ended = command.standing_at or began
-        said = f"command {command.command_id}"
-    elif asked.since is not None and asked.until is not None:
-        began = asked.since.timestamp() + BEFORE_S
-        ended, said = asked.until.timestamp() - AFTER_S, "range"
-    else:
+        span = _around(began, command.standing_at or began)
+        return *span, f"command {command.command_id}"
+    if asked.since is None or asked.until is None:
         raise HTTPException(422, "Name a decision, a command, or since and until.")
-    if ended - began > LONGEST_S - BEFORE_S - AFTER_S:
-        if said == "range":
-            raise HTTPException(422, "A pack holds an hour at most.")
-        ended = began + LONGEST_S - BEFORE_S - AFTER_S
-    return began - BEFORE_S, ended + AFTER_S, said
+    since, until = asked.since.timestamp(), asked.until.timestamp()
+    if until - since > LONGEST_S:
+        raise HTTPException(422, "A pack holds an hour at most.")
+    return since, until, "range"
+
+
+def _around(began: float, ended: float) -> tuple[float, float]:
+    """Since, until (Unix s): with its surroundings, cut after the longest time."""
+    since = began - BEFORE_S
+    return since, min(ended + AFTER_S, since + LONGEST_S)
 
 
 async def _pack(
