@@ -6,12 +6,18 @@
 
 FROM python:3.12.11-slim-bookworm AS libraries
 WORKDIR /build
-COPY requirements/run.lock requirements/dev.lock ./
+COPY requirements/run.lock requirements/dev.lock requirements/audit.lock ./
 # PostgreSQL's driver is locked among the developers' libraries; only it is taken.
 RUN awk '/^[^ #]/ { wanted = /^psycopg/ } wanted' dev.lock > postgresql.lock \
     && python -m venv /opt/iveg \
     && /opt/iveg/bin/pip install --no-cache-dir --disable-pip-version-check \
         --require-hashes -r run.lock -r postgresql.lock
+# What is inside, as CycloneDX, told by a tool that does not come along.
+RUN python -m venv /build/audit \
+    && /build/audit/bin/pip install --no-cache-dir --disable-pip-version-check \
+        --require-hashes -r audit.lock \
+    && /build/audit/bin/cyclonedx-py environment --output-reproducible \
+        --output-file /opt/iveg/sbom.cdx.json /opt/iveg/bin/python
 
 # Compiled here: the file system is read-only later.
 FROM python:3.12.11-slim-bookworm AS code

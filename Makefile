@@ -5,6 +5,8 @@ BIN := $(VENV)/bin
 RUN := $(VENV)/.run
 DEV := $(VENV)/.dev
 BENCH := $(VENV)/.bench
+# Apart from iVeg's own libraries: what judges them is none of them.
+AUDIT := $(VENV)/audit
 # A module of tests and what it starts stay together; most of its time is waiting.
 WORKERS ?= 3
 # A worker that dies ends the run: loadscope would wait for it for ever.
@@ -19,7 +21,7 @@ export PYTHONPATH := $(CURDIR)
 export PYTHONDONTWRITEBYTECODE :=
 
 .NOTPARALLEL:
-.PHONY: test-needs check-needs demo demo-ros2 test quick setup format check bench deep chaos pictures mutants experiment soak migration lock clean
+.PHONY: test-needs check-needs demo demo-ros2 test quick setup format check bench deep chaos pictures mutants experiment soak migration lock audit sbom clean
 
 demo: $(RUN) ; @exec $(BIN)/python -m iveg demo
 demo-ros2: $(DEV) ; @exec $(BIN)/python -m iveg demo --ros2
@@ -36,8 +38,11 @@ mutants: $(DEV) ; $(BIN)/python -m tests.mutants
 experiment: $(RUN) ; @exec $(BIN)/python -m iveg experiment run --$(or $(SIZE),quick)
 soak: $(DEV) ; $(BIN)/python -m benchmarks.soak
 migration: $(DEV) ; $(BIN)/alembic revision --autogenerate -m "$(m)"
-lock: $(DEV) ; $(BIN)/python -m pip install --quiet uv && $(LOCK) -o requirements/run.lock && $(LOCK) --extra bags -o requirements/demo.lock && $(LOCK) $(ALL:%=--extra %) --extra dev -o requirements/dev.lock && $(LOCK) --extra bench -c requirements/dev.lock -o requirements/bench.lock
-clean: ; rm -rf $(VENV) node_modules .mypy_cache .ruff_cache .pytest_cache .hypothesis test-output
+lock: $(DEV) ; $(BIN)/python -m pip install --quiet uv && $(LOCK) -o requirements/run.lock && $(LOCK) --extra bags -o requirements/demo.lock && $(LOCK) $(ALL:%=--extra %) --extra dev -o requirements/dev.lock && $(LOCK) --extra bench -c requirements/dev.lock -o requirements/bench.lock && $(LOCK:pyproject.toml=requirements/audit.in) -o requirements/audit.lock
+# Known holes of what a site installs, and of what checks the page.
+audit: $(AUDIT) ; $(AUDIT)/bin/pip-audit --disable-pip --require-hashes --requirement requirements/run.lock --strict && npm audit --no-package-lock
+sbom: $(AUDIT) ; $(AUDIT)/bin/cyclonedx-py requirements --output-reproducible --output-file sbom.cdx.json requirements/run.lock
+clean: ; rm -rf $(VENV) node_modules .mypy_cache .ruff_cache .pytest_cache .hypothesis test-output sbom.cdx.json
 
 # The system's part: installed on Debian, named elsewhere.
 test-needs check-needs: ; @PYTHON=$(PYTHON) .ci/setup venv $(@:-needs=)
@@ -45,4 +50,5 @@ $(BIN)/python: ; PYTHON=$(PYTHON) .ci/setup venv && $(PYTHON) -m venv $(VENV)
 $(RUN): requirements/demo.lock | $(BIN)/python ; $(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r $< && touch $@
 $(DEV): requirements/dev.lock | $(BIN)/python ; $(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r $< && touch $@ $(RUN)
 $(BENCH): requirements/bench.lock $(DEV) ; $(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r $< && touch $@
+$(AUDIT): requirements/audit.lock | $(BIN)/python ; $(PYTHON) -m venv $@ && $@/bin/pip install --quiet --disable-pip-version-check --require-hashes -r $< && touch $@
 node_modules: package.json ; npm install --silent --no-audit --no-fund --no-package-lock && touch $@

@@ -9,6 +9,8 @@ from tests.processes import ROOT
 
 DOCS = ROOT / "docs"
 INTERFACES = DOCS / "interfaces"
+PLACE = re.compile(r"`((?:iveg|tests|docs)/[\w./-]+)(?:::([\w.]+))?`")
+"""A file in a cell, with the name in it that is meant."""
 _FEW = 3
 """A value of more kinds than that may be any scalar."""
 
@@ -104,3 +106,27 @@ def _numbered(text: str) -> Iterator[tuple[int, tuple[str, str]]]:
         found = re.match(r"(#+) (.*)", line)
         if found and not is_code:
             yield number, (found[1], found[2])
+
+
+def rows(page: str, head: list[str]) -> list[list[str]]:
+    """The cells of each row of each table with these heads, heads left out."""
+    cells = [
+        [cell.strip() for cell in line.strip("|").split(" | ")]
+        for line in page.splitlines()
+        if line.startswith("| ")
+    ]
+    return [row for row in cells if row != head]
+
+
+def lost_places(page: str) -> list[tuple[str, str]]:
+    """Files, and names in them, that a page tells of and nobody finds."""
+    return [
+        (name, symbol)
+        for name, symbol in PLACE.findall(page)
+        if not (ROOT / name).is_file() or (symbol and not _defines(ROOT / name, symbol))
+    ]
+
+
+def _defines(path: Path, name: str) -> bool:
+    defined = rf"^\s*(?:async )?(?:def|class) {name}\b|^{name}\b.* = "
+    return re.search(defined, path.read_text(), re.M) is not None

@@ -316,6 +316,18 @@ def test_the_image_takes_postgresqls_driver_from_the_lock_file() -> None:
     assert taken.count("--hash=sha256:") > len(wanted)
 
 
+def test_the_image_lists_what_is_inside_by_a_tool_that_stays_outside() -> None:
+    locked = (ROOT / "requirements/audit.lock").read_text()
+    told = re.findall(r"(\S+)/bin/cyclonedx-py environment", DOCKERFILE)
+
+    assert told == ["/build/audit"]
+    assert "--output-file /opt/iveg/sbom.cdx.json /opt/iveg/bin/python" in DOCKERFILE
+    assert re.findall(r"^(cyclonedx-bom|pip-audit)==", locked, re.MULTILINE) == [
+        "cyclonedx-bom",
+        "pip-audit",
+    ]
+
+
 def test_the_image_runs_as_nobody_in_particular() -> None:
     user = re.findall(r"^USER (\d+):", DOCKERFILE, re.MULTILINE)
 
