@@ -40,25 +40,25 @@ MARGIN = SafetyMargin("AGI", "P1", 1.4, 1.3, 0.8, 1.2, 0.1, 0.5)
 
 STAGED = {
     "does not slow": (
-        facts(alarm=p1("alert.person_not_slowing"), alarmed_by=AISLE_3),
+        facts(alert=p1("alert.person_not_slowing"), alert_about=AISLE_3),
         "danger",
         ("no frena", "persona en el pasillo 3", "pulse PARAR"),
         ("does not slow down", "person in aisle 3", "press STOP"),
     ),
     "lost while moving": (
-        facts(link="LOST", age_s=4.0, alarm=p1("alert.moving_robot_lost")),
+        facts(link="LOST", age_s=4.0, alert=p1("alert.moving_robot_lost")),
         "danger",
         ("sin contacto hace 4 s", "aléjese"),
         ("no contact for 4 s while moving", "keep away; it should stop by itself"),
     ),
     "STOP not confirmed": (
-        facts(alarm=p1("alert.stop_unconfirmed"), stop="UNCONFIRMED"),
+        facts(alert=p1("alert.stop_unconfirmed"), stop="UNCONFIRMED"),
         "danger",
         ("parada sin confirmar", "use la seta roja"),
         ("STOP not confirmed", "use the red button"),
     ),
     "STOP not obeyed": (
-        facts(alarm=p1("alert.stop_still_moving"), stop="STILL_MOVING"),
+        facts(alert=p1("alert.stop_still_moving"), stop="STILL_MOVING"),
         "danger",
         ("parada recibida pero se mueve", "use la seta roja"),
         ("STOP received but still moving", "use the red button"),

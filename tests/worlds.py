@@ -54,17 +54,17 @@ class Moment(NamedTuple):
     """The fleet as it was told, with everybody in it and the P1 alerts that held.
 
     Attributes:
-        alarms: Robot and key of each.
+        alerts: Robot and key of each.
     """
 
     robots: list[dict[str, Any]]
     people: list[dict[str, Any]]
-    alarms: list[tuple[str, str]]
+    alerts: list[tuple[str, str]]
 
     @property
-    def alarmed(self) -> set[str]:
+    def alerted(self) -> set[str]:
         """Robots of which a P1 held."""
-        return {robot for robot, _ in self.alarms}
+        return {robot for robot, _ in self.alerts}
 
 
 def told(day: list[tuple[Any, ...]]) -> list[Moment]:
@@ -82,14 +82,14 @@ async def _live(day: list[tuple[Any, ...]]) -> list[Moment]:
         desk.loop.step([], desk.clock())
         now = desk.clock()
         active = (one for one in desk.evaluator.alerts.waiting if not one.cleared)
-        alarms = [
+        alerts = [
             (str(one.condition.robot_id), one.condition.key)
             for one in active
             if one.condition.priority == "P1"
         ]
         robots = [one.model_dump(mode="json") for one in views.robots(now)]
         people = [one.model_dump(mode="json") for one in views.people(now)]
-        moments.append(Moment(robots, people, alarms))
+        moments.append(Moment(robots, people, alerts))
     return moments
 
 

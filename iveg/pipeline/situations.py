@@ -35,7 +35,7 @@ class Situations:
     ) -> Situation:
         """How it stands with one robot; ``margin`` is its least."""
         limit = self._evaluator.speed_limits[robot.robot_id]
-        report, alarm = fresh_report(robot, now), gravest(self._alarms(robot.robot_id))
+        report, alert = fresh_report(robot, now), gravest(self._alerts(robot.robot_id))
         once = machine.once
         facts = RobotFacts(
             robot_id=robot.robot_id,
@@ -46,8 +46,8 @@ class Situations:
             limit=limit,
             missing=self._evaluator.missing(robot.robot_id),
             doubts=robot.doubts.active(now),
-            alarm=alarm,
-            alarmed_by=None if alarm is None else self._alarmed_by(robot, alarm, now),
+            alert=alert,
+            alert_about=None if alert is None else self._whom(robot, alert, now),
             near=None if report is None else self._reported(robot, report, limit, now),
             told_near=self._told(robot, limit, now),
             margin=margin,
@@ -60,7 +60,7 @@ class Situations:
         )
         return situation_of(facts)
 
-    def _alarms(self, robot_id: str) -> Iterable[Condition]:
+    def _alerts(self, robot_id: str) -> Iterable[Condition]:
         """The conditions that hold for a robot now."""
         return (
             one.condition
@@ -68,11 +68,9 @@ class Situations:
             if one.cleared is None and one.condition.robot_id == robot_id
         )
 
-    def _alarmed_by(
-        self, robot: RobotState, alarm: Condition, now: Instant
-    ) -> Near | None:
-        """Whom an alarm is about; its own distance is of this moment."""
-        about, distance_m = alarm.slots.get("person"), alarm.slots.get("distance")
+    def _whom(self, robot: RobotState, alert: Condition, now: Instant) -> Near | None:
+        """Whom an alert is about; its own distance is of this moment."""
+        about, distance_m = alert.slots.get("person"), alert.slots.get("distance")
         if not isinstance(about, str):
             return None
         found = self._near(robot, about, now)

@@ -151,7 +151,7 @@ class TestLinkLossInRealTime:
         stage.wait(lambda: stage.robot("AGII")["link"] == "LATE", "AGII is LATE")
         before = stage.robot("AGII")
         stage.wait(lambda: stage.robot("AGII")["link"] == "LOST", "AGII is LOST")
-        stage.wait(lambda: stage.log("AGII", "log.alert.raised"), "an alarm says so")
+        stage.wait(lambda: stage.log("AGII", "log.alert.raised"), "an alert says so")
         stage.wait(lambda: stage.robot("AGII")["link"] == "LIVE", "AGII is back")
         back = stage.robot("AGII")
 

@@ -15,7 +15,7 @@ def is_fresh(robot: Robot) -> bool:
     return applied is not None and applied["age_s"] <= LIMITS.report_stale_s
 
 
-def contradictions(robot: Robot, *, alarmed: bool) -> dict[str, bool]:
+def contradictions(robot: Robot, *, alerted: bool) -> dict[str, bool]:
     """What must not be, by name."""
     found, link, margin = robot["situation"], robot["link"], robot["margin"]
     level, state, factor = found["level"], found["state"], found["factor"]
@@ -40,9 +40,9 @@ def contradictions(robot: Robot, *, alarmed: bool) -> dict[str, bool]:
         "locked beside a limit": level == "locked" and factor != 0.0,
         "work beside silence": level in ("working", "locked") and silent,
         "silence without one": state in ("late", "lost") and link == "LIVE",
-        "a P1 that is no danger": alarmed and level != "danger" and silent,
-        "danger without a P1": level == "danger" and not alarmed,
-        "a call to STOP without a P1": found["action"] == "press_stop" and not alarmed,
+        "a P1 that is no danger": alerted and level != "danger" and silent,
+        "danger without a P1": level == "danger" and not alerted,
+        "a call to STOP without a P1": found["action"] == "press_stop" and not alerted,
         "a sentence of somebody that names no one": found["why"] == "person_in"
         and "lane" not in found["slots"],
     }
@@ -55,8 +55,8 @@ def test_no_situation_contradicts_what_is_told_beside_it(
 ) -> None:
     for moment in told(day):
         for robot in moment.robots:
-            alarmed = robot["robot_id"] in moment.alarmed
-            found = contradictions(robot, alarmed=alarmed)
+            alerted = robot["robot_id"] in moment.alerted
+            found = contradictions(robot, alerted=alerted)
             assert [name for name, holds in found.items() if holds] == [], robot
 
 
@@ -67,7 +67,7 @@ def test_a_p1_of_a_robot_that_is_heard_is_its_situation(
 ) -> None:
     for moment in told([*day, ("wait", 0.1)]):
         levels = {one["robot_id"]: one["situation"]["level"] for one in moment.robots}
-        assert {levels[name] for name in moment.alarmed} <= {"danger"}
+        assert {levels[name] for name in moment.alerted} <= {"danger"}
 
 
 def test_a_healthy_fleet_is_clear() -> None:

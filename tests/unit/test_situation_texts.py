@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from playwright.sync_api import Browser, Page
 
 from iveg.domain.limits import LIMITS
-from iveg.domain.situation.judge import ALARMS
+from iveg.domain.situation.judge import P1_STATES
 from iveg.web.pages.translations import read_translations
 from tests import staged
 from tests.staged import STAGED
@@ -78,11 +78,11 @@ def of_people(
     }
 
 
-def of_alarms(fleet: dict[str, Any], alarms: list[tuple[str, str]]) -> dict[str, bool]:
+def of_alerts(fleet: dict[str, Any], alerts: list[tuple[str, str]]) -> dict[str, bool]:
     """The same of the active P1 alerts; one of silence ends with the next tick."""
     found = {}
     for robot, one in ((one["robot"], one) for one in fleet["robots"]):
-        states = {ALARMS[key][0] for name, key in alarms if name == robot}
+        states = {P1_STATES[key][0] for name, key in alerts if name == robot}
         if one["link"] == "LIVE":
             states.discard("lost_moving")
         said = one["said"].removeprefix("situation.is.").split(" ")[0]
@@ -129,7 +129,7 @@ def test_no_two_texts_of_one_robot_contradict(
         others = {
             **of_fleet(fleet),
             **of_people(fleet, moment.people, waited_s),
-            **of_alarms(fleet, moment.alarms),
+            **of_alerts(fleet, moment.alerts),
         }
         assert [name for name, holds in others.items() if holds] == [], fleet
 
@@ -154,7 +154,7 @@ OF_SPEED = {
 @pytest.mark.parametrize("language", ["es", "en"])
 def test_alerts_and_the_log_have_the_words_of_the_situation(language: str) -> None:
     said = read_translations(language).sentences
-    for key, (state, _) in ALARMS.items():
+    for key, (state, _) in P1_STATES.items():
         plain = re.sub(r" \w+ {age:span}", "", said[f"situation.is.{state}"])
         assert said[key].casefold().startswith(f"{{robot}}: {plain}".casefold())
     for step, state in OF_STOP.items():

@@ -57,8 +57,8 @@ class RobotFacts:
     Attributes:
         age_s: Of its pose (s); None while nobody knows.
         report: Its newest, while that is fresh.
-        alarm: The gravest P1 that holds for it.
-        alarmed_by: Whom that is about.
+        alert: The gravest P1 that holds for it.
+        alert_about: Whom that is about.
         near: Whom the applied reason is about; ``told_near`` that of the speed limit,
             ``margin_near`` that of the margin.
         stop: State of its STOP.
@@ -73,8 +73,8 @@ class RobotFacts:
     limit: SpeedLimit
     missing: Sequence[Missing] = ()
     doubts: Sequence[str] = ()
-    alarm: Condition | None = None
-    alarmed_by: Near | None = None
+    alert: Condition | None = None
+    alert_about: Near | None = None
     near: Near | None = None
     told_near: Near | None = None
     margin: SafetyMargin | None = None

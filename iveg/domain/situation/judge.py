@@ -26,7 +26,7 @@ def situation_of(facts: RobotFacts) -> Situation:
     """The worst of all that holds for a robot."""
     holding = list(_silent(facts) if _is_silent(facts) else _heard(facts))
     worst = min(
-        (*_alarmed(facts), *holding), key=lambda one: _WORST_FIRST.index(one.level)
+        (*_alerted(facts), *holding), key=lambda one: _WORST_FIRST.index(one.level)
     )
     if facts.link == "LATE" and worst.state not in _OF_STOPS:
         worst = _late(worst, facts)
@@ -49,7 +49,7 @@ def _heard(facts: RobotFacts) -> Iterator[Situation]:
 
 # --- danger ---------------------------------------------------------------------------
 
-ALARMS: Mapping[str, tuple[str, Action]] = {
+P1_STATES: Mapping[str, tuple[str, Action]] = {
     "alert.stop_unconfirmed": ("unconfirmed", "red_button"),
     "alert.stop_still_moving": ("still_moving", "red_button"),
     "alert.stop_moved": ("moved", "red_button"),
@@ -61,22 +61,22 @@ ALARMS: Mapping[str, tuple[str, Action]] = {
 """What each P1 is called here, the gravest first."""
 
 
-def gravest(alarms: Iterable[Condition]) -> Condition | None:
+def gravest(alerts: Iterable[Condition]) -> Condition | None:
     """The P1 that a situation names, of those that hold for a robot."""
-    order = list(ALARMS)
-    known = (one for one in alarms if one.key in ALARMS and one.priority == "P1")
+    order = list(P1_STATES)
+    known = (one for one in alerts if one.key in P1_STATES and one.priority == "P1")
     return min(known, key=lambda one: order.index(one.key), default=None)
 
 
-def _alarmed(facts: RobotFacts) -> Iterator[Situation]:
-    if facts.alarm is None:
+def _alerted(facts: RobotFacts) -> Iterator[Situation]:
+    if facts.alert is None:
         return
-    state, action = ALARMS[facts.alarm.key]
+    state, action = P1_STATES[facts.alert.key]
     if state == "lost_moving" and not _is_silent(facts):
         return  # It is heard again; the alert clears with the next tick.
     danger = Situation("danger", state, "alarm", action=action)
-    if facts.alarmed_by is not None:
-        danger = _because(danger, facts.alarmed_by)
+    if facts.alert_about is not None:
+        danger = _because(danger, facts.alert_about)
     yield _aged(danger, facts) if state == "lost_moving" else danger
 
 

@@ -131,7 +131,7 @@ async def test_a_robot_that_is_not_heard_is_late_then_lost_and_has_stopped_itsel
     await stage.until(lambda: stage.robot("AGII")["link"] == "LATE", "AGII is LATE")
     before = stage.robot("AGII")
     await stage.until(lambda: stage.robot("AGII")["link"] == "LOST", "AGII is LOST")
-    await stage.until(lambda: stage.log("AGII", "log.alert.raised"), "an alarm")
+    await stage.until(lambda: stage.log("AGII", "log.alert.raised"), "an alert")
     await stage.until(lambda: stage.robot("AGII")["link"] == "LIVE", "AGII is back")
     back = stage.robot("AGII")
 

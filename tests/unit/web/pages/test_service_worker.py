@@ -152,4 +152,4 @@ _ALERT_1 = """() => {
   document.body.append(one);
   return getComputedStyle(one).backgroundColor;
 }"""
-"""The red of alarms, as the house's tokens say it."""
+"""The red of alerts, as the house's tokens say it."""
