@@ -56,4 +56,8 @@ def test_an_operator_starts_watches_ends_and_opens_an_experiment(
         page.locator("#experiments a", has_text="What there is").click()
     report = opened.value
     expect(report.locator("body")).to_contain_text("Broken off: interrupted.")
-    expect(report.locator("h1")).to_have_text("iVeg experiment: quick")
+    heading = report.get_by_role("heading", level=1)
+    expect(heading).to_have_text("iVeg experiment: quick")
+    report.get_by_role("button", name="Español").click()
+    expect(heading).to_have_text("Experimento de iVeg: quick")
+    assert serious(report) == []

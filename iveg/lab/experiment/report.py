@@ -1,33 +1,32 @@
-"""The report: one HTML file that needs no network, beside what the paper printed."""
+"""The report: one HTML file that needs no network, beside what the paper printed.
+
+It has both languages and all themes of the page: ``?lang=es|en`` and ``?theme=`` choose
+one, else the reader's browser does.
+"""
 
 import gzip
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from html import escape
-from typing import Any
+from importlib.resources import files
+from typing import Any, Final
 
 import orjson
 
 from iveg.domain.latency.paper import PAPER
 from iveg.domain.latency.segments import DATA
 from iveg.lab.experiment import tables
+from iveg.lab.experiment.conclusions import conclusions
 from iveg.lab.experiment.outcome import slices_of
 from iveg.lab.experiment.paper_tables import AGAINST_ITS_TEXT
 from iveg.lab.experiment.slices import whole
+from iveg.lab.experiment.words import SAY, Language, Say
 from iveg.web.pages.charts import figure_of, library
 from iveg.web.pages.latency_figures import cdf_figure
 
 Result = Mapping[str, Any]
-_STYLE = """
-body{font:15px/1.5 system-ui,sans-serif;max-width:1000px;margin:2em auto;padding:0 1em}
-table{border-collapse:collapse;margin:1em 0;font-variant-numeric:tabular-nums}
-th,td{border:1px solid #999;padding:4px 10px;text-align:right}
-th:first-child,td:first-child,td:nth-child(2){text-align:left}
-.figure{height:360px}tr,.figure{break-inside:avoid}
-@media print{body{max-width:none;font-size:11px}th,td{padding:2px 5px}}
-"""
 _EMULATED = (
     "Robots, their cameras and detector, laser, odometry, people and greenhouse are "
-    "emulated; the detector makes mistakes at the rates of the paper's field table. "
+    "emulated; the detector makes mistakes at the rates of one of the paper's tables. "
     "The robots' software, MQTT, IoT Agent and Orion (embedded unless another was "
     "named), iVeg and its page are the real programs."
 )
@@ -80,107 +79,129 @@ _FAILING = (
 )
 
 
+_HOPS: Final = {"uplink": "Δt₁", "fiware": "Δt₂", "iveg": "Δt₃"}
+_Section = tuple[str, str, Sequence[str], Iterable[Sequence[object]]]
+
+
 def write_report(result: Result) -> str:
     """The whole file."""
+    here = files("iveg.lab.experiment")
+    style = files("iveg") / "static" / "css" / "tokens.css"
     parts = [
-        f"<h1>iVeg experiment: {escape(result['plan']['size'])}</h1>",
-        *_head(result),
-        "<h2>Detection</h2>",
-        f"<p>{_COUNTED}</p>",
-        _table(tables.DETECTION, tables.detection(result)),
-        "<h2>Error of place (m)</h2>",
-        _table(tables.PLACE, tables.place(result)),
-        "<h2>What the text says</h2>",
-        _table(tables.CLAIMS, tables.claims(result)),
-        "<h2>Protection</h2>",
-        f"<p>{_PROTECTED}</p>",
-        _table(tables.PROTECTION, tables.protection(result)),
-        f"<p>{_ENTERED}</p>",
-        _table(tables.ENTRIES, tables.entries(result)),
-        "<h2>Slow-downs, and who was not in sight</h2>",
-        _table(tables.SIGHT, tables.out_of_sight(result)),
-        "<h2>Latency (ms)</h2>",
-        f"<p>{_TIMED}</p>",
-        _table(tables.LATENCY, tables.latency(result)),
-        *_figures(result),
-        "<h2>STOP of the fleet (ms since the press)</h2>",
-        _table(tables.STOPS, tables.stops(result)),
-        "<h2>Where the paper disagrees with itself</h2>",
-        _table(tables.DISAGREES, tables.disagreeing()),
-        "<ul>"
-        + "".join(f"<li>{escape(one)}</li>" for one in AGAINST_ITS_TEXT)
-        + "</ul>",
-        "<h2>Runs</h2>",
-        _table(tables.RUNS, tables.runs(result)),
-        "<h2>Field tests with failures</h2>",
-        f"<p>{_FAILING}</p>",
-        _table(tables.FIELD_TESTS, tables.field_tests(result)),
+        '<!doctype html><html lang="en" data-theme="auto"><head><meta charset="utf-8">',
+        '<meta name="viewport" content="width=device-width">',
+        f"<title>iVeg experiment</title><style>{style.read_text('utf-8')}",
+        f"{(here / 'report.css').read_text('utf-8')}</style>",
+        '</head><body><nav><button type="button" lang="en">English</button>',
+        '<button type="button" lang="es">Español</button></nav>',
+        *(_in_language(result, language) for language in SAY),
+        *_library(result),
+        f"<script>{(here / 'report.js').read_text('utf-8')}</script></body></html>",
     ]
-    body = "\n".join(parts)
-    head = (
-        f'<meta charset="utf-8"><title>iVeg experiment</title><style>{_STYLE}</style>'
-    )
-    return (
-        f'<!doctype html><html lang="en"><head>{head}</head><body>{body}</body></html>'
-    )
+    return "\n".join(parts)
 
 
-def _head(result: Result) -> Iterator[str]:
-    plan, machine, runs = result["plan"], result["machine"], result["completion"]
+def _in_language(result: Result, language: Language) -> str:
+    say = SAY[language]
+    title = escape(say("iVeg experiment:")), escape(result["plan"]["size"])
+    parts = [
+        f'<main lang="{language}"><h1>{" ".join(title)}</h1>',
+        *_conclusions(result, say),
+    ]
+    for heading, note, head, rows in _sections(result):
+        parts.append(f"<section><h2>{escape(say(heading))}</h2>")
+        if note:
+            parts.append(f"<p>{escape(say(note))}</p>")
+        parts.append(_table(head, rows, say))
+        if head is tables.LATENCY:
+            parts += _figures(result, language)
+        if head is tables.DISAGREES:
+            parts.append(_list(AGAINST_ITS_TEXT, say))
+        parts.append("</section>")
+    return "\n".join([*parts, "</main>"])
+
+
+def _sections(result: Result) -> Iterator[_Section]:
+    """Heading, note, head and rows of each table."""
+    yield "Detection", _COUNTED, tables.DETECTION, tables.detection(result)
+    yield "Error of place (m)", "", tables.PLACE, tables.place(result)
+    yield "What the text says", "", tables.CLAIMS, tables.claims(result)
+    yield "Protection", _PROTECTED, tables.PROTECTION, tables.protection(result)
+    yield "Entries into rings", _ENTERED, tables.ENTRIES, tables.entries(result)
+    sight = tables.out_of_sight(result)
+    yield "Slow-downs, and who was not in sight", "", tables.SIGHT, sight
+    yield "Latency (ms)", _TIMED, tables.LATENCY, tables.latency(result)
+    stops = tables.stops(result)
+    yield "STOP of the fleet (ms since the press)", "", tables.STOPS, stops
+    disagreeing = tables.disagreeing()
+    yield "Where the paper disagrees with itself", "", tables.DISAGREES, disagreeing
+    yield "Runs", "", tables.RUNS, tables.runs(result)
+    failed = tables.field_tests(result)
+    yield "Field tests with failures", _FAILING, tables.FIELD_TESTS, failed
+
+
+def _conclusions(result: Result, say: Say) -> Iterator[str]:
+    """What was found, then by what."""
+    yield f'<section class="found"><h2>{escape(say("Conclusions"))}</h2>'
     if result["ended_early"]:
-        yield f"<p><b>Broken off: {escape(result['ended_early'])}.</b></p>"
+        why = escape(result["ended_early"])
+        yield f"<p><b>{escape(say('Broken off:'))} {why}.</b></p>"
+    yield f"{_list(conclusions(result), say)}<p>{escape(say(_EMULATED))}</p></section>"
+    yield f"<section><h2>{escape(say('What was run'))}</h2>"
+    yield f"{_table(('what', 'value'), _facts(result), say)}</section>"
+
+
+def _facts(result: Result) -> Iterator[Sequence[object]]:
+    plan, machine, runs = result["plan"], result["machine"], result["completion"]
+    yield "runs", f"{runs['runs']} of {runs['planned']}"
+    yield "each on the virtual clock", f"{plan['counted_s']:g} s"
+    yield "each in real time", f"{plan['seconds']:g} s"
+    yield "seed", plan["seed"]
+    yield "rates of the detector's mistakes", plan["profile"]
     yield (
-        f"<p>iVeg {escape(result['version'])}, seed {plan['seed']}, detector "
-        f"{escape(plan['profile'])}; {escape(machine['system'])}, {machine['cores']} "
-        f"cores, Python {escape(machine['python'])}; {runs['runs']} of "
-        f"{runs['planned']} runs, each {plan['counted_s']:g} s on the virtual clock "
-        f"and {plan['seconds']:g} s in real time.</p>"
+        "configuration",
+        ", ".join(f"{k} {v}" for k, v in result["configuration"].items()),
     )
-    if result["protected"] is not None:
-        yield f"<p><b>{escape(_said(result['protected']))}</b></p>"
-    chosen = ", ".join(f"{k} {v}" for k, v in result["configuration"].items())
-    yield f"<p>Configuration: {escape(chosen)}.</p>"
-    yield f"<p>{_EMULATED}</p>"
-
-
-def _said(protected: Mapping[str, Any]) -> str:
-    """Protection in a sentence."""
-    met, never = protected["encounters"], protected["never_slowed"]
-    if not met:
-        return "Nobody in a camera's view came within 2 m of a moving robot."
-    shares = [tables.percent(protected["slowed"][one]) for one in ("in_view", "all")]
-    return (
-        f"With a person in some camera's view within 2 m, robots drove at no more than "
-        f"half speed for {shares[0]} of the time ({shares[1]} with everybody within "
-        f"2 m); in {never} of {met} encounters never. Virtual clock, rule as it stands."
-    )
+    yield "machine", f"{machine['system']}, {machine['cores']} cores"
+    yield "programs", f"iVeg {result['version']}, Python {machine['python']}"
 
 
 # --- figures --------------------------------------------------------------------------
 
 
-def _figures(result: Result) -> Iterator[str]:
-    """Figures; the file contains Plotly's own script, so that it opens offline."""
+def _figures(result: Result, language: Language) -> Iterator[str]:
+    """Places of the figures, and what is drawn there."""
     if not result["latency"]["slices"]:
         return
+    say = SAY[language]
     drawn = {
-        "bars": orjson.Fragment(_bars(result)),
-        "cdf": orjson.Fragment(cdf_figure(whole(slices_of(result)))),
+        "bars": orjson.loads(_bars(result)),
+        "cdf": orjson.loads(cdf_figure(whole(slices_of(result)))),
     }
-    for name in drawn:
-        yield f'<div class="figure" id="{name}"></div>'
-    script = (
-        gzip.decompress(library().packed).decode().replace("</script", "<\\/script")
-    )
-    yield f"<script>{script}</script>"
-    told = orjson.dumps(drawn).decode().replace("</", "<\\/")
-    yield (
-        f"<script>const figures={told};for(const name in figures)"
-        "{const{data,layout}=figures[name];"
-        "layout.xaxis={...layout.xaxis,title:{text:layout.meta.x}};"
-        "layout.yaxis={...layout.yaxis,title:{text:layout.meta.y}};"
-        "Plotly.newPlot(name,data,layout,{displayModeBar:false})}</script>"
-    )
+    for name, figure in drawn.items():
+        for trace in figure["data"]:
+            _name(trace, say)
+        axes = figure["layout"]["meta"]
+        axes.update({axis: say(what) for axis, what in axes.items()})
+        told = orjson.dumps(figure).decode().replace("</", "<\\/")
+        yield f'<div class="figure" id="{name}-{language}"></div>'
+        yield f'<script type="application/json">{told}</script>'
+
+
+def _name(trace: dict[str, Any], say: Say) -> None:
+    """Put words for the names of a trace and of its places."""
+    if "meta" in trace:
+        data, hop = trace["meta"]["data"], trace["meta"]["hop"]
+        trace["name"] = f"{say(data)} {_HOPS[hop]}"
+    else:
+        trace["x"] = [say(one) for one in trace["x"]]
+
+
+def _library(result: Result) -> Iterator[str]:
+    """Plotly's own script, so that figures open offline."""
+    if result["latency"]["slices"]:
+        script = gzip.decompress(library().packed).decode()
+        yield "<script>" + script.replace("</script", "<\\/script") + "</script>"
 
 
 def _bars(result: Result) -> bytes:
@@ -213,10 +234,17 @@ def _bars(result: Result) -> bytes:
     return figure_of(traces, ("data", "ms"), {"barmode": "stack"})
 
 
-def _table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    cells = "".join(f"<th>{escape(one)}</th>" for one in head)
+def _table(head: Sequence[str], rows: Iterable[Sequence[object]], say: Say) -> str:
+    cells = "".join(f'<th scope="col">{escape(say(one))}</th>' for one in head)
     lines = (
-        "<tr>" + "".join(f"<td>{escape(str(cell))}</td>" for cell in row) + "</tr>"
+        f"<tr>{''.join(f'<td>{escape(say(str(cell)))}</td>' for cell in row)}</tr>"
         for row in rows
     )
-    return f"<table><tr>{cells}</tr>{''.join(lines)}</table>"
+    table = (
+        f"<table><thead><tr>{cells}</tr></thead><tbody>{''.join(lines)}</tbody></table>"
+    )
+    return f'<div class="wide" tabindex="0">{table}</div>'
+
+
+def _list(sentences: Iterable[str], say: Say) -> str:
+    return f"<ul>{''.join(f'<li>{escape(say(one))}</li>' for one in sentences)}</ul>"

@@ -129,7 +129,8 @@ def claims(result: Result) -> Rows:
     of = f"{read.get('skipped', 0)} of {read.get('passed', 0)}"
     yield skipped, of, "", ""
     below = [f"below {P95_BELOW_MS[place]:.0f} ms" for place in PRINTED]
-    yield "P95 from robot to Orion", _worst(result), *below
+    worst = worst_p95(result)
+    yield "P95 from robot to Orion", "–" if worst is None else f"{worst:.1f} ms", *below
 
 
 def _confident(result: Result) -> str:
@@ -141,10 +142,10 @@ def _confident(result: Result) -> str:
     return f"{sum(one >= threshold for one in found) / len(found):.0%} ({threshold})"
 
 
-def _worst(result: Result) -> str:
+def worst_p95(result: Result) -> float | None:
+    """Greatest P95 of a kind of data from robot to Orion (ms)."""
     hops = [row["hops"]["robot_orion"] for row in result["latency"]["rows"]]
-    worst = max((one["p95_ms"] or 0.0 for one in hops), default=0.0)
-    return f"{worst:.1f} ms" if worst else "–"
+    return max((one["p95_ms"] or 0.0 for one in hops), default=0.0) or None
 
 
 SIGHT: Final = ("what", "here", "here, real time")

@@ -149,7 +149,10 @@ function filesOf({ name, state, report }, i18n) {
   ]) {
     const link = make("a", "button", text);
     link.href = `/api/v1/experiments/${name}/${file}`;
-    if (file === "report") link.target = "_blank";
+    if (file === "report") {
+      link.target = "_blank";
+      link.search = `lang=${i18n.language()}&theme=${document.documentElement.dataset.theme}`;
+    }
     cell.append(link, " ");
   }
   return cell;

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import asdict, replace
+from html import unescape
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ from iveg.lab.experiment.recording import read_truth
 from iveg.lab.experiment.report import write_report
 from iveg.lab.experiment.run_store import RunStore
 from iveg.lab.experiment.scoring import Tally
+from iveg.lab.experiment.words import NUMBER, catalogue
 
 CHOSEN = {"fiware": "embedded", "confidence_threshold": 0.8}
 
@@ -174,13 +176,88 @@ def test_field_tests_that_failed_are_counted_with_their_reasons() -> None:
     assert "<td>1</td><td>field</td><td>601</td><td>yes</td><td>–</td>" in page
 
 
+def said(page: str, language: str) -> list[str]:
+    """Everything that a reader of one language reads."""
+    part = page.partition(f'<main lang="{language}">')[2].partition("</main>")[0]
+    shown = re.sub(r"<script.*?</script>", "", part, flags=re.S)
+    return [unescape(one) for one in re.findall(r">([^<>]+)<", shown) if one.strip()]
+
+
+def everything() -> str:
+    """Reports in which each sentence is said at least once."""
+    stopped, quiet = result(why="iveg: did not answer"), result()
+    median = {"p50_ms": 20.5}
+    for one in (stopped, quiet):
+        stops = [{"robot_id": "AGI", "answer": {"direct": median}, "standing": median}]
+        one["stack"]["stops"] = stops
+    quiet["configuration"] = {"fiware": "embedded", "confidence_threshold": 0.7}
+    quiet["protected"]["encounters"] = 0
+    failed = field_test(3, "navigation", "touched", "missed")
+    quiet["runs"] = [*quiet["runs"], failed]
+    quiet["latency"]["rows"][0]["messages"] = {}
+    return write_report(stopped) + write_report(quiet)
+
+
+def test_the_report_is_whole_in_both_languages() -> None:
+    for page in everything().split("<!doctype html>")[1:]:
+        english, spanish = said(page, "en"), said(page, "es")
+
+        assert len(english) == len(spanish) > 300
+        same = {one for one in english if one in spanish and re.search("[A-Za-z]", one)}
+        names = r"AGI|AGII|iveg|demo|nlos-field|together|iVeg .*|fiware .*|Linux.*"
+        both = r"TP|FP|FN|AP|n|P95|Δt.|lidar|detector|robot|total|no|[\d.]+ m?s"
+        assert [s for s in same if not re.fullmatch(f"{names}|{both}", s)] == []
+
+
+def test_every_sentence_of_the_catalogue_is_said() -> None:
+    page = everything()
+    keys = {NUMBER.sub("#", one) for one in said_of_all(page, "en")}
+    parts = {part for key in keys for part in key.split(", ")}
+    parts |= {f"{key.partition(':')[0]}:" for key in keys}
+    drawn = {"ms", "share"}
+
+    assert [s for s in catalogue() if s not in keys | parts | drawn] == []
+    assert [k for k, s in catalogue().items() if k.count("#") != s.count("#")] == []
+
+
+def said_of_all(pages: str, language: str) -> list[str]:
+    each = pages.split("<!doctype html>")[1:]
+    return [text for page in each for text in said(page, language)]
+
+
+def test_the_report_begins_with_its_conclusions_as_its_reader_writes() -> None:
+    page = write_report(result())
+    english, spanish = said(page, "en"), said(page, "es")
+
+    assert english[1] == "Conclusions"
+    assert english[3].startswith("1 of 1 runs were completed, and 1 of 2 field tests")
+    assert english[4].startswith("iVeg decided 4 slow-downs: 4 were applied")
+    assert "92.3% of the farmers in view, and 85.7% of what" in english[5]
+    assert "95% of the messages of each kind took no longer than 5.9 ms" in english[6]
+    assert "El artículo: 97,67 % y 93,33 % en simulación" in spanish[5]
+    assert "más de 10.000 mensajes" in page
+    assert "92,3 % [79,7; 97,3]" in spanish
+    assert "Python 3.1" in "".join(spanish)
+
+
+def test_the_report_has_the_pages_own_colours_in_each_theme() -> None:
+    page = write_report(result())
+    style = page.partition("<style>")[2].partition("</style>")[0]
+    asked = set(re.findall(r"var\((--[\w-]+)", style.partition("/* The report")[2]))
+
+    assert 'data-theme="auto"' in page
+    assert asked > {"--field", "--text", "--line"}
+    assert [name for name in asked if f"{name}:" not in style] == []
+
+
 def test_the_report_needs_no_network() -> None:
     page = write_report(result())
     ours = re.sub(r"<script>/\*\*.*?</script>", "", page, flags=re.S)
 
-    assert "Plotly.newPlot" in page
+    assert "Plotly.react" in page
     assert not re.findall(r"<(?:script|link|img)[^>]+(?:src|href)=", ours)
-    assert page.count("</script>") == 2
+    # Two figures in each language, the library, and what draws them.
+    assert page.count("</script>") == 6
 
 
 def test_a_run_that_broke_off_says_so_and_keeps_what_it_has() -> None:
@@ -191,7 +268,10 @@ def test_a_run_that_broke_off_says_so_and_keeps_what_it_has() -> None:
 
 
 def test_a_report_without_latency_has_no_figures() -> None:
-    assert "Plotly" not in write_report(result(took_ms=()))
+    page = write_report(result(took_ms=()))
+
+    assert 'class="figure"' not in page
+    assert len(page) < 150_000
 
 
 def test_a_clear_change_is_told_and_an_unclear_one_is_not() -> None:
