@@ -6,6 +6,7 @@ from urllib.parse import urlsplit
 from annotated_types import Interval
 from pydantic import AfterValidator, BeforeValidator, StringConstraints
 
+from iveg.domain.accounts import is_name
 from iveg.domain.fleet import split_word
 
 
@@ -27,6 +28,12 @@ def _read_robots(text: str) -> tuple[str, ...]:
     return words
 
 
+def _read_name(text: str) -> str:
+    if not is_name(text):
+        raise ValueError(text)
+    return text
+
+
 Port = Annotated[int, Interval(ge=1, le=65535), "a port from 1 to 65535"]
 Switch = Annotated[
     bool,
@@ -41,6 +48,11 @@ Hex = Annotated[
     str,
     StringConstraints(pattern="^[0-9a-fA-F]{32,128}$"),
     "32 to 128 hexadecimal digits",
+]
+Name = Annotated[
+    str,
+    AfterValidator(_read_name),
+    "1 to 64 visible characters, none of < > \" ' = ; ( )",
 ]
 Service = Annotated[
     str, StringConstraints(pattern="^[a-z0-9_]{1,50}$"), "1 to 50 of a-z, 0-9 and _"

@@ -14,6 +14,7 @@ from typing import Annotated, Any, Final, Literal, get_args, get_type_hints
 from annotated_types import Interval
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
+from iveg.domain.accounts import DEFAULT_NAME
 from iveg.domain.errors import SettingsError
 from iveg.domain.limits import LIMITS
 from iveg.domain.recordings import RecordingLimits
@@ -26,6 +27,7 @@ from iveg.setting_types import (
     DirectRead,
     Gigabytes,
     Hex,
+    Name,
     Port,
     Robots,
     Service,
@@ -137,6 +139,11 @@ class Settings:
         "IVEG_SIGN_IN_TOKEN",
         "",
         "Token of the link that signs a browser in; empty: made at each start.",
+    )
+    sign_in_name: Name = setting(
+        "IVEG_SIGN_IN_NAME",
+        DEFAULT_NAME,
+        "Name of whoever signs in by the link, in everything that they do.",
     )
     confidence_threshold: Annotated[float, Interval(ge=0.0, le=1.0)] = setting(
         "IVEG_CONFIDENCE_THRESHOLD",

@@ -15,6 +15,7 @@ from typing import Annotated
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 
 from iveg.adapters.files import Form, read_lines, write_lines
+from iveg.domain.accounts import SignInMethod
 from iveg.domain.errors import DataFileError
 
 _log = logging.getLogger(__name__)
@@ -31,6 +32,8 @@ class Session:
         digest: SHA-256 of the token (hex).
         role: What they were when they came.
         began: Unix time of the sign-in (s); ``seen`` of the last sign of life.
+        person: Id of the account; empty in sessions of earlier versions.
+        method: How they signed in.
     """
 
     digest: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
@@ -38,6 +41,8 @@ class Session:
     role: str
     began: _UnixTime
     seen: _UnixTime
+    person: str = ""
+    method: SignInMethod = "link"
 
     __pydantic_config__ = ConfigDict(strict=True, extra="forbid")
 

@@ -198,6 +198,7 @@ class Dss:
             api_token=settings.api_token,
             clock=clock.now,
             store=self.stores.sessions,
+            link_name=settings.sign_in_name,
         )
         orion = NotificationEndpoint(
             parts.ingest,

@@ -51,6 +51,9 @@ BAD = [
     ("IVEG_KEEP_POSITIONS_DAYS", "0", "no longer than IVEG_KEEP_DECISIONS_DAYS"),
     ("IVEG_KEEP_AUDIT_DAYS", "364", "no shorter than IVEG_KEEP_DECISIONS_DAYS"),
     ("IVEG_KEEP_RECORDINGS_GB", "2.5", "a whole number of gigabytes from 0"),
+    ("IVEG_SIGN_IN_NAME", "Ana <admin>", "1 to 64 visible characters, none of"),
+    ("IVEG_SIGN_IN_NAME", "An\u202ea", "1 to 64 visible characters"),
+    ("IVEG_SIGN_IN_NAME", " Ana", "1 to 64 visible characters"),
     ("IVEG_UPLINK", "both", "one of per-topic, single"),
     ("IVEG_ON_LINK_LOSS", "drive", "one of stop, slow"),
 ]
@@ -162,6 +165,7 @@ GOOD = {
     "IVEG_DATA_DIRECTORY": "/var/lib/iveg",
     "IVEG_API_TOKEN": "a-long-enough-token!",
     "IVEG_SIGN_IN_TOKEN": "cd" * 32,
+    "IVEG_SIGN_IN_NAME": "Ana Núñez",
     "IVEG_CONFIDENCE_THRESHOLD": "0.75",
     "IVEG_SAFETY_RADIUS_M": "2.5",
     "IVEG_STOP_DIRECT": "off",

@@ -4,7 +4,7 @@ People come with a session cookie, programs with a bearer token, Orion with a sh
 secret.  Every route declares its requirement with ``require``; ``declared_action``
 reads it::
 
-    link with token ──> session cookie ──> operator: read, stop, release
+    link with token ──> session cookie ──> operator: read, stop, release, by name
     bearer token ─────────────────────────> program:  read, stop
     session past its age ─────────────────> expired:  stop, 12 h longer
 
@@ -24,12 +24,20 @@ from starlette.responses import RedirectResponse, Response
 from starlette.websockets import WebSocket
 
 from iveg.adapters.sessions import FileSessions
+from iveg.domain.accounts import DEFAULT_NAME
 from iveg.domain.errors import NotAllowedError
 from iveg.pipeline.ports import Clock
 from iveg.web.problems import NotSignedInError, Problem
 from iveg.web.security.csrf import is_own, refuse_forgery, refuse_other_bodies
 from iveg.web.security.rate_limits import FailedAttempts
-from iveg.web.security.roles import MAY, NOBODY, Action, Principal, Role
+from iveg.web.security.roles import (
+    MAY,
+    NOBODY,
+    PROGRAM,
+    Action,
+    Principal,
+    Role,
+)
 from iveg.web.security.sessions import Sessions
 
 __all__ = [
@@ -62,6 +70,7 @@ class Authenticator:
         api_token: The bearer token of programs; empty lets no program in.
         clock: Read at each question.
         store: Where sessions outlive a restart; None forgets them.
+        link_name: Name of whoever holds the link.
     """
 
     def __init__(
@@ -71,12 +80,13 @@ class Authenticator:
         api_token: str,
         clock: Clock,
         store: FileSessions | None = None,
+        link_name: str = DEFAULT_NAME,
     ) -> None:
         self._sign_in_token = sign_in_token
         self._api_token = api_token
         self._clock = clock
         self._attempts = FailedAttempts()
-        self.sessions = Sessions(clock, store)
+        self.sessions = Sessions(clock, store, link_name=link_name)
         self.refused = 0
         """Sign-ins with a wrong token."""
         self._told_at: float | None = None
@@ -112,7 +122,7 @@ class Authenticator:
         secure = request.url.scheme == "https"
         response.set_cookie(
             _cookie_name(secure=secure),
-            self.sessions.open("operator", "operator"),
+            self.sessions.open_by_link(),
             path="/",
             secure=secure,
             httponly=True,
@@ -156,7 +166,7 @@ class Authenticator:
         scheme, _, token = connection.headers.get("authorization", "").partition(" ")
         if scheme.lower() == "bearer":
             known = bool(self._api_token) and _same(token.strip(), self._api_token)
-            return Principal("program", "program") if known else None
+            return PROGRAM if known else None
         secure = connection.scope["scheme"] in ("https", "wss")
         cookie = connection.cookies.get(_cookie_name(secure=secure))
         return None if cookie is None else self.sessions.find(cookie)

@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final, Literal
 
+from iveg.domain.accounts import SignInMethod
+
 Role = Literal["viewer", "operator", "admin", "program", "expired"]
 Action = Literal["open", "read", "stop", "release", "admin"]
 
@@ -22,13 +24,19 @@ class Principal:
     """An authenticated person or program.
 
     Attributes:
-        name: For the audit and the page; opaque to robots.
+        name: For the record and the page; opaque to robots.
         session: Digest of the session that lets them in; None for programs.
+        person: Id of the account; names may change and be given anew.
+        method: How they proved who they are.
+        signed_in_at: When (Unix s); None for programs, which do so at each request.
     """
 
     name: str
     role: Role
     session: bytes | None = None
+    person: str = ""
+    method: SignInMethod = "link"
+    signed_in_at: float | None = None
 
     def may(self, action: Action) -> bool:
         """Whether the role's row holds this action."""
@@ -37,3 +45,6 @@ class Principal:
 
 NOBODY = Principal("nobody", "expired")
 """Unknown caller of an open route; never passed to a route that requires a role."""
+
+PROGRAM = Principal("program", "program", person="program", method="token")
+"""Whoever sends the one bearer token of the environment."""

@@ -14,6 +14,7 @@ from dataclasses import replace
 from typing import cast
 
 from iveg.adapters.sessions import FileSessions, Session
+from iveg.domain.accounts import DEFAULT_NAME, LINK_PERSON, SignInMethod
 from iveg.pipeline.ports import Clock
 from iveg.web.security.roles import Principal, Role
 
@@ -33,6 +34,7 @@ class Sessions:
         clock: Read at each question.
         store: Where they outlive this process; None forgets them with it.
         most: How many there may be.
+        link_name: Name of whoever holds the link of the environment.
     """
 
     def __init__(
@@ -40,10 +42,12 @@ class Sessions:
         clock: Clock,
         store: FileSessions | None = None,
         most: int = _MOST_SESSIONS,
+        link_name: str = DEFAULT_NAME,
     ) -> None:
         self._clock = clock
         self._store = store
         self._most = most
+        self._link_name = link_name
         self._sessions: dict[bytes, Session] = {}
         self._kept_at = 0.0
         if store is not None:
@@ -52,7 +56,13 @@ class Sessions:
     def __len__(self) -> int:
         return len(self._sessions)
 
-    def open(self, name: str, role: Role) -> str:
+    def open_by_link(self) -> str:
+        """Begin a session of whoever holds the link; returns its token."""
+        return self.open(self._link_name, "operator", LINK_PERSON)
+
+    def open(
+        self, name: str, role: Role, person: str = "", method: SignInMethod = "link"
+    ) -> str:
         """Begin a session; returns its token, which is stored nowhere."""
         if len(self._sessions) >= self._most:
             idlest = min(self._sessions, key=lambda one: self._sessions[one].seen)
@@ -60,7 +70,8 @@ class Sessions:
         token = secrets.token_urlsafe(32)
         now = self._clock().wall
         digest = _digest(token)
-        self._sessions[digest] = Session(digest.hex(), name, role, now, now)
+        began = Session(digest.hex(), name, role, now, now, person, method)
+        self._sessions[digest] = began
         self._keep()
         return token
 
@@ -103,7 +114,9 @@ class Sessions:
             self._sessions[digest] = replace(session, seen=now)
             if abs(now - self._kept_at) >= _KEEP_SEEN_S:
                 self._keep()
-        return Principal(session.name, role, digest)
+        return Principal(
+            session.name, role, digest, session.person, session.method, session.began
+        )
 
     def _remember(self, kept: Iterable[Session]) -> None:
         """Take in those of earlier runs that are not over; the newest of too many."""
@@ -112,9 +125,21 @@ class Sessions:
         for session in newest:
             # A clock that was ahead must not have made a session that never ends.
             began, seen = min(session.began, now), min(session.seen, now)
-            known = replace(session, began=began, seen=seen)
+            known = self._named(replace(session, began=began, seen=seen))
             if session.role in _PEOPLE and _role_at(known, now) is not None:
                 self._sessions[bytes.fromhex(session.digest)] = known
+
+    def _named(self, session: Session) -> Session:
+        """A session of the link under the link's present name.
+
+        Earlier versions had nobody else, and called that person ``operator``.
+        """
+        is_link = session.person == LINK_PERSON or (
+            not session.person and session.name == DEFAULT_NAME
+        )
+        if not is_link:
+            return session
+        return replace(session, name=self._link_name, person=LINK_PERSON)
 
     def _keep(self) -> None:
         self._kept_at = self._clock().wall

@@ -319,6 +319,27 @@ async def test_an_origin_that_is_no_address_is_foreign(
     assert (await operator.post("/stop", headers=headers)).status_code == 403
 
 
+async def test_who_came_by_the_link_has_a_name_and_is_known_by_how_and_when(
+    clock: Clock,
+) -> None:
+    authenticator = Authenticator(
+        sign_in_token=SIGN_IN, api_token=API, clock=clock, link_name="Ana"
+    )
+    transport = httpx.ASGITransport(SignInLink(build_app(authenticator), authenticator))
+    async with httpx.AsyncClient(
+        transport=transport, base_url="http://iveg.test"
+    ) as browser:
+        await browser.get("/", params={"token": SIGN_IN})
+        told = (await browser.get("/read")).json()
+        token = browser.cookies["iveg"]
+
+    who = authenticator.sessions.find(token)
+    assert told["name"] == "Ana"
+    assert who is not None
+    assert (who.person, who.method) == ("link", "link")
+    assert who.signed_in_at == clock().wall
+
+
 # --- sessions -----------------------------------------------------------------------
 
 

@@ -2,11 +2,13 @@
 
 import hashlib
 from collections.abc import Iterator
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import pytest
 
-from iveg.adapters.sessions import FileSessions, Session
+from iveg.adapters.files import write_lines
+from iveg.adapters.sessions import FORM, FileSessions, Session
 from iveg.web.security.roles import Principal
 from iveg.web.security.sessions import Sessions
 from tests.fakes.clock import FakeClock
@@ -201,7 +203,40 @@ def test_a_session_that_was_lowered_is_a_viewers_and_stays_one(
     sessions.lower(Principal("program", "program"))
     store.close()
 
-    assert sessions.current(before) == Principal("Ana", "viewer", before.session)
+    assert sessions.current(before) == replace(before, role="viewer")
     again = restarted(path, clock)
     roles = [found.role for one in (token, other) if (found := again.find(one))]
     assert roles == ["viewer", "operator"]
+
+
+def test_sessions_of_earlier_versions_stay_and_get_the_name_of_the_links_person(
+    path: Path, clock: FakeClock
+) -> None:
+    now = clock().wall
+    before = [Session("", "operator", "operator", now, now)]
+    before.append(Session("", "Eva", "viewer", now, now))
+    lines = []
+    for number, one in enumerate(before):
+        digest = hashlib.sha256(f"token-{number}".encode()).hexdigest()
+        line = {**asdict(one), "digest": digest}
+        del line["person"], line["method"]
+        lines.append(line)
+    write_lines(path, FORM, lines)
+
+    sessions = Sessions(clock, FileSessions(path), link_name="Ana")
+
+    found = [sessions.find(f"token-{number}") for number in range(2)]
+    told = [(one.name, one.role, one.person) for one in found if one is not None]
+    assert told == [("Ana", "operator", "link"), ("Eva", "viewer", "")]
+
+
+def test_a_new_name_of_the_link_is_that_of_its_sessions_after_a_restart(
+    path: Path, clock: FakeClock, store: FileSessions
+) -> None:
+    token = Sessions(clock, store, link_name="Ana").open_by_link()
+    store.close()
+
+    found = Sessions(clock, FileSessions(path), link_name="Eva").find(token)
+
+    assert found is not None
+    assert (found.name, found.person) == ("Eva", "link")
