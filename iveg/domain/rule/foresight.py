@@ -81,6 +81,10 @@ class Foresight:
         self.if_released: Foretold = {}
         self._at = -math.inf
 
+    def is_due(self, now: Instant) -> bool:
+        """Whether the last look is old."""
+        return not 0.0 <= now.mono - self._at < EVERY_S - 1e-6
+
     def look(
         self,
         world: World,
@@ -93,7 +97,7 @@ class Foresight:
 
         ``speeds_before``: of the robots that are slow now (m/s).
         """
-        if not 0.0 <= now.mono - self._at < EVERY_S - 1e-6:
+        if self.is_due(now):
             self._at = now.mono
             zones = [z for z in zones_of(world, people, rule, now) if _is_seen(z, now)]
             circles = Circles([_circle(zone, world, now) for zone in zones])

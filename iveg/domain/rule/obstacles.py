@@ -8,7 +8,7 @@ two metres of is an encounter like any other (docs/safety.md, "The laser").
 It only adds: nothing that it finds or misses lifts a limit (``tests/properties``).
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -62,8 +62,8 @@ class SeenObstacle:
     at: float
 
 
-SeenBy = Callable[[str, Instant], SeenObstacle | None]
-"""Robot, now → what its laser sees near it."""
+SeenBy = Callable[[Instant], Mapping[str, SeenObstacle]]
+"""Now → what the laser of each robot sees near it."""
 
 
 Fault = Literal["blind", "unfit"]
@@ -146,10 +146,13 @@ class Obstacles:
         witness = self._witnesses.get(robot_id)
         return witness is not None and witness.is_unsure
 
-    def seen(self, robot_id: str, now: Instant) -> SeenObstacle | None:
-        """What a robot's laser saw near it within the last half second."""
-        seen = self._seen.get(robot_id)
-        return seen if seen and 0.0 <= now.mono - seen.at <= GONE_S else None
+    def seen(self, now: Instant) -> Mapping[str, SeenObstacle]:
+        """What the laser of each robot saw near it within the last half second."""
+        return {
+            robot_id: one
+            for robot_id, one in self._seen.items()
+            if one is not None and 0.0 <= now.mono - one.at <= GONE_S
+        }
 
     def walkers(self) -> Iterator[Walkers]:
         """Who walks by the newest scan of each robot, since the last time of asking."""

@@ -8,6 +8,8 @@ rings a robot is clear only while every premise of that claim holds (``premises`
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from itertools import count
+from types import MappingProxyType
 
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import CLEAR, HALF_SPEED, SpeedLimit
@@ -81,10 +83,10 @@ class SpeedLimits:
         foretold: Encounters ahead, since the last judgement.
 
     Args:
-        seen: What a robot's laser sees near it that nobody explains.
+        seen: What robots' lasers see near them that nobody explains.
     """
 
-    def __init__(self, greenhouse: Greenhouse, seen: SeenBy = lambda *_: None) -> None:
+    def __init__(self, greenhouse: Greenhouse, seen: SeenBy = lambda _: {}) -> None:
         self._greenhouse = greenhouse
         self._seen = seen
         self._open: dict[str, dict[str, Crossing]] = {}
@@ -110,31 +112,30 @@ class SpeedLimits:
     ) -> tuple[dict[str, SpeedLimit], list[LimitChange]]:
         """Judge the whole fleet; ``new_id`` begins the ids of new decisions."""
         near = self._zones.near(world, people, rule, now, self._open)
-        seen = {
-            name: one
-            for name in world.robots
-            if (one := self._seen(name, now)) is not None
-        }
+        seen, ids = self._seen(now), (f"{new_id}-{number}" for number in count())
         self.foretold = self._foretell(world, people, rule, seen, now)
         changes: list[LimitChange] = []
         for robot in world.robots.values():
-            nearest = {
-                **_nearest(robot, near(robot), self._open.get(robot.robot_id, {})),
-                **_beside(robot, seen.get(robot.robot_id)),
-            }
-            ahead = self.foretold.get(robot.robot_id, {})
-            if nearest or ahead or self._open.get(robot.robot_id):
-                name = f"{new_id}-{len(changes)}"
-                yields_to = self._yields_to(robot, ahead, world, now)
-                changes += self._cross(robot, nearest, ahead, yields_to, now, name)
+            if robot.odometry is None:
+                continue
+            mine = self._open.setdefault(robot.robot_id, {})
+            met = _nearest(robot, near(robot), mine)
+            met |= _beside(seen.get(robot.robot_id))
+            met |= self._foreseen(robot, mine, world, now)
+            if met or mine:
+                changes += self._cross(robot, mine, met, now, ids)
         self.missing = missing_premises(world, now)
+        return self._limit(world, now), changes
+
+    def _limit(self, world: World, now: Instant) -> dict[str, SpeedLimit]:
+        """The limit of every robot; notes since when it is limited."""
         limits = {name: self._speed_limit(name) for name in world.robots}
         for name, limit in limits.items():
             if limit.speed_factor > HALF_SPEED:
                 self.limited_since.pop(name, None)
             else:
                 self.limited_since.setdefault(name, now.mono)
-        return limits, changes
+        return limits
 
     def _foretell(
         self,
@@ -147,13 +148,50 @@ class SpeedLimits:
         if not rule.foresight:
             self._foresight = Foresight()
             return {}
-        before = {
+        before = self._speeds_before() if self._foresight.is_due(now) else {}
+        ahead = self._foresight.look(world, people, rule, now, before)
+        return _with_obstacles(ahead, seen)
+
+    def _speeds_before(self) -> Mapping[str, float]:
+        """Of the robots that are slow now (m/s)."""
+        return {
             robot_id: max(one.speed_before for one in mine.values())
             for robot_id, mine in self._open.items()
             if mine
         }
-        ahead = self._foresight.look(world, people, rule, now, before)
-        return _with_obstacles(ahead, seen)
+
+    def _foreseen(
+        self,
+        robot: RobotState,
+        mine: Mapping[str, Crossing],
+        world: World,
+        now: Instant,
+    ) -> "_Found":
+        """Rings that a robot will reach, as if it were at their border now.
+
+        In time to be slow there; who gives way does not wait for that.  Who is slow for
+        one already stays so while it lies ahead, or would lie ahead again at the speed
+        of before: it shall not speed up for that.
+        """
+        ahead = self.foretold.get(robot.robot_id, _NOBODY)
+        again = self._foresight.if_released.get(robot.robot_id, _NOBODY)
+        odometry = robot.odometry
+        if odometry is None or not (ahead or again):
+            return {}
+        soon_s = slows_within_s(robot.profile.braking, odometry.twist.linear_x)
+        yields_to = self._yields_to(robot, ahead, world, now)
+        held = {cause: one for cause, one in again.items() if cause in mine}
+        near = {
+            cause: one
+            for cause, one in ahead.items()
+            if cause in yields_to
+            or one.in_s <= (max(HOLDS_S, soon_s) if cause in mine else soon_s)
+        }
+        distance_to = odometry.pose.distance_to
+        return {
+            cause: (0.0, distance_to(one.zone.x, one.zone.y), one.zone)
+            for cause, one in (held | near).items()
+        }
 
     def _yields_to(
         self,
@@ -174,26 +212,20 @@ class SpeedLimits:
     def _cross(
         self,
         robot: RobotState,
-        inside: "_Found",
-        ahead: Mapping[str, Encounter],
-        yields_to: Collection[str],
+        mine: dict[str, Crossing],
+        met: "_Found",
         now: Instant,
-        new_id: str,
+        ids: Iterator[str],
     ) -> Iterator[LimitChange]:
-        mine = self._open.setdefault(robot.robot_id, {})
-        again = self._foresight.if_released.get(robot.robot_id, {})
-        foreseen = _foreseen(robot, ahead, again, yields_to, mine)
-        nearest = {**inside, **foreseen}
-        for number, (cause, (depth, distance, zone)) in enumerate(nearest.items()):
+        for cause, (depth, distance, zone) in met.items():
             crossing = mine.get(cause)
             if crossing is not None:
                 mine[cause] = _still(crossing, depth, distance, now)
             elif depth <= 0.0:
-                name = f"{new_id}-{number}"
-                crossing = self._enter(robot, zone, distance, now, name)
+                crossing = self._enter(robot, zone, distance, now, next(ids))
                 mine[cause] = crossing
                 yield LimitChange(crossing, began=True)
-        yield from _leave(mine, nearest, now)
+        yield from _leave(mine, met, now)
 
     def _enter(
         self,
@@ -225,7 +257,7 @@ class SpeedLimits:
 
     def _foretold_s(self, robot_id: str, zone: Zone, distance_m: float) -> float | None:
         """When a robot will reach a cause's ring (s); None: it is inside, or leaves."""
-        encounter = self.foretold.get(robot_id, {}).get(zone.cause)
+        encounter = self.foretold.get(robot_id, _NOBODY).get(zone.cause)
         is_inside = distance_m <= zone.radius_m
         return None if encounter is None or is_inside else encounter.in_s
 
@@ -251,13 +283,14 @@ class SpeedLimits:
         return CLEAR
 
 
-_Found = Mapping[str, tuple[float, float, Zone]]
+_NOBODY: Mapping[str, Encounter] = MappingProxyType({})
+_Found = dict[str, tuple[float, float, Zone]]
 """Cause → the deepest of its circles: how far outside (m), distance (m), the circle."""
 
 
-def _beside(robot: RobotState, seen: SeenObstacle | None) -> _Found:
+def _beside(seen: SeenObstacle | None) -> _Found:
     """What its laser sees within two metres of a robot's outline."""
-    if seen is None or seen.ahead is not None or robot.odometry is None:
+    if seen is None or seen.ahead is not None:
         return {}
     return {CAUSE: (0.0, seen.distance_m, seen.zone)}
 
@@ -274,12 +307,12 @@ def _with_obstacles(foretold: Foretold, seen: Mapping[str, SeenObstacle]) -> For
 
 def _nearest(
     robot: RobotState, zones: Iterable[Zone], mine: Mapping[str, Crossing]
-) -> dict[str, tuple[float, float, Zone]]:
+) -> _Found:
     """The deepest circle of each cause: how far outside (m), distance (m), the circle.
 
     Causes that the robot is far from and was not near to are left out.
     """
-    nearest: dict[str, tuple[float, float, Zone]] = {}
+    nearest: _Found = {}
     if robot.odometry is None:
         return nearest
     pose, robot_id = robot.odometry.pose, robot.robot_id
@@ -295,36 +328,6 @@ def _nearest(
         if cause not in nearest or depth < nearest[cause][0]:
             nearest[cause] = depth, distance, zone
     return nearest
-
-
-def _foreseen(
-    robot: RobotState,
-    ahead: Mapping[str, Encounter],
-    again: Mapping[str, Encounter],
-    yields_to: Collection[str],
-    mine: Mapping[str, Crossing],
-) -> dict[str, tuple[float, float, Zone]]:
-    """Rings that a robot will reach, as if it were at their border now.
-
-    In time to be slow there; who gives way does not wait for that.  Who is slow for one
-    already stays so while it lies ahead, or would lie ahead ``again`` at the speed of
-    before: it shall not speed up for that.
-    """
-    if robot.odometry is None:
-        return {}
-    pose, speed = robot.odometry.pose, robot.odometry.twist.linear_x
-    soon_s = slows_within_s(robot.profile.braking, speed)
-    held = {cause: one for cause, one in again.items() if cause in mine}
-    near = {
-        cause: one
-        for cause, one in ahead.items()
-        if cause in yields_to
-        or one.in_s <= (max(HOLDS_S, soon_s) if cause in mine else soon_s)
-    }
-    return {
-        cause: (0.0, pose.distance_to(one.zone.x, one.zone.y), one.zone)
-        for cause, one in (held | near).items()
-    }
 
 
 def _leave(

@@ -5,9 +5,10 @@ room for how far all may go in half a second; until then, or until somebody appe
 goes farther, only what was within reach is looked at (Verlet's neighbour list).
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
@@ -147,33 +148,33 @@ def _near(
     rule: DetectionRule,
     now: Instant,
     inside: Mapping[str, Mapping[str, object]],
-    made: dict[str, list[Zone]],
+    made: dict[str, Sequence[Zone]],
     robot: RobotState,
 ) -> Iterator[Zone]:
-    """``Near``: people in the order of their numbers, then peers.
+    """``Near``: people, then peers, each in their order; then what it was in before.
 
     ``made``: the circles of this judgement, each made once and only if a robot may be
     near.
     """
-    robots, known = world.robots, people.known
-    mine = inside.get(robot.robot_id, {}).keys()
-    persons = neighbours.people.get(robot.robot_id, _NOBODY) | mine
-    here = [known[one] for one in persons if one in known]
-    for person in sorted(here, key=lambda one: one.number):
-        if person.person_id not in made:
-            circles = _zones_of(person, people, world, rule, now)
-            made[person.person_id] = list(circles)
-        yield from made[person.person_id]
-    peers = neighbours.peers.get(robot.robot_id, _NOBODY) | mine
-    for peer in robots if len(peers) > 1 else peers:
-        if peer not in peers or peer not in robots:
-            continue
-        if peer not in made:
-            made[peer] = list(_circle_of(robots[peer], rule, now))
-        yield from made[peer]
+    name = robot.robot_id
+    causes, mine = neighbours.causes.get(name, _NOBODY), inside.get(name, _NOBODY)
+    for cause in (*causes, *(one for one in mine if one not in causes)):
+        circles = made.get(cause)
+        if circles is None:
+            circles = made[cause] = tuple(_of_cause(cause, world, people, rule, now))
+        yield from circles
 
 
-_NOBODY: frozenset[str] = frozenset()
+def _of_cause(
+    cause: str, world: World, people: People, rule: DetectionRule, now: Instant
+) -> Iterator[Zone]:
+    if cause in people.known:
+        yield from _zones_of(people.known[cause], people, world, rule, now)
+    elif cause in world.robots:
+        yield from _circle_of(world.robots[cause], rule, now)
+
+
+_NOBODY: Mapping[str, None] = MappingProxyType({})
 _Place = tuple[float, float, float]
 """Of a robot: x, y (m), and the moment of its pose (monotonic, s)."""
 
@@ -185,7 +186,7 @@ class _Neighbours:
     Attributes:
         at: When all were compared (monotonic, s).
         places: Places of the robots then; ``persons`` likewise.
-        people: Robot → people; ``peers``: robot → robots.
+        causes: Robot → people, then robots, in their order.
         checked: The newest of each person that is still within reach of ``persons``.
     """
 
@@ -193,8 +194,7 @@ class _Neighbours:
     radius_m: float
     places: Mapping[str, _Place]
     persons: Mapping[str, TrackedPerson]
-    people: Mapping[str, set[str]]
-    peers: Mapping[str, set[str]]
+    causes: Mapping[str, Mapping[str, None]]
     checked: dict[str, TrackedPerson]
 
     @classmethod
@@ -216,21 +216,19 @@ class _Neighbours:
         ]
         spots = [(look.x, look.y, look.at.mono, look.reach_m) for _, look in seen]
         x, y, since, reach = np.array(spots).reshape(-1, 4).T
-        near, beside = dict[str, set[str]](), dict[str, set[str]]()
+        near = dict[str, dict[str, None]]()
         age, limit = _reach(rule, now, since, reach)
         limit[age > LIMITS.ring_lasts_s] = -1.0
         for row, column in _within(robots, x, y, limit):
-            near.setdefault(names[row], set()).add(seen[column][0])
+            near.setdefault(names[row], {})[seen[column][0]] = None
         x, y, since = robots
         # A peer that has long been silent may speak again.
         for row, column in _within(robots, x, y, _reach(rule, now, since)[1]):
             # A robot is near itself, which does not slow it.
             if row != column:
-                beside.setdefault(names[row], set()).add(names[column])
+                near.setdefault(names[row], {})[names[column]] = None
         persons = dict(people.known)
-        return cls(
-            now.mono, rule.radius_m, places, persons, near, beside, dict(persons)
-        )
+        return cls(now.mono, rule.radius_m, places, persons, near, dict(persons))
 
     def hold(
         self, world: World, people: People, rule: DetectionRule, now: Instant
