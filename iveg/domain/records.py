@@ -196,6 +196,8 @@ class OdometryRecord:
         linear: (m/s); ``angular`` (rad/s).
         limit_factor: iVeg's speed limit; ``applied_factor`` the robot's report.
         link: ``LIVE``, ``LATE`` or ``LOST``.
+        margin_m: Least margin to anybody who is seen, while it moves (m; at most a
+            second old); None where it is unknown or there is none.
     """
 
     at: float
@@ -208,6 +210,7 @@ class OdometryRecord:
     limit_factor: float
     applied_factor: float | None = None
     link: str | None = None
+    margin_m: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

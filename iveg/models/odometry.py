@@ -8,7 +8,7 @@ from iveg.models.base import Model
 
 
 class OdometryRow(Model):
-    """Pose in ``map`` (m, rad), speed (m/s, rad/s) and speed limit of a robot."""
+    """Pose in ``map`` (m, rad), speed (m/s, rad/s), speed limit, margin of a robot."""
 
     at: str
     robot_id: str
@@ -20,6 +20,7 @@ class OdometryRow(Model):
     limit_factor: float
     applied_factor: float | None
     link: str | None
+    margin_m: float | None
 
     @classmethod
     def of_record(cls, record: OdometryRecord) -> "OdometryRow":

@@ -194,7 +194,7 @@ def build(
     )
     commander = _commander(fleet.ids, ports, choices, event_log, health_monitor)
     goals = _goals(world, greenhouse, commander, ports, event_log)
-    totals = MarginTotals(world, evaluator.people), SlowTime(world, evaluator.people)
+    totals = _totals(world, evaluator.people, event_log)
     loop = RuleLoop(
         ingest,
         evaluator,
@@ -225,6 +225,14 @@ def build(
         PeerScans(world, scans, ports.fleet.publish_peer_scan, choices.boot),
         SecondWitness(world, scans, obstacles),
     )
+
+
+def _totals(
+    world: World, people: People, event_log: EventLog
+) -> tuple[MarginTotals, SlowTime]:
+    margins = MarginTotals(world, people)
+    event_log.margin_of = margins.of
+    return margins, SlowTime(world, people)
 
 
 def _ticks(

@@ -77,6 +77,7 @@ class EventLog:
         changed: Marks a topic as changed for every browser (``Hub.changed``).
         failed: Told of a part of comfort and its failure.
         lines: The newest log lines, oldest first.
+        margin_of: The newest margin of a robot (m), which its pose is kept with.
     """
 
     def __init__(
@@ -84,6 +85,7 @@ class EventLog:
     ) -> None:
         self.changed = supervision.guard("live", hub.changed)
         self.failed = supervision.failed
+        self.margin_of: Callable[[str, Instant], float | None] = lambda *_: None
         self._hub = hub
         self._sink = sink
         self._thinner = OdometryThinner()
@@ -172,6 +174,7 @@ class EventLog:
                 if robot.safety is None
                 else robot.safety.speed_factor,
                 link=link,
+                margin_m=self.margin_of(robot.robot_id, at),
             )
         )
         if record is not None:

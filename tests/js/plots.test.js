@@ -1,6 +1,7 @@
 import {
   distancesOf,
   limitsOf,
+  marginsOf,
   ringsOf,
   spanOf,
 } from "../../iveg/static/js/panels/past.js";
@@ -12,7 +13,10 @@ const T0 = Date.parse("2026-11-20T12:00:00.000Z");
 /** @param {number} s */
 const at = (s) => new Date(T0 + 1000 * s).toISOString();
 /** @param {number} s @param {number} x */
-const pose = (s, x) => ({ at: at(s), x, y: 0, linear: 0.8, limit_factor: 0.5 });
+const pose = (s, x) => ({
+  ...{ at: at(s), x, y: 0, linear: 0.8, limit_factor: 0.5 },
+  margin_m: x === 1 ? null : x - 2,
+});
 /** @param {number} s @param {number | null} x */
 const seen = (s, x) => ({ at: at(s), x, y: x === null ? null : 0 });
 /** @param {Partial<import("../../iveg/static/js/panels/past.js").Past>} differs */
@@ -61,6 +65,12 @@ test("28.6: the zone is that of somebody just seen, and grows while nobody looks
 test("28.6: a limit in m/s is told where the robot's greatest speed is known", () => {
   equal(limitsOf(past({}))[0].value, 0.4);
   equal(limitsOf(past({ fastest: null })), []);
+});
+
+test("28.6: a margin that was not known breaks its line", () => {
+  const samples = marginsOf(past({})).map((one) => ({ ...one, at: one.at - T0 }));
+  const line = { kind: "", name: "", samples, gapMs: 9000 };
+  equal(pathOf(line, place), "M0 -2h0M4000 2h0");
 });
 
 test("28.6: of what goes on for long the beginning is told, with what was before", () => {

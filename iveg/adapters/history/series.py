@@ -38,13 +38,14 @@ CONFIDENCE_BINS = 20
 
 @dataclass(frozen=True, slots=True)
 class SpeedSeries:
-    """Speed and speed limits of one robot over a range.
+    """Speed, speed limits and margin of one robot over a range.
 
     Attributes:
         at: Unix seconds, rising; the others have its length.
         linear: (m/s), mean of a slice.
         limited to: Strictest factor that iVeg limited to in a slice.
         applied: Strictest factor that the robot reported; None where it was silent.
+        margin: Least margin (m); None where it was unknown or there was none.
         slice_s: Length of a slice (s); 0 where each point is one row.
     """
 
@@ -53,6 +54,7 @@ class SpeedSeries:
     linear: tuple[float, ...]
     limit: tuple[float, ...]
     applied: tuple[float | None, ...]
+    margin: tuple[float | None, ...]
     slice_s: float = field(default=0.0, kw_only=True)
 
 
@@ -297,7 +299,7 @@ def _one(
         select(func.min(o.at), func.max(o.at), func.count()).where(*asked)
     ).one()
     if count <= most:
-        rows = (o.at, o.linear, o.limit_factor, o.applied_factor)
+        rows = (o.at, o.linear, o.limit_factor, o.applied_factor, o.margin_m)
         return SpeedSeries(robot, *_columns(connection, rows, asked))
     # One slice fewer than asked for: the last row may stand on the last edge.
     slice_s = (last - first) / (most - 1) or 1.0
@@ -307,6 +309,7 @@ def _one(
         func.avg(o.linear),
         func.min(o.limit_factor),
         func.min(o.applied_factor),
+        func.min(o.margin_m),
     )
     return SpeedSeries(
         robot, *_columns(connection, slices, asked, place), slice_s=slice_s

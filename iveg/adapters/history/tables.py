@@ -227,6 +227,7 @@ odometry = Table(
     _number("limit_factor", null=False),
     _number("applied_factor"),
     _text("link"),
+    _number("margin_m"),
     Index(None, "robot_id", "at"),
     Index(None, "at"),
     sqlite_autoincrement=True,

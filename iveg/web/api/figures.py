@@ -113,6 +113,7 @@ def _draw_charts(
         {
             **charts.library_facts(),
             "speed": Fragment(charts.speed_figure(speeds, fleet)),
+            "margin": Fragment(charts.margin_figure(speeds)),
             "detections": Fragment(charts.confidence_figure(counts, threshold)),
             "stops": Fragment(charts.stop_figure(stops)),
         }

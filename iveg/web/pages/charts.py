@@ -27,6 +27,7 @@ from iveg.adapters.history.series import (
 from iveg.domain.feedback import FULL_SPEED
 from iveg.domain.fleet import FleetDescription
 from iveg.domain.transports import TRANSPORTS
+from iveg.pipeline.record import ODOMETRY_PERIOD_S
 
 _Trace = Mapping[str, object]
 
@@ -93,6 +94,40 @@ def _shade(since: float, until: float, axis: str) -> _Trace:
         "y0": 0,
         "y1": 1,
     }
+
+
+def margin_figure(series: Sequence[SpeedSeries]) -> bytes:
+    """Least margin of each robot (m), as JSON; a gap where it was not known."""
+    traces = [
+        {
+            "type": "scatter",
+            "mode": "lines",
+            "name": one.robot_id,
+            "meta": {"kind": "margin", "robot": one.robot_id, "slice_s": one.slice_s},
+            "x": [_ms(at) for at, _ in points],
+            "y": [margin for _, margin in points],
+            "connectgaps": False,
+        }
+        for one in series
+        if (points := [*_lasting(one)])
+    ]
+    return figure_of(traces, ("time", "margin"), {})
+
+
+def _lasting(series: SpeedSeries) -> Iterator[tuple[float, float | None]]:
+    """Each known margin; the last before a gap for as long as it stands for.
+
+    A lone one would have no line.
+    """
+    lasts_s = max(ODOMETRY_PERIOD_S, series.slice_s)
+    rows = zip(series.at, series.margin, strict=True)
+    for (at, margin), (then, after) in pairwise([*rows, (float("inf"), None)]):
+        if margin is None:
+            continue
+        yield at, margin
+        if after is None or then - at > 3 * lasts_s:
+            yield min(at + lasts_s, then), margin
+            yield min(at + lasts_s, then), None
 
 
 def confidence_figure(

@@ -237,7 +237,7 @@ async def test_a_short_series_is_answered_row_by_row(
 ) -> None:
     remember(
         database_url,
-        odometry_record(at=NOON + 1, linear=0.2, limit_factor=0.5),
+        odometry_record(at=NOON + 1, linear=0.2, limit_factor=0.5, margin_m=-0.4),
         odometry_record(at=NOON, linear=0.4),
         odometry_record(at=NOON, robot_id="AGII", applied_factor=None),
         odometry_record(at=NOON + 60),
@@ -247,6 +247,7 @@ async def test_a_short_series_is_answered_row_by_row(
 
     assert (agi.robot_id, agi.at, agi.linear) == ("AGI", (NOON, NOON + 1), (0.4, 0.2))
     assert (agi.limit, agi.slice_s) == ((1.0, 0.5), 0.0)
+    assert (agi.margin, agii.margin) == ((None, -0.4), (None,))
     assert agii.applied == (None,)
     assert await queries.speed_series(NOON, NOON + 60, "AGII") == (agii,)
     assert await queries.speed_series(NOON, NOON + 60, "AGIII") == ()
@@ -256,7 +257,10 @@ async def test_a_long_series_is_thinned_and_keeps_a_short_slow_down(
     queries: Queries, database_url: str
 ) -> None:
     rows = [odometry_record(at=NOON + n / 2, linear=1.0) for n in range(5000)]
-    rows[2500] = replace(rows[2500], limit_factor=0.5, applied_factor=0.0)
+    rows[2500] = replace(
+        rows[2500], limit_factor=0.5, applied_factor=0.0, margin_m=-0.4
+    )
+    rows[2499] = replace(rows[2499], margin_m=0.1)
     remember(database_url, *rows)
 
     [series] = await queries.speed_series(NOON, NOON + 2500)
@@ -265,6 +269,7 @@ async def test_a_long_series_is_thinned_and_keeps_a_short_slow_down(
     assert list(series.at) == sorted(series.at)
     assert series.limit.count(0.5) == 1
     assert series.applied.count(0.0) == 1
+    assert [one for one in series.margin if one is not None] == [-0.4]
     assert set(series.linear) == {1.0}
     assert series.slice_s == pytest.approx(2499.5 / 1999)
 

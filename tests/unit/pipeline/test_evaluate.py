@@ -8,6 +8,7 @@ from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.detector import CLASS_NAMES
 from iveg.domain.geometry import Rectangle
 from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.margins import LeastMargins
 from iveg.domain.observations import Hold, Origin
 from iveg.domain.records import (
     AlertRecord,
@@ -572,6 +573,43 @@ def test_poses_are_written_down_twice_a_second() -> None:
         desk.drive("AGI", 0.1 * tenth)
 
     assert 19 <= len(desk.records(OdometryRecord)) <= 24
+
+
+def test_28_6_a_pose_is_kept_with_its_margin_while_that_is_measured() -> None:
+    desk = watched(Desk())
+    for tenth in range(1, 60):
+        desk.clock.now = tenth / 10
+        if tenth < 10 or tenth >= 40:
+            meet(desk, 6.0)
+        desk.drive("AGI", 0.0, linear=0.5 if tenth < 50 else 0.0)
+
+    rows = [one for one in desk.records(OdometryRecord) if one.robot_id == "AGI"]
+    start = desk.clock().wall - desk.clock.now
+
+    def kept(seconds: float) -> float | None:
+        return [one.margin_m for one in rows if one.at - start <= seconds][-1]
+
+    robot, people = desk.world.robot("AGI"), desk.evaluator.people.known.values()
+    gap_m = LeastMargins([robot], people, desk.clock()).telling()[0].gap_m
+    margin_m = kept(1.0)
+    assert margin_m is not None
+    assert 2.0 < gap_m - margin_m < 4.0
+    # Measured; nobody has looked for a second; somebody looks; the robot stands.
+    states = [kept(at) is not None for at in (1.0, 1.5, 3.0, 3.5, 4.5, 5.8)]
+    assert states == [True, True, False, False, True, False]
+
+
+def test_28_6_a_margin_that_is_computed_no_more_is_not_kept_on() -> None:
+    desk = watched(Desk())
+    meet(desk, 6.0)
+    for tenth in range(1, 12):
+        desk.clock.now = tenth / 10
+        meet(desk, 6.0)
+        desk.drive("AGI", 0.0)
+
+    margins = desk.parts.margins
+    assert margins.of("AGI", desk.clock()) is not None
+    assert margins.of("AGI", desk.clock().later(1.2)) is None
 
 
 def test_the_same_look_on_the_other_transport_is_one_sighting() -> None:

@@ -538,6 +538,7 @@ def test_13_19_each_robot_has_a_strip_whose_slow_downs_are_shaded() -> None:
         linear=(0.8, 0.4, 0.4, 0.8),
         limit=(1.0, 0.5, 0.5, 1.0),
         applied=(1.0, 0.5, 0.5, 1.0),
+        margin=(None,) * 4,
         slice_s=0.0,
     )
     free = replace(slowed, robot_id="AGII", limit=(1.0,) * 4)
@@ -553,14 +554,28 @@ def test_13_19_each_robot_has_a_strip_whose_slow_downs_are_shaded() -> None:
     assert (slow["yref"], slow["x0"], slow["x1"]) == ("y domain", 11_000.0, 13_000.0)
 
 
+def test_28_6_a_margin_is_drawn_as_long_as_it_was_measured_and_no_longer() -> None:
+    at = (0.0, 0.5, 1.0, 1.5, 9.0, 9.5)
+    margin = (2.0, 1.5, None, -0.5, 3.0, None)
+    same = (1.0,) * len(at)
+    measured = SpeedSeries("AGI", at, same, same, same, margin)
+    unknown = replace(measured, robot_id="AGII", margin=(None,) * len(at))
+
+    (line,) = orjson.loads(charts.margin_figure([measured, unknown]))["data"]
+
+    assert (line["meta"]["robot"], line["connectgaps"]) == ("AGI", False)
+    assert [*zip(line["x"], line["y"], strict=True)] == [
+        *((0.0, 2.0), (500.0, 1.5), (1000.0, 1.5), (1000.0, None)),
+        *((1500.0, -0.5), (2000.0, -0.5), (2000.0, None)),
+        *((9000.0, 3.0), (9500.0, 3.0), (9500.0, None)),
+    ]
+
+
 async def test_charts_of_nothing_are_empty_figures(client: httpx.AsyncClient) -> None:
     figures = (await client.get("/api/v1/history/charts?robot=AGI")).json()
 
-    assert [figures[name]["data"] for name in ("speed", "detections", "stops")] == [
-        [],
-        [],
-        [],
-    ]
+    names = ("speed", "margin", "detections", "stops")
+    assert [figures[name]["data"] for name in names] == [[], [], [], []]
 
 
 async def test_the_air_of_a_day_is_readings_and_figures(

@@ -11,7 +11,7 @@
  *   y: (number | null)[], meta: Record<string, any>, yaxis?: string, line?: object,
  *   marker?: object}} Trace
  * @typedef {{data: Trace[], layout: Record<string, any>}} Figure
- * @typedef {"speed" | "detections" | "stops"} ChartName
+ * @typedef {"speed" | "margin" | "detections" | "stops"} ChartName
  * @typedef {{library: string, style_ids: string[]}} Source where the library is
  * @typedef {Source & Record<ChartName, Figure>} Charts
  * @typedef {{since: number, until: number}} Span Unix milliseconds
@@ -24,7 +24,7 @@ import { fitPaper } from "./paper.js";
 import { keepInStep, placesIn, stripsOf } from "./strips.js";
 
 /** @type {readonly ChartName[]} */
-export const CHARTS = ["speed", "detections", "stops"];
+export const CHARTS = ["speed", "margin", "detections", "stops"];
 const CONFIG = { displayModeBar: false, responsive: true, displaylogo: false };
 /** Numbers only: month names would be in the library's language. */
 const TICKS = [
@@ -55,7 +55,7 @@ export async function drawCharts(charts, asked, i18n) {
   }
   if (CHARTS.every((name) => charts[name].data.length === 0)) return;
   // The library's first drawing costs as much again as a small figure.
-  for (const name of /** @type {const} */ (["stops", "detections"])) {
+  for (const name of /** @type {const} */ (["stops", "detections", "margin"])) {
     if (charts[name].data.length === 0) continue;
     await drawFigure(need(`#chart-${name}`), charts[name], charts, asked, i18n);
   }
