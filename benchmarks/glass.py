@@ -152,12 +152,12 @@ class Place:
 
 def measure(browser: Browser, side: str, robots: int, scene: str, how: How) -> Run:
     """One side, one fleet."""
-    serving = _iveg if side == "iveg" else _relay
+    serving = iveg_side if side == "iveg" else _relay
     seconds = how.seconds
     with (
         tempfile.TemporaryDirectory() as directory,
         serving(Path(directory), robots, how.direct) as place,
-        _fleet(place, robots, scene, how.hz),
+        talking_fleet(place, robots, scene, how.hz),
         _readers(place, how.elsewhere),
     ):
         context = browser.new_context(viewport={"width": 1280, "height": 900})
@@ -169,13 +169,13 @@ def measure(browser: Browser, side: str, robots: int, scene: str, how: How) -> R
         page.wait_for_timeout(1000 * WARM_UP_S)
         tools = context.new_cdp_session(page)
         tools.send("Performance.enable")
-        before = _spent(place.servers), _spent(place.fiware), _busy_s(tools)
+        before = spent(place.servers), spent(place.fiware), _busy_s(tools)
         page.evaluate(WATCH)
         page.wait_for_timeout(1000 * seconds)
         painted = page.evaluate("() => window.painted")
-        after = _spent(place.servers), _spent(place.fiware), _busy_s(tools)
+        after = spent(place.servers), spent(place.fiware), _busy_s(tools)
         context.close()
-    spent = [now - then for now, then in zip(after, before, strict=True)]
+    took = [now - then for now, then in zip(after, before, strict=True)]
     sent = how.hz * SENSORS * robots * seconds
     return Run(
         side,
@@ -183,9 +183,9 @@ def measure(browser: Browser, side: str, robots: int, scene: str, how: How) -> R
         scene,
         [now - stamp for _, stamp, now in painted],
         late_share(painted, robots, how),
-        1000.0 * spent[0] / sent,
-        1000.0 * spent[1] / sent,
-        1000.0 * spent[2] / seconds,
+        1000.0 * took[0] / sent,
+        1000.0 * took[1] / sent,
+        1000.0 * took[2] / seconds,
         os.getloadavg()[0],
     )
 
@@ -205,8 +205,12 @@ def late_share(
 
 
 @contextmanager
-def _iveg(directory: Path, robots: int, direct: str) -> Iterator[Place]:
+def iveg_side(
+    directory: Path, robots: int, direct: str = "all", recordings: str = "off"
+) -> Iterator[Place]:
+    """A running iVeg for a fleet of so many robots."""
     settings = {
+        "IVEG_RECORDINGS": recordings,
         "IVEG_ROBOTS": ",".join(names(robots)),
         "IVEG_GREENHOUSE": "none",
         "IVEG_APIKEY": APIKEY,
@@ -216,12 +220,13 @@ def _iveg(directory: Path, robots: int, direct: str) -> Iterator[Place]:
         demo = there.start("demo", "--no-emulator")
         there.wait_until_whole()
         parts = children_of(demo.pid)
-        fiware = [one for one in parts if "fiware" in _words_of(one)]
+        fiware = [one for one in parts if "fiware" in words_of(one)]
         serve = [one for one in parts if one not in fiware]
         yield Place(there.sign_in_link, _mqtt_port(there), serve, fiware)
 
 
-def _words_of(pid: int) -> list[str]:
+def words_of(pid: int) -> list[str]:
+    """The command line of a process."""
     return Path(f"/proc/{pid}/cmdline").read_text().split("\0")
 
 
@@ -247,7 +252,8 @@ def _relay(directory: Path, _: int, __: str) -> Iterator[Place]:
 
 
 @contextmanager
-def _fleet(place: Place, robots: int, scene: str, hz: float) -> Iterator[None]:
+def talking_fleet(place: Place, robots: int, scene: str, hz: float) -> Iterator[None]:
+    """Robots that talk to a side."""
     words = ["--port", str(place.mqtt), "--robots", str(robots), "--hz", str(hz)]
     words += ["--apikey", APIKEY, "--scene", scene]
     with _program([sys.executable, "-m", "tests.fleet", *words]):
@@ -281,7 +287,8 @@ def _answers(link: str) -> bool:
         return probe.connect_ex((address.hostname or "", address.port or 0)) == 0
 
 
-def _spent(pids: Sequence[int]) -> float:
+def spent(pids: Sequence[int]) -> float:
+    """Their processor time since their start (s)."""
     return sum(Usage.of(one).cpu_s for one in pids)
 
 

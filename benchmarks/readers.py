@@ -11,6 +11,7 @@ A reader asks for ``iveg.2``; a server without it, such as the relay, tells all 
 import argparse
 import asyncio
 import time
+from collections.abc import Callable
 from http.client import HTTPConnection
 from typing import Final
 from urllib.parse import urlsplit
@@ -27,7 +28,7 @@ LEAD_S: Final = 0.005
 """Before the next frame of the screen, to be in it."""
 
 
-async def look(link: str) -> None:
+async def look(link: str, page_on: "Callable[[ClientConnection], Reader]") -> None:
     """One page, until it is closed."""
     address, cookie = sign_in(link)
     headers = {"Cookie": cookie} if cookie else {}
@@ -39,7 +40,7 @@ async def look(link: str) -> None:
         compression=None,
         max_size=None,
     ) as line:
-        page = Reader(line)
+        page = page_on(line)
         painting = asyncio.create_task(page.paint())
         try:
             async for message in line:
@@ -103,7 +104,7 @@ def sign_in(link: str) -> tuple[str, str]:
 async def _look_all(link: str, pages: int) -> None:
     async with asyncio.TaskGroup() as tasks:
         for _ in range(pages):
-            tasks.create_task(look(link))
+            tasks.create_task(look(link, Reader))
 
 
 def main() -> None:

@@ -1,108 +1,141 @@
-"""CPU that recording costs, and the room that it takes.
+"""What recording costs: CPU of the server and of the process that writes, and room.
 
-    python -m benchmarks.recording_cost --robots 10 --seconds 20
+    python -m benchmarks.recording_cost --robots 10 --seconds 20 --rounds 3
 
-Each robot sends odometry, 720 ranges and four boxes at 30 Hz, and each pose comes a
-second time in a notification.  The loop's share and the thread's are told apart, as
-shares of one core.
+A real server with a reader of its page, and a fleet that talks at 30 Hz in a storm: no
+two looks are alike.  With and without recordings in turns; an age is that of a robot's
+odometry when the frame with it came to the reader.
 """
 
 import argparse
 import asyncio
+import itertools
 import tempfile
 import time
+from collections.abc import Sequence
+from dataclasses import astuple, dataclass
+from datetime import datetime
 from pathlib import Path
+from statistics import median
 
-import numpy as np
+import orjson
+from websockets.asyncio.client import ClientConnection
 
-from iveg.adapters.recordings.directory import RecordingDirectory
-from iveg.adapters.recordings.recorder import WRITE_S, InputRecorder
-from iveg.domain.observations import Instant, Received
-from iveg.domain.recordings import RecordingLimits
-from iveg.domain.transports import DIRECT
-from iveg.ngsi import codec
-from tests.builders import (
-    detection,
-    detection_frame,
-    notification,
-    odometry,
-    origin,
-    pose_value,
-    scan,
+from benchmarks.glass import (
+    WARM_UP_S,
+    Place,
+    iveg_side,
+    spent,
+    talking_fleet,
+    words_of,
 )
+from benchmarks.process import machine, percentile, print_table
+from benchmarks.readers import Reader, look
+from tests.processes import children_of
 
-HZ = 30
-
-
-class Load:
-    """Messages of robots as they come in one display frame."""
-
-    def __init__(self, robots: int) -> None:
-        self._robots = [f"R{n:02d}" for n in range(1, robots + 1)]
-        self._noise = np.random.default_rng(7)
-
-    def frame(self, recorder: InputRecorder, seq: int, at: Instant) -> float:
-        """Hand over one message of each kind and robot; the loop's CPU (s)."""
-        spent = 0.0
-        for robot_id in self._robots:
-            who = origin(seq)
-            x, y = self._noise.normal(5.0, 2.0, 2).tolist()
-            ranges = self._noise.uniform(0.5, 20.0, 720)
-            seen = [detection(x=x + n, y=y, probability=0.9) for n in range(4)]
-            observed = (
-                odometry(robot_id, x, y, origin=who),
-                scan(robot_id, ranges, origin=who),
-                detection_frame(robot_id, *seen, origin=who),
-            )
-            payloads = (
-                codec.write_odometry(observed[0]),
-                codec.write_scan(observed[1]),
-                codec.write_detections(observed[2]),
-            )
-            body = notification({"base_pose_ground_truth": pose_value(x, y, seq=seq)})
-            began = time.thread_time()
-            for one, payload in zip(observed, payloads, strict=True):
-                topic = f"/iveg/{robot_id}_{type(one).__name__}/attrs"
-                recorder.measure(topic, payload, at, one is observed[1])
-                recorder.observed(Received(one, at, DIRECT.id))
-            recorder.notification(body, at, None)
-            spent += time.thread_time() - began
-        return spent
+HZ = 30.0
+WRITER = "iveg.adapters.recordings.writer"
+HEAD = ("recordings", "P95 ms", "server", "writer", "MB/robot-h")
 
 
-async def measure(robots: int, seconds: int, folder: Path) -> None:
-    """Print the shares, and bytes of a robot in an hour."""
-    began = Instant(time.monotonic(), time.time())
-    now = [began]
-    recorder = InputRecorder(
-        RecordingDirectory(folder), RecordingLimits(), lambda: now[0]
+@dataclass(frozen=True, slots=True)
+class Run:
+    """One turn; CPU as a share of one core.
+
+    Attributes:
+        p95_ms: Age of odometry in the reader.
+        robot_hour_mb: Of recordings, for one robot and hour.
+    """
+
+    p95_ms: float
+    server: float
+    writer: float
+    robot_hour_mb: float
+
+
+def measure(robots: int, seconds: float, scene: str, recordings: str) -> Run:
+    """One turn with ``recordings`` on or off."""
+    with (
+        tempfile.TemporaryDirectory() as name,
+        iveg_side(Path(name), robots, recordings=recordings) as place,
+        talking_fleet(place, robots, scene, HZ),
+    ):
+        folder = Path(name) / "recordings"
+        return asyncio.run(_look(place, robots, seconds, folder))
+
+
+class Aging(Reader):
+    """Notes how old each odometry is when it comes."""
+
+    def __init__(self, line: ClientConnection) -> None:
+        super().__init__(line)
+        self.ages_s: list[float] = []
+
+    def take(self, message: str | bytes) -> None:
+        """One frame of telemetry."""
+        super().take(message)
+        if isinstance(message, bytes):
+            now, ends = time.time(), 4 + int.from_bytes(message[:4], "little")
+            for move in orjson.loads(message[4:ends])["moves"]:
+                stamp = datetime.fromisoformat(move[-1])
+                self.ages_s.append(now - stamp.timestamp())
+
+
+async def _look(place: Place, robots: int, seconds: float, folder: Path) -> Run:
+    pages: list[Aging] = []
+
+    def page_on(line: ClientConnection) -> Aging:
+        pages.append(Aging(line))
+        return pages[-1]
+
+    looking = asyncio.create_task(look(place.link, page_on))
+    await asyncio.sleep(WARM_UP_S)
+    (page,) = pages
+    (server,) = (one for one in place.servers if "serve" in words_of(one))
+    writers = [one for one in children_of(server) if WRITER in words_of(one)]
+    before = spent([server]), spent(writers), _size(folder)
+    page.ages_s.clear()
+    await asyncio.sleep(seconds)
+    ages = sorted(page.ages_s)
+    after = spent([server]), spent(writers), _size(folder)
+    looking.cancel()
+    await asyncio.gather(looking, return_exceptions=True)
+    cpu_s, writer_s, size = (
+        now - then for now, then in zip(after, before, strict=True)
     )
-    load, loop_s, thread_s = Load(robots), 0.0, 0.0
-    batch = round(HZ * WRITE_S)
-    for first in range(0, HZ * seconds, batch):
-        for seq in range(first, first + batch):
-            now[0] = began.later(seq / HZ)
-            loop_s += load.frame(recorder, seq, now[0])
-        process, own = time.process_time(), time.thread_time()
-        await recorder.write()
-        thread_s += time.process_time() - process - (time.thread_time() - own)
-    await recorder.close()
-    size = sum(one.size for one in RecordingDirectory(folder).files())
-    print(
-        f"{robots} robots: loop {100 * loop_s / seconds:.2f} % of a core, "
-        f"thread {100 * thread_s / seconds:.2f} %, "
-        f"{size / robots / seconds * 3600 / 1e6:.0f} MB a robot and hour"
-    )
+    hours = robots * seconds / 3600.0
+    p95_ms = 1000.0 * percentile(ages, 0.95)
+    return Run(p95_ms, cpu_s / seconds, writer_s / seconds, size / hours / 1e6)
+
+
+def _size(folder: Path) -> int:
+    return sum(one.stat().st_size for one in folder.glob("*.mcap*"))
 
 
 def main() -> None:
-    """Run it."""
+    """Measure what the command line asks for."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--robots", type=int, default=10)
-    parser.add_argument("--seconds", type=int, default=20)
+    parser.add_argument("--seconds", type=float, default=20.0)
+    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--scenes", default="calm,storm")
     asked = parser.parse_args()
-    with tempfile.TemporaryDirectory() as folder:
-        asyncio.run(measure(asked.robots, asked.seconds, Path(folder)))
+    for scene in asked.scenes.split(","):
+        runs: dict[str, list[Run]] = {"off": [], "on": []}
+        for _, side in itertools.product(range(asked.rounds), runs):
+            run = measure(asked.robots, asked.seconds, scene, side)
+            runs[side].append(run)
+        off, on = (_median(told) for told in runs.values())
+        ratios = [b / a if a else 0.0 for a, b in zip(off, on, strict=True)]
+        table = {"off": off, "on": on, "ratio": ratios}
+        cells = [
+            [side, *(f"{one:.2f}" for one in told)] for side, told in table.items()
+        ]
+        print_table(f"{scene}, {asked.robots} robots; {machine()}", HEAD, cells)
+
+
+def _median(runs: Sequence[Run]) -> list[float]:
+    return [median(values) for values in zip(*map(astuple, runs), strict=True)]
 
 
 if __name__ == "__main__":

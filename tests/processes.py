@@ -117,6 +117,7 @@ class Site:
             "IVEG_DATABASE_URL": f"sqlite:///{self.directory / 'history.sqlite'}",
             "IVEG_SIGN_IN_TOKEN": secrets.token_hex(16),
             "IVEG_API_TOKEN": secrets.token_urlsafe(24),
+            "IVEG_RECORDINGS": "off",
             "XDG_DATA_HOME": str(self.directory),
             **self.settings,
         }

@@ -117,6 +117,13 @@ class DirectReader:
         """Topics and their QoS."""
         return {topic: source.qos for topic, source in self._sources.items()}
 
+    def stream(self, topic: str) -> tuple[str, type[Observation]] | None:
+        """The robot and the one kind of what comes on a topic, if it is one."""
+        source = self._sources.get(topic)
+        if source is None or source.kind is None:
+            return None
+        return source.robot_id, source.kind
+
     def pass_over(self, topic: str, count: int) -> None:
         """So many messages of a topic came and were overtaken before they were read."""
         source = self._sources.get(topic)

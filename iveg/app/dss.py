@@ -105,6 +105,7 @@ class Dss:
         choices = Choices(kept.rules[-1], drills, self._boot, era, tiles)
         greenhouse = load_greenhouse(settings.greenhouse)
         self.pipeline = build(fleet, greenhouse, self._ports(), choices)
+        self.stores.inputs.rule = lambda: self.pipeline.evaluator.rule
         self.services = build_services(self.pipeline, kept, self._senders(), clock.now)
         self.upkeep = HistoryUpkeep(
             self.stores.retained(),
@@ -136,7 +137,6 @@ class Dss:
             clock.now,
             new_id,
             self.stores.history_state,
-            self.stores.inputs.observed,
             self.stores.inputs.tick,
         )
 

@@ -15,8 +15,8 @@ from iveg.adapters.journal import FileJournal
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.adapters.orion import OrionClient
 from iveg.adapters.outbound import OutboundHttp
-from iveg.adapters.recordings.directory import RecordingDirectory
 from iveg.adapters.recordings.recorder import InputRecorder
+from iveg.adapters.recordings.writer import WriterSetup
 from iveg.adapters.rules import FileRules
 from iveg.adapters.sessions import FileSessions
 from iveg.domain.detection_rule import DetectionRule
@@ -110,7 +110,7 @@ def open_outside(
         settings.mqtt_url, settings.mqtt_user, settings.mqtt_password
     )
     return Outside(
-        open_stores(settings, data_directory),
+        open_stores(settings, data_directory, fleet),
         MqttLink(broker, "iveg", apart_s=reading_apart_s(len(fleet.ids))),
         OrionClient(settings.orion_url, *tenant),
         IotAgentClient(settings.iota_url, *tenant),
@@ -118,7 +118,9 @@ def open_outside(
     )
 
 
-def open_stores(settings: Settings, data_directory: Path) -> Stores:
+def open_stores(
+    settings: Settings, data_directory: Path, fleet: FleetDescription
+) -> Stores:
     """Open the stores; a missing directory is created."""
     url = history_url(settings.database_url, data_directory)
     database = sqlite_file(url)
@@ -134,8 +136,12 @@ def open_stores(settings: Settings, data_directory: Path) -> Stores:
         FileDetectors(directory / "detectors.jsonl"),
         FileSessions(directory / "sessions.jsonl"),
         InputRecorder(
-            RecordingDirectory(directory / "recordings"),
-            settings.recording_limits,
+            WriterSetup(
+                (directory / "recordings").resolve(),
+                settings.recording_limits,
+                settings.apikey,
+                fleet.ids,
+            ),
             clock.now,
             is_on=settings.recordings,
         ),

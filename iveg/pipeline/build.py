@@ -12,7 +12,7 @@ from iveg.domain.fleet import FleetDescription
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.latency.watch import LatencyWatch
 from iveg.domain.messages import Channel, Contacts
-from iveg.domain.observations import Instant, Received
+from iveg.domain.observations import Instant
 from iveg.domain.rule.obstacles import Obstacles
 from iveg.domain.stop.drills import Drills
 from iveg.domain.tracking.people import People
@@ -68,8 +68,7 @@ class Ports:
         clock: Reads both clocks.
         new_id: A new id, sortable by time.
         history_state: State of the history.
-        arrived: Comfort that records: called with each copy of a message of the fleet;
-            ``ticked`` with each tick.
+        ticked: Comfort that records: called with each tick.
     """
 
     fleet: FleetPort
@@ -79,7 +78,6 @@ class Ports:
     clock: Callable[[], Instant]
     new_id: Callable[[], str]
     history_state: Callable[[], HopState] = lambda: "ok"
-    arrived: Callable[[Received], None] = lambda _: None
     ticked: Callable[[Instant], None] = lambda _: None
 
 
@@ -303,17 +301,12 @@ def _ingest(
     watch: LatencyWatch,
 ) -> Ingest:
     note_latency = supervision.guard("latency", watch.arrived)
-    record = supervision.guard("recordings", ports.arrived)
 
     def log_rejected(source: str, reason: str) -> None:
         slots = {"source": source, "reason": reason}
         event_log.log(LogEvent("system", "log.rejected", slots), ports.clock())
 
-    def passed(received: Received) -> None:
-        note_latency(received)
-        record(received)
-
-    return Ingest(world.robots.__contains__, log_rejected, world.is_past, passed)
+    return Ingest(world.robots.__contains__, log_rejected, world.is_past, note_latency)
 
 
 def build_services(

@@ -4,28 +4,23 @@ Hundreds come in a second, so this is plain ASGI beside the layers that pages ne
 its own limit and secret.  Refusals look like those of the rest of the application.
 """
 
-from collections.abc import Callable, Container, Mapping
+from collections.abc import Callable, Container, Mapping, Sequence
 from typing import Final
 
 from starlette.routing import Route
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from iveg.domain.errors import UnreadableError
-from iveg.domain.observations import (
-    EntityReading,
-    Instant,
-    LaserScan,
-    Received,
-    kind_of,
-)
+from iveg.domain.observations import EntityReading, Instant, Observation, Received
 from iveg.domain.transports import FIWARE
-from iveg.ngsi.codec import UNREAD, ReadResult, read_notification
+from iveg.ngsi.codec import UNREAD, read_notification
 from iveg.pipeline.ingest import Ingest
 from iveg.pipeline.ports import Clock
 from iveg.web.problems import Problem, problem_of
 from iveg.web.security.authentication import Action, NotifySecret
 from iveg.web.security.headers import MAX_BODY, NOTIFICATIONS_PATH, TOO_LONG
 
+Recorded = Callable[[bytes, Instant, str, Sequence[Observation]], None]
 _TAKEN = (
     {"type": "http.response.start", "status": 204, "headers": []},
     {"type": "http.response.body", "body": b""},
@@ -46,8 +41,8 @@ class NotificationEndpoint:
         is_thinned: Whether Orion leaves out most of what a subscription is about.
         equipment: Id and type of the entities that ``measured`` is told of.
         measured: Told of other equipment; must neither wait nor fail.
-        recorded: Told of each body that is read, and of the subscription where it
-            holds scans alone; likewise.
+        recorded: Told of each body that is read, its subscription and what is observed
+            in it; likewise.
         is_former: Whether a secret may be that of our own earlier start.
     """
 
@@ -65,7 +60,7 @@ class NotificationEndpoint:
         is_thinned: Callable[[str], bool],
         equipment: Container[tuple[str, str]] = frozenset(),
         measured: Callable[[EntityReading, Instant], None] = lambda *_: None,
-        recorded: Callable[[bytes, Instant, str | None], None] = lambda *_: None,
+        recorded: Recorded = lambda *_: None,
         is_former: Callable[[str], bool] = lambda _: False,
     ) -> None:
         self._ingest = ingest
@@ -162,7 +157,7 @@ class NotificationEndpoint:
             self._ingest.reject(subscription_id, "unknown_subscription")
             return None
         self._heard(at)
-        self._recorded(body, at, subscription_id if _is_scans(reading) else None)
+        self._recorded(body, at, subscription_id, reading.observations)
         for problem in reading.problems:
             self._ingest.reject(problem.source, problem.reason, problem.detail)
         for told in reading.equipment:
@@ -193,12 +188,6 @@ class NotificationsFirst:
             await self._endpoint(scope, receive, send)
         else:
             await self._app(scope, receive, send)
-
-
-def _is_scans(reading: ReadResult) -> bool:
-    """Whether it is of scans alone."""
-    observations = reading.observations
-    return bool(observations) and all(kind_of(one) is LaserScan for one in observations)
 
 
 def _secret_of(headers: Mapping[bytes, bytes]) -> str:

@@ -14,7 +14,7 @@ pytestmark = pytest.mark.e2e
 
 @pytest.fixture(scope="module")
 def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
-    with site(tmp_path_factory.mktemp("demo")) as found:
+    with site(tmp_path_factory.mktemp("demo"), IVEG_RECORDINGS="on") as found:
         found.start("demo")
         found.wait_until_live(deadline_s=60.0)
         yield found

@@ -1,9 +1,14 @@
-"""Recordings that lie in a folder, without a thread that writes them."""
+"""Recordings without a process of their own: in a folder, and written in place."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from iveg.adapters.disk import disk_space
 from iveg.adapters.recordings.directory import RecordingDirectory
+from iveg.adapters.recordings.incoming import Unpacking
+from iveg.adapters.recordings.recorder import InputRecorder
+from iveg.adapters.recordings.writer import RecordingWriter, WriterSetup
+from iveg.domain.disk_space import DiskSpace
 from iveg.domain.recordings import RecordingFile
 
 
@@ -18,3 +23,22 @@ class FakeRecordings:
 
     async def finished(self, name: str) -> Path | None:
         return self.directory.finished(name)
+
+
+class WriterInPlace:
+    """Writes what a recorder packs, in the caller's own process and time."""
+
+    def __init__(
+        self,
+        setup: WriterSetup,
+        read_space: Callable[[Path], DiskSpace] = disk_space,
+    ) -> None:
+        self.writer = RecordingWriter(setup, read_space)
+        self._unpacking = Unpacking()
+
+    def write(self, recorder: InputRecorder, now: float) -> None:
+        """Write what waits; ``now`` is monotonic (s)."""
+        for piece in recorder.take_waiting():
+            for came in self._unpacking.feed(piece):
+                self.writer.take(came)
+        self.writer.keep_house(now)

@@ -1,19 +1,31 @@
-"""A decision in force is told, and what a kill leaves open is closed.
+"""A decision in force is told, what a kill leaves open is closed, all is recorded.
 
 That nearly every slow-down carries every link is proven on the virtual clock, in
 ``tests/unit/lab/emulator/test_scenarios.py``.
 """
 
+from collections import Counter
+from collections.abc import Iterator
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import httpx
 import pytest
+from mcap.reader import make_reader
 
-from tests.processes import Site, until
+from tests.processes import Site, site, until
 
 LINKS = ["detection", "filter", "geometry", "rule", "feedback", "applied", "observed"]
 WATCHED_S = 90.0
+MEASURES = ("_odom", "_lidar2D", "_yolox_bounding_boxes", "_safety", "_nav")
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Iterator[Site]:
+    """One that records."""
+    with site(tmp_path, IVEG_RECORDINGS="on") as found:
+        yield found
 
 
 def limiting_decision(api: httpx.Client) -> str | None:
@@ -82,6 +94,13 @@ def test_an_open_decision_has_verdicts_and_a_kill_leaves_it_open_only_until_the_
         )
     assert list(verdicts) == LINKS
     assert (verdicts["geometry"], verdicts["rule"]) == ("ok", "ok")
+    with driving.api() as api:
+        api.post("robots/AGI/stop", json={}).raise_for_status()
+        until(
+            lambda: api.get("robots/AGI").json()["stop"]["state"] == "STANDING",
+            30.0,
+            "AGI stands",
+        )
     serving = next(one for one in driving.programs if one.words[0] == "serve")
     serving.kill()
     driving.start("serve")
@@ -90,6 +109,30 @@ def test_an_open_decision_has_verdicts_and_a_kill_leaves_it_open_only_until_the_
     with driving.api() as api:
         told = until(lambda: closed(api, left), 30.0, "the row to be closed")
     assert "open" not in links_of(told).values()
+    folder = driving.directory / "recordings"
+    (path,) = until(lambda: [*folder.glob("*.mcap")], 30.0, "its recording")
+    everything_is_recorded(path)
+
+
+def everything_is_recorded(path: Path) -> None:
+    """By the public library alone: what a fleet says, twice, and what became of it."""
+    told: Counter[str] = Counter()
+    moments: dict[str, list[int]] = {}
+    with path.open("rb") as stream:
+        for _, channel, message in make_reader(stream).iter_messages():
+            told[channel.topic] += 1
+            moments.setdefault(channel.topic, []).append(message.log_time)
+    measures = {f"/iveg/AGI{one}/attrs" for one in MEASURES}
+    rows = {f"/iveg/{one}" for one in ("decision", "command", "commandevent", "log")}
+    ways = {"/iveg/AGI/cmdexe", "/AGI/iveg/safety", "/ngsi/notifications"}
+    kept = {"/iveg/ticks", "/iveg/rule", *measures, *rows, *ways}
+    drawn = {"/tf", *(f"/AGI/{one}" for one in ("pose", "scan", "detections"))}
+    assert kept | drawn <= set(told)
+    assert told["/iveg/rule"] == 1
+    scans = moments["/iveg/AGI_lidar2D/attrs"]
+    assert len(scans) <= 1 + (scans[-1] - scans[0]) / 0.19e9
+    ticks = moments["/iveg/ticks"]
+    assert len(ticks) > 8 * (ticks[-1] - ticks[0]) / 1e9
 
 
 def closed(api: httpx.Client, decision_id: str) -> dict[str, Any] | None:

@@ -61,6 +61,10 @@ class RecordingDirectory:
             found.append(RecordingFile(name, status.st_size, is_open, status.st_mtime))
         return found
 
+    def has_finished(self) -> bool:
+        """Whether any is finished."""
+        return any(not one.is_open for one in self.files())
+
     def prune(self, limits: RecordingLimits) -> int:
         """Delete what is over the limits; how many files."""
         gone = superfluous(self.files(), limits)
@@ -103,5 +107,7 @@ def finish_broken(path: Path) -> None:
         # Not even its beginning was on the disk.
         _log.info("%s", error)
     except OSError as error:
+        # A disk that is full needs the room.
+        rescued.unlink(missing_ok=True)
         raise HopError("disk", error.strerror or str(error)) from error
     path.unlink()

@@ -1,64 +1,45 @@
-"""Records what comes in, off the path of everything else: one queue, one thread.
+"""Records what comes in, off the path of everything else: one queue, one process.
 
-The loop appends to the queue and no more.  Four times a second the thread writes what
-waits; every two seconds it ends a chunk, so that a crash costs no more than that.  What
-does not fit into the queue is not recorded, and counted.
+The loop packs each input and no more.  Four times a second what waits goes to the
+process that writes (``writer.py``), in pieces that its pipe takes; who waits for the
+pipe is a task of its own.  What does not fit into the queue is not recorded, and
+counted; so is what a process that ended had not kept yet.
 """
 
 import asyncio
-import contextlib
+import logging
 from collections import Counter
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
+import orjson
+
 from iveg.adapters.recordings.directory import RecordingDirectory, finish_broken
 from iveg.adapters.recordings.excerpt import write_excerpt
-from iveg.adapters.recordings.incoming import (
-    NOTIFICATIONS,
-    Drawn,
-    Incoming,
-    Raw,
-    Row,
-    Tick,
-    measure,
-)
-from iveg.adapters.recordings.mcap_file import McapFile
+from iveg.adapters.recordings.incoming import Sort, pack
+from iveg.adapters.recordings.writer import PRUNE_S, WriterSetup
+from iveg.adapters.recordings.writer_process import WriterProcess
 from iveg.adapters.worker import Worker
+from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import HopError
-from iveg.domain.observations import (
-    DetectionFrame,
-    Instant,
-    LaserScan,
-    Observation,
-    Odometry,
-    Received,
-    UnreadScan,
-    kind_of,
-)
-from iveg.domain.recordings import RecordingFile, RecordingLimits
+from iveg.domain.observations import Instant, LaserScan, Observation, kind_of
+from iveg.domain.recordings import RecordingFile
 from iveg.domain.records import Record, is_telemetry
 from iveg.pipeline.ports import Clock
 from iveg.pipeline.record import RecordSink
 
+_log = logging.getLogger(__name__)
 _T = TypeVar("_T")
 PART = "recordings"
 MOST_WAITING, MOST_BYTES = 20_000, 32 * 10**6
-WRITE_S, SETTLE_S, PRUNE_S = 0.25, 2.0, 60.0
+WRITE_S = 0.25
 RESCUE_S = 1800.0
-DRAWN_APART_S: dict[type[Observation], float] = {
-    Odometry: 0.1,
-    LaserScan: 0.2,
-    DetectionFrame: 0.2,
-}
-"""What viewers draw, and the least time between two of a robot (s)."""
+QUIET_S = 60.0
+"""What is dropped is told again where nothing was for so long (s)."""
 SCANS_APART_S = 0.19
 """The least time between two scans of a topic, byte for byte (s): five a second."""
-_EARLY = 0.95
-_DRAWN = Odometry | LaserScan | UnreadScan | DetectionFrame
-_HOUR_S = 3600.0
 
 
 class RecordedSink:
@@ -81,121 +62,166 @@ class InputRecorder:
     """Records what comes in; its methods are called in the loop and never wait.
 
     Args:
-        directory: Of the recordings.
-        limits: How much of them is kept.
-        clock: For the time of rows, and of what has to be done.
+        setup: Of the process that writes.
+        clock: For the time of rows.
         is_on: Whether anything is recorded; what there is, is kept in bounds anyway.
 
     Attributes:
-        counters: Messages ``recordings_written``, and inputs ``recordings_dropped``
-            for want of room.
+        counters: Inputs ``recordings_written``, and ``recordings_dropped`` for want of
+            room, or because the process ended before they were kept.
+        rule: Tells the rule in force, of which each version is recorded.
     """
 
-    def __init__(
-        self,
-        directory: RecordingDirectory,
-        limits: RecordingLimits,
-        clock: Clock,
-        *,
-        is_on: bool = True,
-    ) -> None:
+    def __init__(self, setup: WriterSetup, clock: Clock, *, is_on: bool = True) -> None:
         self.counters: Counter[str] = Counter()
-        self._directory, self._limits = directory, limits
-        self._clock, self._is_on = clock, is_on
+        self.rule: Callable[[], DetectionRule | None] = lambda: None
+        self._setup, self._clock, self._is_on = setup, clock, is_on
+        self._directory = RecordingDirectory(setup.folder)
         # What a crash left takes minutes: not in this process.
         self._apart = Worker(limit_s=RESCUE_S)
-        self._thread = ThreadPoolExecutor(1, PART)
-        self._waiting: list[Incoming] = []
+        self._waiting: list[bytes] = []
         self._bytes = 0
-        self._due: dict[tuple[str, object], float] = {}
-        self._file: McapFile | None = None
-        self._settled_at = self._pruned_at = float("-inf")
+        self._dropped_at = float("-inf")
+        self._due: dict[str, float] = {}
+        self._told_rule: DetectionRule | None = None
+        self._writer: WriterProcess | None = None
 
     # --- what comes in ------------------------------------------------------------
 
     def measure(self, topic: str, payload: bytes, at: Instant, is_scan: bool) -> None:
         """A robot's own message, read from the broker."""
-        if not self._is_on:
-            return
-        if not is_scan or self._is_due(topic, None, SCANS_APART_S, at):
-            self._queue(Raw(measure(topic), at, payload), len(payload))
+        if self._is_on and (not is_scan or self._is_due(topic, at)):
+            self._queue(pack(Sort.MEASURE, at, topic, payload))
 
-    def notification(self, body: bytes, at: Instant, subject: str | None) -> None:
-        """A notification of Orion's; ``subject``: the subscription of one of scans."""
+    def notification(
+        self, body: bytes, at: Instant, subject: str, observed: Sequence[Observation]
+    ) -> None:
+        """A notification of Orion's, its subscription, and what was read in it."""
         if not self._is_on:
             return
-        if subject is None or self._is_due(subject, None, SCANS_APART_S, at):
-            self._queue(Raw(NOTIFICATIONS, at, body), len(body))
-
-    def observed(self, received: Received) -> None:
-        """An observation of a robot, in whichever copy."""
-        if not self._is_on:
-            return
-        observation = received.observation
-        apart_s = DRAWN_APART_S.get(kind_of(observation))
-        if apart_s is None or not isinstance(observation, _DRAWN):
-            return
-        robot_id, kind = observation.robot_id, kind_of(observation)
-        if self._is_due(robot_id, kind, apart_s * _EARLY, received.at):
-            self._queue(Drawn(received), 0)
+        if not _is_scans(observed) or self._is_due(subject, at):
+            self._queue(pack(Sort.NOTIFICATION, at, "", body))
 
     def row(self, record: Record) -> None:
         """A row of the history; telemetry is here already, as it came."""
         if self._is_on and not is_telemetry(record):
-            self._queue(Row(record, self._clock()), 0)
+            self._write_down(record, type(record).__name__.removesuffix("Record"))
 
     def tick(self, at: Instant) -> None:
         """The loop lets time pass."""
-        if self._is_on:
-            self._queue(Tick(at), 0)
+        if not self._is_on:
+            return
+        rule = self.rule()
+        if rule is not None and rule is not self._told_rule:
+            self._told_rule = rule
+            self._write_down(rule, "Rule")
+        self._queue(pack(Sort.TICK, at))
 
-    def _is_due(self, of: str, kind: object, apart_s: float, at: Instant) -> bool:
-        if at.mono < self._due.get((of, kind), float("-inf")):
+    def _write_down(self, row: Record | DetectionRule, name: str) -> None:
+        payload = orjson.dumps(row, default=dict, option=orjson.OPT_SERIALIZE_NUMPY)
+        self._queue(pack(Sort.ROW, self._clock(), name, payload))
+
+    def _is_due(self, stream: str, at: Instant) -> bool:
+        if at.mono < self._due.get(stream, float("-inf")):
             return False
-        self._due[of, kind] = at.mono + apart_s
+        self._due[stream] = at.mono + SCANS_APART_S
         return True
 
-    def _queue(self, incoming: Incoming, size: int) -> None:
-        if len(self._waiting) >= MOST_WAITING or self._bytes + size > MOST_BYTES:
-            self.counters["recordings_dropped"] += 1
+    def _queue(self, packed: bytes) -> None:
+        is_full = len(self._waiting) >= MOST_WAITING
+        if is_full or self._bytes + len(packed) > MOST_BYTES:
+            self._drop()
             return
-        self._waiting.append(incoming)
-        self._bytes += size
+        self._waiting.append(packed)
+        self._bytes += len(packed)
 
-    # --- the thread ---------------------------------------------------------------
+    def _drop(self) -> None:
+        self.counters["recordings_dropped"] += 1
+        now = self._clock().mono
+        if now - self._dropped_at >= QUIET_S:
+            _log.warning("not everything that comes in is recorded: the disk is slow")
+        self._dropped_at = now
+
+    # --- the process that writes --------------------------------------------------
 
     async def run(self) -> None:
-        """Until cancelled; what waits then is still written."""
-        left = self._directory.left_open()
+        """Until cancelled; ``close`` still writes what waits then.
+
+        Raises:
+            HopError: the process ended, or the disk refuses.
+        """
+        left = await _in_thread(self._directory.left_open)
         rescue = asyncio.create_task(self._rescue(left), name="recordings-rescue")
         try:
-            while True:
-                await asyncio.sleep(WRITE_S if self._is_on else PRUNE_S)
-                await self.write()
+            await (self._have_written() if self._is_on else self._prune_forever())
         finally:
             rescue.cancel()
             await asyncio.gather(rescue, return_exceptions=True)
 
+    async def _have_written(self) -> None:
+        """Feed one process until it ends.  Raises HopError."""
+        self._told_rule = None
+        writer = self._writer = await _start(self._setup, self.counters)
+        feed = asyncio.create_task(self._feed(writer), name="recordings-feed")
+        try:
+            await writer.listen()
+        except HopError:
+            self._writer = None
+            raise
+        finally:
+            feed.cancel()
+            await asyncio.gather(feed, return_exceptions=True)
+
+    async def _feed(self, writer: WriterProcess) -> None:
+        while True:
+            await asyncio.sleep(WRITE_S)
+            await writer.feed(self.take_waiting())
+
+    @property
+    def waiting(self) -> int:
+        """Inputs that wait for the process that writes."""
+        return len(self._waiting)
+
+    @property
+    def pid(self) -> int | None:
+        """Of the process that writes; None while there is none."""
+        return None if self._writer is None else self._writer.pid
+
+    def take_waiting(self) -> Sequence[bytes]:
+        """What waits for the process that writes."""
+        waiting, self._waiting, self._bytes = self._waiting, [], 0
+        return waiting
+
     async def close(self) -> None:
         """Write what waits, and finish the file."""
-        # What ails the disk was told by the part's own failure.
-        with contextlib.suppress(HopError):
-            await self.write()
-            await self._in_thread(self._finish)
-        self._thread.shutdown()
+        writer, self._writer = self._writer, None
+        if writer is not None:
+            await writer.end(self.take_waiting())
         self._apart.close()
+
+    async def _prune_forever(self) -> None:
+        while True:
+            limits = self._setup.limits
+            await _in_thread(partial(self._directory.prune, limits))
+            await asyncio.sleep(PRUNE_S)
+
+    async def _rescue(self, left: Sequence[Path]) -> None:
+        for path in left:
+            await self._apart.run(finish_broken, path)
+
+    # --- what there is ------------------------------------------------------------
 
     async def drop_oldest(self) -> bool:
         """Delete the oldest recording; whether there was one that is finished."""
-        return await self._in_thread(self._directory.drop_oldest)
+        return await _in_thread(self._directory.drop_oldest)
 
     async def files(self) -> Sequence[RecordingFile]:
         """All recordings, oldest first."""
-        return await self._in_thread(self._directory.files)
+        return await _in_thread(self._directory.files)
 
     async def finished(self, name: str) -> Path | None:
         """The file of a finished recording."""
-        return await self._in_thread(partial(self._directory.finished, name))
+        return await _in_thread(partial(self._directory.finished, name))
 
     async def excerpt(self, target: Path, since: float, until: float) -> int:
         """Write what came in between two moments (Unix s) as one recording.
@@ -206,64 +232,22 @@ class InputRecorder:
         folder = self._directory.path
         return await self._apart.run(write_excerpt, folder, target, since, until)
 
-    async def _rescue(self, left: Sequence[Path]) -> None:
-        for path in left:
-            await self._apart.run(finish_broken, path)
 
-    async def write(self) -> None:
-        """Write what waits.  Raises HopError: the disk refuses."""
-        waiting, self._waiting, self._bytes = self._waiting, [], 0
-        self.counters["recordings_written"] += await self._in_thread(
-            partial(self._take, waiting, self._clock())
-        )
+async def _start(setup: WriterSetup, counters: Counter[str]) -> WriterProcess:
+    try:
+        return await WriterProcess.start(setup, counters)
+    except OSError as error:
+        raise HopError("recordings", error.strerror or str(error)) from error
 
-    async def _in_thread(self, work: Callable[[], _T]) -> _T:
-        """Have it done where the disk may be slow.  Raises HopError."""
-        loop = asyncio.get_running_loop()
-        try:
-            return await loop.run_in_executor(self._thread, work)
-        except OSError as error:
-            raise HopError("disk", error.strerror or str(error)) from error
 
-    def _take(self, waiting: Sequence[Incoming], now: Instant) -> int:
-        """Write it; how many messages that was."""
-        written = 0
-        try:
-            for one in waiting:
-                file = self._file_of(one.at)
-                for channel, payload in one.messages():
-                    file.add(channel, one.at, payload)
-                    written += 1
-            self._keep_house(now)
-        except OSError:
-            self._abandon()
-            raise
-        return written
+async def _in_thread(work: Callable[[], _T]) -> _T:
+    """Have it done where the disk may be slow.  Raises HopError."""
+    try:
+        return await asyncio.to_thread(work)
+    except OSError as error:
+        raise HopError("disk", error.strerror or str(error)) from error
 
-    def _file_of(self, at: Instant) -> McapFile:
-        """The file of this hour."""
-        file = self._file
-        if file is not None and at.wall // _HOUR_S != file.start.wall // _HOUR_S:
-            self._finish()
-        if self._file is None:
-            self._file = self._directory.begin(at)
-        return self._file
 
-    def _keep_house(self, now: Instant) -> None:
-        if self._file is not None and now.mono - self._settled_at >= SETTLE_S:
-            self._settled_at = now.mono
-            self._file.settle()
-        if now.mono - self._pruned_at >= PRUNE_S:
-            self._pruned_at = now.mono
-            self._directory.prune(self._limits)
-
-    def _finish(self) -> None:
-        file, self._file = self._file, None
-        if file is not None:
-            self._directory.finish(file)
-
-    def _abandon(self) -> None:
-        """Leave a file whose disk refuses; its closed chunks are finished later."""
-        file, self._file = self._file, None
-        if file is not None:
-            file.abandon()
+def _is_scans(observed: Sequence[Observation]) -> bool:
+    """Whether it is of scans alone."""
+    return bool(observed) and all(kind_of(one) is LaserScan for one in observed)

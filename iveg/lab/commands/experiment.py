@@ -111,6 +111,7 @@ def experiment_settings(directory: Path, settings: Settings) -> Settings:
         database_url="",
         data_directory=str(directory / "data"),
         orion_throttle=False,
+        recordings=False,
     )
 
 

@@ -1,58 +1,72 @@
 """Recordings of inputs, read back by the public tools of MCAP and by iVeg."""
 
 import asyncio
-from collections.abc import AsyncIterator, Iterator
+import os
+import signal
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import orjson
 import pytest
 from mcap.reader import make_reader
 
-from iveg.adapters.recordings.directory import RecordingDirectory, finish_broken
+from iveg.adapters import clock
+from iveg.adapters.recordings.directory import finish_broken
+from iveg.adapters.recordings.incoming import Sort, Unpacking, pack
 from iveg.adapters.recordings.mcap_file import CHUNK_BYTES, PADDING
 from iveg.adapters.recordings.reading import is_own, read_messages
-from iveg.adapters.recordings.recorder import MOST_WAITING, InputRecorder, RecordedSink
+from iveg.adapters.recordings.recorder import (
+    MOST_BYTES,
+    MOST_WAITING,
+    WRITE_S,
+    InputRecorder,
+    RecordedSink,
+)
+from iveg.adapters.recordings.writer import WriterSetup
+from iveg.domain.detection_rule import DetectionRule
+from iveg.domain.disk_space import DiskSpace
 from iveg.domain.errors import DataFileError, HopError
-from iveg.domain.observations import Instant, UnreadScan
-from iveg.domain.recordings import RecordingLimits
+from iveg.domain.observations import Instant
 from iveg.domain.records import ClimateRecord, LogRecord
+from iveg.ngsi import codec
 from tests.builders import (
     START,
     at,
     detection,
     detection_frame,
+    notification,
     odometry,
-    received,
+    origin,
+    pose_value,
     scan,
 )
 from tests.fakes.clock import FakeClock
 from tests.fakes.recorder import FakeRecorder
+from tests.fakes.recordings import WriterInPlace
 
 ODOM, SCAN = "/iveg/AGI_odom/attrs", "/iveg/AGI_lidar2D/attrs"
 
 
 class Site:
-    """A recorder whose clock is moved by hand."""
+    """A recorder whose clock is moved by hand, and its writer in the same process."""
 
     def __init__(self, path: Path, *, is_on: bool = True) -> None:
         self.path, self.clock = path / "recordings", FakeClock()
-        self.is_closed = False
-        self.directory = RecordingDirectory(self.path)
-        self.recorder = InputRecorder(
-            self.directory, RecordingLimits(), self.clock, is_on=is_on
-        )
+        self.space = DiskSpace(free=10**12, total=10**12)
+        setup = WriterSetup(self.path, robots=("AGI", "AGII"))
+        self.recorder = InputRecorder(setup, self.clock, is_on=is_on)
+        self._in_place = WriterInPlace(setup, lambda _: self.space)
+        self.writer = self._in_place.writer
+        self.close = self.writer.finish
 
-    def hear(self, seconds: float, text: str = "{}", topic: str = ODOM) -> None:
-        self.recorder.measure(topic, text.encode(), at(seconds), topic == SCAN)
+    def hear(self, seconds: float, payload: bytes = b"{}", topic: str = ODOM) -> None:
+        self.recorder.measure(topic, payload, at(seconds), topic == SCAN)
 
-    async def write(self, seconds: float) -> None:
+    def write(self, seconds: float) -> None:
         self.clock.now = seconds
-        await self.recorder.write()
-
-    async def close(self) -> None:
-        if not self.is_closed:
-            self.is_closed = True
-            await self.recorder.close()
+        self._in_place.write(self.recorder, START.mono + seconds)
 
     def names(self) -> list[str]:
         return sorted(one.name for one in self.path.iterdir())
@@ -63,10 +77,10 @@ class Site:
 
 
 @pytest.fixture
-async def site(tmp_path: Path) -> AsyncIterator[Site]:
+def site(tmp_path: Path) -> Iterator[Site]:
     site = Site(tmp_path)
     yield site
-    await site.close()
+    site.close()
 
 
 def publicly(path: Path, topic: str | None = None) -> Iterator[tuple[str, str, object]]:
@@ -90,11 +104,11 @@ def privately(path: Path) -> list[tuple[str, float, bytes]]:
 
 async def test_what_came_in_is_there_byte_for_byte_with_its_time(site: Site) -> None:
     body = b'{ "subscriptionId": "1", "data": [] }'
-    site.hear(0.0, '{"x":  1}')
-    site.recorder.notification(body, at(0.125), None)
+    site.hear(0.0, b'{"x":  1}')
+    site.recorder.notification(body, at(0.125), "1", ())
     site.recorder.tick(Instant(START.mono + 0.25, START.wall + 1000.25))
-    await site.write(0.3)
-    await site.close()
+    site.write(0.3)
+    site.close()
 
     path = site.only()
     assert path.name == "2023-11-14T22-13-20Z.mcap"
@@ -108,19 +122,23 @@ async def test_what_came_in_is_there_byte_for_byte_with_its_time(site: Site) -> 
         ("/ngsi/notifications", "ngsi.Notification"),
         ("/iveg/ticks", "iveg.Tick"),
     ]
-    assert site.recorder.counters["recordings_written"] == 3
+    assert site.writer.kept == 3
 
 
 async def test_viewers_draw_poses_scans_and_boxes_thinned(site: Site) -> None:
+    looked = codec.write_detections(detection_frame("AGI", detection(x=3.0)))
     for n in range(30):
-        site.recorder.observed(received(odometry(x=n), after=n / 30))
-        site.recorder.observed(
-            received(detection_frame("AGI", detection(x=3.0)), after=n / 30)
-        )
-        lazy = UnreadScan("AGI", scan().origin, scan)
-        site.recorder.observed(received(lazy, after=n / 30))
-    await site.write(1.0)
-    await site.close()
+        pose = pose_value(x=n, seq=n)
+        body = notification({"base_pose_ground_truth": pose})
+        site.hear(n / 30, codec.write_odometry(odometry(x=n, origin=origin(n))))
+        # The copy by FIWARE is no second picture, and a stranger none at all.
+        site.recorder.notification(body, at(n / 30), "1", [odometry()])
+        site.hear(n / 30, codec.write_odometry(odometry("B1")), "/iveg/B1_odom/attrs")
+        site.hear(n / 30, looked, "/iveg/AGI_yolox_bounding_boxes/attrs")
+        site.hear(n / 30, codec.write_scan(scan()), SCAN)
+    site.hear(0.99, b'{"no": "scan"}', SCAN)
+    site.write(1.0)
+    site.close()
 
     found = list(publicly(site.only()))
     told = [schema for _, schema, _ in found]
@@ -140,9 +158,9 @@ async def test_scans_are_kept_five_times_a_second(site: Site) -> None:
     for n in range(30):
         site.hear(n / 30, topic=SCAN)
         site.hear(n / 30)
-        site.recorder.notification(b"{}", at(n / 30), "of scans")
-    await site.write(1.0)
-    await site.close()
+        site.recorder.notification(b"{}", at(n / 30), "of scans", [scan()])
+    site.write(1.0)
+    site.close()
 
     topics = [topic for topic, _, _ in privately(site.only())]
     assert topics.count(SCAN) == 5
@@ -157,8 +175,8 @@ async def test_rows_of_the_history_are_recorded_but_no_telemetry(site: Site) -> 
     air = ClimateRecord(at=1.0, temperature=20.0, relative_humidity=0.5, co2=400.0)
     for one in (row, air):
         sink.enqueue(one)
-    await site.write(1.0)
-    await site.close()
+    site.write(1.0)
+    site.close()
 
     ((topic, schema, value),) = publicly(site.only())
     assert (topic, schema) == ("/iveg/log", "iveg.Log")
@@ -170,13 +188,13 @@ async def test_an_hour_has_a_file_of_its_own_and_a_clock_set_back_spoils_none(
     site: Site,
 ) -> None:
     site.hear(0.0)
-    await site.write(0.0)
+    site.write(0.0)
     site.hear(3600.0)
-    await site.write(3600.0)
+    site.write(3600.0)
     back = Instant(START.mono + 3601.0, START.wall)
     site.recorder.measure(ODOM, b"{}", back, is_scan=False)
-    await site.write(3601.0)
-    await site.close()
+    site.write(3601.0)
+    site.close()
 
     assert site.names() == [
         "2023-11-14T22-13-20Z.mcap",
@@ -189,16 +207,16 @@ async def test_a_clock_that_is_set_within_an_hour_reorders_nothing(site: Site) -
     for n, wall in enumerate((0.0, 100.0, 50.0)):
         then = Instant(START.mono + n, START.wall + wall)
         site.recorder.measure(ODOM, b"{}", then, is_scan=False)
-    await site.write(3.0)
-    await site.close()
+    site.write(3.0)
+    site.close()
     assert [seconds for _, seconds, _ in privately(site.only())] == [0.0, 1.0, 2.0]
 
 
 async def test_a_crash_costs_the_open_chunk_and_nothing_before(site: Site) -> None:
-    site.hear(0.0, '{"n":1}')
-    await site.write(2.0)
-    site.hear(2.5, '{"n":2}')
-    await site.write(3.0)
+    site.hear(0.0, b'{"n":1}')
+    site.write(2.0)
+    site.hear(2.5, b'{"n":2}')
+    site.write(3.0)
     left = site.only()
     assert left.name.endswith(".mcap.open")
 
@@ -218,7 +236,7 @@ async def test_a_file_that_broke_off_at_its_beginning_goes(
     site: Site, cut: int
 ) -> None:
     site.hear(0.0)
-    await site.write(2.0)
+    site.write(2.0)
     broken = site.path / "2023-11-14T21-00-00Z.mcap.open"
     broken.write_bytes(site.only().read_bytes()[:cut])
     finish_broken(broken)
@@ -228,9 +246,9 @@ async def test_a_file_that_broke_off_at_its_beginning_goes(
 async def test_every_cut_of_a_file_is_read_as_far_as_it_goes(site: Site) -> None:
     pad = "x" * (CHUNK_BYTES // 9)
     for n in range(50):
-        site.hear(0.04 * n, f'{{"n":{n},"pad":"{pad}"}}')
-    await site.write(2.0)
-    await site.close()
+        site.hear(0.04 * n, f'{{"n":{n},"pad":"{pad}"}}'.encode())
+    site.write(2.0)
+    site.close()
     whole = site.only().read_bytes()
     cut = site.path / "cut.mcap"
     counts = []
@@ -250,33 +268,85 @@ def test_a_foreign_file_is_told_from_ours(tmp_path: Path) -> None:
             pass
 
 
-async def test_what_does_not_fit_is_counted_and_delays_nobody(site: Site) -> None:
+async def test_what_does_not_fit_is_counted_and_told_once(
+    site: Site, caplog: pytest.LogCaptureFixture
+) -> None:
     for n in range(MOST_WAITING + 7):
         site.hear(n / 1000)
-    await site.write(30.0)
+    site.write(30.0)
     assert site.recorder.counters["recordings_dropped"] == 7
+    assert len(caplog.records) == 1
     site.hear(31.0)
-    await site.write(31.0)
-    assert site.recorder.counters["recordings_written"] == MOST_WAITING + 1
+    site.write(31.0)
+    site.close()
+    assert site.writer.kept == MOST_WAITING + 1
 
 
-async def test_a_disk_that_refuses_is_told_and_taken_up_again(site: Site) -> None:
-    site.path.write_bytes(b"in the way")
+async def test_nothing_is_recorded_while_the_disk_is_low_and_no_other_can_go(
+    site: Site,
+) -> None:
     site.hear(0.0)
-    with pytest.raises(HopError, match="disk"):
-        await site.write(1.0)
-    site.path.unlink()
-    site.hear(2.0)
-    await site.write(3.0)
-    assert len(site.names()) == 1
+    site.write(0.0)
+    site.space = replace(site.space, free=10**8)
+    site.hear(60.0)
+    site.write(60.0)
+    site.hear(61.0)
+    site.write(61.0)
+    assert site.names() == ["2023-11-14T22-13-20Z.mcap"]
+    assert (site.writer.kept, site.writer.dropped) == (2, 1)
+    site.space = replace(site.space, free=10**12)
+    site.write(121.0)
+    site.hear(122.0)
+    site.write(122.0)
+    site.close()
+    assert len(site.names()) == 2
+    assert site.writer.kept == 3
 
 
-async def test_recordings_that_are_off_make_no_file(tmp_path: Path) -> None:
+async def test_each_version_of_the_rule_is_recorded_and_stands_in_each_file(
+    site: Site,
+) -> None:
+    rule = DetectionRule()
+    site.recorder.rule = lambda: rule
+    site.recorder.tick(at(0.0))
+    site.recorder.tick(at(0.1))
+    rule = replace(rule, version=2, threshold=0.9)
+    site.recorder.tick(at(0.2))
+    site.recorder.tick(at(3600.0))
+    site.write(3600.0)
+    site.close()
+
+    first, second = sorted(site.path.iterdir())
+    told = [list(publicly(one, "/iveg/rule")) for one in (first, second)]
+    versions = [[value["version"] for _, _, value in one] for one in told]  # type: ignore[index]
+    assert versions == [[1, 2], [2]]
+    assert told[1][0][:2] == ("/iveg/rule", "iveg.Rule")
+
+
+@pytest.mark.parametrize("size", [1, 7, 1000])
+def test_inputs_are_the_same_in_whatever_pieces_they_come(size: int) -> None:
+    packed = [
+        pack(Sort.MEASURE, at(1.0), "/á", b"1"),
+        pack(Sort.TICK, at(2.0)),
+        pack(Sort.ROW, at(3.0), "Log", b"{}" * 50),
+    ]
+    whole, unpacking = b"".join(packed), Unpacking()
+    found = [
+        one
+        for begins in range(0, len(whole), size)
+        for one in unpacking.feed(whole[begins : begins + size])
+    ]
+    assert [one.at for one in found] == [at(1.0), at(2.0), at(3.0)]
+    assert [one.channel.topic for one in found] == ["/á", "/iveg/ticks", "/iveg/log"]
+    assert found[2].message == b"{}" * 50
+
+
+async def test_recordings_that_are_off_take_nothing_in(tmp_path: Path) -> None:
     site = Site(tmp_path, is_on=False)
     site.hear(0.0)
     site.recorder.tick(START)
-    await site.write(1.0)
-    await site.close()
+    site.recorder.notification(b"{}", START, "1", ())
+    assert site.recorder.waiting == 0
     assert not site.path.exists()
 
 
@@ -285,28 +355,76 @@ async def test_the_oldest_goes_where_the_disk_is_low_and_never_the_open_one(
 ) -> None:
     for hour in range(3):
         site.hear(3600.0 * hour)
-        await site.write(3600.0 * hour)
+        site.write(3600.0 * hour)
     assert [await site.recorder.drop_oldest() for _ in range(3)] == [True, True, False]
     assert len(site.names()) == 1
 
 
-async def test_what_an_earlier_run_left_is_finished_beside_the_new_one(
+class Running:
+    """A recorder with a real process."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.recorder = InputRecorder(WriterSetup(folder), clock.now)
+        self.part = asyncio.create_task(self.recorder.run())
+
+    def hear(self, number: int) -> None:
+        self.recorder.measure(ODOM, b"%d" % number, clock.now(), is_scan=False)
+
+    async def until(self, holds: Callable[[], object]) -> None:
+        async with asyncio.timeout(30.0):
+            while not holds():  # noqa: ASYNC110 - another process does it
+                await asyncio.sleep(0.02)
+
+    async def close(self) -> None:
+        self.part.cancel()
+        await asyncio.gather(self.part, return_exceptions=True)
+        await self.recorder.close()
+
+
+async def test_a_process_that_hangs_and_is_killed_delays_nobody_and_another_goes_on(
     tmp_path: Path,
 ) -> None:
-    first = Site(tmp_path)
-    first.hear(0.0)
-    await first.write(2.0)
-    left = first.only()
-    copied = left.read_bytes()
-    await first.close()
-    first.only().unlink()
-    left.write_bytes(copied)
-    second = Site(tmp_path)
-    running = asyncio.create_task(second.recorder.run())
-    async with asyncio.timeout(20.0):
-        while left.exists():  # noqa: ASYNC110 - another process deletes it
-            await asyncio.sleep(0.02)
-    running.cancel()
-    await asyncio.gather(running, return_exceptions=True)
-    await second.recorder.close()
-    assert [topic for topic, _, _ in privately(second.only())] == [ODOM]
+    running = Running(tmp_path)
+    recorder = running.recorder
+    running.hear(1)
+    await running.until(lambda: recorder.counters["recordings_written"] == 1)
+    assert recorder.pid is not None
+    os.kill(recorder.pid, signal.SIGSTOP)
+    fits = MOST_BYTES // 10**6
+    for _ in range(fits + 8):
+        recorder.measure(ODOM, b"0" * 10**6, clock.now(), is_scan=False)
+    began = time.thread_time()
+    await asyncio.sleep(2 * WRITE_S)
+    assert time.thread_time() - began < 0.5
+    dropped = recorder.counters["recordings_dropped"]
+    assert 8 <= dropped <= 9
+    os.kill(recorder.pid, signal.SIGKILL)
+    with pytest.raises(HopError, match="ended: -9"):
+        await running.part
+    assert recorder.counters["recordings_dropped"] == fits + 8
+
+    running.hear(2)
+    running.part = asyncio.create_task(recorder.run())
+    await running.until(lambda: [*tmp_path.glob("*.mcap")])
+    await running.close()
+    assert recorder.counters["recordings_written"] == 2
+    assert [data for one in _inside(tmp_path) for _, _, data in privately(one)] == [
+        b"1",
+        b"2",
+    ]
+
+
+def _inside(folder: Path) -> list[Path]:
+    return sorted(folder.iterdir())
+
+
+async def test_a_disk_that_refuses_is_told_and_hurts_nobody(tmp_path: Path) -> None:
+    running = Running(tmp_path / "file" / "recordings")
+    (tmp_path / "file").write_bytes(b"in the way")
+    running.hear(1)
+    with pytest.raises(HopError, match="disk: Not a directory"):
+        await running.part
+    running.hear(2)
+    assert running.recorder.counters["recordings_dropped"] == 1
+    await running.close()

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from iveg.adapters.recordings.incoming import NOTIFICATIONS, measure
-from iveg.adapters.recordings.mcap_file import McapFile
+from iveg.adapters.recordings.incoming import NOTIFICATIONS
+from iveg.adapters.recordings.mcap_file import Channel, McapFile
 from iveg.domain.errors import DataFileError
 from iveg.domain.geometry import Pose2D
 from iveg.domain.observations import DetectionFrame, LaserScan, Odometry
@@ -25,6 +25,12 @@ from tests.builders import (
 )
 
 MOUNT = Pose2D(0.0, 0.0, 0.0)
+
+
+def measure(topic: str) -> Channel:
+    return Channel(topic, "iveg.Measure")
+
+
 ODOM = measure("/iveg/AGI_odom/attrs")
 
 

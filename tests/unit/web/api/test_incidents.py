@@ -14,15 +14,14 @@ from mcap.reader import make_reader
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.store import Store
 from iveg.adapters.incident_files import verify_pack
-from iveg.adapters.recordings.directory import RecordingDirectory
 from iveg.adapters.recordings.recorder import InputRecorder
+from iveg.adapters.recordings.writer import WriterSetup
 from iveg.cli import COMMANDS
 from iveg.cli.arguments import parser
 from iveg.cli.incident import run_incident
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.events import LogEvent
 from iveg.domain.observations import Instant
-from iveg.domain.recordings import RecordingLimits
 from iveg.domain.records import Record
 from iveg.pipeline.record import Waiting
 from iveg.settings import Settings
@@ -30,6 +29,7 @@ from iveg.web import problems
 from iveg.web.api.incidents import Sources, router
 from iveg.web.security.authentication import Principal, require
 from tests.fakes.clock import FakeClock
+from tests.fakes.recordings import WriterInPlace
 from tests.fakes.records import (
     NOON,
     command_record,
@@ -49,9 +49,9 @@ class Desk:
     def __init__(self, folder: Path) -> None:
         url = f"sqlite:///{folder / 'history.db'}"
         self.store, self.queries = Store(url), Queries(url)
-        self.recorder = InputRecorder(
-            RecordingDirectory(folder / "recordings"), RecordingLimits(), FakeClock()
-        )
+        setup = WriterSetup(folder / "recordings")
+        self.recorder = InputRecorder(setup, FakeClock())
+        self.in_place = WriterInPlace(setup)
         self.lines: list[LogEvent] = []
         settings = {"IVEG_API_TOKEN": SECRET, "IVEG_MQTT_URL": "mqtt://ana:pw@host:1"}
         self.app = FastAPI()
@@ -86,10 +86,10 @@ class Desk:
         for n in range(1200):
             at = Instant(1000.0 + n / 10, NOON + n / 10)
             self.recorder.measure(ODOM, b'{"n":%d}' % n, at, False)
-        await self.recorder.write()
+        self.in_place.write(self.recorder, 1120.0)
 
     async def close(self) -> None:
-        await self.recorder.close()
+        self.in_place.writer.finish()
         self.queries.close()
         self.store.close()
 
