@@ -35,6 +35,7 @@ _PEER_M = 1.0
 """About a peer's ``base_link``: half of its body, and how far it went since it told."""
 _APART_M = 0.3
 """Returns of one body are not farther apart."""
+_ROUNDING_M = 0.01
 _LEAST_RETURNS = 2
 _BESIDE_M = 0.2
 """Of the robot's own path, where there is no plan."""
@@ -203,14 +204,16 @@ class Witness:
         reach = LIMITS.ring_default_m + self._ahead_s * abs(twist.linear_x)
         near = (gap > 0.0) & (gap <= reach)
         away = np.hypot(x, y)[near]
+        farthest = float(away.max(initial=0.0))
         x, y = _moved(x[near], y[near], pose)
         left = np.ones(x.shape, np.bool_)
         if self._plan is not None:
             blurred = PLAN_M + abs(twist.angular_z) * _TURN_S * away
-            plan = self._plan.about(pose, float(away.max(initial=0.0)) + 2 * PLAN_M)
+            plan = self._plan.about(pose, farthest + 2 * PLAN_M)
             left = plan.distance_to(x, y) > blurred
         for one in known:
-            left &= np.hypot(x - one.x, y - one.y) > one.radius
+            if pose.distance_to(one.x, one.y) <= farthest + one.radius + _ROUNDING_M:
+                left &= np.hypot(x - one.x, y - one.y) > one.radius
         return np.column_stack((x[left], y[left]))
 
     def _is_ahead(self, body: _Floats, pose: Pose2D, twist: Twist2D) -> bool:

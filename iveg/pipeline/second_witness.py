@@ -48,15 +48,15 @@ class SecondWitness:
         return bool(due)
 
     def _is_due(self, robot: RobotState, now: Instant) -> bool:
-        received, age = robot.scan_received, robot.age_s(now)
-        if robot.scan is None or received is None or age is None:
-            return False
-        if age > LIMITS.live_s or now.mono - received.mono > _FRESH_S:
-            return False
+        # First what most fail: this is asked of everybody, a hundred times a second.
         at, scan = self._looked.get(robot.robot_id, (_NEVER, None))
-        is_unsure = self._obstacles.is_unsure(robot.robot_id)
-        apart_s = _UNSURE_S if is_unsure else _APART_S
-        return robot.scan is not scan and now.mono - at >= apart_s
+        if robot.scan is None or robot.scan is scan or now.mono - at < _UNSURE_S:
+            return False
+        if now.mono - at < _APART_S and not self._obstacles.is_unsure(robot.robot_id):
+            return False
+        received, age = robot.scan_received, robot.age_s(now)
+        is_fresh = received is not None and now.mono - received.mono <= _FRESH_S
+        return is_fresh and age is not None and age <= LIMITS.live_s
 
     def _looked_at(self, robot: RobotState) -> float:
         return self._looked.get(robot.robot_id, (_NEVER, None))[0]

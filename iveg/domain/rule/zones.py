@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.limits import LIMITS, ring_radius
-from iveg.domain.observations import Instant
+from iveg.domain.observations import Instant, Odometry
 from iveg.domain.obstacle import Obstacle
 from iveg.domain.robot_state import RobotState
 from iveg.domain.tracking.people import People
@@ -150,7 +150,7 @@ def _near(
     inside: Mapping[str, Mapping[str, object]],
     made: dict[str, Sequence[Zone]],
     robot: RobotState,
-) -> Iterator[Zone]:
+) -> Sequence[Zone]:
     """``Near``: people, then peers, each in their order; then what it was in before.
 
     ``made``: the circles of this judgement, each made once and only if a robot may be
@@ -158,11 +158,12 @@ def _near(
     """
     name = robot.robot_id
     causes, mine = neighbours.causes.get(name, _NOBODY), inside.get(name, _NOBODY)
+    found: list[Zone] = []
     for cause in (*causes, *(one for one in mine if one not in causes)):
-        circles = made.get(cause)
-        if circles is None:
-            circles = made[cause] = tuple(_of_cause(cause, world, people, rule, now))
-        yield from circles
+        if cause not in made:
+            made[cause] = tuple(_of_cause(cause, world, people, rule, now))
+        found += made[cause]
+    return found
 
 
 def _of_cause(
@@ -187,7 +188,8 @@ class _Neighbours:
         at: When all were compared (monotonic, s).
         places: Places of the robots then; ``persons`` likewise.
         causes: Robot → people, then robots, in their order.
-        checked: The newest of each person that is still within reach of ``persons``.
+        checked: The newest odometry and the newest of each person that are still
+            within reach of that, so that nobody is compared twice.
     """
 
     at: float
@@ -195,7 +197,7 @@ class _Neighbours:
     places: Mapping[str, _Place]
     persons: Mapping[str, TrackedPerson]
     causes: Mapping[str, Mapping[str, None]]
-    checked: dict[str, TrackedPerson]
+    checked: dict[str, Odometry | TrackedPerson]
 
     @classmethod
     def of(
@@ -228,7 +230,7 @@ class _Neighbours:
             if row != column:
                 near.setdefault(names[row], {})[names[column]] = None
         persons = dict(people.known)
-        return cls(now.mono, rule.radius_m, places, persons, near, dict(persons))
+        return cls(now.mono, rule.radius_m, places, persons, near, {**persons})
 
     def hold(
         self, world: World, people: People, rule: DetectionRule, now: Instant
@@ -242,12 +244,15 @@ class _Neighbours:
         )
 
     def _is_still_there(self, robot: RobotState) -> bool:
-        if robot.odometry is None:
+        # Its moment is known or estimated once, as it comes.
+        odometry, name = robot.odometry, robot.robot_id
+        if odometry is None or self.checked.get(name) is odometry:
             return True
-        place, now = self.places.get(robot.robot_id), _place_of(robot)
-        if place is None or now is None:
+        place, now = self.places.get(name), _place_of(robot)
+        if place is None or now is None or not _is_as_near(now, place):
             return False
-        return _is_as_near(now, place)
+        self.checked[name] = odometry
+        return True
 
     def _is_still_seen_there(self, person: TrackedPerson) -> bool:
         if self.checked.get(person.person_id) is person:
