@@ -12,11 +12,12 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TypeVar
+from typing import BinaryIO, TypeVar
 
 import httpx
 
 from tests.bonds import bound
+from tests.forge import PROGRAMS, Forked, fork
 from tests.ports import free_ports
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -55,7 +56,7 @@ class Program:
     """
 
     words: tuple[str, ...]
-    process: subprocess.Popen[bytes]
+    process: subprocess.Popen[bytes] | Forked
     log: Path
     log_from: int = 0
 
@@ -141,19 +142,26 @@ class Site:
         """Start ``python -m iveg WORD …`` here, or another module."""
         log = self.directory / f"{len(self.programs)}-{words[0]}.log"
         with log.open("wb") as output:
-            process = subprocess.Popen(
-                bound(sys.executable, "-m", module, *words),
-                cwd=self.directory,
-                env=self._environment(),
-                stdin=subprocess.DEVNULL,
-                stdout=output,
-                stderr=subprocess.STDOUT,
-                # Ctrl-C in the terminal of the tests is not Ctrl-C here.
-                start_new_session=True,
-            )
-        program = Program(words, process, log)
+            program = Program(words, self._begin(module, words, output), log)
         self.programs.append(program)
         return program
+
+    def _begin(
+        self, module: str, words: tuple[str, ...], output: BinaryIO
+    ) -> subprocess.Popen[bytes] | Forked:
+        environment = self._environment()
+        if sys.platform == "linux" and module == "iveg" and words[0] in PROGRAMS:
+            return fork(words, self.directory, environment, output.fileno())
+        return subprocess.Popen(
+            bound(sys.executable, "-m", module, *words),
+            cwd=self.directory,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=subprocess.STDOUT,
+            # Ctrl-C in the terminal of the tests is not Ctrl-C here.
+            start_new_session=True,
+        )
 
     def _environment(self) -> Mapping[str, str]:
         inherited = ("PATH", "HOME", "LANG", "SYSTEMROOT", "TMPDIR")
