@@ -82,11 +82,14 @@ def test_a_line_that_was_reset_has_ended() -> None:
 
 
 @contextlib.contextmanager
-def talking(packets: bytes, early: bytes = b"") -> Iterator[int]:
+def talking(
+    packets: bytes, early: bytes = b"", *, hangs_up: bool = False
+) -> Iterator[int]:
     """A broker that admits one client and says everything at once.
 
     Args:
         packets: Said when the subscription stands; ``early`` before.
+        hangs_up: As soon as it hears from the client again.
     """
 
     def serve() -> None:
@@ -97,7 +100,7 @@ def talking(packets: bytes, early: bytes = b"") -> Iterator[int]:
             subscribe = client.recv(1000)
             client.sendall(early)
             client.sendall(b"\x90\x03" + subscribe[2:4] + b"\x00" + packets)
-            while client.recv(100_000):
+            while client.recv(100_000) and not hangs_up:
                 """Until it hangs up; it confirms what it was sent."""
 
     with socket.create_server(("127.0.0.1", 0)) as server:
@@ -187,7 +190,7 @@ async def test_what_comes_during_a_rest_is_read_together_after_it() -> None:
 
 async def test_a_line_that_ends_during_a_rest_is_lost_after_it() -> None:
     lost = asyncio.Event()
-    with talking(publish_packet("t", b"x")) as port:
+    with talking(publish_packet("t", b"x"), hangs_up=True) as port:
         link = MqttLink(
             BrokerAddress("127.0.0.1", port),
             "test",
