@@ -245,6 +245,12 @@ class Settings:
     equipment: str = setting(
         "IVEG_EQUIPMENT", "", "File of docs/equipment.md, or `demo`; empty: none."
     )
+    calibration: str = setting(
+        "IVEG_CALIBRATION",
+        "",
+        'File of docs/safety.md, "Calibration", or `paper`; '
+        "empty: confidences count as told.",
+    )
 
     @classmethod
     def from_environment(cls, environment: Mapping[str, str]) -> "Settings":

@@ -14,6 +14,7 @@ from fastapi import FastAPI
 
 from iveg import __version__
 from iveg.adapters import clock, log_filter
+from iveg.adapters.calibration_files import load_calibrations
 from iveg.adapters.direct import DirectReader
 from iveg.adapters.equipment_files import load_equipment
 from iveg.adapters.fleet_files import load_fleet
@@ -102,7 +103,8 @@ class Dss:
         )
         drills, era = Drills(settings.drill_days), f"-{self._boot[:8]}"
         tiles = load_equipment(settings.equipment, fleet.ids)
-        choices = Choices(kept.rules[-1], drills, self._boot, era, tiles)
+        rows = load_calibrations(settings.calibration)
+        choices = Choices(kept.rules[-1], drills, self._boot, era, tiles, rows)
         greenhouse = load_greenhouse(settings.greenhouse)
         self.pipeline = build(fleet, greenhouse, self._ports(), choices)
         self.stores.inputs.rule = lambda: self.pipeline.evaluator.rule

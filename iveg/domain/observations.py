@@ -166,10 +166,12 @@ class DetectionFrame(Observation):
     Attributes:
         unread: Class of each box that could not be used (no confidence, no position);
             None where that is not known either.
+        detector: Name of the network, by which it is calibrated; None: not told.
     """
 
     detections: tuple[Detection, ...]
     unread: tuple[str | None, ...] = ()
+    detector: str | None = None
 
 
 @dataclass(frozen=True, slots=True)

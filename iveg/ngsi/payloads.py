@@ -68,6 +68,12 @@ class OriginFields(Wire):
     replay: Text | None = None
 
 
+class BoxesHeaderValue(OriginFields):
+    """``detection_header``."""
+
+    detector: Text | None = None
+
+
 class MotionFields(Wire):
     """Pose in ``map`` and twist."""
 

@@ -15,6 +15,7 @@ from iveg.domain.messages import Channel, Contacts
 from iveg.domain.observations import Instant
 from iveg.domain.rule.obstacles import Obstacles
 from iveg.domain.stop.drills import Drills
+from iveg.domain.tracking.calibration import Calibrations
 from iveg.domain.tracking.people import People
 from iveg.domain.transports import FIWARE, Transport
 from iveg.domain.witness import Plan
@@ -89,6 +90,7 @@ class Choices:
         boot: Random, new at each start; identity of our feedback.
         era: Ends the ids of people, which are unique across starts by it.
         tiles: Of other equipment.
+        calibrations: How sure a look of a detector makes.
     """
 
     rule: DetectionRule = field(default_factory=DetectionRule)
@@ -96,6 +98,11 @@ class Choices:
     boot: str = "iveg-boot"
     era: str = ""
     tiles: Sequence[Tile] = ()
+    calibrations: Calibrations = field(default_factory=Calibrations)
+
+    def people(self, greenhouse: Greenhouse) -> People:
+        """Nobody known yet."""
+        return People(greenhouse, self.era, self.calibrations)
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,7 +182,7 @@ def build(
     watch = LatencyWatch(world.robots, world.ledger.composed_at)
     latency = LatencyMonitor(watch, ports.sink, event_log)
     ingest = _ingest(world, event_log, ports, supervision, watch)
-    scans, people = ScanReader(ingest.reject), People(greenhouse, choices.era)
+    scans, people = ScanReader(ingest.reject), choices.people(greenhouse)
     obstacles = Obstacles(world, people, Plan.of(greenhouse))
     evaluator = Evaluator(
         world,

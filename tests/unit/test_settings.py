@@ -185,6 +185,7 @@ GOOD = {
     "IVEG_UPLINK": "single",
     "IVEG_GREENHOUSE": "none",
     "IVEG_EQUIPMENT": "demo",
+    "IVEG_CALIBRATION": "paper",
     "IVEG_FLEET": "/etc/iveg/fleet.toml",
 }
 

@@ -5,6 +5,8 @@ right nearly every time.  So its looks add up (naive Bayes, even prior)::
 
     log-odds = Σ logit(confidence of a look)        P = 1 / (1 + e^−log-odds)
 
+A detector that somebody calibrated has an offset to each (``calibration``).
+
 A detector's mistake lasts from picture to picture, so the pictures of 0.3 s are one
 look, which counts by the surest of them.  A confidence below 0.50 is no look.  Looks of
 other robots at the same place count, too.  Time without a look counts against a
@@ -24,6 +26,7 @@ from dataclasses import dataclass, field
 
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
+from iveg.domain.tracking.calibration import PLAIN, Calibration
 
 FAINT_FROM = 0.50
 KEPT_FROM = 0.25
@@ -76,7 +79,7 @@ class _Suspect:
 
     Attributes:
         odds: Log-odds of the looks that are over, and of their absence.
-        look: Confidence of the look that goes on since ``look_at``.
+        look: Log-odds of the look that goes on since ``look_at``.
         judged_at: Until when their absence has been counted.
     """
 
@@ -93,7 +96,7 @@ class _Suspect:
     least: float = 1.0
     most: float = 0.0
 
-    def see(self, one: FaintPerson, now: float) -> None:
+    def see(self, one: FaintPerson, look: float, now: float) -> None:
         """It was seen again, or for the first time."""
         self.x, self.y, self.seen_at = one.x, one.y, max(self.seen_at, now)
         self.judged_at = self.seen_at
@@ -102,10 +105,10 @@ class _Suspect:
         self.least = min(self.least, one.confidence)
         self.most = max(self.most, one.confidence)
         if now - self.look_at < LOOK_S - _SLACK_S:
-            self.look = max(self.look, one.confidence)
+            self.look = max(self.look, look)
             return
         self.odds = self.log_odds
-        self.look, self.look_at = one.confidence, now
+        self.look, self.look_at = look, now
         self.count += 1
 
     def miss(self, now: float) -> None:
@@ -127,7 +130,7 @@ class _Suspect:
     @property
     def log_odds(self) -> float:
         """As they stand, without other robots' looks."""
-        return min(_SUREST, self.odds + _logit(self.look))
+        return min(_SUREST, self.odds + self.look)
 
 
 @dataclass(slots=True)
@@ -144,6 +147,7 @@ class Suspicions:
         at: Instant,
         least: float,
         recording: str | None = None,
+        calibration: Calibration = PLAIN,
     ) -> list[Looks | None]:
         """Take one picture of a robot: what is known of each who is in it.
 
@@ -153,6 +157,7 @@ class Suspicions:
             at: When it looked.
             least: Probability from which on a person counts (0 to 1).
             recording: Whose looks are no looks of today.
+            calibration: Of the detector.
 
         Returns:
             None for who is too faint to be suspected and continues nobody.
@@ -160,7 +165,7 @@ class Suspicions:
         now, own = at.mono, (recording, observer)
         known = _kept(self._of.get(own, ()), now)
         free = list(known)
-        found = [_match(one, free, known, now) for one in seen]
+        found = [_match(one, free, known, calibration, now) for one in seen]
         for suspect in free:
             suspect.miss(now)
         self._of[own] = _kept(known, now)
@@ -178,19 +183,23 @@ class Suspicions:
 
 
 def _match(
-    one: FaintPerson, free: list[_Suspect], known: list[_Suspect], now: float
+    one: FaintPerson,
+    free: list[_Suspect],
+    known: list[_Suspect],
+    calibration: Calibration,
+    now: float,
 ) -> _Suspect | None:
     """The nearest suspect within reach that the picture has not shown yet, or a new."""
-    is_look = one.confidence >= FAINT_FROM
+    is_look, look = one.confidence >= FAINT_FROM, calibration.log_odds(one.confidence)
     suspect = _nearest(one, [who for who in free if is_look or who.confirmed], now)
     if suspect is not None:
         free.remove(suspect)
     elif is_look:
-        suspect = _Suspect(one.x, one.y, one.confidence, now, now, now, now)
+        suspect = _Suspect(one.x, one.y, look, now, now, now, now)
         known.append(suspect)
     else:
         return None
-    suspect.see(one, now)
+    suspect.see(one, look, now)
     return suspect
 
 
@@ -230,8 +239,3 @@ def _judged(
 def _kept(known: Sequence[_Suspect], now: float) -> list[_Suspect]:
     going_on = [one for one in known if not one.is_over(now)]
     return sorted(going_on, key=lambda one: one.seen_at)[-MOST_SUSPECTS:]
-
-
-def _logit(probability: float) -> float:
-    bounded = min(max(probability, 0.01), 0.99)
-    return math.log(bounded / (1.0 - bounded))

@@ -16,6 +16,7 @@ from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Detection, DetectionFrame, Instant
 from iveg.domain.robot_state import RobotState
+from iveg.domain.tracking.calibration import Calibration, Calibrations
 from iveg.domain.tracking.looks import (
     FAINT_FROM,
     KEPT_FROM,
@@ -80,9 +81,16 @@ class People:
         greenhouse: What is seen beyond its outer wall is of doubtful position, and
             nobody walks through its crop.
         era: Ends every id.
+        calibrations: How sure a look makes.
     """
 
-    def __init__(self, greenhouse: Greenhouse | None = None, era: str = "") -> None:
+    def __init__(
+        self,
+        greenhouse: Greenhouse | None = None,
+        era: str = "",
+        calibrations: Calibrations | None = None,
+    ) -> None:
+        self._calibrations = calibrations or Calibrations()
         self._bounds = None if greenhouse is None else greenhouse.bounds
         self._suspicions = Suspicions()
         way = straight if greenhouse is None else Ways(greenhouse).between
@@ -121,7 +129,8 @@ class People:
         pose = observer.pose_at_stamp(frame.origin.own_s)
         placed = self._place(frame, observer, pose, rule)
         if rule.possible_people:
-            placed = self._suspect(placed, observer, rule, at)
+            row = self._calibrations.row_of(frame.detector, "person")
+            placed = self._suspect(placed, observer, rule, at, row)
         placed = [
             self._doubt(_match_peer(one, observer, world, at), pose, observer)
             for one in placed
@@ -161,6 +170,7 @@ class People:
         observer: RobotState,
         rule: DetectionRule,
         at: Instant,
+        calibration: Calibration,
     ) -> list[Placed]:
         """Note all looks at everybody; raise faint people whom these confirm."""
         suspects = sorted(filter(_is_suspect, placed), key=_confidence, reverse=True)
@@ -172,6 +182,7 @@ class People:
             at,
             rule.threshold_of("person"),
             observer.recording,
+            calibration,
         )
         of = {id(one): looks for one, looks in zip(suspects, known, strict=True)}
         return [_looked_at(one, of.get(id(one))) for one in placed]

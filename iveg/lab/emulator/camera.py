@@ -79,6 +79,7 @@ class DetectorModel:
         ghost_confidence: How much less sure false boxes are.
         position: Deviation of a box for an encounter (m); ``jitter`` per frame (m).
         counts: By class; other classes have the counts of ``AGI``.
+        name: As its frames tell it; None: they do not.
     """
 
     confidence: float
@@ -88,6 +89,7 @@ class DetectorModel:
     position: float = 0.05
     jitter: float = 0.01
     counts: Mapping[str, Counts] = field(default_factory=lambda: FIELD_COUNTS)
+    name: str | None = None
 
     def counts_of(self, class_id: str) -> Counts:
         """The rates for a class."""
@@ -95,8 +97,8 @@ class DetectorModel:
 
 
 DETECTORS: Mapping[str, DetectorModel] = {
-    "field": DetectorModel(0.72),
-    "simulation": DetectorModel(0.85, spread=0.03),
+    "field": DetectorModel(0.72, name="field"),
+    "simulation": DetectorModel(0.85, spread=0.03, name="simulation"),
     "noisy": DetectorModel(0.80, 0.06, 0.06, 0.0, 0.10, 0.05, {}),
     "perfect": DetectorModel(0.95, 0.0, 0.0, 0.0, 0.0, 0.0, {}),
 }
@@ -182,6 +184,7 @@ class Detector:
 
     Attributes:
         lost: Classes of the targets of the last frame that have no position.
+        name: Of the network, as its frames tell it.
     """
 
     def __init__(
@@ -192,6 +195,7 @@ class Detector:
         place: Place | None = None,
     ) -> None:
         self.lost: tuple[str | None, ...] = ()
+        self.name = model.name
         self._place = place
         self._profile = profile
         self._model = model

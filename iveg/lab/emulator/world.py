@@ -157,7 +157,8 @@ class RobotHardware:
             x, y = self.false_person
             ghost = upright_box(pose, PERSON, x, y, _FALSE_PERSON_CONFIDENCE)
             found = (*found, ghost)
-        return DetectionFrame(self.robot_id, Origin(), found, self._detector.lost)
+        lost, name = self._detector.lost, self._detector.name
+        return DetectionFrame(self.robot_id, Origin(), found, lost, name)
 
     def part_seen(self, target: Target, around: "SimulatedWorld") -> float:
         """Visible share of a target from its camera, whatever the detector reports."""

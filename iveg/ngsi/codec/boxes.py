@@ -20,28 +20,33 @@ def read_frame(robot_id: str, attributes: Mapping[str, object]) -> DetectionFram
         boxes = [boxes]
     if not isinstance(boxes, list) or len(boxes) > payloads.MAX_BOXES:
         raise UnreadableError("bad_bounding_boxes", "neither a box nor a short list")
-    origin = Origin()
+    origin, detector = Origin(), None
     if attributes.get(names.BOXES_HEADER) is not None:
-        origin = read_origin(
-            payloads.OriginFields.model_validate(attributes[names.BOXES_HEADER])
+        header = payloads.BoxesHeaderValue.model_validate(
+            attributes[names.BOXES_HEADER]
         )
+        origin, detector = read_origin(header), header.detector
     try:
         read = list(map(_detection_of, _BOXES.validate_python(boxes)))
     except ValidationError:
         read = [_detection(box) for box in boxes]
-    return _frame(robot_id, origin, boxes, read)
+    return _frame(robot_id, origin, boxes, read, detector)
 
 
 def _frame(
-    robot_id: str, origin: Origin, boxes: list[object], read: list[Detection | None]
+    robot_id: str,
+    origin: Origin,
+    boxes: list[object],
+    read: list[Detection | None],
+    detector: str | None = None,
 ) -> DetectionFrame:
     """What could be read of a frame, and the classes of the boxes that could not."""
     found = tuple(one for one in read if one is not None)
     if len(found) == len(boxes):
-        return DetectionFrame(robot_id, origin, found)
+        return DetectionFrame(robot_id, origin, found, (), detector)
     pairs = zip(boxes, read, strict=True)
     unread = tuple(_class_of(box) for box, detection in pairs if detection is None)
-    return DetectionFrame(robot_id, origin, found, unread)
+    return DetectionFrame(robot_id, origin, found, unread, detector)
 
 
 def _class_of(box: object) -> str | None:

@@ -78,10 +78,10 @@ def write_detections(value: DetectionFrame) -> bytes:
     ]
     # Somebody is there and nobody knows where: that must not look like an empty frame.
     boxes += write_unread(value.unread)
-    return _measure(
-        value.origin,
-        {names.BOXES: boxes, names.BOXES_HEADER: write_origin(value.origin)},
-    )
+    header = write_origin(value.origin)
+    if value.detector is not None:
+        header["detector"] = value.detector
+    return _measure(value.origin, {names.BOXES: boxes, names.BOXES_HEADER: header})
 
 
 def write_unread(unread: Iterable[str | None]) -> list[dict[str, object]]:

@@ -17,6 +17,7 @@ from iveg.domain.observations import (
 )
 from iveg.domain.rule.obstacles import Obstacles
 from iveg.domain.rule.speed_limits import LimitChange, SpeedLimits
+from iveg.domain.tracking.calibration import Calibrations
 from iveg.domain.tracking.people import People, Placed
 from iveg.domain.tracking.person import TrackedPerson
 from iveg.domain.tracking.sight import AllClear
@@ -47,6 +48,7 @@ class Scene:
         robots: As ``IVEG_ROBOTS`` names them, recordings included.
         now: Seconds since the start.
         replay: The map frame by which every message is marked.
+        calibrations: How sure a look of a detector makes.
     """
 
     robots: tuple[str, ...] = ("AGI", "AGII")
@@ -54,11 +56,12 @@ class Scene:
     rule: DetectionRule = field(default_factory=DetectionRule)
     now: float = 0.0
     replay: str | None = None
+    calibrations: Calibrations = field(default_factory=Calibrations)
     changes: list[LimitChange] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.world = World(fleet_of(*self.robots))
-        self.people = People(self.greenhouse)
+        self.people = People(self.greenhouse, calibrations=self.calibrations)
         plan = Plan.of(self.greenhouse)
         self.obstacles = Obstacles(self.world, self.people, plan)
         self.speed_limits = SpeedLimits(self.greenhouse, self.obstacles.seen)

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import pytest
 
+from iveg.domain.tracking.calibration import Calibration
 from iveg.domain.tracking.looks import (
     LOOK_S,
     MOST_SUSPECTS,
@@ -48,6 +49,20 @@ def test_one_look_is_as_sure_as_its_box() -> None:
     assert (looks.count, looks.least, looks.most, looks.over_s) == (1, 0.72, 0.72, 0.0)
     assert looks.probability == pytest.approx(0.72)
     assert not looks.confirmed
+
+
+@pytest.mark.parametrize(("offset", "confirmed"), [(-0.5, False), (0.5, True)])
+def test_looks_count_by_the_calibration_of_their_detector(
+    offset: float, confirmed: bool
+) -> None:
+    suspicions, row = Suspicions(), Calibration(offset)
+    suspicions.look("AGI", [seen(0.65)], at(0.0), 0.8, None, row)
+    (looks,) = suspicions.look("AGI", [seen(0.65)], at(LOOK_S), 0.8, None, row)
+
+    assert looks is not None
+    told = 2 * (math.log(0.65 / 0.35) + offset)
+    assert looks.probability == pytest.approx(1 / (1 + math.exp(-told)))
+    assert (looks.least, looks.most, looks.confirmed) == (0.65, 0.65, confirmed)
 
 
 def test_two_looks_are_surer_than_either() -> None:

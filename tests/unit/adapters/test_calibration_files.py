@@ -1,0 +1,74 @@
+import pytest
+
+from iveg.adapters.calibration_files import (
+    PAPER,
+    load_calibrations,
+    read_calibrations,
+)
+from iveg.domain.errors import DataFileError
+from iveg.domain.tracking.calibration import FARTHEST, PLAIN, logit
+
+ONE = """\
+[[calibrations]]
+class = "person"
+detector = "yolox"
+right = 36
+wrong = 6
+mean_confidence = 0.72
+"""
+
+
+def complaint(text: str) -> str:
+    with pytest.raises(DataFileError) as refused:
+        read_calibrations(text, "rows.toml")
+    return str(refused.value)
+
+
+def test_a_row_is_of_its_detector_and_right_as_often_as_was_counted() -> None:
+    rows = read_calibrations(ONE, "rows.toml")
+
+    odds = rows.row_of("yolox", "person").log_odds(0.72)
+    assert odds == pytest.approx(logit(36.5 / 43), abs=1e-9)
+    assert rows.row_of("ssd", "person") == rows.row_of(None, "person") == PLAIN
+
+
+def test_a_row_without_a_detector_is_of_all_that_have_none() -> None:
+    other = ONE.replace('detector = "yolox"\n', "").replace("right = 36", "right = 6")
+    rows = read_calibrations(ONE + other, "rows.toml")
+
+    assert rows.row_of("ssd", "person") == rows.row_of(None, "person")
+    assert (
+        rows.row_of("ssd", "person").offset < 0 < rows.row_of("yolox", "person").offset
+    )
+
+
+def test_nothing_counted_is_certain() -> None:
+    counts = ONE.replace("= 36", "= 9000000").replace("= 6", "= 0")
+
+    row = read_calibrations(counts, "rows.toml").row_of("yolox", "person")
+    assert row.offset == FARTHEST
+
+
+def test_confidences_count_as_told_where_nobody_counted() -> None:
+    assert load_calibrations("").row_of("field", "person") is PLAIN
+    assert load_calibrations(PAPER).row_of("field", "person").offset > 0.0
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "said"),
+    [
+        ("right = 36", "rihgt = 36", "rows.toml:4:1, calibrations[0].rihgt"),
+        ("right = 36", "right = -1", "rows.toml:4:1, calibrations[0].right"),
+        ("= 0.72", "= 1.0", "rows.toml:6:1, calibrations[0].mean_confidence"),
+        ("= 0.72", "= nan", "rows.toml:6:1"),
+        ('"person"', '"robot"', "rows.toml:2:1, calibrations[0].class"),
+        ('"yolox"', '""', "rows.toml:3:1, calibrations[0].detector"),
+        ("right = 36\nwrong = 6", "right = 0\nwrong = 0", "counts no box"),
+        ("[[calibrations]]", "[calibrations]", "rows.toml:1:1"),
+        (ONE, ONE + ONE, "rows.toml:8:1, calibrations[1].class: is of a detector"),
+        (ONE, "", "calibrations"),
+        (ONE, "right", "rows.toml:1:"),
+    ],
+)
+def test_a_complaint_names_the_line(before: str, after: str, said: str) -> None:
+    assert said in complaint(ONE.replace(before, after))
