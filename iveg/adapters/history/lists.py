@@ -1,4 +1,4 @@
-"""Lists of records, newest first, in pages that stay in step while rows are added.
+"""Lists of records in pages that stay in step while rows are added.
 
 A page ends in a cursor that names its last row, not a count of rows, so that neither
 new rows nor deep pages make the next one wrong or slow.
@@ -6,9 +6,9 @@ new rows nor deep pages make the next one wrong or slow.
 
 import base64
 import binascii
-from collections.abc import Iterator
-from dataclasses import dataclass, fields, replace
-from typing import Generic, TypeVar
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, Generic, TypeVar
 
 import orjson
 from sqlalchemy import (
@@ -17,6 +17,8 @@ from sqlalchemy import (
     Connection,
     RowMapping,
     Table,
+    and_,
+    func,
     literal,
     or_,
     select,
@@ -38,16 +40,22 @@ from iveg.domain.records import (
 )
 
 USUAL_ROWS, MOST_ROWS = 100, 1000
+BY_TIME, NEWEST_FIRST = "at", "-at"
 
 R = TypeVar("R", bound=Record)
 
 
 @dataclass(frozen=True, slots=True)
 class Cursor:
-    """The last row of a page: its time and what tells it from others of that time."""
+    """The last row of a page: its time and what tells it from others of that time.
+
+    Attributes:
+        group: Its value in the column that the list is sorted by; None: by time.
+    """
 
     at: float
     key: int | str
+    group: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,6 +68,8 @@ class Filter:
         person: Id of a person.
         min_probability: Inclusive, 0 to 1.
         limit: Rows of a page.
+        sort: ``at``, or one of the list's ``sorts``, a ``-`` before it for downwards;
+            rows of one value are newest first.
     """
 
     since: float | None = None
@@ -70,11 +80,12 @@ class Filter:
     min_probability: float | None = None
     limit: int = USUAL_ROWS
     cursor: Cursor | None = None
+    sort: str = NEWEST_FIRST
 
 
 @dataclass(frozen=True, slots=True)
 class Page(Generic[R]):
-    """Some rows, newest first, and where the next page starts; None at the end."""
+    """Some rows in their order, and where the next page starts; None at the end."""
 
     items: tuple[R, ...]
     next: Cursor | None
@@ -88,6 +99,7 @@ class ListOf(Generic[R]):
         at: The column that orders it; ``key`` settles equal times.
         classes: Columns that the class filter looks at.
         which: Rows that are in the list at all; None: every one of the table.
+        sorts: Columns that it can be sorted by beside its time, by name.
     """
 
     kind: type[R]
@@ -97,6 +109,7 @@ class ListOf(Generic[R]):
     classes: tuple[Column[str], ...] = ()
     probability: Column[float] | None = None
     which: ColumnElement[bool] | None = None
+    sorts: Mapping[str, Column[str]] = field(default_factory=dict)
 
 
 DECISIONS = ListOf(
@@ -106,6 +119,7 @@ DECISIONS = ListOf(
     tables.decisions.c.decision_id,
     (tables.decisions.c.class_, tables.decisions.c.class_id),
     tables.decisions.c.confidence,
+    sorts={"robot": tables.decisions.c.robot_id},
 )
 DETECTIONS = ListOf(
     DetectionRecord,
@@ -127,12 +141,14 @@ COMMANDS = ListOf(
     tables.commands,
     tables.commands.c.requested_at,
     tables.commands.c.command_id,
+    sorts={"robot": tables.commands.c.robot_id, "kind": tables.commands.c.kind},
 )
 ALERTS = ListOf(
     AlertRecord,
     tables.alerts,
     tables.alerts.c.last_raised_at,
     tables.alerts.c.alert_id,
+    sorts={"robot": tables.alerts.c.robot_id, "priority": tables.alerts.c.priority},
 )
 LOG = ListOf(
     LogRecord,
@@ -140,6 +156,7 @@ LOG = ListOf(
     tables.log.c.at,
     tables.log.c.row_id,
     (tables.log.c.class_,),
+    sorts={"robot": tables.log.c.robot_id, "kind": tables.log.c.kind},
 )
 
 READINGS = ListOf(
@@ -161,10 +178,11 @@ MEASUREMENTS = ListOf(
 def read_page(connection: Connection, of: ListOf[R], asked: Filter) -> Page[R]:
     """One page of a list."""
     limit = min(max(asked.limit, 1), MOST_ROWS)
+    group = _group(of, asked.sort)
     statement = (
         select(of.table)
-        .where(*conditions(of, asked))
-        .order_by(of.at.desc(), of.key.desc())
+        .where(*conditions(of, asked), *_after(of, group, asked))
+        .order_by(*_order(of, group, asked.sort))
         .limit(limit + 1)
     )
     rows = connection.execute(statement).mappings().all()
@@ -172,7 +190,46 @@ def read_page(connection: Connection, of: ListOf[R], asked: Filter) -> Page[R]:
     if len(rows) <= limit:
         return Page(items, None)
     last = rows[limit - 1]
-    return Page(items, Cursor(last[of.at], last[of.key]))
+    value = None if group is None else last[of.sorts[_name(asked.sort)]] or ""
+    return Page(items, Cursor(last[of.at], last[of.key], value))
+
+
+def _name(sort: str) -> str:
+    return sort.removeprefix("-")
+
+
+def _group(of: ListOf[R], sort: str) -> ColumnElement[str] | None:
+    """What a list is sorted by before its time; None: by that alone."""
+    if _name(sort) == BY_TIME:
+        return None
+    return func.coalesce(of.sorts[_name(sort)], "")
+
+
+def _order(
+    of: ListOf[R], group: ColumnElement[str] | None, sort: str
+) -> Iterator[ColumnElement[Any]]:
+    falls = sort.startswith("-")
+    if group is not None:
+        yield group.desc() if falls else group.asc()
+        falls = True
+    for column in (of.at, of.key):
+        yield column.desc() if falls else column.asc()
+
+
+def _after(
+    of: ListOf[R], group: ColumnElement[str] | None, asked: Filter
+) -> Iterator[ColumnElement[bool]]:
+    """What comes after the cursor."""
+    if (cursor := asked.cursor) is None:
+        return
+    falls = asked.sort.startswith("-")
+    place = tuple_(of.at, of.key)
+    last = tuple_(literal(cursor.at), literal(cursor.key))
+    if group is None:
+        yield place < last if falls else place > last
+    else:
+        beyond = group < cursor.group if falls else group > cursor.group
+        yield or_(beyond, and_(group == cursor.group, place < last))
 
 
 def conditions(of: ListOf[R], asked: Filter) -> Iterator[ColumnElement[bool]]:
@@ -191,9 +248,6 @@ def conditions(of: ListOf[R], asked: Filter) -> Iterator[ColumnElement[bool]]:
         yield or_(*(column == asked.class_ for column in of.classes))
     if asked.min_probability is not None and of.probability is not None:
         yield of.probability >= asked.min_probability
-    if asked.cursor is not None:
-        last = (literal(asked.cursor.at), literal(asked.cursor.key))
-        yield tuple_(of.at, of.key) < tuple_(*last)
 
 
 def record_of(kind: type[R], row: RowMapping) -> R:
@@ -205,7 +259,8 @@ def record_of(kind: type[R], row: RowMapping) -> R:
 
 def write_cursor(cursor: Cursor) -> str:
     """A cursor as opaque text that fits into a URL."""
-    text = base64.urlsafe_b64encode(orjson.dumps([cursor.at, cursor.key]))
+    group = () if cursor.group is None else (cursor.group,)
+    text = base64.urlsafe_b64encode(orjson.dumps([cursor.at, cursor.key, *group]))
     return text.decode().rstrip("=")
 
 
@@ -217,12 +272,13 @@ def read_cursor(text: str, of: ListOf[R]) -> Cursor:
     """
     try:
         padded = text.encode("ascii") + b"=" * (-len(text) % 4)
-        at, key = orjson.loads(base64.urlsafe_b64decode(padded))
+        at, key, *group = orjson.loads(base64.urlsafe_b64decode(padded))
     except (ValueError, TypeError, binascii.Error) as error:
         raise UnreadableError("bad_cursor") from error
-    if not isinstance(at, float) or not _is_key(key, of):
+    is_group = [*map(type, group)] in ([], [str]) and "".join(group).isprintable()
+    if not (isinstance(at, float) and _is_key(key, of) and is_group):
         raise UnreadableError("bad_cursor")
-    return Cursor(at, key)
+    return Cursor(at, key, *group)
 
 
 def _is_key(key: object, of: ListOf[R]) -> bool:

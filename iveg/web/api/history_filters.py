@@ -110,6 +110,13 @@ class Filters(RowFilters):
     cursor: str | None = Field(
         None, max_length=200, description="`next` of the page before"
     )
+    sort: str = Field(
+        lists.NEWEST_FIRST,
+        max_length=16,
+        pattern=r"^-?[a-z]+$",
+        description="`at`; of decisions, orders, alerts and log also `robot`, of "
+        "orders and log `kind`, of alerts `priority`; `-` before it: downwards",
+    )
     language: Literal["es", "en"] | None = Field(
         None,
         description="CSV as that reader's spreadsheet expects it, with sentences",
@@ -139,8 +146,13 @@ def filter_of(filters: Filters, of: ListOf[R]) -> Filter:
     """The question to the database.
 
     Raises:
-        RequestValidationError: the cursor belongs to another list, or to none.
+        RequestValidationError: the list cannot be sorted so; the cursor belongs to
+            another list or order, or to none.
     """
+    name = filters.sort.removeprefix("-")
+    if name not in (lists.BY_TIME, *of.sorts):
+        names = ", ".join((lists.BY_TIME, *of.sorts))
+        raise _invalid("sort", f"one of {names}, with or without a - before it")
     return Filter(
         since=_seconds(filters.since),
         until=_seconds(filters.until),
@@ -149,7 +161,8 @@ def filter_of(filters: Filters, of: ListOf[R]) -> Filter:
         person=filters.person,
         min_probability=filters.min_probability,
         limit=filters.limit or lists.USUAL_ROWS,
-        cursor=_cursor(filters.cursor, of),
+        cursor=_cursor(filters.cursor, of, by_time=name == lists.BY_TIME),
+        sort=filters.sort,
     )
 
 
@@ -174,13 +187,16 @@ def _seconds(moment: datetime | None) -> float | None:
     return None if moment is None else moment.timestamp()
 
 
-def _cursor(text: str | None, of: ListOf[R]) -> Cursor | None:
+def _cursor(text: str | None, of: ListOf[R], *, by_time: bool) -> Cursor | None:
     if text is None:
         return None
     try:
-        return lists.read_cursor(text, of)
+        cursor = lists.read_cursor(text, of)
     except UnreadableError as error:
         raise _invalid("cursor", "not a cursor of this list") from error
+    if (cursor.group is None) != by_time:
+        raise _invalid("cursor", "a cursor of another order")
+    return cursor
 
 
 def _invalid(name: str, why: str) -> RequestValidationError:

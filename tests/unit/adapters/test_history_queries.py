@@ -96,6 +96,33 @@ async def test_pages_of_text_ids_stay_in_step_too(
     assert second.next is None
 
 
+@pytest.mark.parametrize(
+    ("sort", "found"),
+    [
+        ("-at", "43210"),
+        ("at", "01234"),
+        # Newest first of each robot; a line of no robot is before the first.
+        ("robot", "42031"),
+        ("-robot", "31204"),
+    ],
+)
+async def test_28_9_a_sorted_list_keeps_its_order_over_pages_and_new_rows(
+    queries: Queries, database_url: str, sort: str, found: str
+) -> None:
+    robots = ("AGI", "AGII", "AGI", "AGII", None)
+    lines = [log_record(id=n, at=NOON, robot_id=r) for n, r in enumerate(robots)]
+    remember(database_url, *lines)
+
+    ids, cursor = "", None
+    for _ in range(5):
+        page = await queries.log(Filter(limit=1, sort=sort, cursor=cursor))
+        ids, cursor = ids + "".join(str(one.id) for one in page.items), page.next
+        if sort == "-at" and len(ids) == 1:
+            remember(database_url, log_record(id=9, at=NOON + 1))
+
+    assert (ids, cursor) == (found, None)
+
+
 async def test_a_full_last_page_is_the_end(queries: Queries, database_url: str) -> None:
     remember(database_url, log_record(id=1), log_record(id=2))
 

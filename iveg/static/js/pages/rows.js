@@ -7,6 +7,7 @@
 import { readApi } from "../core/api.js";
 import { make, need, setHidden, setText } from "../panels/dom.js";
 import { createFilters } from "./filters.js";
+import { createSorting } from "./sorting.js";
 
 const ROWS = 50;
 
@@ -26,6 +27,8 @@ export function createRows({ name, path, i18n, cells, admits = () => true, onIte
   let status = 200;
   let isLoaded = false;
   const filters = createFilters(name, { onRobot: load, onSearch: draw });
+  const sorting = createSorting(name, load);
+  const asks = () => filters.query() + sorting.query();
 
   function draw() {
     const shown = items.filter(admits).map(makeRow).filter(filters.admits);
@@ -51,11 +54,11 @@ export function createRows({ name, path, i18n, cells, admits = () => true, onIte
     return row;
   }
 
-  /** Null also where another robot has been asked for since. @param {string} query */
+  /** Null also where other rows have been asked for since. @param {string} query */
   async function read(query) {
-    const asked = filters.query();
+    const asked = asks();
     const answer = await readApi(`${path}?limit=${ROWS}${asked}${query}`);
-    if (asked !== filters.query()) return null;
+    if (asked !== asks()) return null;
     status = answer.status;
     isLoaded = true;
     return /** @type {Listing | null} */ (status === 200 ? answer.body : null);

@@ -341,6 +341,24 @@ async def test_pages_follow_each_other_by_cursor(
     assert rest["next"] is None
 
 
+async def test_28_9_a_list_is_sorted_and_a_cursor_is_of_one_order(
+    client: httpx.AsyncClient, past: Past
+) -> None:
+    kinds = ("person", "alert", "person")
+    past.holds(*(log_record(id=n, at=NOON + n, kind=k) for n, k in enumerate(kinds)))
+
+    async def ask(**params: str) -> httpx.Response:
+        return await client.get("/api/v1/log", params={"limit": "2", **params})
+
+    first = (await ask(sort="-kind")).json()
+    rest = (await ask(sort="-kind", cursor=first["next"])).json()
+    others = [await ask(cursor=first["next"]), await ask(sort="priority")]
+
+    assert [one["id"] for one in first["items"] + rest["items"]] == [2, 0, 1]
+    assert [one.status_code for one in others] == [422, 422]
+    assert "one of at, robot, kind" in others[1].text
+
+
 @pytest.mark.parametrize(
     ("query", "ids"),
     [
@@ -380,6 +398,8 @@ async def test_filters_are_read_from_the_address(
         "limit=1001",
         "limit=ten",
         "cursor=nonsense",
+        "sort=robot",
+        "sort=--at",
         "format=xml",
         "probability=0.5",
     ],
