@@ -338,7 +338,7 @@ def _without_login(text: str) -> str:
     return re.sub(r"//[^/]*@", "//(hidden)@", text)
 
 
-def _write(value: Any) -> str:
+def _write(value: object) -> str:
     if isinstance(value, bool):
         return "on" if value else "off"
     if isinstance(value, tuple):

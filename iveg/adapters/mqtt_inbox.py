@@ -97,7 +97,7 @@ class InboxClient(aiomqtt.Client):
         async for _ in self.messages:
             """Nothing that anybody subscribes to comes this way."""
 
-    def _on_socket_open(self, client: paho.Client, userdata: Any, sock: Any) -> None:
+    def _on_socket_open(self, client: paho.Client, userdata: object, sock: Any) -> None:
         # Paho reads from this; it has no public way to say which socket.
         line = client._sock = ReadAhead(sock, self._take)
         super()._on_socket_open(client, userdata, line)

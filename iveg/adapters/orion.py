@@ -60,7 +60,7 @@ class OrionClient(OrionSubscriptions):
     async def update_command(
         self,
         robot_id: str,
-        value: Mapping[str, Any],
+        value: Mapping[str, object],
         timeout_s: float = 1.5,
         name: str = names.COMMAND,
     ) -> None:

@@ -12,7 +12,7 @@ import signal
 import socket
 import sys
 from collections.abc import Coroutine
-from typing import Any, TextIO
+from typing import TextIO
 
 import segno
 import uvloop
@@ -24,13 +24,13 @@ LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
 
 def run_until_stopped(
-    work: Coroutine[Any, Any, None], *, until_eof: bool = False
+    work: Coroutine[object, object, None], *, until_eof: bool = False
 ) -> int:
     """Run until the end or the first signal; returns the exit code."""
     return uvloop.run(_guard(work, until_eof=until_eof))
 
 
-async def _guard(work: Coroutine[Any, Any, None], *, until_eof: bool) -> int:
+async def _guard(work: Coroutine[object, object, None], *, until_eof: bool) -> int:
     loop = asyncio.get_running_loop()
     task = asyncio.create_task(work, name="part")
     for number in (signal.SIGINT, signal.SIGTERM):

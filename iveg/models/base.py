@@ -1,6 +1,6 @@
 """Base of all models: frozen, only declared fields, encoded by orjson."""
 
-from typing import Any, Generic, TypeVar
+from typing import Generic, TypeVar
 
 import orjson
 from pydantic import BaseModel, ConfigDict
@@ -34,12 +34,12 @@ class Listing(Model, Generic[M]):
     next: str | None = None
 
 
-def write_json(value: Any) -> bytes:
+def write_json(value: object) -> bytes:
     """Models, and whatever holds them, as JSON."""
     return orjson.dumps(value, default=_plain)
 
 
-def _plain(value: object) -> Any:
+def _plain(value: object) -> object:
     if isinstance(value, Model):
         return orjson.Fragment(value.model_dump_json())
     raise TypeError(type(value).__name__)

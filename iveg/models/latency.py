@@ -1,7 +1,5 @@
 """Latency of messages from hop to hop (docs/interfaces/resources.md)."""
 
-from typing import Any
-
 from pydantic import Field
 
 from iveg.domain.latency.segments import Data, Segment, Window
@@ -137,7 +135,7 @@ class LatencyTable(Model):
     trace: LatencyTrace | None
     library: str = Field(description="Path of the script that draws the figures.")
     style_ids: list[str]
-    figures: dict[str, Any] = Field(
+    figures: dict[str, object] = Field(
         description=(
             "``bars``, ``cdf`` and ``trace`` as Plotly draws them; empty if unwanted."
         )

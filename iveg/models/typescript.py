@@ -128,14 +128,14 @@ def write_sensors() -> str:
     return f"{_SENSORS_HEAD}{''.join(map(_row, rows))}]);\n"
 
 
-def _row(members: Mapping[str, Any]) -> str:
+def _row(members: Mapping[str, object]) -> str:
     lines = "".join(
         f"    {name}: {json.dumps(value)},\n" for name, value in members.items()
     )
     return f"  {{\n{lines}  }},\n"
 
 
-def _shown(kind: Kind, sensor: Sensor) -> dict[str, Any]:
+def _shown(kind: Kind, sensor: Sensor) -> dict[str, object]:
     shown = quantities_of(kind.of)[sensor.shown]
     return {
         "name": kind.name,

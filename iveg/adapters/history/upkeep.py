@@ -3,7 +3,6 @@
 import asyncio
 from collections.abc import Callable, Coroutine
 from pathlib import Path
-from typing import Any
 
 from iveg.adapters import clock
 from iveg.adapters.disk import disk_space
@@ -44,7 +43,7 @@ class RecordedHistory:
         directory: Path,
         stopwatch: Callable[[], float] = clock.mono,
         read_space: Callable[[Path], DiskSpace] = disk_space,
-        drop_recording: Callable[[], Coroutine[Any, Any, bool]] = _no_recording,
+        drop_recording: Callable[[], Coroutine[object, object, bool]] = _no_recording,
     ) -> None:
         self._recorder = recorder
         self._directory = directory

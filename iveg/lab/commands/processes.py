@@ -7,7 +7,7 @@ import signal
 import sys
 from collections.abc import Coroutine, Mapping
 from types import TracebackType
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from iveg.domain.errors import HopError
 
@@ -81,7 +81,7 @@ class Parts:
             process.kill()
             await process.wait()
 
-    async def outlast(self, work: Coroutine[Any, Any, T]) -> T:
+    async def outlast(self, work: Coroutine[object, object, T]) -> T:
         """Run ``work`` while all parts run.
 
         Raises:

@@ -93,7 +93,7 @@ class RobotConfig:
 
 # --- values -------------------------------------------------------------------------
 
-_Reader = Callable[[object], Any]
+_Reader = Callable[[object], object]
 """Checks and converts a value; raises ValueError with what it must be."""
 
 

@@ -9,7 +9,7 @@ else passes beside them at once.
 import asyncio
 import logging
 from collections.abc import Awaitable, Callable, Coroutine, Iterable
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter, Depends, WebSocket, WebSocketDisconnect
 from starlette.websockets import WebSocketState
@@ -222,7 +222,7 @@ async def _watch(websocket: WebSocket, principal: Principal, line: Line) -> None
             return
 
 
-async def _sent(sending: Coroutine[Any, Any, None]) -> None:
+async def _sent(sending: Coroutine[object, object, None]) -> None:
     """Send; of a socket that has closed meanwhile a server says RuntimeError.
 
     Raises:
