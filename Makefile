@@ -13,7 +13,7 @@ WORKERS ?= 4
 SIDE_BY_SIDE = -n $(WORKERS) --dist loadscope --no-loadscope-reorder --max-worker-restart 0
 # What a site installs (run.lock), the demo and all that a test can ask for.
 LOCK = $(BIN)/uv pip compile --quiet --universal --generate-hashes --no-emit-index-url --no-header pyproject.toml
-ALL := bags postgresql ros2
+ALL := bags parquet postgresql ros2
 # No end for a test that takes hours.
 FOR_HOURS := -o faulthandler_timeout=0
 export PYTHONPATH := $(CURDIR)

@@ -12,6 +12,7 @@ from iveg.domain.errors import MissingExtraError
 
 EXTRAS: Final = {
     "bags": "rosbags",
+    "parquet": "pyarrow",
     "postgresql": "psycopg",
     "ros2": "cyclonedds",
 }

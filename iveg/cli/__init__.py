@@ -11,6 +11,7 @@ from iveg.cli.arguments import (
     Call,
     Command,
     add_db,
+    add_export,
     add_incident,
     add_replay,
     add_robot,
@@ -115,6 +116,12 @@ def _incident(call: Call) -> int:
     return run_incident(call.options)
 
 
+def _export(call: Call) -> int:
+    from iveg.cli.export import run_export
+
+    return run_export(call.options, call.settings, call.data)
+
+
 COMMANDS = (
     Command("serve", "the DSS and its page", _serve, add_serve),
     Command("replay", "recorded logs as robots", _replay, add_replay),
@@ -123,5 +130,6 @@ COMMANDS = (
     Command("doctor", "try every hop once and say what is broken", _doctor),
     Command("settings", "print docs/settings.md", _settings),
     Command("db", "the history's database", _db, add_db),
+    Command("export", "a list of the history as a file", _export, add_export),
     Command("incident", "verify an incident pack", _incident, add_incident),
 )

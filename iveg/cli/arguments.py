@@ -9,6 +9,7 @@ from pathlib import Path
 from iveg import __version__
 from iveg.domain.fleet import is_robot_id
 from iveg.domain.geometry import Pose2D
+from iveg.models.dictionary import LISTS
 from iveg.settings import Settings
 
 _FARTHEST_M = 1e6
@@ -85,6 +86,16 @@ def add_incident(incident: argparse.ArgumentParser) -> None:
     actions = incident.add_subparsers(dest="action", required=True)
     verify = actions.add_parser("verify", help="whether a pack is as it was made")
     verify.add_argument("file", type=Path, metavar="FILE")
+
+
+def add_export(export: argparse.ArgumentParser) -> None:
+    """Arguments of ``iveg export``."""
+    export.add_argument("list", choices=list(LISTS), help="of the history")
+    for end in ("since", "until"):
+        export.add_argument(f"--{end}", metavar="MOMENT", help="ISO-8601")
+    export.add_argument("--robot", metavar="ID", help="of this robot alone")
+    export.add_argument("--format", choices=("csv", "ndjson", "parquet"), default="csv")
+    export.add_argument("--out", type=Path, metavar="FILE", help="else to the output")
 
 
 def add_replay(replay: argparse.ArgumentParser) -> None:

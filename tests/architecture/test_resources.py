@@ -9,6 +9,7 @@ from iveg.models.alert import AcknowledgedAlerts
 from iveg.models.base import Model
 from iveg.models.day import Day
 from iveg.models.device import Device
+from iveg.models.dictionary import DictionaryColumn
 from iveg.models.equipment import Measurement
 from iveg.models.odometry import OdometryRow
 from iveg.models.people import DetectionRow, KeptDetection
@@ -28,6 +29,7 @@ _SHOWN: tuple[type[Model], ...] = (
     OdometryRow,
     Measurement,
     Recording,
+    DictionaryColumn,
 )
 _, _DOCUMENT = models_json_schema([(model, "serialization") for model in _SHOWN])
 _SHAPES = _DOCUMENT["$defs"]

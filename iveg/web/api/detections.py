@@ -13,7 +13,7 @@ from iveg.pipeline.newest_detections import NewestDetections
 from iveg.web.api import exports
 from iveg.web.api.answers import FEW_ROWS, Apart
 from iveg.web.api.exports import MEDIA_TYPES, Form
-from iveg.web.api.history_filters import RowFilters, admitting
+from iveg.web.api.history_filters import NewestFilters, admitting
 from iveg.web.security.authentication import require
 
 
@@ -25,7 +25,7 @@ def router(newest: NewestDetections, worker: Apart) -> APIRouter:
 
     @routes.get("/detections/latest", response_model=Listing[DetectionRow])
     async def latest(
-        request: Request, asked: Annotated[RowFilters, Query()]
+        request: Request, asked: Annotated[NewestFilters, Query()]
     ) -> Response:
         """Each detection of the last moments, none left out, newest first."""
         form = asked.format or exports.form_of(request.headers)

@@ -10,25 +10,21 @@ never held in memory.
 import codecs
 import csv
 import io
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import fields
-from functools import partial
-from operator import attrgetter
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Literal, TypeVar
 
 from starlette.datastructures import Headers
 
 from iveg.domain.records import (
     AlertRecord,
-    ByTransport,
     DecisionRecord,
     LogRecord,
     Record,
 )
 from iveg.domain.stamps import format_stamp
-from iveg.domain.transports import TRANSPORTS, TransportId
 from iveg.models.base import Model, write_json
 from iveg.models.decision import sentence_of
+from iveg.models.dictionary import readers_of
 from iveg.web.pages.sentences import Sentences
 
 Form = Literal["json", "csv", "ndjson"]
@@ -61,7 +57,7 @@ def csv_head(kind: type[R], reader: Sentences | None = None) -> bytes:
         kind: What each row is.
         reader: Whose spreadsheet it is for; None for programs.
     """
-    head = [name.rstrip("_") for name, _ in _columns(kind)]
+    head = [name.rstrip("_") for name, _ in readers_of(kind)]
     if reader is None:
         return csv_lines([head])
     if _telling(kind, reader):
@@ -73,29 +69,13 @@ def csv_rows(
     kind: type[R], records: Iterable[R], reader: Sentences | None = None
 ) -> bytes:
     """Rows below that line, times in UTC."""
-    columns = list(_columns(kind))
+    columns = list(readers_of(kind))
     tell = None if reader is None else _telling(kind, reader)
     rows = []
     for record in records:
         row = [cell(name, read(record), reader) for name, read in columns]
         rows.append([tell(record), *row] if tell else row)
     return csv_lines(rows, reader)
-
-
-def _columns(kind: type[R]) -> Iterator[tuple[str, Callable[[R], object]]]:
-    """A column a field; of what is kept by transport one for each of the table."""
-    for one in fields(kind):
-        if one.type != ByTransport:
-            yield one.name, attrgetter(one.name)
-            continue
-        # Programs that read by position know this order.
-        for transport in reversed(TRANSPORTS):
-            name = one.name.replace("_at", f"_{transport.id}_at")
-            yield name, partial(_of_transport, one.name, transport.id)
-
-
-def _of_transport(name: str, transport: TransportId, record: R) -> object:
-    return getattr(record, name).get(transport)
 
 
 def _telling(kind: type[R], reader: Sentences) -> Callable[[Any], str] | None:

@@ -6,23 +6,28 @@ Lists answer JSON, CSV or NDJSON, as ``Accept`` or ``format`` says.
 from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Annotated, Any, Generic, TypeVar
+from secrets import token_hex
+from typing import Annotated, Any, Generic, Literal, TypeVar
 
 from fastapi import APIRouter, Depends, HTTPException, Path, Query, Request, Response
 from fastapi.responses import StreamingResponse
 from orjson import Fragment
 
 from iveg.adapters import clock
+from iveg.adapters.extras import require_extra
 from iveg.adapters.history import lists
 from iveg.adapters.history.lists import Filter, ListOf, Page
 from iveg.adapters.history.queries import Queries
+from iveg.adapters.parquet import parquet_end, parquet_page
 from iveg.domain.alerts.flood import FloodState as NoFlood
+from iveg.domain.errors import MissingExtraError
 from iveg.domain.fleet import NOBODY, FleetDescription
 from iveg.domain.records import CommandRecord, DecisionRecord, Record
 from iveg.models.alert import Alert, AlertListing, Flood, LogEntry
 from iveg.models.base import Listing, Model, write_json
 from iveg.models.command import Command
 from iveg.models.decision import Decision
+from iveg.models.dictionary import DictionaryColumn, dictionary_columns
 from iveg.models.equipment import Measurement
 from iveg.models.odometry import OdometryRow
 from iveg.models.people import DetectionRow
@@ -40,13 +45,17 @@ from iveg.web.security.authentication import require
 R = TypeVar("R", bound=Record)
 _DAY_S = 86_400.0
 _FOR_GOOD = "public, max-age=31536000, immutable"
-_CSV_AND_NDJSON: dict[str, dict[str, str]] = {
-    MEDIA_TYPES[form]: {} for form in ("csv", "ndjson")
+FileForm = Form | Literal["parquet"]
+_PARQUET = "application/vnd.apache.parquet"
+_FILES: dict[str, dict[str, str]] = {
+    MEDIA_TYPES["csv"]: {},
+    MEDIA_TYPES["ndjson"]: {},
+    _PARQUET: {},
 }
 
 
 @dataclass(frozen=True, slots=True)
-class _List(Generic[R]):
+class HistoryList(Generic[R]):
     """One list: its source and its models; ``more`` stands beside it.
 
     Attributes:
@@ -92,7 +101,7 @@ def router(
         read_clock: What "the last 15 minutes" end at.
     """
     routes = APIRouter(dependencies=[Depends(require("read"))], tags=["history"])
-    for one in _lists(queries, flood):
+    for one in lists_of(queries, flood):
         _add_list(routes, one, worker)
 
     @routes.get(
@@ -108,17 +117,29 @@ def router(
             raise HTTPException(404, "There is no such decision.")
         return Json(Decision.of_record(found))
 
+    @routes.get(
+        "/api/v1/exports/dictionary",
+        summary="What each column of an exported list means",
+        response_model=Listing[DictionaryColumn],
+    )
+    async def dictionary() -> Listing[DictionaryColumn]:
+        return Listing(items=dictionary_columns())
+
     figures.add_routes(routes, queries, worker, threshold, fleet, read_clock)
     return routes
 
 
-def _lists(queries: Queries, flood: Callable[[], Flood]) -> tuple[_List[Any], ...]:
+def lists_of(
+    queries: Queries, flood: Callable[[], Flood] = lambda: Flood.of(NoFlood())
+) -> tuple[HistoryList[Any], ...]:
+    """All lists of the history."""
+
     async def steps_of(records: Sequence[CommandRecord]) -> list[Any]:
         steps = await queries.steps_of([one.command_id for one in records])
         return [steps.get(one.command_id, ()) for one in records]
 
     return (
-        _List(
+        HistoryList(
             "decisions",
             lists.DECISIONS,
             queries.decisions,
@@ -126,7 +147,7 @@ def _lists(queries: Queries, flood: Callable[[], Flood]) -> tuple[_List[Any], ..
             Listing[Decision],
             "Why robots were slowed, by when it began",
         ),
-        _List(
+        HistoryList(
             "commands",
             lists.COMMANDS,
             queries.commands,
@@ -135,7 +156,7 @@ def _lists(queries: Queries, flood: Callable[[], Flood]) -> tuple[_List[Any], ..
             "Every STOP, release and resume, by when it was asked",
             beside=steps_of,
         ),
-        _List(
+        HistoryList(
             "alerts",
             lists.ALERTS,
             queries.alerts,
@@ -144,7 +165,7 @@ def _lists(queries: Queries, flood: Callable[[], Flood]) -> tuple[_List[Any], ..
             "Every alert, by when it was last raised, and how fast they come",
             lambda: {"flood": flood()},
         ),
-        _List(
+        HistoryList(
             "log",
             lists.LOG,
             queries.log,
@@ -156,10 +177,10 @@ def _lists(queries: Queries, flood: Callable[[], Flood]) -> tuple[_List[Any], ..
     )
 
 
-def _measured(queries: Queries) -> tuple[_List[Any], ...]:
+def _measured(queries: Queries) -> tuple[HistoryList[Any], ...]:
     """Lists of what was measured; each column of the CSV is a key of the JSON."""
     return (
-        _List(
+        HistoryList(
             "detections",
             lists.DETECTIONS,
             queries.detections,
@@ -167,7 +188,7 @@ def _measured(queries: Queries) -> tuple[_List[Any], ...]:
             Listing[DetectionRow],
             "What robots saw, by when it reached iVeg",
         ),
-        _List(
+        HistoryList(
             "tracks",
             lists.TRACKS,
             queries.tracks,
@@ -175,7 +196,7 @@ def _measured(queries: Queries) -> tuple[_List[Any], ...]:
             Listing[DetectionRow],
             "Where people were: their detections, by when each reached iVeg",
         ),
-        _List(
+        HistoryList(
             "odometry",
             lists.ODOMETRY,
             queries.odometry,
@@ -183,7 +204,7 @@ def _measured(queries: Queries) -> tuple[_List[Any], ...]:
             Listing[OdometryRow],
             "Poses and speeds of robots with their speed limits, twice a second",
         ),
-        _List(
+        HistoryList(
             "readings",
             lists.READINGS,
             queries.readings,
@@ -191,7 +212,7 @@ def _measured(queries: Queries) -> tuple[_List[Any], ...]:
             Listing[Reading],
             "What small sensors of robots said; `class` asks for a kind, as `battery`",
         ),
-        _List(
+        HistoryList(
             "measurements",
             lists.MEASUREMENTS,
             queries.measurements,
@@ -202,13 +223,13 @@ def _measured(queries: Queries) -> tuple[_List[Any], ...]:
     )
 
 
-def _add_list(routes: APIRouter, one: _List[R], worker: Apart) -> None:
+def _add_list(routes: APIRouter, one: HistoryList[R], worker: Apart) -> None:
     @routes.get(
         f"/api/v1/{one.path}",
         name=one.path,
         summary=one.says,
         response_model=one.listing,
-        responses={200: {"content": _CSV_AND_NDJSON}},
+        responses={200: {"content": _FILES}},
     )
     async def listing(
         request: Request, filters: Annotated[Filters, Query()]
@@ -220,7 +241,7 @@ def _add_list(routes: APIRouter, one: _List[R], worker: Apart) -> None:
         return await _file(one, filters, asked, form, worker)
 
 
-async def _listing(page: Page[R], one: _List[R], worker: Apart) -> Response:
+async def _listing(page: Page[R], one: HistoryList[R], worker: Apart) -> Response:
     after = None if page.next is None else lists.write_cursor(page.next)
     rows = await one.rows(page.items)
     if len(rows) <= FEW_ROWS:
@@ -235,21 +256,26 @@ def _write_items(model: Callable[..., Model], rows: Sequence[tuple[Any, ...]]) -
 
 
 async def _file(
-    one: _List[R], filters: Filters, asked: Filter, form: Form, worker: Apart
+    one: HistoryList[R], filters: Filters, asked: Filter, form: FileForm, worker: Apart
 ) -> Response:
     """A whole list as a file; with a limit, that many rows of it."""
+    if form == "parquet":
+        _require_parquet()
     if filters.limit is None:
         asked = replace(asked, limit=lists.MOST_ROWS)
     # The first page is read before the answer begins, so that a refusal can be told.
     first = await one.ask(asked)
-    pages = _pages(one, first, asked, whole=filters.limit is None)
-    if form == "csv":
+    pages = pages_of(one, first, asked, whole=filters.limit is None)
+    if form == "parquet":
+        body = _parquet(one.path, pages, worker)
+    elif form == "csv":
         body = _csv(one.of.kind, pages, filters.language, worker)
     else:
         body = _ndjson(one, pages, worker)
     name = f"{one.path}{_day(asked) if filters.language else ''}.{form}"
     headers = {"Content-Disposition": f'attachment; filename="{name}"'}
-    return StreamingResponse(body, 200, headers, MEDIA_TYPES[form])
+    media_type = _PARQUET if form == "parquet" else MEDIA_TYPES[form]
+    return StreamingResponse(body, 200, headers, media_type)
 
 
 async def _csv(
@@ -268,10 +294,27 @@ def _csv_page(kind: type[R], records: Sequence[R], language: str | None) -> byte
 
 
 async def _ndjson(
-    one: _List[R], pages: AsyncIterator[Sequence[R]], worker: Apart
+    one: HistoryList[R], pages: AsyncIterator[Sequence[R]], worker: Apart
 ) -> AsyncIterator[bytes]:
     async for records in pages:
         yield await worker.run(exports.ndjson_rows, one.model, await one.rows(records))
+
+
+def _require_parquet() -> None:
+    try:
+        require_extra("parquet", "an export as Parquet")
+    except MissingExtraError as error:
+        raise HTTPException(501, str(error)) from error
+
+
+async def _parquet(
+    name: str, pages: AsyncIterator[Sequence[Record]], worker: Apart
+) -> AsyncIterator[bytes]:
+    key, number = token_hex(8), 0
+    async for records in pages:
+        yield await worker.run(parquet_page, key, name, number, records)
+        number += 1
+    yield await worker.run(parquet_end, key, number)
 
 
 @cache
@@ -285,9 +328,10 @@ def _day(asked: Filter) -> str:
     return f"-{in_madrid(at):%Y-%m-%d}"
 
 
-async def _pages(
-    one: _List[R], page: Page[R], asked: Filter, *, whole: bool
+async def pages_of(
+    one: HistoryList[R], page: Page[R], asked: Filter, *, whole: bool
 ) -> AsyncIterator[Sequence[R]]:
+    """The first page and, where the whole list is wanted, all after it."""
     yield page.items
     while whole and page.next is not None:
         page = await one.ask(replace(asked, cursor=page.next))

@@ -101,6 +101,11 @@ class RowFilters(Range):
     limit: int | None = Field(
         None, ge=1, le=lists.MOST_ROWS, description="Rows of a page; 100 unless told"
     )
+
+
+class NewestFilters(RowFilters):
+    """Filters of a list that is in memory, and its form."""
+
     format: Form | None = Field(None, description="Instead of an `Accept` header")
 
 
@@ -116,6 +121,9 @@ class Filters(RowFilters):
         pattern=r"^-?[a-z]+$",
         description="`at`; of decisions, orders, alerts and log also `robot`, of "
         "orders and log `kind`, of alerts `priority`; `-` before it: downwards",
+    )
+    format: Form | Literal["parquet"] | None = Field(
+        None, description="Instead of an `Accept` header; Parquet is always whole"
     )
     language: Literal["es", "en"] | None = Field(
         None,

@@ -4,6 +4,7 @@ import importlib.resources
 import io
 import re
 import sqlite3
+import sys
 from collections.abc import AsyncIterator
 from contextlib import closing
 from dataclasses import replace
@@ -13,6 +14,7 @@ import httpx
 import orjson
 import pytest
 from fastapi import FastAPI
+from pyarrow import parquet
 
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.series import SpeedSeries
@@ -513,6 +515,35 @@ async def test_an_export_runs_through_every_page(
     assert len(some.text.splitlines()) == 7
 
 
+async def test_parquet_is_the_whole_list_or_a_problem_without_its_library(
+    client: httpx.AsyncClient, past: Past, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    past.holds(*(log_record(id=n, at=NOON + n) for n in range(2345)))
+
+    answer = await client.get("/api/v1/log", params={"format": "parquet"})
+
+    assert answer.headers["Content-Type"] == "application/vnd.apache.parquet"
+    table = parquet.read_table(io.BytesIO(answer.content))
+    assert table.column("id").to_pylist() == list(range(2345))[::-1]
+
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    refused = await client.get("/api/v1/log", params={"format": "parquet"})
+    assert refused.status_code == 501
+    assert "iveg[parquet]" in refused.json()["detail"]
+
+
+async def test_the_dictionary_tells_each_column_of_each_list(
+    client: httpx.AsyncClient,
+) -> None:
+    items = (await client.get("/api/v1/exports/dictionary")).json()["items"]
+
+    assert {one["list"] for one in items} == set(LISTS)
+    (told,) = (
+        one for one in items if (one["list"], one["column"]) == ("odometry", "linear")
+    )
+    assert (told["unit"], told["frame"], told["type"]) == ("m/s", "base_link", "number")
+
+
 @pytest.mark.parametrize(
     "accept", ["*/*", "text/html", "application/json, text/csv;q=0.9", "text/csv;q=x"]
 )
@@ -827,6 +858,7 @@ async def test_the_lists_are_described_for_integrators(past: Past) -> None:
         "application/json",
         "text/csv",
         "application/x-ndjson",
+        "application/vnd.apache.parquet",
     }
     fields = described["components"]["schemas"]["DetectionRow"]["properties"]
     assert {"class", "position", "transport"} <= set(fields)

@@ -1,0 +1,104 @@
+"""``iveg export``: a list of the history as a file, whatever its length."""
+
+import argparse
+import asyncio
+import contextlib
+import sys
+from collections.abc import AsyncIterator, Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from iveg.adapters.doctor import check_database
+from iveg.adapters.extras import require_extra
+from iveg.adapters.history.engine import history_url
+from iveg.adapters.history.lists import MOST_ROWS, Filter
+from iveg.adapters.history.queries import Queries
+from iveg.adapters.parquet import ParquetTable
+from iveg.domain.errors import HopError, SettingsError
+from iveg.domain.records import Record
+from iveg.domain.stamps import parse_stamp
+from iveg.settings import Settings
+from iveg.web.api import exports
+from iveg.web.api.history import HistoryList, lists_of, pages_of
+
+_Pages = AsyncIterator[Sequence[Record]]
+_MOMENT = "a moment as ISO-8601, in UTC unless it says otherwise"
+
+
+def run_export(options: argparse.Namespace, settings: Settings, data: Path) -> int:
+    """Write the file; returns the exit code.
+
+    Raises:
+        IvegError: it cannot be done.  Then there is no file.
+    """
+    if options.format == "parquet":
+        require_extra("parquet", "iveg export --format parquet")
+    url = history_url(settings.database_url, data)
+    since = _moment("--since", options.since)
+    until = _moment("--until", options.until)
+    if since is not None and until is not None and since > until:
+        raise SettingsError("--since", options.since, "a moment before --until")
+    asked = Filter(since=since, until=until, robot=options.robot, limit=MOST_ROWS)
+    check_database(url)
+    queries = Queries(url)
+    try:
+        _write(options, queries, asked)
+    finally:
+        queries.close()
+    return 0
+
+
+def _moment(option: str, text: str | None) -> float | None:
+    if text is None:
+        return None
+    found = parse_stamp(text)
+    if found is None:
+        raise SettingsError(option, text, _MOMENT)
+    return found
+
+
+def _write(options: argparse.Namespace, queries: Queries, asked: Filter) -> None:
+    (one,) = (one for one in lists_of(queries) if one.path == options.list)
+    if options.out is None:
+        asyncio.run(_export(one, asked, options.format, sys.stdout.buffer.write))
+        return
+    part = options.out.with_name(options.out.name + ".part")
+    try:
+        with part.open("wb") as file:
+            asyncio.run(_export(one, asked, options.format, file.write))
+        part.replace(options.out)
+    except OSError as error:
+        raise HopError("disk", error.strerror or str(error)) from error
+    finally:
+        with contextlib.suppress(OSError):
+            part.unlink(missing_ok=True)
+
+
+async def _export(
+    one: HistoryList[Any],
+    asked: Filter,
+    form: str,
+    write: Callable[[bytes], object],
+) -> None:
+    pages = pages_of(one, await one.ask(asked), asked, whole=True)
+    writers = {"csv": _csv, "ndjson": _ndjson, "parquet": _parquet}
+    async for piece in writers[form](one, pages):
+        write(piece)
+
+
+async def _csv(one: HistoryList[Any], pages: _Pages) -> AsyncIterator[bytes]:
+    yield exports.csv_head(one.of.kind)
+    async for records in pages:
+        yield exports.csv_rows(one.of.kind, records)
+
+
+async def _ndjson(one: HistoryList[Any], pages: _Pages) -> AsyncIterator[bytes]:
+    async for records in pages:
+        yield exports.ndjson_rows(one.model, await one.rows(records))
+
+
+async def _parquet(one: HistoryList[Any], pages: _Pages) -> AsyncIterator[bytes]:
+    table = ParquetTable(one.path)
+    async for records in pages:
+        yield table.add(records)
+    yield table.end()
