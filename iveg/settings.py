@@ -215,7 +215,7 @@ class Settings:
     keep_audit_days: Days = setting(
         "IVEG_KEEP_AUDIT_DAYS",
         Retention.audit,
-        "The audit trail of STOP, release and resume (days; 0: for ever).",
+        "The audit, by whole days, and the steps of orders (days; 0: for ever).",
     )
     recordings: Switch = setting(
         "IVEG_RECORDINGS",

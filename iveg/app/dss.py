@@ -41,6 +41,7 @@ from iveg.domain.messages import Channel
 from iveg.domain.observations import Instant
 from iveg.domain.stop.drills import Drills
 from iveg.domain.transports import DIRECT, FIWARE
+from iveg.pipeline.audit import AuditTrail
 from iveg.pipeline.build import Choices, Ports, build, build_services
 from iveg.pipeline.equipment import PART as EQUIPMENT
 from iveg.pipeline.latency import hours_of
@@ -109,11 +110,13 @@ class Dss:
         self.pipeline = build(fleet, greenhouse, self._ports(), choices)
         self.stores.inputs.rule = lambda: self.pipeline.evaluator.rule
         self.services = build_services(self.pipeline, kept, self._senders(), clock.now)
+        self.trail = AuditTrail(self.stores.recorder, new_id)
         self.upkeep = HistoryUpkeep(
             self.stores.retained(),
             settings.retention,
             self.pipeline.event_log,
             self.pipeline.supervision,
+            self.trail,
         )
         self.counted: list[Counter[str]] = [
             log_filter.counted,
@@ -201,6 +204,7 @@ class Dss:
             clock=clock.now,
             store=self.stores.sessions,
             link_name=settings.sign_in_name,
+            trail=self.trail,
         )
         orion = NotificationEndpoint(
             parts.ingest,
@@ -235,6 +239,7 @@ class Dss:
             new_id=new_id,
             worker=self.worker,
             recordings=self.stores.inputs,
+            trail=self.trail,
         )
 
     # --- life ---------------------------------------------------------------------

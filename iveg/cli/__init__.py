@@ -10,6 +10,7 @@ from iveg.app.laboratory import find_laboratory
 from iveg.cli.arguments import (
     Call,
     Command,
+    add_audit,
     add_db,
     add_export,
     add_incident,
@@ -122,6 +123,12 @@ def _export(call: Call) -> int:
     return run_export(call.options, call.settings, call.data)
 
 
+def _audit(call: Call) -> int:
+    from iveg.cli.audit import run_audit
+
+    return run_audit(call.options, call.settings, call.data)
+
+
 COMMANDS = (
     Command("serve", "the DSS and its page", _serve, add_serve),
     Command("replay", "recorded logs as robots", _replay, add_replay),
@@ -132,4 +139,5 @@ COMMANDS = (
     Command("db", "the history's database", _db, add_db),
     Command("export", "a list of the history as a file", _export, add_export),
     Command("incident", "verify an incident pack", _incident, add_incident),
+    Command("audit", "whether the audit is whole", _audit, add_audit),
 )

@@ -98,6 +98,13 @@ def add_export(export: argparse.ArgumentParser) -> None:
     export.add_argument("--out", type=Path, metavar="FILE", help="else to the output")
 
 
+def add_audit(audit: argparse.ArgumentParser) -> None:
+    """Arguments of ``iveg audit``."""
+    actions = audit.add_subparsers(dest="action", required=True)
+    actions.add_parser("verify", help="whether a row was changed or is missing")
+    actions.add_parser("end", help="number and hash of the newest row, to keep outside")
+
+
 def add_replay(replay: argparse.ArgumentParser) -> None:
     """Arguments of ``iveg replay``."""
     replay.add_argument("files", nargs="+", type=Path, metavar="FILE")

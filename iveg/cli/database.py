@@ -44,7 +44,7 @@ def run_db(options: argparse.Namespace, settings: Settings, data: Path) -> int:
         return 0
     check_database(url)
     if options.action == "stats":
-        print(*_told(_read(url, read_stats)), sep="\n")
+        print(*_told(read_history(url, read_stats)), sep="\n")
     elif options.action == "purge":
         asyncio.run(_purge(url, settings.retention, dry_run=options.dry_run))
     else:
@@ -54,12 +54,12 @@ def run_db(options: argparse.Namespace, settings: Settings, data: Path) -> int:
 
 
 async def _purge(url: str, retention: Retention, *, dry_run: bool) -> None:
-    recorded = _read(url, partial(recorded_days, most=retention.longest))
+    recorded = read_history(url, partial(recorded_days, most=retention.longest))
     cutoffs = retention.cutoffs(clock.wall(), recorded)
     store = Store(url)
     for step, before in _steps(cutoffs):
         if dry_run:
-            rows = _read(url, partial(count_due, step=step, before=before))
+            rows = read_history(url, partial(count_due, step=step, before=before))
         else:
             rows = await _remove(store, step, before)
         done = "places of" if step.kind == "positions" else "rows of"
@@ -85,7 +85,12 @@ async def _remove(store: Store, step: PurgeStep, before: float) -> int:
         await asyncio.sleep(_PAUSE_S)
 
 
-def _read(url: str, question: Callable[[Connection], _T]) -> _T:
+def read_history(url: str, question: Callable[[Connection], _T]) -> _T:
+    """The answer of the history's database.
+
+    Raises:
+        HopError: it does not answer.
+    """
     engine = reading_engine(url)
     try:
         with engine.connect() as connection:

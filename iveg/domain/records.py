@@ -281,6 +281,37 @@ class MeasurementRecord:
     unit: str
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AuditRecord:
+    """Who did what, to what: a row of the audit, never changed (``domain.audit``).
+
+    Attributes:
+        audit_id: Its own; a row that is offered twice is stored once.
+        at: When it happened; ``stored_at`` when it got its place in the chain.
+        person: Id of the account; ``name``, ``role`` and ``method`` (of signing in)
+            as they were then.
+        action: Such as ``stop`` or ``sign_in_refused``.
+        subject: What it was done to, such as a robot's id.
+        details: Canonical JSON.
+        seq: Place in the chain, from 1 without a gap; 0 until it has one.
+        previous_hash: Of the row before; ``hash`` its own (hex).
+    """
+
+    audit_id: str
+    at: float
+    person: str
+    name: str
+    role: str
+    method: str
+    action: str
+    subject: str = ""
+    details: str = "{}"
+    seq: int = 0
+    stored_at: float = 0.0
+    previous_hash: str = ""
+    hash: str = ""
+
+
 Record = (
     DecisionRecord
     | DetectionRecord
@@ -293,6 +324,7 @@ Record = (
     | LatencyRecord
     | ReadingRecord
     | MeasurementRecord
+    | AuditRecord
 )
 RECORD_TYPES: tuple[type[Record], ...] = (
     DecisionRecord,
@@ -306,6 +338,7 @@ RECORD_TYPES: tuple[type[Record], ...] = (
     LatencyRecord,
     ReadingRecord,
     MeasurementRecord,
+    AuditRecord,
 )
 
 

@@ -42,6 +42,7 @@ PURGE_STEPS = (
     PurgeStep("decisions", "alerts"),
     PurgeStep("decisions", "log"),
     PurgeStep("audit", "command_events"),
+    PurgeStep("audit", "audit"),
 )
 """In this order; docs/deployment.md, "How long the history keeps what"."""
 
@@ -54,7 +55,7 @@ class Retention:
         positions: Until people's places go from detections, decisions and log.
         telemetry: Of odometry, detections, climate, readings and measurements.
         decisions: Of decisions, commands, alerts and log.
-        audit: Of the audit trail of commands.
+        audit: Of the audit, by whole days, and of the steps of commands.
     """
 
     positions: int = 7

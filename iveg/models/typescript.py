@@ -16,6 +16,7 @@ from pydantic.json_schema import models_json_schema
 from iveg.domain.kinds import SENSED, Kind, Sensor
 from iveg.domain.quantities import flags_of, quantities_of
 from iveg.models.alert import AlertListing
+from iveg.models.audit import AuditEntry
 from iveg.models.base import Model
 from iveg.models.climate import ClimateReading
 from iveg.models.command import Drill, FleetPressed, Latency
@@ -41,6 +42,7 @@ TOLD: tuple[type[Model], ...] = (
     Experiments,
     FleetPressed,
     AlertListing,
+    AuditEntry,
     ClimateReading,
     Reading,
     Messages,

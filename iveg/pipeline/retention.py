@@ -8,14 +8,16 @@ telemetry.
 
 import asyncio
 import contextlib
+import logging
 from collections import Counter
 from collections.abc import Awaitable, Callable, Sequence
 from functools import partial
 from typing import Protocol
 
+from iveg.domain.audit import ITSELF, ChainEnd
 from iveg.domain.disk_space import DiskSpace
 from iveg.domain.errors import HopError
-from iveg.domain.events import LogEvent
+from iveg.domain.events import LogEvent, Slot
 from iveg.domain.observations import Instant
 from iveg.domain.retention import (
     DAY_S,
@@ -26,10 +28,12 @@ from iveg.domain.retention import (
     Retention,
     squeezed,
 )
+from iveg.pipeline.audit import AuditTrail
 from iveg.pipeline.event_log import EventLog
 from iveg.pipeline.ports import Clock
 from iveg.pipeline.supervision import Supervision
 
+_log = logging.getLogger(__name__)
 PART = "retention"
 LOOK_S, PURGE_S = 60.0, 3600.0
 SETTLES_S = 300.0
@@ -70,6 +74,9 @@ class RetainedHistory(Protocol):
     async def oldest_telemetry(self) -> float | None:
         """The oldest row of telemetry (Unix s)."""
 
+    async def audit_end(self) -> ChainEnd:
+        """The newest row of the audit."""
+
     async def purge(self, step: PurgeStep, before: float) -> PurgeBatch:
         """One batch of a step, of rows older than this (Unix s)."""
 
@@ -91,6 +98,7 @@ class HistoryUpkeep:
         retention: How long what is kept.
         event_log: Gets a line a day.
         supervision: Told of a disk that is low.
+        trail: Told what was deleted.
         rest: Waits (s).
 
     Attributes:
@@ -103,6 +111,7 @@ class HistoryUpkeep:
         retention: Retention,
         event_log: EventLog,
         supervision: Supervision,
+        trail: AuditTrail,
         rest: Callable[[float], Awaitable[object]] = asyncio.sleep,
     ) -> None:
         self.counters: Counter[str] = Counter()
@@ -110,6 +119,7 @@ class HistoryUpkeep:
         self._retention = retention
         self._event_log = event_log
         self._supervision = supervision
+        self._trail = trail
         self._rest = rest
         self._is_low = False
         self._purges_at: float | None = None
@@ -136,10 +146,10 @@ class HistoryUpkeep:
         is_due = now.mono >= self._purges_at
         squeezes = self._is_low and await self._squeezes_history()
         if is_due or squeezes:
-            await self._purge(now.wall, squeezes=squeezes)
+            await self._purge(now, squeezes=squeezes)
         if is_due:
             self._purges_at = now.mono + PURGE_S
-            self._tell(now)
+            await self._tell(now)
 
     async def _look_at_disk(self) -> None:
         space = await self._history.disk_space()
@@ -157,18 +167,19 @@ class HistoryUpkeep:
         inside = await self._history.room_inside()
         return inside is not None and inside < ENOUGH_INSIDE
 
-    async def _purge(self, wall: float, *, squeezes: bool) -> None:
+    async def _purge(self, now: Instant, *, squeezes: bool) -> None:
+        wall = now.wall
         most = max(self._retention.longest, SPARED_DAYS)
         recorded = await self._history.recorded_days(most)
         cutoffs = self._retention.cutoffs(wall, recorded)
         if squeezes:
             oldest = await self._history.oldest_telemetry()
             cutoffs = squeezed(cutoffs, oldest, wall, recorded)
-        await self._remove(cutoffs)
+        await self._remove(cutoffs, now)
         if squeezes:
             await self._batches(self._history.give_back)
 
-    async def _remove(self, cutoffs: Cutoffs) -> None:
+    async def _remove(self, cutoffs: Cutoffs, now: Instant) -> None:
         for step in PURGE_STEPS:
             if step.kind not in cutoffs:
                 continue
@@ -176,6 +187,9 @@ class HistoryUpkeep:
             rows = await self._batches(batch)
             done = "unplaced" if step.kind == "positions" else "deleted"
             self.counters[f"history_{done}"] += rows
+            if rows:
+                told = {"rows": rows, "before": cutoffs[step.kind]}
+                self._trail.note(ITSELF, done, step.table, told, at=now)
 
     async def _batches(self, batch: Callable[[], Awaitable[PurgeBatch]]) -> int:
         rows = 0
@@ -195,7 +209,7 @@ class HistoryUpkeep:
             await self._rest(BUSY_S)
         raise HopError("database", "rows that wait to be written leave no time")
 
-    def _tell(self, now: Instant) -> None:
+    async def _tell(self, now: Instant) -> None:
         """A line a day, by which days are recorded also where nothing happens."""
         day = int(now.wall // DAY_S)
         if day == self._told_day:
@@ -207,3 +221,7 @@ class HistoryUpkeep:
             "unplaced": fresh["history_unplaced"],
         }
         self._event_log.log(LogEvent("system", "log.history_kept", slots), now)
+        end = await self._history.audit_end()
+        sealed: dict[str, Slot] = {"rows": end.seq, "hash": end.hash}
+        self._event_log.log(LogEvent("system", "log.audit_day", sealed), now)
+        _log.info("audit: row %d, hash %s", end.seq, end.hash)

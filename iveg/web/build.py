@@ -11,6 +11,7 @@ from iveg.domain.stamps import format_stamp
 from iveg.domain.stop import Press
 from iveg.models.snapshot import Server, Snapshot, User
 from iveg.pipeline import topics
+from iveg.pipeline.audit import AuditTrail
 from iveg.pipeline.build import Pipeline, Services
 from iveg.pipeline.ports import Clock, Ids
 from iveg.web import notifications, problems
@@ -36,7 +37,7 @@ from iveg.web.api.answers import Apart
 from iveg.web.live import socket
 from iveg.web.pages.contexts import Site
 from iveg.web.pages.routes import Pages
-from iveg.web.security import connections, headers, rate_limits
+from iveg.web.security import audited, connections, headers, rate_limits
 from iveg.web.security.authentication import Authenticator, Principal
 from iveg.web.security.signin import SignInLink
 from iveg.web.views import Views
@@ -52,6 +53,7 @@ class Face:
         queues: How full the queues are.
         worker: Where long work is done.
         recordings: What came in, as files.
+        trail: Takes what people and programs do.
     """
 
     pipeline: Pipeline
@@ -66,6 +68,7 @@ class Face:
     new_id: Ids
     worker: Apart
     recordings: recordings.Recordings
+    trail: AuditTrail
 
     def snapshot(self, principal: Principal, now: Instant) -> Snapshot:
         """Everything that is known, for a browser that has just come."""
@@ -82,11 +85,13 @@ class Face:
             **topics.read_all(self.views, now),
         )
 
-    async def stop(self, robot_id: str | None, by: str, press: Press) -> None:
-        """STOP one robot, or all."""
+    async def stop(self, robot_id: str | None, who: Principal, press: Press) -> None:
+        """STOP one robot, or all; asked on a WebSocket."""
         commander = self.pipeline.commander
         targets = commander.machines if robot_id is None else [robot_id]
-        await commander.stop(targets, by, self.clock(), press)
+        await commander.stop(targets, who.name, self.clock(), press)
+        told = {"press_id": press.press_id, "socket": True}
+        self.trail.note(who, "stop", robot_id or "", told, at=self.clock())
 
 
 def live_routers(face: Face) -> Iterator[APIRouter]:
@@ -135,6 +140,9 @@ def build_app(
         app.include_router(router)
     problems.install(app, pages.problem)
     identify, clock = face.authenticator.identify, face.clock
+    app.add_middleware(
+        audited.AuditRequests, identify=identify, trail=face.trail, clock=clock
+    )
     app.add_middleware(headers.BodyLimit)
     app.add_middleware(rate_limits.SocketLimits, identify=identify, clock=clock)
     app.add_middleware(

@@ -10,6 +10,7 @@ from fastapi.routing import iter_route_contexts
 from iveg.app.dss import open_dss
 from iveg.asgi import create_app
 from iveg.settings import Settings
+from iveg.web.security.audited import AUDITED, READING
 from iveg.web.security.authentication import Action, declared_action
 from tests.architecture import documents
 
@@ -34,6 +35,17 @@ def test_only_these_are_open_to_strangers(app: FastAPI) -> None:
     assert {path for path, action in _doors(app) if action == "open"} == (
         OPEN_TO_STRANGERS
     )
+
+
+def test_the_audit_knows_every_route_that_changes_something(app: FastAPI) -> None:
+    changing = {
+        (method, path)
+        for path, methods in _methods(app)
+        for method in methods
+        if method not in READING
+    }
+
+    assert changing - {("POST", "/ngsi/notifications")} == set(AUDITED)
 
 
 def test_what_moves_a_robot_asks_for_more_than_what_stops_it(app: FastAPI) -> None:

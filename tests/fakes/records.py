@@ -5,6 +5,7 @@ from typing import Any
 from iveg.domain.latency.sketch import sketch_of, write_bins
 from iveg.domain.records import (
     AlertRecord,
+    AuditRecord,
     ClimateRecord,
     CommandEventRecord,
     CommandRecord,
@@ -34,6 +35,21 @@ def odometry_record(**fields: Any) -> OdometryRecord:
         "link": "LIVE",
     }
     return OdometryRecord(**(defaults | fields))
+
+
+def audit_record(**fields: Any) -> AuditRecord:
+    defaults: dict[str, Any] = {
+        "audit_id": "A1",
+        "at": NOON,
+        "person": "P1",
+        "name": "Ana Núñez",
+        "role": "operator",
+        "method": "link",
+        "action": "stop",
+        "subject": "AGI",
+        "details": '{"status":202}',
+    }
+    return AuditRecord(**(defaults | fields))
 
 
 def climate_record(**fields: Any) -> ClimateRecord:

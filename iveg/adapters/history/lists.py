@@ -29,6 +29,7 @@ from iveg.adapters.history import tables
 from iveg.domain.errors import UnreadableError
 from iveg.domain.records import (
     AlertRecord,
+    AuditRecord,
     CommandRecord,
     DecisionRecord,
     DetectionRecord,
@@ -173,6 +174,13 @@ MEASUREMENTS = ListOf(
     tables.measurements.c.row_id,
     (tables.measurements.c.entity_id, tables.measurements.c.attribute),
 )
+AUDIT = ListOf(
+    AuditRecord,
+    tables.audit,
+    tables.audit.c.at,
+    tables.audit.c.seq,
+    (tables.audit.c.action, tables.audit.c.name),
+)
 
 
 def read_page(connection: Connection, of: ListOf[R], asked: Filter) -> Page[R]:
@@ -240,10 +248,13 @@ def conditions(of: ListOf[R], asked: Filter) -> Iterator[ColumnElement[bool]]:
         yield of.at >= asked.since
     if asked.until is not None:
         yield of.at < asked.until
-    if asked.robot is not None and "robot_id" in of.table.c:
-        yield of.table.c.robot_id == asked.robot
-    if asked.person is not None and "person_id" in of.table.c:
-        yield of.table.c.person_id == asked.person
+    columns = of.table.c
+    robot = columns.get("robot_id", columns.get("subject"))
+    if asked.robot is not None and robot is not None:
+        yield robot == asked.robot
+    person = columns.get("person_id", columns.get("person"))
+    if asked.person is not None and person is not None:
+        yield person == asked.person
     if asked.class_ is not None and of.classes:
         yield or_(*(column == asked.class_ for column in of.classes))
     if asked.min_probability is not None and of.probability is not None:

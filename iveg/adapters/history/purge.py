@@ -29,7 +29,9 @@ from sqlalchemy import (
     update,
 )
 
+from iveg.adapters import clock
 from iveg.adapters.history import tables
+from iveg.adapters.history.audit import is_over, seal
 from iveg.domain.retention import PurgeStep
 
 BOUND_S = 0.015
@@ -51,6 +53,9 @@ _ROW = {
     "alerts": (tables.alerts.c.last_raised_at, tables.alerts.c.alert_id),
     "command_events": (tables.command_events.c.at, tables.command_events.c.row_id),
     "latency": (tables.latency.c.at, tables.latency.c.row_id),
+    "audit": (tables.audit.c.at, tables.audit.c.seq),
+    "audit_sealed": (tables.audit_sealed.c.at, tables.audit_sealed.c.seq),
+    "audit_end": (tables.audit_end.c.at, tables.audit_end.c.one),
 }
 """Table → the column by which its rows age, and its key."""
 _OVER: Mapping[str, ColumnElement[bool]] = {
@@ -91,6 +96,8 @@ def purge_batch(
         before: Rows that are older than this (Unix s).
         stopwatch: Monotonic (s).
     """
+    if step.table == "audit":
+        seal(connection, before, clock.wall())
     statement = _statement(step, before, connection.dialect.name)
     began, rows = stopwatch(), 0
     while True:
@@ -146,6 +153,8 @@ def _statement(step: PurgeStep, before: float, dialect: str) -> Delete | Update:
 def _due(step: PurgeStep, before: float, dialect: str) -> Select[Any]:
     """Keys of the rows of a step, oldest first."""
     at, key = age_of(step.table), _ROW[step.table][1]
+    if step.table == "audit":
+        return select(key).where(is_over(before)).order_by(key)
     which = _OVER.get(step.table, true())
     if step.kind == "positions":
         which = _PLACED[step.table].dialect_options[dialect]["where"]

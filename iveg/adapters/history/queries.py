@@ -13,6 +13,7 @@ from sqlalchemy import Connection, Select, func, select
 from sqlalchemy.exc import SQLAlchemyError
 
 from iveg.adapters.history import ages, lists, series
+from iveg.adapters.history.audit import chain_end
 from iveg.adapters.history.engine import reading_engine
 from iveg.adapters.history.lists import Filter, Page, R, record_of
 from iveg.adapters.history.migrate import reason_of
@@ -24,10 +25,12 @@ from iveg.adapters.history.tables import (
     is_open_command,
     latency,
 )
+from iveg.domain.audit import ChainEnd
 from iveg.domain.day import DaySighting, Pose
 from iveg.domain.errors import HopError
 from iveg.domain.records import (
     AlertRecord,
+    AuditRecord,
     CommandEventRecord,
     CommandRecord,
     DecisionRecord,
@@ -84,6 +87,14 @@ class Queries:
     async def log(self, asked: Filter) -> Page[LogRecord]:
         """Log lines by ``at``."""
         return await self._ask(lambda c: lists.read_page(c, lists.LOG, asked))
+
+    async def audit(self, asked: Filter) -> Page[AuditRecord]:
+        """Rows of the audit, by ``at``; class: an action or a name."""
+        return await self._ask(lambda c: lists.read_page(c, lists.AUDIT, asked))
+
+    async def audit_end(self) -> ChainEnd:
+        """The newest row of the audit."""
+        return await self._ask(chain_end)
 
     async def readings(self, asked: Filter) -> Page[ReadingRecord]:
         """Readings of small sensors, by ``at``; the class filter asks for the kind."""

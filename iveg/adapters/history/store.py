@@ -21,17 +21,19 @@ from sqlalchemy.exc import (
 )
 
 from iveg.adapters import clock
+from iveg.adapters.history.audit import write_audit
 from iveg.adapters.history.engine import writing_engine
 from iveg.adapters.history.migrate import reason_of, upgrade
 from iveg.adapters.history.tables import TABLE_MAPPINGS, TableMapping
 from iveg.domain.errors import HopError
-from iveg.domain.records import CommandEventRecord, CommandRecord, Record
+from iveg.domain.records import AuditRecord, CommandEventRecord, CommandRecord, Record
 from iveg.pipeline.record import Waiting
 
 _log = logging.getLogger(__name__)
 _Row = dict[str, object]
 _T = TypeVar("_T")
 _FIELDS = {kind: tuple(f.name for f in fields(kind)) for kind in TABLE_MAPPINGS}
+_DURABLE = CommandRecord | CommandEventRecord | AuditRecord
 _VALUE_ERRORS = (ValueError, TypeError, OverflowError)
 
 
@@ -133,14 +135,17 @@ def _choose_durability(connection: Connection, rows: Sequence[Waiting]) -> None:
     """
     if connection.dialect.name != "sqlite":
         return
-    audit = any(isinstance(r.record, CommandRecord | CommandEventRecord) for r in rows)
-    level = "FULL" if audit else "NORMAL"
+    level = "FULL" if any(isinstance(r.record, _DURABLE) for r in rows) else "NORMAL"
     connection.connection.cursor().execute(f"PRAGMA synchronous={level}")
 
 
 def _insert(connection: Connection, rows: Sequence[Waiting]) -> None:
     for kind, mapping in TABLE_MAPPINGS.items():
-        values = _values([row for row in rows if type(row.record) is kind], mapping)
+        of_kind = [row for row in rows if type(row.record) is kind]
+        if kind is AuditRecord:
+            write_audit(connection, [row.record for row in of_kind], clock.wall())
+            continue
+        values = _values(of_kind, mapping)
         if values:
             connection.execute(_statement(mapping, connection.dialect.name), values)
             if mapping.keep_s is not None:

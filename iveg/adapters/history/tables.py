@@ -32,6 +32,7 @@ from iveg.adapters.history.json_column import JsonValue
 from iveg.domain.goals import OPEN_STATES
 from iveg.domain.records import (
     AlertRecord,
+    AuditRecord,
     ClimateRecord,
     CommandEventRecord,
     CommandRecord,
@@ -293,6 +294,48 @@ measurements = Table(
 )
 
 
+audit = Table(
+    "audit",
+    metadata,
+    Column("seq", _BIG, primary_key=True, autoincrement=False),
+    _text("audit_id", null=False),
+    _number("at", null=False),
+    _number("stored_at", null=False),
+    _text("person", null=False),
+    _text("name", null=False),
+    _text("role", null=False),
+    _text("method", null=False),
+    _text("action", null=False),
+    _text("subject", null=False),
+    # Text, not JSON: its very bytes are hashed.
+    _text("details", null=False),
+    _text("previous_hash", null=False),
+    _text("hash", null=False),
+    UniqueConstraint("audit_id"),
+    Index(None, "at", "seq"),
+)
+"""Triggers of its migration refuse changes, and deletions beyond ``audit_sealed``."""
+
+audit_sealed = Table(
+    "audit_sealed",
+    metadata,
+    Column("seq", _BIG, primary_key=True, autoincrement=False),
+    _text("hash", null=False),
+    _number("at", null=False),
+)
+"""Ends of segments that retention takes: the row, its hash, when it was sealed."""
+
+audit_end = Table(
+    "audit_end",
+    metadata,
+    Column("one", Integer, primary_key=True, autoincrement=False),
+    Column("seq", BigInteger, nullable=False),
+    _text("hash", null=False),
+    _number("at", null=False),
+)
+"""The newest row that was ever written: one row, so that a lost last one is noticed."""
+
+
 def _placed(name: str, at: Column[float], sqlite: str, postgresql: str) -> Index:
     """Index of the rows that have a place still, by which they are found to lose it."""
     return Index(name, at, sqlite_where=text(sqlite), postgresql_where=text(postgresql))
@@ -348,4 +391,5 @@ TABLE_MAPPINGS: dict[type, TableMapping] = {
     LatencyRecord: TableMapping(latency, keep_s=86400.0),
     ReadingRecord: TableMapping(readings),
     MeasurementRecord: TableMapping(measurements),
+    AuditRecord: TableMapping(audit, ("audit_id",)),
 }

@@ -52,6 +52,7 @@ class RecordedHistory:
         self._is_file = sqlite_file(queries.url) is not None
         self.recorded_days = queries.recorded_days
         self.oldest_telemetry = queries.oldest_telemetry
+        self.audit_end = queries.audit_end
         self.drop_recording = drop_recording
 
     @property

@@ -65,6 +65,25 @@ export type Area = {
   ymax: number;
 };
 
+/** One row, with its place in the chain. */
+export type AuditEntry = {
+  audit_id: string;
+  at: string;
+  person: string;
+  name: string;
+  role: string;
+  method: string;
+  action: string;
+  subject: string;
+  details: Record<string, JsonValue>;
+  /** Place in the chain, from 1 without a gap. */
+  seq: number;
+  /** Long after `at`: the database was away. */
+  stored_at: string;
+  previous_hash: string;
+  hash: string;
+};
+
 /** The battery, as the robot said last. */
 export type Battery = {
   age_s: number | null;

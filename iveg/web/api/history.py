@@ -24,6 +24,7 @@ from iveg.domain.errors import MissingExtraError
 from iveg.domain.fleet import NOBODY, FleetDescription
 from iveg.domain.records import CommandRecord, DecisionRecord, Record
 from iveg.models.alert import Alert, AlertListing, Flood, LogEntry
+from iveg.models.audit import AuditEntry
 from iveg.models.base import Listing, Model, write_json
 from iveg.models.command import Command
 from iveg.models.decision import Decision
@@ -40,7 +41,7 @@ from iveg.web.api.history_filters import Filters, filter_of
 from iveg.web.pages.local_time import in_madrid
 from iveg.web.pages.sentences import Sentences
 from iveg.web.pages.translations import read_translations
-from iveg.web.security.authentication import require
+from iveg.web.security.authentication import Action, require
 
 R = TypeVar("R", bound=Record)
 _DAY_S = 86_400.0
@@ -61,6 +62,7 @@ class HistoryList(Generic[R]):
     Attributes:
         model: Of a row, and of what ``beside`` found for it.
         beside: Other rows that the models of some rows need, in their order.
+        needs: What whoever asks must be allowed.
     """
 
     path: str
@@ -71,6 +73,7 @@ class HistoryList(Generic[R]):
     says: str
     more: Callable[[], dict[str, Any]] = dict
     beside: Callable[[Sequence[R]], Awaitable[list[Any]]] | None = None
+    needs: Action = "read"
 
     async def rows(self, records: Sequence[R]) -> list[tuple[Any, ...]]:
         """What ``model`` is called with, for each record."""
@@ -173,6 +176,15 @@ def lists_of(
             Listing[LogEntry],
             "The action and inference log",
         ),
+        _List(
+            "audit",
+            lists.AUDIT,
+            queries.audit,
+            AuditEntry.of_record,
+            Listing[AuditEntry],
+            "Who did what; `robot` asks for a subject, `class` for an action or name",
+            needs="release",
+        ),
         *_measured(queries),
     )
 
@@ -230,6 +242,7 @@ def _add_list(routes: APIRouter, one: HistoryList[R], worker: Apart) -> None:
         summary=one.says,
         response_model=one.listing,
         responses={200: {"content": _FILES}},
+        dependencies=[Depends(require(one.needs))],
     )
     async def listing(
         request: Request, filters: Annotated[Filters, Query()]

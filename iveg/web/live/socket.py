@@ -46,7 +46,7 @@ _SEND_LIMIT_S = 10.0
 _CHECK_S = 0.5
 _MAX_MESSAGE = 65536
 
-Stop = Callable[[str | None, str, Press], Awaitable[object]]
+Stop = Callable[[str | None, Principal, Press], Awaitable[object]]
 
 
 class Encoder:
@@ -298,6 +298,6 @@ class ClientMessages:
         allowed = _may_still(self._websocket, self._principal, "stop")
         if allowed and (robot_id is None or isinstance(robot_id, str)):
             try:
-                await self._stop(robot_id, self._principal.name, read_press(message))
+                await self._stop(robot_id, self._principal, read_press(message))
             except UnknownRobotError as error:
                 self._subscriber.append(topics.PROBLEM.name, {"reason": str(error)})

@@ -42,7 +42,12 @@ from iveg.web.pages.translations import (
     read_translations,
 )
 from iveg.web.problems import Problem
-from iveg.web.security.authentication import Authenticator, Principal, require
+from iveg.web.security.authentication import (
+    Action,
+    Authenticator,
+    Principal,
+    require,
+)
 
 LANGUAGE_COOKIE = "iveg_language"
 THEME_COOKIE = "iveg_theme"
@@ -151,6 +156,7 @@ def router(
     routes = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
     for route, path in _SCRIPTED.items():
         add_scripted(routes, pages, route, path)
+    add_scripted(routes, pages, "audit", "/audit", "release")
 
     @routes.get("/decisions/{decision_id}", response_model=None)
     async def decision(
@@ -203,11 +209,15 @@ def router(
     return routes
 
 
-def add_scripted(routes: APIRouter, pages: Pages, route: str, path: str) -> None:
+def add_scripted(
+    routes: APIRouter, pages: Pages, route: str, path: str, needs: Action = "read"
+) -> None:
     """Add a page that its script fills; ``route`` names template and script."""
 
     @routes.get(path, name=route, response_model=None)
-    async def scripted(request: Request, visitor: _Reader) -> Response:
+    async def scripted(
+        request: Request, visitor: Annotated[Principal, Depends(require(needs))]
+    ) -> Response:
         return pages.draw(Page(pages.frame(request, route, visitor)))
 
 

@@ -25,11 +25,14 @@ from starlette.websockets import WebSocket
 
 from iveg.adapters.sessions import FileSessions
 from iveg.domain.accounts import DEFAULT_NAME
+from iveg.domain.audit import STRANGER, Actor
 from iveg.domain.errors import NotAllowedError
+from iveg.pipeline.audit import AuditTrail
 from iveg.pipeline.ports import Clock
 from iveg.web.problems import NotSignedInError, Problem
+from iveg.web.security.audited import READING
 from iveg.web.security.csrf import is_own, refuse_forgery, refuse_other_bodies
-from iveg.web.security.rate_limits import FailedAttempts
+from iveg.web.security.rate_limits import REFUSED_ROWS, Allowance, FailedAttempts
 from iveg.web.security.roles import (
     MAY,
     NOBODY,
@@ -57,8 +60,6 @@ __all__ = [
 NO_SESSION, FOREIGN_ORIGIN = 4401, 4403
 """Close codes of ``/live``."""
 
-_SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
-
 _log = logging.getLogger(__name__)
 
 
@@ -71,6 +72,7 @@ class Authenticator:
         clock: Read at each question.
         store: Where sessions outlive a restart; None forgets them.
         link_name: Name of whoever holds the link.
+        trail: Told of sign-ins, and of those that were refused.
     """
 
     def __init__(
@@ -81,11 +83,15 @@ class Authenticator:
         clock: Clock,
         store: FileSessions | None = None,
         link_name: str = DEFAULT_NAME,
+        trail: AuditTrail | None = None,
     ) -> None:
         self._sign_in_token = sign_in_token
         self._api_token = api_token
         self._clock = clock
+        self._trail = trail
         self._attempts = FailedAttempts()
+        # Strangers' rows are for ever: a flood from many addresses writes few.
+        self._rows = Allowance(REFUSED_ROWS, clock().mono)
         self.sessions = Sessions(clock, store, link_name=link_name)
         self.refused = 0
         """Sign-ins with a wrong token."""
@@ -120,9 +126,13 @@ class Authenticator:
         # Somebody else's wrong links must not shut out whoever has the right one.
         self._attempts.succeeded(address)
         secure = request.url.scheme == "https"
+        cookie = self.sessions.open_by_link()
+        who = self.sessions.find(cookie)
+        if who is not None:
+            self._note(who, "sign_in", address)
         response.set_cookie(
             _cookie_name(secure=secure),
-            self.sessions.open_by_link(),
+            cookie,
             path="/",
             secure=secure,
             httponly=True,
@@ -149,8 +159,15 @@ class Authenticator:
             detail = "Too many wrong links came from your address; wait a minute."
             return Problem(429, detail, headers=headers)
         self._attempts.failed(address, now)
+        if self._rows.take(now):
+            self._note(STRANGER, "sign_in_refused", address)
         self._tell_refused(now)
         return Problem(401, "This link does not sign in here, or not any more.")
+
+    def _note(self, actor: Actor, action: str, address: str) -> None:
+        if self._trail is not None:
+            told = {"address": address}
+            self._trail.note(actor, action, details=told, at=self._clock())
 
     def _tell_refused(self, now: float) -> None:
         """Count a refused sign-in; log it once a minute, against floods of the log."""
@@ -187,7 +204,7 @@ class Authenticator:
             raise NotAllowedError(action, principal.role)
         if principal.role == "expired" and action == "stop":
             _log.info("STOP by %s, whose session is over", principal.name)
-        if request.method not in _SAFE_METHODS:
+        if request.method not in READING:
             if principal.session is not None:
                 refuse_forgery(request)
             refuse_other_bodies(request)

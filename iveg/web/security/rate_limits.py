@@ -20,6 +20,8 @@ from iveg.pipeline.ports import Clock
 from iveg.web.security.roles import Principal
 
 SIGN_INS, SIGN_INS_WITHIN_S = 5, 60.0
+REFUSED_ROWS = 5.0
+"""Rows of the audit a second for refused sign-ins, from all addresses together."""
 MESSAGES_PER_S = 20
 PAINTED_PER_S = 300
 """More than frames are ever sent in a second: every honest report counts."""

@@ -143,14 +143,16 @@ def test_each_step_takes_what_is_older_and_nothing_of_that_moment_or_younger(
         [one for n, at in enumerate(ages) for one in everything(at, f"M{n}")],
     )
 
-    for step in PURGE_STEPS:
+    # The audit goes by whole days (test_history_audit).
+    steps = [one for one in PURGE_STEPS if one.table != "audit"]
+    for step in steps:
         with engine.begin() as connection:
             due = count_due(connection, step, OLD)
         assert (due, run(engine, step, OLD)) == (1, PurgeBatch(1, is_last=True)), step
         assert run(engine, step, OLD) == PurgeBatch(0, is_last=True)
 
-    assert {step.table: rows(engine, step.table) for step in PURGE_STEPS} == (
-        dict.fromkeys((step.table for step in PURGE_STEPS), 2)
+    assert {step.table: rows(engine, step.table) for step in steps} == (
+        dict.fromkeys((step.table for step in steps), 2)
     )
     assert rows(engine, "detections", "count(x)") == 2
 

@@ -21,6 +21,7 @@ from tests.fakes.postgresql import PostgreSQL
 from tests.fakes.records import (
     NOON,
     alert_record,
+    audit_record,
     command_event_record,
     command_record,
     decision_record,
@@ -32,6 +33,7 @@ from tests.fakes.records import (
 
 EVERYTHING = (
     alert_record(),
+    audit_record(),
     command_event_record(),
     command_record(),
     decision_record(),
@@ -40,7 +42,7 @@ EVERYTHING = (
     log_record(),
     odometry_record(),
 )
-KEPT = 5
+KEPT = 6
 _PATIENCE_S = 30.0
 
 
@@ -82,6 +84,7 @@ def scalar(database_url: str, query: str) -> object:
 def counts(database_url: str) -> dict[str, object]:
     tables = (
         "alerts",
+        "audit",
         "command_events",
         "commands",
         "decisions",
@@ -200,10 +203,10 @@ async def test_while_the_database_is_locked_nothing_that_matters_is_lost(
         await until(lambda: journal.stat().st_size == 0)
 
     stored = counts(sqlite_url)
-    assert stored.pop("odometry") == 5
+    assert stored.pop("odometry") == 4
     assert stored.pop("detections") == 0
     assert set(stored.values()) == {1}
-    assert recorder.counters["history_dropped"] == 98
+    assert recorder.counters["history_dropped"] == 99
     assert [record.levelname for record in caplog.records] == ["WARNING", "INFO"]
 
 

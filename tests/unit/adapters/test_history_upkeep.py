@@ -14,6 +14,7 @@ from iveg.adapters.history.upkeep import RecordedHistory
 from iveg.domain.disk_space import DiskSpace
 from iveg.domain.records import Record
 from iveg.domain.retention import DAY_S, SPARED_DAYS, Retention
+from iveg.pipeline.audit import AuditTrail
 from iveg.pipeline.record import Waiting
 from iveg.pipeline.retention import HistoryUpkeep
 from tests.builders import START
@@ -78,7 +79,13 @@ async def test_a_full_disk_costs_the_oldest_telemetry_and_gets_its_room_back(
     history = RecordedHistory(recorder, queries, tmp_path, read_space=disk)
     parts = desk.parts
     for_ever = Retention(0, 0, 0, 0)
-    upkeep = HistoryUpkeep(history, for_ever, desk.event_log, parts.supervision)
+    upkeep = HistoryUpkeep(
+        history,
+        for_ever,
+        desk.event_log,
+        parts.supervision,
+        AuditTrail(desk.sink, desk.ids),
+    )
     file = tmp_path / "history.db"
     size, left = file.stat().st_size, []
 

@@ -6,10 +6,12 @@ import pytest
 
 from iveg.adapters.history.purge import PurgeBatch
 from iveg.domain.alerts.alert_book import BookedAlert
+from iveg.domain.audit import ChainEnd
 from iveg.domain.disk_space import DiskSpace
 from iveg.domain.errors import HopError
 from iveg.domain.records import LogRecord
 from iveg.domain.retention import DAY_S, PURGE_STEPS, PurgeStep, Retention
+from iveg.pipeline.audit import AuditTrail
 from iveg.pipeline.retention import (
     ENOUGH_INSIDE,
     LOOK_S,
@@ -62,6 +64,9 @@ class FakeHistory:
     async def oldest_telemetry(self) -> float | None:
         return self.oldest
 
+    async def audit_end(self) -> ChainEnd:
+        return ChainEnd(7, "ab" * 32)
+
     async def purge(self, step: PurgeStep, before: float) -> PurgeBatch:
         rows = min(10, self.due.get(step, 0))
         self.due[step] = self.due.get(step, 0) - rows
@@ -95,6 +100,7 @@ class Upkeep:
             Retention(),
             self.desk.event_log,
             self.desk.parts.supervision,
+            AuditTrail(self.desk.sink, self.desk.ids),
             self._rest,
         )
 

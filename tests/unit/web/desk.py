@@ -14,6 +14,7 @@ from iveg.domain.equipment import Tile
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.messages import CHANNELS
 from iveg.domain.observations import Instant
+from iveg.pipeline.audit import AuditTrail
 from iveg.pipeline.build import KeptChoices, build_services
 from iveg.web import notifications
 from iveg.web.api import metrics
@@ -53,10 +54,12 @@ class WebDesk(Desk):
         self.heard: list[Instant] = []
         self.former_secrets: set[str] = set()
         self.queues = metrics.Queues({"ingest": 3}, {"history": 2}, {"stop_send": 1})
+        self.trail = AuditTrail(self.sink, self.ids)
         self.authenticator = Authenticator(
             sign_in_token="cd" * 32,
             api_token=API_TOKEN,
             clock=self.clock,
+            trail=self.trail,
         )
         self.rule_store = FakeRuleStore()
         self.contact_store = FakeContacts()
@@ -94,6 +97,7 @@ class WebDesk(Desk):
             new_id=self.ids,
             worker=FakeWorker(),
             recordings=self.recordings,
+            trail=self.trail,
         )
         self.table = ConnectionTable(lambda: self.clock().mono, ConnectionCaps())
         self.pages = _pages(self.face.site)

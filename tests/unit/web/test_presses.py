@@ -4,8 +4,11 @@ import pytest
 
 from iveg.domain.stop import Press
 from iveg.web.presses import read_press
+from iveg.web.security.roles import Principal
 from tests.builders import START
 from tests.unit.web.desk import WebDesk
+
+ANA = Principal("ana", "operator")
 
 NOTHING = Press()
 
@@ -51,7 +54,7 @@ async def test_one_press_over_http_and_over_the_socket_is_one_command() -> None:
     said = {"press_id": "p", "pressed_at": START.wall - 0.25}
     async with desk.browser() as browser:
         first = await browser.post("/api/v1/robots/AGI/stop", json=said)
-        await desk.face.stop("AGI", "ana", read_press({"type": "stop", **said}))
+        await desk.face.stop("AGI", ANA, read_press({"type": "stop", **said}))
         again = await browser.post("/api/v1/robots/AGI/stop", json=said)
 
     assert first.json()["command_id"] == again.json()["command_id"]

@@ -39,6 +39,7 @@ const ROUTES = {
   decision: () => import("../pages/decision.js"),
   day: () => import("../pages/day.js"),
   about: () => import("../pages/about.js"),
+  audit: () => import("../pages/audit.js"),
 };
 
 /** @param {App} app */

@@ -1,0 +1,46 @@
+"""``iveg audit``: whether the audit is whole, and its newest hash."""
+
+import argparse
+from pathlib import Path
+
+from iveg.adapters.doctor import check_database
+from iveg.adapters.history.audit import chain_end, faults, sealed_end
+from iveg.adapters.history.engine import history_url
+from iveg.cli.database import read_history
+from iveg.domain.audit import AuditFault
+from iveg.settings import Settings
+
+_MOST_TOLD = 20
+_SAYS = {
+    "changed": "was changed: its hash is not that of its values",
+    "missing": "is missing",
+    "unlinked": "does not follow the row before it",
+}
+
+
+def run_audit(options: argparse.Namespace, settings: Settings, data: Path) -> int:
+    """One question to the audit; returns the exit code.
+
+    Raises:
+        IvegError: the database cannot be read.
+    """
+    url = history_url(settings.database_url, data)
+    check_database(url)
+    end = read_history(url, chain_end)
+    if options.action == "end":
+        print(end.seq, end.hash)
+        return 0
+    found = read_history(url, lambda connection: list(faults(connection)))
+    for fault in found[:_MOST_TOLD]:
+        print(_told(fault))
+    if found:
+        print(f"{len(found)} fault(s): the audit is not as it was written.")
+        return 1
+    gone = read_history(url, sealed_end).seq
+    print(f"Rows {gone + 1} to {end.seq} are as they were written.")
+    print(f"The chain ends with {end.hash}.")
+    return 0
+
+
+def _told(fault: AuditFault) -> str:
+    return f"Row {fault.seq} {_SAYS[fault.what]}."

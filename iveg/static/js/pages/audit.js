@@ -1,0 +1,81 @@
+/**
+ * The Audit page: who did what, with the place of each row in the chain.
+ */
+
+import { make } from "../panels/dom.js";
+import { dayAndTime } from "./history/local_time.js";
+import { createChips, createRows } from "./rows.js";
+
+/** @typedef {import("../core/i18n.js").I18n} I18n */
+
+const LATE_MS = 60_000;
+/** @type {Record<string, string>} the group of an action; all others are settings */
+const GROUPS = {
+  sign_in: "signing",
+  sign_in_refused: "signing",
+  sign_out: "signing",
+  wall: "signing",
+  stop: "orders",
+  drill: "orders",
+  release: "orders",
+  resume: "orders",
+  goal: "orders",
+  cancel_goal: "orders",
+  acknowledge: "alerts",
+  mark_thing: "alerts",
+  unmark_thing: "alerts",
+  export: "data",
+  deleted: "data",
+  unplaced: "data",
+};
+
+/** @param {string} action */
+export const groupOf = (action) => GROUPS[action] ?? "settings";
+
+/** @param {import("../core/page.js").Page} page */
+export function start({ i18n }) {
+  const isChosen = createChips("data-audit-chip", () => rows.draw());
+  const rows = createRows({
+    name: "audit",
+    path: "audit",
+    i18n,
+    cells: (entry) => cellsOf(entry, i18n),
+    admits: ({ action }) => isChosen(groupOf(action)),
+  });
+  rows.load();
+}
+
+/**
+ * Whether a row reached the database long after what it tells of.
+ *
+ * @param {{at: string, stored_at: string}} entry
+ */
+export const isLate = ({ at, stored_at }) =>
+  Date.parse(stored_at) - Date.parse(at) > LATE_MS;
+
+/** @param {any} entry of the API @param {I18n} i18n */
+function cellsOf(entry, i18n) {
+  const { at, name, role, action, subject, details, seq } = entry;
+  const late = isLate(entry) ? ` · ${i18n.t("auditpage.late")}` : "";
+  return [
+    make("td", "time", dayAndTime(at) + late),
+    make(
+      "td",
+      "",
+      name ? i18n.t("rows.by", { by: name }) : i18n.t("auditpage.stranger", { role }),
+    ),
+    make("td", "what", i18n.t(`auditpage.action.${action}`)),
+    make("td", "", subject || "—"),
+    make("td", "what", detailsSaid(details)),
+    make("td", "number", i18n.number(seq, 0)),
+  ];
+}
+
+/** @param {Record<string, unknown>} details */
+function detailsSaid(details) {
+  const parts = Object.entries(details).map(([key, value]) => {
+    const said = typeof value === "string" ? value : JSON.stringify(value);
+    return `${key} ${said}`;
+  });
+  return parts.join(" · ") || "—";
+}

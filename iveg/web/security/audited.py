@@ -1,0 +1,231 @@
+"""Which requests the audit keeps, and what of each (SECURITY.md, "Audit").
+
+Every route that changes something has a row here; a test walks the routes.  Of a body
+only the named keys are kept: the rest may be a password, or long.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+from starlette.datastructures import Headers
+from starlette.requests import HTTPConnection
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from iveg.domain.errors import UnreadableError
+from iveg.ngsi.codec import load_json
+from iveg.ngsi.payloads import clean_text
+from iveg.pipeline.audit import AuditTrail
+from iveg.pipeline.ports import Clock
+from iveg.web.security.roles import Principal
+
+_KEPT_BYTES = 16 * 1024
+_FILES: Final = frozenset(
+    {"text/csv", "application/x-ndjson", "application/zip", "application/vnd.mcap"}
+)
+"""Answers that leave iVeg to be kept."""
+READING: Final = frozenset({"GET", "HEAD", "OPTIONS"})
+"""Methods that change nothing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Audited:
+    """What is kept of one route.
+
+    Attributes:
+        action: Its word in the audit; empty: the route writes its rows itself.
+        subject: The parameter of the path that names what it was done to.
+        asked: Keys of the body that are kept; ``answered`` of the answer.
+    """
+
+    action: str
+    subject: str = ""
+    asked: tuple[str, ...] = ()
+    answered: tuple[str, ...] = ()
+
+
+_COMMAND: Final = ("command_id",)
+_API: Final = "/api/v1"
+AUDITED: Final[Mapping[tuple[str, str], Audited]] = {
+    ("POST", f"{_API}/robots/{{robot_id}}/stop"): Audited(
+        "stop", "robot_id", ("press_id", "pressed_at"), _COMMAND
+    ),
+    ("POST", f"{_API}/fleet/stop"): Audited(
+        "stop", asked=("press_id", "pressed_at"), answered=("commands",)
+    ),
+    ("POST", f"{_API}/robots/{{robot_id}}/drill"): Audited(
+        "drill", "robot_id", answered=_COMMAND
+    ),
+    ("POST", f"{_API}/robots/{{robot_id}}/release"): Audited(
+        "release", "robot_id", ("holds",), _COMMAND
+    ),
+    ("POST", f"{_API}/robots/{{robot_id}}/resume"): Audited(
+        "resume", "robot_id", answered=_COMMAND
+    ),
+    ("POST", f"{_API}/robots/{{robot_id}}/goal"): Audited(
+        "goal", "robot_id", ("kind", "x", "y", "aisle"), ("goal_id",)
+    ),
+    ("DELETE", f"{_API}/robots/{{robot_id}}/goal"): Audited(
+        "cancel_goal", "robot_id", answered=("goal_id",)
+    ),
+    ("PUT", f"{_API}/robots/{{robot_id}}/detector"): Audited(
+        "detector", "robot_id", ("in_service",)
+    ),
+    ("POST", f"{_API}/alerts/{{alert_id}}/acknowledge"): Audited(
+        "acknowledge", "alert_id", ("note",), ("key", "robot_id")
+    ),
+    ("POST", f"{_API}/alerts/acknowledge"): Audited(
+        "acknowledge", asked=("alert_ids", "note"), answered=("left",)
+    ),
+    ("PUT", f"{_API}/rule"): Audited(
+        "rule",
+        asked=(
+            "version",
+            "confidence_threshold",
+            "class_thresholds",
+            "radius_m",
+            "aliases",
+            "foresight",
+        ),
+        answered=("version",),
+    ),
+    ("POST", f"{_API}/things"): Audited("mark_thing", "", ("person_id",), ("id",)),
+    ("DELETE", f"{_API}/things/{{thing_id}}"): Audited("unmark_thing", "thing_id"),
+    ("PUT", f"{_API}/messages/email"): Audited(
+        "messages_email", asked=("on", "server", "port", "security", "least")
+    ),
+    ("PUT", f"{_API}/messages/webhook"): Audited(
+        "messages_webhook", asked=("on", "who", "least")
+    ),
+    ("PUT", f"{_API}/messages/push"): Audited("messages_push", asked=("on",)),
+    ("POST", f"{_API}/messages/devices"): Audited("messages_device", asked=("who",)),
+    ("DELETE", f"{_API}/messages/devices/{{device_id}}"): Audited(
+        "messages_device_removed", "device_id"
+    ),
+    ("POST", f"{_API}/messages/{{channel}}/test"): Audited("messages_test", "channel"),
+    ("POST", f"{_API}/experiments"): Audited("experiment", asked=("size",)),
+    ("POST", f"{_API}/experiments/stop"): Audited("experiment_stopped"),
+    ("POST", "/signin"): Audited(""),
+    ("POST", "/signout"): Audited("sign_out"),
+    ("POST", "/wall"): Audited("wall"),
+}
+"""Method and path of a route → what is kept."""
+
+
+@dataclass(slots=True)
+class _Exchange:
+    """One request and its answer, as far as the audit needs them."""
+
+    reads: bool
+    asked: bytearray = field(default_factory=bytearray)
+    answer: bytearray = field(default_factory=bytearray)
+    status: int = 500
+    is_file: bool = False
+
+    def hear(self, message: Message) -> None:
+        """A part of the request."""
+        _keep(self.asked, message)
+
+    def answered(self, message: Message) -> None:
+        """A part of the answer."""
+        if message["type"] == "http.response.start":
+            self.status = message["status"]
+            told = Headers(raw=message["headers"]).get("content-type", "")
+            self.is_file = told.partition(";")[0] in _FILES
+        elif not self.reads:
+            _keep(self.answer, message)
+
+
+class AuditRequests:
+    """Writes down what people and programs change and export.
+
+    Args:
+        identify: Who sends a request; None for a stranger.
+        trail: Takes the rows; never waits.
+        clock: Read at each of them.
+    """
+
+    def __init__(
+        self,
+        app: ASGIApp,
+        identify: Callable[[HTTPConnection], Principal | None],
+        trail: AuditTrail,
+        clock: Clock,
+    ) -> None:
+        self._app = app
+        self._identify = identify
+        self._trail = trail
+        self._clock = clock
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one request."""
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+        exchange = _Exchange(scope["method"] in READING)
+        # Before it is served: who signs out is nobody afterwards.
+        who = None if exchange.reads else self._identify(HTTPConnection(scope))
+
+        async def hear() -> Message:
+            message = await receive()
+            exchange.hear(message)
+            return message
+
+        async def answer(message: Message) -> None:
+            exchange.answered(message)
+            await send(message)
+
+        try:
+            await self._app(scope, hear, answer)
+        finally:
+            if exchange.reads:
+                self._write_export(scope, exchange)
+            elif who is not None:
+                # Strangers change nothing; a sign-in writes its row itself.
+                self._write_change(who, scope, exchange)
+
+    def _write_export(self, scope: Scope, exchange: _Exchange) -> None:
+        if not exchange.is_file or exchange.status != 200:
+            return
+        who = self._identify(HTTPConnection(scope))
+        if who is not None:
+            asked = {"query": scope["query_string"].decode("latin-1")[:1000]}
+            path = clean_text(scope["path"])
+            self._trail.note(who, "export", path, asked, at=self._clock())
+
+    def _write_change(self, who: Principal, scope: Scope, exchange: _Exchange) -> None:
+        kept = AUDITED.get((scope["method"], path_of(scope)))
+        if kept is None or not kept.action:
+            return
+        details = {
+            "status": exchange.status,
+            **_named(exchange.asked, kept.asked),
+            **_named(exchange.answer, kept.answered),
+        }
+        subject = clean_text(str(scope["path_params"].get(kept.subject, "")))
+        self._trail.note(who, kept.action, subject, details, at=self._clock())
+
+
+def path_of(scope: Scope) -> str:
+    """Path of the route that serves a request, with its parameters' names."""
+    path: str = getattr(scope.get("route"), "path", "")
+    return path
+
+
+def _keep(kept: bytearray, message: Message) -> None:
+    body: bytes = message.get("body", b"")
+    if len(kept) + len(body) <= _KEPT_BYTES:
+        kept += body
+
+
+def _named(body: bytearray, names: Iterable[str]) -> dict[str, Any]:
+    """Some members of a JSON object; none of what is no such object."""
+    if not names:
+        return {}
+    try:
+        read = load_json(bytes(body))
+    except UnreadableError:
+        return {}
+    if not isinstance(read, dict):
+        return {}
+    return {name: read[name] for name in names if name in read}

@@ -1,0 +1,182 @@
+"""What people and programs do is in the audit, by whom and with what came of it."""
+
+import json
+import logging
+
+import pytest
+from starlette.requests import Request
+
+from iveg.domain.records import AuditRecord
+from iveg.domain.stop import Press
+from iveg.web.security.roles import Principal
+from tests.unit.web.desk import WebDesk
+
+OWN = {"X-IVEG": "1", "Sec-Fetch-Site": "same-origin"}
+LINK = "cd" * 32
+
+
+@pytest.fixture
+def desk() -> WebDesk:
+    return WebDesk()
+
+
+def audited(desk: WebDesk) -> list[AuditRecord]:
+    return desk.records(AuditRecord)
+
+
+def only(desk: WebDesk) -> tuple[AuditRecord, dict[str, object]]:
+    (row,) = audited(desk)
+    return row, json.loads(row.details)
+
+
+async def test_a_stop_is_written_with_who_how_and_which_command(desk: WebDesk) -> None:
+    async with desk.browser("viewer") as page:
+        answer = await page.post("/api/v1/robots/AGI/stop", json={"press_id": "p1"})
+
+    row, details = only(desk)
+    assert (row.name, row.role, row.method) == ("ana", "viewer", "link")
+    assert (row.action, row.subject, row.at) == ("stop", "AGI", desk.clock().wall)
+    assert details == {
+        "status": 202,
+        "press_id": "p1",
+        "command_id": answer.json()["command_id"],
+    }
+
+
+async def test_a_stop_on_the_socket_is_written_too(desk: WebDesk) -> None:
+    ana = Principal("ana", "operator", person="P1")
+    await desk.face.stop("AGI", ana, Press("p1"))
+
+    row, details = only(desk)
+    assert (row.person, row.action, row.subject) == ("P1", "stop", "AGI")
+    assert details == {"press_id": "p1", "socket": True}
+
+
+async def test_a_release_tells_the_holds_that_were_on_screen(desk: WebDesk) -> None:
+    async with desk.browser() as page:
+        await page.post("/api/v1/robots/AGI/release", json={"holds": ["H1", "H2"]})
+
+    row, details = only(desk)
+    assert row.action == "release"
+    assert details == {"status": 409, "holds": ["H1", "H2"]}
+
+
+async def test_what_was_refused_is_written_with_its_status(desk: WebDesk) -> None:
+    async with desk.browser("viewer") as page:
+        await page.put("/api/v1/rule", json={"version": 1, "radius_m": 6})
+
+    row, details = only(desk)
+    assert (row.action, row.role) == ("rule", "viewer")
+    assert details["status"] == 403
+
+
+async def test_a_program_has_a_row_of_its_own(desk: WebDesk) -> None:
+    async with desk.program() as program:
+        await program.post("/api/v1/fleet/stop")
+
+    row, details = only(desk)
+    assert (row.person, row.role, row.method) == ("program", "program", "token")
+    assert isinstance(details["commands"], list)
+
+
+async def test_a_change_of_the_rule_tells_both_versions(desk: WebDesk) -> None:
+    async with desk.browser() as page:
+        await page.put("/api/v1/rule", json={"version": 1, "radius_m": 2.5})
+
+    _, details = only(desk)
+    # The answer's version takes the place of the one that was seen.
+    assert details == {"status": 200, "radius_m": 2.5, "version": 2}
+
+
+async def test_passwords_stay_out_of_it(desk: WebDesk) -> None:
+    async with desk.browser() as page:
+        await page.put(
+            "/api/v1/messages/email", json={"on": True, "password": "geheim"}
+        )
+
+    row, _ = only(desk)
+    assert row.action == "messages_email"
+    assert "geheim" not in row.details
+
+
+@pytest.mark.parametrize(
+    "body", [b"{", b"[1]", b"[" * 40 + b"]" * 40, b'{"holds": NaN}', b"\xff"]
+)
+async def test_a_body_that_cannot_be_read_leaves_a_row_without_it(
+    desk: WebDesk, body: bytes
+) -> None:
+    async with desk.browser() as page:
+        headers = {"Content-Type": "application/json"}
+        await page.post("/api/v1/robots/AGI/release", content=body, headers=headers)
+
+    _, details = only(desk)
+    assert details == {"status": details["status"]}
+
+
+async def test_a_subject_that_no_database_takes_is_cleaned(desk: WebDesk) -> None:
+    async with desk.browser() as page:
+        await page.post("/api/v1/alerts/a%00%E2%80%AEb/acknowledge", json={})
+
+    row, _ = only(desk)
+    assert row.subject == "ab"
+
+
+async def test_reading_and_strangers_leave_no_row(desk: WebDesk) -> None:
+    async with desk.browser() as page, desk.stranger() as stranger:
+        await page.get("/api/v1/robots")
+        await stranger.post("/api/v1/robots/AGI/stop")
+
+    assert audited(desk) == []
+
+
+async def test_a_file_that_is_sent_is_an_export(desk: WebDesk) -> None:
+    async with desk.browser() as page:
+        answer = await page.get("/api/v1/detections/latest?format=csv&robot=AGI")
+
+    row, details = only(desk)
+    assert answer.status_code == 200
+    assert (row.action, row.subject) == ("export", "/api/v1/detections/latest")
+    assert details == {"query": "format=csv&robot=AGI"}
+
+
+async def test_sign_ins_and_refusals_are_written_with_their_address(
+    desk: WebDesk,
+) -> None:
+    request = _request()
+    desk.authenticator.sign_in(request, "wrong")
+    desk.authenticator.sign_in(request, LINK)
+
+    told = [(row.action, row.name, row.details) for row in audited(desk)]
+    assert told == [
+        ("sign_in_refused", "", '{"address":"10.0.0.7"}'),
+        ("sign_in", "operator", '{"address":"10.0.0.7"}'),
+    ]
+
+
+def test_a_flood_of_wrong_sign_ins_from_everywhere_writes_few_rows(
+    desk: WebDesk, caplog: pytest.LogCaptureFixture
+) -> None:
+    with caplog.at_level(logging.ERROR):
+        for number in range(500):
+            desk.authenticator.sign_in(
+                _request(f"10.0.{number // 250}.{number % 250}"), "x"
+            )
+
+    assert len(audited(desk)) == 5
+    assert desk.authenticator.refused == 500
+
+
+def _request(address: str = "10.0.0.7") -> Request:
+    headers = [(name.lower().encode(), one.encode()) for name, one in OWN.items()]
+    return Request(
+        {
+            "type": "http",
+            "method": "POST",
+            "path": "/signin",
+            "query_string": b"",
+            "scheme": "http",
+            "server": ("iveg.test", 80),
+            "headers": headers,
+            "client": (address, 1),
+        }
+    )
