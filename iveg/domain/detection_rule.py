@@ -88,6 +88,9 @@ class DetectionRule:
 
     def radius_at(self, age_s: float) -> float:
         """The ring of a sighting that is ``age_s`` old (m)."""
+        if age_s <= LIMITS.growth_grace_s:
+            # Of most, and asked thousands of times a second.
+            return self.radius_m
         return ring_radius(self.radius_m, age_s)
 
 

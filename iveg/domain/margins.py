@@ -15,6 +15,7 @@ through a light curtain here.
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -126,9 +127,16 @@ class LeastMargins:
         columns = self._columns.get(person_id)
         if columns is None or not self._robots:
             return None
-        found = self._pairs.rank[:, columns]
-        row, column = np.unravel_index(int(np.argmin(found)), found.shape)
-        return self._pair(int(row), columns[int(column)])
+        _, row, column = min(self._least[column] for column in columns)
+        return self._pair(row, column)
+
+    @cached_property
+    def _least(self) -> list[tuple[float, int, int]]:
+        """Of each column: the least rank, its row, and the column."""
+        rank = self._pairs.rank
+        rows, columns = rank.argmin(axis=0), np.arange(rank.shape[1])
+        told = rank[rows, columns].tolist(), rows.tolist(), columns.tolist()
+        return list(zip(*told, strict=True))
 
     def telling(self) -> list[SafetyMargin]:
         """The least of all pairs that are known now, and one that is not, if any.
@@ -156,7 +164,7 @@ class LeastMargins:
     def _pair(self, row: int, column: int) -> SafetyMargin:
         pairs, robot = self._pairs, self._robots[row][0]
         parts = pairs.gap, pairs.walks, pairs.reaction, pairs.braking, pairs.age
-        gap, walks, reaction, braking, age = (float(one[row, column]) for one in parts)
+        gap, walks, reaction, braking, age = (one.item(row, column) for one in parts)
         return SafetyMargin(
             robot.robot_id,
             self._persons[column],
@@ -166,7 +174,7 @@ class LeastMargins:
             braking,
             age,
             robot.profile.assumed_braking,
-            bool(pairs.known[row, column]),
+            pairs.known.item(row, column),
         )
 
 

@@ -1,6 +1,6 @@
 """The state of the pipeline as models: built on request, never kept."""
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable
 
 from iveg.domain import margins as margins_
@@ -173,17 +173,22 @@ class Views:
     ) -> list[PersonModel]:
         """Every known person."""
         margins = margins or self.margins(now)
-        return [self._person(one, margins, now) for one in self._people.known.values()]
+        crossings = defaultdict[str, list[Crossing]](list)
+        for one in self._evaluator.crossings:
+            crossings[one.zone.cause].append(one)
+        return [
+            self._person(person, crossings[person.person_id], margins, now)
+            for person in self._people.known.values()
+        ]
 
     def _person(
-        self, person: TrackedPerson, margins: LeastMargins, now: Instant
+        self,
+        person: TrackedPerson,
+        crossings: Iterable[Crossing],
+        margins: LeastMargins,
+        now: Instant,
     ) -> PersonModel:
         newest, rule = person.newest, self._evaluator.rule
-        crossings = [
-            one
-            for one in self._evaluator.crossings
-            if one.zone.cause == person.person_id
-        ]
         rings = self._people.rings(person, rule, now)
         thing = self._people.things.explain(person, now)
         return PersonModel(

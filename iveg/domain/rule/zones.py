@@ -75,18 +75,32 @@ def _zones_of(
     world: World,
     rule: DetectionRule,
     now: Instant,
+    before: Sequence[Zone] = (),
 ) -> Iterator[Zone]:
+    """The circles round somebody; where one made ``before`` is the same, that one."""
+    reason, alert_id, made = person.class_, person.decision_id, iter(before)
     for sighting, radius in people.rings(person, rule, now):
+        recording = world.robot(sighting.observer).recording
+        same = next(made, None)
+        if (
+            same is not None
+            and same.sighting is sighting
+            and same.radius_m == radius
+            and (same.reason, same.recording, same.alert_id)
+            == (reason, recording, alert_id)
+        ):
+            yield same
+            continue
         yield Zone(
-            person.class_,
+            reason,
             person.person_id,
             sighting.observer,
             sighting.x,
             sighting.y,
             radius,
             sighting,
-            world.robot(sighting.observer).recording,
-            person.decision_id,
+            recording,
+            alert_id,
         )
 
 
@@ -114,6 +128,8 @@ class ZoneFinder:
 
     def __init__(self) -> None:
         self._known: _Neighbours | None = None
+        self._made: dict[str, Sequence[Zone]] = {}
+        """The circles of the last judgement, by cause."""
 
     def near(
         self,
@@ -138,7 +154,9 @@ class ZoneFinder:
         known = self._known
         if known is None or not known.hold(world, people, rule, now):
             known = self._known = _Neighbours.of(world, people, rule, now)
-        return partial(_near, known, world, people, rule, now, inside, {})
+        before, self._made = self._made, {}
+        circles = before, self._made
+        return partial(_near, known, world, people, rule, now, inside, circles)
 
 
 def _near(
@@ -148,29 +166,35 @@ def _near(
     rule: DetectionRule,
     now: Instant,
     inside: Mapping[str, Mapping[str, object]],
-    made: dict[str, Sequence[Zone]],
+    circles: tuple[Mapping[str, Sequence[Zone]], dict[str, Sequence[Zone]]],
     robot: RobotState,
 ) -> Sequence[Zone]:
     """``Near``: people, then peers, each in their order; then what it was in before.
 
-    ``made``: the circles of this judgement, each made once and only if a robot may be
-    near.
+    ``circles``: those of the judgement before, and of this one, each made once and
+    only if a robot may be near.
     """
-    name = robot.robot_id
+    (before, made), name = circles, robot.robot_id
     causes, mine = neighbours.causes.get(name, _NOBODY), inside.get(name, _NOBODY)
     found: list[Zone] = []
     for cause in (*causes, *(one for one in mine if one not in causes)):
         if cause not in made:
-            made[cause] = tuple(_of_cause(cause, world, people, rule, now))
+            last = before.get(cause, ())
+            made[cause] = tuple(_of_cause(cause, world, people, rule, now, last))
         found += made[cause]
     return found
 
 
 def _of_cause(
-    cause: str, world: World, people: People, rule: DetectionRule, now: Instant
+    cause: str,
+    world: World,
+    people: People,
+    rule: DetectionRule,
+    now: Instant,
+    before: Sequence[Zone],
 ) -> Iterator[Zone]:
     if cause in people.known:
-        yield from _zones_of(people.known[cause], people, world, rule, now)
+        yield from _zones_of(people.known[cause], people, world, rule, now, before)
     elif cause in world.robots:
         yield from _circle_of(world.robots[cause], rule, now)
 

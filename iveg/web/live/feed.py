@@ -20,6 +20,8 @@ PICTURE_S: Final = 1 / 15
 """Between two scans, or detection frames, of one robot."""
 READ_OUT_S: Final = 0.1
 """Between two states of one robot, or lists of people."""
+STATES_AFTER_S: Final = READ_OUT_S / 2
+"""States of robots come this long after lists of people: each takes long to write."""
 
 _INF: Final = float("inf")
 
@@ -92,7 +94,9 @@ class TelemetryFeed:
             if row is topics.ROBOT:
                 self._moved[topic] = None
                 self._robots.add(topic)
-                self._note(self._read_outs, topics.ROBOT_STATE.of(robot_id), _next_beat)
+                self._note(
+                    self._read_outs, topics.ROBOT_STATE.of(robot_id), _next_state
+                )
             elif row.pace == "read-out":
                 self._note(self._read_outs, topic, _next_beat)
             else:
@@ -202,7 +206,12 @@ def _next_picture(told_at: float) -> float:
 def _next_beat(told_at: float) -> float:
     """When a read-out may be sent again (monotonic, s).
 
-    Read-outs go together, at the same moments to all browsers: what takes all robots
-    and people is worked out once for all of them.
+    Read-outs of a kind go together, at the same moments to all browsers: what takes
+    all robots and people is worked out once for all of them.
     """
     return (math.floor(told_at / READ_OUT_S + 1e-6) + 1) * READ_OUT_S
+
+
+def _next_state(told_at: float) -> float:
+    """The same of the state of a robot."""
+    return _next_beat(told_at - STATES_AFTER_S) + STATES_AFTER_S

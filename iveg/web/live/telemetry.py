@@ -212,7 +212,7 @@ class _People:
                 continue
             self._values[person.person_id] = value
             # Its age counts from here, whichever browser takes it later.
-            text = orjson.dumps({**person.model_dump(), "at": at})
+            text = b'%b,"at":%b}' % (write_json(person)[:-1], orjson.dumps(at))
             self._texts[person.person_id] = version, text
             self._changed = version
 

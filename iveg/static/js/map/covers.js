@@ -18,8 +18,10 @@ export function createCovers(canvas, onGrowth) {
   );
   /** @type {Map<Element, import("./viewport.js").Rect>} */
   const largest = new Map();
+  let height = canvas.clientHeight;
 
   function measure() {
+    height = canvas.clientHeight;
     const { left: x, top: y } = canvas.getBoundingClientRect();
     for (const element of over) {
       const now = element.getBoundingClientRect();
@@ -36,7 +38,8 @@ export function createCovers(canvas, onGrowth) {
   }
 
   return {
-    now: () => [...largest.values(), coverOf({ height: canvas.clientHeight })],
+    // Asked for in each frame: as measured last, for to measure now costs a layout.
+    now: () => [...largest.values(), coverOf({ height })],
     forget() {
       largest.clear();
       measure();

@@ -46,6 +46,8 @@ export function createCardOrder(place) {
     const told = order.map(({ id }) => id).join(" ");
     if (told !== wanted) wantedSinceMs = nowMs;
     wanted = told;
+    // Whether somebody is busy costs a layout, so it is asked where it matters.
+    if (order.every(({ card }, i) => place.children[i] === card)) return;
     if (nowMs - wantedSinceMs < LASTS_MS || isBusy()) return;
     order.forEach(({ card }, i) => {
       if (place.children[i] !== card) place.insertBefore(card, place.children[i]);

@@ -175,6 +175,23 @@ def test_pictures_and_read_outs_go_as_often_as_eyes_need(
     assert topics.count("robots/AGI") <= seconds / READ_OUT_S + 1
 
 
+def test_states_of_robots_are_not_written_in_the_frame_of_the_list_of_people(
+    desk: WebDesk, page: Page
+) -> None:
+    for step in range(200):
+        desk.drive("AGI", 0.01 * step)
+        desk.look("AGI", detection("farmer", 5.0 + 0.01 * step))
+        desk.clock.now += 0.005
+        page.read()
+        page.paint()
+
+    told = [{one["topic"] for one in frame["parts"]} for frame in page.frames[1:]]
+    people = [topics for topics in told if "people" in topics]
+    states = [topics for topics in told if "robots/AGI" in topics]
+    assert min(len(people), len(states)) >= 8
+    assert not any("robots/AGI" in topics for topics in people)
+
+
 def test_of_many_robots_the_next_frame_comes_when_the_page_asked_for_it() -> None:
     desk = WebDesk(MANY)
     page = Page(desk)
@@ -212,13 +229,17 @@ def test_what_was_not_due_comes_when_it_is(desk: WebDesk, page: Page) -> None:
         page.read()
         page.paint()
         desk.clock.now += GAP_S
-    wait_s = page.feed.wait_s(desk.clock().mono)
+    waited_s = 0.0
+    while page.topics().count("robots/AGI/scan") < 2:
+        wait_s = page.feed.wait_s(desk.clock().mono)
+        assert wait_s is not None
+        assert wait_s > 0.0
+        waited_s += wait_s
+        desk.clock.now += wait_s + 1e-6
+        page.read()
+        page.paint()
 
-    assert wait_s is not None
-    assert 0.0 < wait_s <= PICTURE_S
-    desk.clock.now += wait_s + 1e-6
-    page.read()
-    assert page.topics().count("robots/AGI/scan") == 2
+    assert waited_s <= PICTURE_S
 
 
 def test_without_credit_a_change_wakes_nobody(desk: WebDesk, page: Page) -> None:
