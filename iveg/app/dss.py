@@ -33,22 +33,28 @@ from iveg.app.counts import count_all, read_queues
 from iveg.app.laboratory import find_laboratory
 from iveg.app.life import Work, live
 from iveg.app.outside import Outside, open_outside
+from iveg.app.past import Site as PastSite
+from iveg.app.past import picture
+from iveg.app.viewers import Viewers
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import HopError, VitalPartError
 from iveg.domain.fleet import FleetDescription
 from iveg.domain.latency.segments import WINDOW_S
 from iveg.domain.messages import Channel
 from iveg.domain.observations import Instant
+from iveg.domain.records import Record
 from iveg.domain.stop.drills import Drills
 from iveg.domain.transports import DIRECT, FIWARE
 from iveg.pipeline.audit import AuditTrail
 from iveg.pipeline.build import Choices, Ports, build, build_services
 from iveg.pipeline.equipment import PART as EQUIPMENT
 from iveg.pipeline.latency import hours_of
+from iveg.pipeline.memory import Memory
 from iveg.pipeline.ports import MessageSender
 from iveg.pipeline.restore import remember
 from iveg.pipeline.retention import PART as RETENTION
 from iveg.pipeline.retention import HistoryUpkeep
+from iveg.pipeline.trace import Chronicle, Trace
 from iveg.settings import Settings
 from iveg.web.api import messages
 from iveg.web.build import Face
@@ -96,6 +102,9 @@ class Dss:
         previous = settings.notify_token_previous
         self.notify_secret = NotifySecret(notify_token, previous)
         self._boot, self._demo = secrets.token_hex(8), demo
+        self.chronicle = Chronicle(
+            self.stores.inputs.note, __version__, secrets.token_bytes(16)
+        )
         kept = self.stores.kept_choices(
             DetectionRule(
                 threshold=settings.confidence_threshold,
@@ -109,6 +118,8 @@ class Dss:
         greenhouse = load_greenhouse(settings.greenhouse)
         self.pipeline = build(fleet, greenhouse, self._ports(), choices)
         self.stores.inputs.rule = lambda: self.pipeline.evaluator.rule
+        if settings.recordings:
+            self.chronicle.remember = Memory(self.pipeline).write
         self.services = build_services(self.pipeline, kept, self._senders(), clock.now)
         self.trail = AuditTrail(self.stores.recorder, new_id)
         self.upkeep = HistoryUpkeep(
@@ -124,6 +135,8 @@ class Dss:
             self.upkeep.counters,
             self.stores.inputs.counters,
         ]
+        recordings = self.stores.inputs.folder
+        self.past = Viewers(PastSite.of(settings, recordings), clock.now)
         self.worker = Worker(partial(self.pipeline.supervision.failed, "worker"))
         self._attach_reader()
         self.provisioner = self._provisioner()
@@ -138,12 +151,17 @@ class Dss:
             mqtt,
             {direct: mqtt, FIWARE: OrionTransport(self.outside.orion)},
             self.stores.journal,
-            RecordedSink(self.stores.recorder, self.stores.inputs.row),
+            RecordedSink(self.stores.recorder, self._row),
             clock.now,
-            new_id,
+            self.chronicle.ids if self.settings.recordings else new_id,
             self.stores.history_state,
             self.stores.inputs.tick,
+            self.chronicle if self.settings.recordings else Trace(),
         )
+
+    def _row(self, record: Record) -> None:
+        self.stores.inputs.row(record)
+        self.chronicle.row(record)
 
     def _senders(self) -> dict[Channel, MessageSender]:
         outbound, write = self.outside.outbound, messages.writer()
@@ -226,10 +244,12 @@ class Dss:
             self._demo,
             laboratory=find_laboratory("pages") is not None,
         )
+        views = Views(parts, partial(count_all, parts, recorder, self.counted))
+        self.chronicle.picture = partial(picture, views)
         return Face(
             pipeline=parts,
             services=self.services,
-            views=Views(parts, partial(count_all, parts, recorder, self.counted)),
+            views=views,
             authenticator=authenticator,
             orion=orion,
             site=site,
@@ -240,6 +260,7 @@ class Dss:
             worker=self.worker,
             recordings=self.stores.inputs,
             trail=self.trail,
+            past=self.past,
         )
 
     # --- life ---------------------------------------------------------------------
@@ -262,6 +283,7 @@ class Dss:
             await self.pipeline.goals.close()
             await self.outside.close()
             self.worker.close()
+            await self.past.close()
 
     async def _live(self) -> None:
         parts = self.pipeline
@@ -286,6 +308,7 @@ class Dss:
             EQUIPMENT: lambda: self.pipeline.equipment.run(clock.now),
             RETENTION: lambda: self.upkeep.run(clock.now),
             RECORDINGS: self.stores.inputs.run,
+            "past": self.past.run,
             "messages": beside.messenger.run,
             "earlier": self._remember,
             "loop-watch": LoopWatch(supervision.note_turn).run,
@@ -335,6 +358,8 @@ class Dss:
 
     def _notified(self, at: Instant) -> None:
         self.pipeline.health_monitor.notified_at = at.mono
+        if self.settings.recordings:
+            self.chronicle.heard(at)
 
     def is_robot_there(self) -> bool:
         """Whether a robot is connected that is not known to be emulated."""

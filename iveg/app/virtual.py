@@ -4,18 +4,21 @@ The same messages at the same times give the same decisions on any machine, so t
 rule can be tried on what was recorded or simulated.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+import asyncio
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import count
 from typing import Literal
 
 from iveg.domain.detection_rule import DetectionRule
+from iveg.domain.equipment import Tile
 from iveg.domain.feedback import Feedback
 from iveg.domain.fleet import FleetDescription
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import Instant, Received
 from iveg.domain.peer_scan import PeerScan
 from iveg.domain.records import DecisionRecord, Record
-from iveg.domain.transports import DIRECT
+from iveg.domain.tracking.calibration import Calibrations
+from iveg.domain.transports import DIRECT, Transport
 from iveg.ngsi import codec
 from iveg.pipeline.build import Choices, Ports, build
 
@@ -24,6 +27,11 @@ START = Instant(0.0, 1_700_000_000.0)
 
 class VirtualPipeline:
     """A pipeline of its own, and the ports that keep what it says.
+
+    Args:
+        fleet, greenhouse, rule: As iVeg is started with.
+        transports: Ways of an order to a robot; on these no order ever gets anywhere.
+        new_id: Makes ids; unless told, by counting.
 
     Implements ``pipeline.ports.FleetPort``, ``StopJournal`` and ``RecordSink``.
 
@@ -35,7 +43,15 @@ class VirtualPipeline:
     """
 
     def __init__(
-        self, fleet: FleetDescription, greenhouse: Greenhouse, rule: DetectionRule
+        self,
+        fleet: FleetDescription,
+        greenhouse: Greenhouse,
+        rule: DetectionRule,
+        *,
+        tiles: Sequence[Tile] = (),
+        calibrations: Calibrations | None = None,
+        transports: Iterable[Transport] = (),
+        new_id: Callable[[], str] | None = None,
     ) -> None:
         ids = count(1)
         self.now = START
@@ -43,9 +59,19 @@ class VirtualPipeline:
         self.peer_scans: list[PeerScan] = []
         self.decisions: dict[str, DecisionRecord] = {}
         ports = Ports(
-            self, {}, self, self, lambda: self.now, lambda: f"{next(ids):026d}"
+            self,
+            dict.fromkeys(transports, Nowhere()),
+            self,
+            self,
+            lambda: self.now,
+            new_id or (lambda: f"{next(ids):026d}"),
         )
-        self.parts = build(fleet, greenhouse, ports, Choices(rule))
+        self.parts = build(
+            fleet,
+            greenhouse,
+            ports,
+            Choices(rule, tiles=tiles, calibrations=calibrations or Calibrations()),
+        )
 
     def move(self, seconds: float) -> Instant:
         """Set the clock to ``seconds`` after the start."""
@@ -102,6 +128,19 @@ class VirtualPipeline:
         at: Instant,
     ) -> None:
         """Ignore; no robot is released here."""
+
+
+class Nowhere:
+    """A transport that takes orders and never says what became of them.
+
+    Implements ``pipeline.ports.CommandPort``.
+    """
+
+    async def stop(self, *_: object, **__: object) -> None:
+        """Wait for ever."""
+        await asyncio.Event().wait()
+
+    release = resume = goal = stop
 
 
 def read_direct(topic: str, payload: bytes, now: Instant) -> Iterator[Received]:

@@ -62,6 +62,19 @@ class UnreadableError(IvegError):
         self.detail = detail
 
 
+class NotRecordedError(IvegError):
+    """Nothing was recorded at a moment.
+
+    Attributes:
+        at: The moment (Unix s).
+        before, after: The last and the next recorded moments; None: there is none.
+    """
+
+    def __init__(self, at: float, before: float | None, after: float | None) -> None:
+        super().__init__("Nothing was recorded at that moment.")
+        self.at, self.before, self.after = at, before, after
+
+
 class UnknownRobotError(IvegError):
     """No robot of the fleet has this id."""
 

@@ -9,7 +9,7 @@ from iveg.models.command import Command
 from iveg.models.equipment import Tile
 from iveg.models.health import Health
 from iveg.models.people import DetectionFrame, Person
-from iveg.models.places import GreenhouseMap
+from iveg.models.places import GreenhouseMap, Scan
 from iveg.models.robot import Robot
 from iveg.models.rule import Rule
 
@@ -30,12 +30,9 @@ class User(Model):
     role: str
 
 
-class Snapshot(Model):
-    """The first frame of ``/live``."""
+class World(Model):
+    """Everything that is known of the fleet and about it."""
 
-    t: str
-    server: Server
-    user: User
     rule: Rule
     map: GreenhouseMap
     robots: list[Robot]
@@ -48,3 +45,24 @@ class Snapshot(Model):
     health: Health
     climate: Climate | None
     equipment: list[Tile]
+
+
+class Snapshot(World):
+    """The first frame of ``/live``."""
+
+    t: str
+    server: Server
+    user: User
+
+
+class PastWorld(World):
+    """The world as it was at a recorded moment; ages are of that moment."""
+
+    at: str = Field(
+        description="The moment that is shown: the newest by the one asked."
+    )
+    at_s: float = Field(description="The same (Unix s).")
+    verified: bool | None = Field(
+        description="Whether it has the hash that iVeg had then; null: none was passed."
+    )
+    scans: list[Scan]

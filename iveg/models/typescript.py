@@ -27,11 +27,12 @@ from iveg.models.messages import Messages, MessageTest
 from iveg.models.places import Costmap, Coverage, Scan
 from iveg.models.reading import Reading
 from iveg.models.signing_in import SignInCode
-from iveg.models.snapshot import Snapshot
+from iveg.models.snapshot import PastWorld, Snapshot
 from iveg.models.thing import Thing
 
 TOLD: tuple[type[Model], ...] = (
     Snapshot,
+    PastWorld,
     Scan,
     Costmap,
     Coverage,

@@ -12,7 +12,7 @@ from iveg.domain.fleet import FleetDescription
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.latency.watch import LatencyWatch
 from iveg.domain.messages import Channel, Contacts
-from iveg.domain.observations import Instant
+from iveg.domain.observations import Instant, Received
 from iveg.domain.rule.obstacles import Obstacles
 from iveg.domain.stop.drills import Drills
 from iveg.domain.tracking.calibration import Calibrations
@@ -53,6 +53,7 @@ from iveg.pipeline.second_witness import SecondWitness
 from iveg.pipeline.slow_time import SlowTime
 from iveg.pipeline.supervision import Supervision
 from iveg.pipeline.things import ThingMarks
+from iveg.pipeline.trace import Trace
 
 Guard = Callable[[str, Callable[[Instant], None]], Callable[[Instant], None]]
 
@@ -70,6 +71,7 @@ class Ports:
         new_id: A new id, sortable by time.
         history_state: State of the history.
         ticked: Comfort that records: called with each tick.
+        trace: Comfort, too: told what the pipeline does and when.
     """
 
     fleet: FleetPort
@@ -80,6 +82,7 @@ class Ports:
     new_id: Callable[[], str]
     history_state: Callable[[], HopState] = lambda: "ok"
     ticked: Callable[[Instant], None] = lambda _: None
+    trace: Trace = field(default_factory=Trace)
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,9 +182,8 @@ def build(
     health_monitor = HealthMonitor(start, ports.history_state)
     probe, guard = health_monitor.probe, supervision.guard
     world = World(fleet, probe, greenhouse.bounds)
-    watch = LatencyWatch(world.robots, world.ledger.composed_at)
-    latency = LatencyMonitor(watch, ports.sink, event_log)
-    ingest = _ingest(world, event_log, ports, supervision, watch)
+    latency = _latency(world, ports, event_log)
+    ingest = _ingest(world, event_log, ports, supervision, latency.watch)
     scans, people = ScanReader(ingest.reject), choices.people(greenhouse)
     obstacles = Obstacles(world, people, Plan.of(greenhouse))
     evaluator = Evaluator(
@@ -208,9 +210,10 @@ def build(
         event_log,
         ports.clock,
         supervision,
-        guard("latency", watch.decided),
+        guard("latency", latency.watch.decided),
         _ticks(guard, ports, latency, totals),
         (guard("goals", goals.heard), guard("goals", goals.tick)),
+        guard("recordings", ports.trace.stepped),
     )
     return Pipeline(
         hub,
@@ -228,7 +231,7 @@ def build(
         goals,
         _equipment(choices.tiles, start, ports, event_log, supervision),
         PeerScans(world, scans, ports.fleet.publish_peer_scan, choices.boot),
-        SecondWitness(world, scans, obstacles),
+        SecondWitness(world, scans, obstacles, ports.trace.looked),
     )
 
 
@@ -238,6 +241,11 @@ def _totals(
     margins = MarginTotals(world, people)
     event_log.margin_of = margins.of
     return margins, SlowTime(world, people)
+
+
+def _latency(world: World, ports: Ports, event_log: EventLog) -> LatencyMonitor:
+    watch = LatencyWatch(world.robots, world.ledger.composed_at)
+    return LatencyMonitor(watch, ports.sink, event_log)
 
 
 def _ticks(
@@ -251,6 +259,7 @@ def _ticks(
         guard("latency", latency.tick),
         *[guard("totals", one.tick) for one in totals],
         guard("recordings", ports.ticked),
+        guard("recordings", ports.trace.ticked),
     )
 
 
@@ -308,12 +317,17 @@ def _ingest(
     watch: LatencyWatch,
 ) -> Ingest:
     note_latency = supervision.guard("latency", watch.arrived)
+    trace = supervision.guard("recordings", ports.trace.arrived)
 
     def log_rejected(source: str, reason: str) -> None:
         slots = {"source": source, "reason": reason}
         event_log.log(LogEvent("system", "log.rejected", slots), ports.clock())
 
-    return Ingest(world.robots.__contains__, log_rejected, world.is_past, note_latency)
+    def passed(received: Received) -> None:
+        note_latency(received)
+        trace(received)
+
+    return Ingest(world.robots.__contains__, log_rejected, world.is_past, passed)
 
 
 def build_services(

@@ -53,6 +53,8 @@ class RuleLoop:
         decided: Comfort that measures: called with what a judgement was made of.
         ticks: Comfort that lets time pass, called with each tick; all of it guarded.
         goals: Comfort, likewise: called with each new word on a goal; with each tick.
+        stepped: Comfort that records: called with each step before it is taken, and
+            with whether it judges.
     """
 
     def __init__(
@@ -70,6 +72,7 @@ class RuleLoop:
             Callable[[GoalAnswer, Instant, TransportId], None],
             Callable[[Instant], None],
         ],
+        stepped: Callable[[Instant, bool], None] = lambda *_: None,
     ) -> None:
         self._ingest = ingest
         self._evaluator = evaluator
@@ -81,6 +84,7 @@ class RuleLoop:
         self._decided = decided
         self._goal_heard, tick_goals = goals
         self._ticks = (tick_goals, *ticks)
+        self._stepped = stepped
         self._ticked = float("-inf")
         self._health_at = float("-inf")
         self._taken: list[Received] = []
@@ -117,6 +121,7 @@ class RuleLoop:
 
         ``judges``: the fleet now, too; else with the next step that does.
         """
+        self._stepped(now, judges)
         for received in arrived:
             fresh = self._apply(received)
             if fresh:

@@ -6,6 +6,7 @@ may be there, and a hundred a second of all at most.
 """
 
 import asyncio
+from collections.abc import Callable
 
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant, LaserScan, UnreadScan
@@ -28,10 +29,18 @@ class SecondWitness:
     Args:
         scans: Reads them.
         obstacles: Takes what they show.
+        looked: Told of each look before it.
     """
 
-    def __init__(self, world: World, scans: ScanReader, obstacles: Obstacles) -> None:
+    def __init__(
+        self,
+        world: World,
+        scans: ScanReader,
+        obstacles: Obstacles,
+        looked: Callable[[Instant], None] = lambda _: None,
+    ) -> None:
         self._world, self._scans, self._obstacles = world, scans, obstacles
+        self._tell = looked
         self._looked: dict[str, tuple[float, LaserScan | UnreadScan]] = {}
 
     async def run(self, clock: Clock) -> None:
@@ -44,6 +53,7 @@ class SecondWitness:
         """Look at the scan that has waited longest; returns whether one was due."""
         due = [robot for robot in self._world.live_robots() if self._is_due(robot, now)]
         if due:
+            self._tell(now)
             self._look(min(due, key=self._looked_at), now)
         return bool(due)
 

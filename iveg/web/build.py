@@ -28,6 +28,7 @@ from iveg.web.api import (
     latency,
     messages,
     metrics,
+    past,
     recordings,
     robots,
     rule,
@@ -52,7 +53,7 @@ class Face:
         boot: Random, new at each start.
         queues: How full the queues are.
         worker: Where long work is done.
-        recordings: What came in, as files.
+        recordings: What came in, as files; ``past`` as the world that it made.
         trail: Takes what people and programs do.
     """
 
@@ -69,6 +70,7 @@ class Face:
     worker: Apart
     recordings: recordings.Recordings
     trail: AuditTrail
+    past: past.Past
 
     def snapshot(self, principal: Principal, now: Instant) -> Snapshot:
         """Everything that is known, for a browser that has just come."""
@@ -114,6 +116,7 @@ def live_routers(face: Face) -> Iterator[APIRouter]:
     yield messages.router(messages.Desk(beside.messenger, face.new_id, clock))
     yield latency.router(watch, clock, face.worker)
     yield recordings.router(face.recordings)
+    yield past.router(face.past, clock)
     yield health.router(clock, views.health)
     turns = parts.supervision.longest_turn_s
     yield metrics.router(clock, views.health, watch, face.queues, turns)

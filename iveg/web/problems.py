@@ -28,12 +28,14 @@ from iveg.domain.errors import (
     IvegError,
     MarkRefusedError,
     NotAllowedError,
+    NotRecordedError,
     OutdatedError,
     UnknownNameError,
     UnknownRobotError,
     UnreadableError,
     VersionMissingError,
 )
+from iveg.models.base import stamp
 
 _MOST_COMPLAINTS = 20
 
@@ -126,6 +128,9 @@ def problem_of(error: Exception) -> Problem:
             return Problem(409, str(error), _REFUSED[type(error)], {"why": error.why})
         case UnreadableError():
             return Problem(400, str(error), "unreadable", {"reason": error.reason})
+        case NotRecordedError():
+            ends = {"before": stamp(error.before), "after": stamp(error.after)}
+            return Problem(404, str(error), "not-recorded", ends)
         case HopError():
             # Addresses and drivers' words stay inside.
             return Problem(

@@ -25,7 +25,7 @@ from iveg.models.health import HopHealth as HopModel
 from iveg.models.margin import Margin
 from iveg.models.people import Acting, Detection, DetectionFrame, Evidence
 from iveg.models.people import Person as PersonModel
-from iveg.models.places import GreenhouseMap, Position
+from iveg.models.places import GreenhouseMap, Position, Scan
 from iveg.models.robot import (
     Applied,
     Detector,
@@ -157,6 +157,16 @@ class Views:
         """Seconds since the newest sweep arrived."""
         received = self._world.robot(robot_id).scan_received
         return None if received is None else round(now.mono - received.mono, 3)
+
+    def scan(self, robot_id: str) -> Scan:
+        """The newest sweep of one robot, as points in ``map``."""
+        robot = self._world.robot(robot_id)
+        scan = self.scans.newest(robot)
+        if scan is None or robot.scan_pose is None:
+            return Scan(robot_id=robot_id, stamp=None, points=[])
+        swept = scan.points(robot.scan_pose).tolist()
+        points = [(round(x, 3), round(y, 3)) for x, y in swept]
+        return Scan(robot_id=robot_id, stamp=scan.origin.stamp, points=points)
 
     def devices(self, now: Instant) -> list[Device]:
         """Each robot's devices at the IoT Agent, and when each last sent something."""

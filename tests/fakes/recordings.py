@@ -42,3 +42,22 @@ class WriterInPlace:
             for came in self._unpacking.feed(piece):
                 self.writer.take(came)
         self.writer.keep_house(now)
+
+
+class FakePast:
+    """Implements ``web.api.past.Past``.
+
+    Attributes:
+        asked: (viewer, Unix s) of each question.
+        fails: What the next ones raise.
+    """
+
+    def __init__(self) -> None:
+        self.asked: list[tuple[str, float]] = []
+        self.fails: Exception | None = None
+
+    async def world(self, viewer: str, wall: float) -> bytes:
+        self.asked.append((viewer, wall))
+        if self.fails is not None:
+            raise self.fails
+        return b'{"at_s":1}'

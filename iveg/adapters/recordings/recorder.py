@@ -107,6 +107,11 @@ class InputRecorder:
         if self._is_on and not is_telemetry(record):
             self._write_down(record, type(record).__name__.removesuffix("Record"))
 
+    def note(self, name: str, payload: bytes, at: Instant) -> None:
+        """What the loop tells of itself, on the channel of its name."""
+        if self._is_on:
+            self._queue(pack(Sort.ROW, at, name, payload))
+
     def tick(self, at: Instant) -> None:
         """The loop lets time pass."""
         if not self._is_on:
@@ -218,6 +223,11 @@ class InputRecorder:
     async def files(self) -> Sequence[RecordingFile]:
         """All recordings, oldest first."""
         return await _in_thread(self._directory.files)
+
+    @property
+    def folder(self) -> Path:
+        """Where recordings are."""
+        return self._directory.path
 
     async def finished(self, name: str) -> Path | None:
         """The file of a finished recording."""

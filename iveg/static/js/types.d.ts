@@ -716,6 +716,31 @@ export type Occurrence = {
   told: Told[];
 };
 
+/** The world as it was at a recorded moment; ages are of that moment. */
+export type PastWorld = {
+  rule: Rule;
+  map: GreenhouseMap;
+  robots: Robot[];
+  people: Person[];
+  detections: Record<string, DetectionFrame>;
+  /** Those that go on. */
+  commands: Command[];
+  alerts: Alert[];
+  flood: Flood;
+  /** The newest 200, oldest first. */
+  log: LogEntry[];
+  health: Health;
+  climate: Climate | null;
+  equipment: Tile[];
+  /** The moment that is shown: the newest by the one asked. */
+  at: string;
+  /** The same (Unix s). */
+  at_s: number;
+  /** Whether it has the hash that iVeg had then; null: none was passed. */
+  verified: boolean | null;
+  scans: Scan[];
+};
+
 /** A person, or a robot outside the fleet. */
 export type Person = {
   person_id: string;
@@ -1005,9 +1030,6 @@ export type Situation = {
 
 /** The first frame of ``/live``. */
 export type Snapshot = {
-  t: string;
-  server: Server;
-  user: User;
   rule: Rule;
   map: GreenhouseMap;
   robots: Robot[];
@@ -1022,6 +1044,9 @@ export type Snapshot = {
   health: Health;
   climate: Climate | null;
   equipment: Tile[];
+  t: string;
+  server: Server;
+  user: User;
 };
 
 /** Greatest speed factor of a robot, and its reason. */

@@ -176,7 +176,7 @@ def lists_of(
             Listing[LogEntry],
             "The action and inference log",
         ),
-        _List(
+        HistoryList(
             "audit",
             lists.AUDIT,
             queries.audit,

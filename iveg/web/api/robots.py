@@ -34,13 +34,7 @@ def router(views: Views, clock: Clock) -> APIRouter:
     @routes.get("/robots/{robot_id}/scan", response_model=Scan)
     async def scan(robot_id: str) -> Response:
         """The newest sweep of one robot, as points in `map`."""
-        robot = views.robot_state(robot_id)
-        scan = views.scans.newest(robot)
-        if scan is None or robot.scan_pose is None:
-            return Json(Scan(robot_id=robot_id, stamp=None, points=[]))
-        swept = scan.points(robot.scan_pose).tolist()
-        points = [(round(x, 3), round(y, 3)) for x, y in swept]
-        return Json(Scan(robot_id=robot_id, stamp=scan.origin.stamp, points=points))
+        return Json(views.scan(robot_id))
 
     @routes.get("/people", response_model=Listing[Person])
     async def people() -> Response:

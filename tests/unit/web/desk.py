@@ -28,7 +28,7 @@ from iveg.web.security.authentication import Authenticator, NotifySecret, Role
 from iveg.web.views import Views
 from tests.fakes.detector_store import FakeDetectorStore
 from tests.fakes.messages import FakeContacts, FakeSender
-from tests.fakes.recordings import FakeRecordings
+from tests.fakes.recordings import FakePast, FakeRecordings
 from tests.fakes.rule_store import FakeRuleStore
 from tests.fakes.worker import FakeWorker
 from tests.unit.pipeline.desk import FIELD, Desk
@@ -83,7 +83,7 @@ class WebDesk(Desk):
             self.parts.supervision.guard("equipment", self.parts.equipment.receive),
             is_former=self.former_secrets.__contains__,
         )
-        self.recordings = FakeRecordings()
+        self.recordings, self.past = FakeRecordings(), FakePast()
         self.face = Face(
             pipeline=self.parts,
             services=self.services,
@@ -98,6 +98,7 @@ class WebDesk(Desk):
             worker=FakeWorker(),
             recordings=self.recordings,
             trail=self.trail,
+            past=self.past,
         )
         self.table = ConnectionTable(lambda: self.clock().mono, ConnectionCaps())
         self.pages = _pages(self.face.site)

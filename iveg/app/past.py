@@ -1,0 +1,293 @@
+"""The world as it was at any recorded second: the pipeline itself, run once more.
+
+It takes over the memory that was recorded last before a moment, then the inputs since
+then at the very moments at which the live loop took them.  Each second the live process
+recorded a hash of its world; here the same world must come out, else the next memory is
+taken over as well, and whoever asked is told.
+"""
+
+from base64 import b64decode
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+import orjson
+
+from iveg import __version__
+from iveg.adapters.calibration_files import load_calibrations
+from iveg.adapters.direct import DirectReader
+from iveg.adapters.equipment_files import load_equipment
+from iveg.adapters.fleet_files import load_fleet
+from iveg.adapters.greenhouses import load_greenhouse
+from iveg.adapters.recordings.incoming import NOTIFICATIONS
+from iveg.adapters.recordings.timeline import Found, Place, Timeline
+from iveg.app.virtual import VirtualPipeline
+from iveg.domain.detection_rule import DetectionRule
+from iveg.domain.errors import NotRecordedError, UnreadableError
+from iveg.domain.kinds import Scope
+from iveg.domain.observations import Instant
+from iveg.domain.transports import DIRECT, FIWARE
+from iveg.models.base import write_json
+from iveg.pipeline import topics
+from iveg.pipeline.memory import Memory
+from iveg.pipeline.topics import StateReader
+from iveg.pipeline.trace import (
+    JUDGED,
+    KEYFRAMES_S,
+    LOOK,
+    WALL_UNITS,
+    CountedIds,
+    digest,
+    in_ns,
+)
+from iveg.settings import Settings
+from iveg.web.notifications import NotificationEndpoint
+from iveg.web.security.authentication import NotifySecret
+from iveg.web.views import Views
+
+STEPS, MEMORY = "/iveg/steps", "/iveg/memory"
+_NS = 10**9
+_GAP_S: Final = 2.0
+"""Where the loop told nothing for longer, nothing was recorded."""
+_PLAY_ON_S: Final = 20.0
+_NOT_HASHED = topics.LOG, topics.HEALTH, topics.MAP
+"""They tell of the server, and not of the world."""
+
+
+def picture(views: StateReader, now: Instant) -> bytes:
+    """The world as it is hashed: what a page is shown, but of the server itself."""
+    rows = (row for row in topics.TOPICS if row not in _NOT_HASHED)
+    told = write_json({row.member: row.read(views, now) for row in rows if row.read})
+    # Some parts keep things in sets, which are in no order.
+    return orjson.dumps(orjson.loads(told), option=orjson.OPT_SORT_KEYS)
+
+
+@dataclass(frozen=True, slots=True)
+class Site:
+    """What a world of the past is made with; the same as the live one.
+
+    Attributes:
+        folder: Of the recordings.
+    """
+
+    folder: Path
+    fleet: str
+    robots: tuple[str, ...]
+    greenhouse: str
+    equipment: str
+    calibration: str
+    apikey: str
+    direct_read: Scope
+    stop_direct: bool
+
+    @classmethod
+    def of(cls, settings: Settings, folder: Path) -> "Site":
+        """As the settings say."""
+        return cls(
+            folder,
+            settings.fleet,
+            tuple(settings.robots),
+            settings.greenhouse,
+            settings.equipment,
+            settings.calibration,
+            settings.apikey,
+            settings.direct_read,
+            settings.stop_direct,
+        )
+
+
+@dataclass(slots=True)
+class Agreement:
+    """How the hashes of a run compare: with the live ones, so far.
+
+    Attributes:
+        newest: Of the last one that was passed; None: of none yet.
+    """
+
+    equal: int = 0
+    unequal: int = 0
+    newest: bool | None = None
+
+    def note(self, is_equal: bool) -> None:
+        """One more."""
+        self.newest = is_equal
+        self.equal += is_equal
+        self.unequal += not is_equal
+
+
+@dataclass(slots=True)
+class _Waiting:
+    """Messages that were read and not heard yet."""
+
+    messages: deque[tuple[int, str, bytes]] = field(default_factory=deque)
+
+    def until(self, mono: int) -> Iterable[tuple[int, str, bytes]]:
+        while self.messages and self.messages[0][0] <= mono:
+            yield self.messages.popleft()
+
+
+class Past:
+    """One viewer's world, which moves along the recordings.
+
+    Args:
+        site: What it is made with.
+
+    Attributes:
+        now: The moment that it shows.
+        agreement: Of its hashes with those of the live process.
+    """
+
+    def __init__(self, site: Site) -> None:
+        self.agreement = Agreement()
+        self.now = Instant(0.0, 0.0)
+        self._timeline = Timeline(site.folder)
+        self._ids = CountedIds(bytes(16))
+        self._heard_at = self.now
+        self._thinned = False
+        self._place: Place | None = None
+        self._at_ns = 0
+        self._waiting = _Waiting()
+        fleet = load_fleet(site.fleet, site.robots)
+        direct = DIRECT.switched(on=site.stop_direct)
+        self._pipeline = VirtualPipeline(
+            fleet,
+            load_greenhouse(site.greenhouse),
+            DetectionRule(),
+            tiles=load_equipment(site.equipment, fleet.ids),
+            calibrations=load_calibrations(site.calibration),
+            transports=(direct, FIWARE),
+            new_id=self._ids,
+        )
+        self.parts = parts = self._pipeline.parts
+        self._memory = Memory(parts)
+        self.views = Views(parts)
+        self._reader = DirectReader(
+            site.apikey,
+            fleet.ids,
+            lambda: self._heard_at,
+            parts.ingest.enqueue,
+            parts.ingest.reject,
+            site.direct_read,
+            parts.ingest.is_past,
+        )
+        self._heard = self._reader.subscriptions()
+        self._orion = NotificationEndpoint(
+            parts.ingest,
+            NotifySecret(""),
+            lambda: self._heard_at,
+            lambda _: True,
+            ("", ""),
+            lambda _: None,
+            lambda _: self._thinned,
+            parts.equipment.equipment.entities,
+            parts.equipment.receive,
+        )
+
+    # --- moving -------------------------------------------------------------------
+
+    def move(self, wall: float) -> None:
+        """Go to a moment (Unix s).
+
+        Raises:
+            NotRecordedError: nothing was recorded there.
+            UnreadableError: it was recorded by another program or fleet.
+            DataFileError: a file cannot be read.
+        """
+        at = round(wall * _NS)
+        if self._place is None or not 0 <= at - self._at_ns <= _PLAY_ON_S * _NS:
+            self._begin(at)
+        self._play(at)
+        if at - self._at_ns > _GAP_S * _NS:
+            raise self._gap(at)
+
+    def _begin(self, at: int) -> None:
+        """Take over the last memory by a moment."""
+        within = round((KEYFRAMES_S + _GAP_S) * _NS)
+        found = self._timeline.latest(MEMORY, at, within)
+        self._place = None
+        if found is None:
+            raise self._gap(at)
+        self._take_over(orjson.loads(found.message.payload))
+        self._place, self._at_ns = found.behind, found.message.log_time
+
+    def _take_over(self, told: dict[str, Any]) -> None:
+        version = told.get("version")
+        if version != __version__:
+            raise UnreadableError("other_version", f"recorded by iVeg {version}")
+        self._waiting.messages.clear()
+        self._memory.read(b64decode(told["memory"]))
+        self._ids.seed, self._ids.count = bytes.fromhex(told["seed"]), told["ids"]
+        self._pass_to(Instant(told["mono"] / _NS, told["wall"]))
+        self.agreement.newest = None
+
+    def _play(self, at: int) -> None:
+        assert self._place is not None  # noqa: S101 - begun before
+        for found in self._timeline.messages(self._place):
+            message = found.message
+            if message.topic in (STEPS, MEMORY) and message.log_time > at:
+                return
+            self._take(found)
+            self._place = found.behind
+            if message.topic == STEPS:
+                self._at_ns = message.log_time
+
+    def _take(self, found: Found) -> None:
+        topic, log_time, payload = found.message
+        if topic == STEPS:
+            self._repeat(orjson.loads(payload))
+        elif topic == MEMORY:
+            told = orjson.loads(payload)
+            if told["by_hand"] or self.agreement.newest is False:
+                self._take_over(told)
+        elif topic == NOTIFICATIONS.topic or topic in self._heard:
+            mono = in_ns(found.file.instant(log_time).mono)
+            self._waiting.messages.append((mono, topic, payload))
+
+    def _gap(self, at: int) -> NotRecordedError:
+        files = self._timeline.files()
+        before = max((one.last for one in files if one.first <= at), default=None)
+        after = min((one.first for one in files if one.first > at), default=None)
+        seconds = [None if one is None else one / _NS for one in (before, after)]
+        return NotRecordedError(at / _NS, *seconds)
+
+    # --- what the loop did --------------------------------------------------------
+
+    def _repeat(self, told: dict[str, Any]) -> None:
+        """The steps of one tick."""
+        tick_mono, tick_wall = told["mono"], told["wall"]
+        arrived = {
+            tick_mono + mono: (tick_wall + wall / WALL_UNITS, bool(thinned))
+            for mono, wall, thinned in told["arrived"]
+        }
+        for mono, wall, kind in told["steps"]:
+            moment = Instant((tick_mono + mono) / _NS, tick_wall + wall / WALL_UNITS)
+            if kind == LOOK:
+                self._pass_to(moment)
+                self.parts.second_witness.tick(moment)
+                continue
+            for heard_at, topic, payload in self._waiting.until(tick_mono + mono):
+                known = arrived.get(heard_at)
+                guess = moment.wall - moment.mono + heard_at / _NS
+                heard_wall, self._thinned = known or (guess, False)
+                self._hear(Instant(heard_at / _NS, heard_wall), topic, payload)
+            self._pass_to(moment)
+            self.parts.loop.step(
+                self.parts.ingest.drain(), moment, judges=kind == JUDGED
+            )
+        # A press that joined a STOP has drawn one, and was no input.
+        self._ids.count = told["ids"]
+        if "hash" in told:
+            self.agreement.note(told["hash"] == digest(picture(self.views, self.now)))
+
+    def _hear(self, at: Instant, topic: str, payload: bytes) -> None:
+        self._heard_at = at
+        self._pass_to(at)
+        if topic == NOTIFICATIONS.topic:
+            self._orion.receive(payload)
+        else:
+            self._reader.read(topic, payload)
+
+    def _pass_to(self, now: Instant) -> None:
+        self.now = self._ids.now = self._pipeline.now = now

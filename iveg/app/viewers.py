@@ -1,0 +1,158 @@
+"""Who looks at the past: for each a process of its own, so that the loop feels nothing.
+
+A process begins with the first question, keeps its world for the next, and ends when
+nobody has asked for a while.
+"""
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Final
+
+from iveg.adapters.worker import Worker
+from iveg.app.past import Past, Site
+from iveg.domain.errors import (
+    DataFileError,
+    HopError,
+    NotRecordedError,
+    UnreadableError,
+)
+from iveg.domain.observations import Instant
+from iveg.domain.stamps import format_stamp
+from iveg.models.snapshot import PastWorld
+from iveg.pipeline import topics
+from iveg.pipeline.ports import Clock
+
+MOST_VIEWERS: Final = 3
+"""Processes at once; each holds a world of its own."""
+IDLE_S: Final = 60.0
+_IN_USE_S: Final = 10.0
+_LIMIT_S: Final = 60.0
+_CHECK_S: Final = 5.0
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """What a process answers: the world as JSON, or why there is none."""
+
+    world: bytes = b""
+    missing: tuple[float, float | None, float | None] | None = None
+    unreadable: tuple[str, str] | None = None
+
+
+_past: dict[Site, Past] = {}
+"""Of this process, which has one viewer."""
+
+
+def world_at(site: Site, wall: float) -> Shown:
+    """The world at a moment (Unix s); in the process of a viewer."""
+    return asyncio.run(_world_at(site, wall))
+
+
+async def _world_at(site: Site, wall: float) -> Shown:
+    """Orders of the past begin tasks, which end with the question: none gets out."""
+    try:
+        past = _past.get(site)
+        if past is None:
+            past = _past[site] = Past(site)
+        past.move(wall)
+    except NotRecordedError as error:
+        return Shown(missing=(error.at, error.before, error.after))
+    except UnreadableError as error:
+        return Shown(unreadable=(error.reason, error.detail))
+    except DataFileError as error:
+        raise HopError("recordings", str(error)) from error
+    return Shown(picture_of(past).model_dump_json().encode())
+
+
+def picture_of(past: Past) -> PastWorld:
+    """The world that a viewer is shown."""
+    return PastWorld(
+        at=format_stamp(past.now.wall),
+        at_s=past.now.wall,
+        verified=past.agreement.newest,
+        scans=[past.views.scan(one) for one in past.parts.world.robots],
+        **topics.read_all(past.views, past.now),
+    )
+
+
+@dataclass(slots=True)
+class Viewer:
+    """A process, and when it was asked last (monotonic, s)."""
+
+    asked_at: float
+    worker: Worker = field(default_factory=lambda: Worker(limit_s=_LIMIT_S))
+
+
+class Viewers:
+    """All of them.
+
+    Args:
+        site: What worlds are made with.
+        clock: Tells who has not asked for long.
+        work: Answers; tests pass another.
+    """
+
+    def __init__(
+        self, site: Site, clock: Clock, work: Callable[[Site, float], Shown] = world_at
+    ) -> None:
+        self._site, self._clock, self._work = site, clock, work
+        self._viewers: dict[str, Viewer] = {}
+
+    @property
+    def count(self) -> int:
+        """How many processes there are."""
+        return len(self._viewers)
+
+    async def world(self, viewer: str, wall: float) -> bytes:
+        """The world at a moment as JSON, for a viewer by any name of its own.
+
+        Raises:
+            NotRecordedError: nothing was recorded there.
+            UnreadableError: another version or fleet recorded it.
+            HopError: too many look at once, or the process ended.
+        """
+        shown = await self.viewer(viewer).worker.run(self._work, self._site, wall)
+        if shown.missing is not None:
+            raise NotRecordedError(*shown.missing)
+        if shown.unreadable is not None:
+            raise UnreadableError(*shown.unreadable)
+        return shown.world
+
+    def viewer(self, name: str) -> "Viewer":
+        """A viewer by name, old or new.  Raises HopError: there are too many."""
+        now = self._clock().mono
+        viewer = self._viewers.get(name)
+        if viewer is None:
+            self._make_room(now)
+            viewer = self._viewers[name] = Viewer(now)
+        viewer.asked_at = now
+        return viewer
+
+    def _make_room(self, now: float) -> None:
+        if len(self._viewers) < MOST_VIEWERS:
+            return
+        oldest = min(self._viewers, key=lambda one: self._viewers[one].asked_at)
+        if now - self._viewers[oldest].asked_at < _IN_USE_S:
+            raise HopError("past", "too many look at the past at once")
+        self._end(oldest)
+
+    async def run(self) -> None:
+        """End what nobody asks any more, until cancelled."""
+        while True:
+            await asyncio.sleep(_CHECK_S)
+            self.tick(self._clock())
+
+    def tick(self, now: Instant) -> None:
+        """End what nobody asks any more."""
+        for name, viewer in list(self._viewers.items()):
+            if now.mono - viewer.asked_at > IDLE_S:
+                self._end(name)
+
+    def _end(self, name: str) -> None:
+        self._viewers.pop(name).worker.close()
+
+    async def close(self) -> None:
+        """End all."""
+        for name in list(self._viewers):
+            self._end(name)

@@ -1,0 +1,188 @@
+"""What a pipeline remembers, as bytes that another of the same build can take over.
+
+The parts stay where they are, so that every wire between them holds; what they have in
+mind is put in its place.  Which attributes are wires (calls, ports, what never changes)
+is seen once, when nothing has come in yet.
+"""
+
+import io
+import pickle
+from collections.abc import Iterable, Iterator, Mapping
+from enum import Enum
+from typing import Any, Final
+
+from iveg.domain.errors import UnreadableError
+from iveg.domain.fleet import FleetDescription
+from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.observations import LaserScan, UnreadScan
+from iveg.domain.stop.machine import STEPS
+from iveg.domain.witness import Plan
+from iveg.pipeline.build import Pipeline
+
+_CONSTANTS = Greenhouse, FleetDescription, Plan
+_OURS = "iveg.domain.", "iveg.pipeline."
+_LEFT_OUT = "hub", "latency", "evaluator.tracking.newest", "commander._sender"
+"""Parts that no picture of the world needs."""
+_TASKS = "_tasks"
+_PLAIN: Final = {
+    "builtins": {"bool", "dict", "float", "frozenset", "int", "list", "set", "str"},
+    "collections": {"deque", "defaultdict", "Counter", "OrderedDict"},
+    "numpy": {"ndarray", "dtype"},
+    "numpy._core.multiarray": {"_reconstruct", "scalar"},
+    "numpy._core.numeric": {"_frombuffer"},
+    "_codecs": {"encode"},
+}
+
+
+class Memory:
+    """The memory of one pipeline.
+
+    Args:
+        parts: Just built; nothing has come in.
+    """
+
+    def __init__(self, parts: Pipeline) -> None:
+        self._wired: dict[str, object] = {}
+        """Parts and constants by their path, which is the same in each pipeline."""
+        self._kept: dict[str, list[str]] = {}
+        """Attributes of a part that are no wires, by its path."""
+        self._paths: dict[int, str] = {}
+        self._robots = set(parts.world.robots)
+        for state, key in STEPS:
+            self._wire(f"stop.{state}.{key}", STEPS[state, key])
+        for name in parts.__dataclass_fields__:
+            self._find(name, getattr(parts, name))
+
+    def write(self) -> bytes:
+        """As it is now."""
+        told = {
+            path: {name: getattr(self._wired[path], name) for name in names}
+            for path, names in self._kept.items()
+        }
+        buffer = io.BytesIO()
+        _Writer(buffer, self._wired.values(), self._paths).dump(told)
+        return buffer.getvalue()
+
+    def read(self, data: bytes) -> None:
+        """Take over what :meth:`write` gave.
+
+        Raises:
+            UnreadableError: it is of another build, or nothing of the kind.
+        """
+        try:
+            told = _Reader(io.BytesIO(data), self._wired).load()
+            if told["world"]["robots"].keys() != self._robots:
+                raise LookupError("recorded with other robots")
+            for path, state in told.items():
+                for name in self._kept[path]:
+                    setattr(self._wired[path], name, state[name])
+        except Exception as error:
+            raise UnreadableError("memory", repr(error)) from error
+
+    def _find(self, path: str, value: object) -> None:
+        if id(value) in self._paths:
+            return
+        self._wire(path, value)
+        if isinstance(value, _CONSTANTS) or path in _LEFT_OUT:
+            return
+        kept = self._kept[path] = []
+        for name in _attributes(value):
+            one = getattr(value, name)
+            if _is_part(one):
+                self._find(f"{path}.{name}", one)
+            elif name != _TASKS and not _is_wire(one):
+                kept.append(name)
+
+    def _wire(self, path: str, value: object) -> None:
+        self._paths[id(value)], self._wired[path] = path, value
+
+
+def _attributes(value: object) -> Iterator[str]:
+    yield from getattr(value, "__dict__", ())
+    for base in type(value).__mro__:
+        for name in base.__dict__.get("__slots__", ()):
+            if hasattr(value, name):
+                yield name
+
+
+def _is_part(value: object) -> bool:
+    """Whether it is one of the parts that are wired, and not what one of them knows."""
+    if isinstance(value, _CONSTANTS):
+        return True
+    of = type(value)
+    if (
+        not of.__module__.startswith(_OURS)
+        or callable(value)
+        or isinstance(value, Enum)
+    ):
+        return False
+    params = getattr(of, "__dataclass_params__", None)
+    return params is None or not params.frozen
+
+
+def _is_wire(value: object) -> bool:
+    if isinstance(value, Mapping):
+        return any(map(_is_wire, value.values()))
+    if isinstance(value, Iterable) and not isinstance(value, str | bytes):
+        return any(map(_is_wire, list(value)))
+    is_call = callable(value) and not isinstance(value, type)
+    return is_call or not _is_data(value)
+
+
+def _is_data(value: object) -> bool:
+    module = type(value).__module__
+    return module.startswith((*_OURS, "builtins", "collections", "numpy"))
+
+
+class _Writer(pickle.Pickler):
+    """Writes values, and of parts only where they are."""
+
+    def __init__(
+        self, stream: io.BytesIO, wired: Iterable[object], paths: Mapping[int, str]
+    ) -> None:
+        super().__init__(stream, protocol=5)
+
+        def place(value: object) -> tuple[Any, ...]:
+            path = paths.get(id(value))
+            if path is not None:
+                return _at, (path,)
+            reduced: tuple[Any, ...] = value.__reduce_ex__(5)  # type: ignore[assignment]
+            return reduced
+
+        # By type, and not by asking of each value, which takes five times as long.
+        self.dispatch_table = {type(one): place for one in wired}
+        self.dispatch_table[UnreadScan] = _read_scan
+
+
+def _at(path: str) -> object:
+    """Stands in a file for a part; the reader knows it."""
+    raise LookupError(path)
+
+
+def _read_scan(scan: UnreadScan) -> tuple[Any, ...]:
+    try:
+        return _same, (scan.read(),)
+    except UnreadableError:
+        return _same, (None,)
+
+
+def _same(scan: LaserScan | None) -> LaserScan | None:
+    return scan
+
+
+class _Reader(pickle.Unpickler):
+    """Makes nothing but values of ours: a file may come from anywhere."""
+
+    def __init__(self, stream: io.BytesIO, wired: Mapping[str, object]) -> None:
+        super().__init__(stream)
+        self._wired = wired
+
+    def find_class(self, module: str, name: str) -> Any:
+        own = {_at.__name__: self._wired.__getitem__, _same.__name__: _same}
+        if module == __name__ and name in own:
+            return own[name]
+        found = super().find_class(module, name)
+        is_ours = module.startswith(_OURS) and isinstance(found, type)
+        if is_ours or name in _PLAIN.get(module, ()):
+            return found
+        raise pickle.UnpicklingError(f"{module}.{name}")
