@@ -1,11 +1,12 @@
 """Positions in a TOML file, for errors that name line and column.
 
 ``tomllib`` gives positions of syntax errors alone, in their text.  This finds the rest
-line by line: tables, lists of tables, dotted keys and inline tables, as people write
-them.
+line by line: tables, lists of tables, dotted keys, inline tables and lists of them with
+a line each, as people write them.
 """
 
 import re
+from collections.abc import Iterator
 from tomllib import TOMLDecodeError
 
 Path = tuple[str | int, ...]
@@ -17,6 +18,7 @@ _KEY = re.compile(
 )
 _PART = re.compile(r"""[A-Za-z0-9_-]+|"[^"]*"|'[^']*'""")
 _INLINE = re.compile(r"""([A-Za-z0-9_-]+|"[^"]*")\s*=""")
+_ITEM = re.compile(r"\s*(\{)")
 _SAID = re.compile(r"(.*) \(at line (\d+), column (\d+)\)")
 
 
@@ -46,7 +48,8 @@ def _places(text: str) -> dict[Path, tuple[int, int]]:
     found: dict[Path, tuple[int, int]] = {}
     counts: dict[Path, int] = {}
     here: Path = ()
-    for number, line in enumerate(text.splitlines(), 1):
+    lines = enumerate(text.splitlines(), 1)
+    for number, line in lines:
         header = _HEADER.match(line)
         if header is not None:
             names = _names(header[2])
@@ -60,7 +63,25 @@ def _places(text: str) -> dict[Path, tuple[int, int]]:
         found.setdefault(at, (number, key.start(1) + 1))
         for inner in _INLINE.finditer(line, key.end()):
             found.setdefault(at + _names(inner[1]), (number, inner.start(1) + 1))
+        if line.endswith("["):
+            found |= _items(at, lines)
     return found
+
+
+def _items(
+    at: Path, lines: Iterator[tuple[int, str]]
+) -> Iterator[tuple[Path, tuple[int, int]]]:
+    """The inline tables of a list, up to the line that ends it."""
+    index = 0
+    for number, line in lines:
+        item = _ITEM.match(line)
+        if item is not None:
+            yield (*at, index), (number, item.start(1) + 1)
+            for key in _INLINE.finditer(line):
+                yield (*at, index, *_names(key[1])), (number, key.start(1) + 1)
+            index += 1
+        if line.endswith("]"):
+            return
 
 
 def _names(dotted: str) -> Path:

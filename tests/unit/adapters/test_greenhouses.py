@@ -97,38 +97,40 @@ def test_a_file_that_is_not_text_is_refused(tmp_path: Path) -> None:
 def test_a_bad_number_is_refused_with_file_line_and_field() -> None:
     said = complaint(SMALL.replace("xmax = 9, ymax = 4", 'xmax = "9", ymax = 4'))
 
-    assert said.startswith("shed.toml, line 6, rows.xmax: must be a number")
+    assert said.startswith(
+        "shed.toml:6:25, rows[1].xmax: Input should be a valid number"
+    )
 
 
 def test_a_row_turned_inside_out_is_refused() -> None:
     said = complaint(SMALL.replace("ymin = 1, xmax = 9", "ymin = 7, xmax = 9"))
 
-    assert said == "shed.toml, line 5, rows.ymin: must be less than ymax."
+    assert said == "shed.toml:5:3, rows[0]: ymin must be less than ymax."
 
 
 def test_a_lane_without_a_label_is_refused_at_its_heading() -> None:
     said = complaint(SMALL.replace('label = "Pasillo 1"\n', ""))
 
-    assert said == "shed.toml, line 9, lanes.label: is missing."
+    assert said == "shed.toml:9:1, lanes[0].label: Field required."
 
 
-def test_a_misspelt_field_is_refused_with_the_known_ones() -> None:
+def test_a_misspelt_field_is_refused_at_its_place() -> None:
     said = complaint(SMALL.replace("xmin = 1, ymin = 3", "xmim = 1, ymin = 3"))
 
-    assert said.startswith("shed.toml, line 6, rows.xmim: is not a field here")
+    assert said == "shed.toml:6:5, rows[1].xmim: Extra inputs are not permitted."
 
 
 def test_what_lies_outside_the_wall_is_refused() -> None:
     said = complaint(SMALL.replace("xmax = 9, ymax = 4", "xmax = 90, ymax = 4"))
 
-    assert said == "shed.toml, line 6, rows: lies outside bounds."
+    assert said == "shed.toml:6:3, rows[1]: lies outside bounds."
 
 
 @pytest.mark.parametrize("number", ["nan", "inf", "1e7", "true", "[]"])
 def test_only_finite_numbers_of_the_contract_are_taken(number: str) -> None:
     said = complaint(SMALL.replace("xmin = 1, ymin = 3", f"xmin = {number}, ymin = 3"))
 
-    assert said.startswith("shed.toml, line 6, rows.xmin: must be a number")
+    assert said.startswith("shed.toml:6:5, rows[1].xmin: Input should be ")
 
 
 @pytest.mark.parametrize(
@@ -136,36 +138,36 @@ def test_only_finite_numbers_of_the_contract_are_taken(number: str) -> None:
     [("name = \n", 1), (SMALL + "xmid = 3 3\n", 15), ("name = 'a'\nbounds = {", 2)],
 )
 def test_broken_toml_is_refused_with_its_line(text: str, line: int) -> None:
-    assert complaint(text).startswith(f"shed.toml, line {line}: is not TOML")
+    assert complaint(text).startswith(f"shed.toml:{line}:")
 
 
 def test_a_file_without_bounds_is_refused() -> None:
-    assert complaint('name = "a"') == "shed.toml, line 1, bounds: is missing."
+    assert complaint('name = "a"') == "shed.toml:1:1, bounds: Field required."
 
 
 def test_a_list_of_something_else_is_refused() -> None:
     said = complaint(SMALL.replace("rows = [", "posts = [3]\nrows = ["))
 
-    assert said == "shed.toml, line 4, posts: must be a list of tables."
+    assert said.startswith("shed.toml:4:1, posts[0]: Input should be a valid dict")
 
 
 @pytest.mark.parametrize("label", ['""', '"' + "P" * 65 + '"', "7"])
 def test_a_label_that_nobody_can_read_is_refused(label: str) -> None:
     said = complaint(SMALL.replace('"Pasillo 1"', label))
 
-    assert said.endswith("lanes.label: must be a text of 1 to 64 characters.")
+    assert said.startswith("shed.toml:10:1, lanes[0].label: ")
 
 
 def test_bounds_that_are_no_table_are_refused() -> None:
     said = complaint('name = "a"\nbounds = 3')
 
-    assert said.startswith("shed.toml, line 2, bounds: must be a table")
+    assert said.startswith("shed.toml:2:1, bounds: Input should be a valid dict")
 
 
 def test_rows_that_are_no_list_are_refused() -> None:
     said = complaint(SMALL.replace("rows = [", "posts = 3\nrows = ["))
 
-    assert said == "shed.toml, line 4, posts: must be a list of tables."
+    assert said == "shed.toml:4:1, posts: Input should be a valid list."
 
 
 def test_posts_and_starts_of_a_users_greenhouse_are_read() -> None:
@@ -182,4 +184,4 @@ def test_posts_and_starts_of_a_users_greenhouse_are_read() -> None:
 def test_an_unknown_key_is_named_whatever_is_in_it() -> None:
     said = complaint(SMALL.replace("rows = [", '"wall(" = 3\nrows = ['))
 
-    assert "wall(: is not a field here" in said
+    assert "wall(: Extra inputs are not permitted" in said

@@ -17,6 +17,14 @@ body = { length = 1, "wide" = 2 }
 id = "B"
 [robots.drive]
 speed = 3
+
+[house]
+rows = [
+  # the first
+  { xmin = 1, ymin = 2 },
+  { xmin = 3 },
+]
+name = "y"
 """
 
 
@@ -33,6 +41,10 @@ speed = 3
         (("robots", 0, "drive", "type"), (9, 1)),
         (("robots", 1, "id"), (12, 1)),
         (("robots", 1, "drive", "speed"), (14, 1)),
+        (("house", "rows", 0, "ymin"), (19, 15)),
+        (("house", "rows", 1), (20, 3)),
+        (("house", "rows", 1, "xmax"), (20, 3)),
+        (("house", "name"), (22, 1)),
     ],
 )
 def test_a_key_is_found_by_line_and_column(path: Path, place: tuple[int, int]) -> None:
