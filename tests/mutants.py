@@ -116,6 +116,12 @@ MUTANTS = (
         ("unit/domain/rule/test_obstacles.py",),
     ),
     Mutant(
+        "rule: one reason that is over ends the limit of all",
+        "all(one.outside_since is not None for one in mine.values())",
+        "any(one.outside_since is not None for one in mine.values())",
+        ("unit/domain/rule/test_speed_limits.py",),
+    ),
+    Mutant(
         "rule: an encounter that is foretold slows nobody",
         "one.in_s <= (max(HOLDS_S, soon_s) if cause in mine else soon_s)",
         "one.in_s < 0.0",

@@ -50,6 +50,8 @@ class SpeedLimit:
         cause: The person or robot that it is for; None of what only a laser sees.
         distance_m: From ``base_link`` to the centre of the cause (m).
         foretold_s: When it will reach the ring of the cause (s); None: it is inside.
+        over: Its reason has ended: it is lifted a second after that, and so is what the
+            robot judges itself.
     """
 
     speed_factor: float = FULL_SPEED
@@ -58,6 +60,7 @@ class SpeedLimit:
     distance_m: float | None = None
     decision_id: str | None = None
     foretold_s: float | None = None
+    over: bool = False
 
 
 CLEAR = SpeedLimit()

@@ -253,6 +253,7 @@ class SpeedLimitValue(Wire):
     distance_m: Annotated[float, Field(ge=0, le=1e7)] | None = None
     decision_id: Text | None = None
     foretold_s: Seconds | None = None
+    over: bool = False
 
 
 SpeedLimitsValue = Annotated[dict[str, SpeedLimitValue], Field(max_length=MAX_ROBOTS)]

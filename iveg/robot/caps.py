@@ -2,11 +2,12 @@
 
 Factors are 0, 0.5 or 1 and are never multiplied (docs/safety.md): two overlapping zones
 still halve the speed.  A raw cap that falls applies immediately; one that rises must
-stay up for one second first, and a lower cap within that second counts.
+stay up for one second first, and a lower cap within that second counts.  A cap that is
+told to be over, and is lifted by itself a second later, waits for no second one.
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from iveg.domain.feedback import FULL_SPEED, HALF_SPEED
 from iveg.domain.limits import LIMITS
@@ -20,12 +21,18 @@ _REASONS = (
 
 @dataclass(frozen=True, slots=True)
 class Cap:
-    """One reason not to drive faster than ``factor``."""
+    """One reason not to drive faster than ``factor``.
+
+    Attributes:
+        waits: Whether it is lifted a second after it is heard no more; else its reason
+            has ended, and that second is counted while it is still heard.
+    """
 
     factor: float
     reason: str
     cause: str | None = None
     decision_id: str | None = None
+    waits: bool = field(default=True, compare=False)
 
     def _order(self) -> tuple[float, int, bool, bool]:
         reason = -_REASONS.index(self.reason)

@@ -77,15 +77,12 @@ class Judgement:
         self._motion: Motion | None = None
         self._witness = Witness(limits.outline, limits.plan)
         self._lookahead = Lookahead(limits.braking)
-        self._applied = AppliedCap(Cap(0.0, "watchdog"))
+        self._waited = AppliedCap(Cap(0.0, "watchdog"))
+        self.cap = self._waited.cap
+        """In force since the last ``settle``."""
         self.watchdog = Watchdog(boot_at, limits.slow_s)
         self.local = FREE
         """Cap requested by the robot's own software, independent of iVeg."""
-
-    @property
-    def cap(self) -> Cap:
-        """The cap in force since the last ``settle``."""
-        return self._applied.cap
 
     @property
     def twist(self) -> Twist2D:
@@ -139,6 +136,7 @@ class Judgement:
         """Evaluate this moment."""
         self.watchdog.tick(now)
         slowed = self.cap.reason in ("person", "robot")
+        told = [*self._peer_feedback.caps(self._own(now), slowed, now)]
         raw = lowest(
             (
                 self.local,
@@ -146,10 +144,12 @@ class Judgement:
                 self._silence_cap(now),
                 self._obstacle_cap(now),
                 self._foreseen_cap(now),
-                *self._peer_feedback.caps(self._own(now), slowed, now),
+                *(one for one in told if one.waits),
             )
         )
-        self._applied = self._applied.settle(raw, now)
+        self._waited = self._waited.settle(raw, now)
+        ends_late = (one for one in told if not one.waits)
+        self.cap = lowest((self._waited.cap, *ends_late))
 
     def must_stand(self, now: float) -> bool:
         """Whether iVeg's silence requires a hold."""

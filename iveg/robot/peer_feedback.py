@@ -152,7 +152,8 @@ class PeerFeedback:
                     continue
                 ring = _ring(kept.alert, silence) + beyond
                 if _inside(kept.alert, topic.peer, own, ring):
-                    yield _alerted(kept.alert)
+                    # One that is missing has been kept for its second already.
+                    yield _alerted(kept.alert, waits=kept.missing_since is None)
             if topic.peer is not None and own is not None:
                 yield topic.peer.cap(name, own, beyond, now)
 
@@ -265,8 +266,8 @@ def _mandated(speed_limit: SpeedLimit) -> Cap:
     factor = quantised(speed_limit.speed_factor)
     if factor == FULL_SPEED:
         return FREE
-    reason = known_reason(speed_limit.reason)
-    return Cap(factor, reason, speed_limit.cause, speed_limit.decision_id)
+    reason, decision_id = known_reason(speed_limit.reason), speed_limit.decision_id
+    return Cap(factor, reason, speed_limit.cause, decision_id, not speed_limit.over)
 
 
 def _limited_free(speed_limit: SpeedLimit, alert: FeedbackAlert) -> bool:
@@ -302,6 +303,6 @@ def _alert_ahead(kept: _Kept, now: float) -> Iterator[Ahead]:
         yield (x, y, *goes, now - kept.at, _ring(alert, 0.0)), _alerted(alert)
 
 
-def _alerted(alert: FeedbackAlert) -> Cap:
+def _alerted(alert: FeedbackAlert, *, waits: bool = True) -> Cap:
     reason = known_reason(alert.class_ or "stale")
-    return Cap(HALF_SPEED, reason, None, alert.decision_id or None)
+    return Cap(HALF_SPEED, reason, None, alert.decision_id or None, waits)

@@ -8,12 +8,13 @@ import orjson
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from iveg.domain.feedback import CLEAR, FeedbackAlert, SpeedLimit
+from iveg.domain.feedback import CLEAR, Feedback, FeedbackAlert, SpeedLimit
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import Origin, SafetyReport
 from iveg.ngsi import codec
 from iveg.robot.caps import Cap, lowest
 from iveg.robot.effects import Drive
+from iveg.robot.judgement import Judgement, Limits
 from iveg.robot.peer_feedback import PeerFeedback
 from tests.unit.robot.hostile import (
     EVENTS,
@@ -446,6 +447,33 @@ def test_noise_below_the_hysteresis_changes_the_factor_at_most_once_a_crossing(
         rig.alerts = (replace(person(distance), stamp=str(wobble)),)
         rig.run(0.2)
     assert rig.factor_changes() - before <= 1
+
+
+_TOLD = {
+    "clear": CLEAR,
+    "person": SpeedLimit(0.5, "person"),
+    "over": SpeedLimit(0.5, "person", over=True),
+}
+
+
+@given(st.lists(st.tuples(st.sampled_from([*_TOLD]), st.integers(1, 6)), max_size=12))
+@example([("person", 1), ("over", 2), ("clear", 4)])
+def test_a_limit_goes_a_second_after_its_reason_and_no_second_later(
+    run: list[tuple[str, int]],
+) -> None:
+    judgement, ended = Judgement("AGI", 0.0, Limits()), 0
+    steps = [what for what, count in [("clear", 6), *run] for _ in range(count)]
+    for seq, what in enumerate(steps, 1):
+        now = seq / 4
+        judgement.watchdog.sent(seq, now)
+        judgement.note_odometry(Pose2D(0.0, 0.0, 0.0), REST, now)
+        limits, seen = {"AGI": _TOLD[what]}, {"AGI": seq}
+        told = Feedback("AGII", Origin("b", seq), speed_limits=limits, seen=seen)
+        judgement.note_feedback("AGII", told, now)
+        judgement.settle(now)
+        ended = seq if what == "person" else ended
+        is_free = what == "clear" and seq - ended > 4
+        assert (judgement.cap.factor == 1.0) == is_free
 
 
 @given(st.floats(-10, 10), st.floats(-10, 10), st.sampled_from([0.0, 0.5, 1.0]))

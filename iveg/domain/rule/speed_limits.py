@@ -277,6 +277,7 @@ class SpeedLimits:
                 worst.distance_m,
                 worst.decision_id,
                 self._foretold_s(robot_id, worst.zone, worst.distance_m),
+                all(one.outside_since is not None for one in mine.values()),
             )
         for first in self.missing[robot_id]:
             return SpeedLimit(HALF_SPEED, first.reason, first.robot_id)

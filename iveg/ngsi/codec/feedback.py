@@ -56,6 +56,7 @@ def _speed_limits(value: payloads.FeedbackValue) -> dict[str, SpeedLimit]:
             one.distance_m,
             one.decision_id,
             one.foretold_s,
+            one.over,
         )
         for robot_id, one in value.speed_limits.items()
     }
@@ -160,6 +161,7 @@ def _write_speed_limit(speed_limit: SpeedLimit) -> dict[str, object]:
             "distance_m": rounded(speed_limit.distance_m),
             "decision_id": speed_limit.decision_id,
             "foretold_s": rounded(speed_limit.foretold_s),
+            "over": speed_limit.over or None,
         }
     )
 

@@ -365,6 +365,17 @@ def test_feedback_tells_how_people_go_on_where_the_rule_looks_ahead() -> None:
     )
 
 
+def test_a_limit_says_that_it_is_over_and_else_nothing_of_it() -> None:
+    limits = {
+        "AGI": SpeedLimit(0.5, "person", over=True),
+        "AGII": SpeedLimit(0.5, "robot"),
+    }
+    payload = codec.write_feedback(Feedback("AGI", Origin(), speed_limits=limits))
+
+    assert codec.read_feedback(payload).speed_limits == limits
+    assert "over" not in orjson.loads(payload)["speed_limits"]["AGII"]
+
+
 def test_a_backlog_that_nobody_knows_is_not_told() -> None:
     assert "backlog" not in orjson.loads(
         codec.write_feedback(Feedback("AGI", Origin()))

@@ -769,6 +769,29 @@ def test_raising_the_factor_takes_a_second_of_good_news() -> None:
     assert (early, rig.factor) == (0.5, 1.0)
 
 
+def test_a_limit_that_is_over_has_its_second_while_it_is_told() -> None:
+    rig = moving()
+    rig.speed_limits = {"AGI": SpeedLimit(0.5, "person")}
+    rig.run(1.0)
+    rig.speed_limits = {"AGI": SpeedLimit(0.5, "person", over=True)}
+    rig.run(1.5)
+    held = rig.factor
+    rig.speed_limits = {}
+    rig.run(0.3)
+    assert (held, rig.factor) == (0.5, 1.0)
+
+
+def test_an_alert_that_iveg_tells_no_more_has_its_second_while_it_is_kept() -> None:
+    rig = moving()
+    rig.alerts = (person(1.0),)
+    rig.run(1.0)
+    rig.alerts = ()
+    rig.run(1.0)
+    early = rig.factor
+    rig.run(0.5)
+    assert (early, rig.factor) == (0.5, 1.0)
+
+
 def test_noise_about_the_ring_changes_the_factor_once() -> None:
     rig = moving()
     before = rig.factor_changes()

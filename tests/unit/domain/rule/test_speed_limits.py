@@ -144,6 +144,31 @@ def test_the_release_comes_a_second_after_the_robot_is_030_m_outside() -> None:
     assert [change.began for change in scene.changes] == [True, False]
 
 
+def test_a_limit_is_told_to_be_over_between_its_end_and_the_release() -> None:
+    scene = Scene(rule=RINGS)
+    told = []
+    for x in (1.9, 2.29, 2.35, 1.9, 2.35):
+        scene.now = round(scene.now + 0.1, 6)
+        step(scene, x)
+        told.append(scene.judge()["AGI"].over)
+
+    assert told == [False, False, True, False, True]
+
+
+def test_a_limit_with_one_of_two_reasons_left_is_not_over() -> None:
+    scene = Scene(rule=RINGS)
+    scene.drive("AGI", 0.0)
+    scene.drive("AGII", 50.0)
+    scene.look("AGII", person(1.0), person(-1.0, 1.0))
+    scene.look("AGI")
+    scene.judge()
+    scene.drive("AGI", 2.0)
+    told = scene.judge()["AGI"]
+    outside = [one.outside_since for one in scene.speed_limits.crossings]
+    assert sorted(since is None for since in outside) == [False, True]
+    assert not told.over
+
+
 def test_between_ring_and_release_nothing_ends() -> None:
     scene = Scene(rule=RINGS)
     step(scene, 1.9)
