@@ -14,6 +14,7 @@ from operator import is_
 from typing import Literal
 
 from iveg.domain.camera_bias import PeerLooks
+from iveg.domain.carried import CarriedThings
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Detection, DetectionFrame, Instant
@@ -82,6 +83,7 @@ class DetectorEvidence:
         out_of_service: None: it is required.
         class_names: Names that it gave to what is neither a person nor a robot.
         peer_looks: How far off it places other robots.
+        carried: What it takes for a person and goes with the robot.
     """
 
     whole_at: float | None = None
@@ -90,6 +92,7 @@ class DetectorEvidence:
     out_of_service: OutOfService | None = None
     class_names: set[str] = field(default_factory=set)
     peer_looks: PeerLooks = field(default_factory=PeerLooks)
+    carried: CarriedThings = field(default_factory=CarriedThings)
     _allowance: float = FRAMES_HZ
     _counted_at: float | None = None
 

@@ -26,6 +26,11 @@ class Pose2D:
         c, s = math.cos(self.yaw), math.sin(self.yaw)
         return self.x + c * x - s * y, self.y + s * x + c * y
 
+    def inverse(self, x: float, y: float) -> tuple[float, float]:
+        """Take a point from the outer frame to the inner one."""
+        c, s, dx, dy = math.cos(self.yaw), math.sin(self.yaw), x - self.x, y - self.y
+        return c * dx + s * dy, c * dy - s * dx
+
     def compose(self, inner: "Pose2D") -> "Pose2D":
         """The pose of what ``inner`` describes, in the outer frame."""
         x, y = self.transform(inner.x, inner.y)

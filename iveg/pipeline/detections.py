@@ -121,6 +121,8 @@ class DetectionTracking:
         for one in placed:
             self._describe(one, frame, received)
             self._note_peer(one, frame.robot_id, pose, seen_at)
+        if pose is not None:
+            self._note_carried(placed, frame.robot_id, pose, seen_at)
         if any(one.person is not None for one in placed):
             self._event_log.changed(topics.PEOPLE.name)
         return placed
@@ -138,6 +140,14 @@ class DetectionTracking:
             seen, half = one.position[:2], peer.profile.length / 2
             error = peer_error(seen, pose, itself, half)
             self._world.robot(robot_id).detector.peer_looks.note(at.mono, error)
+
+    def _note_carried(
+        self, placed: list[Placed], robot_id: str, pose: Pose2D, at: Instant
+    ) -> None:
+        """Ask of everybody who has a ring whether they go with the robot."""
+        people = [one for one in placed if one.person and one.class_ == "person"]
+        places = [pose.inverse(*one.position[:2]) for one in people]
+        self._world.robot(robot_id).detector.carried.note(pose, places, at.mono)
 
     def _name_unknown_frame(self, robot_id: str, frame_id: str, at: Instant) -> None:
         """Count a frame that nobody described; log it once for each robot."""

@@ -86,6 +86,10 @@ def of_detector(
     if bias is not None and bias.off_m > WARN_M:
         off = round(bias.off_m, 2)
         yield Condition.of_robot("P3", "alert.camera_bias", name, off=off)
+    carried = detector.carried.found(now.mono)
+    if carried is not None:
+        ahead, left = (round(one, 1) for one in carried.place)
+        yield Condition.of_robot("P3", "alert.carried", name, ahead=ahead, left=left)
 
 
 def of_things(things: Iterable[Thing]) -> Iterable[Condition]:

@@ -26,9 +26,7 @@ _LEAST_SLOPE = 1e-9
 
 def into(frame: Pose2D, x: float, y: float) -> tuple[float, float]:
     """A point of ``map`` in a frame with this pose; inverse of its ``transform``."""
-    c, s = math.cos(frame.yaw), math.sin(frame.yaw)
-    dx, dy = x - frame.x, y - frame.y
-    return c * dx + s * dy, c * dy - s * dx
+    return frame.inverse(x, y)
 
 
 @dataclass(frozen=True, slots=True)

@@ -182,3 +182,17 @@ async def test_somebody_who_is_no_peer_says_nothing_of_a_mount() -> None:
         await desk.wait(0.5)
 
     assert await bias_of(desk) is None
+
+
+async def test_a_ghost_that_goes_with_its_robot_is_told_and_slows_it_all_the_way() -> (
+    None
+):
+    desk, factors = WebDesk(), set()
+    for number in range(24):
+        desk.drive("AGI", 0.3 * number, linear=0.6)
+        desk.look("AGI", detection("farmer", 0.3 * number + 1.5))
+        await desk.wait(0.5)
+        factors.add(desk.evaluator.speed_limits["AGI"].speed_factor)
+
+    assert factors == {0.5}
+    assert "alert.carried" in conditions_of(desk)
