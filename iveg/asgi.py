@@ -9,9 +9,10 @@ from fastapi import APIRouter, Depends, FastAPI
 from starlette.staticfiles import StaticFiles
 
 from iveg import __version__
+from iveg.adapters.pdf import find_browser
 from iveg.app.dss import Dss
 from iveg.app.laboratory import find_laboratory
-from iveg.web.api import day, history, incidents, sign_in_code, stop_records
+from iveg.web.api import day, history, incidents, notes, sign_in_code, stop_records
 from iveg.web.api.answers import Json
 from iveg.web.build import build_app, live_routers
 from iveg.web.pages import openapi, routes, service_worker
@@ -74,8 +75,10 @@ def _past_routers(dss: Dss, pages: routes.Pages) -> Iterator[APIRouter]:
             dss.pipeline.event_log.log,
             clock,
             __version__,
+            find_browser(),
         )
     )
+    yield notes.router(queries, dss.pipeline.event_log.log, clock)
     yield sign_in_code.router(dss.sign_in_token)
     yield service_worker.router()
     laboratory = find_laboratory("pages")

@@ -11,6 +11,7 @@ from iveg.models.day import Day
 from iveg.models.device import Device
 from iveg.models.dictionary import DictionaryColumn
 from iveg.models.equipment import Measurement
+from iveg.models.note import Note
 from iveg.models.odometry import OdometryRow
 from iveg.models.people import DetectionRow, KeptDetection
 from iveg.models.recordings import Recording
@@ -30,6 +31,7 @@ _SHOWN: tuple[type[Model], ...] = (
     Measurement,
     Recording,
     DictionaryColumn,
+    Note,
 )
 _, _DOCUMENT = models_json_schema([(model, "serialization") for model in _SHOWN])
 _SHAPES = _DOCUMENT["$defs"]

@@ -159,6 +159,8 @@ LOG = ListOf(
     (tables.log.c.class_,),
     sorts={"robot": tables.log.c.robot_id, "kind": tables.log.c.kind},
 )
+NOTE = "log.note"
+NOTES = replace(LOG, which=tables.log.c.key == NOTE)
 
 READINGS = ListOf(
     ReadingRecord,

@@ -96,6 +96,10 @@ class Queries:
         """The newest row of the audit."""
         return await self._ask(chain_end)
 
+    async def notes(self, asked: Filter) -> Page[LogRecord]:
+        """Notes of people, by when they were written."""
+        return await self._ask(lambda c: lists.read_page(c, lists.NOTES, asked))
+
     async def readings(self, asked: Filter) -> Page[ReadingRecord]:
         """Readings of small sensors, by ``at``; the class filter asks for the kind."""
         return await self._ask(lambda c: lists.read_page(c, lists.READINGS, asked))
@@ -114,6 +118,11 @@ class Queries:
         """One decision; None when it is not known."""
         wanted = select(decisions).where(decisions.c.decision_id == decision_id)
         return next(iter(await self._records(DecisionRecord, wanted)), None)
+
+    async def alert(self, alert_id: str) -> AlertRecord | None:
+        """One alert; None when it is not known."""
+        wanted = select(alerts).where(alerts.c.alert_id == alert_id)
+        return next(iter(await self._records(AlertRecord, wanted)), None)
 
     async def command(self, command_id: str) -> CommandRecord | None:
         """One command; None when it is not known."""

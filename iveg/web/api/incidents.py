@@ -8,7 +8,7 @@ rule and the settings without secrets, under a manifest that one changed byte br
 import asyncio
 import shutil
 import tempfile
-from collections.abc import Awaitable, Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Protocol
@@ -22,6 +22,7 @@ from starlette.background import BackgroundTask
 from iveg.adapters.history.lists import MOST_ROWS, Filter, Page
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.incident_files import write_pack
+from iveg.adapters.pdf import print_pdf
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import HopError
 from iveg.domain.events import LogEvent
@@ -48,10 +49,11 @@ class Recordings(Protocol):
 
 
 class About(Span):
-    """What a pack is about: a range, or a decision or command with its surroundings."""
+    """What a pack is about: a range, or one of the rest with its surroundings."""
 
     decision: str | None = Field(None, pattern=r"^[ -~]{1,64}$")
     command: str | None = Field(None, pattern=r"^[ -~]{1,64}$")
+    alert: str | None = Field(None, pattern=r"^[ -~]{1,64}$")
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +65,7 @@ class Sources:
         settings: Those that hold no secret, by variable.
         log: Takes a line of the log.
         version: Of iVeg.
+        browser: Program that prints the page as PDF; None: HTML alone.
     """
 
     queries: Queries
@@ -73,6 +76,7 @@ class Sources:
     log: Callable[[LogEvent, Instant], None]
     clock: Clock
     version: str
+    browser: str | None = None
 
 
 def router(sources: Sources) -> APIRouter:
@@ -119,8 +123,17 @@ async def _range(asked: About, sources: Sources) -> tuple[float, float, str]:
         began = command.requested_at
         span = _around(began, command.standing_at or began)
         return *span, f"command {command.command_id}"
+    if asked.alert is not None:
+        alert = await sources.queries.alert(asked.alert)
+        if alert is None:
+            raise HTTPException(404, "There is no such alert.")
+        began = alert.last_raised_at
+        span = _around(began, alert.cleared_at or began)
+        return *span, f"alert {alert.alert_id}"
     if asked.since is None or asked.until is None:
-        raise HTTPException(422, "Name a decision, a command, or since and until.")
+        raise HTTPException(
+            422, "Name a decision, a command, an alert, or since and until."
+        )
     since, until = asked.since.timestamp(), asked.until.timestamp()
     if until - since > LONGEST_S:
         raise HTTPException(422, "A pack holds an hour at most.")
@@ -151,7 +164,7 @@ async def _pack(
     }
     kept = {"rules.json": rules, "settings.json": dict(sources.settings)}
     return await sources.worker.run(
-        _write, folder, (since, until, said), facts, rows, kept
+        _write, folder, (since, until, said), facts, rows, kept, sources.browser
     )
 
 
@@ -176,7 +189,38 @@ async def _rows(
             page = await ask(replace(asked, cursor=page.next))
             rows += page.items
         found[name] = rows[::-1]
+    found["notes"] = await _notes(queries, since, until)
     return found
+
+
+async def _notes(queries: Queries, since: float, until: float) -> list[Record]:
+    """Notes about these moments, whenever they were written."""
+    asked = Filter(since=since, limit=MOST_ROWS)
+    page = await queries.notes(asked)
+    rows = [*page.items]
+    while page.next is not None:
+        page = await queries.notes(replace(asked, cursor=page.next))
+        rows += page.items
+    return [
+        one for one in rows[::-1] if since <= one.slots.get("pinned_at", one.at) < until
+    ]
+
+
+def _reports(
+    about: tuple[float, float, str],
+    rows: Mapping[str, Sequence[Record]],
+    browser: str | None,
+) -> Iterator[tuple[str, bytes]]:
+    """The page in each language, and as PDF where there is a browser."""
+    since, until, said = about
+    names = ("decisions", "commands", "alerts", "log", "notes")
+    events = [row for name in names for row in rows[name]]
+    for language in _LANGUAGES:
+        html = write_report(language, since, until, events, said)
+        yield f"report.{language}.html", html
+        pdf = None if browser is None else print_pdf(browser, html)
+        if pdf is not None:
+            yield f"report.{language}.pdf", pdf
 
 
 def _write(
@@ -185,16 +229,10 @@ def _write(
     facts: Mapping[str, object],
     rows: Mapping[str, Sequence[Record]],
     kept: Mapping[str, object],
+    browser: str | None,
 ) -> str:
     """The pack, where nothing waits for it."""
-    since, until, said = about
-    events = [
-        row for name in ("decisions", "commands", "alerts", "log") for row in rows[name]
-    ]
-    reports = {
-        f"report.{language}.html": write_report(language, since, until, events, said)
-        for language in _LANGUAGES
-    }
+    reports = dict(_reports(about, rows, browser))
     lines = {
         f"rows/{name}.ndjson": b"".join(orjson.dumps(asdict(one)) + b"\n" for one in of)
         for name, of in rows.items()

@@ -59,8 +59,15 @@ def write_report(
 
 
 def _lines(rows: Iterable[Record], sentences: Sentences) -> Iterator[Line]:
+    notes: dict[int, Line] = {}
     for row in rows:
         match row:
+            case LogRecord(key="log.note"):
+                text = sentences.say(row.key, row.slots)
+                # It stands at the moment that it is about, and once.
+                notes[row.id] = Line(
+                    row.slots.get("pinned_at", row.at), "note", row.robot_id or "", text
+                )
             case LogRecord():
                 text = sentences.say(row.key, row.slots)
                 yield Line(row.at, "log", row.robot_id or "", text)
@@ -75,6 +82,7 @@ def _lines(rows: Iterable[Record], sentences: Sentences) -> Iterator[Line]:
                 kind = sentences.say(f"history.kind.{row.kind}", {})
                 text = f"{kind} · {row.state} · {row.requested_by}"
                 yield Line(row.requested_at, "command", row.robot_id, text)
+    yield from notes.values()
 
 
 @cache

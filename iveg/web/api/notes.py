@@ -1,0 +1,102 @@
+"""Notes of people over HTTP: pinned to a time and a place, and on the record.
+
+A note is a line of the log: it is written once, and goes into the incident packs of the
+moment that it is about.
+"""
+
+from collections.abc import Callable
+from typing import Annotated, Self
+
+from fastapi import APIRouter, Depends, HTTPException, Query, Response
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from iveg.adapters.history import lists
+from iveg.adapters.history.queries import Queries
+from iveg.domain.events import LogEvent, Slot
+from iveg.domain.observations import Instant
+from iveg.models.base import Listing
+from iveg.models.note import Note
+from iveg.pipeline.ports import Clock
+from iveg.web.api.answers import Json
+from iveg.web.api.history_filters import Moment, Span
+from iveg.web.pages.local_time import in_madrid
+from iveg.web.security.authentication import Principal, require
+
+KEY = lists.NOTE
+MOST_TEXT = 1000
+LONGEST_AGO_S = 400 * 86_400.0
+_FARTHEST_M = 1e4
+_Metres = Annotated[float, Field(ge=-_FARTHEST_M, le=_FARTHEST_M)]
+_Id = Annotated[str, Field(pattern=r"^[ -~]{1,64}$")]
+
+
+class NoteRequest(BaseModel):
+    """What is to be noted; without a time it is about now."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    text: Annotated[
+        str, Field(max_length=MOST_TEXT, pattern=r"^[^\x00-\x09\x0b-\x1f]+$")
+    ]
+    at: Moment | None = None
+    x: _Metres | None = None
+    y: _Metres | None = None
+    robot_id: _Id | None = None
+    decision_id: _Id | None = None
+
+    @model_validator(mode="after")
+    def _whole(self) -> Self:
+        if (self.x is None) != (self.y is None):
+            raise ValueError("a place has both x and y")
+        if not self.text.strip():
+            raise ValueError("a note has a text")
+        return self
+
+
+def router(
+    queries: Queries, log: Callable[[LogEvent, Instant], None], clock: Clock
+) -> APIRouter:
+    """Read by all, written by operators."""
+    routes = APIRouter(prefix="/api/v1", tags=["history"])
+
+    @routes.get(
+        "/notes",
+        response_model=Listing[Note],
+        dependencies=[Depends(require("read"))],
+    )
+    async def notes(asked: Annotated[Span, Query()]) -> Response:
+        """Notes by when they were written, newest first."""
+        since, until = asked.since, asked.until
+        page = await queries.notes(
+            lists.Filter(
+                since=None if since is None else since.timestamp(),
+                until=None if until is None else until.timestamp(),
+                limit=lists.MOST_ROWS,
+            )
+        )
+        return Json(Listing(items=[Note.of_record(one) for one in page.items]))
+
+    @routes.post("/notes", status_code=201)
+    async def write(
+        body: NoteRequest, who: Annotated[Principal, Depends(require("release"))]
+    ) -> dict[str, str]:
+        """Write one down; it cannot be taken back."""
+        now = clock()
+        pinned_at = now.wall if body.at is None else body.at.timestamp()
+        if not now.wall - LONGEST_AGO_S <= pinned_at <= now.wall:
+            raise HTTPException(422, "A note is about a moment of the last 400 days.")
+        slots: dict[str, Slot] = {
+            "by": who.name,
+            "text": body.text,
+            "pinned": f"{in_madrid(pinned_at):%Y-%m-%d %H:%M:%S}",
+            "pinned_at": pinned_at,
+        }
+        if body.x is not None:
+            slots |= {"x": body.x, "y": body.y}
+        event = LogEvent(
+            "system", KEY, slots, body.robot_id, decision_id=body.decision_id
+        )
+        log(event, now)
+        return {"detail": "It is on the record."}
+
+    return routes
