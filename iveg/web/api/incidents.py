@@ -109,27 +109,21 @@ def router(sources: Sources) -> APIRouter:
 
 async def _range(asked: About, sources: Sources) -> tuple[float, float, str]:
     """Since, until (Unix s), and what it is about."""
-    if asked.decision is not None:
-        decision = await sources.queries.decision(asked.decision)
-        if decision is None:
-            raise HTTPException(404, "There is no such decision.")
-        began = decision.started_at
-        span = _around(began, decision.ended_at or began)
-        return *span, f"decision {decision.decision_id}"
-    if asked.command is not None:
-        command = await sources.queries.command(asked.command)
-        if command is None:
-            raise HTTPException(404, "There is no such command.")
-        began = command.requested_at
-        span = _around(began, command.standing_at or began)
-        return *span, f"command {command.command_id}"
-    if asked.alert is not None:
-        alert = await sources.queries.alert(asked.alert)
-        if alert is None:
-            raise HTTPException(404, "There is no such alert.")
-        began = alert.last_raised_at
-        span = _around(began, alert.cleared_at or began)
-        return *span, f"alert {alert.alert_id}"
+    queries = sources.queries
+    rows: dict[str, tuple[Callable[[str], Awaitable[Record | None]], str, str]] = {
+        "decision": (queries.decision, "started_at", "ended_at"),
+        "command": (queries.command, "requested_at", "standing_at"),
+        "alert": (queries.alert, "last_raised_at", "cleared_at"),
+    }
+    for kind, (find, begins, ends) in rows.items():
+        wanted = getattr(asked, kind)
+        if wanted is None:
+            continue
+        found = await find(wanted)
+        if found is None:
+            raise HTTPException(404, f"There is no such {kind}.")
+        began = getattr(found, begins)
+        return *_around(began, getattr(found, ends) or began), f"{kind} {wanted}"
     if asked.since is None or asked.until is None:
         raise HTTPException(
             422, "Name a decision, a command, an alert, or since and until."

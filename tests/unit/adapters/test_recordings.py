@@ -133,7 +133,8 @@ async def test_viewers_draw_poses_scans_and_boxes_thinned(site: Site) -> None:
         site.hear(n / 30, codec.write_odometry(odometry(x=n, origin=origin(n))))
         # The copy by FIWARE is no second picture, and a stranger none at all.
         site.recorder.notification(body, at(n / 30), "1", [odometry()])
-        site.hear(n / 30, codec.write_odometry(odometry("B1")), "/iveg/B1_odom/attrs")
+        strange = notification({"base_pose_ground_truth": pose}, robot_id="B1")
+        site.recorder.notification(strange, at(n / 30), "1", [odometry("B1")])
         site.hear(n / 30, looked, "/iveg/AGI_yolox_bounding_boxes/attrs")
         site.hear(n / 30, codec.write_scan(scan()), SCAN)
     site.hear(0.99, b'{"no": "scan"}', SCAN)
