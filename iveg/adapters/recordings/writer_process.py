@@ -17,6 +17,8 @@ from iveg.domain.errors import HopError
 
 PIECE_BYTES = 1 << 16
 GRACE_S = 5.0
+_GONE = OSError, RuntimeError
+"""What a pipe says whose reader has ended; loops differ.  A timeout is an OSError."""
 _MODULE = "iveg.adapters.recordings.writer"
 _BESIDE_IVEG = Path(iveg.__file__).parents[1]
 
@@ -36,7 +38,7 @@ class WriterProcess:
         self._process = process
         self._inputs, self._answers = process.stdin, process.stdout
         self._counters = counters
-        self._pieces: deque[bytes] = deque()
+        self._waiting: deque[bytes] = deque()
         self._handed = 0
         self._answered: Counter[str] = Counter()
 
@@ -52,7 +54,7 @@ class WriterProcess:
             start_new_session=True,
         )
         writer = cls(process, counters)
-        writer._pieces.append(setup.line())
+        writer._waiting.append(setup.line())
         return writer
 
     @property
@@ -68,13 +70,20 @@ class WriterProcess:
         """
         inputs = list(packed)
         self._handed += len(inputs)
-        whole = b"".join(inputs)
-        for begins in range(0, len(whole), PIECE_BYTES):
-            self._pieces.append(whole[begins : begins + PIECE_BYTES])
-        with contextlib.suppress(ConnectionError):
-            while self._pieces:
-                self._inputs.write(self._pieces.popleft())
+        self._waiting += inputs
+        with contextlib.suppress(*_GONE):
+            while self._waiting:
+                self._inputs.write(self._next_piece())
                 await self._inputs.drain()
+                # A pipe that takes all at once holds up nobody either.
+                await asyncio.sleep(0)
+
+    def _next_piece(self) -> bytes:
+        piece, size = [], 0
+        while self._waiting and size < PIECE_BYTES:
+            piece.append(self._waiting.popleft())
+            size += len(piece[-1])
+        return b"".join(piece)
 
     async def listen(self) -> NoReturn:
         """Take what it says until it ends.
@@ -104,11 +113,12 @@ class WriterProcess:
 
     async def end(self, packed: Iterable[bytes]) -> None:
         """Have it write these, too, and finish; one that hangs is killed."""
-        with contextlib.suppress(TimeoutError, HopError):
+        with contextlib.suppress(HopError, *_GONE):
             async with asyncio.timeout(GRACE_S):
                 await self.feed(packed)
                 self._inputs.close()
                 await self.listen()
         if self._process.returncode is None:
-            self._process.kill()
+            with contextlib.suppress(ProcessLookupError):
+                self._process.kill()
             await self._process.wait()
