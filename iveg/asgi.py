@@ -79,7 +79,8 @@ def _past_routers(dss: Dss, pages: routes.Pages) -> Iterator[APIRouter]:
         )
     )
     yield notes.router(queries, dss.pipeline.event_log.log, clock)
-    yield sign_in_code.router(dss.sign_in_token)
+    if dss.sign_in_token:
+        yield sign_in_code.router(dss.sign_in_token)
     yield service_worker.router()
     laboratory = find_laboratory("pages")
     if laboratory is not None:

@@ -140,6 +140,12 @@ class Settings:
         "",
         "Token of the link that signs a browser in; empty: made at each start.",
     )
+    sign_in: Literal["link", "accounts"] = setting(
+        "IVEG_SIGN_IN",
+        "link",
+        "How people sign in: by the one `link` or a password, or by passwords alone "
+        "(`accounts`), see `iveg user`.",
+    )
     sign_in_name: Name = setting(
         "IVEG_SIGN_IN_NAME",
         DEFAULT_NAME,

@@ -22,6 +22,7 @@ from iveg.adapters.greenhouses import load_greenhouse
 from iveg.adapters.ids import new_id
 from iveg.adapters.loop_watch import LoopWatch
 from iveg.adapters.mail import MailSender
+from iveg.adapters.passwords import Passwords
 from iveg.adapters.provisioner import Provisioner
 from iveg.adapters.recordings.recorder import PART as RECORDINGS
 from iveg.adapters.recordings.recorder import RecordedSink
@@ -61,6 +62,7 @@ from iveg.web.build import Face
 from iveg.web.notifications import NotificationEndpoint
 from iveg.web.pages.contexts import Site
 from iveg.web.security.authentication import Authenticator, NotifySecret
+from iveg.web.security.people import People
 from iveg.web.views import Views
 
 _log = logging.getLogger(__name__)
@@ -97,7 +99,10 @@ class Dss:
         self.on_failure: Callable[[], None] = lambda: None
         self.failure: VitalPartError | None = None
         self.on_close: list[Work] = []
-        self.sign_in_token = settings.sign_in_token or secrets.token_hex(32)
+        # An empty token lets nobody in.
+        by_link = settings.sign_in == "link" or demo
+        link = settings.sign_in_token or secrets.token_hex(32)
+        self.sign_in_token = link if by_link else ""
         notify_token = settings.notify_token or secrets.token_hex(32)
         previous = settings.notify_token_previous
         self.notify_secret = NotifySecret(notify_token, previous)
@@ -121,6 +126,7 @@ class Dss:
         if settings.recordings:
             self.chronicle.remember = Memory(self.pipeline).write
         self.services = build_services(self.pipeline, kept, self._senders(), clock.now)
+        self.people = People(self.stores.accounts, Passwords(), clock.now)
         self.trail = AuditTrail(self.stores.recorder, new_id)
         self.upkeep = HistoryUpkeep(
             self.stores.retained(),
@@ -223,6 +229,7 @@ class Dss:
             store=self.stores.sessions,
             link_name=settings.sign_in_name,
             trail=self.trail,
+            people=self.people,
         )
         orion = NotificationEndpoint(
             parts.ingest,
@@ -243,6 +250,7 @@ class Dss:
             __version__,
             self._demo,
             laboratory=find_laboratory("pages") is not None,
+            link=bool(self.sign_in_token),
         )
         views = Views(parts, partial(count_all, parts, recorder, self.counted))
         self.chronicle.picture = partial(picture, views)
@@ -284,6 +292,7 @@ class Dss:
             await self.outside.close()
             self.worker.close()
             await self.past.close()
+            self.people.close()
 
     async def _live(self) -> None:
         parts = self.pipeline
@@ -310,6 +319,7 @@ class Dss:
             RECORDINGS: self.stores.inputs.run,
             "past": self.past.run,
             "messages": beside.messenger.run,
+            "accounts": self.people.run,
             "earlier": self._remember,
             "loop-watch": LoopWatch(supervision.note_turn).run,
         }

@@ -6,6 +6,7 @@ from pathlib import Path
 from iveg.adapters import clock
 from iveg.adapters.contacts import FileContacts
 from iveg.adapters.detectors import FileDetectors
+from iveg.adapters.history.accounts import AccountStore
 from iveg.adapters.history.engine import history_url, sqlite_file
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.recorder import Recorder, journal_file
@@ -43,6 +44,7 @@ class Stores:
     contacts: FileContacts
     detectors: FileDetectors
     sessions: FileSessions
+    accounts: AccountStore
     inputs: InputRecorder
 
     def history_state(self) -> HopState:
@@ -76,6 +78,7 @@ class Stores:
         self.queries.close()
         self.journal.close()
         self.sessions.close()
+        self.accounts.close()
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,6 +138,7 @@ def open_stores(
         FileContacts(directory / "contacts.jsonl"),
         FileDetectors(directory / "detectors.jsonl"),
         FileSessions(directory / "sessions.jsonl"),
+        AccountStore(url),
         InputRecorder(
             WriterSetup(
                 (directory / "recordings").resolve(),

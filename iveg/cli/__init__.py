@@ -17,6 +17,7 @@ from iveg.cli.arguments import (
     add_replay,
     add_robot,
     add_serve,
+    add_user,
     parser,
 )
 from iveg.cli.running import run_until_stopped
@@ -129,6 +130,12 @@ def _audit(call: Call) -> int:
     return run_audit(call.options, call.settings, call.data)
 
 
+def _user(call: Call) -> int:
+    from iveg.cli.user import run_user
+
+    return run_user(call.options, call.settings, call.data)
+
+
 COMMANDS = (
     Command("serve", "the DSS and its page", _serve, add_serve),
     Command("replay", "recorded logs as robots", _replay, add_replay),
@@ -139,5 +146,6 @@ COMMANDS = (
     Command("db", "the history's database", _db, add_db),
     Command("export", "a list of the history as a file", _export, add_export),
     Command("incident", "verify an incident pack", _incident, add_incident),
+    Command("user", "who may sign in", _user, add_user),
     Command("audit", "whether the audit is whole", _audit, add_audit),
 )

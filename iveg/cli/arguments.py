@@ -98,6 +98,25 @@ def add_export(export: argparse.ArgumentParser) -> None:
     export.add_argument("--out", type=Path, metavar="FILE", help="else to the output")
 
 
+def add_user(user: argparse.ArgumentParser) -> None:
+    """Arguments of ``iveg user``."""
+    actions = user.add_subparsers(dest="action", required=True)
+    actions.add_parser("list", help="names, roles and states")
+    for action, says in {
+        "add": "a person, with a link that works once",
+        "role": "give another role; they sign in anew",
+        "reset": "take the password away, and print a new link",
+        "disable": "sign them out everywhere, for good",
+    }.items():
+        one = actions.add_parser(action, help=says)
+        one.add_argument("name", metavar="NAME")
+        if action in ("add", "role"):
+            roles = ("viewer", "operator", "admin")
+            one.add_argument("--role", choices=roles, required=True)
+        if action == "add":
+            one.add_argument("--days", type=int, metavar="N", help="the account ends")
+
+
 def add_audit(audit: argparse.ArgumentParser) -> None:
     """Arguments of ``iveg audit``."""
     actions = audit.add_subparsers(dest="action", required=True)

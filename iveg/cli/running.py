@@ -51,9 +51,14 @@ def _read(loop: asyncio.AbstractEventLoop, task: asyncio.Task[None]) -> None:
 
 def sign_in_link(settings: Settings, token: str) -> str:
     """Address that signs a browser in; what is behind ``#`` stays in the browser."""
+    return f"{page_address(settings)}/signin#token={token}"
+
+
+def page_address(settings: Settings) -> str:
+    """Address of the page, as others reach it."""
     host = reachable_host(settings.host)
     host = f"[{host}]" if ":" in host else host
-    return f"http://{host}:{settings.port}/signin#token={token}"
+    return f"http://{host}:{settings.port}"
 
 
 def reachable_host(host: str) -> str:

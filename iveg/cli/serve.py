@@ -20,7 +20,13 @@ from iveg.adapters.history.engine import history_url
 from iveg.adapters.history.migrate import upgrade
 from iveg.app.dss import Dss, open_dss
 from iveg.asgi import create_app
-from iveg.cli.running import print_sign_in_link, report_ready, tune_garbage_collection
+from iveg.cli.running import (
+    page_address,
+    print_sign_in_link,
+    report_ready,
+    tune_garbage_collection,
+)
+from iveg.cli.user import invitation_link, set_up
 from iveg.domain.errors import HopError
 from iveg.settings import Settings
 from iveg.web.bounded_http import bounded_http
@@ -70,9 +76,7 @@ async def serve(
     dss.counted.append(table.counters)
     server = _Server(
         config,
-        on_start=report_ready
-        if demo
-        else lambda: print_sign_in_link(settings, dss.sign_in_token),
+        on_start=report_ready if demo else lambda: _print_way_in(settings, dss),
     )
     tune_garbage_collection()
     dss.on_failure = lambda: setattr(server, "should_exit", True)
@@ -87,6 +91,22 @@ async def serve(
         ending.cancel()
     if dss.failure is not None:
         raise dss.failure
+
+
+def _print_way_in(settings: Settings, dss: Dss) -> None:
+    """Print the link; without one, that of the first admin while there is none."""
+    if dss.sign_in_token:
+        print_sign_in_link(settings, dss.sign_in_token)
+        return
+    try:
+        invitation = set_up(dss.stores.accounts, clock.wall())
+    except HopError as error:
+        _log.warning("nobody can be made admin: %s", error)
+        return
+    print(f"iVeg: {page_address(settings)}", flush=True)
+    if invitation is not None:
+        print("Nobody is admin yet. The first has 30 minutes, and this link once:")
+        print(invitation_link(settings, invitation), flush=True)
 
 
 def _config(settings: Settings, app: FastAPI) -> uvicorn.Config:

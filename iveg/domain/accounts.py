@@ -5,10 +5,12 @@ whole update they stand in; such a name would stop nothing by that transport.
 """
 
 import unicodedata
+from dataclasses import dataclass
 from typing import Final, Literal
 
-SignInMethod = Literal["link", "token"]
-"""Proof of an identity: the link's token, or a program's bearer token."""
+SignInMethod = Literal["link", "password", "token"]
+"""Proof of an identity; ``token`` is a program's."""
+PersonRole = Literal["viewer", "operator", "admin"]
 
 LINK_PERSON: Final = "link"
 """Id of whoever holds the link of the environment."""
@@ -26,3 +28,36 @@ def is_name(text: str) -> bool:
         and _REFUSED.isdisjoint(text)
         and not any(unicodedata.category(one)[0] == "C" for one in text)
     )
+
+
+def name_key(name: str) -> str:
+    """What two names may not share: case and width do not tell people apart."""
+    return unicodedata.normalize("NFKC", name).casefold().strip()
+
+
+@dataclass(frozen=True, slots=True)
+class Account:
+    """A person who may sign in.
+
+    Attributes:
+        account_id: Never given anew, as names may be.
+        password: Its hash (PHC string format); empty until the invitation is accepted.
+        ends_at: When it closes by itself (Unix s); None: never.
+        invitation: SHA-256 of what is waited for (hex); empty: nothing.
+        invited_until: When the invitation is over (Unix s).
+        since: Sessions that began before are over (Unix s): a new role or password.
+    """
+
+    account_id: str
+    name: str
+    role: PersonRole
+    password: str = ""
+    disabled: bool = False
+    ends_at: float | None = None
+    invitation: str = ""
+    invited_until: float = 0.0
+    since: float = 0.0
+
+    def is_open(self, now: float) -> bool:
+        """Whether the person may be here at this moment (Unix s)."""
+        return not self.disabled and (self.ends_at is None or now < self.ends_at)

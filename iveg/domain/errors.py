@@ -89,6 +89,21 @@ class UnknownNameError(IvegError):
         super().__init__(f"There is no {kind} {name!r}.")
 
 
+class NotANameError(IvegError):
+    """Nobody may be called so."""
+
+    def __init__(self, name: str) -> None:
+        said = "1 to 64 visible characters, none of < > \" ' = ; ( )"
+        super().__init__(f"{name!r} cannot be a name: it must be {said}.")
+
+
+class NameTakenError(IvegError):
+    """Somebody is called so already, or nearly so."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(f"Somebody is called {name!r} already.")
+
+
 class MarkRefusedError(IvegError):
     """Nothing may be marked as "not a person here" there.
 

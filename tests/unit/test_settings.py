@@ -165,6 +165,7 @@ GOOD = {
     "IVEG_DATA_DIRECTORY": "/var/lib/iveg",
     "IVEG_API_TOKEN": "a-long-enough-token!",
     "IVEG_SIGN_IN_TOKEN": "cd" * 32,
+    "IVEG_SIGN_IN": "accounts",
     "IVEG_SIGN_IN_NAME": "Ana Núñez",
     "IVEG_CONFIDENCE_THRESHOLD": "0.75",
     "IVEG_SAFETY_RADIUS_M": "2.5",

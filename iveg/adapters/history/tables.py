@@ -64,6 +64,11 @@ def _text(name: str, *, null: bool = True, key: str | None = None) -> Column[str
     return Column(name, Text, nullable=null, key=key or name)
 
 
+def _texts(*names: str) -> list[Column[str]]:
+    """Columns of text that is never missing."""
+    return [_text(name, null=False) for name in names]
+
+
 def _json(
     name: str,
     shape: type[dict[str, object]] | type[list[object]] = dict,
@@ -301,16 +306,9 @@ audit = Table(
     _text("audit_id", null=False),
     _number("at", null=False),
     _number("stored_at", null=False),
-    _text("person", null=False),
-    _text("name", null=False),
-    _text("role", null=False),
-    _text("method", null=False),
-    _text("action", null=False),
-    _text("subject", null=False),
+    *_texts("person", "name", "role", "method", "action", "subject"),
     # Text, not JSON: its very bytes are hashed.
-    _text("details", null=False),
-    _text("previous_hash", null=False),
-    _text("hash", null=False),
+    *_texts("details", "previous_hash", "hash"),
     UniqueConstraint("audit_id"),
     Index(None, "at", "seq"),
 )
@@ -334,6 +332,20 @@ audit_end = Table(
     _number("at", null=False),
 )
 """The newest row that was ever written: one row, so that a lost last one is noticed."""
+
+
+accounts = Table(
+    "accounts",
+    metadata,
+    Column("account_id", Text, primary_key=True),
+    *_texts("name", "name_key", "role", "password"),
+    Column("disabled", Boolean, nullable=False),
+    _number("ends_at"),
+    _text("invitation", null=False),
+    _number("invited_until", null=False),
+    _number("since", null=False),
+    UniqueConstraint("name_key"),
+)
 
 
 def _placed(name: str, at: Column[float], sqlite: str, postgresql: str) -> Index:

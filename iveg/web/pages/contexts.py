@@ -29,6 +29,7 @@ class Site:
         demo: The robots are emulated.
         laboratory: Experiments can be started from the page.
         transports: Ids, in the order of their columns.
+        link: One link signs people in; else passwords alone do.
     """
 
     greenhouse: str
@@ -37,6 +38,7 @@ class Site:
     demo: bool
     laboratory: bool = False
     transports: tuple[str, ...] = tuple(one.id for one in TRANSPORTS)
+    link: bool = True
 
     @property
     def slots(self) -> dict[str, int]:
@@ -131,10 +133,12 @@ class SignInPage(Page):
     Attributes:
         address: Of this server, as the browser reached it.
         wrong: A link was tried and does not sign in.
+        least: Characters of a password.
     """
 
     address: str
     wrong: bool = False
+    least: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,6 +17,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup, escape
 from pydantic import BaseModel, ConfigDict, Field
 
+from iveg.adapters.passwords import LEAST, MOST
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.limits import LIMITS
 from iveg.web.pages.contexts import (
@@ -71,12 +72,32 @@ _SCRIPTED: Final = {
 _Reader = Annotated[Principal, Depends(require("read"))]
 
 
-class _SignIn(BaseModel):
-    """What the sign-in page posts: the token behind the ``#`` of the link."""
-
+class _Strict(BaseModel):
     model_config = ConfigDict(strict=True, extra="forbid")
 
+
+class _ByLink(_Strict):
+    """The token behind the ``#`` of the link."""
+
     token: str = Field(max_length=256)
+
+
+class _ByPassword(_Strict):
+    """Who somebody says that they are, and the proof."""
+
+    name: str = Field(max_length=256)
+    password: str = Field(max_length=MOST)
+
+
+class _ByInvitation(_Strict):
+    """An invitation, and the password that is to be."""
+
+    invitation: str = Field(max_length=256)
+    password: str = Field(min_length=LEAST, max_length=MOST)
+
+
+_SignIn = _ByLink | _ByPassword | _ByInvitation
+"""What the sign-in page posts."""
 
 
 class Pages:
@@ -136,7 +157,7 @@ class Pages:
     ) -> Response:
         """The sign-in page."""
         address = str(request.base_url).rstrip("/")
-        page = SignInPage(self.frame(request, "signin"), address, wrong)
+        page = SignInPage(self.frame(request, "signin"), address, wrong, LEAST)
         return self.draw(page, status)
 
 
@@ -194,7 +215,7 @@ def router(
         "/signin", response_model=None, dependencies=[Depends(require("open"))]
     )
     async def sign_in(request: Request, body: _SignIn) -> Response:
-        found = _authenticator(request).sign_in(request, body.token)
+        found = await _enter(request, body)
         return found.response() if isinstance(found, Problem) else found
 
     @routes.post("/signout", response_model=None)
@@ -219,6 +240,17 @@ def add_scripted(
         request: Request, visitor: Annotated[Principal, Depends(require(needs))]
     ) -> Response:
         return pages.draw(Page(pages.frame(request, route, visitor)))
+
+
+async def _enter(request: Request, body: _SignIn) -> Response | Problem:
+    authenticator = _authenticator(request)
+    match body:
+        case _ByLink():
+            return authenticator.sign_in(request, body.token)
+        case _ByPassword(name=name, password=password):
+            return await authenticator.sign_in_by_password(request, name, password)
+        case _ByInvitation(invitation=invitation, password=password):
+            return await authenticator.accept(request, invitation, password)
 
 
 def _authenticator(request: Request) -> Authenticator:

@@ -14,7 +14,7 @@ STOP outlives the session (SECURITY.md): a person who was signed in once can sti
 import hmac
 import logging
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Awaitable, Callable, Iterator, Mapping
 from typing import Final
 
 from fastapi.dependencies.models import Dependant
@@ -23,8 +23,9 @@ from starlette.requests import HTTPConnection, Request
 from starlette.responses import RedirectResponse, Response
 from starlette.websockets import WebSocket
 
+from iveg.adapters.passwords import BusyError
 from iveg.adapters.sessions import FileSessions
-from iveg.domain.accounts import DEFAULT_NAME
+from iveg.domain.accounts import DEFAULT_NAME, Account
 from iveg.domain.audit import STRANGER, Actor
 from iveg.domain.errors import NotAllowedError
 from iveg.pipeline.audit import AuditTrail
@@ -32,6 +33,7 @@ from iveg.pipeline.ports import Clock
 from iveg.web.problems import NotSignedInError, Problem
 from iveg.web.security.audited import READING
 from iveg.web.security.csrf import is_own, refuse_forgery, refuse_other_bodies
+from iveg.web.security.people import People
 from iveg.web.security.rate_limits import REFUSED_ROWS, Allowance, FailedAttempts
 from iveg.web.security.roles import (
     MAY,
@@ -73,6 +75,7 @@ class Authenticator:
         store: Where sessions outlive a restart; None forgets them.
         link_name: Name of whoever holds the link.
         trail: Told of sign-ins, and of those that were refused.
+        people: Those with accounts; None: there is the link alone.
     """
 
     def __init__(
@@ -84,6 +87,7 @@ class Authenticator:
         store: FileSessions | None = None,
         link_name: str = DEFAULT_NAME,
         trail: AuditTrail | None = None,
+        people: People | None = None,
     ) -> None:
         self._sign_in_token = sign_in_token
         self._api_token = api_token
@@ -92,7 +96,9 @@ class Authenticator:
         self._attempts = FailedAttempts()
         # Strangers' rows are for ever: a flood from many addresses writes few.
         self._rows = Allowance(REFUSED_ROWS, clock().mono)
-        self.sessions = Sessions(clock, store, link_name=link_name)
+        self._people = people
+        role_now = None if people is None else people.role_now
+        self.sessions = Sessions(clock, store, link_name=link_name, role_now=role_now)
         self.refused = 0
         """Sign-ins with a wrong token."""
         self._told_at: float | None = None
@@ -124,9 +130,54 @@ class Authenticator:
         if not _same(token, self._sign_in_token):
             return self._refuse(address, self._clock().mono)
         # Somebody else's wrong links must not shut out whoever has the right one.
+        return self._admit(request, self.sessions.open_by_link(), response)
+
+    async def sign_in_by_password(
+        self, request: Request, name: str, password: str
+    ) -> Response | Problem:
+        """Exchange name and password for a session cookie; raises as ``sign_in``.
+
+        A wrong name is told as a wrong password, and takes as long.
+        """
+        return await self._prove(request, lambda one: one.sign_in(name, password))
+
+    async def accept(
+        self, request: Request, invitation: str, password: str
+    ) -> Response | Problem:
+        """Exchange an invitation for an account and its first session."""
+        return await self._prove(request, lambda one: one.accept(invitation, password))
+
+    async def _prove(
+        self,
+        request: Request,
+        proof: Callable[[People], Awaitable[Account | None]],
+    ) -> Response | Problem:
+        refuse_forgery(request)
+        refuse_other_bodies(request)
+        address = "" if request.client is None else request.client.host
+        now = self._clock().mono
+        # Before it is looked at: each look takes a while of a processor.
+        if self._people is None or self._attempts.wait_s(address, now) > 0.0:
+            return self._refuse(address, now)
+        try:
+            account = await proof(self._people)
+        except BusyError:
+            detail = "Too many people sign in at once; try again."
+            return Problem(429, detail, headers={"Retry-After": "2"})
+        if account is None:
+            return self._refuse(address, now)
+        before = self.identify(request)
+        if before is not None:
+            self.sessions.revoke(before)
+        cookie = self.sessions.open(
+            account.name, account.role, account.account_id, "password"
+        )
+        return self._admit(request, cookie, Response(status_code=204))
+
+    def _admit(self, request: Request, cookie: str, response: Response) -> Response:
+        address = "" if request.client is None else request.client.host
         self._attempts.succeeded(address)
         secure = request.url.scheme == "https"
-        cookie = self.sessions.open_by_link()
         who = self.sessions.find(cookie)
         if who is not None:
             self._note(who, "sign_in", address)

@@ -9,7 +9,7 @@ Ages follow the wall clock, because no other goes on counting while iVeg is down
 
 import hashlib
 import secrets
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import cast
 
@@ -35,6 +35,7 @@ class Sessions:
         store: Where they outlive this process; None forgets them with it.
         most: How many there may be.
         link_name: Name of whoever holds the link of the environment.
+        role_now: The role that an account leaves a session of its person; None: over.
     """
 
     def __init__(
@@ -43,11 +44,13 @@ class Sessions:
         store: FileSessions | None = None,
         most: int = _MOST_SESSIONS,
         link_name: str = DEFAULT_NAME,
+        role_now: Callable[[Session, Role], Role | None] | None = None,
     ) -> None:
         self._clock = clock
         self._store = store
         self._most = most
         self._link_name = link_name
+        self._role_now = role_now
         self._sessions: dict[bytes, Session] = {}
         self._kept_at = 0.0
         if store is not None:
@@ -106,6 +109,9 @@ class Sessions:
             return None
         now = self._clock().wall
         role = _role_at(session, now)
+        if role is not None and session.method == "password":
+            # Without accounts nobody can say whether the person still has one.
+            role = self._role_now(session, role) if self._role_now else None
         if role is None:
             del self._sessions[digest]
             self._keep()

@@ -24,7 +24,8 @@ export function start({ store, i18n, tone, wake, installing }) {
     createClassForm(store, i18n, guard),
   ];
   const messages = createMessagesForm(i18n);
-  createSignInCode(i18n);
+  // Without a link there is no code of it.
+  if (document.querySelector("#code-show")) createSignInCode(i18n);
   addEventListener("beforeunload", (event) => {
     // The browser asks, with its own text, before typed values are lost.
     if ([...forms, messages].some((form) => form.isDirty())) event.preventDefault();

@@ -1,50 +1,87 @@
 /**
- * The sign-in page: it posts the token behind the `#` of the link, which no server sees
- * by itself, and takes it off the address.
+ * The sign-in page: it posts the token or invitation behind the `#` of the link, which no
+ * server sees by itself, and takes it off the address; or a name and its password.
  */
 
 import { sendApi } from "../core/api.js";
 import { need, setHidden } from "../panels/dom.js";
 
-/** @type {Record<number, string>} */
-const NOTICES = { 401: "#signin-wrong", 422: "#signin-wrong", 429: "#signin-wait" };
-const OTHERS = "#signin-failed";
+/** @typedef {"link" | "password" | "invitation"} Way */
+
+/** @type {Record<Way, string>} what a refusal means */
+const WRONG = {
+  link: "#signin-wrong",
+  password: "#signin-refused",
+  invitation: "#signin-uninvited",
+};
+const WAIT = "#signin-wait";
+const FAILED = "#signin-failed";
 
 /**
- * The token of a link.
+ * The token or invitation of a link; null without one.
  *
  * @param {string} hash of its address, with the `#`
  */
-export function tokenIn(hash) {
-  return new URLSearchParams(hash.slice(1)).get("token");
+export function tokenIn(hash, name = "token") {
+  return new URLSearchParams(hash.slice(1)).get(name);
 }
 
 /**
  * The notice for an answer of the server; null where somebody is signed in.
  *
  * @param {number} status 0: no answer
+ * @param {Way} [way]
  */
-export function noticeFor(status) {
-  return status === 204 ? null : (NOTICES[status] ?? OTHERS);
+export function noticeFor(status, way = "link") {
+  if (status === 204) return null;
+  if (status === 401 || status === 422) return WRONG[way];
+  return status === 429 ? WAIT : FAILED;
 }
 
-async function signIn() {
-  const token = tokenIn(location.hash);
-  if (token === null) return;
-  history.replaceState(null, "", location.pathname);
-  const { status } = await sendApi("POST", "/signin", { token });
-  const notice = noticeFor(status);
+/** @param {Record<string, string>} proof @param {Way} way */
+async function post(proof, way) {
+  const { status } = await sendApi("POST", "/signin", proof);
+  const notice = noticeFor(status, way);
   if (notice === null) {
     location.replace("/");
     return;
   }
-  for (const one of [...Object.values(NOTICES), OTHERS]) {
+  for (const one of [...Object.values(WRONG), WAIT, FAILED]) {
     setHidden(need(one), one !== notice);
   }
 }
 
+function followLink() {
+  const token = tokenIn(location.hash);
+  const invitation = tokenIn(location.hash, "invitation");
+  if (token === null && invitation === null) return;
+  history.replaceState(null, "", location.pathname);
+  if (token !== null) post({ token }, "link");
+  else invite(String(invitation));
+}
+
+/** @param {string} invitation */
+function invite(invitation) {
+  const field = fieldOf("#invited-password");
+  setHidden(need("#signin-form"), true);
+  setHidden(need("#invited-form"), false);
+  need("#invited-form").onsubmit = (event) => {
+    event.preventDefault();
+    post({ invitation, password: field.value }, "invitation");
+  };
+  field.focus();
+}
+
+/** @param {string} selector */
+const fieldOf = (selector) => /** @type {HTMLInputElement} */ (need(selector));
+
 if (document.body.dataset.route === "signin") {
   // A link that is opened while this page is shown only changes what is behind `#`.
-  addEventListener("hashchange", signIn);
-  signIn();
+  addEventListener("hashchange", followLink);
+  need("#signin-form").addEventListener("submit", (event) => {
+    event.preventDefault();
+    const name = fieldOf("#signin-name").value;
+    post({ name, password: fieldOf("#signin-password").value }, "password");
+  });
+  followLink();
 }

@@ -1,0 +1,89 @@
+"""Passwords by Argon2id (RFC 9106), off the event loop and no faster than one thread.
+
+One thread is the bound: a flood of sign-ins takes half a core at most, never the loop
+on which a STOP runs.
+"""
+
+import asyncio
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Final, TypeVar
+
+from cryptography.exceptions import InvalidKey
+from cryptography.hazmat.primitives.kdf.argon2 import Argon2id
+
+_T = TypeVar("_T")
+LEAST, MOST = 10, 256
+"""Characters of a password."""
+_KIB, _PASSES, _LANES = 19 * 1024, 2, 1
+"""OWASP Password Storage Cheat Sheet."""
+_MOST_WAITING: Final = 16
+
+
+class BusyError(Exception):
+    """More sign-ins wait than are served soon."""
+
+
+class Passwords:
+    """Hashes and checks passwords in a thread of its own."""
+
+    def __init__(self) -> None:
+        self._thread = ThreadPoolExecutor(1, "passwords")
+        self._waiting = 0
+        self._nobodys = ""
+
+    async def hashed(self, password: str) -> str:
+        """The hash to keep (PHC string format).
+
+        Raises:
+            BusyError: too many wait.
+        """
+        return await self._run(_hash, password)
+
+    async def fits(self, password: str, kept: str) -> bool:
+        """Whether a password is the one whose hash is kept.
+
+        An empty hash takes the same time as a wrong password: nobody learns by it which
+        names exist.
+
+        Raises:
+            BusyError: too many wait.
+        """
+        if not self._nobodys:
+            self._nobodys = await self._run(_hash, "")
+        fits = await self._run(_fits, password, kept or self._nobodys)
+        return fits and bool(kept)
+
+    def close(self) -> None:
+        """End the thread."""
+        self._thread.shutdown(wait=False)
+
+    async def _run(self, work: Callable[..., _T], *words: str) -> _T:
+        if self._waiting >= _MOST_WAITING:
+            raise BusyError
+        self._waiting += 1
+        try:
+            loop = asyncio.get_running_loop()
+            return await loop.run_in_executor(self._thread, work, *words)
+        finally:
+            self._waiting -= 1
+
+
+def _hash(password: str) -> str:
+    kdf = Argon2id(
+        salt=os.urandom(16),
+        length=32,
+        iterations=_PASSES,
+        lanes=_LANES,
+        memory_cost=_KIB,
+    )
+    return kdf.derive_phc_encoded(password.encode())
+
+
+def _fits(password: str, kept: str) -> bool:
+    try:
+        Argon2id.verify_phc_encoded(password.encode(), kept)
+    except (InvalidKey, ValueError):
+        return False
+    return True

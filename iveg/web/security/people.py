@@ -1,0 +1,115 @@
+"""People with accounts: their passwords and invitations, and what their sessions are.
+
+Accounts are read anew twice a second, so that who is disabled at the console is out of
+every page within a second.  While the database is away the last that was read counts;
+before the first reading a session may stop and no more.
+"""
+
+import asyncio
+import contextlib
+import hashlib
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from typing import Protocol
+
+from iveg.adapters.passwords import Passwords
+from iveg.adapters.sessions import Session
+from iveg.domain.accounts import Account, name_key
+from iveg.domain.errors import HopError
+from iveg.pipeline.ports import Clock
+from iveg.web.security.roles import Role
+
+_EVERY_S = 0.4
+
+
+class Accounts(Protocol):
+    """Storage of accounts; blocks, and raises HopError while it is away."""
+
+    def read(self) -> Mapping[str, Account]:
+        """All accounts, by id."""
+
+    def accept(self, digest: str, password: str, now: float) -> Account | None:
+        """Exchange an invitation for a password, once; None where it is none."""
+
+
+class People:
+    """Knows who may sign in, and which sessions still stand.
+
+    Args:
+        store: Where accounts are kept.
+        passwords: Checks passwords.
+        clock: Read at each question.
+    """
+
+    def __init__(self, store: Accounts, passwords: Passwords, clock: Clock) -> None:
+        self._store = store
+        self._passwords = passwords
+        self._clock = clock
+        self._thread = ThreadPoolExecutor(1, "accounts")
+        self._known: Mapping[str, Account] | None = None
+
+    async def run(self) -> None:
+        """Read them again and again, until cancelled."""
+        while True:
+            with contextlib.suppress(HopError):
+                await self.refresh()
+            await asyncio.sleep(_EVERY_S)
+
+    async def refresh(self) -> None:
+        """Read them once. Raises HopError."""
+        loop = asyncio.get_running_loop()
+        self._known = await loop.run_in_executor(self._thread, self._store.read)
+
+    def role_now(self, session: Session, left: Role) -> Role | None:
+        """The role that an account leaves a session; None: it is over at once.
+
+        Args:
+            session: Somebody's, who came with a password.
+            left: The role that its age leaves.
+        """
+        if self._known is None:
+            return "expired"
+        account = self._known.get(session.person)
+        if account is None or not account.is_open(self._clock().wall):
+            return None
+        return left if session.began >= account.since else None
+
+    async def sign_in(self, name: str, password: str) -> Account | None:
+        """The account of this name and password; None takes as long.
+
+        Raises:
+            BusyError: too many sign in at once.
+        """
+        key, now = name_key(name), self._clock().wall
+        known = (self._known or {}).values()
+        found = next((one for one in known if name_key(one.name) == key), None)
+        fits = await self._passwords.fits(password, found.password if found else "")
+        return found if found and fits and found.is_open(now) else None
+
+    async def accept(self, invitation: str, password: str) -> Account | None:
+        """Begin an account by its invitation; None where that is none any more.
+
+        Raises:
+            BusyError: too many sign in at once.
+            HopError: the database is away.
+        """
+        digest, now = digest_of(invitation), self._clock().wall
+        if not any(one.invitation == digest for one in (self._known or {}).values()):
+            return None
+        kept = await self._passwords.hashed(password)
+        loop = asyncio.get_running_loop()
+        account = await loop.run_in_executor(
+            self._thread, self._store.accept, digest, kept, now
+        )
+        await self.refresh()
+        return account
+
+    def close(self) -> None:
+        """End the threads."""
+        self._thread.shutdown(wait=False)
+        self._passwords.close()
+
+
+def digest_of(invitation: str) -> str:
+    """What is kept of an invitation: SHA-256 (hex)."""
+    return hashlib.sha256(invitation.encode()).hexdigest()

@@ -1,0 +1,60 @@
+"""Argon2id off the loop: what fits, what takes as long, and how much waits."""
+
+import asyncio
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from iveg.adapters.passwords import BusyError, Passwords
+
+
+@pytest.fixture
+def passwords() -> Iterator[Passwords]:
+    passwords = Passwords()
+    yield passwords
+    passwords.close()
+
+
+async def test_a_password_fits_its_own_hash_and_no_other(passwords: Passwords) -> None:
+    kept, again = await passwords.hashed("acelga-1"), await passwords.hashed("acelga-1")
+
+    assert kept.startswith("$argon2id$v=19$m=19456,t=2,p=1$")
+    assert kept != again
+    assert await passwords.fits("acelga-1", kept)
+    assert not await passwords.fits("Acelga-1", kept)
+
+
+@pytest.mark.parametrize("kept", ["", "#", "$argon2id$v=19$m=8,t=1,p=1$AAAA$AAAA", "ñ"])
+async def test_a_hash_that_is_none_fits_nothing(
+    passwords: Passwords, kept: str
+) -> None:
+    assert not await passwords.fits("", kept)
+
+
+async def test_a_name_that_is_not_there_takes_as_long_as_a_wrong_password(
+    passwords: Passwords,
+) -> None:
+    kept = await passwords.hashed("acelga-1")
+    await passwords.fits("x", "")
+    spent = {"": 0.0, kept: 0.0}
+    for _ in range(8):
+        for one in spent:
+            began = time.process_time()
+            await passwords.fits("wrong", one)
+            spent[one] += time.process_time() - began
+
+    assert 0.5 < spent[""] / spent[kept] < 2.0
+
+
+async def test_the_loop_goes_on_and_too_many_are_refused(passwords: Passwords) -> None:
+    asked = [asyncio.create_task(passwords.hashed("x")) for _ in range(20)]
+    await asyncio.sleep(0)
+    turns = 0
+    while not all(one.done() for one in asked):
+        await asyncio.sleep(0.001)
+        turns += 1
+
+    refused = [one for one in asked if isinstance(one.exception(), BusyError)]
+    assert len(refused) == 4
+    assert turns > 16

@@ -1,0 +1,139 @@
+"""``iveg user``: accounts from the machine itself, each change in the audit."""
+
+from argparse import Namespace
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from sqlalchemy import Connection, text
+
+from iveg.adapters import clock
+from iveg.adapters.history.accounts import AccountStore
+from iveg.adapters.history.audit import faults
+from iveg.adapters.history.migrate import upgrade
+from iveg.cli.database import read_history
+from iveg.cli.user import run_user, set_up
+from iveg.domain.errors import NameTakenError, NotANameError, UnknownNameError
+from iveg.settings import Settings
+from iveg.web.security.people import digest_of
+
+
+class Console:
+    """The command line on one machine."""
+
+    def __init__(self, data: Path, database_url: str) -> None:
+        self.settings = Settings(database_url=database_url)
+        self._data = data
+        upgrade(database_url)
+        self.store = AccountStore(database_url)
+
+    def call(self, action: str, name: str = "", **options: object) -> int:
+        told = {"role": "operator", "days": None, **options}
+        given = Namespace(action=action, name=name, **told)
+        return run_user(given, self.settings, self._data)
+
+    def state(self, name: str) -> tuple[str, bool, bool]:
+        one = next(one for one in self.store.read().values() if one.name == name)
+        return one.role, one.disabled, bool(one.password)
+
+
+@pytest.fixture
+def console(tmp_path: Path) -> Iterator[Console]:
+    console = Console(tmp_path, f"sqlite:///{tmp_path / 'history.db'}")
+    yield console
+    console.store.close()
+
+
+def invitation_in(out: str) -> str:
+    return out.strip().splitlines()[-1].rpartition("#invitation=")[2]
+
+
+def test_a_person_is_added_by_a_link_of_which_only_a_digest_is_kept(
+    console: Console, capsys: pytest.CaptureFixture[str]
+) -> None:
+    console.call("add", "Ana", role="admin")
+
+    invitation = invitation_in(capsys.readouterr().out)
+    (account,) = console.store.read().values()
+    assert account.invitation == digest_of(invitation)
+    now = clock.wall()
+    assert console.store.accept(account.invitation, "#hash", now) is not None
+    assert console.store.accept(account.invitation, "#other", now) is None
+    assert console.state("Ana") == ("admin", False, True)
+
+
+def test_reset_role_and_disable_end_sessions_and_are_in_the_audit(
+    console: Console, capsys: pytest.CaptureFixture[str]
+) -> None:
+    console.call("add", "Ana")
+    began = clock.wall()
+    for action in ("reset", "role", "disable"):
+        console.call(action, "ANA", role="viewer")
+
+    (account,) = console.store.read().values()
+    assert account.since >= began
+    assert console.state("Ana") == ("viewer", True, False)
+    url = console.settings.database_url
+    assert read_history(url, lambda one: list(faults(one))) == []
+    assert read_history(url, _actions) == [
+        "account_added",
+        "account_reset",
+        "account_role",
+        "account_disabled",
+    ]
+
+
+def test_the_list_tells_names_roles_and_states_and_no_secret(
+    console: Console, capsys: pytest.CaptureFixture[str]
+) -> None:
+    console.call("add", "Eva", role="viewer", days=3)
+    console.call("add", "Ana")
+    capsys.readouterr()
+
+    console.call("list")
+
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "Ana  operator  invited"
+    assert lines[1].startswith("Eva  viewer  until 20")
+
+
+def test_nobody_is_called_as_somebody_else_or_as_nobody_can_be(
+    console: Console,
+) -> None:
+    console.call("add", "Ana")
+
+    with pytest.raises(NameTakenError):
+        console.call("add", "ANA")
+    with pytest.raises(NotANameError):
+        console.call("add", "<b>")
+    with pytest.raises(UnknownNameError):
+        console.call("disable", "Eva")
+
+
+def test_a_new_server_invites_its_first_admin_until_there_is_one(
+    console: Console,
+) -> None:
+    now = clock.wall()
+    first, second = set_up(console.store, now), set_up(console.store, now)
+    assert first is not None
+    assert second is not None
+    taken = console.store.accept(digest_of(first), "#hash", now)
+    begun = console.store.accept(digest_of(second), "#hash", now)
+
+    # Each start makes a new link; the one before is none any more.
+    assert taken is None
+    assert begun is not None
+    assert begun.role == "admin"
+    assert set_up(console.store, now) is None
+    assert console.store.accept(digest_of(second), "#hash", now) is None
+
+
+def test_the_first_link_is_over_after_half_an_hour(console: Console) -> None:
+    first = set_up(console.store, clock.wall())
+    assert first is not None
+
+    assert console.store.accept(digest_of(first), "#h", clock.wall() + 1801.0) is None
+
+
+def _actions(connection: Connection) -> list[str]:
+    return list(connection.scalars(text("SELECT action FROM audit ORDER BY seq")))

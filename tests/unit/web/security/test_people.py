@@ -1,0 +1,216 @@
+"""People with accounts: who gets in, by what, and until when."""
+
+from collections.abc import AsyncIterator
+from dataclasses import replace
+
+import httpx
+import pytest
+
+from iveg.domain.accounts import Account
+from iveg.domain.records import AuditRecord
+from iveg.web.pages.openapi import ApiDoc
+from iveg.web.pages.routes import router
+from iveg.web.security.authentication import Authenticator
+from iveg.web.security.people import People, digest_of
+from tests.fakes.accounts import FakeAccounts, FakePasswords
+from tests.unit.web.desk import WebDesk
+
+OWN = {"X-IVEG": "1", "Sec-Fetch-Site": "same-origin"}
+ANA = Account("P1", "Ana Núñez", "operator", password="#acelga-1234")
+EVA = Account("P2", "Eva", "viewer", invitation=digest_of("invited"))
+
+
+class PeoplesDesk(WebDesk):
+    """A desk at which two people have accounts."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        now = self.clock().wall
+        self.accounts = FakeAccounts(ANA, replace(EVA, invited_until=now + 60.0))
+        self.passwords = FakePasswords()
+        self.people = People(self.accounts, self.passwords, self.clock)
+        self.authenticator = Authenticator(
+            sign_in_token="cd" * 32,
+            api_token="",
+            clock=self.clock,
+            trail=self.trail,
+            people=self.people,
+        )
+        self.app.state.authenticator = self.authenticator
+        self.app.include_router(
+            router(
+                self.pages,
+                document=lambda: ApiDoc("", "", (), ()),
+                rule=lambda: self.rules.current,
+            )
+        )
+
+    def page(self) -> httpx.AsyncClient:
+        return self._client(OWN)
+
+
+@pytest.fixture
+async def desk() -> AsyncIterator[PeoplesDesk]:
+    desk = PeoplesDesk()
+    await desk.people.refresh()
+    yield desk
+    desk.people.close()
+
+
+async def enter(page: httpx.AsyncClient, **proof: str) -> int:
+    return (await page.post("/signin", json=proof)).status_code
+
+
+@pytest.mark.parametrize("name", ["Ana Núñez", "ana núñez", " ANA NÚÑEZ"])
+async def test_name_and_password_sign_in_whatever_the_capitals(
+    desk: PeoplesDesk, name: str
+) -> None:
+    async with desk.page() as page:
+        status = await enter(page, name=name, password="acelga-1234")
+        stopped = await page.post("/api/v1/robots/AGI/stop")
+        who = desk.authenticator.sessions.find(page.cookies["iveg"])
+
+    assert (status, stopped.status_code) == (204, 202)
+    assert who is not None
+    assert (who.person, who.name, who.role) == ("P1", "Ana Núñez", "operator")
+    (command,) = desk.commander.commands.values()
+    assert command.requesters == ("Ana Núñez",)
+
+
+@pytest.mark.parametrize("name", ["Ana Núñez", "Eva", "nobody", ""])
+async def test_a_wrong_name_and_a_wrong_password_are_told_alike(
+    desk: PeoplesDesk, name: str
+) -> None:
+    async with desk.page() as page:
+        wrong = {"name": name, "password": "wrong-password"}
+        answer = await page.post("/signin", json=wrong)
+        known = await page.post("/signin", json={"name": "Ana Núñez", "password": "x"})
+
+    assert (answer.status_code, answer.text) == (known.status_code, known.text)
+    assert answer.status_code == 401
+    # Each was checked against something, so that none is faster.
+    assert len(desk.passwords.asked) == 2
+
+
+async def test_five_wrong_passwords_are_enough_for_a_minute_and_cost_no_more(
+    desk: PeoplesDesk,
+) -> None:
+    async with desk.page() as page:
+        wrong = [await enter(page, name="Eva", password="x" * 10) for _ in range(7)]
+        desk.clock.now += 61.0
+        right = await enter(page, name=ANA.name, password="acelga-1234")
+
+    assert wrong == [401] * 5 + [429] * 2
+    assert right == 204
+    assert len(desk.passwords.asked) == 6
+
+
+async def test_an_invitation_works_once_and_chooses_the_password(
+    desk: PeoplesDesk,
+) -> None:
+    proof = {"invitation": "invited", "password": "berenjena-77"}
+    async with desk.page() as page, desk.page() as other:
+        statuses = [await enter(page, **proof), await enter(other, **proof)]
+        again = await enter(other, name="Eva", password="berenjena-77")
+
+    assert statuses == [204, 401]
+    assert again == 204
+
+
+async def test_an_invitation_that_is_over_begins_nothing(desk: PeoplesDesk) -> None:
+    desk.clock.now += 61.0
+    async with desk.page() as page:
+        status = await enter(page, invitation="invited", password="berenjena-77")
+
+    assert status == 401
+    assert desk.accounts.known["P2"].password == ""
+
+
+async def test_a_short_password_is_refused_and_the_invitation_stays(
+    desk: PeoplesDesk,
+) -> None:
+    async with desk.page() as page:
+        short = await enter(page, invitation="invited", password="short")
+        long = await enter(page, invitation="invited", password="berenjena-77")
+
+    assert (short, long) == (422, 204)
+
+
+@pytest.mark.parametrize(
+    ("after", "status"),
+    [
+        (ANA, 202),
+        (replace(ANA, disabled=True), 401),
+        (replace(ANA, since=9e9), 401),
+        (replace(ANA, ends_at=1.0), 401),
+        (None, 401),
+    ],
+)
+async def test_who_is_disabled_reset_or_over_is_out_with_stop_and_all(
+    desk: PeoplesDesk, after: Account | None, status: int
+) -> None:
+    async with desk.page() as page:
+        await enter(page, name=ANA.name, password="acelga-1234")
+        who = desk.authenticator.sessions.find(page.cookies["iveg"])
+        assert who is not None
+        desk.accounts.known = {} if after is None else {"P1": after}
+        await desk.people.refresh()
+        current = desk.authenticator.sessions.current(who)
+        stopped = await page.post("/api/v1/robots/AGI/stop")
+
+    assert stopped.status_code == status
+    # `/live` asks this twice a second and closes.
+    assert (current is None) == (status == 401)
+
+
+async def test_while_the_database_is_away_what_was_read_last_counts(
+    desk: PeoplesDesk,
+) -> None:
+    async with desk.page() as page:
+        await enter(page, name=ANA.name, password="acelga-1234")
+        desk.accounts.is_away = True
+        running = await page.post("/api/v1/robots/AGI/stop")
+
+    assert running.status_code == 202
+
+
+async def test_before_the_first_reading_a_session_may_stop_and_no_more(
+    desk: PeoplesDesk,
+) -> None:
+    async with desk.page() as page:
+        await enter(page, name=ANA.name, password="acelga-1234")
+        desk.people._known = None
+        read = await page.get("/api/v1/robots")
+        stopped = await page.post("/api/v1/robots/AGI/stop")
+
+    assert (read.status_code, stopped.status_code) == (403, 202)
+
+
+async def test_signing_in_anew_ends_the_session_before(desk: PeoplesDesk) -> None:
+    async with desk.page() as page:
+        await enter(page, name=ANA.name, password="acelga-1234")
+        before = page.cookies["iveg"]
+        await enter(page, name=ANA.name, password="acelga-1234")
+
+    assert desk.authenticator.sessions.find(before) is None
+
+
+async def test_another_sites_page_signs_nobody_in(desk: PeoplesDesk) -> None:
+    async with desk.stranger() as page:
+        status = await enter(page, name=ANA.name, password="acelga-1234")
+
+    assert status == 403
+    assert desk.passwords.asked == []
+
+
+async def test_the_audit_has_the_sign_in_and_no_password(desk: PeoplesDesk) -> None:
+    async with desk.page() as page:
+        await enter(page, name=ANA.name, password="wrong-password")
+        await enter(page, name=ANA.name, password="acelga-1234")
+
+    rows = desk.records(AuditRecord)
+    assert [(one.action, one.person, one.method) for one in rows] == [
+        ("sign_in_refused", "", "none"),
+        ("sign_in", "P1", "password"),
+    ]
+    assert "password" not in "".join(one.details for one in rows)
