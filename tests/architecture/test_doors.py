@@ -1,22 +1,30 @@
 """Every door of the finished application is declared, and every document knows it."""
 
+import hashlib
 import re
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
+import httpx
 import pytest
 from fastapi import FastAPI
 from fastapi.routing import iter_route_contexts
+from starlette.requests import Request
 
 from iveg.app.dss import open_dss
 from iveg.asgi import create_app
 from iveg.settings import Settings
 from iveg.web.security.audited import AUDITED, READING
 from iveg.web.security.authentication import Action, declared_action
-from tests.architecture import documents
+from iveg.web.security.roles import MAY
+from iveg.web.security.sessions import IDLE_S
+from tests.architecture import documents, security_table
 
 INTERFACES = documents.interfaces()
 HEADINGS = documents.named_headings(INTERFACES)
 STATIC_FILES = "/static"
+API_TOKEN = "a-token-for-programs"
 OPEN_TO_STRANGERS = {"/healthz", "/signin", "/ngsi/notifications", "/sw.js"}
 """Notifications have a secret of their own; the service worker is a file like all
 scripts below `/static`, and must be at the root."""
@@ -24,7 +32,8 @@ scripts below `/static`, and must be at the root."""
 
 @pytest.fixture(scope="module")
 def app(tmp_path_factory: pytest.TempPathFactory) -> FastAPI:
-    return create_app(open_dss(Settings(), tmp_path_factory.mktemp("data")))
+    settings = Settings(api_token=API_TOKEN)
+    return create_app(open_dss(settings, tmp_path_factory.mktemp("data")))
 
 
 def test_every_route_and_websocket_declares_a_role(app: FastAPI) -> None:
@@ -46,6 +55,33 @@ def test_the_audit_knows_every_route_that_changes_something(app: FastAPI) -> Non
     }
 
     assert changing - {("POST", "/ngsi/notifications")} == set(AUDITED)
+
+
+def test_the_table_of_routes_in_the_security_page_is_the_routes(app: FastAPI) -> None:
+    page = security_table.PAGE.read_text()
+
+    assert page == security_table.with_table(page, security_table.table(app))
+
+
+@pytest.mark.parametrize("role", [*MAY, "stranger"])
+async def test_every_route_lets_each_role_in_or_not_as_the_table_says(
+    app: FastAPI, role: str
+) -> None:
+    headers, may = _who(app, role), MAY.get(role, frozenset({"open"}))  # type: ignore[call-overload]
+    refusal = 401 if role == "stranger" else 403
+    authenticator = app.state.authenticator
+    wrong = []
+    async with _asking(app, headers) as client:
+        for path, action, method in _asked(app):
+            if action not in may:
+                status = (await client.request(method, path)).status_code
+                if status != refusal:
+                    wrong.append((method, path, status))
+            elif action != "open":
+                # The handler itself is not what is asked about.
+                authenticator.authorise(_request(method, path, headers), action)
+
+    assert wrong == []
 
 
 def test_what_moves_a_robot_asks_for_more_than_what_stops_it(app: FastAPI) -> None:
@@ -88,6 +124,46 @@ def test_the_settings_name_both_secrets_of_notifications(tmp_path: Path) -> None
         True,
         False,
     ]
+
+
+def _who(app: FastAPI, role: str) -> dict[str, str]:
+    """Headers of somebody of this role."""
+    own = {"X-IVEG": "1", "Sec-Fetch-Site": "same-origin"}
+    if role == "stranger":
+        return own
+    if role == "program":
+        return {"Authorization": f"Bearer {API_TOKEN}"}
+    sessions = app.state.authenticator.sessions
+    if role != "expired":
+        return {**own, "Cookie": f"iveg={sessions.open('ana', role)}"}
+    token = sessions.open("ana", "admin")
+    digest = hashlib.sha256(token.encode()).digest()
+    old = sessions._sessions[digest]
+    sessions._sessions[digest] = replace(old, began=old.began - IDLE_S * 2.5)
+    return {**own, "Cookie": f"iveg={token}"}
+
+
+def _asking(app: FastAPI, headers: dict[str, str]) -> httpx.AsyncClient:
+    transport = httpx.ASGITransport(app)
+    return httpx.AsyncClient(
+        transport=transport, base_url="http://iveg.test", headers=headers
+    )
+
+
+def _asked(app: FastAPI) -> Iterator[tuple[str, Action, str]]:
+    """Path, action and method of every route of HTTP."""
+    for route in iter_route_contexts(app.routes):
+        action = declared_action(route)
+        if action is None:
+            continue
+        for method in set(route.methods or ()):
+            yield re.sub(r"\{[^}]+\}", "AGI", str(route.path)), action, method
+
+
+def _request(method: str, path: str, headers: dict[str, str]) -> Request:
+    raw = [(name.lower().encode(), one.encode()) for name, one in headers.items()]
+    scope = {"type": "http", "method": method, "path": path, "scheme": "http"}
+    return Request({**scope, "query_string": b"", "headers": raw})
 
 
 def _methods(app: FastAPI) -> list[tuple[str, set[str]]]:

@@ -218,8 +218,11 @@ def router(
         found = await _enter(request, body)
         return found.response() if isinstance(found, Problem) else found
 
-    @routes.post("/signout", response_model=None)
-    async def sign_out(request: Request, _: _Reader) -> Response:
+    # Whose session is past its age can end it, too.
+    @routes.post(
+        "/signout", response_model=None, dependencies=[Depends(require("stop"))]
+    )
+    async def sign_out(request: Request) -> Response:
         return _authenticator(request).sign_out(request)
 
     @routes.post("/wall", status_code=204)

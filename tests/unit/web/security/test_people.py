@@ -214,3 +214,18 @@ async def test_the_audit_has_the_sign_in_and_no_password(desk: PeoplesDesk) -> N
         ("sign_in", "P1", "password"),
     ]
     assert "password" not in "".join(one.details for one in rows)
+
+
+async def test_an_expired_session_can_still_stop_and_sign_out(
+    desk: PeoplesDesk,
+) -> None:
+    async with desk.page() as page:
+        await enter(page, name=ANA.name, password="acelga-1234")
+        desk.clock.now += 13 * 3600.0
+        read = await page.get("/api/v1/robots")
+        stopped = await page.post("/api/v1/robots/AGI/stop")
+        token = page.cookies["iveg"]
+        left = await page.post("/signout")
+
+    assert [one.status_code for one in (read, stopped, left)] == [403, 202, 303]
+    assert desk.authenticator.sessions.find(token) is None
