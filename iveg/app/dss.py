@@ -63,6 +63,7 @@ from iveg.web.notifications import NotificationEndpoint
 from iveg.web.pages.contexts import Site
 from iveg.web.security.authentication import Authenticator, NotifySecret
 from iveg.web.security.people import People
+from iveg.web.security.programs import Programs
 from iveg.web.views import Views
 
 _log = logging.getLogger(__name__)
@@ -127,6 +128,7 @@ class Dss:
             self.chronicle.remember = Memory(self.pipeline).write
         self.services = build_services(self.pipeline, kept, self._senders(), clock.now)
         self.people = People(self.stores.accounts, Passwords(), clock.now)
+        self.programs = Programs(self.stores.api_tokens, clock.now)
         self.trail = AuditTrail(self.stores.recorder, new_id)
         self.upkeep = HistoryUpkeep(
             self.stores.retained(),
@@ -230,6 +232,7 @@ class Dss:
             link_name=settings.sign_in_name,
             trail=self.trail,
             people=self.people,
+            programs=self.programs,
         )
         orion = NotificationEndpoint(
             parts.ingest,
@@ -293,6 +296,7 @@ class Dss:
             self.worker.close()
             await self.past.close()
             self.people.close()
+            self.programs.close()
 
     async def _live(self) -> None:
         parts = self.pipeline
@@ -320,6 +324,7 @@ class Dss:
             "past": self.past.run,
             "messages": beside.messenger.run,
             "accounts": self.people.run,
+            "api-tokens": self.programs.run,
             "earlier": self._remember,
             "loop-watch": LoopWatch(supervision.note_turn).run,
         }

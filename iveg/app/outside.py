@@ -7,6 +7,7 @@ from iveg.adapters import clock
 from iveg.adapters.contacts import FileContacts
 from iveg.adapters.detectors import FileDetectors
 from iveg.adapters.history.accounts import AccountStore
+from iveg.adapters.history.api_tokens import ApiTokenStore
 from iveg.adapters.history.engine import history_url, sqlite_file
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.recorder import Recorder, journal_file
@@ -45,6 +46,7 @@ class Stores:
     detectors: FileDetectors
     sessions: FileSessions
     accounts: AccountStore
+    api_tokens: ApiTokenStore
     inputs: InputRecorder
 
     def history_state(self) -> HopState:
@@ -79,6 +81,7 @@ class Stores:
         self.journal.close()
         self.sessions.close()
         self.accounts.close()
+        self.api_tokens.close()
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,6 +142,7 @@ def open_stores(
         FileDetectors(directory / "detectors.jsonl"),
         FileSessions(directory / "sessions.jsonl"),
         AccountStore(url),
+        ApiTokenStore(url),
         InputRecorder(
             WriterSetup(
                 (directory / "recordings").resolve(),

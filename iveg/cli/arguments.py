@@ -107,12 +107,17 @@ def add_user(user: argparse.ArgumentParser) -> None:
         "role": "give another role; they sign in anew",
         "reset": "take the password away, and print a new link",
         "disable": "sign them out everywhere, for good",
+        "token": "a program's token, printed once",
+        "revoke": "end a program's token",
     }.items():
         one = actions.add_parser(action, help=says)
         one.add_argument("name", metavar="NAME")
         if action in ("add", "role"):
             roles = ("viewer", "operator", "admin")
             one.add_argument("--role", choices=roles, required=True)
+        if action == "token":
+            scopes = ("read", "stop", "operate")
+            one.add_argument("--scope", choices=scopes, required=True)
         if action == "add":
             one.add_argument("--days", type=int, metavar="N", help="the account ends")
 

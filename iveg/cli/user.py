@@ -9,10 +9,18 @@ from pathlib import Path
 from iveg.adapters import clock
 from iveg.adapters.doctor import check_database
 from iveg.adapters.history.accounts import AccountStore
+from iveg.adapters.history.api_tokens import ApiTokenStore
 from iveg.adapters.history.engine import history_url
 from iveg.adapters.ids import new_id
 from iveg.cli.running import page_address
-from iveg.domain.accounts import Account, PersonRole, is_name, name_key
+from iveg.domain.accounts import (
+    Account,
+    ApiToken,
+    PersonRole,
+    TokenScope,
+    is_name,
+    name_key,
+)
 from iveg.domain.audit import CONSOLE
 from iveg.domain.errors import NotANameError, UnknownNameError
 from iveg.domain.retention import DAY_S
@@ -33,11 +41,20 @@ def run_user(options: argparse.Namespace, settings: Settings, data: Path) -> int
     """
     url = history_url(settings.database_url, data)
     check_database(url)
-    store = AccountStore(url)
+    store, tokens = AccountStore(url), ApiTokenStore(url)
     try:
-        _act(options, settings, store)
+        if options.action == "token":
+            print(add_token(tokens, options.name, options.scope))
+        elif options.action == "revoke":
+            tokens.revoke(options.name, CONSOLE)
+            print(f"{options.name} is out within a second.")
+        else:
+            _act(options, settings, store)
+        if options.action == "list":
+            print(*_programs(tokens.read().values()), sep="\n", end="")
     finally:
         store.close()
+        tokens.close()
     return 0
 
 
@@ -81,6 +98,21 @@ def add(
     invitation, invited = _invited(account, waits_s)
     store.add(invited, CONSOLE)
     return invitation
+
+
+def add_token(store: ApiTokenStore, name: str, scope: TokenScope) -> str:
+    """Add a program; returns its token, which is stored nowhere.
+
+    Raises:
+        NotANameError: no program may be called so.
+        NameTakenError: one is called so already.
+    """
+    if not is_name(name):
+        raise NotANameError(name)
+    token = secrets.token_urlsafe(32)
+    made = ApiToken(new_id(), name, scope, digest_of(token), clock.wall())
+    store.add(made, CONSOLE)
+    return token
 
 
 def invite_again(store: AccountStore, name: str, waits_s: float) -> str:
@@ -137,6 +169,12 @@ def _told(accounts: Iterable[Account]) -> Iterable[str]:
     now = clock.wall()
     for one in sorted(accounts, key=lambda account: name_key(account.name)):
         yield f"{one.name}  {one.role}  {_state(one, now)}"
+
+
+def _programs(tokens: Iterable[ApiToken]) -> Iterable[str]:
+    for one in sorted(tokens, key=lambda token: name_key(token.name)):
+        used = "never used" if one.used_at is None else format_stamp(one.used_at)
+        yield f"{one.name}  program  {one.scope}  {used}\n"
 
 
 def _state(account: Account, now: float) -> str:

@@ -11,6 +11,8 @@ from typing import Final, Literal
 SignInMethod = Literal["link", "password", "token"]
 """Proof of an identity; ``token`` is a program's."""
 PersonRole = Literal["viewer", "operator", "admin"]
+TokenScope = Literal["read", "stop", "operate"]
+"""What a program may: read; also stop; also release, resume and all else of people."""
 
 LINK_PERSON: Final = "link"
 """Id of whoever holds the link of the environment."""
@@ -61,3 +63,20 @@ class Account:
     def is_open(self, now: float) -> bool:
         """Whether the person may be here at this moment (Unix s)."""
         return not self.disabled and (self.ends_at is None or now < self.ends_at)
+
+
+@dataclass(frozen=True, slots=True)
+class ApiToken:
+    """A program that may call, by a token of which the digest is kept.
+
+    Attributes:
+        digest: SHA-256 of the token (hex).
+        made_at: When (Unix s); ``used_at`` when it was used last, to a minute.
+    """
+
+    token_id: str
+    name: str
+    scope: TokenScope
+    digest: str
+    made_at: float
+    used_at: float | None = None

@@ -55,7 +55,7 @@ class AccountStore:
             except IntegrityError:
                 return False
             told = {"role": account.role, "ends_at": account.ends_at}
-            _note(connection, by, "account_added", account, told)
+            note_change(connection, by, "account_added", account.name, told)
             return True
 
         if not self._store.run(work):
@@ -67,7 +67,8 @@ class AccountStore:
         def work(connection: Connection) -> None:
             wanted = update(accounts).where(accounts.c.account_id == account.account_id)
             connection.execute(wanted.values(**asdict(account)))
-            _note(connection, by, action, account, {"role": account.role})
+            told = {"role": account.role}
+            note_change(connection, by, action, account.name, told)
 
         self._store.run(work)
 
@@ -100,9 +101,10 @@ class AccountStore:
         self._reading.dispose()
 
 
-def _note(
-    connection: Connection, by: Actor, action: str, account: Account, told: Json
+def note_change(
+    connection: Connection, by: Actor, action: str, name: str, told: Json
 ) -> None:
+    """Write a change of somebody's rights into the audit, in the same transaction."""
     now = clock.wall()
     row = AuditRecord(
         audit_id=new_id(),
@@ -112,7 +114,7 @@ def _note(
         role=by.role,
         method=by.method,
         action=action,
-        subject=account.name,
+        subject=name,
         details=canonical(told),
     )
     write_audit(connection, [row], now)

@@ -55,6 +55,7 @@ _ROW = {
     "latency": (tables.latency.c.at, tables.latency.c.row_id),
     "audit": (tables.audit.c.at, tables.audit.c.seq),
     "audit_sealed": (tables.audit_sealed.c.at, tables.audit_sealed.c.seq),
+    "api_tokens": (tables.api_tokens.c.made_at, tables.api_tokens.c.token_id),
     "accounts": (tables.accounts.c.since, tables.accounts.c.account_id),
     "audit_end": (tables.audit_end.c.at, tables.audit_end.c.one),
 }

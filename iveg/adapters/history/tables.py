@@ -69,6 +69,11 @@ def _texts(*names: str) -> list[Column[str]]:
     return [_text(name, null=False) for name in names]
 
 
+def _numbers(*names: str) -> list[Column[float]]:
+    """Columns of numbers that are never missing."""
+    return [_number(name, null=False) for name in names]
+
+
 def _json(
     name: str,
     shape: type[dict[str, object]] | type[list[object]] = dict,
@@ -216,12 +221,7 @@ odometry = Table(
     _row_id(),
     _number("at", null=False),
     _text("robot_id", null=False),
-    _number("x", null=False),
-    _number("y", null=False),
-    _number("yaw", null=False),
-    _number("linear", null=False),
-    _number("angular", null=False),
-    _number("limit_factor", null=False),
+    *_numbers("x", "y", "yaw", "linear", "angular", "limit_factor"),
     _number("applied_factor"),
     _text("link"),
     _number("margin_m"),
@@ -250,9 +250,7 @@ latency = Table(
     _number("at", null=False),
     *_texts("robot_id", "data", "hop"),
     Column("count", BigInteger, nullable=False),
-    _number("total_s", null=False),
-    _number("least_s", null=False),
-    _number("most_s", null=False),
+    *_numbers("total_s", "least_s", "most_s"),
     _text("bins", null=False),
     Index(None, "at"),
     sqlite_autoincrement=True,
@@ -291,8 +289,7 @@ audit = Table(
     metadata,
     Column("seq", _BIG, primary_key=True, autoincrement=False),
     _text("audit_id", null=False),
-    _number("at", null=False),
-    _number("stored_at", null=False),
+    *_numbers("at", "stored_at"),
     *_texts("person", "name", "role", "method", "action", "subject"),
     # Text, not JSON: its very bytes are hashed.
     *_texts("details", "previous_hash", "hash"),
@@ -329,8 +326,18 @@ accounts = Table(
     Column("disabled", Boolean, nullable=False),
     _number("ends_at"),
     _text("invitation", null=False),
-    _number("invited_until", null=False),
-    _number("since", null=False),
+    *_numbers("invited_until", "since"),
+    UniqueConstraint("name_key"),
+)
+
+
+api_tokens = Table(
+    "api_tokens",
+    metadata,
+    Column("token_id", Text, primary_key=True),
+    *_texts("name", "name_key", "scope", "digest"),
+    _number("made_at", null=False),
+    _number("used_at"),
     UniqueConstraint("name_key"),
 )
 

@@ -236,7 +236,7 @@ async def _sent(sending: Coroutine[object, object, None]) -> None:
 
 def _may_still(websocket: WebSocket, principal: Principal, action: Action) -> bool:
     authenticator: Authenticator = websocket.app.state.authenticator
-    current = authenticator.sessions.current(principal)
+    current = authenticator.current(principal)
     return current is not None and current.may(action)
 
 

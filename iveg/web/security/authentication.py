@@ -34,6 +34,7 @@ from iveg.web.problems import NotSignedInError, Problem
 from iveg.web.security.audited import READING
 from iveg.web.security.csrf import is_own, refuse_forgery, refuse_other_bodies
 from iveg.web.security.people import People
+from iveg.web.security.programs import Programs
 from iveg.web.security.rate_limits import REFUSED_ROWS, Allowance, FailedAttempts
 from iveg.web.security.roles import (
     MAY,
@@ -76,6 +77,7 @@ class Authenticator:
         link_name: Name of whoever holds the link.
         trail: Told of sign-ins, and of those that were refused.
         people: Those with accounts; None: there is the link alone.
+        programs: Those with tokens of their own; None: there is ``api_token`` alone.
     """
 
     def __init__(
@@ -88,6 +90,7 @@ class Authenticator:
         link_name: str = DEFAULT_NAME,
         trail: AuditTrail | None = None,
         people: People | None = None,
+        programs: Programs | None = None,
     ) -> None:
         self._sign_in_token = sign_in_token
         self._api_token = api_token
@@ -97,6 +100,7 @@ class Authenticator:
         # Strangers' rows are for ever: a flood from many addresses writes few.
         self._rows = Allowance(REFUSED_ROWS, clock().mono)
         self._people = people
+        self._programs = programs
         role_now = None if people is None else people.role_now
         self.sessions = Sessions(clock, store, link_name=link_name, role_now=role_now)
         self.refused = 0
@@ -233,11 +237,21 @@ class Authenticator:
         """The owner of the cookie or bearer token; None for a stranger."""
         scheme, _, token = connection.headers.get("authorization", "").partition(" ")
         if scheme.lower() == "bearer":
-            known = bool(self._api_token) and _same(token.strip(), self._api_token)
-            return PROGRAM if known else None
+            return self._program(token.strip())
         secure = connection.scope["scheme"] in ("https", "wss")
         cookie = connection.cookies.get(_cookie_name(secure=secure))
         return None if cookie is None else self.sessions.find(cookie)
+
+    def _program(self, token: str) -> Principal | None:
+        if _same(token, self._api_token):
+            return PROGRAM
+        return None if self._programs is None else self._programs.find(token)
+
+    def current(self, principal: Principal) -> Principal | None:
+        """The same person or program as of now: with what is left, or gone."""
+        if principal.session is not None or principal == PROGRAM:
+            return self.sessions.current(principal)
+        return None if self._programs is None else self._programs.current(principal)
 
     def authorise(self, request: Request, action: Action) -> Principal:
         """Let a request in, or say why not.

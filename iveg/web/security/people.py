@@ -19,7 +19,8 @@ from iveg.domain.errors import HopError
 from iveg.pipeline.ports import Clock
 from iveg.web.security.roles import Role
 
-_EVERY_S = 0.4
+EVERY_S = 0.4
+"""Between two readings of who may come in (s)."""
 
 
 class Accounts(Protocol):
@@ -53,7 +54,7 @@ class People:
         while True:
             with contextlib.suppress(HopError):
                 await self.refresh()
-            await asyncio.sleep(_EVERY_S)
+            await asyncio.sleep(EVERY_S)
 
     async def refresh(self) -> None:
         """Read them once. Raises HopError."""

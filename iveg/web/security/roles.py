@@ -6,14 +6,18 @@ from typing import Final, Literal
 
 from iveg.domain.accounts import SignInMethod
 
-Role = Literal["viewer", "operator", "admin", "program", "expired"]
+Role = Literal[
+    "viewer", "operator", "admin", "reader", "program", "controller", "expired"
+]
 Action = Literal["open", "read", "stop", "release", "admin"]
 
 MAY: Final[Mapping[Role, frozenset[Action]]] = {
     "viewer": frozenset({"open", "read", "stop"}),
     "operator": frozenset({"open", "read", "stop", "release"}),
     "admin": frozenset({"open", "read", "stop", "release", "admin"}),
+    "reader": frozenset({"open", "read"}),
     "program": frozenset({"open", "read", "stop"}),
+    "controller": frozenset({"open", "read", "stop", "release"}),
     "expired": frozenset({"open", "stop"}),
 }
 """The table of SECURITY.md, "Roles"; what is not here is refused."""

@@ -9,6 +9,7 @@ from sqlalchemy import Connection, text
 
 from iveg.adapters import clock
 from iveg.adapters.history.accounts import AccountStore
+from iveg.adapters.history.api_tokens import ApiTokenStore
 from iveg.adapters.history.audit import faults
 from iveg.adapters.history.migrate import upgrade
 from iveg.cli.database import read_history
@@ -133,6 +134,29 @@ def test_the_first_link_is_over_after_half_an_hour(console: Console) -> None:
     assert first is not None
 
     assert console.store.accept(digest_of(first), "#h", clock.wall() + 1801.0) is None
+
+
+def test_a_programs_token_is_printed_once_listed_and_revoked(
+    console: Console, capsys: pytest.CaptureFixture[str]
+) -> None:
+    console.call("token", "MES", scope="stop")
+    token = capsys.readouterr().out.strip()
+    tokens = ApiTokenStore(console.settings.database_url)
+    kept = tokens.read()[digest_of(token)]
+    tokens.used({kept.digest: 1_700_000_000.0})
+    console.call("list")
+    listed = capsys.readouterr().out
+    console.call("revoke", "mes")
+
+    assert (kept.name, kept.scope) == ("MES", "stop")
+    assert listed.splitlines()[-1] == "MES  program  stop  2023-11-14T22:13:20.000Z"
+    assert token not in listed
+    assert tokens.read() == {}
+    with pytest.raises(UnknownNameError):
+        console.call("revoke", "MES")
+    tokens.close()
+    url = console.settings.database_url
+    assert read_history(url, _actions) == ["token_added", "token_revoked"]
 
 
 def _actions(connection: Connection) -> list[str]:

@@ -19,6 +19,8 @@ const GROUPS = {
   account_role: "signing",
   account_reset: "signing",
   account_disabled: "signing",
+  token_added: "signing",
+  token_revoked: "signing",
   stop: "orders",
   drill: "orders",
   release: "orders",

@@ -1,0 +1,92 @@
+"""Programs with tokens of their own: what each may do, and when it was here last.
+
+Read anew twice a second, as accounts are, so that a token that is revoked at the
+console is none within a second; use is written down once a minute at most.
+"""
+
+import asyncio
+import contextlib
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from typing import Final, Protocol
+
+from iveg.domain.accounts import ApiToken, TokenScope
+from iveg.domain.errors import HopError
+from iveg.pipeline.ports import Clock
+from iveg.web.security.people import EVERY_S, digest_of
+from iveg.web.security.roles import Principal, Role
+
+_ROLES: Final[Mapping[TokenScope, Role]] = {
+    "read": "reader",
+    "stop": "program",
+    "operate": "controller",
+}
+_USED_S = 60.0
+
+
+class ApiTokens(Protocol):
+    """Storage of tokens; blocks, and raises HopError while it is away."""
+
+    def read(self) -> Mapping[str, ApiToken]:
+        """All tokens, by their digests."""
+
+    def used(self, digests: Mapping[str, float]) -> None:
+        """Keep when tokens were used last (Unix s)."""
+
+
+class Programs:
+    """Knows the tokens of programs.
+
+    Args:
+        store: Where they are kept.
+        clock: Read at each question.
+    """
+
+    def __init__(self, store: ApiTokens, clock: Clock) -> None:
+        self._store = store
+        self._clock = clock
+        self._thread = ThreadPoolExecutor(1, "api-tokens")
+        self._known: Mapping[str, ApiToken] = {}
+        self._used: dict[str, float] = {}
+        self._kept_at = clock().mono
+
+    async def run(self) -> None:
+        """Read them again and again, until cancelled."""
+        while True:
+            with contextlib.suppress(HopError):
+                await self.refresh()
+            await asyncio.sleep(EVERY_S)
+
+    async def refresh(self) -> None:
+        """Read them once, and keep what was used. Raises HopError."""
+        loop, now = asyncio.get_running_loop(), self._clock().mono
+        if self._used and now - self._kept_at >= _USED_S:
+            used, self._used, self._kept_at = self._used, {}, now
+            await loop.run_in_executor(self._thread, self._store.used, used)
+        self._known = await loop.run_in_executor(self._thread, self._store.read)
+
+    def find(self, token: str) -> Principal | None:
+        """Whose token this is; None: nobody's, or nobody's any more."""
+        digest = digest_of(token)
+        known = self._known.get(digest)
+        if known is None:
+            return None
+        self._used[digest] = self._clock().wall
+        return _principal(known)
+
+    def current(self, principal: Principal) -> Principal | None:
+        """The same program as of now; None where its token was revoked."""
+        known = self._known.values()
+        return next(
+            (_principal(one) for one in known if one.token_id == principal.person), None
+        )
+
+    def close(self) -> None:
+        """End the thread."""
+        self._thread.shutdown(wait=False)
+
+
+def _principal(token: ApiToken) -> Principal:
+    return Principal(
+        token.name, _ROLES[token.scope], person=token.token_id, method="token"
+    )
