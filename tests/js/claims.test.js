@@ -1,4 +1,5 @@
 import { claim, mayStand } from "../../iveg/static/js/map/layers/claims.js";
+import { laneNames } from "../../iveg/static/js/map/layers/greenhouse.js";
 import { createPlaces } from "../../iveg/static/js/map/layers/places.js";
 import { equal, test } from "./harness.js";
 
@@ -23,6 +24,19 @@ test("13.19: words give way to an aisle's name, to figures and to robots", () =>
     mayStand(paint, "1,4 m", x, y, 11);
   equal([at(30, 560), at(300, 300), at(450, 450)], [false, false, false]);
   equal([at(30, 100), at(300, 330), at(450, 500)], [true, true, true]);
+});
+
+test("28.7: an aisle's name gives way to a robot, and stays where it went", () => {
+  const paint = frame();
+  const [robot] = paint.scene.robots;
+  const nameAt = (/** @type {number} */ y) => {
+    robot.pose = { x: 1, y, yaw: 0 };
+    return Math.round([...laneNames(paint)][0].y);
+  };
+  const [south, north] = [nameAt(10), nameAt(1)];
+  equal([south > 500, north < 100], [true, true]);
+  // The robot has left, and the name has no reason to move.
+  equal([nameAt(10), nameAt(19), nameAt(10)], [north, south, south]);
 });
 
 test("13.19: of two words at one place the first one is written", () => {

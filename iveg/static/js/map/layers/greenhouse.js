@@ -150,29 +150,86 @@ function drawObstacle(paint, thing) {
 }
 
 /**
- * Places of lane names: at the near end, turned along a lane that is taller than wide;
- * none where a lane is too small for its name.
+ * Which place of its lane each name has; one that is free is kept, so that none jumps to
+ * and fro.
+ *
+ * @type {WeakMap<object, number>}
+ */
+const kept = new WeakMap();
+/** Between a name and a robot's body (px). */
+const CLEAR_PX = 4;
+/** The whole name first: at the near end, at the far one, in the middle; then its number. */
+const ORDER = [0, 2, 1, 3, 5, 4];
+
+/**
+ * @typedef {{text: string, size: number, isTall: boolean, x: number, y: number}} Name
+ *   x, y: its middle (px)
+ */
+
+/**
+ * Names of lanes where no robot covers them, turned along a lane that is taller than wide;
+ * a number alone where there is no room for more, and none where a lane is too small.
  *
  * @param {Paint} paint
  */
 export function* laneNames(paint) {
-  const { view, labels } = paint;
   for (const lane of paint.scene.map?.lanes ?? []) {
-    const [x, y, width, height] = rectOf(paint, lane);
-    const isTall = height > width;
-    const [thickness, length] = isTall ? [width, height] : [height, width];
-    const text = labels.lane(lane.label);
-    const size = Math.min(13, thickness * 0.6);
-    if (size < 8 || length < text.length * size * 0.7) continue;
-    const inset = text.length * size * 0.3 + 8;
-    if (isTall) {
-      const end = Math.min(y + height, view.height) - inset;
-      yield { text, size, isTall, x: x + width / 2, y: Math.max(y + inset, end) };
-    } else {
-      const start = Math.min(Math.max(x, 0) + inset, x + width - inset);
-      yield { text, size, isTall, x: start, y: y + height / 2 };
-    }
+    const text = paint.labels.lane(lane.label);
+    const number = text.match(/\d\S*$/)?.[0] ?? text;
+    const names = [text, number].flatMap((one) => namesIn(paint, lane, one));
+    if (!names.length) continue;
+    const before = kept.get(lane) ?? 0;
+    const places = [before, ...ORDER].filter((place) => place < names.length);
+    const free = places.find((place) => {
+      // A number makes room for its whole name only where that will stay.
+      const clear = place < 3 && before >= 3 ? paint.view.scale : CLEAR_PX;
+      return isFree(paint, names[place], clear);
+    });
+    kept.set(lane, free ?? 0);
+    yield names[free ?? 0];
   }
+}
+
+/**
+ * At the near end of what is in sight, in the middle and at the far end.
+ *
+ * @param {Paint} paint @param {Box2D} lane @param {string} text
+ * @returns {Name[]}
+ */
+function namesIn(paint, lane, text) {
+  const [x, y, width, height] = rectOf(paint, lane);
+  const isTall = height > width;
+  const [thickness, length] = isTall ? [width, height] : [height, width];
+  const size = Math.min(13, thickness * 0.6);
+  if (size < 8 || length < text.length * size * 0.7) return [];
+  const { view } = paint;
+  const half = halfOf({ text, size }) + 8;
+  const [start, most] = isTall ? [y, view.height] : [x, view.width];
+  const [from, to] = [Math.max(start, 0), Math.min(start + length, most)];
+  const along = [from + half, (from + to) / 2, to - half].map((at) =>
+    Math.min(Math.max(at, start + half), start + length - half),
+  );
+  if (!isTall)
+    return along.map((at) => ({ text, size, isTall, x: at, y: y + height / 2 }));
+  // A number stands upright.
+  const name = { text, size, isTall: text.length > 2, x: x + width / 2 };
+  return along.reverse().map((at) => ({ ...name, y: at }));
+}
+
+/** Half the length of a name (px). @param {{text: string, size: number}} name */
+const halfOf = ({ text, size }) => text.length * size * 0.3;
+
+/** @param {Paint} paint @param {Name} name @param {number} clear (px) */
+function isFree({ view, scene }, name, clear) {
+  const half = halfOf(name);
+  const [across, up] = name.isTall ? [name.size / 2, half] : [half, name.size / 2];
+  return !scene.robots.some(({ pose, length }) => {
+    const away = (length * view.scale) / 2 + clear;
+    return (
+      Math.abs(screenX(view, pose.x) - name.x) < across + away &&
+      Math.abs(screenY(view, pose.y) - name.y) < up + away
+    );
+  });
 }
 
 /** @param {Paint} paint */

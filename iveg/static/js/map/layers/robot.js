@@ -276,53 +276,75 @@ function drawPadlock({ ctx, theme }, x, y) {
  */
 function drawTag(paint, robot, length) {
   const { theme } = paint;
-  const y = heightOfTag(paint, robot, length);
+  const { y, tags, aside } = placeOfTag(paint, robot, length);
   const isLost = isSilent(robot.link);
-  label(paint, robot.id, 0, y, {
+  label(paint, robot.id, aside, y, {
     ...NAME,
     colour: isLost ? theme.muted : theme.text,
   });
-  let x = widthOf(paint, robot.id, NAME) / 2 + 6;
-  if (isSeenHeld(robot)) drawPadlock(paint, -x - PADLOCK_PX, y);
-  for (const [text, fill, ink] of tagsOf(paint, robot)) {
+  const half = widthOf(paint, robot.id, NAME) / 2 + 6;
+  if (isSeenHeld(robot)) drawPadlock(paint, aside - half - PADLOCK_PX, y);
+  let x = aside + half;
+  for (const [text, fill, ink] of tags) {
     x += pill(paint, text, x, y, fill, ink) + 4;
   }
 }
 
 /**
- * Above the robot, else below, else farther away: where no other label is.
+ * Above the robot, else below, else farther away: where no other label is.  Where there is
+ * no room for all of it, its name stands alone; the card has the rest.  At an edge of the
+ * map it moves aside.
  *
  * @param {Paint} paint
  * @param {SceneRobot} robot
  * @param {number} length
- * @returns {number} middle of the labels, from the robot's (px)
+ * @returns {{y: number, aside: number, tags: Tag[]}} middle of the labels and of the
+ *   name, from the robot's (px)
  */
-function heightOfTag(paint, robot, length) {
-  const { view, places } = paint;
+function placeOfTag(paint, robot, length) {
   const near = length / 2 + 20;
   const heights = [-near, near, -near - WORDS_PX, near + WORDS_PX];
-  if (!places) return heights[0];
-  const half = widthOf(paint, robot.id, NAME) / 2;
-  const tags = tagsOf(paint, robot).map(([text]) => widthOfPill(paint, text));
-  const x = screenX(view, robot.pose.x);
-  const y = screenY(view, robot.pose.y);
-  const left = x - half - (isSeenHeld(robot) ? 2 * PADLOCK_PX + 6 : 0);
-  const right = x + half + tags.reduce((sum, width) => sum + width + 4, 6);
-  const rects = heights.map((dy) => {
-    const [top, bottom] = [y + dy - PADLOCK_PX, y + dy + PADLOCK_PX];
-    return { left, right, top, bottom };
-  });
-  return heights[claim(paint, rects) ?? 0];
+  const tags = tagsOf(paint, robot);
+  for (const told of tags.length ? [tags, []] : [tags]) {
+    const { rects, aside } = rectsOf(paint, robot, heights, told);
+    const found = claim(paint, rects);
+    if (found !== null) return { y: heights[found], aside, tags: told };
+  }
+  return { y: heights[0], aside: 0, tags };
 }
 
 /**
+ * @param {Paint} paint @param {SceneRobot} robot
+ * @param {number[]} heights @param {Tag[]} tags
+ */
+function rectsOf(paint, robot, heights, tags) {
+  const { view } = paint;
+  const half = widthOf(paint, robot.id, NAME) / 2;
+  const widths = tags.map(([text]) => widthOfPill(paint, text));
+  const x = screenX(view, robot.pose.x);
+  const y = screenY(view, robot.pose.y);
+  const left = x - half - (isSeenHeld(robot) ? 2 * PADLOCK_PX + 6 : 0);
+  const right = x + half + widths.reduce((sum, width) => sum + width + 4, 6);
+  const isInView = x >= 0 && x <= view.width;
+  const aside = isInView ? Math.max(-left, Math.min(0, view.width - right)) : 0;
+  const rects = heights.map((dy) => ({
+    left: left + aside,
+    right: right + aside,
+    top: y + dy - PADLOCK_PX,
+    bottom: y + dy + PADLOCK_PX,
+  }));
+  return { rects, aside };
+}
+
+/**
+ * @typedef {[text: string, ground: string, ink: string]} Tag
  * @param {Pick<Paint, "theme" | "labels">} paint
  * @param {SceneRobot} robot
- * @returns {[string, string, string][]} words, their ground and their ink
+ * @returns {Tag[]}
  */
 export function tagsOf({ theme, labels }, robot) {
   const { alert, bg, muted, onAlert2, text } = theme;
-  /** @type {[string, string, string][]} */
+  /** @type {Tag[]} */
   const tags = [];
   if (robot.link === "LATE") tags.push([labels.age(robot.ageS), alert[1], onAlert2]);
   if (isSilent(robot.link)) tags.push([labels.ago(robot.ageS), muted, bg]);

@@ -1,11 +1,12 @@
 /**
- * The layers that hardly ever change, drawn once per viewport, theme, language, greenhouse
- * and what is known of it.
+ * The layers that hardly ever change, drawn once per viewport, theme, language, greenhouse,
+ * what is known of it, and where the names of its lanes are.
  *
  * @typedef {import("./paint.js").Paint} Paint
  * @typedef {[name: string, draw: (paint: Paint) => void]} StaticLayer
  */
 
+import { laneNames } from "./greenhouse.js";
 import { matchPixels } from "./paint.js";
 
 /** The hatching of what no camera sees grows denser with time alone. */
@@ -41,7 +42,10 @@ export function createStaticImage(layers) {
       const shown = layers.filter(([name]) => isOn(name));
       const { coverage, nowMs } = paint.scene;
       const age = coverage && Math.floor(nowMs / DENSER_MS);
-      const wanted = [...placeOf(paint, ratio), age, ...shown];
+      const names = [...laneNames(paint)]
+        .map(({ text, x, y }) => `${text} ${x} ${y}`)
+        .join();
+      const wanted = [...placeOf(paint, ratio), age, names, ...shown];
       if (!isSame(wanted, drawnFor)) redraw(paint, ratio, shown);
       drawnFor = wanted;
       return canvas;
