@@ -341,6 +341,25 @@ def test_the_settings_page_shows_the_rule_in_force(
     expect(page.locator("#rule-threshold")).to_have_text(re.compile(rf"{share}\W%"))
     expect(page.locator("#rule-radius")).to_have_text(radius.replace(".", ","))
     expect(page.locator("#rule-version")).to_have_text(str(rule["version"]))
+    expect(page.locator("details.section:not([open])")).to_have_count(0)
+
+
+def test_28_7_settings_on_a_phone_are_folded_and_an_address_opens_one(
+    open_page: OpenPage,
+) -> None:
+    page = open_page(390, 844, route="/settings")
+    opened = page.locator("details.section[open]")
+
+    expect(opened).to_have_attribute("id", "rule-section")
+    expect(page.locator("#rule-form")).to_be_visible()
+    assert page.evaluate("document.documentElement.scrollHeight") < 1500
+    page.locator("#sound-section summary").press("Enter")
+    expect(page.locator("#sound-section")).to_have_attribute("open", "")
+
+    page.goto(f"{page.url}#code-title")
+
+    expect(page.locator("#code-show")).to_be_in_viewport()
+    assert serious(page) == []
 
 
 def test_every_entry_of_the_menu_leads_to_its_page(open_page: OpenPage) -> None:

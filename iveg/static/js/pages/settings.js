@@ -9,12 +9,14 @@ import { createClassForm } from "./classes.js";
 import { createGuard } from "./guard.js";
 import { createMessagesForm } from "./messages.js";
 import { createRuleForm } from "./rule.js";
+import { openSections } from "./sections.js";
 import { createSignInCode } from "./sign_in_code.js";
 
 /** @typedef {import("../core/protocol.js").Rule} Rule */
 
 /** @param {import("../core/page.js").Page} page */
 export function start({ store, i18n, tone, wake, installing }) {
+  openSections();
   createSoundPanel(i18n, tone);
   wireWake(wake, i18n);
   wireInstall(installing, i18n);
