@@ -78,7 +78,7 @@ CASES = (
     Case("fleet", "/fleet", 1440, 900, "light", "en", "#machines tbody tr"),
     Case("climate", "/climate", 768, 1024, "sunlight", "es", "#trend-co2 .main-svg"),
     Case("history", "/history", 1440, 900, "sunlight", "es", "#chart-stops .main-svg"),
-    Case("settings", "/settings", 390, 844, "light", "es", "#class-save"),
+    Case("settings", "/settings", 390, 844, "light", "es", "#rule-form"),
 )
 
 
