@@ -45,6 +45,7 @@ class TelemetryFeed:
         """Changed topics, and when each may be sent (monotonic, s)."""
         self._told: dict[str, tuple[int, float]] = {}
         self._is_full = False
+        self._waits_for_news = True
 
     def painted(self, number: object, now: float, report: dict[str, object]) -> None:
         """The page has painted a frame: there may be credit for another.
@@ -67,6 +68,7 @@ class TelemetryFeed:
         opens_at = self.window.opens_at
         self._subscriber.wants_telemetry = opens_at <= now
         wake_at = opens_at if opens_at > now else self._due_at()
+        self._waits_for_news |= opens_at <= now < wake_at
         return None if wake_at == _INF else max(0.0, wake_at - now)
 
     def next_frame(self, now: Instant) -> bytes | None:
@@ -85,7 +87,10 @@ class TelemetryFeed:
             return None
         told = frame.write(self.window.next_number)
         self._painting.sent(self.window.next_number, now.mono)
-        self.window.sent(frame.heavy, now.mono)
+        # What had to come first is not late.
+        late_s = 0.0 if self._waits_for_news else now.mono - self.window.opens_at
+        self.window.sent(frame.heavy, now.mono, late_s)
+        self._waits_for_news = False
         return told
 
     def _absorb(self) -> None:

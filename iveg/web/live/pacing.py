@@ -30,11 +30,16 @@ SCREEN_FRAME_S: Final = 0.015
 that who is late for a picture is sent something newer before the next."""
 LONGEST_WAIT_S: Final = 0.1
 """For which a page may ask: more would show the past, and counts as nothing."""
+LATEST_S: Final = 0.006
+"""So much earlier a frame is made at most, where this side is usually late."""
 
 FEW_ROBOTS: Final = 2
 """So few bring less than a frame a picture by themselves."""
 
 _LEARNS: Final = 0.5
+_FORGETS: Final = 0.05
+"""How late this side is it learns by the worst: a picture that is missed costs more
+than the age of a frame that waits for it."""
 
 
 class _Sent(NamedTuple):
@@ -59,6 +64,7 @@ class CreditWindow:
         self._asked_at = float("-inf")
         self._round_trip_s = 0.0
         self._line_s: float | None = None
+        self._late_s = 0.0
 
     @property
     def next_number(self) -> int:
@@ -93,8 +99,13 @@ class CreditWindow:
         """Number of heavy bytes that may go with it."""
         return BYTES - sum(one.heavy for one in self._sent)
 
-    def sent(self, heavy: int, now: float) -> None:
-        """One more frame is on its way, ``heavy`` bytes of it heavy."""
+    def sent(self, heavy: int, now: float, late_s: float = 0.0) -> None:
+        """One more frame is on its way, ``heavy`` bytes of it heavy.
+
+        ``late_s`` is how long it could have gone already: this side had other work.
+        """
+        behind_s = min(late_s, LATEST_S) - self._late_s
+        self._late_s += (_LEARNS if behind_s > 0.0 else _FORGETS) * behind_s
         self._number += 1
         self._sent_at = now
         self._sent.append(_Sent(self._number, heavy, now))
@@ -116,7 +127,8 @@ class CreditWindow:
         self._round_trip_s += _LEARNS * (away_s - self._round_trip_s)
         while self._sent and self._sent[0].number <= number:
             self._sent.popleft()
-        self._asked_at = now + (_bounded(wait, LONGEST_WAIT_S) or 0.0)
+        waits_s = _bounded(wait, LONGEST_WAIT_S) or 0.0
+        self._asked_at = now + max(0.0, waits_s - self._late_s)
         half_s = _bounded(within, self._round_trip_s / 2)
         self._line_s = None if half_s is None else 2 * half_s
         return True

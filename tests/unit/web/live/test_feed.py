@@ -222,6 +222,29 @@ def test_of_two_robots_each_change_goes_at_once(desk: WebDesk, page: Page) -> No
     assert page.read() is not None
 
 
+@pytest.mark.parametrize("has_news", [True, False])
+def test_a_frame_that_had_to_wait_for_news_is_not_late(*, has_news: bool) -> None:
+    fleet = MANY[:3]
+    desk = WebDesk(fleet)
+    page = Page(desk)
+    for robot_id in fleet:
+        desk.drive(robot_id)
+    page.read()
+    page.paint()
+    desk.clock.now += 1.0
+    if has_news:
+        desk.drive(fleet[0], 1.0)
+    page.feed.wait_s(desk.clock().mono)
+    desk.clock.now += 0.02
+    desk.drive(fleet[0], 2.0)
+    page.read()
+    page.feed.painted(page.frames[-1]["frame"], desk.clock().mono, {"wait": 0.05})
+
+    wait_s = page.feed.wait_s(desk.clock().mono)
+    assert wait_s is not None
+    assert (wait_s < 0.049) == has_news
+
+
 def test_what_was_not_due_comes_when_it_is(desk: WebDesk, page: Page) -> None:
     for x in (0.0, 1.0):
         desk.drive("AGI", x)

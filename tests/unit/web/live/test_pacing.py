@@ -6,6 +6,7 @@ from iveg.web.live.pacing import (
     BYTES,
     FRAMES,
     GAP_S,
+    LATEST_S,
     LONGEST_WAIT_S,
     SCREEN_FRAME_S,
     CreditWindow,
@@ -41,6 +42,23 @@ def test_while_none_is_painted_there_is_a_frame_for_each_picture_of_a_screen() -
     window = filled(1)
 
     assert window.opens_at == NOW + SCREEN_FRAME_S
+
+
+def opens_after(window: CreditWindow, frames: int, late_s: float) -> float:
+    """How long it waits after frames that were so late, asked to wait 50 ms."""
+    for _ in range(frames):
+        window.sent(0, NOW, late_s)
+        window.painted(window.next_number - 1, NOW, 0.05)
+    return window.opens_at - NOW
+
+
+def test_where_frames_are_late_the_next_is_made_earlier_but_never_by_much() -> None:
+    window = CreditWindow()
+
+    assert opens_after(window, 1, 0.0) == pytest.approx(0.05)
+    assert opens_after(window, 20, 0.003) == pytest.approx(0.047, abs=1e-5)
+    assert opens_after(window, 20, 1.0) == pytest.approx(0.05 - LATEST_S, abs=1e-5)
+    assert opens_after(window, 200, 0.0) == pytest.approx(0.05, abs=1e-5)
 
 
 def test_of_few_robots_no_frame_waits_for_others() -> None:
