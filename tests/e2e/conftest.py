@@ -22,9 +22,11 @@ def browser() -> Iterator[Browser]:
 
 
 @contextmanager
-def driving_site(directory: Path, scenario: str = "demo") -> Iterator[Site]:
+def driving_site(
+    directory: Path, scenario: str = "demo", **settings: str
+) -> Iterator[Site]:
     """FIWARE, dashboard and emulator, driving."""
-    with site(directory) as place:
+    with site(directory, **settings) as place:
         place.start("fiware").wait_until_ready()
         place.start("serve")
         place.wait_until_served()
@@ -40,9 +42,17 @@ def scenario() -> str:
 
 
 @pytest.fixture(scope="module")
-def stack(tmp_path_factory: pytest.TempPathFactory, scenario: str) -> Iterator[Site]:
+def settings() -> dict[str, str]:
+    """Settings of a module's iVeg."""
+    return {}
+
+
+@pytest.fixture(scope="module")
+def stack(
+    tmp_path_factory: pytest.TempPathFactory, scenario: str, settings: dict[str, str]
+) -> Iterator[Site]:
     """FIWARE, dashboard and emulator, driving; shared by the tests of a module."""
-    with driving_site(tmp_path_factory.mktemp("iveg"), scenario) as place:
+    with driving_site(tmp_path_factory.mktemp("iveg"), scenario, **settings) as place:
         yield place
 
 

@@ -10,7 +10,14 @@ from playwright.sync_api import Browser, Page, WebSocketRoute, expect
 from iveg.ngsi.codec import format_stamp
 from tests.e2e.conftest import OpenPage, live_page
 from tests.e2e.hands import HELD_MS, begin_hold, let_go, open_menu
-from tests.e2e.reading import card, evaluate, number, strip_stop, wait_for_mode
+from tests.e2e.reading import (
+    COVERED_STOPS,
+    card,
+    evaluate,
+    number,
+    strip_stop,
+    wait_for_mode,
+)
 from tests.processes import Site, until
 
 pytestmark = pytest.mark.e2e
@@ -50,6 +57,12 @@ def scenario() -> str:
 
 
 @pytest.fixture(scope="module")
+def settings() -> dict[str, str]:
+    """One test looks at the past."""
+    return {"IVEG_RECORDINGS": "on"}
+
+
+@pytest.fixture(scope="module")
 def page(browser: Browser, stack: Site) -> Iterator[Page]:
     """One for all tests."""
     with live_page(browser, stack, "AGI", "AGII") as live:
@@ -77,6 +90,38 @@ def test_a_press_makes_the_robot_stand_says_how_long_it_took_and_lets_others_dri
     # Its speed comes on a longer way than the word that it stands.
     until(lambda: abs(number(page, "AGI", "v")) < 0.02, 30.0, "AGI shows its rest")
     expect(page.locator('#log [data-kind="command"]').first).to_be_visible()
+
+
+def test_a_press_in_the_past_stops_the_robot_of_now(
+    page: Page, stack: Site, open_page: OpenPage
+) -> None:
+    wait_for_mode(page, "AGI", "RUNNING")
+    at = format_stamp(time.time())
+    with stack.api() as api:
+        asked = {"at": at, "viewer": "test"}
+
+        def answers() -> bool:
+            return api.get("world", params=asked).status_code == 200
+
+        until(answers, 60.0, "the past answers")
+    past = open_page(route=f"/?t={at}")
+    expect(card(past, "AGI").locator("[data-field=x]")).not_to_have_text(
+        "—", timeout=60_000
+    )
+    expect(past.locator("#past")).to_contain_text("PASADO")
+    expect(past.locator("#status-said")).to_contain_text("no en este mapa")
+
+    strip_stop(past, "AGI").click()
+
+    expect(card(page, "AGI")).to_have_attribute(
+        "data-mode", "STOPPED", timeout=WITHIN_MS
+    )
+    expect(strip_stop(past, "AGI")).to_contain_text(STANDING, timeout=WITHIN_MS)
+    expect(card(past, "AGI")).to_have_attribute("data-mode", "RUNNING")
+    assert evaluate(past, COVERED_STOPS) == []
+    past.keyboard.press("Escape")
+    wait_for_mode(past, "AGI", "STOPPED")
+    expect(past.locator("#past")).to_have_count(0)
 
 
 def test_one_press_stops_the_fleet(page: Page) -> None:

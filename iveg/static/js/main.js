@@ -6,6 +6,7 @@
  */
 
 import { loadI18n, switchLanguage } from "./core/i18n.js";
+import { askedMoment } from "./core/moments.js";
 import { createPainting } from "./core/painting.js";
 import { LiveLine } from "./core/socket.js";
 import { Store } from "./core/store.js";
@@ -35,7 +36,8 @@ async function start() {
   const i18n = await loadI18n();
   if (!document.querySelector("#stops")) return;
   const store = new Store();
-  const draws = document.querySelector("#map") !== null;
+  const isPast = askedMoment(location.search) !== null;
+  const draws = document.querySelector("#map") !== null && !isPast;
   const painting = createPainting();
   const { when: whenPainted } = painting;
   const line = new LiveLine({ url: liveUrl(), store, draws, whenPainted });

@@ -16,7 +16,7 @@ import { laneName, placeName } from "./lanes.js";
 
 const LOCALES = { es: "es-ES", en: "en-GB" };
 /** Greenhouses live by the clock on their wall; data stay in UTC. */
-const TIME_ZONE = "Europe/Madrid";
+export const TIME_ZONE = "Europe/Madrid";
 const NOTHING = "—";
 const PERCENT = { style: /** @type {const} */ ("percent"), maximumFractionDigits: 0 };
 

@@ -6,14 +6,17 @@
 
 import { createAlertsPanel } from "../panels/alerts.js";
 import { createDecisionPanel } from "../panels/decision.js";
+import { need, setHidden } from "../panels/dom.js";
 import { createHealthPanel } from "../panels/health.js";
 import { createHints } from "../panels/hints.js";
 import { createSignOut } from "../panels/signout.js";
 import { labelTables } from "../panels/tables.js";
 import { createTone } from "../panels/tone.js";
 import { createWall } from "../panels/wall.js";
+import { readApi } from "./api.js";
 import { guarded } from "./hub.js";
 import { createInstalling, registerWorker } from "./install.js";
+import { askedMoment, BEFORE_S, pastAddress } from "./moments.js";
 import { createWakeLock } from "./wakelock.js";
 
 /**
@@ -59,23 +62,41 @@ export async function startPage(app) {
   if (!document.querySelector("#map")) return;
   guarded(() => page.wake.supervise());
   guarded(() => createHints(app));
+  const shown = await shownBy(app);
   const parts = await Promise.allSettled([
     import("../panels/mapbox.js").then(({ createMapbox }) =>
-      createMapbox(app, decision),
+      createMapbox(shown, decision),
     ),
     import("../panels/robots.js").then(({ createRobotsPanel }) =>
-      createRobotsPanel(app),
+      createRobotsPanel(shown),
     ),
     import("../panels/log.js").then(({ createLogPanel }) =>
-      createLogPanel(app, decision),
+      createLogPanel(shown, decision),
     ),
-    import("../panels/timebar.js").then(({ createTimebar }) => createTimebar(app)),
+    import("../panels/timebar.js").then(({ createTimebar }) => createTimebar(shown)),
     import("../panels/people.js").then(({ createPeoplePanel }) =>
-      createPeoplePanel(app),
+      createPeoplePanel(shown),
     ),
   ]);
   for (const part of parts) if (part.status === "rejected") reportError(part.reason);
   guarded(() => goToAsked(app));
+}
+
+/** What the live page shows: now, or the recorded moment that the address names.
+ * @param {App} app */
+async function shownBy(app) {
+  const asked = askedMoment(location.search);
+  need("#to-past").addEventListener("click", () =>
+    location.assign(pastAddress(app.line.serverNow() - BEFORE_S)),
+  );
+  if (asked === null) {
+    readApi("recordings").then(({ body }) =>
+      setHidden(need("#to-past"), !body?.items?.length),
+    );
+    return app;
+  }
+  const { createTimeTravel } = await import("../panels/time_travel.js");
+  return createTimeTravel(app, asked);
 }
 
 /**

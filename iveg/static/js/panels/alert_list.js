@@ -8,6 +8,7 @@
 import { sendApi } from "../core/api.js";
 import { createMembers, endOf } from "./alert_members.js";
 import { make, need, setAttribute, setHidden, setText } from "./dom.js";
+import { makePastLink } from "./past_link.js";
 
 /** @typedef {import("../core/protocol.js").Alert} Alert */
 
@@ -116,6 +117,7 @@ export function createAlertList(list, i18n, send = acknowledge, stillMs = STILL_
     const priority = i18n.t(`alert.priority.${alert.priority}`);
     setText(need("b", item), `${priority}: ${sentenceOf(alert, i18n)}`);
     setText(need("small", item), factsOf(alert, i18n));
+    need(".past-link", item).replaceWith(makePastLink(alert.raised_at, i18n));
     members.get(alert.alert_id)?.draw(alert);
     const may = ACKNOWLEDGERS.has(role);
     setHidden(need("form", item), alert.acknowledged_at !== null || !may);
@@ -160,7 +162,7 @@ function makeItem(onAcknowledge) {
     event.preventDefault();
     onAcknowledge(input.value);
   });
-  body.append(make("b"), make("small"), form, make("p"));
+  body.append(make("b"), make("small"), make("a", "past-link"), form, make("p"));
   item.append(make("span", "shape"), body);
   return item;
 }

@@ -8,6 +8,7 @@ import { dayAndTime, millisecondsOf } from "../pages/history/local_time.js";
 import { drawDecision } from "./decision_map.js";
 import { make, need } from "./dom.js";
 import { readPast, spanOf } from "./past.js";
+import { makePastLink } from "./past_link.js";
 import { makePlots } from "./record_plots.js";
 import { makeShare } from "./share.js";
 import { delaysOf, makeTimeline } from "./timeline.js";
@@ -94,6 +95,7 @@ export function createRecord(place, i18n) {
       makeFacts(shown, i18n),
       ...(plots ? [plots] : []),
       makeTimeline(steps),
+      ...(shown.started_at ? [makePastLink(shown.started_at, i18n)] : []),
       make("small", "", `${i18n.t("decision.id")} ${shown.decision_id}`),
       makeShare(
         `/decisions/${encodeURIComponent(shown.decision_id)}`,

@@ -119,12 +119,7 @@ export function createMapbox(app, decision) {
     map.follow(/** @type {CustomEvent<string>} */ (event).detail);
   });
   map.onPick(onPick);
-  followCostmap(
-    store,
-    () => map.layers().some(({ name, on }) => name === "costmap" && on),
-    map.believer,
-  );
-  followCoverage(store);
+  if (!document.body.hasAttribute("data-past")) followPresent(map, store);
   createLegend(app);
   onThemeChange(() => map.setTheme());
   store.subscribe("robots/", showBeliever);
@@ -134,6 +129,14 @@ export function createMapbox(app, decision) {
   store.subscribe("snapshot", showAsked);
   showAsked();
   for (const tool of all(".map-tools [disabled]")) tool.removeAttribute("disabled");
+}
+
+/** What only the present has: costmap and coverage.
+ * @param {LiveMap} map @param {App["store"]} store */
+function followPresent(map, store) {
+  const isOn = () => map.layers().some(({ name, on }) => name === "costmap" && on);
+  followCostmap(store, isOn, map.believer);
+  followCoverage(store);
 }
 
 /** @param {LiveMap} map */

@@ -50,8 +50,10 @@ export function createStatusLine({ store, i18n }) {
   /** @param {{shown: Told, aloud: Told | null}} told */
   function write({ shown, aloud }) {
     setAttribute(place, "data-level", shown.level);
-    place.toggleAttribute("data-long", shown.said.length > LONG);
-    setText(need("#status-said"), shown.said);
+    const isPast = document.body.hasAttribute("data-past");
+    const said = isPast ? i18n.t("past.now", { said: shown.said }) : shown.said;
+    place.toggleAttribute("data-long", said.length > LONG);
+    setText(need("#status-said"), said);
     if (shown.robotId) setAttribute(place, "href", addressOf(shown.robotId));
     else place.removeAttribute("href");
     if (aloud) setText(need("#status-told"), aloud.said);
@@ -61,8 +63,10 @@ export function createStatusLine({ store, i18n }) {
   function drawMark(state) {
     const mark = need("#mark");
     const isReplay = [...store.robots().values()].some(({ replay }) => replay);
-    const live = isReplay ? "header.replay" : "header.live";
-    setAttribute(mark, "data-state", state === "open" && isReplay ? "replay" : state);
+    const isPast = document.body.hasAttribute("data-past");
+    const live = isPast ? "past.mark" : isReplay ? "header.replay" : "header.live";
+    const isOther = state === "open" && (isReplay || isPast);
+    setAttribute(mark, "data-state", isOther ? "replay" : state);
     setText(
       need("[data-i18n]", mark),
       i18n.t(state === "lost" || state === "signed-out" ? "header.no_link" : live),

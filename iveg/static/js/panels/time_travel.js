@@ -1,0 +1,187 @@
+/**
+ * The Live page in the past: its map, cards and log show a recorded moment.
+ *
+ * STOP, the status line, alerts and the line to the server are those of now all the same:
+ * only what is drawn here is given another store and another clock.
+ *
+ * @typedef {import("../main.js").App} App
+ */
+
+import { readApi } from "../core/api.js";
+import { TIME_ZONE } from "../core/messages.js";
+import { BEFORE_S, nextEvent, pastAddress } from "../core/moments.js";
+import { PastStore } from "../core/past_store.js";
+import { need, setAttribute, setHidden, setText } from "./dom.js";
+
+const TICK_MS = 250;
+const WINDOW_S = 600;
+/** What is newer may not be on the disk yet (s). */
+const NEWEST_S = 4;
+const FAR_S = 900;
+const LIVE = "/";
+
+/**
+ * @param {App} app
+ * @param {number} askedS Unix time
+ * @returns {App} for the panels that show the past
+ */
+export function createTimeTravel(app, askedS) {
+  const { i18n, line } = app;
+  const world = new PastStore();
+  const viewer = crypto.randomUUID();
+  const bar = makeBar();
+  const slider = /** @type {HTMLInputElement} */ (need("[data-part=slider]", bar));
+  const rate = /** @type {HTMLSelectElement} */ (need("[data-part=rate]", bar));
+  let targetS = askedS;
+  let isPlaying = false;
+  let isAsking = false;
+  let playedAtMs = performance.now();
+  let wantedS = Number.NaN;
+  let problem = "";
+
+  /** @param {number} atS */
+  function seek(atS) {
+    targetS = Math.min(atS, line.serverNow() - NEWEST_S);
+    history.replaceState(null, "", pastAddress(targetS));
+    draw();
+    void bring();
+  }
+
+  /** Asks for the newest target, one question at a time. */
+  async function bring() {
+    if (isAsking || wantedS === targetS) return;
+    isAsking = true;
+    wantedS = targetS;
+    const at = new Date(1000 * wantedS).toISOString();
+    const { status, body } = await readApi(
+      `world?${new URLSearchParams({ at, viewer })}`,
+    );
+    isAsking = false;
+    if (status === 200) world.take(body);
+    if (status === 200) problem = "";
+    else refuse(status, body);
+    draw();
+    void bring();
+  }
+
+  /** @param {number} status @param {any} body */
+  function refuse(status, body) {
+    isPlaying = false;
+    const key = status === 404 ? "gap" : status === 400 ? "other" : "failed";
+    problem = i18n.t(`past.problem.${key}`, {
+      before: body?.before ? i18n.time(body.before) : "—",
+      after: body?.after ? i18n.time(body.after) : "—",
+    });
+  }
+
+  /** @param {1 | -1} way */
+  async function stepEvent(way) {
+    const at = await findEvent(targetS, way);
+    if (at === null) problem = i18n.t("past.problem.no_event");
+    else seek(at);
+    draw();
+  }
+
+  function tick() {
+    const nowMs = performance.now();
+    const passedS = (nowMs - playedAtMs) / 1000;
+    playedAtMs = nowMs;
+    // A slow server is waited for: what plays is what is shown.
+    if (isPlaying && !isAsking) seek(targetS + passedS * Number(rate.value));
+    else world.freshen();
+  }
+
+  function draw() {
+    const said = whenSaid(targetS, i18n.language());
+    setText(need("[data-part=when]", bar), said);
+    const state = problem || (world.isUnequal ? i18n.t("past.unequal") : "");
+    setText(need("[data-part=said]", bar), state);
+    setAttribute(bar, "data-problem", String(problem !== ""));
+    const play = need("[data-part=play]", bar);
+    setText(play, i18n.t(isPlaying ? "past.pause" : "past.play"));
+    setAttribute(play, "aria-pressed", String(isPlaying));
+    if (document.activeElement !== slider || isPlaying) centre();
+    setAttribute(slider, "aria-valuetext", said);
+  }
+
+  let middleS = askedS;
+
+  /** The slider reaches ten minutes to both sides of where it was last let go. */
+  function centre() {
+    if (Math.abs(targetS - middleS) > WINDOW_S) middleS = targetS;
+    slider.value = String(targetS - middleS);
+  }
+
+  /** @type {Record<string, () => void>} */
+  const actions = {
+    play: () => {
+      isPlaying = !isPlaying;
+      draw();
+    },
+    back: () => seek(targetS - BEFORE_S),
+    on: () => seek(targetS + BEFORE_S),
+    "event-back": () => void stepEvent(-1),
+    "event-on": () => void stepEvent(1),
+  };
+  for (const [part, act] of Object.entries(actions)) {
+    need(`[data-part=${part}]`, bar).addEventListener("click", act);
+  }
+  slider.addEventListener("input", () => seek(middleS + Number(slider.value)));
+  document.addEventListener("keydown", ({ key, defaultPrevented }) => {
+    const isOpen = document.querySelector("dialog[open]") !== null;
+    if (key === "Escape" && !isOpen && !defaultPrevented) location.assign(LIVE);
+  });
+  i18n.onChange(draw);
+  setInterval(tick, TICK_MS);
+  seek(askedS);
+  const past = { serverNow: () => targetS };
+  return {
+    ...app,
+    store: world.store,
+    line: /** @type {App["line"]} */ (/** @type {any} */ (past)),
+  };
+}
+
+/**
+ * The nearest event of the log before or after a moment.
+ *
+ * @param {number} atS Unix time @param {1 | -1} way
+ */
+async function findEvent(atS, way) {
+  const [from, to] = way > 0 ? [atS, atS + FAR_S] : [atS - FAR_S, atS];
+  const [since, until] = [from, to].map((one) => new Date(1000 * one).toISOString());
+  const range = new URLSearchParams({ since, until, limit: "500" });
+  const { body } = await readApi(`log?${range}`);
+  return nextEvent(body?.items ?? [], atS, way);
+}
+
+function makeBar() {
+  const { content } = /** @type {HTMLTemplateElement} */ (need("#past-bar"));
+  const bar = /** @type {HTMLElement} */ (
+    /** @type {Element} */ (content.firstElementChild).cloneNode(true)
+  );
+  need(".messages").prepend(bar);
+  setAttribute(document.body, "data-past", "");
+  setHidden(need("#to-past"), true);
+  return bar;
+}
+
+/**
+ * Date, time and zone, on the greenhouse's clock as all times of the page.
+ *
+ * @param {number} atS Unix time
+ * @param {string} language
+ */
+function whenSaid(atS, language) {
+  return new Intl.DateTimeFormat(language, {
+    timeZone: TIME_ZONE,
+    hourCycle: "h23",
+    day: "numeric",
+    month: "short",
+    year: "numeric",
+    hour: "2-digit",
+    minute: "2-digit",
+    second: "2-digit",
+    timeZoneName: "short",
+  }).format(1000 * atS);
+}

@@ -1,0 +1,30 @@
+import {
+  askedMoment,
+  nextEvent,
+  pastAddress,
+} from "../../iveg/static/js/core/moments.js";
+import { equal, test } from "./harness.js";
+
+test("a moment is an address, and an address without one is now", () => {
+  const atS = Date.UTC(2026, 10, 24, 9, 42, 7) / 1000;
+  const address = pastAddress(atS);
+
+  equal(askedMoment(address.slice(1)), atS);
+  equal(askedMoment(""), null);
+  equal(askedMoment("?t=yesterday"), null);
+});
+
+test("the next event is the nearest that somebody would look for", () => {
+  const at = (/** @type {number} */ s) => new Date(1000 * s).toISOString();
+  const entries = [
+    { at: at(30), kind: "alert" },
+    { at: at(12), kind: "detection" },
+    { at: at(20), kind: "command" },
+    { at: at(5), kind: "speed" },
+  ];
+
+  equal(nextEvent(entries, 10, 1), 20);
+  equal(nextEvent(entries, 20, 1), 30);
+  equal(nextEvent(entries, 20, -1), 5);
+  equal(nextEvent(entries, 5, -1), null);
+});
