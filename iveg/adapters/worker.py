@@ -118,11 +118,12 @@ class Worker:
     def _end(self) -> None:
         line, self._line = self._line, None
         process, self._process = self._process, None
-        if line is not None:
-            line.close()
+        # A process whose line is closed would say so in the log before it dies.
         if process is not None:
             process.kill()
             process.join()
+        if line is not None:
+            line.close()
 
 
 def _serve(line: Connection) -> None:
