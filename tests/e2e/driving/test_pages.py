@@ -31,7 +31,7 @@ ROUTES = (
     "/latency",
     "/settings",
 )
-OTHERS = ("/history", "/docs", "/about")
+OTHERS = ("/history", "/docs", "/about", "/audit")
 """Looked at in one theme."""
 THEMES = ("dark", "sunlight")
 STANDING = re.compile(r"PARADO")
