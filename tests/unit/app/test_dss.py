@@ -18,6 +18,8 @@ async def test_mqtt_and_the_rule_loop_alone_share_the_fate_of_the_process(
 ) -> None:
     assert set(dss.vital()) == {"mqtt", "rule-loop"}
     assert set(dss.comfort()) == {
+        "accounts",
+        "api-tokens",
         "costmap",
         "coverage",
         "provisioner",
