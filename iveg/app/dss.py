@@ -21,14 +21,11 @@ from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.adapters.ids import new_id
 from iveg.adapters.loop_watch import LoopWatch
-from iveg.adapters.mail import MailSender
 from iveg.adapters.passwords import Passwords
 from iveg.adapters.provisioner import Provisioner
 from iveg.adapters.recordings.recorder import PART as RECORDINGS
 from iveg.adapters.recordings.recorder import RecordedSink
 from iveg.adapters.transports import MqttTransport, OrionTransport
-from iveg.adapters.web_push import PushSender
-from iveg.adapters.webhook import WebhookSender
 from iveg.adapters.worker import Worker
 from iveg.app.counts import count_all, read_queues
 from iveg.app.laboratory import find_laboratory
@@ -37,11 +34,9 @@ from iveg.app.outside import Outside, open_outside
 from iveg.app.past import Site as PastSite
 from iveg.app.past import picture
 from iveg.app.viewers import Viewers
-from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import HopError, VitalPartError
 from iveg.domain.fleet import FleetDescription
 from iveg.domain.latency.segments import WINDOW_S
-from iveg.domain.messages import Channel
 from iveg.domain.observations import Instant
 from iveg.domain.records import Record
 from iveg.domain.stop.drills import Drills
@@ -51,7 +46,6 @@ from iveg.pipeline.build import Choices, Ports, build, build_services
 from iveg.pipeline.equipment import PART as EQUIPMENT
 from iveg.pipeline.latency import hours_of
 from iveg.pipeline.memory import Memory
-from iveg.pipeline.ports import MessageSender
 from iveg.pipeline.restore import remember
 from iveg.pipeline.retention import PART as RETENTION
 from iveg.pipeline.retention import HistoryUpkeep
@@ -111,12 +105,7 @@ class Dss:
         self.chronicle = Chronicle(
             self.stores.inputs.note, __version__, secrets.token_bytes(16)
         )
-        kept = self.stores.kept_choices(
-            DetectionRule(
-                threshold=settings.confidence_threshold,
-                radius_m=settings.safety_radius_m,
-            )
-        )
+        kept = self.stores.kept_choices(settings)
         drills, era = Drills(settings.drill_days), f"-{self._boot[:8]}"
         tiles = load_equipment(settings.equipment, fleet.ids)
         rows = load_calibrations(settings.calibration)
@@ -126,7 +115,9 @@ class Dss:
         self.stores.inputs.rule = lambda: self.pipeline.evaluator.rule
         if settings.recordings:
             self.chronicle.remember = Memory(self.pipeline).write
-        self.services = build_services(self.pipeline, kept, self._senders(), clock.now)
+        self.services = build_services(
+            self.pipeline, kept, outside.senders(messages.writer()), clock.now
+        )
         self.people = People(self.stores.accounts, Passwords(), clock.now)
         self.programs = Programs(self.stores.api_tokens, clock.now)
         self.trail = AuditTrail(self.stores.recorder, new_id)
@@ -170,14 +161,6 @@ class Dss:
     def _row(self, record: Record) -> None:
         self.stores.inputs.row(record)
         self.chronicle.row(record)
-
-    def _senders(self) -> dict[Channel, MessageSender]:
-        outbound, write = self.outside.outbound, messages.writer()
-        return {
-            "push": PushSender(outbound, write),
-            "email": MailSender(outbound, write),
-            "webhook": WebhookSender(outbound),
-        }
 
     def _attach_reader(self) -> None:
         """Have robots' own messages read from the broker."""

@@ -14,6 +14,7 @@ from iveg.adapters.history.recorder import Recorder, journal_file
 from iveg.adapters.history.upkeep import RecordedHistory
 from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.journal import FileJournal
+from iveg.adapters.mail import MailSender, Write
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.adapters.orion import OrionClient
 from iveg.adapters.outbound import OutboundHttp
@@ -21,11 +22,15 @@ from iveg.adapters.recordings.recorder import InputRecorder
 from iveg.adapters.recordings.writer import WriterSetup
 from iveg.adapters.rules import FileRules
 from iveg.adapters.sessions import FileSessions
+from iveg.adapters.web_push import PushSender
+from iveg.adapters.webhook import WebhookSender
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.fleet import FleetDescription
+from iveg.domain.messages import Channel
 from iveg.pipeline.build import KeptChoices
 from iveg.pipeline.health_monitor import HopState
 from iveg.pipeline.loop import reading_apart_s
+from iveg.pipeline.ports import MessageSender
 from iveg.settings import Settings
 
 
@@ -62,8 +67,11 @@ class Stores:
             drop_recording=self.inputs.drop_oldest,
         )
 
-    def kept_choices(self, first: DetectionRule) -> KeptChoices:
-        """Choices of earlier runs; ``first`` is the rule where there is none."""
+    def kept_choices(self, settings: Settings) -> KeptChoices:
+        """Choices of earlier runs; the settings have the rule where there is none."""
+        first = DetectionRule(
+            threshold=settings.confidence_threshold, radius_m=settings.safety_radius_m
+        )
         return KeptChoices(
             self.rules,
             self.contacts,
@@ -98,6 +106,14 @@ class Outside:
     orion: OrionClient
     agent: IotAgentClient
     outbound: OutboundHttp
+
+    def senders(self, write: Write) -> dict[Channel, MessageSender]:
+        """The channels of messages to people."""
+        return {
+            "push": PushSender(self.outbound, write),
+            "email": MailSender(self.outbound, write),
+            "webhook": WebhookSender(self.outbound),
+        }
 
     async def close(self) -> None:
         """Close all but the link, which ends with its task."""

@@ -16,6 +16,7 @@ from typing import Any, Final, Literal
 
 from iveg.domain.records import (
     AlertRecord,
+    AuditRecord,
     ByTransport,
     CommandRecord,
     DecisionRecord,
@@ -40,6 +41,7 @@ LISTS: Final[Mapping[str, type[Record]]] = MappingProxyType(
         "odometry": OdometryRecord,
         "readings": ReadingRecord,
         "measurements": MeasurementRecord,
+        "audit": AuditRecord,
     }
 )
 """Lists that are exported, by name."""
@@ -127,6 +129,9 @@ MEANINGS: Final[Mapping[str, Told]] = {
     "yaw": Told("Heading, counterclockwise from x.", "rad", "map"),
     "linear": Told("Speed forward.", "m/s", "base_link"),
     "angular": Told("Turning rate.", "rad/s", "base_link"),
+    "margin_m": Told(
+        "Least margin to anybody seen, while it moves; empty: unknown or nobody.", "m"
+    ),
     "distance_m": Told("From the robot to the centre of the ring.", "m"),
     "speed_factor": Told("What the robot was limited to.", "0, 0.5 or 1"),
     "limit_factor": Told("Speed limit of iVeg.", "0, 0.5 or 1"),
@@ -159,6 +164,18 @@ MEANINGS: Final[Mapping[str, Told]] = {
     "entity_id": Told("Entity at Orion."),
     "attribute": Told("Its attribute."),
     "unit": Told("Unit of `value`."),
+    "audit_id": Told("The row."),
+    "person": Told("Id of the account."),
+    "name": Told("How they were called then."),
+    "role": Told("Their role then."),
+    "method": Told("How they had signed in."),
+    "action": Told("What they did."),
+    "subject": Told("To what, such as a robot's id.", joins="`robot_id`, …"),
+    "details": Told("What belongs to it, as JSON."),
+    "seq": Told("Place in the chain, without a gap."),
+    "stored_at": _time("It got its place in the chain."),
+    "previous_hash": Told("Of the row before (SHA-256, hex)."),
+    "hash": Told("Its own (SHA-256, hex)."),
 }
 """By column; the same name means the same in every list, but for the next table."""
 MEANINGS_APART: Final[Mapping[tuple[str, str], Told]] = {

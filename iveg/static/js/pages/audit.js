@@ -30,6 +30,7 @@ const GROUPS = {
   acknowledge: "alerts",
   mark_thing: "alerts",
   unmark_thing: "alerts",
+  note: "data",
   export: "data",
   deleted: "data",
   unplaced: "data",
