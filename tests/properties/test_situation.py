@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 
 from iveg.domain.limits import LIMITS
 from tests.worlds import days, told
@@ -62,12 +62,36 @@ def test_no_situation_contradicts_what_is_told_beside_it(
 
 @settings(max_examples=15, deadline=None)
 @given(days)
+@example(
+    [
+        ("drive", "AGII", 0.0, 0.0),
+        ("hold", "AGI"),
+        ("report", "AGII", 0.0, "clear", (), 0.3),
+        ("hold", "AGI"),
+        ("hold", "AGI"),
+        ("drive", "AGII", 0.0, 0.0),
+    ]
+)
 def test_a_p1_of_a_robot_that_is_heard_is_its_situation(
     day: list[tuple[Any, ...]],
 ) -> None:
-    for moment in told([*day, ("wait", 0.1)]):
-        levels = {one["robot_id"]: one["situation"]["level"] for one in moment.robots}
-        assert {levels[name] for name in moment.alerted} <= {"danger"}
+    *before, last = told([*day, ("wait", 0.1)])
+
+    assert _levels_of_p1(last.robots, last.alerts) <= {"danger"}
+    for moment in before:
+        heard = {one["robot_id"] for one in moment.robots if one["link"] == "LIVE"}
+        # Of who is heard again it is over with the next tick.
+        held = [one for one in moment.alerts if one not in _lost(heard)]
+        assert _levels_of_p1(moment.robots, held) <= {"danger"}
+
+
+def _lost(robots: set[str]) -> set[tuple[str, str]]:
+    return {(name, "alert.moving_robot_lost") for name in robots}
+
+
+def _levels_of_p1(robots: list[Robot], alerts: list[tuple[str, str]]) -> set[str]:
+    levels = {one["robot_id"]: one["situation"]["level"] for one in robots}
+    return {levels[name] for name, _ in alerts}
 
 
 def test_a_healthy_fleet_is_clear() -> None:
