@@ -8,7 +8,7 @@ BENCH := $(VENV)/.bench
 # Apart from iVeg's own libraries: what judges them is none of them.
 AUDIT := $(VENV)/audit
 # A module of tests and what it starts stay together; most of its time is waiting.
-WORKERS ?= 4
+WORKERS ?= 3
 # A worker that dies ends the run: loadscope would wait for it for ever.
 SIDE_BY_SIDE = -n $(WORKERS) --dist loadscope --no-loadscope-reorder --max-worker-restart 0
 # What a site installs (run.lock), the demo and all that a test can ask for.

@@ -182,7 +182,8 @@ class _Reader(pickle.Unpickler):
         if module == __name__ and name in own:
             return own[name]
         found = super().find_class(module, name)
-        is_ours = module.startswith(_OURS) and isinstance(found, type)
+        # By where it is from: a module of ours holds what it imports, too.
+        is_ours = isinstance(found, type) and found.__module__.startswith(_OURS)
         if is_ours or name in _PLAIN.get(module, ()):
             return found
         raise pickle.UnpicklingError(f"{module}.{name}")

@@ -306,6 +306,17 @@ def test_a_memory_from_elsewhere_runs_nothing(folder: Path) -> None:
         memory.read(pickle.dumps(Evil()))
 
 
+def test_a_memory_makes_nothing_that_a_module_of_ours_imports(tmp_path: Path) -> None:
+    memory = Memory(Past(site_of(tmp_path)).parts)
+    written = tmp_path / "written"
+    path = f"V{written}\n".encode()
+    through = b"\x80\x04\x8c\x15iveg.pipeline.command\x8c\x13logging.FileHandler\x93("
+
+    with pytest.raises(UnreadableError, match="FileHandler"):
+        memory.read(through + path + b"tR.")
+    assert not written.exists()
+
+
 async def test_a_viewer_is_a_process_of_its_own_that_ends_when_idle(
     folder: Path,
 ) -> None:
