@@ -11,7 +11,7 @@ A witness only adds: it lifts no limit, and finds no spot empty.
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +25,8 @@ from iveg.domain.observations import LaserScan
 from iveg.domain.obstacle import Obstacle
 
 _Floats = NDArray[np.float64]
+Explains = Callable[[_Floats, _Floats], NDArray[np.bool_]]
+"""Which returns at x and y, shape (n,) in ``map`` (m), something explains."""
 GONE_S = 0.5
 """Without a return for so long it is gone."""
 PLAN_M = 0.4
@@ -149,14 +151,20 @@ class Witness:
         outline: The robot's body.
         plan: None: nobody drew the place.
         ahead_s: It looks farther by how far the robot drives in this time (s).
+        explains: What is known beside the plan; None: nothing.
     """
 
     def __init__(
-        self, outline: Outline, plan: Plan | None, ahead_s: float = 0.0
+        self,
+        outline: Outline,
+        plan: Plan | None,
+        ahead_s: float = 0.0,
+        explains: Explains | None = None,
     ) -> None:
         self._outline = outline
         self._plan = plan
         self._ahead_s = ahead_s
+        self._explains = explains
         self._known: tuple[Obstacle, ...] = ()
         self.walkers: tuple[Obstacle, ...] = ()
         """Of the last scan, those who walk, or walked just now."""
@@ -214,6 +222,8 @@ class Witness:
         for one in known:
             if pose.distance_to(one.x, one.y) <= farthest + one.radius + _ROUNDING_M:
                 left &= np.hypot(x - one.x, y - one.y) > one.radius
+        if self._explains is not None:
+            left[left] = ~self._explains(x[left], y[left])
         return np.column_stack((x[left], y[left]))
 
     def _is_ahead(self, body: _Floats, pose: Pose2D, twist: Twist2D) -> bool:
