@@ -12,7 +12,15 @@ from iveg import __version__
 from iveg.adapters.pdf import find_browser
 from iveg.app.dss import Dss
 from iveg.app.laboratory import find_laboratory
-from iveg.web.api import day, history, incidents, notes, sign_in_code, stop_records
+from iveg.web.api import (
+    day,
+    history,
+    incidents,
+    notes,
+    sign_in_code,
+    stop_records,
+    users,
+)
 from iveg.web.api.answers import Json
 from iveg.web.build import build_app, live_routers
 from iveg.web.pages import openapi, routes, service_worker
@@ -81,6 +89,7 @@ def _past_routers(dss: Dss, pages: routes.Pages) -> Iterator[APIRouter]:
     yield notes.router(queries, dss.pipeline.event_log.log, clock)
     if dss.sign_in_token:
         yield sign_in_code.router(dss.sign_in_token)
+    yield users.router(dss.people, clock)
     yield service_worker.router()
     laboratory = find_laboratory("pages")
     if laboratory is not None:

@@ -3,10 +3,10 @@
 import argparse
 import secrets
 from collections.abc import Iterable
-from dataclasses import replace
 from pathlib import Path
 
 from iveg.adapters import clock
+from iveg.adapters.admission import Admission, has_admin
 from iveg.adapters.doctor import check_database
 from iveg.adapters.history.accounts import AccountStore
 from iveg.adapters.history.api_tokens import ApiTokenStore
@@ -16,8 +16,8 @@ from iveg.cli.running import page_address
 from iveg.domain.accounts import (
     Account,
     ApiToken,
-    PersonRole,
     TokenScope,
+    digest_of,
     is_name,
     name_key,
 )
@@ -26,10 +26,9 @@ from iveg.domain.errors import NotANameError, UnknownNameError
 from iveg.domain.retention import DAY_S
 from iveg.domain.stamps import format_stamp
 from iveg.settings import Settings
-from iveg.web.security.people import digest_of
 
-INVITED_S, SET_UP_S = 3 * DAY_S, 1800.0
-"""How long an invitation waits, and the first of a new server (s)."""
+SET_UP_S = 1800.0
+"""How long the first invitation of a new server waits (s)."""
 FIRST_ADMIN = "admin"
 
 
@@ -59,45 +58,23 @@ def run_user(options: argparse.Namespace, settings: Settings, data: Path) -> int
 
 
 def _act(options: argparse.Namespace, settings: Settings, store: AccountStore) -> None:
+    now = clock.wall()
+    admission = Admission(store, CONSOLE, now)
     if options.action == "list":
         print(*_told(store.read().values()), sep="\n")
     elif options.action == "add":
-        ends_at = clock.wall() + options.days * DAY_S if options.days else None
-        invitation = add(store, options.name, options.role, INVITED_S, ends_at)
+        ends_at = now + options.days * DAY_S if options.days else None
+        invitation, _ = admission.add(options.name, options.role, ends_at)
         _print_invitation(settings, invitation)
     elif options.action == "reset":
-        _print_invitation(settings, invite_again(store, options.name, INVITED_S))
+        invitation, _ = admission.reset(_find(store, options.name))
+        _print_invitation(settings, invitation)
     elif options.action == "role":
-        changed = replace(
-            _find(store, options.name), role=options.role, since=clock.wall()
-        )
-        store.change(changed, "account_role", CONSOLE)
+        changed = admission.give_role(_find(store, options.name), options.role)
         print(f"{changed.name} is {changed.role}, and signs in anew.")
     else:
-        off = replace(_find(store, options.name), disabled=True, invitation="")
-        store.change(off, "account_disabled", CONSOLE)
+        off = admission.disable(_find(store, options.name))
         print(f"{off.name} is out within a second.")
-
-
-def add(
-    store: AccountStore,
-    name: str,
-    role: PersonRole,
-    waits_s: float,
-    ends_at: float | None = None,
-) -> str:
-    """Add an account; returns its invitation, which is stored nowhere.
-
-    Raises:
-        NotANameError: nobody may be called so.
-        NameTakenError: somebody is called so already.
-    """
-    if not is_name(name):
-        raise NotANameError(name)
-    account = Account(new_id(), name, role, ends_at=ends_at)
-    invitation, invited = _invited(account, waits_s)
-    store.add(invited, CONSOLE)
-    return invitation
 
 
 def add_token(store: ApiTokenStore, name: str, scope: TokenScope) -> str:
@@ -115,41 +92,21 @@ def add_token(store: ApiTokenStore, name: str, scope: TokenScope) -> str:
     return token
 
 
-def invite_again(store: AccountStore, name: str, waits_s: float) -> str:
-    """Take a password away, and return a new invitation; sessions end.
-
-    Raises:
-        UnknownNameError: nobody is called so.
-    """
-    account = replace(_find(store, name), password="", disabled=False)
-    invitation, invited = _invited(account, waits_s)
-    store.change(replace(invited, since=clock.wall()), "account_reset", CONSOLE)
-    return invitation
-
-
 def set_up(store: AccountStore, now: float) -> str | None:
     """An invitation for the first admin; None where somebody is admin already."""
     known = store.read().values()
-    admins = [one for one in known if one.role == "admin" and one.is_open(now)]
-    if any(one.password for one in admins):
+    if has_admin(known, now):
         return None
+    admission = Admission(store, CONSOLE, now)
     waiting = [one for one in known if name_key(one.name) == FIRST_ADMIN]
     if waiting:
-        return invite_again(store, waiting[0].name, SET_UP_S)
-    return add(store, FIRST_ADMIN, "admin", SET_UP_S)
+        return admission.reset(waiting[0], SET_UP_S)[0]
+    return admission.add(FIRST_ADMIN, "admin", waits_s=SET_UP_S)[0]
 
 
 def invitation_link(settings: Settings, invitation: str) -> str:
     """Address of the page that asks for a password."""
     return f"{page_address(settings)}/signin#invitation={invitation}"
-
-
-def _invited(account: Account, waits_s: float) -> tuple[str, Account]:
-    invitation = secrets.token_urlsafe(32)
-    until = clock.wall() + waits_s
-    return invitation, replace(
-        account, invitation=digest_of(invitation), invited_until=until
-    )
 
 
 def _find(store: AccountStore, name: str) -> Account:
@@ -178,9 +135,7 @@ def _programs(tokens: Iterable[ApiToken]) -> Iterable[str]:
 
 
 def _state(account: Account, now: float) -> str:
-    if account.disabled:
-        return "disabled"
-    if account.ends_at is not None:
-        word = "until" if now < account.ends_at else "over since"
-        return f"{word} {format_stamp(account.ends_at)}"
-    return "active" if account.password else "invited"
+    state = account.state(now)
+    if account.ends_at is None or state == "disabled":
+        return state
+    return f"{state}, ends {format_stamp(account.ends_at)}"

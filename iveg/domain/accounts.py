@@ -4,6 +4,7 @@ A name travels with each STOP through Orion, which refuses some characters with 
 whole update they stand in; such a name would stop nothing by that transport.
 """
 
+import hashlib
 import unicodedata
 from dataclasses import dataclass
 from typing import Final, Literal
@@ -11,6 +12,8 @@ from typing import Final, Literal
 SignInMethod = Literal["link", "password", "token"]
 """Proof of an identity; ``token`` is a program's."""
 PersonRole = Literal["viewer", "operator", "admin"]
+AccountState = Literal["active", "invited", "lapsed", "over", "disabled"]
+"""``lapsed``: the invitation was not taken in time; ``over``: ended by itself."""
 TokenScope = Literal["read", "stop", "operate"]
 """What a program may: read; also stop; also release, resume and all else of people."""
 
@@ -35,6 +38,11 @@ def is_name(text: str) -> bool:
 def name_key(name: str) -> str:
     """What two names may not share: case and width do not tell people apart."""
     return unicodedata.normalize("NFKC", name).casefold().strip()
+
+
+def digest_of(secret: str) -> str:
+    """What is kept of an invitation or a token: SHA-256 (hex)."""
+    return hashlib.sha256(secret.encode()).hexdigest()
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +71,16 @@ class Account:
     def is_open(self, now: float) -> bool:
         """Whether the person may be here at this moment (Unix s)."""
         return not self.disabled and (self.ends_at is None or now < self.ends_at)
+
+    def state(self, now: float) -> AccountState:
+        """What became of the account at this moment (Unix s)."""
+        if self.disabled:
+            return "disabled"
+        if not self.is_open(now):
+            return "over"
+        if self.password:
+            return "active"
+        return "invited" if self.invitation and now < self.invited_until else "lapsed"
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,8 +1,9 @@
-"""The way in for another device."""
+"""The way in for another device, and for other people."""
 
 from pydantic import Field
 
-from iveg.models.base import Model
+from iveg.domain.accounts import Account, AccountState, PersonRole
+from iveg.models.base import Model, stamp
 
 
 class SignInCode(Model):
@@ -13,3 +14,36 @@ class SignInCode(Model):
     local: bool = Field(
         description="The address works on the server's own computer alone."
     )
+
+
+class UserAccount(Model):
+    """An account, as admins see it."""
+
+    user_id: str
+    name: str
+    role: PersonRole
+    state: AccountState
+    ends_at: str | None = Field(description="When it ends by itself; null: never.")
+    invited_until: str | None = Field(description="Null where no invitation waits.")
+    own: bool = Field(description="Of whoever asks: another admin changes it.")
+
+    @classmethod
+    def of(cls, account: Account, now: float, *, own: bool = False) -> "UserAccount":
+        """As it is at this moment (Unix s)."""
+        state = account.state(now)
+        return cls(
+            user_id=account.account_id,
+            name=account.name,
+            role=account.role,
+            state=state,
+            ends_at=stamp(account.ends_at),
+            invited_until=stamp(account.invited_until if state == "invited" else None),
+            own=own,
+        )
+
+
+class Invitation(Model):
+    """An account with the link that begins it, which is shown this once."""
+
+    user: UserAccount
+    code: SignInCode

@@ -4,8 +4,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from iveg.adapters.passwords import Passwords
-from iveg.domain.accounts import Account
-from iveg.domain.errors import HopError
+from iveg.domain.accounts import Account, name_key
+from iveg.domain.audit import Actor
+from iveg.domain.errors import HopError, NameTakenError
 
 
 class FakeAccounts:
@@ -14,11 +15,23 @@ class FakeAccounts:
     def __init__(self, *known: Account) -> None:
         self.known = {one.account_id: one for one in known}
         self.is_away = False
+        self.changes: list[tuple[str, str, str]] = []
 
     def read(self) -> Mapping[str, Account]:
         if self.is_away:
             raise HopError("database", "away")
         return dict(self.known)
+
+    def add(self, account: Account, by: Actor) -> None:
+        keys = {name_key(one.name) for one in self.known.values()}
+        if name_key(account.name) in keys:
+            raise NameTakenError(account.name)
+        self.known[account.account_id] = account
+        self.changes.append(("account_added", account.name, by.name))
+
+    def change(self, account: Account, action: str, by: Actor) -> None:
+        self.known[account.account_id] = account
+        self.changes.append((action, account.name, by.name))
 
     def accept(self, digest: str, password: str, now: float) -> Account | None:
         for one in self.known.values():

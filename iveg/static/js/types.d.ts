@@ -502,6 +502,12 @@ export type HopHealth = {
   growing: boolean;
 };
 
+/** An account with the link that begins it, which is shown this once. */
+export type Invitation = {
+  user: UserAccount;
+  code: SignInCode;
+};
+
 export type JsonValue = unknown;
 
 /** A lane of the greenhouse. */
@@ -1122,6 +1128,20 @@ export type Twist = {
 export type User = {
   name: string;
   role: string;
+};
+
+/** An account, as admins see it. */
+export type UserAccount = {
+  user_id: string;
+  name: string;
+  role: "viewer" | "operator" | "admin";
+  state: "active" | "invited" | "lapsed" | "over" | "disabled";
+  /** When it ends by itself; null: never. */
+  ends_at: string | null;
+  /** Null where no invitation waits. */
+  invited_until: string | null;
+  /** Of whoever asks: another admin changes it. */
+  own: boolean;
 };
 
 /** The webhook; of its secret address only the host is shown, null without one. */

@@ -28,14 +28,20 @@ def router(token: str) -> APIRouter:
     )
     async def code(request: Request) -> Response:
         """The link at the address by which this browser has reached iVeg."""
-        link = f"{str(request.base_url).rstrip('/')}/signin#token={token}"
-        image = segno.make(link, micro=False).svg_data_uri(
-            scale=_SCALE, border=4, dark="#000", light="#fff"
-        )
-        local = is_local(request.url.hostname or "")
-        return Json(SignInCode(link=link, image=image, local=local))
+        return Json(code_of(request, f"token={token}"))
 
     return routes
+
+
+def code_of(request: Request, proof: str) -> SignInCode:
+    """A link to sign in by, at the address by which this browser has reached iVeg."""
+    link = f"{str(request.base_url).rstrip('/')}/signin#{proof}"
+    image = segno.make(link, micro=False).svg_data_uri(
+        scale=_SCALE, border=4, dark="#000", light="#fff"
+    )
+    return SignInCode(
+        link=link, image=image, local=is_local(request.url.hostname or "")
+    )
 
 
 def is_local(host: str) -> bool:

@@ -178,6 +178,7 @@ def router(
     for route, path in _SCRIPTED.items():
         add_scripted(routes, pages, route, path)
     add_scripted(routes, pages, "audit", "/audit", "release")
+    add_scripted(routes, pages, "users", "/users", "admin")
 
     @routes.get("/decisions/{decision_id}", response_model=None)
     async def decision(

@@ -36,12 +36,15 @@ class Audited:
         action: Its word in the audit; empty: the route writes its rows itself.
         subject: The parameter of the path that names what it was done to.
         asked: Keys of the body that are kept; ``answered`` of the answer.
+        by_store: A change and its row are one transaction of the store; here only what
+            was refused is written.
     """
 
     action: str
     subject: str = ""
     asked: tuple[str, ...] = ()
     answered: tuple[str, ...] = ()
+    by_store: bool = False
 
 
 _COMMAND: Final = ("command_id",)
@@ -108,6 +111,18 @@ AUDITED: Final[Mapping[tuple[str, str], Audited]] = {
     ("POST", f"{_API}/messages/{{channel}}/test"): Audited("messages_test", "channel"),
     ("POST", f"{_API}/experiments"): Audited("experiment", asked=("size",)),
     ("POST", f"{_API}/experiments/stop"): Audited("experiment_stopped"),
+    ("POST", f"{_API}/users"): Audited(
+        "account_added", asked=("name", "role", "days"), by_store=True
+    ),
+    ("PUT", f"{_API}/users/{{user_id}}/role"): Audited(
+        "account_role", "user_id", ("role",), by_store=True
+    ),
+    ("POST", f"{_API}/users/{{user_id}}/reset"): Audited(
+        "account_reset", "user_id", by_store=True
+    ),
+    ("POST", f"{_API}/users/{{user_id}}/disable"): Audited(
+        "account_disabled", "user_id", by_store=True
+    ),
     ("POST", "/signin"): Audited(""),
     ("POST", "/signout"): Audited("sign_out"),
     ("POST", "/wall"): Audited("wall"),
@@ -199,6 +214,8 @@ class AuditRequests:
     def _write_change(self, who: Principal, scope: Scope, exchange: _Exchange) -> None:
         kept = AUDITED.get((scope["method"], path_of(scope)))
         if kept is None or not kept.action:
+            return
+        if kept.by_store and exchange.status < 400:
             return
         details = {
             "status": exchange.status,

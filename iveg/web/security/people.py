@@ -7,23 +7,25 @@ before the first reading a session may stop and no more.
 
 import asyncio
 import contextlib
-import hashlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from typing import Protocol
+from typing import Protocol, TypeVar
 
+from iveg.adapters.admission import Admission, ChangingAccounts
 from iveg.adapters.passwords import Passwords
 from iveg.adapters.sessions import Session
-from iveg.domain.accounts import Account, name_key
+from iveg.domain.accounts import Account, digest_of, name_key
+from iveg.domain.audit import Actor
 from iveg.domain.errors import HopError
 from iveg.pipeline.ports import Clock
 from iveg.web.security.roles import Role
 
+_T = TypeVar("_T")
 EVERY_S = 0.4
 """Between two readings of who may come in (s)."""
 
 
-class Accounts(Protocol):
+class Accounts(ChangingAccounts, Protocol):
     """Storage of accounts; blocks, and raises HopError while it is away."""
 
     def read(self) -> Mapping[str, Account]:
@@ -60,6 +62,32 @@ class People:
         """Read them once. Raises HopError."""
         loop = asyncio.get_running_loop()
         self._known = await loop.run_in_executor(self._thread, self._store.read)
+
+    async def known(self) -> Mapping[str, Account]:
+        """All accounts as they are kept now, by id. Raises HopError."""
+        await self.refresh()
+        return self._known or {}
+
+    async def change(
+        self, by: Actor, work: Callable[[Admission, Mapping[str, Account]], _T]
+    ) -> _T:
+        """Change accounts; counts at once, here and in every session.
+
+        Args:
+            by: Who changes them.
+            work: Called in a thread, one after the other, with all accounts by id.
+
+        Raises:
+            HopError: the database is away; nothing was changed.
+        """
+        admission = Admission(self._store, by, self._clock().wall)
+        loop = asyncio.get_running_loop()
+        done = await loop.run_in_executor(
+            self._thread, lambda: work(admission, self._store.read())
+        )
+        with contextlib.suppress(HopError):
+            await self.refresh()
+        return done
 
     def role_now(self, session: Session, left: Role) -> Role | None:
         """The role that an account leaves a session; None: it is over at once.
@@ -109,8 +137,3 @@ class People:
         """End the threads."""
         self._thread.shutdown(wait=False)
         self._passwords.close()
-
-
-def digest_of(invitation: str) -> str:
-    """What is kept of an invitation: SHA-256 (hex)."""
-    return hashlib.sha256(invitation.encode()).hexdigest()

@@ -10,10 +10,10 @@ from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from typing import Final, Protocol
 
-from iveg.domain.accounts import ApiToken, TokenScope
+from iveg.domain.accounts import ApiToken, TokenScope, digest_of
 from iveg.domain.errors import HopError
 from iveg.pipeline.ports import Clock
-from iveg.web.security.people import EVERY_S, digest_of
+from iveg.web.security.people import EVERY_S
 from iveg.web.security.roles import Principal, Role
 
 _ROLES: Final[Mapping[TokenScope, Role]] = {

@@ -14,9 +14,9 @@ from iveg.adapters.history.audit import faults
 from iveg.adapters.history.migrate import upgrade
 from iveg.cli.database import read_history
 from iveg.cli.user import run_user, set_up
+from iveg.domain.accounts import digest_of
 from iveg.domain.errors import NameTakenError, NotANameError, UnknownNameError
 from iveg.settings import Settings
-from iveg.web.security.people import digest_of
 
 
 class Console:
@@ -95,7 +95,7 @@ def test_the_list_tells_names_roles_and_states_and_no_secret(
 
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "Ana  operator  invited"
-    assert lines[1].startswith("Eva  viewer  until 20")
+    assert lines[1].startswith("Eva  viewer  invited, ends 20")
 
 
 def test_nobody_is_called_as_somebody_else_or_as_nobody_can_be(

@@ -43,6 +43,7 @@ const ROUTES = {
   day: () => import("../pages/day.js"),
   about: () => import("../pages/about.js"),
   audit: () => import("../pages/audit.js"),
+  users: () => import("../pages/users.js"),
 };
 
 /** @param {App} app */

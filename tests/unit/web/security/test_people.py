@@ -6,12 +6,12 @@ from dataclasses import replace
 import httpx
 import pytest
 
-from iveg.domain.accounts import Account
+from iveg.domain.accounts import Account, digest_of
 from iveg.domain.records import AuditRecord
 from iveg.web.pages.openapi import ApiDoc
 from iveg.web.pages.routes import router
 from iveg.web.security.authentication import Authenticator
-from iveg.web.security.people import People, digest_of
+from iveg.web.security.people import People
 from tests.fakes.accounts import FakeAccounts, FakePasswords
 from tests.unit.web.desk import WebDesk
 

@@ -6,10 +6,9 @@ from dataclasses import replace
 import httpx
 import pytest
 
-from iveg.domain.accounts import ApiToken, TokenScope
+from iveg.domain.accounts import ApiToken, TokenScope, digest_of
 from iveg.domain.records import AuditRecord
 from iveg.web.security.authentication import Authenticator
-from iveg.web.security.people import digest_of
 from iveg.web.security.programs import Programs
 from tests.unit.web.desk import API_TOKEN, WebDesk
 

@@ -1,0 +1,139 @@
+"""Accounts of people over HTTP, for admins: invite, change a role, reset, shut out.
+
+An invitation is a password until it is taken: it leaves by the one answer that made it.
+"""
+
+from collections.abc import Mapping
+from typing import Annotated, Final
+
+from fastapi import APIRouter, Depends, HTTPException, Request, Response
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+
+from iveg.adapters.admission import Admission
+from iveg.domain.accounts import MOST_NAME, Account, PersonRole, is_name, name_key
+from iveg.domain.errors import UnknownNameError
+from iveg.domain.retention import DAY_S
+from iveg.models.base import Listing
+from iveg.models.signing_in import Invitation, UserAccount
+from iveg.pipeline.ports import Clock
+from iveg.web.api.answers import Json
+from iveg.web.api.sign_in_code import code_of
+from iveg.web.security.authentication import Principal, require
+from iveg.web.security.people import People
+
+MOST_ACCOUNTS: Final = 1000
+_MOST_DAYS = 3650
+
+_Admin = Annotated[Principal, Depends(require("admin"))]
+_Known = Mapping[str, Account]
+
+
+def named(text: str) -> str:
+    """A name that somebody may have. Raises ValueError."""
+    if not is_name(text):
+        raise ValueError("not a name")
+    return text
+
+
+Name = Annotated[str, Field(max_length=MOST_NAME), AfterValidator(named)]
+
+
+class _Body(BaseModel):
+    model_config = ConfigDict(strict=True, extra="forbid")
+
+
+class UserBody(_Body):
+    """Somebody new; `days` until the account ends by itself."""
+
+    name: Name
+    role: PersonRole
+    days: Annotated[int, Field(ge=1, le=_MOST_DAYS)] | None = None
+
+
+class RoleBody(_Body):
+    """The role that is to be."""
+
+    role: PersonRole
+
+
+def router(people: People, clock: Clock) -> APIRouter:
+    """The routes of accounts; all for admins."""
+    routes = APIRouter(
+        prefix="/api/v1/users", tags=["users"], dependencies=[Depends(require("admin"))]
+    )
+
+    @routes.get("", response_model=Listing[UserAccount])
+    async def users(who: _Admin) -> Response:
+        """Every account, by name."""
+        known, now = await people.known(), clock().wall
+        items = [
+            UserAccount.of(one, now, own=user_id == who.person)
+            for user_id, one in known.items()
+        ]
+        items.sort(key=lambda one: name_key(one.name))
+        return Json(Listing(items=items))
+
+    @routes.post("", response_model=Invitation, status_code=201)
+    async def invite(request: Request, body: UserBody, who: _Admin) -> Response:
+        """Add an account, and show its invitation this once."""
+        now = clock().wall
+        ends_at = None if body.days is None else now + body.days * DAY_S
+
+        def work(admission: Admission, known: _Known) -> tuple[str, Account]:
+            if len(known) >= MOST_ACCOUNTS:
+                raise HTTPException(409, f"There are {MOST_ACCOUNTS} accounts already.")
+            return admission.add(body.name, body.role, ends_at)
+
+        return _invitation(request, await people.change(who, work), now, 201)
+
+    _add_changes(routes, people, clock)
+    return routes
+
+
+def _add_changes(routes: APIRouter, people: People, clock: Clock) -> None:
+    @routes.put("/{user_id}/role", response_model=UserAccount)
+    async def give_role(user_id: str, body: RoleBody, who: _Admin) -> Response:
+        """Change a role; the person signs in anew."""
+        changed = await people.change(
+            who,
+            lambda admission, known: admission.give_role(
+                _other(known, user_id, who), body.role
+            ),
+        )
+        return Json(UserAccount.of(changed, clock().wall))
+
+    @routes.post("/{user_id}/reset", response_model=Invitation)
+    async def reset(request: Request, user_id: str, who: _Admin) -> Response:
+        """Take a password away, let in who was shut out, and invite again."""
+        made = await people.change(
+            who,
+            lambda admission, known: admission.reset(_other(known, user_id, who)),
+        )
+        return _invitation(request, made, clock().wall)
+
+    @routes.post("/{user_id}/disable", response_model=UserAccount)
+    async def disable(user_id: str, who: _Admin) -> Response:
+        """Shut somebody out at once, STOP included."""
+        off = await people.change(
+            who,
+            lambda admission, known: admission.disable(_other(known, user_id, who)),
+        )
+        return Json(UserAccount.of(off, clock().wall))
+
+
+def _other(known: _Known, user_id: str, who: Principal) -> Account:
+    """The account of somebody else: whoever changes accounts stays admin."""
+    if user_id == who.person:
+        raise HTTPException(409, "Another admin changes your own account.")
+    found = known.get(user_id)
+    if found is None:
+        raise UnknownNameError("account", user_id)
+    return found
+
+
+def _invitation(
+    request: Request, made: tuple[str, Account], now: float, status: int = 200
+) -> Response:
+    invitation, account = made
+    code = code_of(request, f"invitation={invitation}")
+    return Json(Invitation(user=UserAccount.of(account, now), code=code), status)

@@ -1,0 +1,176 @@
+"""Accounts over HTTP: an admin invites, changes and shuts out; nobody else does."""
+
+from collections.abc import AsyncIterator
+from dataclasses import replace
+
+import httpx
+import pytest
+
+from iveg.domain.accounts import Account, digest_of
+from iveg.domain.records import AuditRecord
+from iveg.web.api import users
+from tests.unit.web.security.test_people import ANA, OWN, PeoplesDesk, enter
+
+CHIEF = Account("P9", "Chief", "admin", password="#acelga-1234")
+
+
+class AdminsDesk(PeoplesDesk):
+    """Beside them an admin is signed in."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.accounts.known["P9"] = CHIEF
+        self.app.include_router(users.router(self.people, self.clock))
+        # The audit asks the authenticator of the face.
+        self.face.authenticator.sessions = self.authenticator.sessions
+
+    def admin(self) -> httpx.AsyncClient:
+        token = self.authenticator.sessions.open("Chief", "admin", "P9", "password")
+        return self._client({**OWN, "Cookie": f"iveg={token}"})
+
+
+@pytest.fixture
+async def desk() -> AsyncIterator[AdminsDesk]:
+    desk = AdminsDesk()
+    await desk.people.refresh()
+    yield desk
+    desk.people.close()
+
+
+async def test_an_invitation_is_shown_once_and_begins_the_account(
+    desk: AdminsDesk,
+) -> None:
+    body = {"name": "Luz Gil", "role": "operator", "days": 2}
+    async with desk.admin() as chief, desk.page() as page:
+        made = await chief.post("/api/v1/users", json=body)
+        listed = await chief.get("/api/v1/users")
+        link = made.json()["code"]["link"]
+        proof = {"invitation": link.partition("#invitation=")[2]}
+        begun = await enter(page, **proof, password="berenjena-77")
+        desk.clock.now += 2 * 86_400.0 - 1.0
+        before = await enter(page, name="Luz Gil", password="berenjena-77")
+        desk.clock.now += 2.0
+        after = await enter(page, name="Luz Gil", password="berenjena-77")
+
+    assert (made.status_code, begun, before, after) == (201, 204, 204, 401)
+    assert made.json()["code"]["image"].startswith("data:image/svg+xml")
+    assert made.json()["user"]["state"] == "invited"
+    (kept,) = (one for one in desk.accounts.known.values() if one.name == "Luz Gil")
+    assert kept.invitation == ""
+    # The list tells neither an invitation nor a hash.
+    assert proof["invitation"] not in listed.text
+    assert digest_of(proof["invitation"]) not in listed.text
+    assert "acelga" not in listed.text
+    assert [one["name"] for one in listed.json()["items"]] == [
+        "Ana Núñez",
+        "Chief",
+        "Eva",
+        "Luz Gil",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("change", "body"),
+    [("reset", None), ("disable", None), ("role", {"role": "viewer"})],
+)
+async def test_who_is_changed_is_signed_out_before_the_answer(
+    desk: AdminsDesk, change: str, body: dict[str, str] | None
+) -> None:
+    method = "PUT" if body else "POST"
+    async with desk.admin() as chief, desk.page() as ana:
+        await enter(ana, name=ANA.name, password="acelga-1234")
+        desk.clock.now += 1.0
+        done = await chief.request(method, f"/api/v1/users/P1/{change}", json=body)
+        stopped = await ana.post("/api/v1/robots/AGI/stop")
+
+    assert (done.status_code, stopped.status_code) == (200, 401)
+    word = "disabled" if change == "disable" else change
+    assert desk.accounts.changes == [(f"account_{word}", ANA.name, "Chief")]
+
+
+async def test_a_reset_lets_in_again_who_was_shut_out(desk: AdminsDesk) -> None:
+    desk.accounts.known["P1"] = replace(ANA, disabled=True)
+    async with desk.admin() as chief, desk.page() as ana:
+        made = await chief.post("/api/v1/users/P1/reset")
+        link = made.json()["code"]["link"].partition("#invitation=")[2]
+        old = await enter(ana, name=ANA.name, password="acelga-1234")
+        begun = await enter(ana, invitation=link, password="berenjena-77")
+
+    assert (old, begun) == (401, 204)
+
+
+@pytest.mark.parametrize("change", ["reset", "disable", "role"])
+async def test_nobody_changes_their_own_account_so_that_an_admin_stays(
+    desk: AdminsDesk, change: str
+) -> None:
+    body = {"role": "viewer"} if change == "role" else None
+    method = "PUT" if body else "POST"
+    async with desk.admin() as chief:
+        refused = await chief.request(method, f"/api/v1/users/P9/{change}", json=body)
+
+    assert refused.status_code == 409
+    assert desk.accounts.known["P9"] == CHIEF
+    (row,) = desk.records(AuditRecord)
+    assert row.subject == "P9"
+    assert '"status":409' in row.details
+
+
+@pytest.mark.parametrize(
+    ("body", "status"),
+    [
+        ({"name": "ANA núñez", "role": "viewer"}, 409),
+        ({"name": "a<b", "role": "viewer"}, 422),
+        ({"name": " Luz", "role": "viewer"}, 422),
+        ({"name": "x" * 65, "role": "viewer"}, 422),
+        ({"name": "Luz\x00", "role": "viewer"}, 422),
+        ({"name": "Luz", "role": "program"}, 422),
+        ({"name": "Luz", "role": "viewer", "days": 0}, 422),
+        ({"name": "Luz", "role": "viewer", "days": 1e9}, 422),
+        ({"name": "Luz", "role": "viewer", "password": "x"}, 422),
+    ],
+)
+async def test_what_cannot_be_an_account_is_refused(
+    desk: AdminsDesk, body: dict[str, object], status: int
+) -> None:
+    before = dict(desk.accounts.known)
+    async with desk.admin() as chief:
+        refused = await chief.post("/api/v1/users", json=body)
+
+    assert refused.status_code == status
+    assert desk.accounts.known == before
+
+
+async def test_there_are_only_so_many_accounts(
+    desk: AdminsDesk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(users, "MOST_ACCOUNTS", len(desk.accounts.known))
+    async with desk.admin() as chief:
+        refused = await chief.post("/api/v1/users", json={"name": "Z", "role": "admin"})
+
+    assert refused.status_code == 409
+
+
+async def test_with_the_database_away_nothing_is_said_to_have_changed(
+    desk: AdminsDesk,
+) -> None:
+    async with desk.admin() as chief:
+        desk.accounts.is_away = True
+        listed = await chief.get("/api/v1/users")
+        off = await chief.post("/api/v1/users/P1/disable")
+        desk.accounts.is_away = False
+        nobody = await chief.post("/api/v1/users/P0/disable")
+
+    assert [one.status_code for one in (listed, off, nobody)] == [503, 503, 404]
+    assert desk.accounts.changes == []
+
+
+async def test_what_is_refused_is_in_the_audit_with_its_status(
+    desk: AdminsDesk,
+) -> None:
+    async with desk.browser("operator") as page:
+        refused = await page.post("/api/v1/users", json={"name": "Me", "role": "admin"})
+
+    assert refused.status_code == 403
+    (row,) = desk.records(AuditRecord)
+    assert row.action == "account_added"
+    assert row.details == '{"name":"Me","role":"admin","status":403}'
