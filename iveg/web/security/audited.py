@@ -217,11 +217,11 @@ class AuditRequests:
             return
         if kept.by_store and exchange.status < 400:
             return
-        details = {
-            "status": exchange.status,
-            **_named(exchange.asked, kept.asked),
-            **_named(exchange.answer, kept.answered),
-        }
+        asked = _named(exchange.asked, kept.asked)
+        answered = _named(exchange.answer, kept.answered)
+        # What was seen stays beside what came of it.
+        seen = {f"{name}_seen": asked[name] for name in asked.keys() & answered.keys()}
+        details = {"status": exchange.status, **asked, **answered, **seen}
         subject = clean_text(str(scope["path_params"].get(kept.subject, "")))
         self._trail.note(who, kept.action, subject, details, at=self._clock())
 
