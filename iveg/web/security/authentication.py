@@ -104,7 +104,7 @@ class Authenticator:
         role_now = None if people is None else people.role_now
         self.sessions = Sessions(clock, store, link_name=link_name, role_now=role_now)
         self.refused = 0
-        """Sign-ins with a wrong token."""
+        """Sign-ins with a wrong token, password or invitation."""
         self._told_at: float | None = None
 
     # --- people sign in ---------------------------------------------------------
@@ -132,7 +132,7 @@ class Authenticator:
     ) -> Response | Problem:
         address = "" if request.client is None else request.client.host
         if not _same(token, self._sign_in_token):
-            return self._refuse(address, self._clock().mono)
+            return self._refuse(address, self._clock().mono, "wrong token")
         # Somebody else's wrong links must not shut out whoever has the right one.
         return self._admit(request, self.sessions.open_by_link(), response)
 
@@ -143,33 +143,39 @@ class Authenticator:
 
         A wrong name is told as a wrong password, and takes as long.
         """
-        return await self._prove(request, lambda one: one.sign_in(name, password))
+        return await self._prove(
+            request, lambda one: one.sign_in(name, password), "wrong name or password"
+        )
 
     async def accept(
         self, request: Request, invitation: str, password: str
     ) -> Response | Problem:
         """Exchange an invitation for an account and its first session."""
-        return await self._prove(request, lambda one: one.accept(invitation, password))
+        return await self._prove(
+            request, lambda one: one.accept(invitation, password), "no such invitation"
+        )
 
     async def _prove(
         self,
         request: Request,
         proof: Callable[[People], Awaitable[Account | None]],
+        wrong: str,
     ) -> Response | Problem:
         refuse_forgery(request)
         refuse_other_bodies(request)
         address = "" if request.client is None else request.client.host
         now = self._clock().mono
-        # Before it is looked at: each look takes a while of a processor.
+        # Before it is looked at: each look takes a while of a processor, and a limit
+        # that the right password passes is none for who guesses.
         if self._people is None or self._attempts.wait_s(address, now) > 0.0:
-            return self._refuse(address, now)
+            return self._refuse(address, now, wrong)
         try:
             account = await proof(self._people)
         except BusyError:
             detail = "Too many people sign in at once; try again."
             return Problem(429, detail, headers={"Retry-After": "2"})
         if account is None:
-            return self._refuse(address, now)
+            return self._refuse(address, now, wrong)
         before = self.identify(request)
         if before is not None:
             self.sessions.revoke(before)
@@ -207,7 +213,7 @@ class Authenticator:
         )
         return response
 
-    def _refuse(self, address: str, now: float) -> Problem:
+    def _refuse(self, address: str, now: float, wrong: str) -> Problem:
         wait_s = self._attempts.wait_s(address, now)
         if wait_s > 0.0:
             headers = {"Retry-After": str(math.ceil(wait_s))}
@@ -216,7 +222,7 @@ class Authenticator:
         self._attempts.failed(address, now)
         if self._rows.take(now):
             self._note(STRANGER, "sign_in_refused", address)
-        self._tell_refused(now)
+        self._tell_refused(now, wrong)
         return Problem(401, "This link does not sign in here, or not any more.")
 
     def _note(self, actor: Actor, action: str, address: str) -> None:
@@ -224,12 +230,12 @@ class Authenticator:
             told = {"address": address}
             self._trail.note(actor, action, details=told, at=self._clock())
 
-    def _tell_refused(self, now: float) -> None:
+    def _tell_refused(self, now: float, wrong: str) -> None:
         """Count a refused sign-in; log it once a minute, against floods of the log."""
         self.refused += 1
         if self._told_at is None or now - self._told_at >= 60.0:
             self._told_at = now
-            _log.warning("sign-in refused: wrong token (%d so far)", self.refused)
+            _log.warning("sign-in refused: %s (%d so far)", wrong, self.refused)
 
     # --- identification ---------------------------------------------------------
 

@@ -117,6 +117,26 @@ async def test_an_invitation_works_once_and_chooses_the_password(
     assert again == 204
 
 
+@pytest.mark.parametrize(
+    ("proof", "said"),
+    [
+        ({"token": "x"}, "wrong token"),
+        ({"name": "Eva", "password": "x"}, "wrong name or password"),
+        ({"invitation": "x", "password": "x" * 10}, "no such invitation"),
+    ],
+)
+async def test_the_log_says_what_was_wrong_and_not_whose(
+    desk: PeoplesDesk,
+    proof: dict[str, str],
+    said: str,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    async with desk.page() as page:
+        await enter(page, **proof)
+
+    assert caplog.messages == [f"sign-in refused: {said} (1 so far)"]
+
+
 async def test_an_invitation_that_is_over_begins_nothing(desk: PeoplesDesk) -> None:
     desk.clock.now += 61.0
     async with desk.page() as page:
