@@ -14,6 +14,7 @@ from fastapi import FastAPI
 
 from iveg import __version__
 from iveg.adapters import clock, log_filter
+from iveg.adapters.backfill import BackfillReader
 from iveg.adapters.calibration_files import load_calibrations
 from iveg.adapters.direct import DirectReader
 from iveg.adapters.equipment_files import load_equipment
@@ -42,6 +43,7 @@ from iveg.domain.records import Record
 from iveg.domain.stop.drills import Drills
 from iveg.domain.transports import DIRECT, FIWARE
 from iveg.pipeline.audit import AuditTrail
+from iveg.pipeline.backfill import PART as BACKFILL
 from iveg.pipeline.build import Choices, Ports, build, build_services
 from iveg.pipeline.equipment import PART as EQUIPMENT
 from iveg.pipeline.latency import hours_of
@@ -176,9 +178,18 @@ class Dss:
             self.pipeline.supervision.guard("latency", watch.passed_over),
             self.pipeline.supervision.guard(RECORDINGS, self.stores.inputs.measure),
         )
+        late = BackfillReader(
+            self.fleet.ids,
+            clock.now,
+            self.pipeline.backfill.has_room,
+            self.pipeline.supervision.guard(BACKFILL, self.pipeline.backfill.take),
+            ingest.reject,
+            self.pipeline.supervision.guard(RECORDINGS, self.stores.inputs.measure),
+        )
+        is_wanted = self.settings.direct_read == "all"
         self.outside.link.attach(
-            reader.subscriptions(),
-            reader.read,
+            reader.subscriptions() | (late.subscriptions() if is_wanted else {}),
+            late.beside(reader.read),
             self._broker_back,
             self._broker_lost,
             reader.pass_over,

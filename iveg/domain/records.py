@@ -78,6 +78,8 @@ class DetectionRecord:
         confident: Whether it reached the threshold.
         transport: Id of the transport whose copy was first.
         box: The box with its ``frame_id``; None when it was not kept.
+        late: The robot kept it during a gap and sent it afterwards: nothing acted on
+            it, and ``at`` is when it was measured.
     """
 
     at: float
@@ -93,6 +95,7 @@ class DetectionRecord:
     class_: str | None = None
     person_id: str | None = None
     box: Json | None = None
+    late: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -198,6 +201,7 @@ class OdometryRecord:
         link: ``LIVE``, ``LATE`` or ``LOST``.
         margin_m: Least margin to anybody who is seen, while it moves (m; at most a
             second old); None where it is unknown or there is none.
+        late: As of a detection; ``limit_factor`` is then that of an unheard robot.
     """
 
     at: float
@@ -211,6 +215,7 @@ class OdometryRecord:
     applied_factor: float | None = None
     link: str | None = None
     margin_m: float | None = None
+    late: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -162,6 +162,7 @@ MEANINGS: Final[Mapping[str, Told]] = {
     "members": Told("Its newest times, each with priority and life."),
     "value": Told("The reading."),
     "entity_id": Told("Entity at Orion."),
+    "late": Told("The robot kept it during a gap and sent it afterwards."),
     "attribute": Told("Its attribute."),
     "unit": Told("Unit of `value`."),
     "audit_id": Told("The row."),

@@ -21,6 +21,7 @@ class OdometryRow(Model):
     applied_factor: float | None
     link: str | None
     margin_m: float | None
+    late: bool
 
     @classmethod
     def of_record(cls, record: OdometryRecord) -> "OdometryRow":

@@ -153,13 +153,15 @@ class DetectionRow(KeptDetection):
     x: float | None
     y: float | None
     z: float | None
+    late: bool = Field(description="Sent after a gap; nothing acted on it.")
 
     @classmethod
     def of_row(cls, record: DetectionRecord) -> "DetectionRow":
         """One detection as it is remembered."""
         told = dict(KeptDetection.of_record(record))
         at = format_stamp(record.at)
-        return cls(**told, at=at, x=record.x, y=record.y, z=record.z)
+        x, y, z = record.x, record.y, record.z
+        return cls(**told, at=at, x=x, y=y, z=z, late=record.late)
 
 
 class Detection(KeptDetection):

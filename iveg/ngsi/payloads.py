@@ -5,6 +5,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
+from iveg.domain.backfill import MOST_MESSAGES
 from iveg.domain.peer_scan import BEAMS, PLACES
 
 MAX_BEAMS = 4096
@@ -312,6 +313,13 @@ class PeerScanValue(OriginFields):
         list[Annotated[int, Field(ge=0, lt=PLACES)]],
         Field(min_length=BEAMS, max_length=BEAMS),
     ]
+
+
+class BackfillValue(OriginFields):
+    """``/{robot}/iveg/backfill``; its messages are read one by one."""
+
+    robot_id: Text
+    messages: Annotated[list[dict[str, object]], Field(max_length=MOST_MESSAGES)]
 
 
 class NotificationValue(Wire):

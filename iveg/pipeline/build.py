@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from iveg.domain.backfill import Silences
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.detector import OutOfService
 from iveg.domain.equipment import Equipment, Tile
@@ -20,6 +21,8 @@ from iveg.domain.tracking.people import People
 from iveg.domain.transports import FIWARE, Transport
 from iveg.domain.witness import Plan
 from iveg.domain.world import World
+from iveg.pipeline.backfill import PART as BACKFILL
+from iveg.pipeline.backfill import Backfill
 from iveg.pipeline.command import Commander
 from iveg.pipeline.coverage import CoverageMonitor
 from iveg.pipeline.detectors import Detectors
@@ -129,11 +132,13 @@ class Pipeline:
     equipment: EquipmentMonitor
     peer_scans: PeerScans
     second_witness: SecondWitness
+    backfill: Backfill
 
     def counters(self) -> Counter[str]:
         """Everything that is counted in it."""
         total = Counter(self.ingest.counters)
         total.update(self.world.counters)
+        total.update(self.backfill.counters)
         total.update(self.commander.counters)
         total.update(self.supervision.counters)
         total["live.browsers"] = self.hub.watchers
@@ -182,8 +187,7 @@ def build(
     health_monitor = HealthMonitor(start, ports.history_state)
     probe, guard = health_monitor.probe, supervision.guard
     world = World(fleet, probe, greenhouse.bounds)
-    latency = _latency(world, ports, event_log)
-    ingest = _ingest(world, event_log, ports, supervision, latency.watch)
+    latency, ingest, silences = _inputs(world, event_log, ports, supervision)
     scans, people = ScanReader(ingest.reject), choices.people(greenhouse)
     obstacles = Obstacles(world, people, Plan.of(greenhouse))
     evaluator = Evaluator(
@@ -232,6 +236,23 @@ def build(
         _equipment(choices.tiles, start, ports, event_log, supervision),
         PeerScans(world, scans, ports.fleet.publish_peer_scan, choices.boot),
         SecondWitness(world, scans, obstacles, ports.trace.looked),
+        _backfill(fleet, evaluator, ports, silences, ingest),
+    )
+
+
+def _backfill(
+    fleet: FleetDescription,
+    evaluator: Evaluator,
+    ports: Ports,
+    silences: Silences,
+    ingest: Ingest,
+) -> Backfill:
+    return Backfill(
+        fleet.members,
+        lambda: evaluator.rule,
+        ports.sink,
+        silences,
+        ingest.reject,
     )
 
 
@@ -309,15 +330,16 @@ def _goals(
     )
 
 
-def _ingest(
+def _inputs(
     world: World,
     event_log: EventLog,
     ports: Ports,
     supervision: Supervision,
-    watch: LatencyWatch,
-) -> Ingest:
-    note_latency = supervision.guard("latency", watch.arrived)
+) -> tuple[LatencyMonitor, Ingest, Silences]:
+    latency, silences = _latency(world, ports, event_log), Silences()
+    note_latency = supervision.guard("latency", latency.watch.arrived)
     trace = supervision.guard("recordings", ports.trace.arrived)
+    note_heard = supervision.guard(BACKFILL, silences.hear)
 
     def log_rejected(source: str, reason: str) -> None:
         slots = {"source": source, "reason": reason}
@@ -326,8 +348,11 @@ def _ingest(
     def passed(received: Received) -> None:
         note_latency(received)
         trace(received)
+        note_heard(received)
 
-    return Ingest(world.robots.__contains__, log_rejected, world.is_past, passed)
+    is_robot = world.robots.__contains__
+    ingest = Ingest(is_robot, log_rejected, world.is_past, passed)
+    return latency, ingest, silences
 
 
 def build_services(

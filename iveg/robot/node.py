@@ -6,6 +6,7 @@ command first; disk and broker have a queue of their own and are never waited fo
 
 import asyncio
 import logging
+import math
 import secrets
 from collections.abc import Callable
 from dataclasses import replace
@@ -43,6 +44,7 @@ from iveg.robot.effects import Answer, Drive, Effect, Persist, Report
 from iveg.robot.goals import Facts, Navigate, RobotGoals, read_goal
 from iveg.robot.hold_file import read_holds, write_holds
 from iveg.robot.judgement import Limits
+from iveg.robot.keepsake import Keepsake
 from iveg.robot.lane import SafetyLane
 from iveg.robot.node_settings import NodeSettings
 from iveg.robot.safety import SafetyMachine, State
@@ -88,16 +90,13 @@ class RobotNode:
     ) -> None:
         self._read_clock = read_clock
         self.boot = secrets.token_hex(4)
-        self._id = robot_id
-        self._drive = drive
+        self._id, self._drive = robot_id, drive
         self._started = self._read_clock().mono
-        self._echo = Echo()
-        self._on_feedback_read = on_feedback
+        self._echo, self._on_feedback_read = Echo(), on_feedback
         self._faults: tuple[RobotFault, ...] = ()
         self._on_peer_scan: Callable[[str, bytes], None] | None = None
-        self._asks_for_scans = False
         self._is_replay = replay is not None
-        self._nobody_there = held
+        self._asks_for_scans, self._nobody_there = False, held
         self._loop: asyncio.AbstractEventLoop | None = None
         self._commanded: tuple[Twist2D, float] = REST, 0.0
         self._goals = RobotGoals(robot_id, navigate)
@@ -129,6 +128,8 @@ class RobotNode:
             profile.braking,
         )
         self._machine = self._new_machine(hold_file, limits)
+        self._keepsake = Keepsake(robot_id, self.boot, is_on=not self._is_replay)
+        self._heard_at = -math.inf
 
     def _new_uplink(self, settings: NodeSettings, replay: str | None) -> Uplink:
         return Uplink(
@@ -199,7 +200,7 @@ class RobotNode:
 
     async def run(self) -> None:
         """Run until cancelled; the drive is left at rest."""
-        self._nobody_there = False
+        self._nobody_there, publish = False, self._link.publish
         try:
             async with asyncio.TaskGroup() as tasks:
                 for name, work in (
@@ -207,6 +208,10 @@ class RobotNode:
                     ("link", self._link.run()),
                     ("keep", self._lane.keep_forever()),
                     ("send", self._lane.send_forever()),
+                    (
+                        "backfill",
+                        self._keepsake.send_forever(self._late_batch, publish),
+                    ),
                 ):
                     tasks.create_task(work, name=f"robot-{self._id}-{name}")
         finally:
@@ -229,10 +234,18 @@ class RobotNode:
                 self._machine.note_path(one.path, mono)
             elif isinstance(one, Unplaced) and one.twist is not None:
                 self._perform(self._machine.odometry(None, one.twist, mono), mono)
-        if self._link.connected:
-            own = self._own(now)
-            for one in observations:
+        own = self._own(now)
+        for one in observations:
+            self._keepsake.keep(one, own)
+            if self._link.connected:
                 self._uplink.send(one, own)
+
+    def _late_batch(self) -> bytes | None:
+        """What was kept and may be sent now: never before what is live."""
+        now, is_free = self._read_clock(), not self._link.offered
+        silent_s = now.mono - self._heard_at if self._link.connected else math.inf
+        batch = self._keepsake.next_batch(self._own(now), self.holds, silent_s)
+        return batch if is_free else None
 
     def request_twist(self, twist: Twist2D) -> None:
         """Take upstream navigation's ``cmd_vel``; it expires after 0.5 s."""
@@ -317,6 +330,7 @@ class RobotNode:
         except UnreadableError:
             return  # Counts as no feedback: the watchdog does the rest.
         self._echo.note(feedback.origin)
+        self._heard_at = now
         self._uplink.rates.note_backlog(feedback.backlog_s, now)
         peer = topic.removeprefix("/").partition("/")[0]
         self._perform(self._machine.feedback(peer, feedback, now), now)
@@ -351,13 +365,8 @@ class RobotNode:
 
     def _tell_goal(self, answers: list[GoalAnswer]) -> None:
         for answer in answers:
-            _log.info(
-                "%s: goal %s %s %s",
-                self._id,
-                answer.id,
-                answer.result,
-                answer.why or "",
-            )
+            told = self._id, answer.id, answer.result, answer.why or ""
+            _log.info("%s: goal %s %s %s", *told)
             own = self._own(self._read_clock())
             self._lane.answer(self._uplink.goal_answer(answer, own))
 
@@ -379,9 +388,9 @@ class RobotNode:
     def _report(self, report: SafetyReport, *, is_measure: bool) -> None:
         now, wish = self._read_clock(), self._asks_for_scans
         report = replace(report, faults=self._faults, peer_scans=wish)
-        seq, messages = self._uplink.report(
-            report, self._own(now), is_measure=is_measure
-        )
+        own = self._own(now)
+        self._keepsake.keep(report, own)
+        seq, messages = self._uplink.report(report, own, is_measure=is_measure)
         self._machine.reported(seq, now.mono)
         for message in messages:
             self._lane.report(message)

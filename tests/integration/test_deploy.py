@@ -174,7 +174,8 @@ def of_robot(robot: str) -> set[str]:
     """What a robot may write, written out once more by hand."""
     plain = {f"/iveg/{robot}{suffix}/attrs" for suffix in DEVICES}
     plain.add(f"/iveg/{robot}/cmdexe")
-    return plain | {f"/json{topic}" for topic in plain} | straight(robot)
+    late = f"/{robot}/iveg/backfill"
+    return plain | {f"/json{topic}" for topic in plain} | straight(robot) | {late}
 
 
 def straight(robot: str) -> set[str]:
@@ -243,7 +244,7 @@ MAY_READ = {
     | PROBES
     | straight("AGI")
     | straight("AGII")
-    | {"/AGIII/iveg/safety"},
+    | {"/AGIII/iveg/safety", "/AGI/iveg/backfill", "/AGII/iveg/backfill"},
     "iveg_emulator": COMMANDS | FEEDBACK | DESIRED,
     "iveg_health": set(),
 }

@@ -5,6 +5,7 @@
 
 from iveg.domain.stamps import format_stamp, parse_stamp
 from iveg.ngsi.codec.attributes import IsPast, read_attributes
+from iveg.ngsi.codec.backfill import read_backfill, write_backfill
 from iveg.ngsi.codec.commands import (
     write_command,
     write_desired,
@@ -49,12 +50,14 @@ __all__ = [
     "parse_stamp",
     "read_answer",
     "read_attributes",
+    "read_backfill",
     "read_entity",
     "read_feedback",
     "read_measure",
     "read_notification",
     "read_peer_scan",
     "write_answer",
+    "write_backfill",
     "write_climate",
     "write_command",
     "write_desired",
