@@ -63,7 +63,7 @@ function cellsOf(user, i18n, change) {
   const ending = state === "active" && at ? "ending" : state;
   const said = i18n.t(`userspage.state.${ending}`);
   return [
-    make("td", "what", name),
+    make("td", "", name),
     make("td", "", i18n.t(`header.role.${role}`)),
     make("td", "", at ? `${said} ${dayAndTime(at)}` : said),
     user.own ? make("td", "", i18n.t("userspage.own")) : changesOf(user, i18n, change),
