@@ -11,8 +11,9 @@ A witness only adds: it lifts no limit, and finds no spot empty.
 """
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +26,6 @@ from iveg.domain.observations import LaserScan
 from iveg.domain.obstacle import Obstacle
 
 _Floats = NDArray[np.float64]
-Explains = Callable[[_Floats, _Floats], NDArray[np.bool_]]
-"""Which returns at x and y, shape (n,) in ``map`` (m), something explains."""
 GONE_S = 0.5
 """Without a return for so long it is gone."""
 PLAN_M = 0.4
@@ -144,6 +143,13 @@ class KnownBody:
         return cls(pose.x, pose.y, _PEER_M)
 
 
+class Explainer(Protocol):
+    """What is known of a place beside its plan."""
+
+    def explains(self, x: _Floats, y: _Floats) -> NDArray[np.bool_]:
+        """Which returns at x and y, shape (n,) in ``map`` (m), it explains."""
+
+
 class Witness:
     """What one robot's laser sees beside it.
 
@@ -151,7 +157,7 @@ class Witness:
         outline: The robot's body.
         plan: None: nobody drew the place.
         ahead_s: It looks farther by how far the robot drives in this time (s).
-        explains: What is known beside the plan; None: nothing.
+        known_here: What is known beside the plan; None: nothing.
     """
 
     def __init__(
@@ -159,12 +165,12 @@ class Witness:
         outline: Outline,
         plan: Plan | None,
         ahead_s: float = 0.0,
-        explains: Explains | None = None,
+        known_here: Explainer | None = None,
     ) -> None:
         self._outline = outline
         self._plan = plan
         self._ahead_s = ahead_s
-        self._explains = explains
+        self._known_here = known_here
         self._known: tuple[Obstacle, ...] = ()
         self.walkers: tuple[Obstacle, ...] = ()
         """Of the last scan, those who walk, or walked just now."""
@@ -222,8 +228,8 @@ class Witness:
         for one in known:
             if pose.distance_to(one.x, one.y) <= farthest + one.radius + _ROUNDING_M:
                 left &= np.hypot(x - one.x, y - one.y) > one.radius
-        if self._explains is not None:
-            left[left] = ~self._explains(x[left], y[left])
+        if self._known_here is not None:
+            left[left] = ~self._known_here.explains(x[left], y[left])
         return np.column_stack((x[left], y[left]))
 
     def _is_ahead(self, body: _Floats, pose: Pose2D, twist: Twist2D) -> bool:

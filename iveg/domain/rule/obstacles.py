@@ -122,7 +122,7 @@ class Obstacles:
         outline = Outline(profile.length, profile.width)
         witness = self._witnesses.setdefault(
             robot.robot_id,
-            Witness(outline, self._plan, HORIZON_S, self.known_here.explains),
+            Witness(outline, self._plan, HORIZON_S, self.known_here),
         )
         people = tuple(self._sighted(now))
         known = (*self._peers(robot, now), *people)

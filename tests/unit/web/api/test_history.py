@@ -149,6 +149,7 @@ async def test_a_detection_reads_as_the_contract_says(
         "x": -3.5,
         "y": 2.0,
         "z": 0.9,
+        "late": False,
     }
 
 
