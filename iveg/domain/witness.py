@@ -13,7 +13,6 @@ A witness only adds: it lifts no limit, and finds no spot empty.
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -143,13 +142,6 @@ class KnownBody:
         return cls(pose.x, pose.y, _PEER_M)
 
 
-class Explainer(Protocol):
-    """What is known of a place beside its plan."""
-
-    def explains(self, x: _Floats, y: _Floats) -> NDArray[np.bool_]:
-        """Which returns at x and y, shape (n,) in ``map`` (m), it explains."""
-
-
 class Witness:
     """What one robot's laser sees beside it.
 
@@ -157,20 +149,14 @@ class Witness:
         outline: The robot's body.
         plan: None: nobody drew the place.
         ahead_s: It looks farther by how far the robot drives in this time (s).
-        known_here: What is known beside the plan; None: nothing.
     """
 
     def __init__(
-        self,
-        outline: Outline,
-        plan: Plan | None,
-        ahead_s: float = 0.0,
-        known_here: Explainer | None = None,
+        self, outline: Outline, plan: Plan | None, ahead_s: float = 0.0
     ) -> None:
         self._outline = outline
         self._plan = plan
         self._ahead_s = ahead_s
-        self._known_here = known_here
         self._known: tuple[Obstacle, ...] = ()
         self.walkers: tuple[Obstacle, ...] = ()
         """Of the last scan, those who walk, or walked just now."""
@@ -228,8 +214,6 @@ class Witness:
         for one in known:
             if pose.distance_to(one.x, one.y) <= farthest + one.radius + _ROUNDING_M:
                 left &= np.hypot(x - one.x, y - one.y) > one.radius
-        if self._known_here is not None:
-            left[left] = ~self._known_here.explains(x[left], y[left])
         return np.column_stack((x[left], y[left]))
 
     def _is_ahead(self, body: _Floats, pose: Pose2D, twist: Twist2D) -> bool:

@@ -9,11 +9,9 @@ from hypothesis import strategies as st
 
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.greenhouse import Greenhouse
-from iveg.domain.known_here import CELL_M, FROM_PLAN_M, STANDS_S, KnownHere
 from iveg.domain.observations import LaserScan, Origin
 from iveg.domain.witness import Outline, Plan
 from iveg.robot.judgement import Limits
-from tests.builders import at
 from tests.unit.domain.scene import FIELD, HEDGE, Scene
 from tests.unit.domain.scene import person as camera
 from tests.unit.robot.rig import AHEAD, Rig, person
@@ -92,50 +90,6 @@ def test_no_scan_that_the_server_reads_makes_a_robot_faster_or_later_slow(
         )
         named = {one.reason for one in after.values() if one.speed_factor == 1.0}
         assert named <= {"clear"}
-
-
-_THING = st.sampled_from((0.35, 0.45, 0.49, 0.6, 1.2))
-_LOOK = st.tuples(
-    st.sampled_from((1.0, 60.0, 140.0, 200.0)),
-    st.lists(_THING, max_size=3),
-    st.sampled_from((None, None, None, (1.0, 0.45), (1.4, 0.6))),
-)
-_ROW = Plan.of(
-    Greenhouse("g", Rectangle(-9, -9, 9, 9), rows=(Rectangle(-5, -1, 5, 0),))
-)
-
-
-@given(
-    st.lists(_LOOK, min_size=4, max_size=24),
-    st.sampled_from((0.45, 0.49)),
-)
-def test_only_what_stood_for_ten_minutes_beside_the_plan_is_explained_besides(
-    looks: list[tuple[float, list[float], tuple[float, float] | None]], stays: float
-) -> None:
-    known, now, seen = KnownHere(_ROW), 0.0, dict[float, list[float]]()
-    moves = list[tuple[float, tuple[float, float]]]()
-    for after_s, others, mover in looks:
-        now += after_s
-        away = [stays, *others]
-        points = np.array([(1.0 + 0.03 * n, y) for y in away for n in range(3)])
-        if mover is not None:
-            known.moved([mover])
-            moves.append((now, mover))
-        known.learn(points, Pose2D(1.0, 2.5, -1.57), (), at(now))
-        seen[now] = away
-        for (x, y), here in zip(points, known.explains(*points.T), strict=True):
-            if not here:
-                continue
-            assert y <= FROM_PLAN_M
-            ago = [then for then in seen if now - then <= STANDS_S + 1e-6]
-            assert any(now - then >= STANDS_S for then in seen)
-            for then in ago:
-                assert min(abs(one - y) for one in seen[then]) <= 2 * CELL_M
-            assert all(
-                math.dist(place, (x, y)) > 0.4 - CELL_M
-                for then, place in moves
-                if now - then < STANDS_S
-            )
 
 
 def _scan(ranges: list[float]) -> LaserScan:

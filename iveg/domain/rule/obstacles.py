@@ -15,7 +15,6 @@ from typing import Literal
 import numpy as np
 
 from iveg.domain.geometry import Pose2D
-from iveg.domain.known_here import KnownHere
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant, LaserScan
 from iveg.domain.obstacle import Obstacle
@@ -101,14 +100,10 @@ class Obstacles:
 
     Args:
         plan: What stands in the greenhouse.
-
-    Attributes:
-        known_here: What stands there besides, and slows nobody.
     """
 
     def __init__(self, world: World, people: People, plan: Plan) -> None:
         self._world, self._people, self._plan = world, people, plan
-        self.known_here = KnownHere(plan)
         self._witnesses: dict[str, Witness] = {}
         self._seen: dict[str, SeenObstacle | None] = {}
         self._walkers: dict[str, tuple[Instant, Sequence[Obstacle]]] = {}
@@ -121,35 +116,23 @@ class Obstacles:
             return
         outline = Outline(profile.length, profile.width)
         witness = self._witnesses.setdefault(
-            robot.robot_id,
-            Witness(outline, self._plan, HORIZON_S, self.known_here),
+            robot.robot_id, Witness(outline, self._plan, HORIZON_S)
         )
-        people = tuple(self._sighted(now))
-        known = (*self._peers(robot, now), *people)
-        self.known_here.moved((one.x, one.y) for one in people)
+        known = (*self._peers(robot, now), *self._sighted(now))
         witness.look(scan, pose, odometry.twist, known, now.mono)
-        self.known_here.moved((one.x, one.y) for one in witness.walkers)
         self._seen[robot.robot_id] = _first(robot, witness, now)
         self._walkers[robot.robot_id] = now, witness.walkers
-        if self._plan.is_drawn and self._is_due(robot.robot_id, now):
-            fault = self._check(scan, pose, now)
-            if fault is None and _may_teach(robot, now):
-                points = scan.points(pose).astype(np.float64)
-                self.known_here.learn(points, pose.compose(scan.mount), known, now)
+        if self._plan.is_drawn:
+            self._check(scan, pose, now)
 
-    def _is_due(self, robot_id: str, now: Instant) -> bool:
-        """Whether a second has passed since a whole scan was looked at."""
-        before = self._fits.get(robot_id)
-        return before is None or now.mono - before.at >= _CHECKED_S
-
-    def _check(self, scan: LaserScan, pose: Pose2D, now: Instant) -> Fault | None:
-        """Compare a whole scan with the plan."""
+    def _check(self, scan: LaserScan, pose: Pose2D, now: Instant) -> None:
+        """Compare a whole scan with the plan, once a second."""
         before = self._fits.get(scan.robot_id)
-        fault = fault_of(scan, pose, self._plan)
-        goes_on = before is not None and before.fault == fault
-        since = before.since if before is not None and goes_on else now.mono
-        self._fits[scan.robot_id] = _Fit(fault, since, now.mono)
-        return fault
+        if before is None or now.mono - before.at >= _CHECKED_S:
+            fault = fault_of(scan, pose, self._plan)
+            goes_on = before is not None and before.fault == fault
+            since = before.since if before is not None and goes_on else now.mono
+            self._fits[scan.robot_id] = _Fit(fault, since, now.mono)
 
     def fault(self, robot_id: str, now: Instant) -> Fault | None:
         """What is wrong with a robot's laser, if it is so for some seconds."""
@@ -198,12 +181,6 @@ class Obstacles:
                 age = one.age_s(now)
                 if age <= _YOUNG_S and not one.reach_m and not one.laser:
                     yield KnownBody(one.x, one.y, _PERSON_M + LIMITS.walking_m_s * age)
-
-
-def _may_teach(robot: RobotState, now: Instant) -> bool:
-    """Whether a robot surely knows where it is."""
-    age = robot.age_s(now)
-    return age is not None and age <= _YOUNG_S and not robot.doubts.is_open(now)
 
 
 def _first(robot: RobotState, witness: Witness, now: Instant) -> SeenObstacle | None:
