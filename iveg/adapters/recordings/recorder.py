@@ -165,13 +165,13 @@ class InputRecorder:
 
     async def _have_written(self) -> None:
         """Feed one process until it ends.  Raises HopError."""
-        self._told_rule = None
         writer = self._writer = await _start(self._setup, self.counters)
         feed = asyncio.create_task(self._feed(writer), name="recordings-feed")
         try:
             await writer.listen()
         except HopError:
-            self._writer = None
+            # The next one is told the rule anew.
+            self._writer = self._told_rule = None
             raise
         finally:
             feed.cancel()

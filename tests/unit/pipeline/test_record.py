@@ -5,6 +5,7 @@ from iveg.pipeline.record import OdometryThinner, RecordQueue, Waiting
 from tests.fakes.records import (
     NOON,
     alert_record,
+    audit_record,
     climate_record,
     command_event_record,
     command_record,
@@ -18,6 +19,7 @@ from tests.fakes.records import (
 
 KEPT = (
     alert_record(),
+    audit_record(),
     command_event_record(),
     command_record(),
     decision_record(),
