@@ -225,7 +225,7 @@ class Settings:
     )
     recordings: Switch = setting(
         "IVEG_RECORDINGS",
-        True,
+        False,
         "Keep what comes in, byte for byte (docs/interfaces/recordings.md).",
     )
     keep_recordings_days: Days = setting(
