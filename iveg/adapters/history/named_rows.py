@@ -1,0 +1,96 @@
+"""Rows that people call by name, each change of them with its row of the audit."""
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Generic, TypeVar
+
+from sqlalchemy import Connection, Table, insert, select
+from sqlalchemy.exc import IntegrityError, SQLAlchemyError
+
+from iveg.adapters import clock
+from iveg.adapters.history.audit import write_audit
+from iveg.adapters.history.engine import reading_engine
+from iveg.adapters.history.migrate import reason_of
+from iveg.adapters.history.store import Store
+from iveg.adapters.ids import new_id
+from iveg.domain.accounts import Account, ApiToken, name_key
+from iveg.domain.audit import Actor, canonical
+from iveg.domain.errors import HopError, NameTakenError
+from iveg.domain.records import AuditRecord, Json
+
+R = TypeVar("R", Account, ApiToken)
+
+
+class NamedRows(Generic[R]):
+    """Reads and adds rows of one table; blocks, so a server calls it in a thread.
+
+    Every method raises ``HopError`` when the database does not answer.
+
+    Args:
+        database_url: Of the history.
+        table: Its columns are the fields of a row, and ``name_key``, which is unique.
+        kind: Of a row.
+        key: The field by which they are read.
+    """
+
+    def __init__(
+        self, database_url: str, table: Table, kind: type[R], key: str
+    ) -> None:
+        self._store = Store(database_url)
+        self._reading = reading_engine(database_url)
+        self._table, self._key = table, key
+        self._kind: type[R] = kind
+        self._columns = [one for one in table.c if one.key != "name_key"]
+
+    def read(self) -> Mapping[str, R]:
+        """All rows, by their key."""
+        try:
+            with self._reading.connect() as connection:
+                rows = connection.execute(select(*self._columns)).mappings()
+                return {row[self._key]: self._kind(**row) for row in rows}
+        except SQLAlchemyError as error:
+            raise HopError("database", reason_of(error)) from error
+
+    def _add(self, row: R, by: Actor, action: str, told: Json) -> None:
+        """Keep a new row.
+
+        Raises:
+            NameTakenError: one is called so already.
+        """
+        values = asdict(row) | {"name_key": name_key(row.name)}
+
+        def work(connection: Connection) -> bool:
+            try:
+                with connection.begin_nested():
+                    connection.execute(insert(self._table).values(**values))
+            except IntegrityError:
+                return False
+            note_change(connection, by, action, row.name, told)
+            return True
+
+        if not self._store.run(work):
+            raise NameTakenError(row.name)
+
+    def close(self) -> None:
+        """Let go of the connections."""
+        self._store.close()
+        self._reading.dispose()
+
+
+def note_change(
+    connection: Connection, by: Actor, action: str, name: str, told: Json
+) -> None:
+    """Write a change of somebody's rights into the audit, in the same transaction."""
+    now = clock.wall()
+    row = AuditRecord(
+        audit_id=new_id(),
+        at=now,
+        person=by.person,
+        name=by.name,
+        role=by.role,
+        method=by.method,
+        action=action,
+        subject=name,
+        details=canonical(told),
+    )
+    write_audit(connection, [row], now)
