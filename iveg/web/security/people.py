@@ -5,10 +5,9 @@ every page within a second.  While the database is away the last that was read c
 before the first reading a session may stop and no more.
 """
 
-import asyncio
 import contextlib
 from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from typing import Protocol, TypeVar
 
 from iveg.adapters.admission import Admission, ChangingAccounts
@@ -18,11 +17,10 @@ from iveg.domain.accounts import Account, digest_of, name_key
 from iveg.domain.audit import Actor
 from iveg.domain.errors import HopError
 from iveg.pipeline.ports import Clock
+from iveg.web.security.rereading import Rereading
 from iveg.web.security.roles import Role
 
 _T = TypeVar("_T")
-EVERY_S = 0.4
-"""Between two readings of who may come in (s)."""
 
 
 class Accounts(ChangingAccounts, Protocol):
@@ -35,7 +33,7 @@ class Accounts(ChangingAccounts, Protocol):
         """Exchange an invitation for a password, once; None where it is none."""
 
 
-class People:
+class People(Rereading):
     """Knows who may sign in, and which sessions still stand.
 
     Args:
@@ -45,23 +43,15 @@ class People:
     """
 
     def __init__(self, store: Accounts, passwords: Passwords, clock: Clock) -> None:
+        super().__init__("accounts")
         self._store = store
         self._passwords = passwords
         self._clock = clock
-        self._thread = ThreadPoolExecutor(1, "accounts")
         self._known: Mapping[str, Account] | None = None
-
-    async def run(self) -> None:
-        """Read them again and again, until cancelled."""
-        while True:
-            with contextlib.suppress(HopError):
-                await self.refresh()
-            await asyncio.sleep(EVERY_S)
 
     async def refresh(self) -> None:
         """Read them once. Raises HopError."""
-        loop = asyncio.get_running_loop()
-        self._known = await loop.run_in_executor(self._thread, self._store.read)
+        self._known = await self._apart(self._store.read)
 
     async def known(self) -> Mapping[str, Account]:
         """All accounts as they are kept now, by id. Raises HopError."""
@@ -81,10 +71,7 @@ class People:
             HopError: the database is away; nothing was changed.
         """
         admission = Admission(self._store, by, self._clock().wall)
-        loop = asyncio.get_running_loop()
-        done = await loop.run_in_executor(
-            self._thread, lambda: work(admission, self._store.read())
-        )
+        done = await self._apart(lambda: work(admission, self._store.read()))
         with contextlib.suppress(HopError):
             await self.refresh()
         return done
@@ -126,14 +113,11 @@ class People:
         if not any(one.invitation == digest for one in (self._known or {}).values()):
             return None
         kept = await self._passwords.hashed(password)
-        loop = asyncio.get_running_loop()
-        account = await loop.run_in_executor(
-            self._thread, self._store.accept, digest, kept, now
-        )
+        account = await self._apart(partial(self._store.accept, digest, kept, now))
         await self.refresh()
         return account
 
     def close(self) -> None:
         """End the threads."""
-        self._thread.shutdown(wait=False)
+        super().close()
         self._passwords.close()

@@ -4,16 +4,13 @@ Read anew twice a second, as accounts are, so that a token that is revoked at th
 console is none within a second; use is written down once a minute at most.
 """
 
-import asyncio
-import contextlib
 from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from typing import Final, Protocol
 
 from iveg.domain.accounts import ApiToken, TokenScope, digest_of
-from iveg.domain.errors import HopError
 from iveg.pipeline.ports import Clock
-from iveg.web.security.people import EVERY_S
+from iveg.web.security.rereading import Rereading
 from iveg.web.security.roles import Principal, Role
 
 _ROLES: Final[Mapping[TokenScope, Role]] = {
@@ -34,7 +31,7 @@ class ApiTokens(Protocol):
         """Keep when tokens were used last (Unix s)."""
 
 
-class Programs:
+class Programs(Rereading):
     """Knows the tokens of programs.
 
     Args:
@@ -43,27 +40,20 @@ class Programs:
     """
 
     def __init__(self, store: ApiTokens, clock: Clock) -> None:
+        super().__init__("api-tokens")
         self._store = store
         self._clock = clock
-        self._thread = ThreadPoolExecutor(1, "api-tokens")
         self._known: Mapping[str, ApiToken] = {}
         self._used: dict[str, float] = {}
         self._kept_at = clock().mono
 
-    async def run(self) -> None:
-        """Read them again and again, until cancelled."""
-        while True:
-            with contextlib.suppress(HopError):
-                await self.refresh()
-            await asyncio.sleep(EVERY_S)
-
     async def refresh(self) -> None:
         """Read them once, and keep what was used. Raises HopError."""
-        loop, now = asyncio.get_running_loop(), self._clock().mono
+        now = self._clock().mono
         if self._used and now - self._kept_at >= _USED_S:
             used, self._used, self._kept_at = self._used, {}, now
-            await loop.run_in_executor(self._thread, self._store.used, used)
-        self._known = await loop.run_in_executor(self._thread, self._store.read)
+            await self._apart(partial(self._store.used, used))
+        self._known = await self._apart(self._store.read)
 
     def find(self, token: str) -> Principal | None:
         """Whose token this is; None: nobody's, or nobody's any more."""
@@ -80,10 +70,6 @@ class Programs:
         return next(
             (_principal(one) for one in known if one.token_id == principal.person), None
         )
-
-    def close(self) -> None:
-        """End the thread."""
-        self._thread.shutdown(wait=False)
 
 
 def _principal(token: ApiToken) -> Principal:
