@@ -133,7 +133,7 @@ class Filters(RowFilters):
 
 def admitting(asked: RowFilters) -> Callable[[JudgedDetection], bool]:
     """Whether a detection that is in memory is one of those that are asked for."""
-    since, until = _seconds(asked.since), _seconds(asked.until)
+    since, until = seconds(asked.since), seconds(asked.until)
 
     def admits(judged: JudgedDetection) -> bool:
         one, frame, received = judged
@@ -162,8 +162,8 @@ def filter_of(filters: Filters, of: ListOf[R]) -> Filter:
         names = ", ".join((lists.BY_TIME, *of.sorts))
         raise _invalid("sort", f"one of {names}, with or without a - before it")
     return Filter(
-        since=_seconds(filters.since),
-        until=_seconds(filters.until),
+        since=seconds(filters.since),
+        until=seconds(filters.until),
         robot=filters.robot,
         class_=filters.class_,
         person=filters.person,
@@ -191,7 +191,8 @@ def range_of(
     return since, until
 
 
-def _seconds(moment: datetime | None) -> float | None:
+def seconds(moment: datetime | None) -> float | None:
+    """Unix time (s); None where none was asked for."""
     return None if moment is None else moment.timestamp()
 
 

@@ -18,7 +18,7 @@ from iveg.models.base import Listing
 from iveg.models.note import Note
 from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json
-from iveg.web.api.history_filters import Moment, Span
+from iveg.web.api.history_filters import Moment, Span, seconds
 from iveg.web.pages.local_time import in_madrid
 from iveg.web.security.authentication import Principal, require
 
@@ -66,14 +66,9 @@ def router(
     )
     async def notes(asked: Annotated[Span, Query()]) -> Response:
         """Notes by when they were written, newest first."""
-        since, until = asked.since, asked.until
-        page = await queries.notes(
-            lists.Filter(
-                since=None if since is None else since.timestamp(),
-                until=None if until is None else until.timestamp(),
-                limit=lists.MOST_ROWS,
-            )
-        )
+        since, until = seconds(asked.since), seconds(asked.until)
+        wanted = lists.Filter(since=since, until=until, limit=lists.MOST_ROWS)
+        page = await queries.notes(wanted)
         return Json(Listing(items=[Note.of_record(one) for one in page.items]))
 
     @routes.post("/notes", status_code=201)
