@@ -58,6 +58,23 @@ CONSOLE: Final = NamedActor("console", "console", "system", "shell")
 """Whoever calls ``iveg`` on the machine itself."""
 
 
+def act_of(
+    actor: Actor, action: str, subject: str, details: Json, *, audit_id: str, at: float
+) -> AuditRecord:
+    """What somebody did at a moment (Unix s), without its place in the chain yet."""
+    return AuditRecord(
+        audit_id=audit_id,
+        at=at,
+        person=actor.person,
+        name=actor.name,
+        role=actor.role,
+        method=actor.method,
+        action=action,
+        subject=subject,
+        details=canonical(details),
+    )
+
+
 @dataclass(frozen=True, slots=True)
 class ChainEnd:
     """The newest row of the chain, or of its part that has gone."""

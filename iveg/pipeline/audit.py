@@ -4,9 +4,9 @@ It never waits: rows go the way of the history, so that a STOP works where the d
 full or the database away, and the row that comes late says so.
 """
 
-from iveg.domain.audit import Actor, canonical
+from iveg.domain.audit import Actor, act_of
 from iveg.domain.observations import Instant
-from iveg.domain.records import AuditRecord, Json
+from iveg.domain.records import Json
 from iveg.pipeline.ports import Ids
 from iveg.pipeline.record import RecordSink
 
@@ -33,16 +33,6 @@ class AuditTrail:
         at: Instant,
     ) -> None:
         """Write one act down; returns at once."""
-        self._sink.enqueue(
-            AuditRecord(
-                audit_id=self._new_id(),
-                at=at.wall,
-                person=actor.person,
-                name=actor.name,
-                role=actor.role,
-                method=actor.method,
-                action=action,
-                subject=subject,
-                details=canonical(details or {}),
-            )
-        )
+        told, audit_id = details or {}, self._new_id()
+        act = act_of(actor, action, subject, told, audit_id=audit_id, at=at.wall)
+        self._sink.enqueue(act)

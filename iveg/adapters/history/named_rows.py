@@ -14,9 +14,9 @@ from iveg.adapters.history.migrate import reason_of
 from iveg.adapters.history.store import Store
 from iveg.adapters.ids import new_id
 from iveg.domain.accounts import Account, ApiToken, name_key
-from iveg.domain.audit import Actor, canonical
+from iveg.domain.audit import Actor, act_of
 from iveg.domain.errors import HopError, NameTakenError
-from iveg.domain.records import AuditRecord, Json
+from iveg.domain.records import Json
 
 R = TypeVar("R", Account, ApiToken)
 
@@ -82,15 +82,5 @@ def note_change(
 ) -> None:
     """Write a change of somebody's rights into the audit, in the same transaction."""
     now = clock.wall()
-    row = AuditRecord(
-        audit_id=new_id(),
-        at=now,
-        person=by.person,
-        name=by.name,
-        role=by.role,
-        method=by.method,
-        action=action,
-        subject=name,
-        details=canonical(told),
-    )
-    write_audit(connection, [row], now)
+    act = act_of(by, action, name, told, audit_id=new_id(), at=now)
+    write_audit(connection, [act], now)
