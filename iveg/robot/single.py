@@ -19,7 +19,6 @@ from iveg.ngsi.codec.fields import (
     write_lidar_header,
     write_motion,
     write_origin,
-    write_ranges,
 )
 from iveg.ngsi.codec.reports import write_unread
 
@@ -62,7 +61,7 @@ class SinglePayload:
             self._saw_nothing = False
             payload |= {names.BOXES: [], names.BOXES_HEADER: origin}
         if self.scan is not None:
-            payload["laser_scan"] = write_ranges(self.scan.ranges)
+            payload["laser_scan"] = self.scan.ranges
             payload[names.LIDAR_HEADER] = write_lidar_header(self.scan, origin)
             self.scan = None
         return orjson.dumps(payload, option=orjson.OPT_SERIALIZE_NUMPY)

@@ -72,7 +72,8 @@ def sweep(
     _discs(sensor, model, round_things, ranges)
     ranges += rng.normal(0.0, model.noise, model.beams)
     ranges[(ranges > model.range_max) | (ranges < model.range_min)] = np.inf
-    return ranges.astype(np.float32)
+    # Lasers count millimetres.
+    return ranges.round(3).astype(np.float32)
 
 
 def _discs(sensor: Pose2D, model: LaserModel, discs: Floats, ranges: Floats) -> None:

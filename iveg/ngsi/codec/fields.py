@@ -2,9 +2,6 @@
 
 from collections.abc import Iterable, Mapping
 
-import numpy as np
-from numpy.typing import NDArray
-
 from iveg.domain.errors import UnreadableError
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import FeedbackRef, Hold, LaserScan, Origin
@@ -75,15 +72,6 @@ def read_holds(values: Iterable[payloads.HoldValue]) -> tuple[Hold, ...]:
 def write_hold(hold: Hold) -> dict[str, str]:
     """One hold of a robot's report."""
     return {"id": hold.id, "source": hold.source, "ack": hold.ack}
-
-
-def write_ranges(ranges: NDArray[np.float32]) -> NDArray[np.float64]:
-    """The numbers of a scan as a driver prints them: float32, with all its digits.
-
-    Eleven decimals tell any two float32 of a millimetre or more apart; Orion keeps
-    nine, which is as good from a decimetre on.
-    """
-    return ranges.astype(np.float64).round(11)
 
 
 def write_motion(pose: Pose2D, twist: Twist2D) -> dict[str, object]:

@@ -27,7 +27,6 @@ from iveg.ngsi.codec.fields import (
     write_lidar_header,
     write_motion,
     write_origin,
-    write_ranges,
 )
 
 
@@ -49,7 +48,7 @@ def write_scan(value: LaserScan) -> bytes:
     return _measure(
         value.origin,
         {
-            names.LIDAR: write_ranges(value.ranges),
+            names.LIDAR: value.ranges,
             names.LIDAR_HEADER: write_lidar_header(value, write_origin(value.origin)),
         },
     )
