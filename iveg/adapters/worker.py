@@ -7,7 +7,6 @@ and is made anew where it died or took too long.  Questions wait in one short li
 
 import asyncio
 import multiprocessing
-import os
 import pickle
 import signal
 from collections.abc import Callable, Mapping, Sequence
@@ -16,6 +15,7 @@ from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
 from typing import ParamSpec, TypeVar
 
+from iveg.adapters.urgency import give_way
 from iveg.domain.errors import HopError
 
 MOST_WAITING = 16
@@ -23,7 +23,6 @@ MOST_WAITING = 16
 LIMIT_S = 60.0
 """Time that one may take."""
 _NAME = "worker"
-_LESS_URGENT = 10
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
 
@@ -129,7 +128,7 @@ class Worker:
 def _serve(line: Connection) -> None:
     """Answer until the server is gone; Ctrl-C is the server's to heed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    os.nice(_LESS_URGENT)
+    give_way()
     while True:
         try:
             work, args, kwargs = line.recv()

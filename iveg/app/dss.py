@@ -136,8 +136,8 @@ class Dss:
             self.upkeep.counters,
             self.stores.inputs.counters,
         ]
-        recordings = self.stores.inputs.folder
-        self.past = Viewers(PastSite.of(settings, recordings), clock.now)
+        site = PastSite.of(settings, self.stores.inputs.folder)
+        self.past = Viewers(site, clock.now, has_spare=settings.recordings)
         self.worker = Worker(partial(self.pipeline.supervision.failed, "worker"))
         self._attach_reader()
         self.provisioner = self._provisioner()

@@ -1,12 +1,14 @@
 """Who looks at the past: for each a process of its own, so that the loop feels nothing.
 
 A process begins with the first question, keeps its world for the next, and ends when
-nobody has asked for a while.
+nobody has asked for a while.  Where there are recordings one is always ready for who
+comes next, because its imports alone take a second.
 """
 
 import asyncio
+import contextlib
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Final
 
 from iveg.adapters.worker import Worker
@@ -49,6 +51,12 @@ def world_at(site: Site, wall: float) -> Shown:
     return asyncio.run(_world_at(site, wall))
 
 
+def make_ready(site: Site) -> None:
+    """Make the world before anybody asks for it; in the process of a viewer."""
+    with contextlib.suppress(DataFileError):
+        _past.setdefault(site, Past(site))
+
+
 async def _world_at(site: Site, wall: float) -> Shown:
     """Orders of the past begin tasks, which end with the question: none gets out."""
     try:
@@ -81,7 +89,11 @@ class Viewer:
     """A process, and when it was asked last (monotonic, s)."""
 
     asked_at: float
-    worker: Worker = field(default_factory=lambda: Worker(limit_s=_LIMIT_S))
+    worker: Worker
+
+
+def _worker() -> Worker:
+    return Worker(limit_s=_LIMIT_S)
 
 
 class Viewers:
@@ -90,14 +102,22 @@ class Viewers:
     Args:
         site: What worlds are made with.
         clock: Tells who has not asked for long.
+        has_spare: Whether a process is kept ready for the next viewer.
         work: Answers; tests pass another.
     """
 
     def __init__(
-        self, site: Site, clock: Clock, work: Callable[[Site, float], Shown] = world_at
+        self,
+        site: Site,
+        clock: Clock,
+        *,
+        has_spare: bool = False,
+        work: Callable[[Site, float], Shown] = world_at,
     ) -> None:
-        self._site, self._clock, self._work = site, clock, work
+        self._site, self._clock, self._has_spare = site, clock, has_spare
+        self._work = work
         self._viewers: dict[str, Viewer] = {}
+        self._spare: Worker | None = None
 
     @property
     def count(self) -> int:
@@ -125,7 +145,8 @@ class Viewers:
         viewer = self._viewers.get(name)
         if viewer is None:
             self._make_room(now)
-            viewer = self._viewers[name] = Viewer(now)
+            worker, self._spare = self._spare or _worker(), None
+            viewer = self._viewers[name] = Viewer(now, worker)
         viewer.asked_at = now
         return viewer
 
@@ -138,10 +159,20 @@ class Viewers:
         self._end(oldest)
 
     async def run(self) -> None:
-        """End what nobody asks any more, until cancelled."""
+        """End what nobody asks any more, and keep one ready, until cancelled."""
         while True:
             await asyncio.sleep(_CHECK_S)
             self.tick(self._clock())
+            await self.keep_ready()
+
+    async def keep_ready(self) -> None:
+        """Have a process for the next viewer, where one is wanted."""
+        if not self._has_spare or self._spare is not None:
+            return
+        spare = self._spare = _worker()
+        # Who comes meanwhile has this one, and waits in its line.
+        with contextlib.suppress(HopError):
+            await spare.run(make_ready, self._site)
 
     def tick(self, now: Instant) -> None:
         """End what nobody asks any more."""
@@ -156,3 +187,5 @@ class Viewers:
         """End all."""
         for name in list(self._viewers):
             self._end(name)
+        if self._spare is not None:
+            self._spare.close()

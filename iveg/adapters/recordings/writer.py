@@ -22,6 +22,7 @@ from iveg.adapters.recordings.directory import RecordingDirectory
 from iveg.adapters.recordings.drawing import Drawing
 from iveg.adapters.recordings.incoming import Incoming, Sort, Unpacking
 from iveg.adapters.recordings.mcap_file import McapFile
+from iveg.adapters.urgency import give_way
 from iveg.domain.disk_space import DiskSpace
 from iveg.domain.recordings import RecordingLimits
 
@@ -30,7 +31,6 @@ KEPT_ANEW = frozenset({"Rule"})
 """Rows whose newest also stands at the beginning of each file."""
 _HOUR_S = 3600.0
 _PIECE = 1 << 18
-_LESS_URGENT = 10
 
 
 @dataclass(frozen=True)
@@ -181,7 +181,7 @@ def main() -> None:
     """Signals are the feeder's to heed; its end is the writer's."""
     for one in (signal.SIGINT, signal.SIGTERM):
         signal.signal(one, signal.SIG_IGN)
-    os.nice(_LESS_URGENT)
+    give_way()
     with (
         open(0, "rb", buffering=0) as source,
         open(1, "wb", buffering=0) as answers,

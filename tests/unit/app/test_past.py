@@ -1,6 +1,7 @@
 """What was recorded, played through the pipeline again, is the world that was."""
 
 import asyncio
+import multiprocessing
 import os
 import pickle
 import re
@@ -321,12 +322,17 @@ async def test_a_viewer_is_a_process_of_its_own_that_ends_when_idle(
     folder: Path,
 ) -> None:
     clock = FakeClock()
-    viewers = Viewers(site_of(folder), clock)
+    viewers = Viewers(site_of(folder), clock, has_spare=True)
     try:
+        await viewers.keep_ready()
+        assert viewers.count == 0
+        (ready,) = multiprocessing.active_children()
         told = orjson.loads(await viewers.world("ana", START.wall + 9))
         here = Past(site_of(folder))
         here.move(START.wall + 9)
         assert orjson.loads(picture_of(here).model_dump_json()) == told
+        # Who came first has the process that was ready.
+        assert multiprocessing.active_children() == [ready]
         with pytest.raises(NotRecordedError):
             await viewers.world("ana", START.wall + 9999)
         clock.now += IDLE_S + 1
