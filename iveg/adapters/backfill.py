@@ -69,7 +69,7 @@ class BackfillReader:
         except UnreadableError as error:
             self._reject(robot_id, error.reason, error.detail)
             return
-        self._recorded(topic, payload, at, False)
+        self._recorded(topic, payload, at)
         for problem in problems:
             self._reject(problem.source, problem.reason, problem.detail)
         self._take(batch, at)

@@ -12,7 +12,6 @@ from functools import partial
 from iveg.domain.kinds import KINDS, Kind, Scope
 from iveg.domain.observations import (
     Instant,
-    LaserScan,
     Observation,
     Received,
     kind_of,
@@ -21,7 +20,7 @@ from iveg.domain.transports import DIRECT
 from iveg.ngsi import codec, names
 
 PassedOver = Callable[[str, type[Observation], int], None]
-Recorded = Callable[[str, bytes, Instant, bool], None]
+Recorded = Callable[[str, bytes, Instant], None]
 _WIDER: Sequence[Scope] = ("off", "safety", "all")
 
 
@@ -59,8 +58,7 @@ class DirectReader:
         is_past: Tells by its identity what FIWARE has already brought.
         passed_over: Told of a robot's messages of one kind that reached the broker and
             were not read, because a newer one was there.
-        recorded: Told of each message that is read: topic, payload, when, and whether
-            it is a scan.
+        recorded: Told of each message that is read: topic, payload, and when.
     """
 
     def __init__(
@@ -139,7 +137,7 @@ class DirectReader:
         if self._is_early(source, at.mono):
             self.pass_over(topic, 1)
             return
-        self._recorded(topic, payload, at, source.kind is LaserScan)
+        self._recorded(topic, payload, at)
         reading = source.read(payload)
         for problem in reading.problems:
             self._reject(problem.source, problem.reason, problem.detail)

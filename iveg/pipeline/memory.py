@@ -21,7 +21,10 @@ from iveg.pipeline.build import Pipeline
 
 _CONSTANTS = Greenhouse, FleetDescription, Plan
 _OURS = "iveg.domain.", "iveg.pipeline."
-_LEFT_OUT = "hub", "latency", "evaluator.tracking.newest", "commander._sender"
+_LEFT_OUT = (
+    *("hub", "latency", "commander._sender"),
+    *("evaluator.tracking.newest", "evaluator.tracking.kept"),
+)
 """Parts that no picture of the world needs."""
 _TASKS = "_tasks"
 _PLAIN: Final = {

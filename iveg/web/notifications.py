@@ -20,7 +20,7 @@ from iveg.web.problems import Problem, problem_of
 from iveg.web.security.authentication import Action, NotifySecret
 from iveg.web.security.headers import MAX_BODY, NOTIFICATIONS_PATH, TOO_LONG
 
-Recorded = Callable[[bytes, Instant, str, Sequence[Observation]], None]
+Recorded = Callable[[bytes, Instant, Sequence[Observation]], None]
 _TAKEN = (
     {"type": "http.response.start", "status": 204, "headers": []},
     {"type": "http.response.body", "body": b""},
@@ -41,8 +41,7 @@ class NotificationEndpoint:
         is_thinned: Whether Orion leaves out most of what a subscription is about.
         equipment: Id and type of the entities that ``measured`` is told of.
         measured: Told of other equipment; must neither wait nor fail.
-        recorded: Told of each body that is read, its subscription and what is observed
-            in it; likewise.
+        recorded: Told of each body that is read and what is observed in it; likewise.
         is_former: Whether a secret may be that of our own earlier start.
     """
 
@@ -157,7 +156,7 @@ class NotificationEndpoint:
             self._ingest.reject(subscription_id, "unknown_subscription")
             return None
         self._heard(at)
-        self._recorded(body, at, subscription_id, reading.observations)
+        self._recorded(body, at, reading.observations)
         for problem in reading.problems:
             self._ingest.reject(problem.source, problem.reason, problem.detail)
         for told in reading.equipment:

@@ -35,7 +35,7 @@ async def main():
     asyncio.create_task(recorder.run())
     while True:
         now = clock.now()
-        recorder.measure("/iveg/AGI_odom/attrs", repr(now.mono).encode(), now, False)
+        recorder.measure("/iveg/AGI_odom/attrs", repr(now.mono).encode(), now)
         await asyncio.sleep(0.01)
 
 asyncio.run(main())

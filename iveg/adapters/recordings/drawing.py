@@ -56,15 +56,15 @@ class Drawing:
         with contextlib.suppress(UnreadableError):
             self._read(came)
         for one in self._found:
-            with contextlib.suppress(UnreadableError):
-                for channel, value in foxglove.told(_read(one), came.at.wall):
-                    yield channel, orjson.dumps(value)
+            for channel, value in foxglove.told(one, came.at.wall):
+                yield channel, orjson.dumps(value)
 
     def _read(self, came: Incoming) -> None:
         if came.sort is Sort.NOTIFICATION:
             _, reading = read_notification(came.payload, lambda *_: False, UNREAD)
             for one in reading.observations:
-                self._draw(one)
+                with contextlib.suppress(UnreadableError):
+                    self._draw(one)
         elif came.sort is Sort.MEASURE:
             stream = self._reader.stream(came.name)
             if stream is None or self._is_due(stream):
@@ -74,12 +74,17 @@ class Drawing:
         self._draw(received.observation)
 
     def _draw(self, observation: Observation) -> None:
+        """Have one drawn that is due.  Raises UnreadableError."""
         stream = observation.robot_id, kind_of(observation)
         is_ours = observation.robot_id in self._robots
         if is_ours and isinstance(observation, _DRAWN) and self._is_due(stream):
+            one = _read(observation)
+            if isinstance(one, LaserScan) and not one.ranges.size:
+                # A twin without its numbers takes nobody's turn.
+                return
+            self._found.append(one)
             apart_s = DRAWN_APART_S[kind_of(observation)] * _EARLY
             self._due[stream] = self._at.mono + apart_s
-            self._found.append(observation)
 
     def _is_due(self, stream: _Stream) -> bool:
         is_drawn = stream[1] in DRAWN_APART_S

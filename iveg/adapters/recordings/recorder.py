@@ -8,6 +8,7 @@ counted; so is what a process that ended had not kept yet.
 
 import asyncio
 import logging
+import re
 from collections import Counter
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -24,7 +25,7 @@ from iveg.adapters.recordings.writer_process import WriterProcess
 from iveg.adapters.worker import Worker
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import HopError
-from iveg.domain.observations import Instant, LaserScan, Observation, kind_of
+from iveg.domain.observations import Instant, LaserScan, Observation, Overtaken
 from iveg.domain.recordings import RecordingFile
 from iveg.domain.records import Record, is_telemetry
 from iveg.pipeline.ports import Clock
@@ -38,8 +39,8 @@ WRITE_S = 0.25
 RESCUE_S = 1800.0
 QUIET_S = 60.0
 """What is dropped is told again where nothing was for so long (s)."""
-SCANS_APART_S = 0.19
-"""The least time between two scans of a topic, byte for byte (s): five a second."""
+_NUMBERS = re.compile(rb"\[[-+.,\deE\snul]{100,}\]")
+"""A long list of numbers in JSON."""
 
 
 class RecordedSink:
@@ -82,25 +83,27 @@ class InputRecorder:
         self._waiting: list[bytes] = []
         self._bytes = 0
         self._dropped_at = float("-inf")
-        self._due: dict[str, float] = {}
         self._told_rule: DetectionRule | None = None
         self._writer: WriterProcess | None = None
 
     # --- what comes in ------------------------------------------------------------
 
-    def measure(self, topic: str, payload: bytes, at: Instant, is_scan: bool) -> None:
+    def measure(self, topic: str, payload: bytes, at: Instant) -> None:
         """A robot's own message, read from the broker."""
-        if self._is_on and (not is_scan or self._is_due(topic, at)):
+        if self._is_on:
             self._queue(pack(Sort.MEASURE, at, topic, payload))
 
     def notification(
-        self, body: bytes, at: Instant, subject: str, observed: Sequence[Observation]
+        self, body: bytes, at: Instant, observed: Sequence[Observation]
     ) -> None:
-        """A notification of Orion's, its subscription, and what was read in it."""
-        if not self._is_on:
-            return
-        if not _is_scans(observed) or self._is_due(subject, at):
-            self._queue(pack(Sort.NOTIFICATION, at, "", body))
+        """A notification of Orion's, and what was read in it.
+
+        Of a scan that its twin has overtaken nothing but its identity was read, and
+        nothing else is recorded: its numbers are those of its twin.
+        """
+        if self._is_on:
+            told = _NUMBERS.sub(b"[]", body) if _are_twins(observed) else body
+            self._queue(pack(Sort.NOTIFICATION, at, "", told))
 
     def row(self, record: Record) -> None:
         """A row of the history; telemetry is here already, as it came."""
@@ -125,12 +128,6 @@ class InputRecorder:
     def _write_down(self, row: Record | DetectionRule, name: str) -> None:
         payload = orjson.dumps(row, default=dict, option=orjson.OPT_SERIALIZE_NUMPY)
         self._queue(pack(Sort.ROW, self._clock(), name, payload))
-
-    def _is_due(self, stream: str, at: Instant) -> bool:
-        if at.mono < self._due.get(stream, float("-inf")):
-            return False
-        self._due[stream] = at.mono + SCANS_APART_S
-        return True
 
     def _queue(self, packed: bytes) -> None:
         is_full = len(self._waiting) >= MOST_WAITING
@@ -258,6 +255,8 @@ async def _in_thread(work: Callable[[], _T]) -> _T:
         raise HopError("disk", error.strerror or str(error)) from error
 
 
-def _is_scans(observed: Sequence[Observation]) -> bool:
-    """Whether it is of scans alone."""
-    return bool(observed) and all(kind_of(one) is LaserScan for one in observed)
+def _are_twins(observed: Sequence[Observation]) -> bool:
+    """Whether there is nothing but scans that were overtaken."""
+    return bool(observed) and all(
+        isinstance(one, Overtaken) and one.kind is LaserScan for one in observed
+    )

@@ -28,7 +28,7 @@ from iveg.adapters.recordings.writer import WriterSetup
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.disk_space import DiskSpace
 from iveg.domain.errors import DataFileError, HopError
-from iveg.domain.observations import Instant
+from iveg.domain.observations import Instant, LaserScan, Observation, Overtaken
 from iveg.domain.records import ClimateRecord, LogRecord
 from iveg.ngsi import codec
 from tests.builders import (
@@ -46,6 +46,7 @@ from tests.fakes.clock import FakeClock
 from tests.fakes.recorder import FakeRecorder
 from tests.fakes.recordings import WriterInPlace
 
+TWINS = "/ngsi/notifications"
 ODOM, SCAN = "/iveg/AGI_odom/attrs", "/iveg/AGI_lidar2D/attrs"
 
 
@@ -62,7 +63,7 @@ class Site:
         self.close = self.writer.finish
 
     def hear(self, seconds: float, payload: bytes = b"{}", topic: str = ODOM) -> None:
-        self.recorder.measure(topic, payload, at(seconds), topic == SCAN)
+        self.recorder.measure(topic, payload, at(seconds))
 
     def write(self, seconds: float) -> None:
         self.clock.now = seconds
@@ -105,7 +106,7 @@ def privately(path: Path) -> list[tuple[str, float, bytes]]:
 async def test_what_came_in_is_there_byte_for_byte_with_its_time(site: Site) -> None:
     body = b'{ "subscriptionId": "1", "data": [] }'
     site.hear(0.0, b'{"x":  1}')
-    site.recorder.notification(body, at(0.125), "1", ())
+    site.recorder.notification(body, at(0.125), ())
     site.recorder.tick(Instant(START.mono + 0.25, START.wall + 1000.25))
     site.write(0.3)
     site.close()
@@ -132,9 +133,9 @@ async def test_viewers_draw_poses_scans_and_boxes_thinned(site: Site) -> None:
         body = notification({"base_pose_ground_truth": pose})
         site.hear(n / 30, codec.write_odometry(odometry(x=n, origin=origin(n))))
         # The copy by FIWARE is no second picture, and a stranger none at all.
-        site.recorder.notification(body, at(n / 30), "1", [odometry()])
+        site.recorder.notification(body, at(n / 30), [odometry()])
         strange = notification({"base_pose_ground_truth": pose}, robot_id="B1")
-        site.recorder.notification(strange, at(n / 30), "1", [odometry("B1")])
+        site.recorder.notification(strange, at(n / 30), [odometry("B1")])
         site.hear(n / 30, looked, "/iveg/AGI_yolox_bounding_boxes/attrs")
         site.hear(n / 30, codec.write_scan(scan()), SCAN)
     site.hear(0.99, b'{"no": "scan"}', SCAN)
@@ -155,18 +156,28 @@ async def test_viewers_draw_poses_scans_and_boxes_thinned(site: Site) -> None:
     assert box["cubes"][0]["pose"]["position"] == {"x": 3.0, "y": 0.0, "z": 0.9}
 
 
-async def test_scans_are_kept_five_times_a_second(site: Site) -> None:
-    for n in range(30):
-        site.hear(n / 30, topic=SCAN)
-        site.hear(n / 30)
-        site.recorder.notification(b"{}", at(n / 30), "of scans", [scan()])
-    site.write(1.0)
+async def test_of_a_scan_that_its_twin_has_overtaken_no_numbers_are_kept(
+    site: Site,
+) -> None:
+    swept = scan(ranges=[2.5] * 360, angle_increment=0.01)
+    value = codec.write_scan(swept)
+    body = notification(orjson.loads(value))
+    twin = Overtaken("AGI", origin(), LaserScan)
+    site.hear(0.0, value, SCAN)
+    looks: list[list[Observation]] = [[twin], [twin, odometry()], [swept]]
+    for second, observed in enumerate(looks):
+        site.recorder.notification(body, at(second), observed)
+    site.write(3.0)
     site.close()
 
-    topics = [topic for topic, _, _ in privately(site.only())]
-    assert topics.count(SCAN) == 5
-    assert topics.count("/ngsi/notifications") == 5
-    assert topics.count(ODOM) == 30
+    kept = [one for topic, _, one in privately(site.only()) if topic == TWINS]
+    assert kept[1:] == [body, body]
+    told, whole = (orjson.loads(one)["data"][0] for one in (kept[0], body))
+    assert told["lidar_points"]["value"] == []
+    assert told | {"lidar_points": whole["lidar_points"]} == whole
+    # Of the twin without numbers viewers draw nothing, and the next one at once.
+    drawn = [schema for _, schema, _ in publicly(site.only())]
+    assert drawn.count("foxglove.LaserScan") == 3
 
 
 async def test_rows_of_the_history_are_recorded_but_no_telemetry(site: Site) -> None:
@@ -193,7 +204,7 @@ async def test_an_hour_has_a_file_of_its_own_and_a_clock_set_back_spoils_none(
     site.hear(3600.0)
     site.write(3600.0)
     back = Instant(START.mono + 3601.0, START.wall)
-    site.recorder.measure(ODOM, b"{}", back, is_scan=False)
+    site.recorder.measure(ODOM, b"{}", back)
     site.write(3601.0)
     site.close()
 
@@ -207,7 +218,7 @@ async def test_an_hour_has_a_file_of_its_own_and_a_clock_set_back_spoils_none(
 async def test_a_clock_that_is_set_within_an_hour_reorders_nothing(site: Site) -> None:
     for n, wall in enumerate((0.0, 100.0, 50.0)):
         then = Instant(START.mono + n, START.wall + wall)
-        site.recorder.measure(ODOM, b"{}", then, is_scan=False)
+        site.recorder.measure(ODOM, b"{}", then)
     site.write(3.0)
     site.close()
     assert [seconds for _, seconds, _ in privately(site.only())] == [0.0, 1.0, 2.0]
@@ -346,7 +357,7 @@ async def test_recordings_that_are_off_take_nothing_in(tmp_path: Path) -> None:
     site = Site(tmp_path, is_on=False)
     site.hear(0.0)
     site.recorder.tick(START)
-    site.recorder.notification(b"{}", START, "1", ())
+    site.recorder.notification(b"{}", START, ())
     assert site.recorder.waiting == 0
     assert not site.path.exists()
 
@@ -370,7 +381,7 @@ class Running:
         self.part = asyncio.create_task(self.recorder.run())
 
     def hear(self, number: int) -> None:
-        self.recorder.measure(ODOM, b"%d" % number, clock.now(), is_scan=False)
+        self.recorder.measure(ODOM, b"%d" % number, clock.now())
 
     async def until(self, holds: Callable[[], object]) -> None:
         async with asyncio.timeout(30.0):
@@ -394,7 +405,7 @@ async def test_a_process_that_hangs_and_is_killed_delays_nobody_and_another_goes
     os.kill(recorder.pid, signal.SIGSTOP)
     fits = MOST_BYTES // 10**6
     for _ in range(fits + 8):
-        recorder.measure(ODOM, b"0" * 10**6, clock.now(), is_scan=False)
+        recorder.measure(ODOM, b"0" * 10**6, clock.now())
     began = time.thread_time()
     await asyncio.sleep(2 * WRITE_S)
     assert time.thread_time() - began < 0.5

@@ -98,7 +98,7 @@ class Desk:
         self.store.write([Waiting(one, n, 0.0) for n, one in enumerate(rows, 1)])
         for n in range(1200):
             at = Instant(1000.0 + n / 10, NOON + n / 10)
-            self.recorder.measure(ODOM, b'{"n":%d}' % n, at, False)
+            self.recorder.measure(ODOM, b'{"n":%d}' % n, at)
         self.in_place.write(self.recorder, 1120.0)
 
     def log(self, event: LogEvent, at: Instant) -> None:
