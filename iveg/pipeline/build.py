@@ -203,7 +203,9 @@ def build(
         scans.newest,
         obstacles,
     )
-    commander = _commander(fleet.ids, ports, choices, event_log, health_monitor)
+    commander = _commander(
+        fleet.ids, ports, choices, event_log, health_monitor, supervision
+    )
     goals = _goals(world, greenhouse, commander, ports, event_log)
     totals = _totals(world, evaluator.people, event_log)
     loop = RuleLoop(
@@ -301,6 +303,7 @@ def _commander(
     choices: Choices,
     event_log: EventLog,
     health_monitor: HealthMonitor,
+    supervision: Supervision,
 ) -> Commander:
     return Commander(
         robots,
@@ -313,6 +316,7 @@ def _commander(
         drills=choices.drills,
         agent_lag_s=health_monitor.probe.lag,
         is_cut=lambda way, at: way == FIWARE.id and health_monitor.is_cut(at),
+        sent=supervision.guard("recordings", ports.trace.sent),
     )
 
 

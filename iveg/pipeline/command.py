@@ -71,6 +71,7 @@ class Commander:
         drills: When each robot's STOP was last proved.
         agent_lag_s: How far the IoT Agent is behind (s); None where nobody knows.
         is_cut: Whether what lies behind a transport is known to pass nothing on.
+        sent: Told each time that a send came back.
     """
 
     def __init__(
@@ -86,6 +87,7 @@ class Commander:
         drills: Drills,
         agent_lag_s: Callable[[Instant], float | None],
         is_cut: IsCut,
+        sent: Callable[[], None] = lambda: None,
     ) -> None:
         self.machines: Mapping[str, StopMachine] = {
             robot_id: StopMachine(robot_id, ports) for robot_id in robots
@@ -100,7 +102,7 @@ class Commander:
         self._sender = OrderSender(
             by_id, fleet, journal, event_log, clock, self._came_back, is_cut
         )
-        self._agent_lag_s = agent_lag_s
+        self._agent_lag_s, self._sent = agent_lag_s, sent
         self._journal = journal
         self._event_log = event_log
         self._new_id = new_id
@@ -327,6 +329,7 @@ class Commander:
         """A transport took the order or failed: the command's display changes."""
         self._perform(machine, effects, at)
         self._show(machine)
+        self._sent()
 
     def _show(self, machine: StopMachine) -> None:
         self._event_log.changed(topics.ROBOT.of(machine.robot_id))

@@ -38,6 +38,9 @@ class Trace:
     def looked(self, now: Instant) -> None:
         """The second witness looks at a scan."""
 
+    def sent(self) -> None:
+        """How an order was sent has come back."""
+
     def ticked(self, now: Instant) -> None:
         """The loop has let time pass."""
 
@@ -89,6 +92,10 @@ class Chronicle(Trace):
     def _note(self, now: Instant, kind: int) -> None:
         self.ids.now = now
         self._steps.append((now, kind))
+
+    def sent(self) -> None:
+        """No input: it is in the next memory."""
+        self._touched = True
 
     def row(self, record: Record) -> None:
         """What people did is no input: it is in the next memory."""
