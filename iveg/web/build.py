@@ -38,6 +38,7 @@ from iveg.web.api.answers import Apart
 from iveg.web.live import socket
 from iveg.web.pages.contexts import Site
 from iveg.web.pages.routes import Pages
+from iveg.web.refusals import DocumentedApp
 from iveg.web.security import audited, connections, headers, rate_limits
 from iveg.web.security.authentication import Authenticator, Principal
 from iveg.web.security.signin import SignInLink
@@ -136,7 +137,7 @@ def build_app(
         routers: Its routes.
         facts: Further arguments of FastAPI.
     """
-    app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None, **facts)
+    app = DocumentedApp(docs_url=None, redoc_url=None, openapi_url=None, **facts)
     app.state.authenticator, app.state.orion = face.authenticator, face.orion
     app.router.routes.append(face.orion.route())
     for router in routers:

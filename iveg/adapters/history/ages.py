@@ -27,9 +27,10 @@ def lost_of(
     lost: list[Literal["places", "telemetry"]] = []
     if any(connection.scalar(one) for one in (unplaced, unplaced_look)):
         lost.append("places")
-    unknown = select(exists().where(decided, s.started_at < driven))
-    if driven is not None and (driven >= until or connection.scalar(unknown)):
-        lost.append("telemetry")
+    if driven is not None:
+        unknown = select(exists().where(decided, s.started_at < driven))
+        if driven >= until or connection.scalar(unknown):
+            lost.append("telemetry")
     return tuple(lost)
 
 

@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict
 
 from iveg.models.experiment import Experiment, Experiments
 from iveg.web.api.answers import Json
+from iveg.web.refusals import refusals
 from iveg.web.security.authentication import require
 
 Size = Literal["minimal", "quick", "full"]
@@ -63,6 +64,7 @@ def router(bench: ExperimentRunner) -> APIRouter:
         "/experiments",
         status_code=202,
         response_model=Experiment,
+        responses=refusals(409),
         dependencies=Running,
     )
     async def start(wanted: Wanted) -> Response:

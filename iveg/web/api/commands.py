@@ -14,6 +14,7 @@ from iveg.pipeline.command import Commander
 from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.presses import DESCRIBED, press_of
+from iveg.web.refusals import refusals
 from iveg.web.security.authentication import Principal, require
 
 Pressing = Annotated[Principal, Depends(require("stop"))]
@@ -61,6 +62,7 @@ def router(commander: Commander, clock: Clock) -> APIRouter:
         "/robots/{robot_id}/drill",
         status_code=202,
         response_model=Pressed,
+        responses=refusals(409),
         openapi_extra=DESCRIBED,
     )
     async def drill(request: Request, robot_id: str, who: Releasing) -> Response:
@@ -73,6 +75,7 @@ def router(commander: Commander, clock: Clock) -> APIRouter:
         "/robots/{robot_id}/release",
         status_code=202,
         response_model=Pressed,
+        responses=refusals(409),
     )
     async def release(robot_id: str, body: ReleaseRequest, who: Releasing) -> Response:
         """Lift exactly the holds that the person saw; 409 when they have changed."""
@@ -83,6 +86,7 @@ def router(commander: Commander, clock: Clock) -> APIRouter:
         "/robots/{robot_id}/resume",
         status_code=202,
         response_model=Pressed,
+        responses=refusals(409),
     )
     async def resume(robot_id: str, who: Releasing) -> Response:
         """Let a released robot drive again."""

@@ -22,6 +22,7 @@ from iveg.models.places import Point
 from iveg.pipeline.evaluate import Evaluator
 from iveg.pipeline.mapping import Mapper
 from iveg.pipeline.ports import Clock
+from iveg.web.refusals import refusals
 from iveg.web.security.authentication import require
 
 _PNG = "image/png"
@@ -40,7 +41,7 @@ def router(mapper: Mapper, evaluator: Evaluator, clock: Clock) -> APIRouter:
     @routes.get(
         "/costmap",
         response_model=CostmapModel,
-        responses={200: {"content": {_PNG: {}}}},
+        responses={200: {"content": {_PNG: {}}}, **refusals(404)},
     )
     async def costmap(
         request: Request, robot: Annotated[str | None, Query(max_length=64)] = None

@@ -30,6 +30,7 @@ from iveg.web.api.history_filters import HistoryDay
 from iveg.web.pages.contexts import DayPage
 from iveg.web.pages.local_time import in_madrid, start_of
 from iveg.web.pages.routes import Pages
+from iveg.web.refusals import refusals
 from iveg.web.security.authentication import require
 
 _DAY = timedelta(days=1)
@@ -163,7 +164,13 @@ def router(days: Days, pages: Pages, clock: Clock) -> APIRouter:
     routes = APIRouter()
     who = Depends(require("read"))
 
-    @routes.get("/api/v1/day", response_model=Day, dependencies=[who], tags=["history"])
+    @routes.get(
+        "/api/v1/day",
+        response_model=Day,
+        dependencies=[who],
+        tags=["history"],
+        responses=refusals(503),
+    )
     async def numbers(
         day: Annotated[
             HistoryDay | None, Query(description="Today unless told")

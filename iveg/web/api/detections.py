@@ -23,7 +23,11 @@ def router(newest: NewestDetections, worker: Apart) -> APIRouter:
         prefix="/api/v1", tags=["live"], dependencies=[Depends(require("read"))]
     )
 
-    @routes.get("/detections/latest", response_model=Listing[DetectionRow])
+    @routes.get(
+        "/detections/latest",
+        response_model=Listing[DetectionRow],
+        responses={200: {"content": {one: {} for one in MEDIA_TYPES.values()}}},
+    )
     async def latest(
         request: Request, asked: Annotated[NewestFilters, Query()]
     ) -> Response:

@@ -9,6 +9,7 @@ from iveg.models.robot import Detector
 from iveg.pipeline.detectors import Detectors
 from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json
+from iveg.web.refusals import refusals
 from iveg.web.security.authentication import Principal, require
 
 
@@ -24,7 +25,9 @@ def router(detectors: Detectors, clock: Clock) -> APIRouter:
     """The word of an operator on a robot's detector."""
     routes = APIRouter(prefix="/api/v1", tags=["robots"])
 
-    @routes.put("/robots/{robot_id}/detector", response_model=Detector)
+    @routes.put(
+        "/robots/{robot_id}/detector", response_model=Detector, responses=refusals(503)
+    )
     async def service(
         robot_id: str,
         body: ServiceRequest,

@@ -10,6 +10,7 @@ from iveg.models.goal import Goal
 from iveg.pipeline.goals import GoalDispatcher
 from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json
+from iveg.web.refusals import refusals
 from iveg.web.security.authentication import Principal, require
 
 Sending = Annotated[Principal, Depends(require("release"))]
@@ -60,7 +61,7 @@ GoalRequest = Annotated[
 
 def router(goals: GoalDispatcher, clock: Clock) -> APIRouter:
     """Goals of robots."""
-    routes = APIRouter(prefix="/api/v1", tags=["commands"])
+    routes = APIRouter(prefix="/api/v1", tags=["commands"], responses=refusals(409))
 
     @routes.post("/robots/{robot_id}/goal", status_code=202, response_model=Goal)
     async def give(robot_id: str, body: GoalRequest, who: Sending) -> Response:

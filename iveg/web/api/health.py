@@ -1,6 +1,7 @@
 """Health of the data path: for people, supervisors and Prometheus."""
 
 from collections.abc import Callable
+from typing import Any
 
 from fastapi import APIRouter, Depends, Response
 from fastapi.responses import PlainTextResponse
@@ -11,6 +12,8 @@ from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.security.authentication import require
 
+_READY: dict[int | str, dict[str, Any]] = {503: {"description": "A hop is not well."}}
+
 
 def router(
     clock: Clock,
@@ -19,12 +22,16 @@ def router(
     """The endpoints that machines ask."""
     routes = APIRouter(tags=["health"])
 
-    @routes.get("/healthz", dependencies=[Depends(require("open"))])
+    @routes.get(
+        "/healthz",
+        dependencies=[Depends(require("open"))],
+        response_class=PlainTextResponse,
+    )
     async def alive() -> Response:
         """The process answers; says nothing else to strangers."""
         return PlainTextResponse("ok\n")
 
-    @routes.get("/readyz", dependencies=[Depends(require("read"))])
+    @routes.get("/readyz", dependencies=[Depends(require("read"))], responses=_READY)
     async def ready() -> Response:
         """200 when every hop is well, else 503."""
         state = health(clock())

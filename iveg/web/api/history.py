@@ -41,6 +41,7 @@ from iveg.web.api.history_filters import Filters, filter_of
 from iveg.web.pages.local_time import in_madrid
 from iveg.web.pages.sentences import Sentences
 from iveg.web.pages.translations import read_translations
+from iveg.web.refusals import refusals
 from iveg.web.security.authentication import Action, require
 
 R = TypeVar("R", bound=Record)
@@ -103,7 +104,11 @@ def router(
         fleet: Whose greatest speeds the chart is about.
         read_clock: What "the last 15 minutes" end at.
     """
-    routes = APIRouter(dependencies=[Depends(require("read"))], tags=["history"])
+    routes = APIRouter(
+        dependencies=[Depends(require("read"))],
+        tags=["history"],
+        responses=refusals(503),
+    )
     for one in lists_of(queries, flood):
         _add_list(routes, one, worker)
 
@@ -241,7 +246,7 @@ def _add_list(routes: APIRouter, one: HistoryList[R], worker: Apart) -> None:
         name=one.path,
         summary=one.says,
         response_model=one.listing,
-        responses={200: {"content": _FILES}},
+        responses={200: {"content": _FILES}, **refusals(501)},
         dependencies=[Depends(require(one.needs))],
     )
     async def listing(

@@ -34,6 +34,7 @@ from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Apart
 from iveg.web.api.history_filters import Span
 from iveg.web.pages.incident_report import write_report
+from iveg.web.refusals import refusals
 from iveg.web.security.authentication import Principal, require
 
 MEDIA_TYPE = "application/zip"
@@ -83,7 +84,11 @@ def router(sources: Sources) -> APIRouter:
     """The route of incident packs."""
     routes = APIRouter(prefix="/api/v1", tags=["history"])
 
-    @routes.get("/incident", response_class=FileResponse)
+    @routes.get(
+        "/incident",
+        response_class=FileResponse,
+        responses={200: {"content": {MEDIA_TYPE: {}}}, **refusals(404, 503)},
+    )
     async def incident(
         asked: Annotated[About, Query()],
         principal: Annotated[Principal, Depends(require("release"))],

@@ -33,7 +33,7 @@ from iveg.models.latency import (
 )
 from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Apart
-from iveg.web.api.exports import cell, csv_lines, form_of
+from iveg.web.api.exports import MEDIA_TYPES, cell, csv_lines, form_of
 from iveg.web.pages import charts
 from iveg.web.pages.latency_figures import (
     bars_figure,
@@ -66,7 +66,11 @@ def router(watch: LatencyWatch, clock: Clock, worker: Apart) -> APIRouter:
         prefix="/api/v1", tags=["latency"], dependencies=[Depends(require("read"))]
     )
 
-    @routes.get("/latency", response_model=LatencyTable)
+    @routes.get(
+        "/latency",
+        response_model=LatencyTable,
+        responses={200: {"content": {MEDIA_TYPES["csv"]: {}}}},
+    )
     async def latency(request: Request, asked: Annotated[Asked, Query()]) -> Response:
         """Mean and quantiles of each hop, clocks, rates, loss, and the figures."""
         parts = collect(watch.streams, asked.window, asked.robot)

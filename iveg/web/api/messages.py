@@ -32,6 +32,7 @@ from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.pages.sentences import Sentences
 from iveg.web.pages.translations import LANGUAGES, read_translations
+from iveg.web.refusals import refusals
 from iveg.web.security.authentication import Principal, require
 
 TEST_REST_S = 5.0
@@ -231,7 +232,9 @@ _Operator = Annotated[Principal, Depends(require("release"))]
 
 def router(desk: Desk) -> APIRouter:
     """Operators alone: here are people's addresses."""
-    routes = APIRouter(prefix="/api/v1/messages", tags=["messages"])
+    routes = APIRouter(
+        prefix="/api/v1/messages", tags=["messages"], responses=refusals(503)
+    )
     _add_channels(routes, desk)
     _add_devices(routes, desk)
 
@@ -240,7 +243,9 @@ def router(desk: Desk) -> APIRouter:
         """Recipients by channel, and the result of the newest message."""
         return desk.answer()
 
-    @routes.post("/{channel}/test", response_model=MessageTest)
+    @routes.post(
+        "/{channel}/test", response_model=MessageTest, responses=refusals(409, 429)
+    )
     async def test(channel: Channel, _: _Operator) -> Response:
         """Send a test now, whether or not the channel is on."""
         return await desk.test(channel)

@@ -48,7 +48,11 @@ def router(
     """The endpoint that Prometheus asks."""
     routes = APIRouter(tags=["health"])
 
-    @routes.get("/metrics", dependencies=[Depends(require("read"))])
+    @routes.get(
+        "/metrics",
+        dependencies=[Depends(require("read"))],
+        response_class=PlainTextResponse,
+    )
     async def metrics() -> Response:
         """Counters, hops, latency and safety in Prometheus' text format."""
         now = clock()

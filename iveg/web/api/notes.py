@@ -20,6 +20,7 @@ from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.api.history_filters import Moment, Span, seconds
 from iveg.web.pages.local_time import in_madrid
+from iveg.web.refusals import refusals
 from iveg.web.security.authentication import Principal, require
 
 KEY = lists.NOTE
@@ -57,7 +58,7 @@ def router(
     queries: Queries, log: Callable[[LogEvent, Instant], None], clock: Clock
 ) -> APIRouter:
     """Read by all, written by operators."""
-    routes = APIRouter(prefix="/api/v1", tags=["history"])
+    routes = APIRouter(prefix="/api/v1", tags=["history"], responses=refusals(503))
 
     @routes.get(
         "/notes",

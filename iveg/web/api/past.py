@@ -7,6 +7,7 @@ from fastapi import APIRouter, Depends, HTTPException, Query, Response
 from iveg.models.snapshot import PastWorld
 from iveg.pipeline.ports import Clock
 from iveg.web.api.history_filters import Moment
+from iveg.web.refusals import refusals
 from iveg.web.security.authentication import require
 
 _VIEWER = r"^[A-Za-z0-9-]{1,64}$"
@@ -28,7 +29,10 @@ class Past(Protocol):
 def router(past: Past, clock: Clock) -> APIRouter:
     """The route."""
     routes = APIRouter(
-        prefix="/api/v1", tags=["history"], dependencies=[Depends(require("read"))]
+        prefix="/api/v1",
+        tags=["history"],
+        dependencies=[Depends(require("read"))],
+        responses=refusals(400, 404, 503),
     )
 
     @routes.get("/world", response_model=PastWorld)

@@ -11,6 +11,7 @@ from iveg.domain.recordings import RecordingFile
 from iveg.models.base import Listing
 from iveg.models.recordings import Recording
 from iveg.web.api.answers import Json
+from iveg.web.refusals import refusals
 from iveg.web.security.authentication import require
 
 MEDIA_TYPE = "application/vnd.mcap"
@@ -29,7 +30,10 @@ class Recordings(Protocol):
 def router(recordings: Recordings) -> APIRouter:
     """Their list, and each as a file."""
     routes = APIRouter(
-        prefix="/api/v1", tags=["history"], dependencies=[Depends(require("read"))]
+        prefix="/api/v1",
+        tags=["history"],
+        dependencies=[Depends(require("read"))],
+        responses=refusals(503),
     )
 
     @routes.get("/recordings", response_model=Listing[Recording])
@@ -38,7 +42,11 @@ def router(recordings: Recordings) -> APIRouter:
         files = await recordings.files()
         return Json(Listing(items=[Recording.of(one) for one in files]))
 
-    @routes.get("/recordings/{recording_id}", response_class=FileResponse)
+    @routes.get(
+        "/recordings/{recording_id}",
+        response_class=FileResponse,
+        responses={200: {"content": {MEDIA_TYPE: {}}}},
+    )
     async def recording(recording_id: str) -> FileResponse:
         """The recording of this name as MCAP; 404 while it is still written."""
         path = await recordings.finished(recording_id)

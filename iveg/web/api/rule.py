@@ -14,6 +14,7 @@ from iveg.ngsi.payloads import clean_text
 from iveg.pipeline.ports import Clock
 from iveg.pipeline.rules import Rules
 from iveg.web.api.answers import Json
+from iveg.web.refusals import refusals
 from iveg.web.security.authentication import Principal, require
 
 T = TypeVar("T")
@@ -99,7 +100,7 @@ def router(rules: Rules, clock: Clock) -> APIRouter:
         items = [RuleModel.of(one) for one in reversed(rules.versions)]
         return Json(Listing(items=items))
 
-    @routes.put("/rule", response_model=RuleModel)
+    @routes.put("/rule", response_model=RuleModel, responses=refusals(409, 428, 503))
     async def change(
         body: RuleChange, who: Annotated[Principal, Depends(require("release"))]
     ) -> Response:

@@ -27,6 +27,7 @@ from iveg.models.command import (
 from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.api.history_filters import Range, range_of
+from iveg.web.refusals import refusals
 from iveg.web.security.authentication import require
 
 DRILL_DEADLINE_MS = 5000.0
@@ -41,7 +42,10 @@ def router(
 ) -> APIRouter:
     """Routes of past STOPs; ``find`` knows the commands of this run."""
     routes = APIRouter(
-        prefix="/api/v1", tags=["commands"], dependencies=[Depends(require("read"))]
+        prefix="/api/v1",
+        tags=["commands"],
+        dependencies=[Depends(require("read"))],
+        responses=refusals(503),
     )
 
     @routes.get("/commands/latency", response_model=Latency)

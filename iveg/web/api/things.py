@@ -12,6 +12,7 @@ from iveg.pipeline.ports import Clock
 from iveg.pipeline.things import ThingMarks
 from iveg.web.api.answers import Json
 from iveg.web.pages.local_time import in_madrid, start_of
+from iveg.web.refusals import refusals
 from iveg.web.security.authentication import Principal, require
 
 Marking = Annotated[Principal, Depends(require("release"))]
@@ -35,7 +36,9 @@ def router(marks: ThingMarks, clock: Clock) -> APIRouter:
         """Every place that is marked "not a person here"."""
         return Json(Listing(items=[Thing.of(one) for one in marks.known]))
 
-    @routes.post("/things", status_code=201, response_model=Thing)
+    @routes.post(
+        "/things", status_code=201, response_model=Thing, responses=refusals(404, 409)
+    )
     async def mark(body: MarkRequest, who: Marking) -> Response:
         """Mark where a track is, until the end of the day at the latest.
 

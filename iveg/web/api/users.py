@@ -18,6 +18,7 @@ from iveg.models.signing_in import Invitation, UserAccount
 from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.api.sign_in_code import code_of
+from iveg.web.refusals import refusals
 from iveg.web.security.authentication import Principal, require
 from iveg.web.security.people import People
 
@@ -59,7 +60,10 @@ class RoleBody(_Body):
 def router(people: People, clock: Clock) -> APIRouter:
     """The routes of accounts; all for admins."""
     routes = APIRouter(
-        prefix="/api/v1/users", tags=["users"], dependencies=[Depends(require("admin"))]
+        prefix="/api/v1/users",
+        tags=["users"],
+        dependencies=[Depends(require("admin"))],
+        responses=refusals(409, 503),
     )
 
     @routes.get("", response_model=Listing[UserAccount])

@@ -19,9 +19,9 @@ from fastapi.openapi.models import (
     Response,
     Schema,
 )
-from fastapi.routing import iter_route_contexts
 
-from iveg.web.security.authentication import Action, declared_action
+from iveg.web.refusals import declared_actions
+from iveg.web.security.authentication import Action
 
 METHODS = ("get", "post", "put", "patch", "delete")
 
@@ -105,7 +105,7 @@ def describe_api(app: FastAPI) -> ApiDoc:
     """Flatten the OpenAPI document of a finished application."""
     document = OpenAPI.model_validate(app.openapi())
     groups: dict[str, list[CallDoc]] = {}
-    actions = _actions(app)
+    actions = declared_actions(app)
     for path, method, operation in _operations(document.paths or {}):
         tag = operation.tags[0] if operation.tags else "api"
         action = actions.get((path, method.upper()))
@@ -116,16 +116,6 @@ def describe_api(app: FastAPI) -> ApiDoc:
         tuple(GroupDoc(name, tuple(calls)) for name, calls in groups.items()),
         tuple(_shapes(document)),
     )
-
-
-def _actions(app: FastAPI) -> dict[tuple[str, str], Action]:
-    found = {}
-    for route in iter_route_contexts(app.routes):
-        action = declared_action(route)
-        if action is not None:
-            for method in route.methods or ():
-                found[str(route.path_format), method] = action
-    return found
 
 
 def _operations(
