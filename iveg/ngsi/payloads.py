@@ -31,6 +31,26 @@ def clean_text(text: str) -> str:
     return kept[:MAX_TEXT]
 
 
+def legible(text: str) -> str:
+    """Text without characters that are unseen or turn others round (Cc, Cf, Cs …).
+
+    Line ends stay.
+    """
+    return "".join(c for c in text if c == "\n" or unicodedata.category(c)[0] != "C")
+
+
+def all_legible(value: object) -> object:
+    """JSON with every text in it legible."""
+    match value:
+        case str():
+            return legible(value)
+        case list():
+            return [all_legible(one) for one in value]
+        case dict():
+            return {legible(name): all_legible(one) for name, one in value.items()}
+    return value
+
+
 Text = Annotated[str, AfterValidator(clean_text)]
 Metres = Annotated[float, Field(ge=-1e6, le=1e6)]
 Radians = Annotated[float, Field(ge=-1e4, le=1e4)]

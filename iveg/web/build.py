@@ -144,6 +144,7 @@ def build_app(
         app.include_router(router)
     problems.install(app, pages.problem)
     identify, clock = face.authenticator.identify, face.clock
+    app.add_middleware(headers.ReadableBodies)
     app.add_middleware(
         audited.AuditRequests, identify=identify, trail=face.trail, clock=clock
     )

@@ -37,6 +37,7 @@ from iveg.domain.errors import (
     VersionMissingError,
 )
 from iveg.models.base import stamp
+from iveg.ngsi.payloads import all_legible
 
 _MOST_COMPLAINTS = 20
 
@@ -88,7 +89,8 @@ class Problem:
             **self.extra,
         }
         return JSONResponse(
-            members,
+            # A name that somebody asked for may be told back, but turns nothing round.
+            all_legible(members),
             self.status,
             headers={"Cache-Control": "no-store", **self.headers},
             media_type="application/problem+json",

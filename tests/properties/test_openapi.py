@@ -5,11 +5,8 @@ and compares each answer with it; this module adds who asks and what they may.
 `IVEG_OPENAPI_EXAMPLES` sets how many of each sort a route is asked (`make deep`).
 """
 
-import asyncio
-import hashlib
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +15,6 @@ import jsonschema_rs
 import pytest
 import requests
 import schemathesis
-from fastapi import FastAPI
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 from schemathesis import APIOperation, Case, GenerationMode
@@ -30,135 +26,49 @@ from schemathesis.specs.openapi.checks import (
     status_code_conformance,
 )
 
-from iveg.adapters.fleet_files import load_fleet
-from iveg.adapters.history.engine import history_url
-from iveg.adapters.history.migrate import upgrade
-from iveg.adapters.mail import Write
-from iveg.app.dss import Dss
-from iveg.app.outside import Outside, open_outside
-from iveg.asgi import create_app
-from iveg.domain.errors import NotRecordedError
-from iveg.domain.messages import CHANNELS, Channel
-from iveg.domain.transports import DIRECT, FIWARE, Transport
-from iveg.pipeline.build import Ports
-from iveg.pipeline.ports import CommandPort, MessageSender
-from iveg.settings import Settings
+from iveg.domain.messages import CHANNELS
 from iveg.web.refusals import declared_actions
 from iveg.web.security.roles import MAY
-from iveg.web.security.sessions import IDLE_S
-from tests.fakes.context_broker import FakeContextBroker
-from tests.fakes.fleet import FakeFleet
-from tests.fakes.messages import FakeSender
-from tests.fakes.recordings import FakePast
-from tests.fakes.worker import FakeWorker
+from tests.unit.web.whole import STRANGER, WholeServer, whole_server
 
 EXAMPLES = int(os.environ.get("IVEG_OPENAPI_EXAMPLES", "3"))
 IS_LONG = EXAMPLES > 10
 """Then each run asks something else."""
-ADDRESS = "http://iveg.test"
-API_TOKEN = "a-token-for-programs"
 KNOWN = {"robot_id": ("AGI", "AGII"), "channel": CHANNELS}
 """What nobody guesses, and what there is."""
 DOWN = {"GET /readyz"}
 """Answers 503 by design where no hop is there."""
-CHECKS = (
-    not_a_server_error,
-    status_code_conformance,
-    content_type_conformance,
-)
-STRANGER = "stranger"
+CHECKS = [not_a_server_error, status_code_conformance, content_type_conformance]
+NAMES = ("method", "url", "headers", "params", "json", "data")
 Operation = APIOperation[Any, Any, Any, Any]
 Sent = Case[Any]
 Document = dict[str, Any]
-Found = dict[tuple[str, str], str]
-
-
-class _Outside(Outside):
-    """Nothing leaves the machine."""
-
-    def senders(self, _: Write) -> dict[Channel, MessageSender]:
-        return {name: FakeSender(name) for name in CHANNELS}
-
-
-class _Dss(Dss):
-    """STOP goes to robots and to a context broker that take everything."""
-
-    def _ports(self) -> Ports:
-        fleet = FakeFleet()
-        ways: dict[Transport, CommandPort] = {
-            DIRECT: fleet,
-            FIWARE: FakeContextBroker(),
-        }
-        return replace(super()._ports(), fleet=fleet, transports=ways)
-
-    def is_robot_there(self) -> bool:
-        """So that no experiment is started."""
-        return True
-
-
-@dataclass
-class Desk:
-    """An application, and who may ask it."""
-
-    app: FastAPI
-    runner: asyncio.Runner
-    client: httpx.AsyncClient
-    headers: dict[str, dict[str, str]]
-
-    def ask(self, role: str, case: Sent) -> httpx.Response:
-        """What somebody of this role is answered."""
-        sent = case.as_transport_kwargs(base_url=ADDRESS)
-        names = ("method", "url", "headers", "params", "json", "data")
-        request = requests.Request(**{name: sent.get(name) for name in names}).prepare()
-        told = {
-            name: str(value)
-            for name, value in request.headers.items()
-            if name.lower() not in ("content-length", "cookie", "authorization")
-        }
-        asking = self.client.request(
-            str(request.method),
-            str(request.url),
-            headers=told | self.headers[role],
-            content=request.body or b"",  # type: ignore[arg-type]
-        )
-        return self.runner.run(asking)
 
 
 @pytest.fixture
-def desk(tmp_path: Path) -> Iterator[Desk]:
-    upgrade(history_url(None, tmp_path))
-    chosen = Settings(api_token=API_TOKEN)
-    fleet = load_fleet(chosen.fleet, chosen.robots)
-    real = open_outside(chosen, tmp_path, fleet)
-    fields = ("stores", "link", "orion", "agent", "outbound")
-    dss = _Dss(chosen, fleet, _Outside(*(getattr(real, one) for one in fields)))
-    dss.worker = FakeWorker()  # type: ignore[assignment]
-    past = FakePast()
-    past.fails = NotRecordedError(0.0, None, None)
-    dss.face = replace(dss.face, worker=FakeWorker(), past=past)
-    app = create_app(dss)
-    with asyncio.Runner() as runner:
-        client = httpx.AsyncClient(
-            transport=httpx.ASGITransport(app, raise_app_exceptions=False)
-        )
-        yield Desk(app, runner, client, _credentials(app))
-        runner.run(client.aclose())
-        runner.run(dss.outside.close())
+def server(tmp_path: Path) -> Iterator[WholeServer]:
+    with whole_server(tmp_path) as server:
+        yield server
 
 
 @pytest.mark.slow
-def test_every_route_does_what_its_document_says_to_whoever_asks(desk: Desk) -> None:
-    document, actions = desk.app.openapi(), declared_actions(desk.app)
-    found: Found = {}
+def test_every_route_does_what_its_document_says_to_whoever_asks(
+    server: WholeServer,
+) -> None:
+    document, actions = server.app.openapi(), declared_actions(server.app)
+    found: dict[tuple[str, str], str] = {}
     asked: set[tuple[str, int]] = set()
 
     for operation in _operations(document):
         action = actions[operation.path, operation.method.upper()]
-        for role, case, answer in _explored(desk, operation):
+        for role, case, answer in _explored(server, operation):
             asked.add((operation.label, answer.status_code))
             about = f"{role}: {answer.request.url!s:.200} {case.body!r:.200}"
-            for complaint in _complaints(operation, action, role, case, answer):
-                found.setdefault((operation.label, complaint), about)
+            complaints = [
+                *_misserved(operation, action, role, case, answer),
+                *_misshapen(document, operation.label, answer),
+            ]
+            found |= {(operation.label, one): about for one in complaints}
 
     assert found == {}
     assert len({label for label, _ in asked}) == len(list(_operations(document)))
@@ -172,7 +82,7 @@ def _operations(document: Document) -> Iterator[Operation]:
 
 
 def _explored(
-    desk: Desk, operation: Operation
+    server: WholeServer, operation: Operation
 ) -> list[tuple[str, Sent, httpx.Response]]:
     """Who asked what, and was answered what."""
     answers = []
@@ -194,7 +104,7 @@ def _explored(
             for name in case.path_parameters.keys() & KNOWN.keys():
                 if data.draw(st.booleans()):
                     case.path_parameters[name] = data.draw(st.sampled_from(KNOWN[name]))
-            answers.append((role, case, desk.ask(role, case)))
+            answers.append((role, case, _answer(server, role, case)))
 
         ask()
     return answers
@@ -207,51 +117,42 @@ def _modes(operation: Operation) -> list[GenerationMode]:
     return [GenerationMode.POSITIVE]
 
 
-def _complaints(
-    operation: Operation,
-    action: str,
-    role: str,
-    case: Sent,
-    answer: httpx.Response,
+def _answer(server: WholeServer, role: str, case: Sent) -> httpx.Response:
+    sent = case.as_transport_kwargs(base_url="http://iveg.test")
+    request = requests.Request(**{name: sent.get(name) for name in NAMES}).prepare()
+    headers = {
+        name: str(value)
+        for name, value in request.headers.items()
+        if name.lower() not in ("content-length", "cookie", "authorization")
+    }
+    method, url = str(request.method), str(request.url)
+    return server.ask(role, method, url, headers=headers, content=request.body or b"")
+
+
+def _misserved(
+    operation: Operation, action: str, role: str, case: Sent, answer: httpx.Response
 ) -> Iterator[str]:
     """What an answer has that neither the document nor the table of roles says."""
     may = action == "open" or (role != STRANGER and action in MAY[role])  # type: ignore[index]
-    refusal = 401 if role == STRANGER else 403
+    refused = answer.status_code == (401 if role == STRANGER else 403)
     # What is no JSON is refused before anybody asks who sent it.
-    if may == (answer.status_code == refusal) and answer.status_code != 400:
+    if may == refused and answer.status_code != 400:
         yield f"{answer.status_code} for {role}, who may: {may}"
     if operation.label in DOWN and answer.status_code == 503:
         return
     try:
-        case.validate_response(answer, checks=list(CHECKS))
+        case.validate_response(answer, checks=CHECKS)
     except FailureGroup as failures:
         yield from (f"{answer.status_code} {one!s:.300}" for one in failures.exceptions)
 
 
-def _misshapen(document: Document, label: str, answer: httpx.Response) -> str | None:
+def _misshapen(document: Document, label: str, answer: httpx.Response) -> Iterator[str]:
     """What of a JSON answer is not as documented; schemathesis reads no tuples."""
     method, path = label.split()
     told = document["paths"][path][method.lower()]["responses"]
     media = answer.headers["content-type"].partition(";")[0]
     shape = told.get(str(answer.status_code), {}).get("content", {}).get(media, {})
-    if not shape.get("schema") or not media.endswith("json"):
-        return None
-    whole = {**shape["schema"], "components": document["components"]}
-    errors = jsonschema_rs.Draft202012Validator(whole).iter_errors(answer.json())
-    return next((f"{one.instance_path}: {one.message:.300}" for one in errors), None)
-
-
-def _credentials(app: FastAPI) -> dict[str, dict[str, str]]:
-    """Headers of somebody of each role."""
-    page = {"X-IVEG": "1", "Sec-Fetch-Site": "same-origin"}
-    sessions = app.state.authenticator.sessions
-    told: dict[str, dict[str, str]] = {
-        role: {**page, "Cookie": f"iveg={sessions.open('ana', role)}"} for role in MAY
-    }
-    token = sessions.open("ana", "admin")
-    digest = hashlib.sha256(token.encode()).digest()
-    old = sessions._sessions[digest]
-    sessions._sessions[digest] = replace(old, began=old.began - IDLE_S * 2.5)
-    told["expired"] = {**page, "Cookie": f"iveg={token}"}
-    told["program"] = {"Authorization": f"Bearer {API_TOKEN}"}
-    return {**told, STRANGER: page}
+    if shape.get("schema") and media.endswith("json"):
+        whole = {**shape["schema"], "components": document["components"]}
+        errors = jsonschema_rs.Draft202012Validator(whole).iter_errors(answer.json())
+        yield from (f"{one.instance_path}: {one.message:.300}" for one in errors)

@@ -28,7 +28,8 @@ class AcknowledgementTogether(Acknowledgement):
     """The alerts that the person saw in a list, and the note on all of them."""
 
     alert_ids: Annotated[
-        list[Annotated[str, Field(max_length=64)]], Field(max_length=MOST_TOGETHER)
+        list[Annotated[str, Field(pattern=r"^[ -~]{1,64}$")]],
+        Field(max_length=MOST_TOGETHER),
     ]
 
 

@@ -16,6 +16,7 @@ from iveg.domain.events import LogEvent, Slot
 from iveg.domain.observations import Instant
 from iveg.models.base import Listing
 from iveg.models.note import Note
+from iveg.ngsi.payloads import legible
 from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.api.history_filters import Moment, Span, seconds
@@ -36,9 +37,7 @@ class NoteRequest(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    text: Annotated[
-        str, Field(max_length=MOST_TEXT, pattern=r"^[^\x00-\x09\x0b-\x1f]+$")
-    ]
+    text: Annotated[str, Field(max_length=MOST_TEXT)]
     at: Moment | None = None
     x: _Metres | None = None
     y: _Metres | None = None
@@ -49,8 +48,8 @@ class NoteRequest(BaseModel):
     def _whole(self) -> Self:
         if (self.x is None) != (self.y is None):
             raise ValueError("a place has both x and y")
-        if not self.text.strip():
-            raise ValueError("a note has a text")
+        if not self.text.strip() or legible(self.text) != self.text:
+            raise ValueError("a note has a text, without marks that turn it round")
         return self
 
 

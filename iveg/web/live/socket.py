@@ -21,6 +21,7 @@ from iveg.domain.stop import Press
 from iveg.models.base import write_json
 from iveg.models.snapshot import Snapshot
 from iveg.ngsi.codec import load_json
+from iveg.ngsi.payloads import legible
 from iveg.pipeline import topics
 from iveg.pipeline.ports import Clock
 from iveg.pipeline.publish import Hub, Subscriber
@@ -300,4 +301,5 @@ class ClientMessages:
             try:
                 await self._stop(robot_id, self._principal, read_press(message))
             except UnknownRobotError as error:
-                self._subscriber.append(topics.PROBLEM.name, {"reason": str(error)})
+                reason = legible(str(error))
+                self._subscriber.append(topics.PROBLEM.name, {"reason": reason})

@@ -1,0 +1,139 @@
+"""The whole server as programs and browsers see it; only what is outside is fake."""
+
+import asyncio
+import hashlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+
+import httpx
+from fastapi import FastAPI
+
+from iveg.adapters.fleet_files import load_fleet
+from iveg.adapters.history.engine import history_url
+from iveg.adapters.history.migrate import upgrade
+from iveg.adapters.history.recorder import Recorder, journal_file
+from iveg.adapters.mail import Write
+from iveg.app.dss import Dss
+from iveg.app.outside import Outside, open_outside
+from iveg.asgi import create_app
+from iveg.domain.errors import NotRecordedError
+from iveg.domain.messages import CHANNELS, Channel
+from iveg.domain.records import Record
+from iveg.domain.transports import DIRECT, FIWARE, Transport
+from iveg.pipeline.build import Ports
+from iveg.pipeline.ports import CommandPort, MessageSender
+from iveg.settings import Settings
+from iveg.web.security.roles import MAY
+from iveg.web.security.sessions import IDLE_S
+from tests.fakes.context_broker import FakeContextBroker
+from tests.fakes.fleet import FakeFleet
+from tests.fakes.messages import FakeSender
+from tests.fakes.recordings import FakePast
+from tests.fakes.worker import FakeWorker
+
+API_TOKEN = "a-token-for-programs"
+STRANGER = "stranger"
+
+
+class _Recorder(Recorder):
+    """Remembers what is to be written."""
+
+    def __init__(self, url: str, directory: Path) -> None:
+        super().__init__(url, journal_file(url, directory))
+        self.records: list[Record] = []
+
+    def enqueue(self, record: Record) -> None:
+        self.records.append(record)
+
+
+class _Outside(Outside):
+    """Nothing leaves the machine."""
+
+    def senders(self, _: Write) -> dict[Channel, MessageSender]:
+        return {name: FakeSender(name) for name in CHANNELS}
+
+
+class _Dss(Dss):
+    """STOP goes to robots and to a context broker that take everything."""
+
+    def _ports(self) -> Ports:
+        fleet = FakeFleet()
+        ways: dict[Transport, CommandPort] = {
+            DIRECT: fleet,
+            FIWARE: FakeContextBroker(),
+        }
+        return replace(super()._ports(), fleet=fleet, transports=ways)
+
+    def is_robot_there(self) -> bool:
+        """So that no experiment is started."""
+        return True
+
+
+@dataclass(frozen=True)
+class WholeServer:
+    """A server that is not running: nothing happens but what is asked.
+
+    Attributes:
+        records: What it would write into the history.
+        headers: Who asks, by role.
+    """
+
+    dss: Dss
+    app: FastAPI
+    runner: asyncio.Runner
+    client: httpx.AsyncClient
+    records: list[Record]
+    headers: dict[str, dict[str, str]]
+
+    def ask(
+        self, role: str, method: str, path: str, **request: object
+    ) -> httpx.Response:
+        """What somebody of this role is answered."""
+        told = dict(request.pop("headers", {})) | self.headers[role]  # type: ignore[call-overload]
+        asking = self.client.request(method, path, headers=told, **request)  # type: ignore[arg-type]
+        return self.runner.run(asking)
+
+
+@contextmanager
+def whole_server(folder: Path) -> Iterator[WholeServer]:
+    """A server with its files in ``folder``."""
+    url = history_url(None, folder)
+    upgrade(url)
+    chosen = Settings(api_token=API_TOKEN)
+    fleet = load_fleet(chosen.fleet, chosen.robots)
+    real = open_outside(chosen, folder, fleet)
+    recorder = _Recorder(url, folder)
+    parts = {one.name: getattr(real, one.name) for one in fields(real)}
+    parts["stores"] = replace(real.stores, recorder=recorder)
+    dss = _Dss(chosen, fleet, _Outside(**parts))
+    dss.worker = FakeWorker()  # type: ignore[assignment]
+    past = FakePast()
+    past.fails = NotRecordedError(0.0, None, None)
+    dss.face = replace(dss.face, worker=FakeWorker(), past=past)
+    app = create_app(dss)
+    transport = httpx.ASGITransport(app, raise_app_exceptions=False)
+    client = httpx.AsyncClient(transport=transport, base_url="http://iveg.test")
+    with asyncio.Runner() as runner:
+        yield WholeServer(
+            dss, app, runner, client, recorder.records, _headers_of_roles(app)
+        )
+        runner.run(client.aclose())
+        runner.run(dss.outside.close())
+        runner.run(real.stores.recorder.close())
+
+
+def _headers_of_roles(app: FastAPI) -> dict[str, dict[str, str]]:
+    page = {"X-IVEG": "1", "Sec-Fetch-Site": "same-origin"}
+    sessions = app.state.authenticator.sessions
+    told: dict[str, dict[str, str]] = {
+        role: {**page, "Cookie": f"iveg={sessions.open('ana', role)}"} for role in MAY
+    }
+    token = sessions.open("ana", "admin")
+    digest = hashlib.sha256(token.encode()).digest()
+    old = sessions._sessions[digest]
+    sessions._sessions[digest] = replace(old, began=old.began - IDLE_S * 2.5)
+    told["expired"] = {**page, "Cookie": f"iveg={token}"}
+    told["program"] = {"Authorization": f"Bearer {API_TOKEN}"}
+    return {**told, STRANGER: page}
