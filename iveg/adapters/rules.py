@@ -19,6 +19,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from iveg.adapters.files import Form, put_aside, read_lines, write_lines
 from iveg.domain.detection_rule import (
     ALIASES,
+    FORESIGHT_LEAST_S,
+    FORESIGHT_MOST_S,
     RECOVERED,
     UPGRADED,
     Class,
@@ -155,6 +157,9 @@ class _StoredRule(BaseModel):
     aliases: dict[str, Class] = Field(default_factory=lambda: dict(ALIASES))
     possible_people: bool = False
     foresight: bool = True
+    foresight_s: float = Field(
+        FORESIGHT_MOST_S, ge=FORESIGHT_LEAST_S, le=FORESIGHT_MOST_S
+    )
     author: str = _SETTINGS
     since: float | None = None
 

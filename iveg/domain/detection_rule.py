@@ -13,6 +13,10 @@ from iveg.domain.limits import LIMITS, ring_radius
 Class = Literal["person", "robot"]
 Kind = Literal["alert", "faint", "other"]
 
+FORESIGHT_LEAST_S: Final = 0.5
+"""The shortest horizon of foresight (s)."""
+FORESIGHT_MOST_S: Final = 3.0
+"""The farthest (s): so far it was measured how much comes true."""
 RECOVERED: Final = "recovered"
 """Author of a version that was made from what could be read of a damaged file."""
 UPGRADED: Final = "upgrade"
@@ -55,6 +59,7 @@ class DetectionRule:
         possible_people: Whether looks add up.  False only in versions that were stored
             before every one had it; no rule in force lacks it.
         foresight: Whether a robot slows before it reaches a ring, to be slow there.
+        foresight_s: How far ahead that looks (s).
         author: Who made this version; ``since`` when (Unix s), None for the first.
     """
 
@@ -66,6 +71,7 @@ class DetectionRule:
     aliases: Mapping[str, Class] = field(default_factory=lambda: ALIASES)
     possible_people: bool = True
     foresight: bool = True
+    foresight_s: float = FORESIGHT_MOST_S
     author: str = "settings"
     since: float | None = None
 
@@ -85,6 +91,11 @@ class DetectionRule:
         if confidence < self.threshold_of(class_):
             return RuleVerdict("faint", class_)
         return RuleVerdict("other" if class_ is None else "alert", class_)
+
+    def foresees(self, in_s: float) -> bool:
+        """Whether an encounter so soon (s) is within the horizon."""
+        # Moments are sums of steps.
+        return in_s <= self.foresight_s + 1e-6
 
     def radius_at(self, age_s: float) -> float:
         """The ring of a sighting that is ``age_s`` old (m)."""
@@ -119,6 +130,7 @@ def strictest(rules: Iterable[DetectionRule], since: float) -> DetectionRule:
         radius_m=max(rule.radius_m for rule in every),
         aliases=aliases,
         foresight=any(rule.foresight for rule in every),
+        foresight_s=max(rule.foresight_s for rule in every),
         author=RECOVERED,
         since=since,
     )

@@ -24,6 +24,7 @@ class Rule(Model):
     )
     possible_people: bool = Field(description="True; else of before it was always so.")
     foresight: bool
+    foresight_s: float = Field(description="How far ahead foresight looks (s).")
     author: str
     since: str | None
 
@@ -40,6 +41,7 @@ class Rule(Model):
             aliases=dict(rule.aliases),
             possible_people=rule.possible_people,
             foresight=rule.foresight,
+            foresight_s=rule.foresight_s,
             author=rule.author,
             since=stamp(rule.since),
         )

@@ -13,6 +13,8 @@ const rule = /** @type {import("../../iveg/static/js/core/protocol.js").Rule} */
     class_thresholds: {},
     radius_m: 2,
     factor: 0.5,
+    foresight: true,
+    foresight_s: 3,
     aliases: { person: "person", farmer: "person", husky: "robot" },
   })
 );
@@ -26,6 +28,8 @@ test("13.14 each way to lower protection is named", () => {
   equal(keys({ radius_m: 1.5 }), ["lowering.radius"]);
   equal(keys({ aliases: { person: "person", husky: "robot" } }), ["lowering.words"]);
   equal(keys({ aliases: { ...rule.aliases, farmer: "robot" } }), ["lowering.words"]);
+  equal(keys({ foresight: false, foresight_s: 1 }), ["lowering.foresight"]);
+  equal(keys({ foresight_s: 2 }), ["lowering.horizon"]);
 });
 
 test("13.14 what protects as much or more asks for no second word", () => {

@@ -62,6 +62,34 @@ def test_no_robot_is_ever_faster_for_it(
             assert after[robot_id].speed_factor <= limit.speed_factor
 
 
+@given(st.sampled_from((0.5, 1.0, 2.0)), st.lists(_STEP, min_size=1, max_size=15))
+def test_nothing_beyond_the_horizon_of_the_rule_is_foretold(
+    horizon_s: float,
+    run: list[
+        tuple[
+            float,
+            float,
+            list[tuple[float, float]],
+            tuple[tuple[float, float], ...] | None,
+        ]
+    ],
+) -> None:
+    far, near = Scene(), Scene(rule=DetectionRule(foresight_s=horizon_s))
+    for after_s, speed, people, _ in run:
+        for scene in (far, near):
+            scene.now = round(scene.now + after_s, 6)
+            scene.drive("AGI", 0.0, linear=speed)
+            scene.look("AGII", *(person(*spot) for spot in people))
+            scene.judge()
+        kept, every = (_in_s(scene) for scene in (near, far))
+        assert kept == {who: s for who, s in every.items() if s <= horizon_s}
+
+
+def _in_s(scene: Scene) -> dict[str, float]:
+    ahead = scene.speed_limits.foretold.get("AGI", {})
+    return {cause: one.in_s for cause, one in ahead.items()}
+
+
 _TASK = st.sampled_from((None, "waiting", "scouting", "hauling", "sowing"))
 
 

@@ -103,11 +103,13 @@ class Foresight:
             circles = Circles([_circle(zone, world, now) for zone in zones])
             drive = [one for one in world.live_robots() if zones and _drives(one)]
             self._foretold = {
-                one.robot_id: _first(path_of(one, now), zones, circles, now)
+                one.robot_id: _first(path_of(one, now), zones, circles, rule, now)
                 for one in drive
             }
             self.if_released = {
-                one.robot_id: _first(path_of(one, now, speed), zones, circles, now)
+                one.robot_id: _first(
+                    path_of(one, now, speed), zones, circles, rule, now
+                )
                 for one in drive
                 if (speed := speeds_before.get(one.robot_id)) is not None
             }
@@ -144,13 +146,17 @@ def _circle(zone: Zone, world: World, now: Instant) -> tuple[float, ...]:
 
 
 def _first(
-    path: Path, zones: Sequence[Zone], circles: Circles, now: Instant
+    path: Path,
+    zones: Sequence[Zone],
+    circles: Circles,
+    rule: DetectionRule,
+    now: Instant,
 ) -> Mapping[str, Encounter]:
     """A path's first encounter with each cause in whose rings it does not begin."""
     inside, meetings = circles.met_by(path)
     with_it = {zones[one].cause for one in inside}
     found: dict[str, Encounter] = {}
-    for met in meetings:
+    for met in (one for one in meetings if rule.foresees(one.in_s)):
         zone = zones[met.circle]
         if zone.cause in with_it or zone.recording is not None:
             continue

@@ -11,11 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from iveg.domain.detection_rule import FORESIGHT_MOST_S
 from iveg.domain.feedback import HALF_SPEED
 from iveg.domain.geometry import Pose2D, Twist2D
 
 _Floats = NDArray[np.float64]
-HORIZON_S = 3.0
+HORIZON_S = FORESIGHT_MOST_S
 _STEP_S = 0.1
 AHEAD_S: _Floats = np.arange(0.0, HORIZON_S + _STEP_S / 2, _STEP_S)
 """The moments of a path (s)."""

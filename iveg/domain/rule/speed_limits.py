@@ -150,7 +150,7 @@ class SpeedLimits:
             return {}
         before = self._speeds_before() if self._foresight.is_due(now) else {}
         ahead = self._foresight.look(world, people, rule, now, before)
-        return _with_obstacles(ahead, seen)
+        return _with_obstacles(ahead, seen, rule)
 
     def _speeds_before(self) -> Mapping[str, float]:
         """Of the robots that are slow now (m/s)."""
@@ -296,12 +296,14 @@ def _beside(seen: SeenObstacle | None) -> _Found:
     return {CAUSE: (0.0, seen.distance_m, seen.zone)}
 
 
-def _with_obstacles(foretold: Foretold, seen: Mapping[str, SeenObstacle]) -> Foretold:
+def _with_obstacles(
+    foretold: Foretold, seen: Mapping[str, SeenObstacle], rule: DetectionRule
+) -> Foretold:
     """Encounters with those whom lasers see before robots, too."""
     met = {
         name: {**foretold.get(name, {}), CAUSE: one.ahead}
         for name, one in seen.items()
-        if one.ahead is not None
+        if one.ahead is not None and rule.foresees(one.ahead.in_s)
     }
     return {**foretold, **met} if met else foretold
 

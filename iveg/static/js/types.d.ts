@@ -927,6 +927,8 @@ export type Rule = {
   /** True; else of before it was always so. */
   possible_people: boolean;
   foresight: boolean;
+  /** How far ahead foresight looks (s). */
+  foresight_s: number;
   author: string;
   since: string | null;
 };

@@ -5,7 +5,12 @@ from typing import Annotated, Literal, TypeVar
 from fastapi import APIRouter, Depends, Response
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
-from iveg.domain.detection_rule import Class, DetectionRule
+from iveg.domain.detection_rule import (
+    FORESIGHT_LEAST_S,
+    FORESIGHT_MOST_S,
+    Class,
+    DetectionRule,
+)
 from iveg.domain.errors import VersionMissingError
 from iveg.domain.limits import LIMITS
 from iveg.models.base import Listing
@@ -20,6 +25,7 @@ from iveg.web.security.authentication import Principal, require
 T = TypeVar("T")
 _Share = Annotated[float, Field(ge=0.0, le=1.0, allow_inf_nan=False)]
 _RADIUS = Field(ge=LIMITS.ring_least_m, le=LIMITS.ring_most_m, allow_inf_nan=False)
+_HORIZON = Field(ge=FORESIGHT_LEAST_S, le=FORESIGHT_MOST_S, allow_inf_nan=False)
 _MOST_ALIASES = 200
 
 
@@ -46,6 +52,7 @@ class RuleChange(BaseModel):
     possible_people: bool | None = None
     """Of one version ago: looks always add up."""
     foresight: bool | None = None
+    foresight_s: Annotated[float, _HORIZON] | None = None
 
     @field_validator("aliases")
     @classmethod
@@ -75,6 +82,7 @@ class RuleChange(BaseModel):
             _new(self.radius_m, rule.radius_m),
             _new(self.aliases, dict(rule.aliases)),
             foresight=_new(self.foresight, rule.foresight),
+            foresight_s=_new(self.foresight_s, rule.foresight_s),
         )
 
 

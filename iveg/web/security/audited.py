@@ -89,6 +89,7 @@ AUDITED: Final[Mapping[tuple[str, str], Audited]] = {
             "radius_m",
             "aliases",
             "foresight",
+            "foresight_s",
         ),
         answered=("version",),
     ),

@@ -16,6 +16,7 @@ CHANGED = DetectionRule(
     threshold=0.7,
     class_thresholds={"robot": 0.9},
     radius_m=3.0,
+    foresight_s=2.0,
     aliases={"person": "person", "robot": "robot", "abuela": "person"},
     author="ana",
     since=START.wall,

@@ -98,6 +98,7 @@ export function createGuard(store, i18n) {
     const { status } = await sendApi("PUT", "rule", {
       ...{ confidence_threshold, radius_m, class_thresholds, aliases },
       foresight: kept.before.foresight === true,
+      foresight_s: kept.before.foresight_s,
       version: store.get("rule")?.version,
     });
     if (status === 200) keep(null);

@@ -3,7 +3,7 @@
  *
  * @typedef {import("../core/protocol.js").Rule} Rule
  * @typedef {Partial<Pick<Rule, "confidence_threshold" | "radius_m" | "class_thresholds" |
- *   "aliases" | "foresight">>} Change
+ *   "aliases" | "foresight" | "foresight_s">>} Change
  * @typedef {{key: string, slots: Record<string, string | number>}} Lowering
  */
 
@@ -18,12 +18,18 @@ export function loweringsOf(before, change) {
   const after = { ...before, ...change };
   const [from, to] = [personShare(before), personShare(after)];
   const radius = { from: before.radius_m, to: after.radius_m };
+  const horizon = { from: before.foresight_s, to: after.foresight_s };
   const words = lostWords(before.aliases ?? {}, after.aliases ?? {});
   return [
     ...when(to > from, "lowering.threshold", { from, to }),
     ...when(radius.to < radius.from, "lowering.radius", radius),
     ...when(words.length > 0, "lowering.words", { words: words.join(", ") }),
     ...when(before.foresight === true && !after.foresight, "lowering.foresight", {}),
+    ...when(
+      after.foresight === true && horizon.to < horizon.from,
+      "lowering.horizon",
+      horizon,
+    ),
   ];
 }
 
