@@ -14,6 +14,7 @@ from iveg.lab.emulator.scenarios import scenario_named
 from iveg.lab.emulator.world import SimulatedWorld
 from iveg.lab.experiment import stage as staging
 from iveg.lab.experiment.stage import STEP_S
+from iveg.pipeline.build import Pipeline
 from iveg.pipeline.things import ThingMarks
 from iveg.web.views import Views
 from tests.unit.pipeline.desk import Desk, settle
@@ -30,6 +31,9 @@ class Stage:
         robots: Of the fleet.
         profile: Of the detector; ``seed`` of people and noise.
         foresight: Robots slow before they reach a ring.
+
+    Attributes:
+        desk: The pipeline.
     """
 
     def __init__(
@@ -46,7 +50,7 @@ class Stage:
         world = SimulatedWorld(
             greenhouse, layout, DETECTORS[layout.detector or profile], seed
         )
-        self._desk = desk = Desk(robots, greenhouse)
+        self.desk = desk = Desk(robots, greenhouse)
         desk.evaluator.rule = replace(desk.evaluator.rule, foresight=foresight)
         self._views = Views(desk.parts)
         self._stage = staging.Stage(
@@ -61,18 +65,22 @@ class Stage:
         self.happen = self._stage.happen
 
     def _move(self, seconds: float) -> Instant:
-        self._desk.clock.now = seconds
+        self.desk.clock.now = seconds
         return self.now
 
     def _hear(self, topic: str, payload: bytes) -> None:
         for received in read_direct(topic, payload, self.now):
-            self._desk.ingest.enqueue(received)
+            self.desk.ingest.enqueue(received)
+
+    @property
+    def parts(self) -> Pipeline:
+        return self.desk.parts
 
     # --- time -------------------------------------------------------------------------
 
     @property
     def now(self) -> Instant:
-        return self._desk.clock()
+        return self.desk.clock()
 
     async def until(
         self, probe: Callable[[], T], what: str, within_s: float = 90.0
@@ -96,7 +104,7 @@ class Stage:
 
     def mark(self, person_id: str) -> None:
         """An operator says that somebody is no person, for the rest of the day."""
-        marks = ThingMarks(self._desk.evaluator.people, self._desk.parts.event_log)
+        marks = ThingMarks(self.desk.evaluator.people, self.desk.parts.event_log)
         marks.mark(person_id, "ana", self.now.wall + 3600.0, self.now)
 
     # --- what iVeg says ---------------------------------------------------------------
@@ -120,22 +128,22 @@ class Stage:
 
     def decisions(self, robot_id: str, reason: str) -> list[DecisionRecord]:
         """What slowed a robot, oldest first, each as it stands now."""
-        records = self._desk.records(DecisionRecord)
+        records = self.desk.records(DecisionRecord)
         newest = {one.decision_id: one for one in records if one.reason == reason}
         return [one for one in newest.values() if one.robot_id == robot_id]
 
     def detections(self, robot_id: str, class_: str) -> list[DetectionRecord]:
         """What a robot has seen, oldest first."""
-        records = self._desk.records(DetectionRecord)
+        records = self.desk.records(DetectionRecord)
         return [
             one for one in records if (one.robot_id, one.class_) == (robot_id, class_)
         ]
 
     def kept(self) -> tuple[list[DecisionRecord], list[DetectionRecord]]:
         """Decisions as they stand now, and the detections of the history."""
-        records = self._desk.records(DecisionRecord)
+        records = self.desk.records(DecisionRecord)
         newest = {one.decision_id: one for one in records}
-        return list(newest.values()), self._desk.records(DetectionRecord)
+        return list(newest.values()), self.desk.records(DetectionRecord)
 
     def alerts(self) -> list[Json]:
         return [one.model_dump() for one in self._views.alerts()]
@@ -146,7 +154,7 @@ class Stage:
 
     def log(self, robot_id: str | None, key: str) -> list[Json]:
         """Lines whose key begins so, oldest first; of one robot or of all."""
-        told = self._views.log(list(self._desk.event_log.lines))
+        told = self._views.log(list(self.desk.event_log.lines))
         lines: list[Json] = [one.model_dump() for one in told]
         return [
             line

@@ -17,6 +17,7 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from iveg.adapters.files import Form, put_aside, read_lines, write_lines
+from iveg.domain.comparison import Comparison
 from iveg.domain.detection_rule import (
     ALIASES,
     FORESIGHT_LEAST_S,
@@ -95,13 +96,13 @@ class FileRules:
         rules, damage = [], ""
         for number, line in read_lines(self._path, FORM):
             try:
-                rules.append(_StoredRule.model_validate_json(line).rule())
+                rules.append(StoredRule.model_validate_json(line).rule())
             except ValidationError as error:
                 damage = damage or f"line {number}: {_first(error)}"
         return rules, damage
 
     def _write(self, versions: list[DetectionRule]) -> None:
-        write_lines(self._path, FORM, map(_fields, versions))
+        write_lines(self._path, FORM, map(rule_fields, versions))
         self._versions = versions
 
 
@@ -142,7 +143,7 @@ def _with_looks(versions: list[DetectionRule], wall: float) -> list[DetectionRul
     return [*versions, changed]
 
 
-class _StoredRule(BaseModel):
+class StoredRule(BaseModel):
     """One line of the file; a key that is missing has the rule's default."""
 
     model_config = ConfigDict(strict=True, extra="forbid")
@@ -160,6 +161,7 @@ class _StoredRule(BaseModel):
     foresight_s: float = Field(
         FORESIGHT_MOST_S, ge=FORESIGHT_LEAST_S, le=FORESIGHT_MOST_S
     )
+    comparison: Comparison | None = None
     author: str = _SETTINGS
     since: float | None = None
 
@@ -175,7 +177,8 @@ def _first(error: ValidationError) -> str:
     return f"{place}: {told['msg']}" if place else told["msg"]
 
 
-def _fields(rule: DetectionRule) -> dict[str, object]:
+def rule_fields(rule: DetectionRule) -> dict[str, object]:
+    """The line of a version."""
     fields = asdict(rule)
     return {
         **fields,

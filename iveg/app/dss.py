@@ -316,6 +316,7 @@ class Dss:
             RETENTION: lambda: self.upkeep.run(clock.now),
             RECORDINGS: self.stores.inputs.run,
             "past": self.past.run,
+            "shadow-rule": beside.trials.run,
             "messages": beside.messenger.run,
             "accounts": self.people.run,
             "api-tokens": self.programs.run,

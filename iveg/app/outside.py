@@ -22,6 +22,7 @@ from iveg.adapters.recordings.recorder import InputRecorder
 from iveg.adapters.recordings.writer import WriterSetup
 from iveg.adapters.rules import FileRules
 from iveg.adapters.sessions import FileSessions
+from iveg.adapters.trials import FileTrials
 from iveg.adapters.web_push import PushSender
 from iveg.adapters.webhook import WebhookSender
 from iveg.domain.detection_rule import DetectionRule
@@ -49,6 +50,7 @@ class Stores:
     rules: FileRules
     contacts: FileContacts
     detectors: FileDetectors
+    trials: FileTrials
     sessions: FileSessions
     accounts: AccountStore
     api_tokens: ApiTokenStore
@@ -76,9 +78,11 @@ class Stores:
             self.rules,
             self.contacts,
             self.detectors,
+            self.trials,
             self.rules.load(first, clock.now()),
             self.contacts.load(),
             self.detectors.load(),
+            self.trials.load(),
         )
 
     async def close(self) -> None:
@@ -156,6 +160,7 @@ def open_stores(
         FileRules(directory / "rules.jsonl"),
         FileContacts(directory / "contacts.jsonl"),
         FileDetectors(directory / "detectors.jsonl"),
+        FileTrials(directory / "trial.jsonl"),
         FileSessions(directory / "sessions.jsonl"),
         AccountStore(url),
         ApiTokenStore(url),

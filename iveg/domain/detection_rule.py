@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Final, Literal
 
+from iveg.domain.comparison import Comparison
 from iveg.domain.limits import LIMITS, ring_radius
 
 Class = Literal["person", "robot"]
@@ -60,6 +61,7 @@ class DetectionRule:
             before every one had it; no rule in force lacks it.
         foresight: Whether a robot slows before it reaches a ring, to be slow there.
         foresight_s: How far ahead that looks (s).
+        comparison: What came of the trial that it was before; None: it was none.
         author: Who made this version; ``since`` when (Unix s), None for the first.
     """
 
@@ -72,6 +74,7 @@ class DetectionRule:
     possible_people: bool = True
     foresight: bool = True
     foresight_s: float = FORESIGHT_MOST_S
+    comparison: Comparison | None = None
     author: str = "settings"
     since: float | None = None
 

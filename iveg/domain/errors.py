@@ -156,6 +156,18 @@ class ExperimentRefusedError(IvegError):
         self.why = why
 
 
+class TrialRefusedError(IvegError):
+    """No trial of a rule may begin, end or be promoted now.
+
+    Attributes:
+        why: ``running`` (another is), ``same`` (as the rule in force) or ``none``.
+    """
+
+    def __init__(self, why: str) -> None:
+        super().__init__(f"That is not possible with the trial of a rule: {why}.")
+        self.why = why
+
+
 class OutboundError(IvegError):
     """An address outside iVeg took no message.
 

@@ -26,6 +26,7 @@ from iveg.models.latency import LatencyTable
 from iveg.models.messages import Messages, MessageTest
 from iveg.models.places import Costmap, Coverage, Scan
 from iveg.models.reading import Reading
+from iveg.models.rule import Trial
 from iveg.models.signing_in import Invitation, SignInCode
 from iveg.models.snapshot import PastWorld, Snapshot
 from iveg.models.thing import Thing
@@ -51,6 +52,7 @@ TOLD: tuple[type[Model], ...] = (
     SignInCode,
     Invitation,
     Thing,
+    Trial,
 )
 """All that a page reads; what they are made of comes with them."""
 _PLAIN = {

@@ -15,6 +15,7 @@ from iveg.domain.latency.watch import LatencyWatch
 from iveg.domain.messages import Channel, Contacts
 from iveg.domain.observations import Instant, Received
 from iveg.domain.rule.obstacles import Obstacles
+from iveg.domain.rule.trial import Trial
 from iveg.domain.stop.drills import Drills
 from iveg.domain.tracking.calibration import Calibrations
 from iveg.domain.tracking.people import People
@@ -47,12 +48,14 @@ from iveg.pipeline.ports import (
     MessageSender,
     RuleStore,
     StopJournal,
+    TrialStore,
 )
 from iveg.pipeline.publish import Hub
 from iveg.pipeline.record import RecordSink
 from iveg.pipeline.rules import Rules
 from iveg.pipeline.scans import ScanReader
 from iveg.pipeline.second_witness import SecondWitness
+from iveg.pipeline.shadow import ShadowRule, Trials
 from iveg.pipeline.slow_time import SlowTime
 from iveg.pipeline.supervision import Supervision
 from iveg.pipeline.things import ThingMarks
@@ -133,6 +136,7 @@ class Pipeline:
     peer_scans: PeerScans
     second_witness: SecondWitness
     backfill: Backfill
+    shadow: ShadowRule
 
     def counters(self) -> Counter[str]:
         """Everything that is counted in it."""
@@ -156,14 +160,17 @@ class KeptChoices:
         rules: Every version of the rule, oldest first.
         contacts: People outside whom iVeg sends messages.
         out_of_service: Detectors that nobody waits for, by robot.
+        trial: Of a candidate of the rule.
     """
 
     rule_store: RuleStore
     contact_store: ContactStore
     detector_store: DetectorStore
+    trial_store: TrialStore
     rules: Sequence[DetectionRule] = ()
     contacts: Contacts = field(default_factory=Contacts)
     out_of_service: Mapping[str, OutOfService] = field(default_factory=dict)
+    trial: Trial | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,6 +183,7 @@ class Services:
     messenger: Messenger
     mapper: Mapper
     coverage: CoverageMonitor
+    trials: Trials
 
 
 def build(
@@ -189,7 +197,6 @@ def build(
     world = World(fleet, probe, greenhouse.bounds)
     latency, ingest, silences = _inputs(world, event_log, ports, supervision)
     scans, people = ScanReader(ingest.reject), choices.people(greenhouse)
-    obstacles = Obstacles(world, people, Plan.of(greenhouse))
     evaluator = Evaluator(
         world,
         greenhouse,
@@ -201,7 +208,7 @@ def build(
         choices.boot,
         probe.lag,
         scans.newest,
-        obstacles,
+        obstacles := Obstacles(world, people, Plan.of(greenhouse)),
     )
     commander = _commander(
         fleet.ids, ports, choices, event_log, health_monitor, supervision
@@ -239,6 +246,7 @@ def build(
         PeerScans(world, scans, ports.fleet.publish_peer_scan, choices.boot),
         SecondWitness(world, scans, obstacles, ports.trace.looked),
         _backfill(fleet, evaluator, ports, silences, ingest),
+        ShadowRule.beside(evaluator, scans.newest, supervision),
     )
 
 
@@ -372,11 +380,14 @@ def build_services(
         kept.contacts, kept.contact_store, senders, alerts, event_log, clock
     )
     alerts.on_raised = parts.supervision.guard("messages", messenger.enqueue_raised)
+    rules = Rules(evaluator, kept.rule_store, event_log, kept.rules)
+    store = kept.trial_store
     return Services(
-        Rules(evaluator, kept.rule_store, event_log, kept.rules),
+        rules,
         Detectors(parts.world, kept.detector_store, event_log, kept.out_of_service),
         ThingMarks(evaluator.people, event_log),
         messenger,
         Mapper(parts.world, greenhouse.bounds, parts.scans),
         CoverageMonitor(parts.world, greenhouse),
+        Trials(parts.shadow, evaluator, rules, store, kept.trial, clock),
     )

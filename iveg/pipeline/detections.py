@@ -4,7 +4,7 @@ A sighting is logged at its start, so that a person who stands before a camera f
 hour does not fill the log.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from iveg.domain.camera_bias import peer_error
 from iveg.domain.detection_rule import DetectionRule
@@ -41,6 +41,7 @@ class DetectionTracking:
     Attributes:
         placed: What each robot's newest look found, faint ones included.
         other: When the newest confident object of another class came, by robot.
+        taken: Comfort, called with each frame that is judged and its source moment.
         kept: Chooses the detections that become rows.
         newest: Each detection of the last moments.
     """
@@ -54,6 +55,7 @@ class DetectionTracking:
     ) -> None:
         self.placed: dict[str, list[Placed]] = {}
         self.other: dict[str, Instant] = {}
+        self.taken: Callable[[DetectionFrame, Instant], None] = lambda *_: None
         self.kept = KeptDetections(event_log)
         self.newest = NewestDetections()
         self._world = world
@@ -91,6 +93,7 @@ class DetectionTracking:
             self._world.counters["pictures.not_judged"] += 1
             detector.note_flaw("overload", received.at)
             return
+        self.taken(frame, seen_at)
         frame = detector.bounded(frame, rule)
         placed = self._look(frame, received, rule, seen_at)
         turned_away, unplaced = self._people.turned_away, self._people.unplaced

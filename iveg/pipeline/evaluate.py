@@ -6,7 +6,7 @@ heartbeat to the fleet is sent from here and nowhere else, so that a loop that h
 falls silent and slows the robots.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 from iveg.domain.alerts import conditions
 from iveg.domain.decisions import Decisions, SlowdownDecision
@@ -29,7 +29,7 @@ from iveg.domain.observations import (
 from iveg.domain.plausibility import ignores_limit
 from iveg.domain.records import AlertRecord, DecisionRecord
 from iveg.domain.rule.foresight import Encounter
-from iveg.domain.rule.obstacles import Obstacles
+from iveg.domain.rule.obstacles import Obstacles, Walkers
 from iveg.domain.rule.premises import Missing
 from iveg.domain.rule.speed_limits import Crossing, LimitChange, SpeedLimits
 from iveg.domain.tracking.laser_sight import LaserSight, ScanOf
@@ -66,6 +66,8 @@ class Evaluator:
 
     Attributes:
         rule: The version in force; a new one counts from the next judgement on.
+        aged: Comfort, called with each tick and with who was seen to walk by lasers.
+        judged: The same with each judgement: the rule, limits, changes, and when.
     """
 
     def __init__(
@@ -85,6 +87,11 @@ class Evaluator:
         self.world = world
         self.greenhouse = greenhouse
         self.rule = rule
+        self.aged: Callable[[Sequence[Walkers], Instant], None] = lambda *_: None
+        self.judged: Callable[
+            [DetectionRule, Mapping[str, SpeedLimit], Sequence[LimitChange], Instant],
+            None,
+        ] = lambda *_: None
         self.people = people
         self.decisions = Decisions()
         self.alerts = Alerting(event_log, new_id)
@@ -109,6 +116,10 @@ class Evaluator:
         self._unjudged: Instant | None = None
         self._started: Instant | None = None
         self._untold = False
+
+    def beginning(self) -> tuple[People, SpeedLimits]:
+        """Who is known and what slows robots now, for another rule to begin with."""
+        return self.people.copy(), self._speed_limits.copy()
 
     @property
     def crossings(self) -> Iterable[Crossing]:
@@ -251,6 +262,7 @@ class Evaluator:
         # A slow-down never waits; other news waits until robots can use more.
         if slower or (self._untold and self._feedback_publisher.may_publish(now)):
             self.publish(now)
+        self.judged(self.rule, speed_limits, changes, now)
 
     def _crossed(self, change: LimitChange, now: Instant) -> None:
         crossing = change.crossing
@@ -281,7 +293,9 @@ class Evaluator:
         self._staleness.tick(now)
         self._log_returned_detectors(now)
         self.tracking.forget(now)
-        self.tracking.witness(self._obstacles.walkers())
+        walkers = list(self._obstacles.walkers())
+        self.tracking.witness(walkers)
+        self.aged(walkers, now)
         self.settle()
         self._judge(now)
         if now.mono - self._feedback_publisher.published_at >= HEARTBEAT_S - 1e-3:

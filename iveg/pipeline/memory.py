@@ -22,7 +22,7 @@ from iveg.pipeline.build import Pipeline
 _CONSTANTS = Greenhouse, FleetDescription, Plan
 _OURS = "iveg.domain.", "iveg.pipeline."
 _LEFT_OUT = (
-    *("hub", "latency", "commander._sender"),
+    *("hub", "latency", "commander._sender", "shadow"),
     *("evaluator.tracking.newest", "evaluator.tracking.kept"),
 )
 """Parts that no picture of the world needs."""

@@ -10,6 +10,7 @@ from iveg.domain.goals import CancelOrder, GoalOrder
 from iveg.domain.messages import Contacts, MessageDelivery, OutboundMessage
 from iveg.domain.observations import Instant
 from iveg.domain.peer_scan import PeerScan
+from iveg.domain.rule.trial import Trial
 
 
 class GoalPort(Protocol):
@@ -105,6 +106,13 @@ class RuleStore(Protocol):
 
     async def append(self, rule: DetectionRule) -> None:
         """Write a new version down; returns when it is on disk. Raises HopError."""
+
+
+class TrialStore(Protocol):
+    """Storage of the trial of a rule."""
+
+    async def save(self, trial: Trial | None) -> None:
+        """Put it in the place of the one before; returns on disk. Raises HopError."""
 
 
 class DetectorStore(Protocol):

@@ -111,6 +111,7 @@ def live_routers(face: Face) -> Iterator[APIRouter]:
     yield goals.router(parts.goals, clock)
     yield alerts.router(evaluator, clock)
     yield rule.router(beside.rules, clock)
+    yield rule.trial_router(beside.trials, beside.rules, clock)
     yield detections.router(evaluator.tracking.newest, face.worker)
     yield detectors.router(beside.detectors, clock)
     yield things.router(beside.things, clock)

@@ -31,6 +31,7 @@ from iveg.domain.errors import (
     NotAllowedError,
     NotRecordedError,
     OutdatedError,
+    TrialRefusedError,
     UnknownNameError,
     UnknownRobotError,
     UnreadableError,
@@ -127,7 +128,12 @@ def problem_of(error: Exception) -> Problem:
             return Problem(
                 error.status_code, str(error.detail), headers=error.headers or {}
             )
-        case CommandRefusedError() | ExperimentRefusedError() | MarkRefusedError():
+        case (
+            CommandRefusedError()
+            | ExperimentRefusedError()
+            | MarkRefusedError()
+            | TrialRefusedError()
+        ):
             return Problem(409, str(error), _REFUSED[type(error)], {"why": error.why})
         case UnreadableError():
             return Problem(400, str(error), "unreadable", {"reason": error.reason})
@@ -153,6 +159,7 @@ _REFUSED: Mapping[type[IvegError], str] = {
     CommandRefusedError: "command-refused",
     ExperimentRefusedError: "experiment-refused",
     MarkRefusedError: "mark-refused",
+    TrialRefusedError: "trial-refused",
 }
 _PLAIN: tuple[tuple[type[IvegError], int, str], ...] = (
     (UnknownRobotError, 404, "unknown-robot"),

@@ -1,7 +1,8 @@
-"""A store of rule versions in memory, whose disk may be full."""
+"""Stores of rule versions and of a trial in memory, whose disk may be full."""
 
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import HopError
+from iveg.domain.rule.trial import Trial
 
 
 class FakeRuleStore:
@@ -15,3 +16,16 @@ class FakeRuleStore:
         if self.full:
             raise HopError("disk", "no space left")
         self.written.append(rule)
+
+
+class FakeTrialStore:
+    """Keeps what was written last; ``full`` refuses."""
+
+    def __init__(self) -> None:
+        self.written: Trial | None = None
+        self.full = False
+
+    async def save(self, trial: Trial | None) -> None:
+        if self.full:
+            raise HopError("disk", "no space left")
+        self.written = trial

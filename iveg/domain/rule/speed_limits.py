@@ -7,6 +7,7 @@ rings a robot is clear only while every premise of that claim holds (``premises`
 """
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
+from copy import copy
 from dataclasses import dataclass, replace
 from itertools import count
 from types import MappingProxyType
@@ -96,6 +97,14 @@ class SpeedLimits:
         self._zones = ZoneFinder()
         self._foresight = Foresight()
         self.foretold: Foretold = {}
+
+    def copy(self) -> "SpeedLimits":
+        """Another with the same crossings and forecasts."""
+        other = SpeedLimits(self._greenhouse, self._seen)
+        other._open = {name: {**mine} for name, mine in self._open.items()}
+        other._foresight = copy(self._foresight)
+        other.limited_since = {**self.limited_since}
+        return other
 
     @property
     def crossings(self) -> Iterable[Crossing]:

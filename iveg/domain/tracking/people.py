@@ -6,6 +6,7 @@ one stands there, and else handed to the tracker.
 
 import math
 from collections.abc import Iterable, Sequence
+from copy import deepcopy
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -103,6 +104,11 @@ class People:
         """Detections of the last frame that may be somebody, with an unknown place."""
         self.unknown_frames: frozenset[str] = frozenset()
         """Frames that the last frame named and nobody described."""
+
+    def copy(self) -> "People":
+        """Another that knows the same, and takes the same words of operators."""
+        shared = self.things, self._bounds, self._calibrations, self._tracker.way
+        return deepcopy(self, {id(one): one for one in shared})
 
     @property
     def known(self) -> dict[str, TrackedPerson]:

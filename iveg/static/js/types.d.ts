@@ -203,6 +203,22 @@ export type CommandTimes = {
   standing: string | null;
 };
 
+/** A candidate beside the version in force, on the same inputs. */
+export type Comparison = {
+  since: string;
+  until: string;
+  /** The version that was in force. */
+  against: number;
+  /** Time of the range that was compared (s). */
+  compared_s: number;
+  in_force: Doings;
+  candidate: Doings;
+  /** How often the candidate alone would have slowed a robot. */
+  would_slow: number;
+  /** How often it alone would not have. */
+  would_not: number;
+};
+
 /** Cells from the south-western corner, row by row: 0-100, -1 unknown. */
 export type Costmap = {
   /** Metres a cell. */
@@ -337,6 +353,14 @@ export type Detector = {
   out_by: string | null;
   out_since: string | null;
   bias: CameraBias | null;
+};
+
+/** What one version of the rule did over a range. */
+export type Doings = {
+  /** Reason → seconds of a robot at half speed. */
+  slowed_s: Record<string, number>;
+  /** Reason → how often a robot was slowed. */
+  encounters: Record<string, number>;
 };
 
 /** One drill and its verdict. */
@@ -929,6 +953,8 @@ export type Rule = {
   foresight: boolean;
   /** How far ahead foresight looks (s). */
   foresight_s: number;
+  /** What came of the trial that it was before. */
+  comparison: Comparison | null;
   author: string;
   since: string | null;
 };
@@ -1118,6 +1144,28 @@ export type Told = {
   to: string;
   at: string;
   failed: string | null;
+};
+
+/** A candidate that runs beside the rule in force and acts on nothing. */
+export type Trial = {
+  rule: Rule;
+  by: string;
+  since: string;
+  comparison: Comparison | null;
+  /** Newest first. */
+  differences: TrialDifference[];
+};
+
+/** A time in which candidate and rule in force would tell a robot otherwise. */
+export type TrialDifference = {
+  robot_id: string;
+  /** The candidate alone would slow it; it alone would not. */
+  kind: "slows" | "frees";
+  reason: string;
+  cause: string | null;
+  decision_id: string | null;
+  began: string;
+  ended: string | null;
 };
 
 /** Speed (m/s) and turn rate (rad/s). */

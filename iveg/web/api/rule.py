@@ -15,9 +15,11 @@ from iveg.domain.errors import VersionMissingError
 from iveg.domain.limits import LIMITS
 from iveg.models.base import Listing
 from iveg.models.rule import Rule as RuleModel
+from iveg.models.rule import Trial as TrialModel
 from iveg.ngsi.payloads import clean_text
 from iveg.pipeline.ports import Clock
 from iveg.pipeline.rules import Rules
+from iveg.pipeline.shadow import Trials
 from iveg.web.api.answers import Json
 from iveg.web.refusals import refusals
 from iveg.web.security.authentication import Principal, require
@@ -90,6 +92,14 @@ def _new(wanted: T | None, old: T) -> T:
     return old if wanted is None else wanted
 
 
+class Promotion(BaseModel):
+    """The version in force that the person saw beside the trial."""
+
+    model_config = ConfigDict(strict=True, extra="forbid")
+
+    version: int
+
+
 def router(rules: Rules, clock: Clock) -> APIRouter:
     """Read by all, changed by operators; every version keeps its author and time."""
     routes = APIRouter(prefix="/api/v1", tags=["rule"])
@@ -119,5 +129,37 @@ def router(rules: Rules, clock: Clock) -> APIRouter:
         return Json(
             RuleModel.of(await rules.change(wanted, who.name, clock(), body.version))
         )
+
+    return routes
+
+
+def trial_router(trials: Trials, rules: Rules, clock: Clock) -> APIRouter:
+    """The trial of a candidate: seen by all, begun, ended, promoted by operators."""
+    routes = APIRouter(prefix="/api/v1/rule/trial", tags=["rule"])
+    operator = Depends(require("release"))
+
+    @routes.get(
+        "", response_model=Listing[TrialModel], dependencies=[Depends(require("read"))]
+    )
+    async def current() -> Response:
+        """The trial, if one runs: it acts on nothing."""
+        trial = trials.current
+        return Json(Listing(items=[TrialModel.of(trial)] if trial else []))
+
+    @routes.post("", response_model=TrialModel, status_code=201)
+    async def begin(body: RuleChange, who: Annotated[Principal, operator]) -> Response:
+        """Try the rule in force with other parameters, beside it."""
+        wanted = body.applied_to(rules.current)
+        return Json(TrialModel.of(await trials.begin(wanted, who.name, clock())), 201)
+
+    @routes.delete("", response_model=TrialModel, dependencies=[operator])
+    async def end() -> Response:
+        """End the trial; the answer is how it stood."""
+        return Json(TrialModel.of(await trials.end()))
+
+    @routes.post("/promote", response_model=RuleModel)
+    async def promote(body: Promotion, who: Annotated[Principal, operator]) -> Response:
+        """Put the candidate in force, with what came of the trial."""
+        return Json(RuleModel.of(await trials.promote(who.name, clock(), body.version)))
 
     return routes

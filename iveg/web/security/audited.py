@@ -48,6 +48,14 @@ class Audited:
 
 
 _COMMAND: Final = ("command_id",)
+_RULE: Final = (
+    "confidence_threshold",
+    "class_thresholds",
+    "radius_m",
+    "aliases",
+    "foresight",
+    "foresight_s",
+)
 _API: Final = "/api/v1"
 AUDITED: Final[Mapping[tuple[str, str], Audited]] = {
     ("POST", f"{_API}/robots/{{robot_id}}/stop"): Audited(
@@ -82,16 +90,13 @@ AUDITED: Final[Mapping[tuple[str, str], Audited]] = {
     ),
     ("PUT", f"{_API}/rule"): Audited(
         "rule",
-        asked=(
-            "version",
-            "confidence_threshold",
-            "class_thresholds",
-            "radius_m",
-            "aliases",
-            "foresight",
-            "foresight_s",
-        ),
+        asked=("version", *_RULE),
         answered=("version",),
+    ),
+    ("POST", f"{_API}/rule/trial"): Audited("trial", asked=_RULE),
+    ("DELETE", f"{_API}/rule/trial"): Audited("trial_ended"),
+    ("POST", f"{_API}/rule/trial/promote"): Audited(
+        "trial_promoted", asked=("version",), answered=("version",)
     ),
     ("POST", f"{_API}/notes"): Audited(
         "note", asked=("text", "at", "x", "y", "robot_id", "decision_id")

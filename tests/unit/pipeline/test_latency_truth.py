@@ -50,7 +50,7 @@ class Air(Stage):
             due, _, transport, device, payload = heapq.heappop(self._on_way)
             at = Instant(due, START.wall + due - START.mono)
             for observation in codec.read_measure(device, payload).observations:
-                self._desk.ingest.enqueue(Received(observation, at, transport))
+                self.desk.ingest.enqueue(Received(observation, at, transport))
         await super().step()
 
     def _hear(self, topic: str, payload: bytes) -> None:
@@ -71,7 +71,7 @@ class Air(Stage):
 
     def took(self, robot_id: str, hop: Segment) -> Sketch:
         """What a hop took for a robot's odometry in the last minute."""
-        streams = self._desk.latency.watch.streams
+        streams = self.desk.latency.watch.streams
         one = next(s for s in streams if (s.robot_id, s.data) == (robot_id, "odometry"))
         return merged(one.segments[hop].parts("1min"))
 
@@ -136,6 +136,6 @@ async def test_a_delay_that_begins_later_is_not_taken_for_a_clock_that_was_set()
     air._radio.faults = LinkFaults(delay_ms=400.0)
     await play(air, 15.0)
 
-    clock = air._desk.latency.watch.clocks["AGI"]
+    clock = air.desk.latency.watch.clocks["AGI"]
     assert (clock.state, clock.offset_s, clock.jumps) == ("in_step", 0.0, 0)
     assert air.took("AGI", "uplink").quantile(0.95) == close(0.400)

@@ -29,7 +29,7 @@ from iveg.web.views import Views
 from tests.fakes.detector_store import FakeDetectorStore
 from tests.fakes.messages import FakeContacts, FakeSender
 from tests.fakes.recordings import FakePast, FakeRecordings
-from tests.fakes.rule_store import FakeRuleStore
+from tests.fakes.rule_store import FakeRuleStore, FakeTrialStore
 from tests.fakes.worker import FakeWorker
 from tests.unit.pipeline.desk import FIELD, Desk
 
@@ -65,7 +65,8 @@ class WebDesk(Desk):
         self.contact_store = FakeContacts()
         self.detector_store = FakeDetectorStore()
         self.senders = {name: FakeSender(name) for name in CHANNELS}
-        kept = KeptChoices(self.rule_store, self.contact_store, self.detector_store)
+        self.trial_store = FakeTrialStore()
+        kept = self._kept()
         self.services = build_services(self.parts, kept, {**self.senders}, self.clock)
         self.rules = self.services.rules
         self.counters = Counter({"some": 1})
@@ -103,6 +104,15 @@ class WebDesk(Desk):
         self.table = ConnectionTable(lambda: self.clock().mono, ConnectionCaps())
         self.pages = _pages(self.face.site)
         self.app = build_app(self.face, self.pages, live_routers(self.face))
+
+    def _kept(self) -> KeptChoices:
+        """Nothing yet, and the stores."""
+        return KeptChoices(
+            self.rule_store,
+            self.contact_store,
+            self.detector_store,
+            self.trial_store,
+        )
 
     # --- who asks -----------------------------------------------------------------
 
