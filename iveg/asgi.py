@@ -23,7 +23,7 @@ from iveg.web.api import (
 )
 from iveg.web.api.answers import Json
 from iveg.web.build import build_app, live_routers
-from iveg.web.pages import openapi, routes, service_worker
+from iveg.web.pages import openapi, routes, service_worker, sign_on
 from iveg.web.security.authentication import require
 
 
@@ -44,6 +44,7 @@ def create_app(dss: Dss) -> FastAPI:
             pages,
             document=cache(lambda: openapi.describe_api(app)),
             rule=lambda: dss.pipeline.evaluator.rule,
+            sign_on=dss.sign_on,
         )
     )
 
@@ -90,6 +91,8 @@ def _past_routers(dss: Dss, pages: routes.Pages) -> Iterator[APIRouter]:
     if dss.sign_in_token:
         yield sign_in_code.router(dss.sign_in_token)
     yield users.router(dss.people, clock)
+    if dss.sign_on is not None:
+        yield sign_on.router(pages, dss.sign_on)
     yield service_worker.router()
     laboratory = find_laboratory("pages")
     if laboratory is not None:

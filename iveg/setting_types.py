@@ -1,12 +1,13 @@
 """What the values of settings may be: a rule, and behind it the same in words."""
 
-from typing import Annotated, Literal
+from ipaddress import ip_address
+from typing import Annotated, Literal, get_args
 from urllib.parse import urlsplit
 
 from annotated_types import Interval
 from pydantic import AfterValidator, BeforeValidator, StringConstraints
 
-from iveg.domain.accounts import is_name
+from iveg.domain.accounts import PersonRole, is_name
 from iveg.domain.fleet import split_word
 
 
@@ -18,6 +19,50 @@ def _address(*schemes: str) -> AfterValidator:
         return value.rstrip("/")
 
     return AfterValidator(read)
+
+
+def is_safe_address(url: str) -> bool:
+    """Whether secrets may go to an address: https, or this very machine."""
+    try:
+        parts = urlsplit(url)
+        host, port = parts.hostname or "", parts.port
+    except ValueError:
+        return False
+    if not host or port == 0 or parts.username is not None or parts.fragment:
+        return False
+    if not url.isascii() or not url.isprintable() or " " in url:
+        return False
+    return parts.scheme == "https" or (parts.scheme == "http" and is_loopback(host))
+
+
+def is_loopback(host: str) -> bool:
+    """Whether a host is this machine, by its looks; names are not resolved."""
+    try:
+        return ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+def _read_safe_address(url: str) -> str:
+    # As it is: the issuer is compared to the last slash.
+    if not is_safe_address(url):
+        raise ValueError(url)
+    return url
+
+
+def _read_roles(text: str) -> tuple[str, ...]:
+    rows = tuple(row.strip() for row in text.split(","))
+    read = [split_role(row) for row in rows]
+    if None in read or len({one[0] for one in read if one}) != len(rows):
+        raise ValueError(text)
+    return rows
+
+
+def split_role(row: str) -> tuple[str, PersonRole] | None:
+    """Value of a claim and the role that it gives; None: neither is told."""
+    value, _, word = row.rpartition("=")
+    role = next((one for one in get_args(PersonRole) if one == word.strip()), None)
+    return (value.strip(), role) if role and value.strip() else None
 
 
 def _read_robots(text: str) -> tuple[str, ...]:
@@ -44,6 +89,24 @@ Broker = Annotated[
     str, _address("mqtt", "mqtts"), "an address such as mqtt://host:port"
 ]
 Url = Annotated[str, _address("http", "https"), "an address such as http://host:port"]
+SafeUrl = Annotated[
+    str,
+    AfterValidator(_read_safe_address),
+    "an https address, or one of this machine",
+]
+RoleMap = Annotated[
+    tuple[str, ...],
+    BeforeValidator(_read_roles),
+    "values of the claim and roles, such as growers=operator,owners=admin",
+]
+Line = Annotated[
+    str,
+    StringConstraints(pattern=r"^[^\x00-\x1f\x7f]{1,256}$"),
+    "1 to 256 characters on one line",
+]
+Hours = Annotated[
+    float, Interval(ge=0.25, le=24.0), "a number of hours from 0.25 to 24"
+]
 Hex = Annotated[
     str,
     StringConstraints(pattern="^[0-9a-fA-F]{32,128}$"),

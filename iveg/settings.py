@@ -14,7 +14,7 @@ from typing import Annotated, Any, Final, Literal, get_args, get_type_hints
 from annotated_types import Interval
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
-from iveg.domain.accounts import DEFAULT_NAME
+from iveg.domain.accounts import DEFAULT_NAME, PersonRole
 from iveg.domain.errors import SettingsError
 from iveg.domain.limits import LIMITS
 from iveg.domain.recordings import RecordingLimits
@@ -27,14 +27,19 @@ from iveg.setting_types import (
     DirectRead,
     Gigabytes,
     Hex,
+    Hours,
+    Line,
     Name,
     Port,
     Robots,
+    RoleMap,
+    SafeUrl,
     Service,
     ServicePath,
     Switch,
     Token,
     Url,
+    split_role,
 )
 
 _QUIET: Final = ConfigDict(hide_input_in_errors=True)
@@ -46,6 +51,7 @@ _SECRETS: Final = frozenset(
         "IVEG_API_TOKEN",
         "IVEG_SIGN_IN_TOKEN",
         "IVEG_MQTT_PASSWORD",
+        "IVEG_SSO_CLIENT_SECRET",
     }
 )
 
@@ -150,6 +156,51 @@ class Settings:
         "IVEG_SIGN_IN_NAME",
         DEFAULT_NAME,
         "Name of whoever signs in by the link, in everything that they do.",
+    )
+    sso_issuer: SafeUrl = setting(
+        "IVEG_SSO_ISSUER",
+        "",
+        "Identity provider at which people may sign in, by its address (`issuer`) to "
+        "the last slash; empty: none (docs/deployment.md).",
+    )
+    sso_provider: Literal["oidc", "keyrock"] = setting(
+        "IVEG_SSO_PROVIDER",
+        "oidc",
+        "What it speaks: OpenID Connect (`oidc`), or FIWARE Keyrock's own (`keyrock`).",
+    )
+    sso_client_id: Line = setting(
+        "IVEG_SSO_CLIENT_ID", "", "Name of this iVeg at the provider."
+    )
+    sso_client_secret: Line = setting(
+        "IVEG_SSO_CLIENT_SECRET",
+        "",
+        "Secret of this iVeg at the provider; empty: a public client.",
+    )
+    sso_scopes: Line = setting(
+        "IVEG_SSO_SCOPES", "openid profile", "What is asked of the provider."
+    )
+    sso_role_claim: Line = setting(
+        "IVEG_SSO_ROLE_CLAIM",
+        "roles",
+        "Claim that holds a person's roles: a path such as `realm_access.roles`, "
+        "`groups` or `roles[].name`.",
+    )
+    sso_roles: RoleMap = setting(
+        "IVEG_SSO_ROLES",
+        (),
+        "What its values give here, such as `growers=operator,owners=admin`; the "
+        "highest counts, and nobody comes in without one.",
+    )
+    sso_name_claim: Line = setting(
+        "IVEG_SSO_NAME_CLAIM", "name", "Claim that holds a person's name."
+    )
+    sso_label: Line = setting(
+        "IVEG_SSO_LABEL", "", "What the button says; empty: Single sign-on."
+    )
+    sso_hours: Hours = setting(
+        "IVEG_SSO_HOURS",
+        12.0,
+        "How long a session lasts that began at the provider (h); STOP for longer.",
     )
     confidence_threshold: Annotated[float, Interval(ge=0.0, le=1.0)] = setting(
         "IVEG_CONFIDENCE_THRESHOLD",
@@ -292,6 +343,17 @@ class Settings:
         if (kept.audit or forever) < (kept.decisions or forever):
             name, value = "IVEG_KEEP_AUDIT_DAYS", str(kept.audit)
             raise SettingsError(name, value, "no shorter than IVEG_KEEP_DECISIONS_DAYS")
+
+        if self.sso_issuer and not self.sso_client_id:
+            name = "IVEG_SSO_CLIENT_ID"
+            raise SettingsError(name, "", "set where IVEG_SSO_ISSUER is")
+        if self.sso_issuer and not self.sso_roles:
+            raise SettingsError("IVEG_SSO_ROLES", "", "set where IVEG_SSO_ISSUER is")
+
+    @property
+    def sso_role_map(self) -> dict[str, PersonRole]:
+        """Value of the provider's claim → the role that it gives."""
+        return dict(row for one in self.sso_roles if (row := split_role(one)))
 
     @property
     def recording_limits(self) -> RecordingLimits:

@@ -5,16 +5,23 @@ digest is kept.
 """
 
 import secrets
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Final, Protocol
 
 from iveg.adapters.ids import new_id
 from iveg.domain.accounts import Account, PersonRole, digest_of, is_name
 from iveg.domain.audit import Actor
-from iveg.domain.errors import NotANameError
+from iveg.domain.errors import (
+    NameTakenError,
+    NotANameError,
+    ProvidedAccountError,
+    SignOnError,
+)
 from iveg.domain.retention import DAY_S
+from iveg.domain.single_sign_on import another_name
 
+MOST_ACCOUNTS: Final = 1000
 INVITED_S: Final = 3 * DAY_S
 """How long an invitation waits (s)."""
 
@@ -66,14 +73,27 @@ class Admission:
     def reset(
         self, account: Account, waits_s: float = INVITED_S
     ) -> tuple[str, Account]:
-        """Take a password away and invite again; sessions end."""
+        """Take a password away and invite again; sessions end.
+
+        Whom the provider vouches for is let in again, and gets no invitation.
+        """
+        if account.provider:
+            back = replace(account, disabled=False, since=self._now)
+            self._store.change(back, "account_reset", self._by)
+            return "", back
         reset = replace(account, password="", disabled=False, since=self._now)
         invitation, invited = self._invited(reset, waits_s)
         self._store.change(invited, "account_reset", self._by)
         return invitation, invited
 
     def give_role(self, account: Account, role: PersonRole) -> Account:
-        """Change a role; sessions end."""
+        """Change a role; sessions end.
+
+        Raises:
+            ProvidedAccountError: the provider gives it.
+        """
+        if account.provider:
+            raise ProvidedAccountError(account.name)
         changed = replace(account, role=role, since=self._now)
         self._store.change(changed, "account_role", self._by)
         return changed
@@ -83,6 +103,39 @@ class Admission:
         off = replace(account, disabled=True, invitation="")
         self._store.change(off, "account_disabled", self._by)
         return off
+
+    def vouched(self, known: Mapping[str, Account], told: Account) -> Account:
+        """Let somebody in whom a provider vouches for, under the name that they had.
+
+        Another role ends the sessions of the one before.
+
+        Args:
+            known: All accounts, by id.
+            told: As the provider says.
+
+        Raises:
+            SignOnError: they are shut out here, or there are too many accounts.
+        """
+        account = known.get(told.account_id)
+        if account is None:
+            return self._vouched_first(known, told)
+        if not account.is_open(self._now):
+            raise SignOnError("disabled", account.account_id)
+        if account.role == told.role:
+            return account
+        changed = replace(account, role=told.role, since=self._now)
+        self._store.change(changed, "account_role", self._by)
+        return changed
+
+    def _vouched_first(self, known: Mapping[str, Account], told: Account) -> Account:
+        if len(known) >= MOST_ACCOUNTS:
+            raise SignOnError("busy", f"{MOST_ACCOUNTS} accounts are there already")
+        try:
+            self._store.add(told, self._by)
+        except NameTakenError:
+            told = replace(told, name=another_name(told.name, told.account_id))
+            self._store.add(told, self._by)
+        return told
 
     def _invited(self, account: Account, waits_s: float) -> tuple[str, Account]:
         invitation = secrets.token_urlsafe(32)

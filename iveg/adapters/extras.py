@@ -15,6 +15,7 @@ EXTRAS: Final = {
     "parquet": "pyarrow",
     "postgresql": "psycopg",
     "ros2": "cyclonedds",
+    "sso": "authlib",
 }
 """Extra → the library that it brings."""
 

@@ -34,6 +34,8 @@ class Session:
         began: Unix time of the sign-in (s); ``seen`` of the last sign of life.
         person: Id of the account; empty in sessions of earlier versions.
         method: How they signed in.
+        until: When it is over at the latest (Unix s); None: no earlier than others.
+        proven: When the person proved who they are (Unix s); None: not told.
     """
 
     digest: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
@@ -43,6 +45,8 @@ class Session:
     seen: _UnixTime
     person: str = ""
     method: SignInMethod = "link"
+    until: _UnixTime | None = None
+    proven: _UnixTime | None = None
 
     __pydantic_config__ = ConfigDict(strict=True, extra="forbid")
 

@@ -34,6 +34,7 @@ from iveg.app.life import Work, live
 from iveg.app.outside import Outside, open_outside
 from iveg.app.past import Site as PastSite
 from iveg.app.past import picture
+from iveg.app.sign_on import ways_in
 from iveg.app.viewers import Viewers
 from iveg.domain.errors import HopError, VitalPartError
 from iveg.domain.fleet import FleetDescription
@@ -57,7 +58,7 @@ from iveg.web.api import messages
 from iveg.web.build import Face
 from iveg.web.notifications import NotificationEndpoint
 from iveg.web.pages.contexts import Site
-from iveg.web.security.authentication import Authenticator, NotifySecret
+from iveg.web.security.authentication import NotifySecret
 from iveg.web.security.people import People
 from iveg.web.security.programs import Programs
 from iveg.web.views import Views
@@ -218,15 +219,13 @@ class Dss:
 
     def _face(self) -> Face:
         parts, settings, recorder = self.pipeline, self.settings, self.stores.recorder
-        authenticator = Authenticator(
-            sign_in_token=self.sign_in_token,
-            api_token=settings.api_token,
-            clock=clock.now,
-            store=self.stores.sessions,
-            link_name=settings.sign_in_name,
-            trail=self.trail,
-            people=self.people,
-            programs=self.programs,
+        authenticator, self.sign_on = ways_in(
+            settings,
+            self.sign_in_token,
+            (self.people, self.programs),
+            self.stores.sessions,
+            self.trail,
+            self.outside.provider,
         )
         orion = NotificationEndpoint(
             parts.ingest,
@@ -248,6 +247,7 @@ class Dss:
             self._demo,
             laboratory=find_laboratory("pages") is not None,
             link=bool(self.sign_in_token),
+            sso=None if self.outside.provider is None else settings.sso_label,
         )
         views = Views(parts, partial(count_all, parts, recorder, self.counted))
         self.chronicle.picture = partial(picture, views)

@@ -12,6 +12,7 @@ from iveg.adapters.history.engine import history_url, sqlite_file
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.recorder import Recorder, journal_file
 from iveg.adapters.history.upkeep import RecordedHistory
+from iveg.adapters.identity_provider import IdentityProvider
 from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.journal import FileJournal
 from iveg.adapters.mail import MailSender, Write
@@ -25,6 +26,7 @@ from iveg.adapters.sessions import FileSessions
 from iveg.adapters.trials import FileTrials
 from iveg.adapters.web_push import PushSender
 from iveg.adapters.webhook import WebhookSender
+from iveg.app.sign_on import open_provider
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.fleet import FleetDescription
 from iveg.domain.messages import Channel
@@ -103,6 +105,7 @@ class Outside:
     Attributes:
         link: Connection to the broker, still without readers.
         outbound: HTTP to addresses that a person has typed.
+        provider: Vouches for people; None: nobody does.
     """
 
     stores: Stores
@@ -110,6 +113,7 @@ class Outside:
     orion: OrionClient
     agent: IotAgentClient
     outbound: OutboundHttp
+    provider: IdentityProvider | None = None
 
     def senders(self, write: Write) -> dict[Channel, MessageSender]:
         """The channels of messages to people."""
@@ -125,6 +129,8 @@ class Outside:
         await self.orion.close()
         await self.agent.close()
         self.outbound.close()
+        if self.provider is not None:
+            await self.provider.close()
 
 
 def open_outside(
@@ -141,6 +147,7 @@ def open_outside(
         OrionClient(settings.orion_url, *tenant),
         IotAgentClient(settings.iota_url, *tenant),
         OutboundHttp(),
+        open_provider(settings),
     )
 
 

@@ -118,6 +118,9 @@ def _find(store: AccountStore, name: str) -> Account:
 
 
 def _print_invitation(settings: Settings, invitation: str) -> None:
+    if not invitation:
+        print("They may sign in at the identity provider again.")
+        return
     print("Their link, which works once and for 3 days:")
     print(invitation_link(settings, invitation))
 

@@ -9,8 +9,8 @@ import unicodedata
 from dataclasses import dataclass
 from typing import Final, Literal
 
-SignInMethod = Literal["link", "password", "token"]
-"""Proof of an identity; ``token`` is a program's."""
+SignInMethod = Literal["link", "password", "sso", "token"]
+"""Proof of an identity; ``sso`` is the identity provider's, ``token`` a program's."""
 PersonRole = Literal["viewer", "operator", "admin"]
 AccountState = Literal["active", "invited", "lapsed", "over", "disabled"]
 """``lapsed``: the invitation was not taken in time; ``over``: ended by itself."""
@@ -56,6 +56,7 @@ class Account:
         invitation: SHA-256 of what is waited for (hex); empty: nothing.
         invited_until: When the invitation is over (Unix s).
         since: Sessions that began before are over (Unix s): a new role or password.
+        provider: Issuer that vouches for the person and gives the role; empty: none.
     """
 
     account_id: str
@@ -67,6 +68,7 @@ class Account:
     invitation: str = ""
     invited_until: float = 0.0
     since: float = 0.0
+    provider: str = ""
 
     def is_open(self, now: float) -> bool:
         """Whether the person may be here at this moment (Unix s)."""
@@ -78,7 +80,7 @@ class Account:
             return "disabled"
         if not self.is_open(now):
             return "over"
-        if self.password:
+        if self.password or self.provider:
             return "active"
         return "invited" if self.invitation and now < self.invited_until else "lapsed"
 

@@ -14,6 +14,8 @@ IvegError
 ├── ExperimentRefusedError  an experiment that may not start now (HTTP 409)
 ├── OutboundError           an address outside iVeg that took no message
 ├── NotAllowedError         somebody without the role (HTTP 403)
+├── SignOnError             a sign-in at the identity provider that let nobody in
+├── ProvidedAccountError    a change of what the identity provider says (HTTP 409)
 ├── VitalPartError          a part that STOP needs has ended; ends the process
 └── HopError                a neighbour that cannot be reached or answered wrongly
     └── NoAnswerError       one that took the question and did not answer in time
@@ -185,6 +187,27 @@ class NotAllowedError(IvegError):
 
     def __init__(self, action: str, role: str) -> None:
         super().__init__(f"{role} may not {action}.")
+
+
+class SignOnError(IvegError):
+    """A sign-in at the identity provider let nobody in.
+
+    Attributes:
+        failure: One of ``SignOnFailure``, for which people are shown a sentence.
+        detail: For the log and the audit; holds no token.
+    """
+
+    def __init__(self, failure: str, detail: str = "") -> None:
+        super().__init__(f"{failure}: {detail}" if detail else failure)
+        self.failure = failure
+        self.detail = detail
+
+
+class ProvidedAccountError(IvegError):
+    """The account is the identity provider's, which alone changes this of it."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(f"{name} signs in at the identity provider, as it says.")
 
 
 class VitalPartError(IvegError):

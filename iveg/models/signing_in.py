@@ -46,4 +46,6 @@ class Invitation(Model):
     """An account with the link that begins it, which is shown this once."""
 
     user: UserAccount
-    code: SignInCode
+    code: SignInCode | None = Field(
+        description="Null for somebody whom the identity provider vouches for."
+    )

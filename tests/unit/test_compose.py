@@ -20,7 +20,13 @@ SERVICES: dict[str, dict[str, Any]] = yaml.safe_load(COMPOSE)["services"]
 NETWORKS: dict[str, dict[str, Any]] = yaml.safe_load(COMPOSE)["networks"]
 KNOWN = {row.metadata["variable"] for row in fields(Settings)}
 ASKED = set(re.findall(r"(?<!\$)\$\{(\w+)(:-|:\?|:\+|-|\})", COMPOSE))
-MAY_BE_EMPTY = {"IVEG_FLEET"}
+MAY_BE_EMPTY = {
+    "IVEG_FLEET",
+    "IVEG_SSO_CLIENT_ID",
+    "IVEG_SSO_CLIENT_SECRET",
+    "IVEG_SSO_ISSUER",
+    "IVEG_SSO_ROLES",
+}
 PRIVATE = ("mongodb", "orion", "iot-agent", "postgresql", "iveg-migrate", "emulator")
 DOCKERFILE = (ROOT / "Dockerfile").read_text()
 

@@ -9,6 +9,7 @@ import pytest
 
 from iveg.adapters.extras import EXTRAS
 from iveg.adapters.history.engine import writing_engine
+from iveg.app.sign_on import open_provider
 from iveg.cli import UNUSABLE, main
 from iveg.domain.errors import MissingExtraError
 from iveg.domain.geometry import Pose2D
@@ -75,6 +76,18 @@ def test_a_command_without_its_extra_says_in_one_sentence_what_to_install(
         f"needs {EXTRAS[without]}, which is not installed: "
         f"pip install 'iveg[{without}]'."
     )
+
+
+@pytest.mark.parametrize("extra", ["sso"])
+def test_an_identity_provider_without_its_extra_names_the_setting(
+    without: str, tmp_path: Path
+) -> None:
+    settings = Settings(
+        sso_issuer="https://idm.test", sso_client_id="iveg", sso_roles=("a=viewer",)
+    )
+
+    with pytest.raises(MissingExtraError, match=r"IVEG_SSO_ISSUER.*iveg\[sso\]"):
+        open_provider(settings)
 
 
 @pytest.mark.parametrize("extra", ["bags"])

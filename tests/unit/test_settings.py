@@ -54,6 +54,10 @@ BAD = [
     ("IVEG_SIGN_IN_NAME", "Ana <admin>", "1 to 64 visible characters, none of"),
     ("IVEG_SIGN_IN_NAME", "An\u202ea", "1 to 64 visible characters"),
     ("IVEG_SIGN_IN_NAME", " Ana", "1 to 64 visible characters"),
+    ("IVEG_SSO_ISSUER", "http://idm.test", "an https address, or one of this machine"),
+    ("IVEG_SSO_ROLES", "growers=owner", "values of the claim and roles"),
+    ("IVEG_SSO_ROLES", "a=admin,a=viewer", "values of the claim and roles"),
+    ("IVEG_SSO_HOURS", "25", "a number of hours from 0.25 to 24"),
     ("IVEG_UPLINK", "both", "one of per-topic, single"),
     ("IVEG_ON_LINK_LOSS", "drive", "one of stop, slow"),
 ]
@@ -167,6 +171,16 @@ GOOD = {
     "IVEG_SIGN_IN_TOKEN": "cd" * 32,
     "IVEG_SIGN_IN": "accounts",
     "IVEG_SIGN_IN_NAME": "Ana Núñez",
+    "IVEG_SSO_ISSUER": "https://idm.test/realms/coop/",
+    "IVEG_SSO_PROVIDER": "keyrock",
+    "IVEG_SSO_CLIENT_ID": "iveg",
+    "IVEG_SSO_CLIENT_SECRET": "of the client",
+    "IVEG_SSO_SCOPES": "openid",
+    "IVEG_SSO_ROLE_CLAIM": "realm_access.roles",
+    "IVEG_SSO_ROLES": "growers=operator,owners = admin",
+    "IVEG_SSO_NAME_CLAIM": "preferred_username",
+    "IVEG_SSO_LABEL": "Cooperativa",
+    "IVEG_SSO_HOURS": "8",
     "IVEG_CONFIDENCE_THRESHOLD": "0.75",
     "IVEG_SAFETY_RADIUS_M": "2.5",
     "IVEG_STOP_DIRECT": "off",
@@ -189,6 +203,25 @@ GOOD = {
     "IVEG_CALIBRATION": "paper",
     "IVEG_FLEET": "/etc/iveg/fleet.toml",
 }
+
+
+@pytest.mark.parametrize(
+    ("also", "name"),
+    [
+        ({}, "IVEG_SSO_CLIENT_ID"),
+        ({"IVEG_SSO_CLIENT_ID": "iveg"}, "IVEG_SSO_ROLES"),
+        ({"IVEG_SSO_ISSUER": "https://u:p@idm.test"}, "IVEG_SSO_ISSUER"),
+    ],
+)
+def test_an_identity_provider_is_told_with_all_that_it_needs(
+    also: dict[str, str], name: str
+) -> None:
+    environment = {"IVEG_SSO_ISSUER": "https://idm.test", **also}
+
+    with pytest.raises(SettingsError, match=f"^{name}=") as caught:
+        Settings.from_environment(environment)
+
+    assert "u:p" not in str(caught.value)
 
 
 def test_every_setting_can_be_set() -> None:

@@ -323,6 +323,7 @@ accounts = Table(
     _number("ends_at"),
     _text("invitation", null=False),
     *_numbers("invited_until", "since"),
+    _text("provider", null=False),
     UniqueConstraint("name_key"),
 )
 

@@ -529,7 +529,8 @@ export type HopHealth = {
 /** An account with the link that begins it, which is shown this once. */
 export type Invitation = {
   user: UserAccount;
-  code: SignInCode;
+  /** Null for somebody whom the identity provider vouches for. */
+  code: SignInCode | null;
 };
 
 export type JsonValue = unknown;

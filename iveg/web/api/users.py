@@ -4,12 +4,12 @@ An invitation is a password until it is taken: it leaves by the one answer that 
 """
 
 from collections.abc import Mapping
-from typing import Annotated, Final
+from typing import Annotated
 
 from fastapi import APIRouter, Depends, HTTPException, Request, Response
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
-from iveg.adapters.admission import Admission
+from iveg.adapters.admission import MOST_ACCOUNTS, Admission
 from iveg.domain.accounts import MOST_NAME, Account, PersonRole, is_name, name_key
 from iveg.domain.errors import UnknownNameError
 from iveg.domain.retention import DAY_S
@@ -22,7 +22,6 @@ from iveg.web.refusals import refusals
 from iveg.web.security.authentication import Principal, require
 from iveg.web.security.people import People
 
-MOST_ACCOUNTS: Final = 1000
 _MOST_DAYS = 3650
 
 _Admin = Annotated[Principal, Depends(require("admin"))]
@@ -139,5 +138,5 @@ def _invitation(
     request: Request, made: tuple[str, Account], now: float, status: int = 200
 ) -> Response:
     invitation, account = made
-    code = code_of(request, f"invitation={invitation}")
+    code = code_of(request, f"invitation={invitation}") if invitation else None
     return Json(Invitation(user=UserAccount.of(account, now), code=code), status)

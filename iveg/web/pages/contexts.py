@@ -30,6 +30,7 @@ class Site:
         laboratory: Experiments can be started from the page.
         transports: Ids, in the order of their columns.
         link: One link signs people in; else passwords alone do.
+        sso: What the button of the identity provider says; None: there is none.
     """
 
     greenhouse: str
@@ -39,6 +40,7 @@ class Site:
     laboratory: bool = False
     transports: tuple[str, ...] = tuple(one.id for one in TRANSPORTS)
     link: bool = True
+    sso: str | None = None
 
     @property
     def slots(self) -> dict[str, int]:
@@ -134,11 +136,24 @@ class SignInPage(Page):
         address: Of this server, as the browser reached it.
         wrong: A link was tried and does not sign in.
         least: Characters of a password.
+        failure: Why the identity provider let nobody in; empty: it was not asked.
     """
 
     address: str
     wrong: bool = False
     least: int = 0
+    failure: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class EnteredPage(Page):
+    """``entered.html``: signed in by the identity provider.
+
+    Attributes:
+        to: Path at which the person goes on.
+    """
+
+    to: str
 
 
 @dataclass(frozen=True, slots=True)

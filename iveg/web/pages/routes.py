@@ -12,7 +12,7 @@ from importlib.resources import files
 from typing import Annotated, Final
 
 from fastapi import APIRouter, Depends, Path, Request, Response
-from fastapi.responses import HTMLResponse
+from fastapi.responses import HTMLResponse, JSONResponse
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup, escape
 from pydantic import BaseModel, ConfigDict, Field
@@ -49,6 +49,7 @@ from iveg.web.security.authentication import (
     Principal,
     require,
 )
+from iveg.web.security.single_sign_on import SingleSignOn
 
 LANGUAGE_COOKIE = "iveg_language"
 THEME_COOKIE = "iveg_theme"
@@ -153,11 +154,19 @@ class Pages:
         return self.sign_in(request, 401, wrong=True)
 
     def sign_in(
-        self, request: Request, status: int = 200, *, wrong: bool = False
+        self,
+        request: Request,
+        status: int = 200,
+        *,
+        wrong: bool = False,
+        failure: str = "",
     ) -> Response:
-        """The sign-in page."""
-        address = str(request.base_url).rstrip("/")
-        page = SignInPage(self.frame(request, "signin"), address, wrong, LEAST)
+        """The sign-in page; ``failure`` is the identity provider's."""
+        address, frame = (
+            str(request.base_url).rstrip("/"),
+            self.frame(request, "signin"),
+        )
+        page = SignInPage(frame, address, wrong, LEAST, failure)
         return self.draw(page, status)
 
 
@@ -166,6 +175,7 @@ def router(
     *,
     document: Callable[[], ApiDoc],
     rule: Callable[[], DetectionRule],
+    sign_on: SingleSignOn | None = None,
 ) -> APIRouter:
     """The routes of all pages.
 
@@ -173,6 +183,7 @@ def router(
         pages: What draws them.
         document: The HTTP interface as it stands.
         rule: The version in force.
+        sign_on: Signs people out at the identity provider, too; None: there is none.
     """
     routes = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
     for route, path in _SCRIPTED.items():
@@ -224,7 +235,7 @@ def router(
         "/signout", response_model=None, dependencies=[Depends(require("stop"))]
     )
     async def sign_out(request: Request) -> Response:
-        return _authenticator(request).sign_out(request)
+        return await _leave(request, sign_on)
 
     @routes.post("/wall", status_code=204)
     async def wall(request: Request, visitor: _Reader) -> None:
@@ -255,6 +266,20 @@ async def _enter(request: Request, body: _SignIn) -> Response | Problem:
             return await authenticator.sign_in_by_password(request, name, password)
         case _ByInvitation(invitation=invitation, password=password):
             return await authenticator.accept(request, invitation, password)
+
+
+async def _leave(request: Request, sign_on: SingleSignOn | None) -> Response:
+    """End a session, here before anywhere else."""
+    authenticator = _authenticator(request)
+    who = authenticator.identify(request)
+    gone = authenticator.sign_out(request)
+    if sign_on is None or who is None:
+        return gone
+    onward = await sign_on.sign_out_address(request, who)
+    if onward is None:
+        return gone
+    cookie = gone.headers["set-cookie"]
+    return JSONResponse({"next": onward}, headers={"Set-Cookie": cookie})
 
 
 def _authenticator(request: Request) -> Authenticator:

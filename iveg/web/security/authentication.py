@@ -134,7 +134,7 @@ class Authenticator:
         if not _same(token, self._sign_in_token):
             return self._refuse(address, self._clock().mono, "wrong token")
         # Somebody else's wrong links must not shut out whoever has the right one.
-        return self._admit(request, self.sessions.open_by_link(), response)
+        return self.admit(request, self.sessions.open_by_link(), response)
 
     async def sign_in_by_password(
         self, request: Request, name: str, password: str
@@ -182,15 +182,18 @@ class Authenticator:
         cookie = self.sessions.open(
             account.name, account.role, account.account_id, "password"
         )
-        return self._admit(request, cookie, Response(status_code=204))
+        return self.admit(request, cookie, Response(status_code=204))
 
-    def _admit(self, request: Request, cookie: str, response: Response) -> Response:
+    def admit(
+        self, request: Request, cookie: str, response: Response, **told: object
+    ) -> Response:
+        """Give a browser its session; the rest goes into the audit."""
         address = "" if request.client is None else request.client.host
         self._attempts.succeeded(address)
         secure = request.url.scheme == "https"
         who = self.sessions.find(cookie)
         if who is not None:
-            self._note(who, "sign_in", address)
+            self._note(who, "sign_in", address, **told)
         response.set_cookie(
             _cookie_name(secure=secure),
             cookie,
@@ -225,10 +228,10 @@ class Authenticator:
         self._tell_refused(now, wrong)
         return Problem(401, "This link does not sign in here, or not any more.")
 
-    def _note(self, actor: Actor, action: str, address: str) -> None:
+    def _note(self, actor: Actor, action: str, address: str, **told: object) -> None:
         if self._trail is not None:
-            told = {"address": address}
-            self._trail.note(actor, action, details=told, at=self._clock())
+            details = {"address": address, **told}
+            self._trail.note(actor, action, details=details, at=self._clock())
 
     def _tell_refused(self, now: float, wrong: str) -> None:
         """Count a refused sign-in; log it once a minute, against floods of the log."""

@@ -14,7 +14,7 @@ from iveg.adapters.admission import Admission, ChangingAccounts
 from iveg.adapters.passwords import Passwords
 from iveg.adapters.sessions import Session
 from iveg.domain.accounts import Account, digest_of, name_key
-from iveg.domain.audit import Actor
+from iveg.domain.audit import Actor, NamedActor
 from iveg.domain.errors import HopError
 from iveg.pipeline.ports import Clock
 from iveg.web.security.rereading import Rereading
@@ -80,7 +80,7 @@ class People(Rereading):
         """The role that an account leaves a session; None: it is over at once.
 
         Args:
-            session: Somebody's, who came with a password.
+            session: Somebody's, who came with a password or by the provider.
             left: The role that its age leaves.
         """
         if self._known is None:
@@ -101,6 +101,16 @@ class People(Rereading):
         found = next((one for one in known if name_key(one.name) == key), None)
         fits = await self._passwords.fits(password, found.password if found else "")
         return found if found and fits and found.is_open(now) else None
+
+    async def vouched(self, told: Account) -> Account:
+        """The account of somebody whom the provider vouches for; made where needed.
+
+        Raises:
+            SignOnError: they are shut out here.
+            HopError: the database is away.
+        """
+        by = NamedActor(told.account_id, told.name, told.role, "sso")
+        return await self.change(by, lambda one, known: one.vouched(known, told))
 
     async def accept(self, invitation: str, password: str) -> Account | None:
         """Begin an account by its invitation; None where that is none any more.

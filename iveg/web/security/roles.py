@@ -33,6 +33,8 @@ class Principal:
         person: Id of the account; names may change and be given anew.
         method: How they proved who they are.
         signed_in_at: When (Unix s); None for programs, which do so at each request.
+        proven_at: When the person last proved who they are (Unix s); later than that
+            they were only let in again, by the provider's own session. None: unknown.
     """
 
     name: str
@@ -41,6 +43,7 @@ class Principal:
     person: str = ""
     method: SignInMethod = "link"
     signed_in_at: float | None = None
+    proven_at: float | None = None
 
     def may(self, action: Action) -> bool:
         """Whether the role's row holds this action."""

@@ -64,16 +64,35 @@ class Sessions:
         return self.open(self._link_name, "operator", LINK_PERSON)
 
     def open(
-        self, name: str, role: Role, person: str = "", method: SignInMethod = "link"
+        self,
+        name: str,
+        role: Role,
+        person: str = "",
+        method: SignInMethod = "link",
+        until: float | None = None,
+        proven: float | None = None,
     ) -> str:
-        """Begin a session; returns its token, which is stored nowhere."""
+        """Begin a session; returns its token, which is stored nowhere.
+
+        Args:
+            name: Of the person.
+            role: What they are.
+            person: Id of the account.
+            method: How they signed in.
+            until: When it is over at the latest (Unix s).
+            proven: When the provider saw them prove who they are (Unix s); None: it
+                does not say.  Every other way in is a proof by itself.
+        """
         if len(self._sessions) >= self._most:
             idlest = min(self._sessions, key=lambda one: self._sessions[one].seen)
             del self._sessions[idlest]
         token = secrets.token_urlsafe(32)
         now = self._clock().wall
         digest = _digest(token)
-        began = Session(digest.hex(), name, role, now, now, person, method)
+        proven = proven if method == "sso" else now
+        began = Session(
+            digest.hex(), name, role, now, now, person, method, until, proven
+        )
         self._sessions[digest] = began
         self._keep()
         return token
@@ -109,7 +128,7 @@ class Sessions:
             return None
         now = self._clock().wall
         role = _role_at(session, now)
-        if role is not None and session.method == "password":
+        if role is not None and session.method in ("password", "sso"):
             # Without accounts nobody can say whether the person still has one.
             role = self._role_now(session, role) if self._role_now else None
         if role is None:
@@ -121,7 +140,13 @@ class Sessions:
             if abs(now - self._kept_at) >= _KEEP_SEEN_S:
                 self._keep()
         return Principal(
-            session.name, role, digest, session.person, session.method, session.began
+            session.name,
+            role,
+            digest,
+            session.person,
+            session.method,
+            session.began,
+            session.proven,
         )
 
     def _remember(self, kept: Iterable[Session]) -> None:
@@ -155,7 +180,8 @@ class Sessions:
 
 def _role_at(session: Session, now: float) -> Role | None:
     """The role that is left at ``now`` (Unix s); None when all is over."""
-    over = now - min(session.seen + IDLE_S, session.began + ABSOLUTE_S)
+    ends = min(session.seen + IDLE_S, session.began + ABSOLUTE_S)
+    over = now - (ends if session.until is None else min(ends, session.until))
     if over <= 0:
         return cast("Role", session.role)
     return "expired" if over <= STOP_ONLY_S else None

@@ -8,12 +8,14 @@ import { need, setText } from "./dom.js";
 export function createSignOut({ i18n }) {
   const button = /** @type {HTMLButtonElement} */ (need("#sign-out"));
   button.addEventListener("click", async () => {
-    if (await signOut()) location.assign("/signin");
+    const next = await signOut();
+    if (next) location.assign(next);
     else setText(need("#sign-out-note"), i18n.t("signout.failed"));
   });
   button.disabled = false;
 }
 
+/** Where to go on, at the identity provider where that is asked to, too; null: failed. */
 async function signOut() {
   try {
     // The answer redirects to a page that needs a session.
@@ -22,8 +24,10 @@ async function signOut() {
       headers: { "X-IVEG": "1" },
       redirect: "manual",
     });
-    return answer.type === "opaqueredirect" || answer.ok || answer.status === 401;
+    if (answer.status === 200) return String((await answer.json()).next);
+    const isOut = answer.type === "opaqueredirect" || answer.status === 401;
+    return isOut ? "/signin" : null;
   } catch {
-    return false;
+    return null;
   }
 }

@@ -1,0 +1,325 @@
+"""An identity provider on loopback, in the shapes of three, and with their vices.
+
+It speaks HTTP, keeps PKCE and its codes, signs by RSA or EC, and shows a page on which
+a browser signs in.  What it tells of people has the shape of Keycloak's, Entra's or
+Keyrock's documentation (docs/deployment.md, "Single sign-on").
+"""
+
+import asyncio
+import base64
+import contextlib
+import hashlib
+import hmac
+import html
+import json
+import secrets
+import time
+from collections.abc import AsyncIterator, Callable, Iterator
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Any
+from urllib.parse import parse_qs, urlencode, urlsplit
+
+import uvicorn
+from joserfc import jwt
+from joserfc.jwk import ECKey, OctKey, RSAKey
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import (
+    HTMLResponse,
+    JSONResponse,
+    RedirectResponse,
+    Response,
+    StreamingResponse,
+)
+from starlette.routing import Route
+
+from tests.ports import free_ports
+
+CLIENT, SECRET = "iveg", "a-secret-of-the-client"
+KEYCLOAK = {
+    "preferred_username": "ana",
+    "name": "Ana Núñez",
+    "realm_access": {"roles": ["offline_access", "growers"]},
+}
+ENTRA = {
+    "oid": "00000000-0000-0000-66f3-3332eca7ea81",
+    "name": "Ana Núñez",
+    "groups": ["0760b6cf-170e-4a14-91b3-4b78e0739963"],
+    "roles": ["growers"],
+}
+KEYROCK = {
+    "organizations": [{"id": "13e8", "name": "coop", "roles": [{"name": "owners"}]}],
+    "displayName": "Ana Núñez",
+    "roles": [{"id": "9c4e", "name": "growers"}],
+    "email": "ana@coop.test",
+    "username": "ana",
+}
+"""Of one person, by each of the three."""
+
+_PAGE = """<!doctype html><title>Provider</title><form method="post" action="/login">
+<input type="hidden" name="asked" value="{}"><label>Name <input name="who"></label>
+<button>Enter</button></form>"""
+
+
+def _new_key(kind: str = "RSA") -> RSAKey | ECKey:
+    if kind == "RSA":
+        return RSAKey.generate_key(2048, auto_kid=True)
+    return ECKey.generate_key("P-256", auto_kid=True)
+
+
+_first_key = cache(_new_key)
+"""Making one takes a while."""
+
+
+@dataclass
+class FakeIdentityProvider:
+    """One provider.
+
+    Attributes:
+        people: Subject → claims; ``proved`` are the moments of their last proof.
+        vice: What it does wrong; empty: nothing.
+        id_token: Changes the claims of the next ID token.
+        asked: Paths that were asked for, and forms that came to the token endpoint.
+        discloses_proof: It tells ``auth_time``.
+    """
+
+    url: str
+    people: dict[str, dict[str, Any]]
+    wall: Callable[[], float] = time.time
+    alg: str = "RS256"
+    vice: str = ""
+    id_token: dict[str, Any] = field(default_factory=dict)
+    in_user_info: bool = False
+    discloses_proof: bool = True
+    asked: list[str] = field(default_factory=list)
+    forms: list[dict[str, str]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.key = _first_key("EC" if self.alg.startswith("ES") else "RSA")
+        self.published = [self.key]
+        self.proved: dict[str, float] = {}
+        self._codes: dict[str, tuple[str, dict[str, str]]] = {}
+        self._tokens: dict[str, str] = {}
+
+    def rotate(self) -> None:
+        """Sign by another key."""
+        self.key = _new_key("EC" if self.alg.startswith("ES") else "RSA")
+        self.published.append(self.key)
+
+    def approve(self, address: str, who: str) -> str:
+        """What the provider's page does: where a browser goes that was sent here."""
+        query = {k: v[0] for k, v in parse_qs(urlsplit(address).query).items()}
+        assert (query["response_type"], query["client_id"]) == ("code", CLIENT)
+        if query.get("prompt") == "login" or who not in self.proved:
+            self.proved[who] = self.wall()
+        code = secrets.token_urlsafe(16)
+        self._codes[code] = (who, query)
+        answer = {"code": code, "state": query["state"]}
+        return f"{query['redirect_uri']}?{urlencode(answer)}"
+
+    def app(self) -> Starlette:
+        """The application."""
+        return Starlette(
+            routes=[
+                Route("/.well-known/openid-configuration", self._about),
+                Route("/keys", self._keys),
+                Route("/authorize", self._authorize),
+                Route("/oauth2/authorize", self._authorize),
+                Route("/login", self._login, methods=["POST"]),
+                Route("/token", self._token, methods=["POST"]),
+                Route("/oauth2/token", self._token, methods=["POST"]),
+                Route("/userinfo", self._user_info),
+                Route("/user", self._keyrock_user),
+                Route("/out", self._out),
+            ]
+        )
+
+    async def _vice(self, request: Request) -> Response | None:
+        self.asked.append(request.url.path)
+        vice, _, where = self.vice.partition(" ")
+        if where and where != request.url.path:
+            return None
+        match vice:
+            case "slow":
+                await asyncio.sleep(30.0)
+            case "huge":
+                return StreamingResponse(_endless(), media_type="application/json")
+            case "loop":
+                return RedirectResponse(str(request.url), 302)
+            case "text":
+                return Response("<html>")
+            case "away":
+                return JSONResponse({"error": "server_error"}, 503)
+        return None
+
+    async def _about(self, request: Request) -> Response:
+        if (bad := await self._vice(request)) is not None:
+            return bad
+        about = {
+            "issuer": self.url,
+            "authorization_endpoint": f"{self.url}/authorize",
+            "token_endpoint": f"{self.url}/token",
+            "jwks_uri": f"{self.url}/keys",
+            "userinfo_endpoint": f"{self.url}/userinfo",
+            "end_session_endpoint": f"{self.url}/out",
+        }
+        if self.vice == "wrong_issuer":
+            about["issuer"] = "https://somebody-else.test"
+        if self.vice == "plain_http":
+            about["token_endpoint"] = "http://169.254.169.254/latest"
+        if self.vice == "no_sign_out":
+            del about["end_session_endpoint"]
+        return JSONResponse(about)
+
+    async def _keys(self, request: Request) -> Response:
+        if (bad := await self._vice(request)) is not None:
+            return bad
+        keys = [{**one.as_dict(private=False), "use": "sig"} for one in self.published]
+        if self.vice == "many_keys":
+            keys = [{**keys[0], "kid": str(n)} for n in range(10_000)]
+        if self.vice == "hundreds_of_keys":
+            keys = [{"kty": "EC", "kid": str(n)} for n in range(500)]
+        if self.vice == "large_key":
+            keys[0]["n"] = "_" * 40_000
+        return JSONResponse({"keys": keys})
+
+    async def _authorize(self, request: Request) -> Response:
+        self.asked.append(request.url.path)
+        return HTMLResponse(_PAGE.format(html.escape(str(request.url))))
+
+    async def _login(self, request: Request) -> Response:
+        form = _form(await request.body())
+        return RedirectResponse(self.approve(form["asked"], form["who"]), 303)
+
+    async def _token(self, request: Request) -> Response:
+        if (bad := await self._vice(request)) is not None:
+            return bad
+        form = _form(await request.body())
+        self.forms.append(form)
+        login = base64.b64encode(f"{CLIENT}:{SECRET}".encode()).decode()
+        who, asked = self._codes.pop(form["code"], ("", {}))
+        challenge = hashlib.sha256(form["code_verifier"].encode()).digest()
+        proof = _encoded(challenge).decode()
+        is_theirs = (
+            request.headers.get("authorization") == f"Basic {login}"
+            and form["redirect_uri"] == asked.get("redirect_uri")
+            and asked.get("code_challenge", proof) == proof
+        )
+        if not who or not is_theirs:
+            return JSONResponse({"error": "invalid_grant"}, 400)
+        access = secrets.token_urlsafe(16)
+        self._tokens[access] = who
+        told = {"access_token": access, "token_type": "bearer", "expires_in": 300}
+        if "nonce" in asked:
+            told["id_token"] = self._signed(who, asked["nonce"])
+        return JSONResponse(told)
+
+    def _signed(self, who: str, nonce: str) -> str:
+        now = int(self.wall())
+        claims: dict[str, Any] = {
+            "iss": self.url,
+            "sub": who,
+            "aud": CLIENT,
+            "iat": now,
+            "exp": now + 300,
+            "nonce": nonce,
+        }
+        if self.discloses_proof:
+            claims["auth_time"] = int(self.proved[who])
+        if not self.in_user_info:
+            claims |= self.people[who]
+        claims |= self.id_token
+        claims = {name: value for name, value in claims.items() if value is not None}
+        header = {"alg": self.alg, "kid": self.key.kid}
+        match self.vice:
+            case "none":
+                return b".".join([_part({"alg": "none"}), _part(claims), b""]).decode()
+            case "shared_secret":
+                secret = OctKey.import_key(SECRET + "x" * 32)
+                return jwt.encode({"alg": "HS256"}, claims, secret, ["HS256"])
+            case "public_key_as_secret":
+                # By hand: a library refuses to sign so.
+                header["alg"] = "HS256"
+                parts = [_part(header), _part(claims)]
+                public = self.key.as_pem(private=False)
+                mac = hmac.digest(public, b".".join(parts), "sha256")
+                return b".".join([*parts, _encoded(mac)]).decode()
+            case "foreign_key":
+                stolen = _new_key()
+                return jwt.encode(header, claims, stolen)
+            case "no_token":
+                return "not.a.token"
+        return jwt.encode(header, claims, self.key, [self.alg])
+
+    async def _user_info(self, request: Request) -> Response:
+        if (bad := await self._vice(request)) is not None:
+            return bad
+        token = request.headers.get("authorization", "").removeprefix("Bearer ")
+        who = self._tokens.get(token)
+        if who is None:
+            return JSONResponse({"error": "invalid_token"}, 401)
+        sub = "somebody-else" if self.vice == "other_user_info" else who
+        told = self.people[who] if self.in_user_info else {}
+        return JSONResponse({**told, "sub": sub})
+
+    async def _keyrock_user(self, request: Request) -> Response:
+        if (bad := await self._vice(request)) is not None:
+            return bad
+        who = self._tokens.get(request.query_params.get("access_token", ""))
+        if who is None:
+            return JSONResponse({"error": "invalid_token"}, 401)
+        app_id = "another" if self.vice == "other_app" else CLIENT
+        return JSONResponse({**self.people[who], "id": who, "app_id": app_id})
+
+    async def _out(self, request: Request) -> Response:
+        self.asked.append(f"/out?{request.url.query}")
+        return RedirectResponse(request.query_params["post_logout_redirect_uri"], 303)
+
+
+@contextlib.asynccontextmanager
+async def serving(provider: FakeIdentityProvider) -> AsyncIterator[None]:
+    """The provider, while the test runs."""
+    port = urlsplit(provider.url).port
+    assert port is not None
+    config = uvicorn.Config(
+        provider.app(), port=port, log_config=None, lifespan="off", ws="none"
+    )
+    server = uvicorn.Server(config)
+    server.capture_signals = contextlib.nullcontext  # type: ignore[method-assign,assignment]
+    task = asyncio.create_task(server.serve())
+    while not server.started:  # noqa: ASYNC110 (uvicorn has no event for it)
+        await asyncio.sleep(0.005)
+    try:
+        yield
+    finally:
+        # Its own way to end sleeps for a tenth of a second.
+        task.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await task
+        server.force_exit = True
+        await server.shutdown()
+
+
+def own_url() -> str:
+    """An address on loopback that nobody else has."""
+    (port,) = free_ports(1)
+    return f"http://127.0.0.1:{port}"
+
+
+def _form(body: bytes) -> dict[str, str]:
+    return {k: v[0] for k, v in parse_qs(body.decode()).items()}
+
+
+def _part(told: dict[str, Any]) -> bytes:
+    return _encoded(json.dumps(told).encode())
+
+
+def _encoded(part: bytes) -> bytes:
+    return base64.urlsafe_b64encode(part).rstrip(b"=")
+
+
+def _endless() -> Iterator[bytes]:
+    yield b'{"a": "'
+    for _ in range(10_000):
+        yield b"a" * 65536

@@ -1,0 +1,257 @@
+"""OpenID Connect: what an answer of the provider proves, and what a bad one costs."""
+
+import time
+from collections.abc import AsyncIterator
+from urllib.parse import parse_qs, urlsplit
+
+import pytest
+
+from iveg.adapters.identity_provider import Attempt, Client, Keyrock, Vouched
+from iveg.adapters.oidc import OpenIdProvider
+from iveg.domain.errors import HopError, NoAnswerError, SignOnError
+from tests.fakes.clock import FakeClock
+from tests.fakes.identity_provider import (
+    CLIENT,
+    KEYCLOAK,
+    KEYROCK,
+    SECRET,
+    FakeIdentityProvider,
+    own_url,
+    serving,
+)
+
+BACK = "http://iveg.test/signin/sso/callback"
+
+
+@pytest.fixture
+async def provider() -> AsyncIterator[FakeIdentityProvider]:
+    clock = FakeClock()
+    people = {"ana-1": dict(KEYCLOAK)}
+    made = FakeIdentityProvider(own_url(), people, lambda: clock().wall)
+    made.clock = clock  # type: ignore[attr-defined]
+    async with serving(made):
+        yield made
+
+
+@pytest.fixture
+async def openid(provider: FakeIdentityProvider) -> AsyncIterator[OpenIdProvider]:
+    client = Client(provider.url, CLIENT, SECRET, "openid profile")
+    made = OpenIdProvider(client, provider.clock)  # type: ignore[attr-defined]
+    yield made
+    await made.close()
+
+
+async def vouched(
+    openid: OpenIdProvider | Keyrock, provider: FakeIdentityProvider
+) -> Vouched:
+    attempt = Attempt(BACK)
+    back = provider.approve(await openid.address(attempt), "ana-1")
+    return await openid.vouch(attempt, parse_qs(urlsplit(back).query)["code"][0])
+
+
+@pytest.mark.parametrize("alg", ["RS256", "PS512", "ES256"])
+async def test_a_person_is_vouched_for_by_a_signed_token(
+    openid: OpenIdProvider, provider: FakeIdentityProvider, alg: str
+) -> None:
+    provider.alg = alg
+    provider.__post_init__()
+
+    proof = await vouched(openid, provider)
+
+    assert proof.subject == "ana-1"
+    assert proof.claims["realm_access"] == KEYCLOAK["realm_access"]
+    # The client's secret is sent by the header that no log of forms keeps.
+    assert "client_secret" not in provider.forms[0]
+
+
+async def test_the_code_is_tied_to_the_browser_by_pkce(
+    openid: OpenIdProvider, provider: FakeIdentityProvider
+) -> None:
+    attempt = Attempt(BACK)
+    address = await openid.address(attempt)
+    code = parse_qs(urlsplit(provider.approve(address, "ana-1")).query)["code"][0]
+
+    with pytest.raises(SignOnError, match="invalid_grant"):
+        await openid.vouch(Attempt(BACK, nonce=attempt.nonce), code)
+
+    assert "code_challenge_method=S256" in address
+    assert attempt.verifier not in address
+
+
+@pytest.mark.parametrize(
+    ("vice", "why"),
+    [
+        ("none", "a signature that proves nothing"),
+        ("shared_secret", "a signature that proves nothing"),
+        ("public_key_as_secret", "a signature that proves nothing"),
+        ("foreign_key", "BadSignatureError"),
+        ("no_token", "is none"),
+    ],
+)
+async def test_a_token_that_nobody_else_signed_proves_nothing(
+    openid: OpenIdProvider, provider: FakeIdentityProvider, vice: str, why: str
+) -> None:
+    provider.vice = vice
+
+    with pytest.raises(SignOnError, match=why) as refused:
+        await vouched(openid, provider)
+
+    assert refused.value.failure == "untrusted"
+
+
+@pytest.mark.parametrize(
+    ("claim", "value"),
+    [
+        ("iss", "https://somebody-else.test"),
+        ("iss", None),
+        ("aud", "another-client"),
+        ("aud", ["another-client"]),
+        ("aud", [CLIENT, "another-client"]),
+        ("azp", "another-client"),
+        ("aud", None),
+        ("exp", 1),
+        ("exp", None),
+        ("exp", "never"),
+        ("iat", 1e11),
+        ("nonce", "of-another-sign-in"),
+        ("nonce", None),
+        ("sub", None),
+        ("sub", 7),
+        ("at_hash", "b2YgYW5vdGhlciB0b2tlbg"),
+    ],
+)
+async def test_a_token_with_one_wrong_claim_proves_nothing(
+    openid: OpenIdProvider, provider: FakeIdentityProvider, claim: str, value: object
+) -> None:
+    provider.id_token = {claim: value}
+
+    with pytest.raises(SignOnError, match="ID token: ") as refused:
+        await vouched(openid, provider)
+
+    assert refused.value.failure == "untrusted"
+
+
+@pytest.mark.parametrize(("late_s", "fits"), [(325.0, True), (335.0, False)])
+async def test_clocks_may_differ_by_half_a_minute(
+    openid: OpenIdProvider,
+    provider: FakeIdentityProvider,
+    late_s: float,
+    fits: bool,
+) -> None:
+    attempt = Attempt(BACK)
+    back = provider.approve(await openid.address(attempt), "ana-1")
+    code = parse_qs(urlsplit(back).query)["code"][0]
+    began = provider.clock.now  # type: ignore[attr-defined]
+    provider.wall = lambda: began
+    provider.id_token = {"iat": 1, "exp": int(openid._clock().wall)}
+    provider.clock.now += late_s - 300.0  # type: ignore[attr-defined]
+
+    proves = True
+    try:
+        await openid.vouch(attempt, code)
+    except SignOnError:
+        proves = False
+
+    assert proves is fits
+
+
+async def test_a_new_key_is_found_without_a_restart_and_not_asked_for_in_a_loop(
+    openid: OpenIdProvider, provider: FakeIdentityProvider
+) -> None:
+    await vouched(openid, provider)
+    provider.rotate()
+    with pytest.raises(SignOnError):  # within the half minute nobody asks again
+        await vouched(openid, provider)
+    asked = provider.asked.count("/keys")
+    provider.clock.now += 31.0  # type: ignore[attr-defined]
+
+    again = await vouched(openid, provider)
+
+    assert (again.subject, asked, provider.asked.count("/keys")) == ("ana-1", 1, 2)
+
+
+async def test_user_info_adds_what_the_token_lacks_and_only_of_the_same_person(
+    openid: OpenIdProvider, provider: FakeIdentityProvider
+) -> None:
+    provider.in_user_info = True
+    told = await vouched(openid, provider)
+    provider.vice = "other_user_info"
+    other = await vouched(openid, provider)
+
+    assert told.claims["name"] == "Ana Núñez"
+    assert "name" not in other.claims
+
+
+@pytest.mark.parametrize(
+    "vice",
+    [
+        "wrong_issuer",
+        "plain_http",
+        "huge",
+        "huge /keys",
+        "huge /token",
+        "many_keys",
+        "hundreds_of_keys",
+        "loop",
+        "loop /token",
+        "loop /userinfo",
+        "text",
+        "text /token",
+        "text /keys",
+        "away",
+        "large_key",
+    ],
+)
+async def test_a_bad_provider_is_refused_in_bounded_time_and_memory(
+    openid: OpenIdProvider, provider: FakeIdentityProvider, vice: str
+) -> None:
+    provider.vice = vice
+    begun = time.monotonic()
+
+    refused = False
+    try:
+        proof = await vouched(openid, provider)
+    except (HopError, SignOnError):
+        refused = True
+
+    # A redirect is not followed: nothing of the user, but the token counts.
+    assert refused or (vice == "loop /userinfo" and proof.subject == "ana-1")
+    assert len(provider.asked) <= 4
+    assert time.monotonic() - begun < 5.0
+
+
+async def test_a_slow_provider_is_waited_for_so_long_and_no_longer(
+    openid: OpenIdProvider, provider: FakeIdentityProvider
+) -> None:
+    openid._http._timeout_s = 0.1
+    provider.vice = "slow"
+
+    with pytest.raises(NoAnswerError):
+        await openid.address(Attempt(BACK))
+
+
+async def test_keyrock_tells_who_it_is_at_its_own_address(
+    provider: FakeIdentityProvider,
+) -> None:
+    provider.people = {"ana-1": dict(KEYROCK)}
+    keyrock = Keyrock(Client(provider.url, CLIENT, SECRET, ""))
+
+    proof = await vouched(keyrock, provider)
+    provider.vice = "other_app"
+    with pytest.raises(SignOnError, match="another application"):
+        await vouched(keyrock, provider)
+    with pytest.raises(SignOnError, match="not_renewed"):
+        await keyrock.address(Attempt(BACK, anew=True))
+    await keyrock.close()
+
+    assert proof.subject == "ana-1"
+    assert proof.claims["roles"] == KEYROCK["roles"]
+
+
+def test_nothing_that_is_secret_is_shown_by_a_traceback() -> None:
+    attempt = Attempt(BACK)
+    shown = repr((attempt, Client("https://a.test", CLIENT, SECRET, "")))
+
+    assert not {SECRET, attempt.nonce, attempt.verifier} & set(shown.split("'"))
+    assert SECRET not in shown
+    assert attempt.verifier not in shown

@@ -1,0 +1,471 @@
+"""Single sign-on from the browser's side: who comes in, as whom, and who does not."""
+
+import asyncio
+import logging
+from collections.abc import AsyncIterator
+from dataclasses import replace
+
+import httpx
+import pytest
+
+from iveg.adapters.identity_provider import Client
+from iveg.adapters.oidc import OpenIdProvider
+from iveg.domain.accounts import Account
+from iveg.domain.records import AuditRecord
+from iveg.domain.single_sign_on import ClaimReading, person_id
+from iveg.web.pages import sign_on
+from iveg.web.pages.contexts import Site
+from iveg.web.pages.openapi import ApiDoc
+from iveg.web.pages.routes import Pages, router
+from iveg.web.security.authentication import Authenticator
+from iveg.web.security.people import People
+from iveg.web.security.roles import Principal
+from iveg.web.security.single_sign_on import SingleSignOn
+from tests.fakes.accounts import FakeAccounts, FakePasswords
+from tests.fakes.identity_provider import (
+    CLIENT,
+    KEYCLOAK,
+    SECRET,
+    FakeIdentityProvider,
+    own_url,
+    serving,
+)
+from tests.unit.web.desk import HOST, WebDesk
+
+OWN = {"X-IVEG": "1", "Sec-Fetch-Site": "same-origin"}
+PAGES = {"Accept": "text/html", "Accept-Language": "en"}
+LOCAL = Account("P1", "Ada", "admin", password="#acelga-1234")
+CALLBACK = f"http://{HOST}/signin/sso/callback"
+LASTS_S = 3600.0
+
+
+class SignOnDesk(WebDesk):
+    """A desk with a provider beside its accounts."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.provider = FakeIdentityProvider(
+            own_url(), {"ana-1": dict(KEYCLOAK)}, lambda: self.clock().wall
+        )
+        self.accounts = FakeAccounts(LOCAL)
+        self.people = People(self.accounts, FakePasswords(), self.clock)
+        self.authenticator = Authenticator(
+            sign_in_token="",
+            api_token="",
+            clock=self.clock,
+            trail=self.trail,
+            people=self.people,
+        )
+        client = Client(self.provider.url, CLIENT, SECRET, "openid")
+        reading = ClaimReading("realm_access.roles", "name", {"growers": "operator"})
+        self.sign_on = SingleSignOn(
+            OpenIdProvider(client, self.clock),
+            reading,
+            self.people,
+            self.authenticator,
+            self.clock,
+            self.trail,
+            LASTS_S,
+        )
+        self.app.state.authenticator = self.authenticator
+        site = Site("field", ("AGI", "AGII"), "1", demo=False, sso="Cooperativa")
+        pages = Pages(site)
+        self.app.include_router(
+            router(
+                pages,
+                document=lambda: ApiDoc("", "", (), ()),
+                rule=lambda: self.rules.current,
+                sign_on=self.sign_on,
+            )
+        )
+        self.app.include_router(sign_on.router(pages, self.sign_on))
+        self.person = person_id(self.provider.url, "ana-1")
+
+    def page(self) -> httpx.AsyncClient:
+        return self._client(OWN)
+
+    async def through(
+        self, page: httpx.AsyncClient, path: str = "/signin/sso", who: str = "ana-1"
+    ) -> httpx.Response:
+        """Sign in on the provider's page."""
+        sent = await page.get(path)
+        assert sent.status_code == 303, sent.text
+        return await page.get(
+            self.provider.approve(sent.headers["location"], who), headers=PAGES
+        )
+
+    def who(self, page: httpx.AsyncClient) -> Principal | None:
+        cookie = page.cookies.get("iveg")
+        return None if cookie is None else self.authenticator.sessions.find(cookie)
+
+    def acts(self) -> list[tuple[str, str, str]]:
+        """Action, method and details of what the audit was told."""
+        return [
+            (one.action, one.method, one.details)
+            for one in self.sink.records
+            if isinstance(one, AuditRecord)
+        ]
+
+
+@pytest.fixture
+async def desk() -> AsyncIterator[SignOnDesk]:
+    desk = SignOnDesk()
+    await desk.people.refresh()
+    async with serving(desk.provider):
+        yield desk
+    await desk.sign_on.close()
+    desk.people.close()
+
+
+async def test_whom_the_provider_vouches_for_is_in_by_name_role_and_stable_id(
+    desk: SignOnDesk,
+) -> None:
+    async with desk.page() as page:
+        entered = await desk.through(page, "/signin/sso?to=/alerts?open=1")
+        who = desk.who(page)
+        stopped = await page.post("/api/v1/robots/AGI/stop")
+
+    assert (entered.status_code, entered.headers["refresh"]) == (
+        200,
+        "0; url=/alerts?open=1",
+    )
+    assert who is not None
+    assert (who.name, who.role, who.person, who.method) == (
+        "Ana Núñez",
+        "operator",
+        desk.person,
+        "sso",
+    )
+    assert stopped.status_code == 202
+    (command,) = desk.commander.commands.values()
+    assert command.requesters == ("Ana Núñez",)
+    assert [one[:2] for one in desk.acts()[:1]] == [("sign_in", "sso")]
+    assert desk.accounts.known[desk.person].provider == desk.provider.url
+
+
+@pytest.mark.parametrize(
+    "to",
+    [
+        "//evil.test",
+        "/\\evil.test",
+        "https://evil.test",
+        "alerts",
+        "/a\r\nSet-Cookie: x=1",
+        "",
+        "/\x00",
+        "/" + "a" * 501,
+    ],
+)
+async def test_the_way_back_leads_to_own_paths_alone(desk: SignOnDesk, to: str) -> None:
+    async with desk.page() as page:
+        sent = await page.get("/signin/sso", params={"to": to})
+        back = desk.provider.approve(sent.headers["location"], "ana-1")
+        entered = await page.get(back)
+
+    assert entered.headers["refresh"] == "0; url=/"
+
+
+@pytest.mark.parametrize("language", ["es", "en"])
+async def test_who_has_no_mapped_role_is_told_so_and_is_not_in(
+    desk: SignOnDesk, language: str
+) -> None:
+    desk.provider.people["ana-1"] = {**KEYCLOAK, "realm_access": {"roles": ["guest"]}}
+    said = {"es": "no le da ningún papel en iVeg", "en": "gives you no role in iVeg"}
+    async with desk.page() as page:
+        page.headers["Accept-Language"] = language
+        sent = await page.get("/signin/sso")
+        back = desk.provider.approve(sent.headers["location"], "ana-1")
+        refused = await page.get(back)
+
+        assert desk.who(page) is None
+    assert refused.status_code == 403
+    assert said[language] in refused.text
+    assert "Cooperativa" in refused.text
+    ((action, method, details),) = desk.acts()
+    assert (action, method) == ("sign_in_refused", "sso")
+    assert '"why":"no_role"' in details
+    assert desk.accounts.known == {"P1": LOCAL}
+
+
+async def test_an_answer_counts_once_in_its_own_browser_and_for_ten_minutes(
+    desk: SignOnDesk,
+) -> None:
+    async with desk.page() as page, desk.page() as other:
+        sent = await page.get("/signin/sso")
+        back = desk.provider.approve(sent.headers["location"], "ana-1")
+        entered = await page.get(back)
+        again = await page.get(back)
+
+        await other.get("/signin/sso")
+        sent = await page.get("/signin/sso")
+        back = desk.provider.approve(sent.headers["location"], "ana-1")
+        stolen = await other.get(back)
+
+        sent = await page.get("/signin/sso")
+        late = desk.provider.approve(sent.headers["location"], "ana-1")
+        desk.clock.now += 601.0
+        over = await page.get(late)
+        made_up = await page.get(f"{CALLBACK}?code=x&state=x")
+
+        assert desk.who(other) is None
+    assert entered.status_code == 200
+    assert [one.status_code for one in (again, stolen, over, made_up)] == [400] * 4
+    assert desk.provider.asked.count("/token") == 1
+
+
+@pytest.mark.parametrize(
+    ("query", "status", "why"),
+    [
+        ({"error": "access_denied"}, 403, "refused"),
+        ({"error": "x\n<b>" * 40}, 403, "refused"),
+        ({}, 403, "untrusted"),
+        ({"code": ""}, 403, "untrusted"),
+        ({"code": "x" * 5000}, 403, "untrusted"),
+        ({"code": "guessed"}, 403, "untrusted"),
+        ({"code": "x", "iss": "https://evil.test"}, 403, "untrusted"),
+    ],
+)
+async def test_an_answer_that_proves_nothing_is_told_with_its_cause(
+    desk: SignOnDesk, query: dict[str, str], status: int, why: str
+) -> None:
+    async with desk.page() as page:
+        sent = await page.get("/signin/sso")
+        state = httpx.URL(sent.headers["location"]).params["state"]
+        refused = await page.get(CALLBACK, params={**query, "state": state})
+
+        assert desk.who(page) is None
+    assert refused.status_code == status
+    assert 'id="signin-sso"' in refused.text
+    assert "<b>" not in refused.text
+    ((_, _, details),) = desk.acts()
+    assert f'"why":"{why}"' in details
+
+
+async def test_wrong_answers_of_one_address_are_limited_and_ask_the_provider_nothing(
+    desk: SignOnDesk,
+) -> None:
+    async with desk.page() as page:
+        answers = [await page.get(f"{CALLBACK}?code=x&state={n}") for n in range(7)]
+
+    assert [one.status_code for one in answers] == [400] * 5 + [429] * 2
+    assert desk.provider.asked == []
+
+
+async def test_who_is_disabled_here_is_out_at_once_and_stays_out(
+    desk: SignOnDesk,
+) -> None:
+    async with desk.page() as page:
+        await desk.through(page)
+        before = desk.who(page)
+        known = desk.accounts.known
+        known[desk.person] = replace(known[desk.person], disabled=True)
+        await desk.people.refresh()
+        stopped = await page.post("/api/v1/robots/AGI/stop")
+        again = await desk.through(page)
+
+    assert before is not None
+    assert stopped.status_code == 401
+    assert again.status_code == 403
+    assert "shut out" in again.text
+
+
+async def test_another_role_at_the_provider_ends_sessions_of_the_one_before(
+    desk: SignOnDesk,
+) -> None:
+    async with desk.page() as page, desk.page() as other:
+        await desk.through(page)
+        desk.clock.now += 1.0
+        desk.sign_on._reading.roles["growers"] = "viewer"  # type: ignore[index]
+        await desk.through(other)
+
+        assert desk.who(page) is None
+        now = desk.who(other)
+    assert now is not None
+    assert now.role == "viewer"
+
+
+async def test_a_name_that_somebody_has_gets_a_mark_and_stays(desk: SignOnDesk) -> None:
+    other = replace(LOCAL, account_id="P2", name="Ana Núñez")
+    desk.accounts.known["P2"] = other
+    async with desk.page() as page:
+        await desk.through(page)
+        first = desk.who(page)
+        await desk.through(page)
+        second = desk.who(page)
+
+    assert first is not None
+    assert second is not None
+    assert first.name == second.name == f"Ana Núñez {desk.person[4:10]}"
+
+
+async def test_with_the_provider_down_a_local_admin_signs_in_and_releases(
+    desk: SignOnDesk,
+) -> None:
+    desk.provider.vice = "away"
+    async with desk.page() as page:
+        down = await page.get("/signin/sso", headers=PAGES)
+        proof = {"name": "Ada", "password": "acelga-1234"}
+        entered = await page.post("/signin", json=proof)
+        stopped = await page.post("/api/v1/robots/AGI/stop")
+        released = await page.post(
+            "/api/v1/robots/AGI/release", json={"holds": [], "confirmed": True}
+        )
+
+    assert down.status_code == 503
+    assert "did not answer" in down.text
+    assert (entered.status_code, stopped.status_code) == (204, 202)
+    # Whatever the robot says to it: it was no question of rights.
+    assert released.status_code not in (401, 403)
+
+
+async def test_a_session_of_the_provider_ends_in_time_and_leaves_stop(
+    desk: SignOnDesk,
+) -> None:
+    async with desk.page() as page:
+        await desk.through(page)
+        desk.clock.now += LASTS_S - 1.0
+        before = await page.get("/api/v1/robots")
+        desk.clock.now += 2.0
+        after = await page.get("/api/v1/robots")
+        stopped = await page.post("/api/v1/robots/AGI/stop")
+
+    statuses = [one.status_code for one in (before, after, stopped)]
+    assert statuses == [200, 403, 202]
+
+
+async def test_a_silent_sign_in_is_not_taken_for_a_proof_and_a_new_one_is(
+    desk: SignOnDesk,
+) -> None:
+    async with desk.page() as page:
+        await desk.through(page)
+        first = desk.who(page)
+        desk.clock.now += 1200.0
+        await desk.through(page)
+        silent = desk.who(page)
+        asked = await page.get("/signin/sso?anew=1&to=/fleet")
+        address = asked.headers["location"]
+        entered = await page.get(desk.provider.approve(address, "ana-1"))
+        anew = desk.who(page)
+
+    assert first is not None
+    assert silent is not None
+    assert anew is not None
+    assert "prompt=login" in address
+    assert "max_age=0" in address
+    assert entered.headers["refresh"] == "0; url=/fleet"
+    began = first.signed_in_at
+    assert began is not None
+    assert silent.signed_in_at == began + 1200.0
+    assert [silent.proven_at, anew.proven_at] == pytest.approx(
+        [began, began + 1200.0], abs=1.0
+    )
+    # Only the newest session is left.
+    assert len(desk.authenticator.sessions) == 1
+
+
+@pytest.mark.parametrize("vice", ["says_nothing", "old_proof", "somebody_else"])
+async def test_a_proof_that_is_none_renews_nothing_and_ends_nothing(
+    desk: SignOnDesk, vice: str
+) -> None:
+    desk.provider.people["eva-2"] = dict(KEYCLOAK)
+    async with desk.page() as page:
+        await desk.through(page)
+        before = desk.who(page)
+        desk.clock.now += 1200.0
+        sent = await page.get("/signin/sso?anew=1")
+        who = "eva-2" if vice == "somebody_else" else "ana-1"
+        back = desk.provider.approve(sent.headers["location"], who)
+        desk.provider.discloses_proof = vice != "says_nothing"
+        if vice == "old_proof":
+            desk.provider.proved["ana-1"] -= 600.0
+        refused = await page.get(back)
+        after = desk.who(page)
+
+    assert refused.status_code == 403
+    assert '"why":"not_renewed"' in desk.acts()[-1][2]
+    assert before is not None
+    assert after == before
+
+
+async def test_nobody_renews_what_did_not_begin_at_the_provider(
+    desk: SignOnDesk,
+) -> None:
+    async with desk.page() as page:
+        stranger = await page.get("/signin/sso?anew=1")
+        await page.post("/signin", json={"name": "Ada", "password": "acelga-1234"})
+        local = await page.get("/signin/sso?anew=1")
+
+    assert (stranger.status_code, local.status_code) == (403, 403)
+
+
+@pytest.mark.parametrize("vice", ["", "no_sign_out"])
+async def test_who_signs_out_does_so_at_the_provider_too_where_it_offers_it(
+    desk: SignOnDesk, vice: str
+) -> None:
+    desk.provider.vice = vice
+    async with desk.page() as page:
+        await desk.through(page)
+        out = await page.post("/signout")
+        signed_out = await page.post("/api/v1/robots/AGI/stop")
+
+    assert signed_out.status_code == 401
+    if vice:
+        assert out.status_code == 303
+    else:
+        onward = httpx.URL(out.json()["next"])
+        assert str(onward).startswith(f"{desk.provider.url}/out?")
+        assert onward.params["post_logout_redirect_uri"] == f"http://{HOST}/signin"
+        assert onward.params["id_token_hint"].count(".") == 2
+
+
+async def test_a_provider_that_hangs_holds_up_neither_stop_nor_more_than_eight(
+    desk: SignOnDesk,
+) -> None:
+    desk.provider.vice = "slow"
+    async with desk.page() as page:
+        hanging = [asyncio.create_task(page.get("/signin/sso")) for _ in range(8)]
+        while desk.sign_on._together < 8:  # noqa: ASYNC110
+            await asyncio.sleep(0)
+        one_more = await page.get("/signin/sso")
+        cookie = desk.authenticator.sessions.open("Ada", "operator")
+        stopped = await page.post(
+            "/api/v1/robots/AGI/stop", headers={"Cookie": f"iveg={cookie}"}
+        )
+        for task in hanging:
+            task.cancel()
+        await asyncio.gather(*hanging, return_exceptions=True)
+
+    assert one_more.status_code == 429
+    assert stopped.status_code == 202
+
+
+async def test_sign_ins_that_nobody_ends_take_no_more_than_their_place(
+    desk: SignOnDesk,
+) -> None:
+    async with desk.page() as page:
+        first = await page.get("/signin/sso")
+        for _ in range(20):
+            await page.get("/signin/sso")
+        back = desk.provider.approve(first.headers["location"], "ana-1")
+        over = await page.get(back)
+
+    assert len(desk.sign_on._waiting) == 16
+    assert over.status_code == 400
+
+
+async def test_neither_log_nor_audit_holds_a_token_a_code_or_a_secret(
+    desk: SignOnDesk, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.INFO, "iveg")
+    async with desk.page() as page:
+        await desk.through(page)
+        desk.provider.vice = "foreign_key"
+        await desk.through(page)
+
+    told = caplog.text + "".join(details for _, _, details in desk.acts())
+    codes = [form["code"] for form in desk.provider.forms]
+    verifiers = [form["code_verifier"] for form in desk.provider.forms]
+    assert len(codes) == 2
+    assert "sign-in by the provider refused" in told
+    secret = [SECRET, "eyJ", *codes, *verifiers]
+    assert [one for one in secret if one in told] == []
