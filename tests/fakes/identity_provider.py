@@ -283,7 +283,12 @@ async def serving(provider: FakeIdentityProvider) -> AsyncIterator[None]:
     port = urlsplit(provider.url).port
     assert port is not None
     config = uvicorn.Config(
-        provider.app(), port=port, log_config=None, lifespan="off", ws="none"
+        provider.app(),
+        host=urlsplit(provider.url).hostname or "",
+        port=port,
+        log_config=None,
+        lifespan="off",
+        ws="none",
     )
     server = uvicorn.Server(config)
     server.capture_signals = contextlib.nullcontext  # type: ignore[method-assign,assignment]
