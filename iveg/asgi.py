@@ -13,6 +13,7 @@ from iveg.adapters.pdf import find_browser
 from iveg.app.dss import Dss
 from iveg.app.laboratory import find_laboratory
 from iveg.web.api import (
+    account,
     day,
     history,
     incidents,
@@ -90,6 +91,7 @@ def _past_routers(dss: Dss, pages: routes.Pages) -> Iterator[APIRouter]:
     yield notes.router(queries, dss.pipeline.event_log.log, clock)
     if dss.sign_in_token:
         yield sign_in_code.router(dss.sign_in_token)
+    yield account.router(dss.people)
     yield users.router(dss.people, clock)
     if dss.sign_on is not None:
         yield sign_on.router(pages, dss.sign_on)

@@ -58,9 +58,9 @@ from iveg.web.api import messages
 from iveg.web.build import Face
 from iveg.web.notifications import NotificationEndpoint
 from iveg.web.pages.contexts import Site
-from iveg.web.security.authentication import NotifySecret
 from iveg.web.security.people import People
 from iveg.web.security.programs import Programs
+from iveg.web.security.secrets import NotifySecret
 from iveg.web.views import Views
 
 _log = logging.getLogger(__name__)

@@ -44,7 +44,7 @@ from iveg.pipeline.trace import (
 )
 from iveg.settings import Settings
 from iveg.web.notifications import NotificationEndpoint
-from iveg.web.security.authentication import NotifySecret
+from iveg.web.security.secrets import NotifySecret
 from iveg.web.views import Views
 
 STEPS, MEMORY = "/iveg/steps", "/iveg/memory"

@@ -2,7 +2,7 @@
 
 from pydantic import Field
 
-from iveg.domain.accounts import Account, AccountState, PersonRole
+from iveg.domain.accounts import Account, AccountState, PersonRole, SignInMethod
 from iveg.models.base import Model, stamp
 
 
@@ -14,6 +14,17 @@ class SignInCode(Model):
     local: bool = Field(
         description="The address works on the server's own computer alone."
     )
+
+
+class OwnAccount(Model):
+    """Whoever asks, as they are known here."""
+
+    name: str
+    role: str
+    method: SignInMethod = Field(description="How they came in.")
+    account: bool = Field(description="They have one; else a link or a token.")
+    signed_in_at: str | None = Field(description="Null for programs.")
+    ends_at: str | None = Field(description="When it ends by itself; null: never.")
 
 
 class UserAccount(Model):

@@ -41,6 +41,19 @@ class FakeAccounts:
                 return begun
         return None
 
+    def change_password(
+        self, by: Actor, was: str, password: str, now: float
+    ) -> Account | None:
+        if self.is_away:
+            raise HopError("database", "away")
+        known = self.known.get(by.person)
+        if known is None or known.password != was or not was:
+            return None
+        changed = replace(known, password=password, since=now)
+        self.known[by.person] = changed
+        self.changes.append(("password_changed", known.name, by.name))
+        return changed
+
 
 class FakePasswords(Passwords):
     """Keeps a password with a mark before it; ``asked`` counts the checks."""

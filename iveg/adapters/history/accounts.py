@@ -36,6 +36,36 @@ class AccountStore(NamedRows[Account]):
 
         self._store.run(work)
 
+    def change_password(
+        self, by: Actor, was: str, password: str, now: float
+    ) -> Account | None:
+        """Put a hash in the place of another; None where that is kept no longer.
+
+        Args:
+            by: Whose it is.
+            was: The hash that they have proved to know the password of.
+            password: Hash to keep.
+            now: This moment (Unix s); sessions that began before are over.
+        """
+        c = accounts.c
+
+        def work(connection: Connection) -> Account | None:
+            same = (c.account_id == by.person) & (c.password == was) & ~c.disabled
+            taken = {"password": password, "since": now}
+            if (
+                not was
+                or not connection.execute(
+                    update(accounts).where(same).values(**taken)
+                ).rowcount
+            ):
+                return None
+            wanted = select(*self._columns).where(c.account_id == by.person)
+            account = Account(**connection.execute(wanted).mappings().one())
+            note_change(connection, by, "password_changed", account.name, {})
+            return account
+
+        return self._store.run(work)
+
     def accept(self, digest: str, password: str, now: float) -> Account | None:
         """Exchange an invitation for a password, once; None where it is none.
 

@@ -747,6 +747,20 @@ export type Occurrence = {
   told: Told[];
 };
 
+/** Whoever asks, as they are known here. */
+export type OwnAccount = {
+  name: string;
+  role: string;
+  /** How they came in. */
+  method: "link" | "password" | "token";
+  /** They have one; else a link or a token. */
+  account: boolean;
+  /** Null for programs. */
+  signed_in_at: string | null;
+  /** When it ends by itself; null: never. */
+  ends_at: string | null;
+};
+
 /** The world as it was at a recorded moment; ages are of that moment. */
 export type PastWorld = {
   rule: Rule;

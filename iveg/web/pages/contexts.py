@@ -65,6 +65,7 @@ class PageFrame:
         route: Name of the page: of its template, and of its entry in the navigation.
         name: Who is signed in; None shows neither navigation nor STOP.
         role: ``viewer``, ``operator``, ``admin`` or ``program``.
+        account: Whether they have one of their own.
     """
 
     site: Site
@@ -72,6 +73,7 @@ class PageFrame:
     route: str
     name: str | None = None
     role: str | None = None
+    account: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,6 +128,17 @@ class AboutPage(Page):
     """
 
     rule: DetectionRule
+
+
+@dataclass(frozen=True, slots=True)
+class AccountPage(Page):
+    """``account.html``: what somebody may know and change of themselves.
+
+    Attributes:
+        least: Characters of a password.
+    """
+
+    least: int
 
 
 @dataclass(frozen=True, slots=True)

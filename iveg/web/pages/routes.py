@@ -23,6 +23,7 @@ from iveg.domain.limits import LIMITS
 from iveg.web.pages.contexts import (
     THEMES,
     AboutPage,
+    AccountPage,
     Appearance,
     DocsPage,
     ErrorPage,
@@ -122,7 +123,9 @@ class Pages:
         look = _look(request)
         if visitor is None:
             return PageFrame(self._site, look, route)
-        return PageFrame(self._site, look, route, visitor.name, visitor.role)
+        return PageFrame(
+            self._site, look, route, visitor.name, visitor.role, visitor.has_account
+        )
 
     def draw(self, page: Page, status: int = 200) -> HTMLResponse:
         """A page as a response.
@@ -191,6 +194,10 @@ def router(
     add_scripted(routes, pages, "audit", "/audit", "release")
     add_scripted(routes, pages, "users", "/users", "admin")
 
+    @routes.get("/account", response_model=None)
+    async def account(request: Request, visitor: _Reader) -> Response:
+        return pages.draw(AccountPage(pages.frame(request, "account", visitor), LEAST))
+
     @routes.get("/decisions/{decision_id}", response_model=None)
     async def decision(
         request: Request,
@@ -219,6 +226,11 @@ def router(
     async def about(request: Request, visitor: _Reader) -> Response:
         return pages.draw(AboutPage(pages.frame(request, "about", visitor), rule()))
 
+    _add_signing(routes, pages)
+    return routes
+
+
+def _add_signing(routes: APIRouter, pages: Pages) -> None:
     @routes.get("/signin", response_model=None, dependencies=[Depends(require("open"))])
     async def signin(request: Request) -> Response:
         return pages.sign_in(request)
@@ -241,8 +253,6 @@ def router(
     async def wall(request: Request, visitor: _Reader) -> None:
         # A screen on a wall is everybody's: it looks and stops, and frees nothing.
         _authenticator(request).sessions.lower(visitor)
-
-    return routes
 
 
 def add_scripted(

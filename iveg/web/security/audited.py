@@ -129,6 +129,7 @@ AUDITED: Final[Mapping[tuple[str, str], Audited]] = {
     ("POST", f"{_API}/users/{{user_id}}/disable"): Audited(
         "account_disabled", "user_id", by_store=True
     ),
+    ("PUT", f"{_API}/account/password"): Audited("password_changed", by_store=True),
     ("POST", "/signin"): Audited(""),
     ("POST", "/signout"): Audited("sign_out"),
     ("POST", "/wall"): Audited("wall"),

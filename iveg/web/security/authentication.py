@@ -11,7 +11,6 @@ reads it::
 STOP outlives the session (SECURITY.md): a person who was signed in once can still stop.
 """
 
-import hmac
 import logging
 import math
 from collections.abc import Awaitable, Callable, Iterator, Mapping
@@ -44,6 +43,7 @@ from iveg.web.security.roles import (
     Principal,
     Role,
 )
+from iveg.web.security.secrets import same_secret
 from iveg.web.security.sessions import Sessions
 
 __all__ = [
@@ -52,7 +52,6 @@ __all__ = [
     "NO_SESSION",
     "Action",
     "Authenticator",
-    "NotifySecret",
     "Principal",
     "Requirement",
     "Role",
@@ -131,7 +130,7 @@ class Authenticator:
         self, request: Request, token: str, response: Response
     ) -> Response | Problem:
         address = "" if request.client is None else request.client.host
-        if not _same(token, self._sign_in_token):
+        if not same_secret(token, self._sign_in_token):
             return self._refuse(address, self._clock().mono, "wrong token")
         # Somebody else's wrong links must not shut out whoever has the right one.
         return self.admit(request, self.sessions.open_by_link(), response)
@@ -153,6 +152,20 @@ class Authenticator:
         """Exchange an invitation for an account and its first session."""
         return await self._prove(
             request, lambda one: one.accept(invitation, password), "no such invitation"
+        )
+
+    async def change_password(
+        self, request: Request, who: Principal, old: str, new: str
+    ) -> Response | Problem:
+        """Sign somebody in anew by a new password; their other sessions end.
+
+        A wrong old one counts as a sign-in that was refused.
+
+        Raises:
+            HopError: the database is away; nothing was changed.
+        """
+        return await self._prove(
+            request, lambda one: one.change_password(who, old, new), "wrong password"
         )
 
     async def _prove(
@@ -220,7 +233,7 @@ class Authenticator:
         wait_s = self._attempts.wait_s(address, now)
         if wait_s > 0.0:
             headers = {"Retry-After": str(math.ceil(wait_s))}
-            detail = "Too many wrong links came from your address; wait a minute."
+            detail = "Too many wrong sign-ins came from your address; wait a minute."
             return Problem(429, detail, headers=headers)
         self._attempts.failed(address, now)
         if self._rows.take(now):
@@ -252,7 +265,7 @@ class Authenticator:
         return None if cookie is None else self.sessions.find(cookie)
 
     def _program(self, token: str) -> Principal | None:
-        if _same(token, self._api_token):
+        if same_secret(token, self._api_token):
             return PROGRAM
         return None if self._programs is None else self._programs.find(token)
 
@@ -308,27 +321,6 @@ class Authenticator:
             )
             raise WebSocketException(NO_SESSION)
         return principal
-
-
-class NotifySecret:
-    """The secret that Orion sends with each notification.
-
-    Args:
-        current: What new subscriptions carry.
-        previous: Still taken while the secret is being changed; empty: none.
-    """
-
-    def __init__(self, current: str, previous: str = "") -> None:
-        self.current = current
-        self._previous = previous
-
-    def admits(self, given: str | None) -> bool:
-        """Whether a notification with this ``X-Iveg-Notify-Token`` is Orion's."""
-        if not given:
-            return False
-        # Both are always compared, so that time does not tell which one matched.
-        matches = [_same(given, known) for known in (self.current, self._previous)]
-        return any(matches)
 
 
 # --- what a route asks for ----------------------------------------------------------
@@ -392,8 +384,3 @@ def _calls(dependant: Dependant) -> Iterator[object]:
 
 def _cookie_name(*, secure: bool) -> str:
     return "__Host-iveg" if secure else "iveg"
-
-
-def _same(given: str, known: str) -> bool:
-    """Compare in constant time; an empty secret matches nothing."""
-    return hmac.compare_digest(given.encode(), known.encode()) and bool(known)

@@ -32,6 +32,11 @@ class Accounts(ChangingAccounts, Protocol):
     def accept(self, digest: str, password: str, now: float) -> Account | None:
         """Exchange an invitation for a password, once; None where it is none."""
 
+    def change_password(
+        self, by: Actor, was: str, password: str, now: float
+    ) -> Account | None:
+        """Put a hash in the place of another; None where that is kept no longer."""
+
 
 class People(Rereading):
     """Knows who may sign in, and which sessions still stand.
@@ -85,10 +90,14 @@ class People(Rereading):
         """
         if self._known is None:
             return "expired"
-        account = self._known.get(session.person)
+        account = self.find(session.person)
         if account is None or not account.is_open(self._clock().wall):
             return None
         return left if session.began >= account.since else None
+
+    def find(self, person: str) -> Account | None:
+        """The account of this id, as it was read last."""
+        return (self._known or {}).get(person)
 
     async def sign_in(self, name: str, password: str) -> Account | None:
         """The account of this name and password; None takes as long.
@@ -126,6 +135,23 @@ class People(Rereading):
         account = await self._apart(partial(self._store.accept, digest, kept, now))
         await self.refresh()
         return account
+
+    async def change_password(self, who: Actor, old: str, new: str) -> Account | None:
+        """Give somebody a new password; None where the old one is wrong.
+
+        Raises:
+            BusyError: too many sign in at once.
+            HopError: the database is away.
+        """
+        account = self.find(who.person)
+        was = account.password if account else ""
+        if not await self._passwords.fits(old, was):
+            return None
+        kept, now = await self._passwords.hashed(new), self._clock().wall
+        work = partial(self._store.change_password, who, was, kept, now)
+        changed = await self._apart(work)
+        await self.refresh()
+        return changed
 
     def close(self) -> None:
         """End the threads."""

@@ -45,6 +45,11 @@ class Principal:
     signed_in_at: float | None = None
     proven_at: float | None = None
 
+    @property
+    def has_account(self) -> bool:
+        """Whether it is a person by name, not whoever holds a link or a token."""
+        return self.method not in ("link", "token")
+
     def may(self, action: Action) -> bool:
         """Whether the role's row holds this action."""
         return action in MAY[self.role]

@@ -2,6 +2,7 @@
 
 from argparse import Namespace
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,7 @@ from iveg.adapters.history.migrate import upgrade
 from iveg.cli.database import read_history
 from iveg.cli.user import run_user, set_up
 from iveg.domain.accounts import digest_of
+from iveg.domain.audit import CONSOLE
 from iveg.domain.errors import NameTakenError, NotANameError, UnknownNameError
 from iveg.settings import Settings
 
@@ -61,6 +63,28 @@ def test_a_person_is_added_by_a_link_of_which_only_a_digest_is_kept(
     assert console.store.accept(account.invitation, "#hash", now) is not None
     assert console.store.accept(account.invitation, "#other", now) is None
     assert console.state("Ana") == ("admin", False, True)
+
+
+def test_a_password_is_changed_by_who_has_the_one_that_is_kept(
+    console: Console, capsys: pytest.CaptureFixture[str]
+) -> None:
+    console.call("add", "Ana", role="admin")
+    ana = replace(CONSOLE, person=next(iter(console.store.read())), name="Ana")
+    invitation = digest_of(invitation_in(capsys.readouterr().out))
+    nobody = console.store.change_password(ana, "", "#new", clock.wall())
+    console.store.accept(invitation, "#old", clock.wall())
+
+    late = console.store.change_password(ana, "#other", "#new", clock.wall())
+    changed = console.store.change_password(ana, "#old", "#new", 9e9)
+    console.call("disable", "Ana")
+    shut_out = console.store.change_password(ana, "#new", "#newer", clock.wall())
+
+    assert (nobody, late, shut_out) == (None, None, None)
+    assert changed is not None
+    assert (changed.password, changed.since) == ("#new", 9e9)
+    url = console.settings.database_url
+    assert read_history(url, lambda one: list(faults(one))) == []
+    assert read_history(url, _actions).count("password_changed") == 1
 
 
 def test_reset_role_and_disable_end_sessions_and_are_in_the_audit(

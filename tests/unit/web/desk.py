@@ -24,7 +24,8 @@ from iveg.web.live import socket
 from iveg.web.live.bounded import BoundedSocket
 from iveg.web.pages.contexts import Site
 from iveg.web.pages.routes import Pages
-from iveg.web.security.authentication import Authenticator, NotifySecret, Role
+from iveg.web.security.authentication import Authenticator, Role
+from iveg.web.security.secrets import NotifySecret
 from iveg.web.views import Views
 from tests.fakes.detector_store import FakeDetectorStore
 from tests.fakes.messages import FakeContacts, FakeSender

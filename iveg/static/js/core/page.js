@@ -30,6 +30,7 @@ import { createWakeLock } from "./wakelock.js";
 
 /** @type {Record<string, () => Promise<{start: (page: Page) => unknown}>>} */
 const ROUTES = {
+  account: () => import("../pages/account.js"),
   alerts: () => import("../pages/alerts.js"),
   commands: () => import("../pages/commands.js"),
   command: () => import("../pages/command.js"),

@@ -19,6 +19,7 @@ const GROUPS = {
   account_role: "signing",
   account_reset: "signing",
   account_disabled: "signing",
+  password_changed: "signing",
   token_added: "signing",
   token_revoked: "signing",
   stop: "orders",

@@ -19,11 +19,11 @@ from iveg.web.security.authentication import (
     MAY,
     Action,
     Authenticator,
-    NotifySecret,
     Principal,
     declared_action,
     require,
 )
+from iveg.web.security.secrets import NotifySecret
 from iveg.web.security.sessions import Sessions
 from iveg.web.security.signin import SignInLink
 

@@ -1,0 +1,58 @@
+"""One's own account over HTTP: what is known of it, and a new password."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Request, Response
+from pydantic import BaseModel, ConfigDict, Field
+
+from iveg.adapters.passwords import LEAST, MOST
+from iveg.models.base import stamp
+from iveg.models.signing_in import OwnAccount
+from iveg.web.api.answers import Json
+from iveg.web.problems import Problem
+from iveg.web.security.authentication import Authenticator, Principal, require
+from iveg.web.security.people import People
+
+_Reader = Annotated[Principal, Depends(require("read"))]
+
+
+class PasswordBody(BaseModel):
+    """The password that was, and the one that is to be."""
+
+    model_config = ConfigDict(strict=True, extra="forbid")
+
+    old: str = Field(max_length=MOST)
+    new: str = Field(min_length=LEAST, max_length=MOST)
+
+
+def router(people: People) -> APIRouter:
+    """The routes of whoever asks, about themselves."""
+    routes = APIRouter(prefix="/api/v1/account", tags=["account"])
+
+    @routes.get("", response_model=OwnAccount)
+    async def own(who: _Reader) -> Response:
+        """Who this is."""
+        account = people.find(who.person)
+        return Json(
+            OwnAccount(
+                name=who.name,
+                role=who.role,
+                method=who.method,
+                account=who.has_account,
+                signed_in_at=stamp(who.signed_in_at),
+                ends_at=stamp(account.ends_at if account else None),
+            )
+        )
+
+    @routes.put("/password", status_code=204)
+    async def change(request: Request, body: PasswordBody, who: _Reader) -> Response:
+        """Change the password; every session ends but this one, which begins anew."""
+        authenticator: Authenticator = request.app.state.authenticator
+        done = await authenticator.change_password(request, who, body.old, body.new)
+        if not isinstance(done, Problem):
+            return done
+        if done.status != 401:
+            return done.response()
+        return Problem(403, "The old password is wrong.", "wrong-password").response()
+
+    return routes
