@@ -12,6 +12,7 @@ from typing import Final, Literal
 SignInMethod = Literal["link", "password", "sso", "token"]
 """Proof of an identity; ``sso`` is the identity provider's, ``token`` a program's."""
 PersonRole = Literal["viewer", "operator", "admin"]
+Language = Literal["es", "en"]
 AccountState = Literal["active", "invited", "lapsed", "over", "disabled"]
 """``lapsed``: the invitation was not taken in time; ``over``: ended by itself."""
 TokenScope = Literal["read", "stop", "operate"]
@@ -57,6 +58,7 @@ class Account:
         invited_until: When the invitation is over (Unix s).
         since: Sessions that began before are over (Unix s): a new role or password.
         provider: Issuer that vouches for the person and gives the role; empty: none.
+        language: What the person reads; empty: whatever their browser asks for.
     """
 
     account_id: str
@@ -69,6 +71,7 @@ class Account:
     invited_until: float = 0.0
     since: float = 0.0
     provider: str = ""
+    language: Language | Literal[""] = ""
 
     def is_open(self, now: float) -> bool:
         """Whether the person may be here at this moment (Unix s)."""

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from iveg.adapters.passwords import Passwords
-from iveg.domain.accounts import Account, name_key
+from iveg.domain.accounts import Account, Language, name_key
 from iveg.domain.audit import Actor
 from iveg.domain.errors import HopError, NameTakenError
 
@@ -53,6 +53,11 @@ class FakeAccounts:
         self.known[by.person] = changed
         self.changes.append(("password_changed", known.name, by.name))
         return changed
+
+    def choose_language(self, person: str, language: Language) -> None:
+        if self.is_away:
+            raise HopError("database", "away")
+        self.known[person] = replace(self.known[person], language=language)
 
 
 class FakePasswords(Passwords):

@@ -6,7 +6,7 @@ from sqlalchemy import Connection, select, update
 
 from iveg.adapters.history.named_rows import NamedRows, note_change
 from iveg.adapters.history.tables import accounts
-from iveg.domain.accounts import Account
+from iveg.domain.accounts import Account, Language
 from iveg.domain.audit import Actor
 
 
@@ -65,6 +65,12 @@ class AccountStore(NamedRows[Account]):
             return account
 
         return self._store.run(work)
+
+    def choose_language(self, person: str, language: Language) -> None:
+        """Keep what somebody reads."""
+        same = accounts.c.account_id == person
+        wanted = update(accounts).where(same).values(language=language)
+        self._store.run(lambda connection: connection.execute(wanted))
 
     def accept(self, digest: str, password: str, now: float) -> Account | None:
         """Exchange an invitation for a password, once; None where it is none.

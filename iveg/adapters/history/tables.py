@@ -324,6 +324,7 @@ accounts = Table(
     _text("invitation", null=False),
     *_numbers("invited_until", "since"),
     _text("provider", null=False),
+    _text("language", null=False),
     UniqueConstraint("name_key"),
 )
 

@@ -5,6 +5,7 @@
  * STOP controls along.
  */
 
+import { sendApi } from "./core/api.js";
 import { loadI18n, switchLanguage } from "./core/i18n.js";
 import { askedMoment } from "./core/moments.js";
 import { createPainting } from "./core/painting.js";
@@ -52,7 +53,11 @@ function wireLanguage() {
   const buttons = all("button[data-language]");
   for (const button of buttons) {
     button.addEventListener("click", () => {
-      switchLanguage(/** @type {"es" | "en"} */ (button.dataset.language));
+      const language = /** @type {"es" | "en"} */ (button.dataset.language);
+      switchLanguage(language);
+      // Other browsers learn of it when their person signs in.
+      if ("account" in document.body.dataset)
+        sendApi("PUT", "account/language", { language });
       for (const other of buttons) {
         const isIts = other.dataset.language === button.dataset.language;
         setAttribute(other, "aria-pressed", String(isIts));

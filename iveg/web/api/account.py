@@ -2,13 +2,15 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Request, Response
+from fastapi import APIRouter, Depends, HTTPException, Request, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from iveg.adapters.passwords import LEAST, MOST
+from iveg.domain.accounts import Language
 from iveg.models.base import stamp
 from iveg.models.signing_in import OwnAccount
 from iveg.web.api.answers import Json
+from iveg.web.cookies import keep_language
 from iveg.web.problems import Problem
 from iveg.web.security.authentication import Authenticator, Principal, require
 from iveg.web.security.people import People
@@ -23,6 +25,14 @@ class PasswordBody(BaseModel):
 
     old: str = Field(max_length=MOST)
     new: str = Field(min_length=LEAST, max_length=MOST)
+
+
+class LanguageBody(BaseModel):
+    """The language that is to be."""
+
+    model_config = ConfigDict(strict=True, extra="forbid")
+
+    language: Language
 
 
 def router(people: People) -> APIRouter:
@@ -54,5 +64,15 @@ def router(people: People) -> APIRouter:
         if done.status != 401:
             return done.response()
         return Problem(403, "The old password is wrong.", "wrong-password").response()
+
+    @routes.put("/language", status_code=204)
+    async def choose(body: LanguageBody, who: _Reader) -> Response:
+        """Keep a language for every browser in which the person signs in."""
+        if not who.has_account:
+            raise HTTPException(409, "A link has no account; its browsers choose.")
+        await people.choose_language(who.person, body.language)
+        response = Response(status_code=204)
+        keep_language(response, body.language)
+        return response
 
     return routes

@@ -20,6 +20,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from iveg.adapters.passwords import LEAST, MOST
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.limits import LIMITS
+from iveg.web import cookies
 from iveg.web.pages.contexts import (
     THEMES,
     AboutPage,
@@ -51,10 +52,6 @@ from iveg.web.security.authentication import (
     require,
 )
 from iveg.web.security.single_sign_on import SingleSignOn
-
-LANGUAGE_COOKIE = "iveg_language"
-THEME_COOKIE = "iveg_theme"
-PALETTE_COOKIE = "iveg_palette"
 
 _RECORD_ID = Annotated[str, Path(pattern=r"^[ -~]{1,64}$")]
 _EXPLAINED = (400, 401, 403, 404, 405, 429, 500, 503)
@@ -226,11 +223,13 @@ def router(
     async def about(request: Request, visitor: _Reader) -> Response:
         return pages.draw(AboutPage(pages.frame(request, "about", visitor), rule()))
 
-    _add_signing(routes, pages)
+    _add_signing(routes, pages, sign_on)
     return routes
 
 
-def _add_signing(routes: APIRouter, pages: Pages) -> None:
+def _add_signing(
+    routes: APIRouter, pages: Pages, sign_on: SingleSignOn | None
+) -> None:
     @routes.get("/signin", response_model=None, dependencies=[Depends(require("open"))])
     async def signin(request: Request) -> Response:
         return pages.sign_in(request)
@@ -298,12 +297,12 @@ def _authenticator(request: Request) -> Authenticator:
 
 
 def _look(request: Request) -> Appearance:
-    cookies = request.cookies
-    language = cookies.get(LANGUAGE_COOKIE, "")
+    chosen = request.cookies
+    language = chosen.get(cookies.LANGUAGE, "")
     if language not in LANGUAGES:
         language = preferred_language(request.headers.get("accept-language", ""))
-    theme = THEMES.get(cookies.get(THEME_COOKIE, ""), "auto")
-    return Appearance(language, theme, cookies.get(PALETTE_COOKIE) == "paper")
+    theme = THEMES.get(chosen.get(cookies.THEME, ""), "auto")
+    return Appearance(language, theme, chosen.get(cookies.PALETTE) == "paper")
 
 
 def limits_text() -> str:

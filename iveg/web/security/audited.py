@@ -130,6 +130,7 @@ AUDITED: Final[Mapping[tuple[str, str], Audited]] = {
         "account_disabled", "user_id", by_store=True
     ),
     ("PUT", f"{_API}/account/password"): Audited("password_changed", by_store=True),
+    ("PUT", f"{_API}/account/language"): Audited("language", asked=("language",)),
     ("POST", "/signin"): Audited(""),
     ("POST", "/signout"): Audited("sign_out"),
     ("POST", "/wall"): Audited("wall"),

@@ -29,6 +29,7 @@ from iveg.domain.audit import STRANGER, Actor
 from iveg.domain.errors import NotAllowedError
 from iveg.pipeline.audit import AuditTrail
 from iveg.pipeline.ports import Clock
+from iveg.web.cookies import keep_language, session_cookie
 from iveg.web.problems import NotSignedInError, Problem
 from iveg.web.security.audited import READING
 from iveg.web.security.csrf import is_own, refuse_forgery, refuse_other_bodies
@@ -195,7 +196,9 @@ class Authenticator:
         cookie = self.sessions.open(
             account.name, account.role, account.account_id, "password"
         )
-        return self.admit(request, cookie, Response(status_code=204))
+        response = Response(status_code=204)
+        keep_language(response, account.language)
+        return self.admit(request, cookie, response)
 
     def admit(
         self, request: Request, cookie: str, response: Response, **told: object
@@ -208,7 +211,7 @@ class Authenticator:
         if who is not None:
             self._note(who, "sign_in", address, **told)
         response.set_cookie(
-            _cookie_name(secure=secure),
+            session_cookie(secure=secure),
             cookie,
             path="/",
             secure=secure,
@@ -225,7 +228,10 @@ class Authenticator:
         response = RedirectResponse("/", 303)
         secure = request.url.scheme == "https"
         response.delete_cookie(
-            _cookie_name(secure=secure), secure=secure, httponly=True, samesite="strict"
+            session_cookie(secure=secure),
+            secure=secure,
+            httponly=True,
+            samesite="strict",
         )
         return response
 
@@ -261,7 +267,7 @@ class Authenticator:
         if scheme.lower() == "bearer":
             return self._program(token.strip())
         secure = connection.scope["scheme"] in ("https", "wss")
-        cookie = connection.cookies.get(_cookie_name(secure=secure))
+        cookie = connection.cookies.get(session_cookie(secure=secure))
         return None if cookie is None else self.sessions.find(cookie)
 
     def _program(self, token: str) -> Principal | None:
@@ -377,10 +383,3 @@ def _calls(dependant: Dependant) -> Iterator[object]:
     for child in dependant.dependencies:
         yield child.call
         yield from _calls(child)
-
-
-# --- small shared pieces ------------------------------------------------------------
-
-
-def _cookie_name(*, secure: bool) -> str:
-    return "__Host-iveg" if secure else "iveg"

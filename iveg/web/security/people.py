@@ -13,7 +13,7 @@ from typing import Protocol, TypeVar
 from iveg.adapters.admission import Admission, ChangingAccounts
 from iveg.adapters.passwords import Passwords
 from iveg.adapters.sessions import Session
-from iveg.domain.accounts import Account, digest_of, name_key
+from iveg.domain.accounts import Account, Language, digest_of, name_key
 from iveg.domain.audit import Actor, NamedActor
 from iveg.domain.errors import HopError
 from iveg.pipeline.ports import Clock
@@ -36,6 +36,9 @@ class Accounts(ChangingAccounts, Protocol):
         self, by: Actor, was: str, password: str, now: float
     ) -> Account | None:
         """Put a hash in the place of another; None where that is kept no longer."""
+
+    def choose_language(self, person: str, language: Language) -> None:
+        """Keep what somebody reads."""
 
 
 class People(Rereading):
@@ -152,6 +155,11 @@ class People(Rereading):
         changed = await self._apart(work)
         await self.refresh()
         return changed
+
+    async def choose_language(self, person: str, language: Language) -> None:
+        """Keep what somebody reads. Raises HopError."""
+        await self._apart(partial(self._store.choose_language, person, language))
+        await self.refresh()
 
     def close(self) -> None:
         """End the threads."""

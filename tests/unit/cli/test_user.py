@@ -76,12 +76,15 @@ def test_a_password_is_changed_by_who_has_the_one_that_is_kept(
 
     late = console.store.change_password(ana, "#other", "#new", clock.wall())
     changed = console.store.change_password(ana, "#old", "#new", 9e9)
+    console.store.choose_language(ana.person, "en")
     console.call("disable", "Ana")
     shut_out = console.store.change_password(ana, "#new", "#newer", clock.wall())
 
     assert (nobody, late, shut_out) == (None, None, None)
     assert changed is not None
     assert (changed.password, changed.since) == ("#new", 9e9)
+    (kept,) = console.store.read().values()
+    assert (kept.language, kept.disabled) == ("en", True)
     url = console.settings.database_url
     assert read_history(url, lambda one: list(faults(one))) == []
     assert read_history(url, _actions).count("password_changed") == 1

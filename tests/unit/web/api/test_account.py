@@ -146,3 +146,41 @@ async def test_who_came_by_the_link_has_no_password(desk: OwnDesk) -> None:
         refused = await change(page)
 
     assert refused.status_code == 403
+
+
+async def test_a_language_is_kept_with_the_account_and_given_to_the_next_browser(
+    desk: OwnDesk,
+) -> None:
+    english = {"language": "en"}
+    async with desk.ana() as here:
+        before = here.cookies.get("iveg_language")
+        chosen = await here.put("/api/v1/account/language", json=english)
+    async with desk.ana() as there:
+        page = await there.get("/account")
+
+    assert (before, chosen.status_code) == (None, 204)
+    assert there.cookies["iveg_language"] == "en"
+    assert '<html lang="en"' in page.text
+
+
+@pytest.mark.parametrize(
+    ("language", "status"), [("fr", 422), ("", 422), (None, 422), ("en", 503)]
+)
+async def test_a_language_that_cannot_be_kept_is_refused(
+    desk: OwnDesk, language: str | None, status: int
+) -> None:
+    async with desk.ana() as page:
+        desk.accounts.is_away = True
+        body = {"language": language}
+        refused = await page.put("/api/v1/account/language", json=body)
+
+    assert refused.status_code == status
+    assert "set-cookie" not in refused.headers
+
+
+async def test_a_link_keeps_its_language_in_the_browser(desk: OwnDesk) -> None:
+    async with desk.browser() as page:
+        body = {"language": "en"}
+        refused = await page.put("/api/v1/account/language", json=body)
+
+    assert refused.status_code == 409
