@@ -15,6 +15,7 @@ BENCHMARKS = (
     "notify_cost",
     "paint",
     "ros2_cost",
+    "sign_in_flood",
     "tracking",
     "glass",
 )

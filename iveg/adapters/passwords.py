@@ -6,6 +6,8 @@ on which a STOP runs.
 
 import asyncio
 import os
+import sys
+import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Final, TypeVar
@@ -19,6 +21,7 @@ LEAST, MOST = 10, 256
 _KIB, _PASSES, _LANES = 19 * 1024, 2, 1
 """OWASP Password Storage Cheat Sheet."""
 _MOST_WAITING: Final = 16
+_NICENESS: Final = 10
 
 
 class BusyError(Exception):
@@ -29,7 +32,7 @@ class Passwords:
     """Hashes and checks passwords in a thread of its own."""
 
     def __init__(self) -> None:
-        self._thread = ThreadPoolExecutor(1, "passwords")
+        self._thread = ThreadPoolExecutor(1, "passwords", _step_back)
         self._waiting = 0
         self._nobodys = ""
 
@@ -68,6 +71,12 @@ class Passwords:
             return await loop.run_in_executor(self._thread, work, *words)
         finally:
             self._waiting -= 1
+
+
+def _step_back() -> None:
+    """Have the system serve the loop first; Linux alone has a niceness of threads."""
+    if sys.platform == "linux":
+        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICENESS)
 
 
 def _hash(password: str) -> str:

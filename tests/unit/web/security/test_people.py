@@ -1,11 +1,16 @@
 """People with accounts: who gets in, by what, and until when."""
 
-from collections.abc import AsyncIterator
+import asyncio
+import threading
+from collections.abc import AsyncIterator, Callable
 from dataclasses import replace
+from functools import partial
+from typing import TypeVar
 
 import httpx
 import pytest
 
+from iveg.adapters.passwords import Passwords
 from iveg.domain.accounts import Account, digest_of
 from iveg.domain.records import AuditRecord
 from iveg.web.pages.openapi import ApiDoc
@@ -13,8 +18,9 @@ from iveg.web.pages.routes import router
 from iveg.web.security.authentication import Authenticator
 from iveg.web.security.people import People
 from tests.fakes.accounts import FakeAccounts, FakePasswords
-from tests.unit.web.desk import WebDesk
+from tests.unit.web.desk import HOST, WebDesk
 
+T = TypeVar("T")
 OWN = {"X-IVEG": "1", "Sec-Fetch-Site": "same-origin"}
 ANA = Account("P1", "Ana Núñez", "operator", password="#acelga-1234")
 EVA = Account("P2", "Eva", "viewer", invitation=digest_of("invited"))
@@ -23,12 +29,12 @@ EVA = Account("P2", "Eva", "viewer", invitation=digest_of("invited"))
 class PeoplesDesk(WebDesk):
     """A desk at which two people have accounts."""
 
-    def __init__(self) -> None:
+    def __init__(self, real: Passwords | None = None) -> None:
         super().__init__()
         now = self.clock().wall
         self.accounts = FakeAccounts(ANA, replace(EVA, invited_until=now + 60.0))
         self.passwords = FakePasswords()
-        self.people = People(self.accounts, self.passwords, self.clock)
+        self.people = People(self.accounts, real or self.passwords, self.clock)
         self.authenticator = Authenticator(
             sign_in_token="cd" * 32,
             api_token="",
@@ -90,6 +96,83 @@ async def test_a_wrong_name_and_a_wrong_password_are_told_alike(
     assert answer.status_code == 401
     # Each was checked against something, so that none is faster.
     assert len(desk.passwords.asked) == 2
+
+
+class HeldPasswords(Passwords):
+    """Real ones; ``computed`` says what, on which thread.  ``gate`` holds them up."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.computed: list[tuple[str, str]] = []
+        self.gate = threading.Event()
+        self.gate.set()
+
+    async def _run(self, work: Callable[..., T], *words: str) -> T:
+        return await super()._run(partial(self._held, work), *words)
+
+    def _held(self, work: Callable[..., T], *words: str) -> T:
+        self.computed.append((work.__name__, threading.current_thread().name))
+        assert self.gate.wait(30)
+        return work(*words)
+
+
+@pytest.fixture
+async def held() -> AsyncIterator[tuple[PeoplesDesk, HeldPasswords]]:
+    passwords = HeldPasswords()
+    desk = PeoplesDesk(passwords)
+    await desk.people.refresh()
+    yield desk, passwords
+    desk.people.close()
+
+
+@pytest.mark.parametrize("name", ["Ana Núñez", "Eva", "Out", "nobody", "", "x" * 64])
+async def test_whoever_is_not_let_in_is_computed_as_often_and_by_the_same_path(
+    held: tuple[PeoplesDesk, HeldPasswords], name: str
+) -> None:
+    desk, passwords = held
+    desk.accounts.known["P1"] = replace(ANA, password=await passwords.hashed("right-1"))
+    desk.accounts.known["P3"] = Account("P3", "Out", "viewer", disabled=True)
+    await desk.people.refresh()
+    passwords.computed.clear()
+
+    async with desk.page() as page:
+        statuses = [await enter(page, name=name, password="wrong-1") for _ in range(2)]
+
+    assert statuses == [401, 401]
+    # The hash that stands for nobody's is made once, whoever comes first.
+    assert [work for work, _ in passwords.computed] == ["_hash", "_fits", "_fits"]
+
+
+async def test_a_flood_of_sign_ins_waits_in_a_short_line_beside_the_loop(
+    held: tuple[PeoplesDesk, HeldPasswords],
+) -> None:
+    desk, passwords = held
+    await passwords.fits("", "")
+    passwords.computed.clear()
+    passwords.gate.clear()
+
+    async def flood(number: int) -> int:
+        address = f"10.0.{number // 250}.{number % 250}"
+        transport = httpx.ASGITransport(desk.app, client=(address, 1))
+        async with httpx.AsyncClient(
+            transport=transport, base_url=f"http://{HOST}", headers=OWN
+        ) as page:
+            return await enter(page, name="Eva", password="wrong-password")
+
+    guesses = [asyncio.create_task(flood(number)) for number in range(300)]
+    async with asyncio.timeout(30):
+        await asyncio.wait(guesses[16:])
+    async with desk.browser("viewer") as page:
+        stop = await page.post("/api/v1/robots/AGI/stop")
+    computed_until_then = len(passwords.computed)
+    passwords.gate.set()
+
+    assert stop.status_code == 202
+    assert [robot for robot, _ in desk.fleet.stops] == ["AGI"]
+    # One is at work, fifteen wait; the others were refused before any computing.
+    assert computed_until_then == 1
+    assert sorted(await asyncio.gather(*guesses)) == [401] * 16 + [429] * 284
+    assert {thread for _, thread in passwords.computed} == {"passwords_0"}
 
 
 async def test_five_wrong_passwords_are_enough_for_a_minute_and_cost_no_more(
