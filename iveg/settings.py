@@ -77,6 +77,18 @@ class Settings:
     )
     mqtt_user: str = setting("IVEG_MQTT_USER", "", "User at the broker.")
     mqtt_password: str = setting("IVEG_MQTT_PASSWORD", "", "Password at the broker.")
+    mqtt_ca: str = setting(
+        "IVEG_MQTT_CA",
+        "",
+        "File of certificates that are trusted with `mqtts`; empty: the system's.",
+    )
+    mqtt_cert: str = setting(
+        "IVEG_MQTT_CERT",
+        "",
+        "File of the own certificate, by which the broker knows who comes. It and its "
+        "key are read at each connection, and a new one connects anew.",
+    )
+    mqtt_key: str = setting("IVEG_MQTT_KEY", "", "File of the key of `IVEG_MQTT_CERT`.")
     orion_url: Url = setting(
         "IVEG_ORION_URL", "http://127.0.0.1:1026", "Orion Context Broker, NGSI-v2."
     )

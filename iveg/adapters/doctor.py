@@ -6,7 +6,6 @@ They report the reason of a failure where a running iVeg tries again.
 import asyncio
 import contextlib
 import secrets
-import ssl
 from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 
@@ -89,7 +88,7 @@ async def probe_device(
         username=address.user,
         password=address.password,
         timeout=within_s,
-        tls_context=ssl.create_default_context() if address.tls else None,
+        tls_context=address.context(),
         socket_options=NODELAY,
     )
     device = ProbeDevice(client, TopicListener())

@@ -21,6 +21,7 @@ import aiomqtt
 from iveg.adapters.log_filter import quiet
 from iveg.adapters.mqtt_inbox import Arrived, Qos1Message
 from iveg.adapters.mqtt_outbox import OutboxClient
+from iveg.adapters.tls import NO_FILES, FileState, TlsFiles
 from iveg.domain.errors import HopError
 
 _log = logging.getLogger(__name__)
@@ -36,16 +37,19 @@ _ANSWERED_WITHIN_S, _CONFIRMED_WITHIN_S = 5.0, 1.5
 
 @dataclass(frozen=True, slots=True)
 class BrokerAddress:
-    """Address of the broker, user and password."""
+    """Address of the broker, user and password, and the files of TLS."""
 
     host: str
     port: int
     user: str | None = None
     password: str | None = None
     tls: bool = False
+    files: TlsFiles = NO_FILES
 
     @classmethod
-    def from_url(cls, url: str, user: str = "", password: str = "") -> "BrokerAddress":
+    def from_url(
+        cls, url: str, user: str = "", password: str = "", files: TlsFiles = NO_FILES
+    ) -> "BrokerAddress":
         """Read ``mqtt://user:password@host:port``; arguments win over the URL."""
         parts = urlsplit(url)
         tls = parts.scheme == "mqtts"
@@ -55,7 +59,16 @@ class BrokerAddress:
             user or unquote(parts.username or "") or None,
             password or unquote(parts.password or "") or None,
             tls,
+            files,
         )
+
+    def context(self) -> ssl.SSLContext | None:
+        """What TLS needs, from the files as they are now; None without TLS.
+
+        Raises:
+            OSError: a file is missing or is no certificate.
+        """
+        return self.files.context() if self.tls else None
 
 
 class MqttLink:
@@ -71,6 +84,7 @@ class MqttLink:
         on_passed_over: Called with a topic and how many of its messages were not
             handed over because newer ones had come with them; before the newest.
         apart_s: Least time between two readings (s); 0: whenever something comes.
+        look_every_s: Between two looks for another certificate (s).
     """
 
     def __init__(
@@ -83,9 +97,11 @@ class MqttLink:
         on_loss: Callable[[], None] = lambda: None,
         on_passed_over: Callable[[str, int], None] = lambda _topic, _count: None,
         apart_s: float = 0.0,
+        look_every_s: float = 2.0,
     ) -> None:
         self._address = address
         self._name = name
+        self._look_every_s = look_every_s
         self._apart_s = apart_s
         self.attach(
             subscriptions or {}, on_message, on_connect, on_loss, on_passed_over
@@ -148,6 +164,11 @@ class MqttLink:
                 if not self._loss_told:
                     _log.warning("%s: broker lost: %s", self._name, error)
                     self._loss_told = True
+            else:
+                # Its certificate is another: nobody has to wait for a broker.
+                self._client = None
+                self._on_loss()
+                continue
             if self._client is not None:
                 self._client = None
                 pause = _FIRST_PAUSE_S
@@ -156,7 +177,7 @@ class MqttLink:
             pause = min(_LONGEST_PAUSE_S, 2 * pause)
 
     async def _session(self) -> None:
-        address = self._address
+        address, files = self._address, self._address.files.state()
         async with OutboxClient(
             address.host,
             address.port,
@@ -164,7 +185,7 @@ class MqttLink:
             password=address.password,
             keepalive=_KEEPALIVE_S,
             timeout=_ANSWERED_WITHIN_S,
-            tls_context=ssl.create_default_context() if address.tls else None,
+            tls_context=address.context(),
             socket_options=NODELAY,
             take=self._take,
             apart_s=self._apart_s,
@@ -183,9 +204,34 @@ class MqttLink:
             )
             try:
                 self._hand_qos1(self._early)
-                await client.lost()
+                await self._until_over(client, files)
             finally:
                 sender.cancel()
+
+    async def _until_over(self, client: OutboxClient, files: FileState) -> None:
+        """Until the connection is lost (MqttError), or its certificate is another."""
+        lost = asyncio.ensure_future(client.lost())
+        try:
+            while True:
+                await asyncio.wait({lost}, timeout=self._look_every_s)
+                if lost.done():
+                    return lost.result()
+                now = self._address.files.state()
+                if now != files and self._can_connect():
+                    _log.info("%s: a new certificate: connecting anew", self._name)
+                    return None
+                files = now
+        finally:
+            lost.cancel()
+
+    def _can_connect(self) -> bool:
+        """Whether the files fit together: half-written ones end no connection."""
+        try:
+            self._address.context()
+        except OSError as error:
+            _log.warning("%s: certificate not used: %s", self._name, error)
+            return False
+        return True
 
     def _take(self, arrived: Arrived) -> None:
         """A mistake of ours in here must end ``run``, and not the connection alone."""

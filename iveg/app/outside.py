@@ -23,6 +23,7 @@ from iveg.adapters.recordings.recorder import InputRecorder
 from iveg.adapters.recordings.writer import WriterSetup
 from iveg.adapters.rules import FileRules
 from iveg.adapters.sessions import FileSessions
+from iveg.adapters.tls import TlsFiles
 from iveg.adapters.trials import FileTrials
 from iveg.adapters.web_push import PushSender
 from iveg.adapters.webhook import WebhookSender
@@ -139,7 +140,10 @@ def open_outside(
     """Open the ports that the settings name; nothing is connected yet."""
     tenant = settings.fiware_service, settings.fiware_servicepath
     broker = BrokerAddress.from_url(
-        settings.mqtt_url, settings.mqtt_user, settings.mqtt_password
+        settings.mqtt_url,
+        settings.mqtt_user,
+        settings.mqtt_password,
+        TlsFiles(settings.mqtt_ca, settings.mqtt_cert, settings.mqtt_key),
     )
     return Outside(
         open_stores(settings, data_directory, fleet),

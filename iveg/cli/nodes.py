@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from iveg.adapters.mqtt import BrokerAddress
+from iveg.adapters.tls import TlsFiles
 from iveg.domain.witness import Plan
 from iveg.robot.node_settings import NodeSettings
 from iveg.settings import Settings
@@ -30,5 +31,8 @@ def node_settings(
 def broker_of(settings: Settings) -> BrokerAddress:
     """Address of the MQTT broker with user and password."""
     return BrokerAddress.from_url(
-        settings.mqtt_url, settings.mqtt_user, settings.mqtt_password
+        settings.mqtt_url,
+        settings.mqtt_user,
+        settings.mqtt_password,
+        TlsFiles(settings.mqtt_ca, settings.mqtt_cert, settings.mqtt_key),
     )

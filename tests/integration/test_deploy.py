@@ -11,14 +11,17 @@ import subprocess
 import sys
 import time
 from collections import defaultdict
-from collections.abc import AsyncIterator, Iterator
-from dataclasses import dataclass, field
+from collections.abc import AsyncIterator, Callable, Iterator
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import aiomqtt
 import pytest
 
+from iveg.adapters.certificates import write_secret
+from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.adapters.orion import OrionClient
+from iveg.adapters.tls import TlsFiles
 from iveg.cli.diagnosis import judge
 from iveg.cli.doctor import Examination
 from iveg.domain.hops import Check
@@ -67,35 +70,42 @@ class Broker:
 
 @pytest.fixture(scope="module")
 def broker(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Broker]:
-    mosquitto = program("mosquitto")
-    folder = tmp_path_factory.mktemp("broker")
     port, tls_port = free_ports(2)
-    broker = Broker(port, tls_port, folder)
+    broker = Broker(port, tls_port, tmp_path_factory.mktemp("broker"))
     make_users(broker)
-    make_certificate(folder / "secrets/mosquitto/tls")
+    make_certificate(broker.folder / "secrets/mosquitto/tls")
+    with mosquitto(broker, "mosquitto-tls"):
+        yield broker
+
+
+@contextlib.contextmanager
+def mosquitto(broker: Broker, listener: str) -> Iterator[int]:
+    """A Mosquitto with one more listener; yields its process id."""
+    found, folder = program("mosquitto"), broker.folder
     conf = folder / "mosquitto.conf"
     conf.write_text(local(ROOT / "deploy/mosquitto.conf", broker) + as_root())
-    encrypted = folder / "secrets/mosquitto/conf.d/mosquitto-tls.conf"
-    encrypted.write_text(local(ROOT / "deploy/mosquitto-tls.conf", broker))
+    encrypted = folder / f"secrets/mosquitto/conf.d/{listener}.conf"
+    encrypted.write_text(local(ROOT / f"deploy/{listener}.conf", broker))
     with (folder / "log").open("w") as log:
         process = subprocess.Popen(
-            bound(mosquitto, "-c", str(conf)), stdout=log, stderr=subprocess.STDOUT
+            bound(found, "-c", str(conf)), stdout=log, stderr=subprocess.STDOUT
         )
     try:
-        wait_for(port)
-        yield broker
+        wait_for(broker.port)
+        yield process.pid
     finally:
         process.terminate()
         process.wait(20)
 
 
-def make_users(broker: Broker) -> None:
+def make_users(broker: Broker, *more: str) -> None:
     """Users and access list as ``deploy/make-secrets`` makes them, and the spy."""
     secrets = broker.folder / "secrets"
     subprocess.run(
         [
             *(sys.executable, str(ROOT / "deploy/make-secrets"), "--emulator"),
             *("--directory", str(secrets), "--state", str(broker.folder / "state")),
+            *more,
         ],
         check=True,
         stdout=subprocess.DEVNULL,
@@ -131,6 +141,7 @@ def local(conf: Path, broker: Broker) -> str:
         .replace("/mosquitto/data", str(broker.folder / "state/mosquitto"))
         .replace("listener 1883", f"listener {broker.port} 127.0.0.1")
         .replace("listener 8883", f"listener {broker.tls_port} 127.0.0.1")
+        .replace("listener 8884", f"listener {broker.tls_port} 127.0.0.1")
     )
 
 
@@ -440,6 +451,149 @@ def test_the_broker_had_nothing_to_complain_of(broker: Broker) -> None:
     ]
 
     assert complaints == []
+
+
+# --- certificates -----------------------------------------------------------------
+
+
+@dataclass
+class Gate:
+    """A Mosquitto that knows robots by their certificates."""
+
+    broker: Broker
+    pid: int
+
+    def make_secrets(self, *more: str) -> None:
+        """As an operator does, and HUP."""
+        secrets = self.broker.folder / "secrets"
+        subprocess.run(
+            [
+                *(sys.executable, str(ROOT / "deploy/make-secrets"), *more),
+                *("--directory", str(secrets)),
+                *("--state", str(self.broker.folder / "state")),
+            ],
+            check=True,
+            stdout=subprocess.DEVNULL,
+            timeout=60,
+        )
+        os.kill(self.pid, signal.SIGHUP)
+
+    def files(self, name: str) -> TlsFiles:
+        folder = self.broker.folder / "secrets/certificates" / name
+        own = folder / name
+        return TlsFiles(str(folder / "ca.crt"), f"{own}.crt", f"{own}.key")
+
+    def client(self, files: TlsFiles) -> aiomqtt.Client:
+        return aiomqtt.Client(
+            "127.0.0.1",
+            self.broker.tls_port,
+            tls_context=files.context(),
+            timeout=20.0,
+        )
+
+    async def is_let_in(self, files: TlsFiles) -> bool:
+        return await asyncio.to_thread(self._greets, files)
+
+    def _greets(self, files: TlsFiles) -> bool:
+        """Whether a CONNECT is answered; a client library would wait for long."""
+        place = ("127.0.0.1", self.broker.tls_port)
+        try:
+            with (
+                socket.create_connection(place, 20) as line,
+                files.context().wrap_socket(line, server_hostname=place[0]) as wrapped,
+            ):
+                wrapped.sendall(b"\x10\x0d\x00\x04MQTT\x04\x02\x00\x3c\x00\x01x")
+                return wrapped.recv(4) == b"\x20\x02\x00\x00"
+        except OSError:
+            return False
+
+
+@pytest.fixture
+def gate(tmp_path: Path) -> Iterator[Gate]:
+    port, tls_port = free_ports(2)
+    broker = Broker(port, tls_port, tmp_path)
+    make_users(broker, "--certificates")
+    with mosquitto(broker, "mosquitto-certificates") as pid:
+        yield Gate(broker, pid)
+
+
+async def test_a_certificate_lets_its_robot_in_as_itself_and_as_nobody_else(
+    gate: Gate,
+) -> None:
+    of_robot = gate.files("AGI")
+    async with (
+        gate.client(gate.files("iveg_dss")) as dss,
+        gate.client(of_robot) as robot,
+    ):
+        await dss.subscribe("/iveg/+/attrs", qos=1)
+        await robot.publish("/iveg/AGII/attrs", b"lie", qos=1)
+        await robot.publish("/iveg/AGI/attrs", b"truth", qos=1)
+        async with asyncio.timeout(30):
+            first = await anext(dss.messages)
+
+    assert (str(first.topic), first.payload) == ("/iveg/AGI/attrs", b"truth")
+    assert not await gate.is_let_in(replace(of_robot, certificate="", key=""))
+
+
+async def test_a_revoked_robot_is_heard_no_more_and_allowed_by_a_new_certificate(
+    gate: Gate, tmp_path: Path
+) -> None:
+    old = tmp_path / "copied"
+    shutil.copytree(Path(gate.files("AGI").certificate).parent, old)
+    copied = TlsFiles(*(str(old / name) for name in ("ca.crt", "AGI.crt", "AGI.key")))
+    async with gate.client(gate.files("iveg_dss")) as dss:
+        await dss.subscribe("/iveg/+/attrs", qos=1)
+        async with gate.client(copied) as robot:
+            gate.make_secrets("--revoke", "AGI")
+            async with asyncio.timeout(30):
+                while await gate.is_let_in(copied):
+                    pass
+            with contextlib.suppress(aiomqtt.MqttError):
+                await robot.publish("/iveg/AGI/attrs", b"still there", qos=1)
+        async with gate.client(gate.files("AGII")) as other:
+            await other.publish("/iveg/AGII/attrs", b"not meant", qos=1)
+        async with asyncio.timeout(30):
+            first = await anext(dss.messages)
+    gate.make_secrets("--allow", "AGI")
+    async with asyncio.timeout(30):
+        while not await gate.is_let_in(gate.files("AGI")):
+            pass
+
+    assert first.payload == b"not meant"
+    assert not await gate.is_let_in(copied)
+
+
+async def test_a_new_certificate_is_used_without_a_restart_and_a_broken_one_is_not(
+    gate: Gate, caplog: pytest.LogCaptureFixture
+) -> None:
+    files = gate.files("iveg_dss")
+    address = BrokerAddress("127.0.0.1", gate.broker.tls_port, tls=True, files=files)
+    link = MqttLink(address, "iveg", look_every_s=0.05)
+    running = asyncio.create_task(link.run())
+    await until(lambda: link.connected)
+
+    write_secret(Path(files.key), b"half a key")
+    await until(lambda: "certificate not used" in caplog.text)
+    await link.publish("/AGI/iveg/desired", b"{}", qos=1)
+    kept = link.connects
+    renewed(files)
+    gate.make_secrets()
+    await until(lambda: link.connects == kept + 1 and link.connected)
+    await link.publish("/AGI/iveg/desired", b"{}", qos=1)
+    running.cancel()
+
+    assert kept == 1
+
+
+def renewed(files: TlsFiles) -> None:
+    """Without a key another certificate is made."""
+    Path(files.key).unlink()
+
+
+async def until(true: Callable[[], object]) -> None:
+    async with asyncio.timeout(30):
+        while not true():  # noqa: ASYNC110 - what is waited for has no event
+            await asyncio.sleep(0.01)
 
 
 # --- the agent's health check -----------------------------------------------------

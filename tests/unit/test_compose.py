@@ -192,7 +192,7 @@ def test_every_long_running_service_says_whether_it_is_well() -> None:
 def test_ports_open_on_loopback_unless_a_site_chooses_otherwise() -> None:
     ports = [port for one in SERVICES.values() for port in one.get("ports", [])]
 
-    assert len(ports) == 3
+    assert len(ports) == 4
     assert [port for port in ports if ":-127.0.0.1}:" not in port] == []
 
 
