@@ -14,6 +14,7 @@ from iveg.app.dss import Dss
 from iveg.app.laboratory import find_laboratory
 from iveg.web.api import (
     account,
+    cost,
     day,
     history,
     incidents,
@@ -67,6 +68,12 @@ def _past_routers(dss: Dss, pages: routes.Pages) -> Iterator[APIRouter]:
     greenhouse, worker = evaluator.greenhouse, dss.worker
     days = day.Days(queries.url, greenhouse, dss.settings.drill_days, worker)
     yield day.router(days, pages, clock)
+    braking = {
+        robot_id: one.profile.assumed_braking
+        for robot_id, one in dss.fleet.members.items()
+    }
+    costs = cost.Costs(queries.url, greenhouse, braking, worker)
+    yield cost.router(costs, pages, clock)
     yield history.router(
         queries,
         worker,

@@ -20,7 +20,7 @@ class Worked(Model):
 class Slowed(Model):
     """Minutes of robots slowed, by what slowed them and the aisle that it was in."""
 
-    cause: str = Field(description="``person`` or ``robot``.")
+    cause: str = Field(description="``person`` or ``robot``; of a cost any reason.")
     lane: str | None = Field(description="Null: outside the aisles, or unknown.")
     minutes: float
 

@@ -7,6 +7,7 @@ from pydantic.json_schema import models_json_schema
 
 from iveg.models.alert import AcknowledgedAlerts
 from iveg.models.base import Model
+from iveg.models.cost import Cost
 from iveg.models.day import Day
 from iveg.models.device import Device
 from iveg.models.dictionary import DictionaryColumn
@@ -23,6 +24,7 @@ PAGE = (documents.INTERFACES / "resources.md").read_text()
 _SHOWN: tuple[type[Model], ...] = (
     *TOLD,
     AcknowledgedAlerts,
+    Cost,
     Day,
     Device,
     KeptDetection,

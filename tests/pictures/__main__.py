@@ -33,6 +33,7 @@ PAGES = {
     "decision": "/decisions/D1",
     "history": "/history",
     "day": "/day",
+    "compare": "/compare",
     "fleet": "/fleet",
     "climate": "/climate",
     "latency": "/latency",

@@ -30,7 +30,7 @@ from sqlalchemy import (
 )
 
 from iveg.adapters import clock
-from iveg.adapters.history import tables
+from iveg.adapters.history import partial_indexes, tables
 from iveg.adapters.history.audit import is_over, seal
 from iveg.domain.retention import PurgeStep
 
@@ -67,9 +67,9 @@ _OVER: Mapping[str, ColumnElement[bool]] = {
     "alerts": tables.alerts.c.cleared_at.is_not(None),
 }
 _PLACED: Mapping[str, Index] = {
-    "detections": tables.placed_detections,
-    "decisions": tables.placed_decisions,
-    "log": tables.placed_lines,
+    "detections": partial_indexes.placed_detections,
+    "decisions": partial_indexes.placed_decisions,
+    "log": partial_indexes.placed_lines,
 }
 """Table → the index of those of its rows that have a place."""
 

@@ -14,6 +14,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from iveg.adapters.history import ages, lists, series
 from iveg.adapters.history.audit import chain_end
+from iveg.adapters.history.cost import CostRows, cost_rows
 from iveg.adapters.history.engine import reading_engine
 from iveg.adapters.history.lists import Filter, Page, R, record_of
 from iveg.adapters.history.migrate import reason_of
@@ -229,6 +230,12 @@ class Queries:
     ) -> tuple[Literal["places", "telemetry"], ...]:
         """What of a range is no longer kept, or of a part of it."""
         return await self._ask(lambda c: ages.lost_of(c, since, until))
+
+    async def cost_rows(
+        self, since: float, until: float, braking: Mapping[str, float]
+    ) -> CostRows:
+        """What a range cost and how near it was; ``braking`` of each robot (m/s²)."""
+        return await self._ask(lambda c: cost_rows(c, since, until, braking))
 
     async def climate_series(self, since: float, until: float) -> series.ClimateSeries:
         """The air over a range, at most 288 points."""

@@ -149,7 +149,7 @@ def climate_series(
     if count <= most:
         return ClimateSeries(*_columns(connection, (c.at, *values), asked))
     slice_s = (until - since) / most
-    place = _whole(connection, (c.at - since) / slice_s)
+    place = whole(connection, (c.at - since) / slice_s)
     means = (func.min(c.at), *(func.avg(value) for value in values))
     return ClimateSeries(*_columns(connection, means, asked, place), slice_s=slice_s)
 
@@ -164,7 +164,7 @@ def measurement_series(
     c = measurements.c
     slice_s = (until - since) / most
     is_sliced = slice_s > READING_PERIOD_S
-    place = _whole(connection, (c.at - since) / slice_s) if is_sliced else c.row_id
+    place = whole(connection, (c.at - since) / slice_s) if is_sliced else c.row_id
     names = (c.entity_id, c.attribute)
     wanted = (
         select(*names, func.min(c.at), func.avg(c.value))
@@ -185,7 +185,7 @@ def measurement_series(
 def poses_of(connection: Connection, since: float, until: float) -> tuple[Pose, ...]:
     """Poses of robots in each second of ``since <= at < until``, in order."""
     c = odometry.c
-    second = _whole(connection, c.at)
+    second = whole(connection, c.at)
     wanted = (
         select(
             c.robot_id,
@@ -206,7 +206,7 @@ def people_seen(
 ) -> tuple[DaySighting, ...]:
     """Positions of confirmed people in each second of ``since <= at < until``."""
     c = detections.c
-    second = _whole(connection, c.at)
+    second = whole(connection, c.at)
     wanted = (
         select(second, func.avg(c.x), func.avg(c.y), c.robot_id)
         .where(c.at >= since, c.at < until, c.confident, c.class_ == "person")
@@ -224,7 +224,7 @@ def confidence_counts(
 ) -> tuple[ConfidenceCount, ...]:
     """Detections of ``since <= at < until`` by class and confidence."""
     bins = detections.c.probability * CONFIDENCE_BINS
-    place = _whole(connection, bins).label("place")
+    place = whole(connection, bins).label("place")
     statement = (
         select(detections.c.class_id, place, func.count())
         .where(detections.c.at >= since, detections.c.at < until)
@@ -303,7 +303,7 @@ def _one(
         return SpeedSeries(robot, *_columns(connection, rows, asked))
     # One slice fewer than asked for: the last row may stand on the last edge.
     slice_s = (last - first) / (most - 1) or 1.0
-    place = _whole(connection, (o.at - first) / slice_s)
+    place = whole(connection, (o.at - first) / slice_s)
     slices = (
         func.min(o.at),
         func.avg(o.linear),
@@ -328,7 +328,7 @@ def _columns(
     return list(zip(*rows, strict=True)) or [()] * len(wanted)
 
 
-def _whole(connection: Connection, value: ColumnElement[Any]) -> ColumnElement[int]:
+def whole(connection: Connection, value: ColumnElement[Any]) -> ColumnElement[int]:
     """Rounded down: a cast does that on SQLite, and rounds to nearest on PostgreSQL."""
     if connection.dialect.name == "sqlite":
         return cast(value, Integer)

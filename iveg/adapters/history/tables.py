@@ -24,7 +24,6 @@ from sqlalchemy import (
     and_,
     false,
     or_,
-    text,
 )
 from sqlalchemy.types import TypeEngine
 
@@ -337,22 +336,6 @@ api_tokens = Table(
     _number("made_at", null=False),
     _number("used_at"),
     UniqueConstraint("name_key"),
-)
-
-
-def _placed(name: str, at: Column[float], sqlite: str, postgresql: str) -> Index:
-    """Index of the rows that have a place still, by which they are found to lose it."""
-    return Index(name, at, sqlite_where=text(sqlite), postgresql_where=text(postgresql))
-
-
-placed_detections = _placed(
-    "ix_detections_placed", detections.c.at, "x IS NOT NULL", "x IS NOT NULL"
-)
-placed_decisions = _placed(
-    "ix_decisions_placed", decisions.c.started_at, "x IS NOT NULL", "x IS NOT NULL"
-)
-placed_lines = _placed(
-    "ix_log_placed", log.c.at, "instr(slots, '\"x\":') > 0", "slots ? 'x'"
 )
 
 

@@ -17,6 +17,7 @@ from pydantic import (
     Field,
     model_validator,
 )
+from pydantic_core import PydanticCustomError
 
 from iveg.adapters.history import lists
 from iveg.adapters.history.lists import Cursor, Filter, ListOf
@@ -35,7 +36,8 @@ _NO_CONTROLS = r"^[^\x00-\x1f]*$"
 """PostgreSQL refuses text that holds NUL."""
 
 
-def _mend_plus(value: object) -> object:
+def mend_plus(value: object) -> object:
+    """A moment's text, with the plus that an address makes a space."""
     # An unescaped "+00:00" reaches us as " 00:00", from nearly every first attempt.
     if isinstance(value, str) and "T" in value:
         return value.strip().replace(" ", "+")
@@ -44,18 +46,19 @@ def _mend_plus(value: object) -> object:
 
 def _in_utc(moment: datetime) -> datetime:
     told = moment if moment.tzinfo else moment.replace(tzinfo=UTC)
-    _as_kept(told.date())
+    as_kept(told.date())
     return told
 
 
-def _as_kept(day: date) -> date:
+def as_kept(day: date) -> date:
+    """The day, if a history may have it.  Raises PydanticCustomError."""
     if not _FIRST_DAY <= day <= _LAST_DAY:
-        raise ValueError("no day of any history")
+        raise PydanticCustomError("day", "no day of any history")
     return day
 
 
-Moment = Annotated[datetime, BeforeValidator(_mend_plus), AfterValidator(_in_utc)]
-HistoryDay = Annotated[date, AfterValidator(_as_kept)]
+Moment = Annotated[datetime, BeforeValidator(mend_plus), AfterValidator(_in_utc)]
+HistoryDay = Annotated[date, AfterValidator(as_kept)]
 
 
 class Span(BaseModel):
@@ -69,7 +72,7 @@ class Span(BaseModel):
     @model_validator(mode="after")
     def _in_order(self) -> Self:
         if self.since and self.until and self.since > self.until:
-            raise ValueError("since is after until")
+            raise PydanticCustomError("order", "since is after until")
         return self
 
 

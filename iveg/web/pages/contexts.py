@@ -5,11 +5,13 @@ A template sees its own dataclass as ``page`` and the functions ``t`` (a sentenc
 attribute).  Live values never come this way; they arrive on ``/live``.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal, get_args
 
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.transports import TRANSPORTS
+from iveg.models.cost import Cost
 from iveg.models.day import Day
 from iveg.web.pages.openapi import ApiDoc
 
@@ -110,6 +112,39 @@ class DayPage(Page):
     day: Day
     before: str
     after: str
+
+
+@dataclass(frozen=True, slots=True)
+class ComparePage(Page):
+    """``compare.html``: what two ranges cost, side by side.
+
+    Attributes:
+        than: What ``one`` is compared with.
+    """
+
+    than: Cost
+    one: Cost
+
+    @property
+    def slowed(self) -> Mapping[tuple[str, str | None], tuple[float, float]]:
+        """(cause, aisle) → minutes of both, the longest in all first."""
+        minutes = [
+            {(row.cause, row.lane): row.minutes for row in cost.slowed or ()}
+            for cost in (self.than, self.one)
+        ]
+        than, one = minutes
+        keys = sorted(than | one, key=lambda it: -than.get(it, 0) - one.get(it, 0))
+        return {key: (than.get(key, 0.0), one.get(key, 0.0)) for key in keys}
+
+    def alerts(self, priority: str) -> tuple[int | None, int | None]:
+        """How many of a priority, in both; None where nobody knows."""
+        than, one = (
+            None
+            if cost.alerts is None
+            else sum(row.count for row in cost.alerts if row.priority == priority)
+            for cost in (self.than, self.one)
+        )
+        return than, one
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,6 +22,12 @@ def start_of(day: date) -> float:
     return (midnight - ahead).replace(tzinfo=UTC).timestamp()
 
 
+def moment_of(wall: datetime) -> float:
+    """When the wall clock there shows a time (Unix s); the first of two in October."""
+    ahead = 2 * _HOUR if _is_summer(wall - 2 * _HOUR) else _HOUR
+    return (wall - ahead).replace(tzinfo=UTC).timestamp()
+
+
 def _is_summer(moment: datetime) -> bool:
     """From the last Sunday of March to that of October, both at 01:00 UTC."""
     return _last_sunday(moment.year, 3) <= moment < _last_sunday(moment.year, 10)

@@ -20,6 +20,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from iveg.adapters.passwords import LEAST, MOST
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.limits import LIMITS
+from iveg.domain.stamps import format_stamp
 from iveg.web import cookies
 from iveg.web.pages.contexts import (
     THEMES,
@@ -315,6 +316,18 @@ def _clock(stamp: str) -> str:
     return f"{in_madrid(datetime.fromisoformat(stamp).timestamp()):%H:%M:%S}"
 
 
+def _wall(stamp: str) -> str:
+    """Day and time in Madrid of an ISO-8601 stamp, as a form has them."""
+    at = datetime.fromisoformat(stamp).timestamp()
+    return in_madrid(at).isoformat(timespec="seconds")
+
+
+def _before(stamp: str) -> str:
+    """Ten seconds before an ISO-8601 stamp, as an address of the map of then."""
+    at = datetime.fromisoformat(stamp).timestamp()
+    return f"/?t={format_stamp(at - 10.0)}"
+
+
 def _environment(translations: Translations) -> Environment:
     """Templates that speak one language."""
     environment = Environment(
@@ -326,6 +339,8 @@ def _environment(translations: Translations) -> Environment:
     )
 
     environment.filters["clock"] = _clock
+    environment.filters["wall"] = _wall
+    environment.filters["before"] = _before
     environment.filters["lane"] = Sentences(translations).lane
 
     def say(key: str, **slots: Slot) -> Markup:
@@ -353,6 +368,7 @@ def _environment(translations: Translations) -> Environment:
         t=translations.say,
         say=say,
         label=label,
+        has=translations.sentences.__contains__,
         limits=LIMITS,
         limits_text=limits_text(),
     )

@@ -8,7 +8,7 @@ from sqlalchemy import Connection, text
 
 from iveg.adapters.history.engine import describe, sqlite_url, writing_engine
 from iveg.adapters.history.migrate import upgrade
-from iveg.adapters.history.tables import metadata
+from iveg.adapters.history.partial_indexes import metadata
 from iveg.domain.errors import DataFileError, HopError, SettingsError
 
 

@@ -41,6 +41,7 @@ const ROUTES = {
   settings: () => import("../pages/settings.js"),
   decisions: () => import("../pages/decisions.js"),
   decision: () => import("../pages/decision.js"),
+  compare: () => import("../pages/day.js"),
   day: () => import("../pages/day.js"),
   about: () => import("../pages/about.js"),
   audit: () => import("../pages/audit.js"),

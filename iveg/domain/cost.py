@@ -1,0 +1,269 @@
+"""What limits cost over a range, and how near it was: from rows of the history alone.
+
+Aisles are where robots were, so that they are known as long as telemetry is kept; near
+misses as long as people's places are.  Time lost is estimated against the same robot's
+free speed (docs/interfaces/resources.md, "TaskCost").
+"""
+
+from bisect import bisect_right
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import floor
+
+from iveg.domain.greenhouse import Greenhouse
+
+SLOT_S = 10.0
+"""Slow driving is read in slots of this: a few metres of an aisle (s)."""
+CELL_M = 1.0
+"""Side of a cell of the heat map (m)."""
+MOST_MISSES, MOST_TASKS = 20, 200
+NEAR_M = 1.5
+"""From the middle of a driving robot to that of a person: nearer is a near miss (m)."""
+_APART_S = 10.0
+"""Near misses of one robot nearer in time than this are one."""
+
+
+@dataclass(frozen=True, slots=True)
+class SlowSlot:
+    """A robot that drove under a limit, in one slot; means over it.
+
+    Attributes:
+        at: When the slot begins (Unix s).
+        seconds: How long it drove so; ``half_s`` of it at half speed or less.
+        speed: (m/s).
+    """
+
+    robot_id: str
+    at: float
+    seconds: float
+    half_s: float
+    x: float
+    y: float
+    speed: float
+
+
+@dataclass(frozen=True, slots=True)
+class NearSecond:
+    """A second in which a robot drove within ``NEAR_M`` of somebody who is seen.
+
+    Attributes:
+        at: Its beginning (Unix s).
+        speed: The greatest (m/s).
+        distance_m: The least between the middles of both (m).
+    """
+
+    robot_id: str
+    at: float
+    x: float
+    y: float
+    speed: float
+    distance_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class SpeedChange:
+    """A robot said that it applies another factor, and why."""
+
+    robot_id: str
+    at: float
+    factor: float
+    reason: str
+    decision_id: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class NearMiss:
+    """Seconds near somebody that hang together.
+
+    Attributes:
+        worst: The second of the least distance.
+        seconds: How many of them there were.
+        decision_id: What the robot was told then, where it was told.
+    """
+
+    worst: NearSecond
+    seconds: int
+    lane: str | None
+    decision_id: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """A goal of a robot, from the order to its end (Unix s)."""
+
+    task_id: str
+    robot_id: str
+    state: str
+    since: float
+    until: float
+
+
+@dataclass(frozen=True, slots=True)
+class TaskCost:
+    """What limits cost a robot in one task; ``task`` None: outside tasks.
+
+    Attributes:
+        slowed_s: How long it drove under a limit.
+        held_s: How long it was held in the task; outside tasks nobody knows whether
+            it would have driven.
+        free_speed: What it drives when it is free (m/s); None where it never was.
+    """
+
+    robot_id: str
+    task: Task | None
+    free_speed: float | None
+    slowed_s: float = 0.0
+    held_s: float = 0.0
+    slow_m: float = 0.0
+    """Metres driven under a limit."""
+
+    @property
+    def lost_m(self) -> float | None:
+        """Metres that it would have driven more (m); None where nobody knows."""
+        if self.free_speed is None:
+            return None
+        return max(0.0, (self.slowed_s + self.held_s) * self.free_speed - self.slow_m)
+
+    @property
+    def lost_s(self) -> float | None:
+        """The time that these metres take at free speed (s)."""
+        if self.lost_m is None or not self.free_speed:
+            return None
+        return self.lost_m / self.free_speed
+
+
+class SpeedChanges:
+    """What robots said that they applied, to be looked up by time."""
+
+    def __init__(self, changes: Iterable[SpeedChange]) -> None:
+        self._of: dict[str, list[SpeedChange]] = defaultdict(list)
+        for one in sorted(changes, key=lambda it: it.at):
+            self._of[one.robot_id].append(one)
+        self._slow = {
+            robot: [one for one in told if 0.0 < one.factor < 1.0]
+            for robot, told in self._of.items()
+        }
+        self._at = {r: [one.at for one in told] for r, told in self._slow.items()}
+
+    def why_slow(self, robot_id: str, at: float) -> SpeedChange | None:
+        """The newest limit, none that held it, that it told until then."""
+        place = bisect_right(self._at.get(robot_id, ()), at)
+        return self._slow[robot_id][place - 1] if place else None
+
+    def held_s(self, robot_id: str, since: float, until: float) -> float:
+        """How long it was held between two moments (s)."""
+        told = self._of.get(robot_id, [])
+        ends = [one.at for one in told[1:]] + [until]
+        return sum(
+            max(0.0, min(end, until) - max(one.at, since))
+            for one, end in zip(told, ends, strict=bool(told))
+            if one.factor <= 0.0
+        )
+
+
+def slowed_by_aisle(
+    slots: Iterable[SlowSlot], changes: SpeedChanges, greenhouse: Greenhouse
+) -> dict[tuple[str, str | None], float]:
+    """(reason, aisle of the robot) → minutes at half speed or less."""
+    minutes: dict[tuple[str, str | None], float] = defaultdict(float)
+    for one in slots:
+        if one.half_s > 0.0:
+            change = changes.why_slow(one.robot_id, one.at + SLOT_S)
+            why = "" if change is None else change.reason
+            minutes[why, greenhouse.lane_at(one.x, one.y)] += one.half_s / 60.0
+    return dict(minutes)
+
+
+def heat(near: Iterable[NearSecond]) -> Counter[tuple[int, int]]:
+    """Cell of the plan, counted from the origin of ``map`` → seconds."""
+    return Counter((floor(one.x / CELL_M), floor(one.y / CELL_M)) for one in near)
+
+
+def near_misses(
+    near: Sequence[NearSecond], changes: SpeedChanges, greenhouse: Greenhouse
+) -> list[NearMiss]:
+    """Each with its worst second, the worst first."""
+    found = [
+        _miss(together, changes, greenhouse)
+        for together in _together(sorted(near, key=lambda it: (it.robot_id, it.at)))
+    ]
+    return sorted(found, key=lambda it: (it.worst.distance_m, it.worst.at))
+
+
+def _together(near: Iterable[NearSecond]) -> Iterator[list[NearSecond]]:
+    """Seconds of one robot that hang together, of seconds in order."""
+    found: list[NearSecond] = []
+    for one in near:
+        if found and not _hangs(found[-1], one):
+            yield found
+            found = []
+        found.append(one)
+    if found:
+        yield found
+
+
+def _hangs(before: NearSecond, one: NearSecond) -> bool:
+    return before.robot_id == one.robot_id and one.at - before.at <= _APART_S
+
+
+def _miss(
+    together: Sequence[NearSecond], changes: SpeedChanges, greenhouse: Greenhouse
+) -> NearMiss:
+    worst = min(together, key=lambda one: one.distance_m)
+    # A decision follows the first near second as often as it comes before it.
+    change = changes.why_slow(worst.robot_id, together[-1].at + 1.0)
+    is_of_it = change is not None and change.at >= together[0].at - _APART_S
+    return NearMiss(
+        worst,
+        len(together),
+        greenhouse.lane_at(worst.x, worst.y),
+        change.decision_id if change is not None and is_of_it else None,
+    )
+
+
+def costs(
+    slots: Iterable[SlowSlot],
+    tasks: Sequence[Task],
+    changes: SpeedChanges,
+    free_speed: Mapping[str, float],
+) -> list[TaskCost]:
+    """What each task cost, oldest first, and each robot outside of any, last."""
+    found = {
+        one.task_id: TaskCost(
+            one.robot_id,
+            one,
+            free_speed.get(one.robot_id),
+            held_s=changes.held_s(one.robot_id, one.since, one.until),
+        )
+        for one in sorted(tasks, key=lambda it: it.since)
+    }
+    outside: dict[str, TaskCost] = {}
+    for slot in slots:
+        task = _task_at(tasks, slot)
+        if task is None:
+            robot = slot.robot_id
+            before = outside.get(robot) or TaskCost(robot, None, free_speed.get(robot))
+            outside[robot] = _with(before, slot)
+        else:
+            found[task.task_id] = _with(found[task.task_id], slot)
+    return [*found.values(), *(outside[robot] for robot in sorted(outside))]
+
+
+def _with(cost: TaskCost, slot: SlowSlot) -> TaskCost:
+    return replace(
+        cost,
+        slowed_s=cost.slowed_s + slot.seconds,
+        slow_m=cost.slow_m + slot.seconds * slot.speed,
+    )
+
+
+def _task_at(tasks: Iterable[Task], slot: SlowSlot) -> Task | None:
+    return next(
+        (
+            one
+            for one in tasks
+            if one.robot_id == slot.robot_id and one.since <= slot.at < one.until
+        ),
+        None,
+    )
