@@ -19,6 +19,8 @@ from iveg.web.api import (
     history,
     incidents,
     notes,
+    passkeys,
+    proof,
     sign_in_code,
     stop_records,
     users,
@@ -98,8 +100,10 @@ def _past_routers(dss: Dss, pages: routes.Pages) -> Iterator[APIRouter]:
     yield notes.router(queries, dss.pipeline.event_log.log, clock)
     if dss.sign_in_token:
         yield sign_in_code.router(dss.sign_in_token)
-    yield account.router(dss.people)
-    yield users.router(dss.people, clock)
+    yield account.router(dss.door.people)
+    yield users.router(dss.door.people, clock)
+    yield passkeys.router(dss.door.people, dss.door.passkeys)
+    yield proof.router(dss.door.people, dss.door.passkeys)
     if dss.sign_on is not None:
         yield sign_on.router(pages, dss.sign_on)
     yield service_worker.router()

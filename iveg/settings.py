@@ -214,6 +214,12 @@ class Settings:
         12.0,
         "How long a session lasts that began at the provider (h); STOP for longer.",
     )
+    release_proof_minutes: Annotated[float, Interval(ge=0.0, le=1440.0)] = setting(
+        "IVEG_RELEASE_PROOF_MINUTES",
+        15.0,
+        "A release asks whoever has an account to prove anew who they are where they "
+        "last did so longer ago (minutes); 0 never asks. STOP never does.",
+    )
     confidence_threshold: Annotated[float, Interval(ge=0.0, le=1.0)] = setting(
         "IVEG_CONFIDENCE_THRESHOLD",
         LIMITS.detection_threshold,

@@ -13,11 +13,17 @@ from iveg.domain.errors import MissingExtraError
 EXTRAS: Final = {
     "bags": "rosbags",
     "parquet": "pyarrow",
+    "passkeys": "webauthn",
     "postgresql": "psycopg",
     "ros2": "cyclonedds",
     "sso": "authlib",
 }
 """Extra → the library that it brings."""
+
+
+def has_extra(extra: str) -> bool:
+    """Whether the library of an extra is installed; it is not imported."""
+    return find_spec(EXTRAS[extra]) is not None
 
 
 def require_extra(extra: str, what: str) -> None:
@@ -30,5 +36,5 @@ def require_extra(extra: str, what: str) -> None:
     Raises:
         MissingExtraError: it is not.
     """
-    if find_spec(EXTRAS[extra]) is None:
+    if not has_extra(extra):
         raise MissingExtraError(what, EXTRAS[extra], extra)

@@ -1,39 +1,23 @@
-"""Passwords by Argon2id (RFC 9106), off the event loop and no faster than one thread.
+"""Passwords by Argon2id (RFC 9106), off the loop and no faster than one thread."""
 
-One thread is the bound: a flood of sign-ins takes half a core at most, never the loop
-on which a STOP runs.
-"""
-
-import asyncio
 import os
-import sys
-import threading
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-from typing import Final, TypeVar
 
 from cryptography.exceptions import InvalidKey
 from cryptography.hazmat.primitives.kdf.argon2 import Argon2id
 
-_T = TypeVar("_T")
+from iveg.adapters.bounded_thread import BoundedThread
+
 LEAST, MOST = 10, 256
 """Characters of a password."""
 _KIB, _PASSES, _LANES = 19 * 1024, 2, 1
 """OWASP Password Storage Cheat Sheet."""
-_MOST_WAITING: Final = 16
-_NICENESS: Final = 10
-
-
-class BusyError(Exception):
-    """More sign-ins wait than are served soon."""
 
 
 class Passwords:
-    """Hashes and checks passwords in a thread of its own."""
+    """Hashes and checks passwords in a thread of its own; tests pass another."""
 
-    def __init__(self) -> None:
-        self._thread = ThreadPoolExecutor(1, "passwords", _step_back)
-        self._waiting = 0
+    def __init__(self, thread: BoundedThread | None = None) -> None:
+        self._thread = thread or BoundedThread("passwords")
         self._nobodys = ""
 
     async def hashed(self, password: str) -> str:
@@ -42,7 +26,7 @@ class Passwords:
         Raises:
             BusyError: too many wait.
         """
-        return await self._run(_hash, password)
+        return await self._thread.run(_hash, password)
 
     async def fits(self, password: str, kept: str) -> bool:
         """Whether a password is the one whose hash is kept.
@@ -54,29 +38,13 @@ class Passwords:
             BusyError: too many wait.
         """
         if not self._nobodys:
-            self._nobodys = await self._run(_hash, "")
-        fits = await self._run(_fits, password, kept or self._nobodys)
+            self._nobodys = await self._thread.run(_hash, "")
+        fits = await self._thread.run(_fits, password, kept or self._nobodys)
         return fits and bool(kept)
 
     def close(self) -> None:
         """End the thread."""
-        self._thread.shutdown(wait=False)
-
-    async def _run(self, work: Callable[..., _T], *words: str) -> _T:
-        if self._waiting >= _MOST_WAITING:
-            raise BusyError
-        self._waiting += 1
-        try:
-            loop = asyncio.get_running_loop()
-            return await loop.run_in_executor(self._thread, work, *words)
-        finally:
-            self._waiting -= 1
-
-
-def _step_back() -> None:
-    """Have the system serve the loop first; Linux alone has a niceness of threads."""
-    if sys.platform == "linux":
-        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICENESS)
+        self._thread.close()
 
 
 def _hash(password: str) -> str:

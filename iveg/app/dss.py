@@ -22,19 +22,19 @@ from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.adapters.ids import new_id
 from iveg.adapters.loop_watch import LoopWatch
-from iveg.adapters.passwords import Passwords
 from iveg.adapters.provisioner import Provisioner
 from iveg.adapters.recordings.recorder import PART as RECORDINGS
 from iveg.adapters.recordings.recorder import RecordedSink
 from iveg.adapters.transports import MqttTransport, OrionTransport
+from iveg.adapters.webauthn import has_passkeys
 from iveg.adapters.worker import Worker
 from iveg.app.counts import count_all, read_queues
+from iveg.app.door import open_door
 from iveg.app.laboratory import find_laboratory
 from iveg.app.life import Work, live
 from iveg.app.outside import Outside, open_outside
 from iveg.app.past import Site as PastSite
 from iveg.app.past import picture
-from iveg.app.sign_on import ways_in
 from iveg.app.viewers import Viewers
 from iveg.domain.errors import HopError, VitalPartError
 from iveg.domain.fleet import FleetDescription
@@ -58,8 +58,6 @@ from iveg.web.api import messages
 from iveg.web.build import Face
 from iveg.web.notifications import NotificationEndpoint
 from iveg.web.pages.contexts import Site
-from iveg.web.security.people import People
-from iveg.web.security.programs import Programs
 from iveg.web.security.secrets import NotifySecret
 from iveg.web.views import Views
 
@@ -121,8 +119,7 @@ class Dss:
         self.services = build_services(
             self.pipeline, kept, outside.senders(messages.writer()), clock.now
         )
-        self.people = People(self.stores.accounts, Passwords(), clock.now)
-        self.programs = Programs(self.stores.api_tokens, clock.now)
+        self.door = open_door(self.stores, clock.now)
         self.trail = AuditTrail(self.stores.recorder, new_id)
         self.upkeep = HistoryUpkeep(
             self.stores.retained(),
@@ -219,13 +216,13 @@ class Dss:
 
     def _face(self) -> Face:
         parts, settings, recorder = self.pipeline, self.settings, self.stores.recorder
-        authenticator, self.sign_on = ways_in(
+        authenticator, self.sign_on = self.door.ways_in(
             settings,
             self.sign_in_token,
-            (self.people, self.programs),
             self.stores.sessions,
             self.trail,
             self.outside.provider,
+            clock.now,
         )
         orion = NotificationEndpoint(
             parts.ingest,
@@ -248,6 +245,7 @@ class Dss:
             laboratory=find_laboratory("pages") is not None,
             link=bool(self.sign_in_token),
             sso=None if self.outside.provider is None else settings.sso_label,
+            passkeys=has_passkeys(),
         )
         views = Views(parts, partial(count_all, parts, recorder, self.counted))
         self.chronicle.picture = partial(picture, views)
@@ -289,8 +287,7 @@ class Dss:
             await self.outside.close()
             self.worker.close()
             await self.past.close()
-            self.people.close()
-            self.programs.close()
+            self.door.close()
 
     async def _live(self) -> None:
         parts = self.pipeline
@@ -318,8 +315,7 @@ class Dss:
             "past": self.past.run,
             "shadow-rule": beside.trials.run,
             "messages": beside.messenger.run,
-            "accounts": self.people.run,
-            "api-tokens": self.programs.run,
+            **self.door.comfort(),
             "earlier": self._remember,
             "loop-watch": LoopWatch(supervision.note_turn).run,
         }

@@ -9,6 +9,7 @@ from iveg.adapters.detectors import FileDetectors
 from iveg.adapters.history.accounts import AccountStore
 from iveg.adapters.history.api_tokens import ApiTokenStore
 from iveg.adapters.history.engine import history_url, sqlite_file
+from iveg.adapters.history.passkeys import PasskeyStore
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.recorder import Recorder, journal_file
 from iveg.adapters.history.upkeep import RecordedHistory
@@ -57,6 +58,7 @@ class Stores:
     sessions: FileSessions
     accounts: AccountStore
     api_tokens: ApiTokenStore
+    passkeys: PasskeyStore
     inputs: InputRecorder
 
     def history_state(self) -> HopState:
@@ -97,6 +99,7 @@ class Stores:
         self.sessions.close()
         self.accounts.close()
         self.api_tokens.close()
+        self.passkeys.close()
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,6 +178,7 @@ def open_stores(
         FileSessions(directory / "sessions.jsonl"),
         AccountStore(url),
         ApiTokenStore(url),
+        PasskeyStore(url),
         InputRecorder(
             WriterSetup(
                 (directory / "recordings").resolve(),

@@ -9,8 +9,10 @@ import unicodedata
 from dataclasses import dataclass
 from typing import Final, Literal
 
-SignInMethod = Literal["link", "password", "sso", "token"]
+SignInMethod = Literal["link", "password", "passkey", "sso", "token"]
 """Proof of an identity; ``sso`` is the identity provider's, ``token`` a program's."""
+OF_ACCOUNTS: Final = frozenset({"password", "passkey", "sso"})
+"""Methods of people with an account, which decides over their sessions."""
 PersonRole = Literal["viewer", "operator", "admin"]
 Language = Literal["es", "en"]
 AccountState = Literal["active", "invited", "lapsed", "over", "disabled"]

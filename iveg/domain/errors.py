@@ -13,6 +13,7 @@ IvegError
 ├── VersionMissingError     a change that does not say of what (HTTP 428)
 ├── ExperimentRefusedError  an experiment that may not start now (HTTP 409)
 ├── OutboundError           an address outside iVeg that took no message
+├── BusyError               more sign-ins wait than are served soon (HTTP 429)
 ├── NotAllowedError         somebody without the role (HTTP 403)
 ├── SignOnError             a sign-in at the identity provider that let nobody in
 ├── ProvidedAccountError    a change of what the identity provider says (HTTP 409)
@@ -180,6 +181,13 @@ class OutboundError(IvegError):
     def __init__(self, why: str) -> None:
         super().__init__(f"The message was not taken: {why}.")
         self.why = why
+
+
+class BusyError(IvegError):
+    """More sign-ins wait than are served soon."""
+
+    def __init__(self) -> None:
+        super().__init__("Too many people sign in at once; try again.")
 
 
 class NotAllowedError(IvegError):

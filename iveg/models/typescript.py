@@ -27,7 +27,13 @@ from iveg.models.messages import Messages, MessageTest
 from iveg.models.places import Costmap, Coverage, Scan
 from iveg.models.reading import Reading
 from iveg.models.rule import Trial
-from iveg.models.signing_in import Invitation, OwnAccount, SignInCode
+from iveg.models.signing_in import (
+    Invitation,
+    OwnAccount,
+    PasskeyOfPerson,
+    Proof,
+    SignInCode,
+)
 from iveg.models.snapshot import PastWorld, Snapshot
 from iveg.models.thing import Thing
 
@@ -51,6 +57,8 @@ TOLD: tuple[type[Model], ...] = (
     MessageTest,
     SignInCode,
     Invitation,
+    PasskeyOfPerson,
+    Proof,
     OwnAccount,
     Thing,
     Trial,

@@ -8,6 +8,8 @@ Errors of this boundary alone, under the tree of ``domain/errors``::
     IvegError
     ├── NotSignedInError    401
     ├── ForeignOriginError  403
+    ├── PasskeyAddressError 409
+    ├── ProofNeededError    403
     └── NotJsonError        415
 """
 
@@ -22,11 +24,13 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
 from iveg.domain.errors import (
+    BusyError,
     CommandRefusedError,
     ExperimentRefusedError,
     HopError,
     IvegError,
     MarkRefusedError,
+    MissingExtraError,
     NameTakenError,
     NotAllowedError,
     NotRecordedError,
@@ -56,6 +60,20 @@ class ForeignOriginError(IvegError):
 
     def __init__(self, missing: str) -> None:
         super().__init__(f"This did not come from iVeg's own page: {missing}.")
+
+
+class ProofNeededError(IvegError):
+    """Somebody is signed in and has to prove anew that it is them."""
+
+    def __init__(self) -> None:
+        super().__init__("Prove again who you are: POST /api/v1/account/proof.")
+
+
+class PasskeyAddressError(IvegError):
+    """Browsers make no passkeys for an address in numbers."""
+
+    def __init__(self) -> None:
+        super().__init__("Passkeys need an address with a name, such as iveg.example.")
 
 
 class NotJsonError(IvegError):
@@ -146,12 +164,10 @@ def problem_of(error: Exception) -> Problem:
             return Problem(
                 503, f"{error.hop} did not answer.", "hop", {"hop": error.hop}
             )
-        case NotSignedInError():
-            challenge = {"WWW-Authenticate": "Bearer"}
-            return Problem(401, str(error), "not-signed-in", headers=challenge)
     for kind, status, code in _PLAIN:
         if isinstance(error, kind):
-            return Problem(status, str(error), code)
+            headers = _HEADERS.get(kind, {})
+            return Problem(status, str(error), code, headers=headers)
     # The server logs the traceback: Starlette raises it again after this answer.
     return Problem(500, "Something failed inside iVeg; its log says what.")
 
@@ -163,6 +179,8 @@ _REFUSED: Mapping[type[IvegError], str] = {
     TrialRefusedError: "trial-refused",
 }
 _PLAIN: tuple[tuple[type[IvegError], int, str], ...] = (
+    (NotSignedInError, 401, "not-signed-in"),
+    (BusyError, 429, "busy"),
     (UnknownRobotError, 404, "unknown-robot"),
     (UnknownNameError, 404, "unknown-name"),
     (NotAllowedError, 403, "not-allowed"),
@@ -170,9 +188,17 @@ _PLAIN: tuple[tuple[type[IvegError], int, str], ...] = (
     (OutdatedError, 409, "outdated"),
     (ProvidedAccountError, 409, "provided-account"),
     (VersionMissingError, 428, "version-missing"),
+    (ProofNeededError, 403, "proof-needed"),
+    (PasskeyAddressError, 409, "passkey-address"),
+    (MissingExtraError, 501, "missing-extra"),
     (ForeignOriginError, 403, "foreign-origin"),
     (NotJsonError, 415, "not-json"),
 )
+
+_HEADERS: Mapping[type[IvegError], Mapping[str, str]] = {
+    NotSignedInError: {"WWW-Authenticate": "Bearer"},
+    BusyError: {"Retry-After": "2"},
+}
 
 
 def _invalid(error: RequestValidationError) -> Problem:

@@ -25,7 +25,13 @@ INTERFACES = documents.interfaces()
 HEADINGS = documents.named_headings(INTERFACES)
 STATIC_FILES = "/static"
 API_TOKEN = "a-token-for-programs"
-OPEN_TO_STRANGERS = {"/healthz", "/signin", "/ngsi/notifications", "/sw.js"}
+OPEN_TO_STRANGERS = {
+    "/healthz",
+    "/signin",
+    "/signin/passkey",
+    "/ngsi/notifications",
+    "/sw.js",
+}
 """Notifications have a secret of their own; the service worker is a file like all
 scripts below `/static`, and must be at the root."""
 

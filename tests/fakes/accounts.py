@@ -1,12 +1,13 @@
-"""Accounts in memory, and passwords that are checked without Argon2."""
+"""Accounts and passkeys in memory, and passwords that are checked without Argon2."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 from iveg.adapters.passwords import Passwords
 from iveg.domain.accounts import Account, Language, name_key
 from iveg.domain.audit import Actor
-from iveg.domain.errors import HopError, NameTakenError
+from iveg.domain.errors import HopError, NameTakenError, UnknownNameError
+from iveg.domain.passkeys import Passkey
 
 
 class FakeAccounts:
@@ -73,3 +74,33 @@ class FakePasswords(Passwords):
     async def fits(self, password: str, kept: str) -> bool:
         self.asked.append(kept)
         return kept == f"#{password}"
+
+
+class FakePasskeys:
+    """Implements ``web.security.passkeys.StoredPasskeys``."""
+
+    def __init__(self) -> None:
+        self.known: dict[str, Passkey] = {}
+        self.is_away = False
+        self.changes: list[tuple[str, str, str]] = []
+
+    def read(self) -> Mapping[str, Passkey]:
+        if self.is_away:
+            raise HopError("database", "away")
+        return dict(self.known)
+
+    def add(self, passkey: Passkey, by: Actor) -> None:
+        if passkey.credential_id in self.known:
+            raise NameTakenError(passkey.name)
+        self.known[passkey.credential_id] = passkey
+        self.changes.append(("passkey_added", passkey.name, by.name))
+
+    def remove(self, account_id: str, credential_id: str, by: Actor) -> None:
+        kept = self.known.get(credential_id)
+        if kept is None or kept.account_id != account_id:
+            raise UnknownNameError("passkey", credential_id)
+        del self.known[credential_id]
+        self.changes.append(("passkey_removed", kept.name, by.name))
+
+    def used(self, used: Iterable[Passkey]) -> None:
+        self.known.update({one.credential_id: one for one in used})

@@ -2,10 +2,10 @@
 
 from dataclasses import asdict
 
-from sqlalchemy import Connection, select, update
+from sqlalchemy import Connection, delete, select, update
 
 from iveg.adapters.history.named_rows import NamedRows, note_change
-from iveg.adapters.history.tables import accounts
+from iveg.adapters.history.tables import accounts, passkeys
 from iveg.domain.accounts import Account, Language
 from iveg.domain.audit import Actor
 
@@ -92,6 +92,9 @@ class AccountStore(NamedRows[Account]):
             account = Account(**{**row, **taken})
             same = c.account_id == account.account_id
             connection.execute(update(accounts).where(same).values(**taken))
+            # Whoever was reset may have lost the device that still has one.
+            gone = passkeys.c.account_id == account.account_id
+            connection.execute(delete(passkeys).where(gone))
             return account
 
         return self._store.run(work)

@@ -26,6 +26,7 @@ from sqlalchemy import (
 )
 
 from iveg.adapters.history import tables
+from iveg.adapters.history.table_mappings import TABLE_MAPPINGS
 from iveg.domain.errors import UnreadableError
 from iveg.domain.records import (
     AlertRecord,
@@ -265,7 +266,7 @@ def conditions(of: ListOf[R], asked: Filter) -> Iterator[ColumnElement[bool]]:
 
 def record_of(kind: type[R], row: RowMapping) -> R:
     """A row as the record that was offered; what a damaged row lacks is its default."""
-    columns = tables.TABLE_MAPPINGS[kind].table.c
+    columns = TABLE_MAPPINGS[kind].table.c
     values = {field.name: row[columns[field.name]] for field in fields(kind)}
     return kind(**{name: one for name, one in values.items() if one is not None})
 

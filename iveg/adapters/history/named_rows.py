@@ -16,19 +16,20 @@ from iveg.adapters.ids import new_id
 from iveg.domain.accounts import Account, ApiToken, name_key
 from iveg.domain.audit import Actor, act_of
 from iveg.domain.errors import HopError, NameTakenError
+from iveg.domain.passkeys import Passkey
 from iveg.domain.records import Json
 
-R = TypeVar("R", Account, ApiToken)
+R = TypeVar("R", Account, ApiToken, Passkey)
 
 
-class NamedRows(Generic[R]):
-    """Reads and adds rows of one table; blocks, so a server calls it in a thread.
+class KeyedRows(Generic[R]):
+    """Reads rows of one table; blocks, so a server calls it in a thread.
 
     Every method raises ``HopError`` when the database does not answer.
 
     Args:
         database_url: Of the history.
-        table: Its columns are the fields of a row, and ``name_key``, which is unique.
+        table: Its columns are the fields of a row, and maybe ``name_key``.
         kind: Of a row.
         key: The field by which they are read.
     """
@@ -51,6 +52,15 @@ class NamedRows(Generic[R]):
         except SQLAlchemyError as error:
             raise HopError("database", reason_of(error)) from error
 
+    def close(self) -> None:
+        """Let go of the connections."""
+        self._store.close()
+        self._reading.dispose()
+
+
+class NamedRows(KeyedRows[R]):
+    """Adds rows, too, of which no two share a ``name_key``."""
+
     def _add(self, row: R, by: Actor, action: str, told: Json) -> None:
         """Keep a new row.
 
@@ -70,11 +80,6 @@ class NamedRows(Generic[R]):
 
         if not self._store.run(work):
             raise NameTakenError(row.name)
-
-    def close(self) -> None:
-        """Let go of the connections."""
-        self._store.close()
-        self._reading.dispose()
 
 
 def note_change(

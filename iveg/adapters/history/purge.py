@@ -56,6 +56,7 @@ _ROW = {
     "audit": (tables.audit.c.at, tables.audit.c.seq),
     "audit_sealed": (tables.audit_sealed.c.at, tables.audit_sealed.c.seq),
     "api_tokens": (tables.api_tokens.c.made_at, tables.api_tokens.c.token_id),
+    "passkeys": (tables.passkeys.c.made_at, tables.passkeys.c.credential_id),
     "accounts": (tables.accounts.c.since, tables.accounts.c.account_id),
     "audit_end": (tables.audit_end.c.at, tables.audit_end.c.one),
 }

@@ -24,7 +24,7 @@ from iveg.adapters import clock
 from iveg.adapters.history.audit import write_audit
 from iveg.adapters.history.engine import writing_engine
 from iveg.adapters.history.migrate import reason_of, upgrade
-from iveg.adapters.history.tables import TABLE_MAPPINGS, TableMapping
+from iveg.adapters.history.table_mappings import TABLE_MAPPINGS, TableMapping
 from iveg.domain.errors import HopError
 from iveg.domain.records import AuditRecord, CommandEventRecord, CommandRecord, Record
 from iveg.pipeline.record import Waiting

@@ -6,7 +6,6 @@ robot do then", which time travel, retention and charts all ask.  ``revision`` l
 newest state of a decision, command or alert win in whatever order states arrive.
 """
 
-from dataclasses import dataclass
 from typing import Any
 
 from sqlalchemy import (
@@ -29,20 +28,6 @@ from sqlalchemy.types import TypeEngine
 
 from iveg.adapters.history.json_column import JsonValue
 from iveg.domain.goals import OPEN_STATES
-from iveg.domain.records import (
-    AlertRecord,
-    AuditRecord,
-    ClimateRecord,
-    CommandEventRecord,
-    CommandRecord,
-    DecisionRecord,
-    DetectionRecord,
-    LatencyRecord,
-    LogRecord,
-    MeasurementRecord,
-    OdometryRecord,
-    ReadingRecord,
-)
 
 metadata = MetaData(
     naming_convention={
@@ -339,6 +324,17 @@ api_tokens = Table(
 )
 
 
+passkeys = Table(
+    "passkeys",
+    metadata,
+    Column("credential_id", Text, primary_key=True),
+    *_texts("account_id", "name", "rp_id", "public_key"),
+    Column("sign_count", BigInteger, nullable=False),
+    _number("made_at", null=False),
+    _number("used_at"),
+)
+
+
 def is_open_command() -> ColumnElement[bool]:
     """Whether the last row of a command says that it still goes on."""
     c = commands.c
@@ -346,37 +342,3 @@ def is_open_command() -> ColumnElement[bool]:
     goals = and_(c.kind == "goal", c.state.in_(OPEN_STATES))
     # A release that was refused or confirmed keeps the state that followed.
     return or_(stops, and_(c.kind != "stop", c.state == "RELEASING"), goals)
-
-
-@dataclass(frozen=True, slots=True)
-class TableMapping:
-    """Table of one kind of record.
-
-    Attributes:
-        identity: Columns that name the thing or fact; empty where every row is new.
-        changes: Whether a later record takes the place of an earlier one.
-        keep_s: How long before the newest a row is kept (s, by ``at``); None: for good.
-    """
-
-    table: Table
-    identity: tuple[str, ...] = ()
-    changes: bool = False
-    keep_s: float | None = None
-
-
-TABLE_MAPPINGS: dict[type, TableMapping] = {
-    CommandRecord: TableMapping(commands, ("command_id",), changes=True),
-    CommandEventRecord: TableMapping(
-        command_events, ("command_id", "at", "state", "why")
-    ),
-    DecisionRecord: TableMapping(decisions, ("decision_id",), changes=True),
-    AlertRecord: TableMapping(alerts, ("alert_id",), changes=True),
-    LogRecord: TableMapping(log, ("id", "at")),
-    DetectionRecord: TableMapping(detections),
-    OdometryRecord: TableMapping(odometry),
-    ClimateRecord: TableMapping(climate),
-    LatencyRecord: TableMapping(latency, keep_s=86400.0),
-    ReadingRecord: TableMapping(readings),
-    MeasurementRecord: TableMapping(measurements),
-    AuditRecord: TableMapping(audit, ("audit_id",)),
-}

@@ -752,13 +752,25 @@ export type OwnAccount = {
   name: string;
   role: string;
   /** How they came in. */
-  method: "link" | "password" | "token";
+  method: "link" | "password" | "passkey" | "sso" | "token";
   /** They have one; else a link or a token. */
   account: boolean;
   /** Null for programs. */
   signed_in_at: string | null;
   /** When it ends by itself; null: never. */
   ends_at: string | null;
+};
+
+/** A passkey of whoever asks. */
+export type PasskeyOfPerson = {
+  passkey_id: string;
+  /** What the person calls it. */
+  name: string;
+  /** The address it works at. */
+  host: string;
+  made_at: string;
+  /** Null: never. */
+  used_at: string | null;
 };
 
 /** The world as it was at a recorded moment; ages are of that moment. */
@@ -857,6 +869,15 @@ export type Profile = {
   width: number;
   max_speed: number;
   turning_radius: number;
+};
+
+/** Whether a release would ask whoever asks to prove anew who they are. */
+export type Proof = {
+  needed: boolean;
+  /** When it would; null: never. */
+  until: string | null;
+  /** `password`, `passkey`: how to prove it. */
+  ways: string[];
 };
 
 /** People near moving robots, all runs together (docs/experiment.md, Protection). */

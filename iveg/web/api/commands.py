@@ -19,6 +19,7 @@ from iveg.web.security.authentication import Principal, require
 
 Pressing = Annotated[Principal, Depends(require("stop"))]
 Releasing = Annotated[Principal, Depends(require("release"))]
+Proven = Annotated[Principal, Depends(require("release", proven=True))]
 HoldId = Annotated[str, Field(min_length=1, max_length=64)]
 
 
@@ -77,7 +78,7 @@ def router(commander: Commander, clock: Clock) -> APIRouter:
         response_model=Pressed,
         responses=refusals(409),
     )
-    async def release(robot_id: str, body: ReleaseRequest, who: Releasing) -> Response:
+    async def release(robot_id: str, body: ReleaseRequest, who: Proven) -> Response:
         """Lift exactly the holds that the person saw; 409 when they have changed."""
         command = await commander.release(robot_id, body.holds, who.name, clock())
         return Json(Pressed.of(command), 202)

@@ -33,6 +33,7 @@ class Site:
         transports: Ids, in the order of their columns.
         link: One link signs people in; else passwords alone do.
         sso: What the button of the identity provider says; None: there is none.
+        passkeys: The library for passkeys is installed.
     """
 
     greenhouse: str
@@ -43,6 +44,7 @@ class Site:
     transports: tuple[str, ...] = tuple(one.id for one in TRANSPORTS)
     link: bool = True
     sso: str | None = None
+    passkeys: bool = False
 
     @property
     def slots(self) -> dict[str, int]:

@@ -46,6 +46,7 @@ from iveg.web.pages.translations import (
     read_translations,
 )
 from iveg.web.problems import Problem
+from iveg.web.security.answer import AnswerOfDevice
 from iveg.web.security.authentication import (
     Action,
     Authenticator,
@@ -96,7 +97,13 @@ class _ByInvitation(_Strict):
     password: str = Field(min_length=LEAST, max_length=MOST)
 
 
-_SignIn = _ByLink | _ByPassword | _ByInvitation
+class _ByPasskey(_Strict):
+    """What a device answered to the challenge of ``GET /signin/passkey``."""
+
+    passkey: AnswerOfDevice
+
+
+_SignIn = _ByLink | _ByPassword | _ByInvitation | _ByPasskey
 """What the sign-in page posts."""
 
 
@@ -228,9 +235,7 @@ def router(
     return routes
 
 
-def _add_signing(
-    routes: APIRouter, pages: Pages, sign_on: SingleSignOn | None
-) -> None:
+def _add_signing(routes: APIRouter, pages: Pages, sign_on: SingleSignOn | None) -> None:
     @routes.get("/signin", response_model=None, dependencies=[Depends(require("open"))])
     async def signin(request: Request) -> Response:
         return pages.sign_in(request)
@@ -276,6 +281,8 @@ async def _enter(request: Request, body: _SignIn) -> Response | Problem:
             return await authenticator.sign_in_by_password(request, name, password)
         case _ByInvitation(invitation=invitation, password=password):
             return await authenticator.accept(request, invitation, password)
+        case _ByPasskey(passkey=answer):
+            return await authenticator.sign_in_by_passkey(request, answer)
 
 
 async def _leave(request: Request, sign_on: SingleSignOn | None) -> Response:

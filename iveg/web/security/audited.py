@@ -129,6 +129,13 @@ AUDITED: Final[Mapping[tuple[str, str], Audited]] = {
     ("POST", f"{_API}/users/{{user_id}}/disable"): Audited(
         "account_disabled", "user_id", by_store=True
     ),
+    ("POST", f"{_API}/account/proof"): Audited("proof"),
+    ("POST", f"{_API}/account/passkeys"): Audited(
+        "passkey_added", asked=("name",), by_store=True
+    ),
+    ("DELETE", f"{_API}/account/passkeys/{{passkey_id}}"): Audited(
+        "passkey_removed", "passkey_id", by_store=True
+    ),
     ("PUT", f"{_API}/account/password"): Audited("password_changed", by_store=True),
     ("PUT", f"{_API}/account/language"): Audited("language", asked=("language",)),
     ("POST", "/signin"): Audited(""),

@@ -12,7 +12,6 @@ STOP outlives the session (SECURITY.md): a person who was signed in once can sti
 """
 
 import logging
-import math
 from collections.abc import Awaitable, Callable, Iterator, Mapping
 from typing import Final
 
@@ -22,20 +21,21 @@ from starlette.requests import HTTPConnection, Request
 from starlette.responses import RedirectResponse, Response
 from starlette.websockets import WebSocket
 
-from iveg.adapters.passwords import BusyError
 from iveg.adapters.sessions import FileSessions
-from iveg.domain.accounts import DEFAULT_NAME, Account
-from iveg.domain.audit import STRANGER, Actor
+from iveg.adapters.webauthn import Credential
+from iveg.domain.accounts import DEFAULT_NAME, Account, SignInMethod
 from iveg.domain.errors import NotAllowedError
 from iveg.pipeline.audit import AuditTrail
 from iveg.pipeline.ports import Clock
 from iveg.web.cookies import keep_language, session_cookie
 from iveg.web.problems import NotSignedInError, Problem
+from iveg.web.security.attempts import Attempts
 from iveg.web.security.audited import READING
 from iveg.web.security.csrf import is_own, refuse_forgery, refuse_other_bodies
+from iveg.web.security.passkeys import SIGN_IN, Passkeys, site_of
 from iveg.web.security.people import People
 from iveg.web.security.programs import Programs
-from iveg.web.security.rate_limits import REFUSED_ROWS, Allowance, FailedAttempts
+from iveg.web.security.proofs import Freshness
 from iveg.web.security.roles import (
     MAY,
     NOBODY,
@@ -78,6 +78,8 @@ class Authenticator:
         trail: Told of sign-ins, and of those that were refused.
         people: Those with accounts; None: there is the link alone.
         programs: Those with tokens of their own; None: there is ``api_token`` alone.
+        passkeys: Those of people; None: there are none.
+        proven_within_s: How old a proof may be that a release rests on (s); 0: any.
     """
 
     def __init__(
@@ -91,21 +93,19 @@ class Authenticator:
         trail: AuditTrail | None = None,
         people: People | None = None,
         programs: Programs | None = None,
+        passkeys: Passkeys | None = None,
+        proven_within_s: float = 0.0,
     ) -> None:
         self._sign_in_token = sign_in_token
         self._api_token = api_token
         self._clock = clock
-        self._trail = trail
-        self._attempts = FailedAttempts()
-        # Strangers' rows are for ever: a flood from many addresses writes few.
-        self._rows = Allowance(REFUSED_ROWS, clock().mono)
+        self.attempts = Attempts(clock, trail)
         self._people = people
         self._programs = programs
+        self._passkeys = passkeys
+        self.freshness = Freshness(proven_within_s, clock)
         role_now = None if people is None else people.role_now
         self.sessions = Sessions(clock, store, link_name=link_name, role_now=role_now)
-        self.refused = 0
-        """Sign-ins with a wrong token, password or invitation."""
-        self._told_at: float | None = None
 
     # --- people sign in ---------------------------------------------------------
 
@@ -132,7 +132,7 @@ class Authenticator:
     ) -> Response | Problem:
         address = "" if request.client is None else request.client.host
         if not same_secret(token, self._sign_in_token):
-            return self._refuse(address, self._clock().mono, "wrong token")
+            return self.attempts.refuse(address, self._clock().mono, "wrong token")
         # Somebody else's wrong links must not shut out whoever has the right one.
         return self.admit(request, self.sessions.open_by_link(), response)
 
@@ -155,6 +155,20 @@ class Authenticator:
             request, lambda one: one.accept(invitation, password), "no such invitation"
         )
 
+    async def sign_in_by_passkey(
+        self, request: Request, credential: Credential
+    ) -> Response | Problem:
+        """Exchange a passkey's answer for a session cookie; raises as ``sign_in``."""
+        site = site_of(request)
+
+        async def proof(people: People) -> Account | None:
+            found = self._passkeys and await self._passkeys.prove(
+                site, credential, SIGN_IN
+            )
+            return people.account(found.account_id) if found else None
+
+        return await self._prove(request, proof, "no such passkey", "passkey")
+
     async def change_password(
         self, request: Request, who: Principal, old: str, new: str
     ) -> Response | Problem:
@@ -174,27 +188,19 @@ class Authenticator:
         request: Request,
         proof: Callable[[People], Awaitable[Account | None]],
         wrong: str,
+        method: SignInMethod = "password",
     ) -> Response | Problem:
-        refuse_forgery(request)
-        refuse_other_bodies(request)
-        address = "" if request.client is None else request.client.host
-        now = self._clock().mono
-        # Before it is looked at: each look takes a while of a processor, and a limit
-        # that the right password passes is none for who guesses.
-        if self._people is None or self._attempts.wait_s(address, now) > 0.0:
-            return self._refuse(address, now, wrong)
-        try:
-            account = await proof(self._people)
-        except BusyError:
-            detail = "Too many people sign in at once; try again."
-            return Problem(429, detail, headers={"Retry-After": "2"})
-        if account is None:
-            return self._refuse(address, now, wrong)
+        people = self._people
+        account = await self.attempts.weigh(
+            request, wrong, lambda: None if people is None else proof(people)
+        )
+        if isinstance(account, Problem):
+            return account
         before = self.identify(request)
         if before is not None:
             self.sessions.revoke(before)
         cookie = self.sessions.open(
-            account.name, account.role, account.account_id, "password"
+            account.name, account.role, account.account_id, method
         )
         response = Response(status_code=204)
         keep_language(response, account.language)
@@ -205,11 +211,11 @@ class Authenticator:
     ) -> Response:
         """Give a browser its session; the rest goes into the audit."""
         address = "" if request.client is None else request.client.host
-        self._attempts.succeeded(address)
+        self.attempts.succeeded(address)
         secure = request.url.scheme == "https"
         who = self.sessions.find(cookie)
         if who is not None:
-            self._note(who, "sign_in", address, **told)
+            self.attempts.note(who, "sign_in", address, **told)
         response.set_cookie(
             session_cookie(secure=secure),
             cookie,
@@ -234,30 +240,6 @@ class Authenticator:
             samesite="strict",
         )
         return response
-
-    def _refuse(self, address: str, now: float, wrong: str) -> Problem:
-        wait_s = self._attempts.wait_s(address, now)
-        if wait_s > 0.0:
-            headers = {"Retry-After": str(math.ceil(wait_s))}
-            detail = "Too many wrong sign-ins came from your address; wait a minute."
-            return Problem(429, detail, headers=headers)
-        self._attempts.failed(address, now)
-        if self._rows.take(now):
-            self._note(STRANGER, "sign_in_refused", address)
-        self._tell_refused(now, wrong)
-        return Problem(401, "This link does not sign in here, or not any more.")
-
-    def _note(self, actor: Actor, action: str, address: str, **told: object) -> None:
-        if self._trail is not None:
-            details = {"address": address, **told}
-            self._trail.note(actor, action, details=details, at=self._clock())
-
-    def _tell_refused(self, now: float, wrong: str) -> None:
-        """Count a refused sign-in; log it once a minute, against floods of the log."""
-        self.refused += 1
-        if self._told_at is None or now - self._told_at >= 60.0:
-            self._told_at = now
-            _log.warning("sign-in refused: %s (%d so far)", wrong, self.refused)
 
     # --- identification ---------------------------------------------------------
 
@@ -339,8 +321,9 @@ class Requirement:
     ``app.state.authenticator``.
     """
 
-    def __init__(self, action: Action) -> None:
+    def __init__(self, action: Action, *, proven: bool = False) -> None:
         self.action = action
+        self._proven = proven
 
     async def __call__(self, connection: HTTPConnection) -> Principal:
         """The authorised principal, or the error that refuses the request."""
@@ -349,7 +332,10 @@ class Requirement:
             return authenticator.identify(connection) or NOBODY
         if isinstance(connection, WebSocket):
             return await authenticator.authorise_websocket(connection)
-        return authenticator.authorise(Request(connection.scope), self.action)
+        who = authenticator.authorise(Request(connection.scope), self.action)
+        if self._proven:
+            authenticator.freshness.refuse_stale(who)
+        return who
 
 
 _REQUIREMENTS: Final[Mapping[Action, Requirement]] = {
@@ -358,9 +344,14 @@ _REQUIREMENTS: Final[Mapping[Action, Requirement]] = {
 }
 
 
-def require(action: Action) -> Requirement:
-    """Requirement of a route: ``Depends(require("stop"))``; ``open`` asks nothing."""
-    return _REQUIREMENTS[action]
+def require(action: Action, *, proven: bool = False) -> Requirement:
+    """Requirement of a route: ``Depends(require("stop"))``; ``open`` asks nothing.
+
+    Args:
+        action: What the role has to allow.
+        proven: Whether the proof of who it is must be fresh, too (``Freshness``).
+    """
+    return Requirement(action, proven=True) if proven else _REQUIREMENTS[action]
 
 
 def declared_action(route: object) -> Action | None:

@@ -98,6 +98,12 @@ class People(Rereading):
             return None
         return left if session.began >= account.since else None
 
+    def account(self, account_id: str) -> Account | None:
+        """Somebody's account; None where they may not be here, or have not begun."""
+        account = self.find(account_id)
+        begun = account is not None and account.state(self._clock().wall) == "active"
+        return account if begun else None
+
     def find(self, person: str) -> Account | None:
         """The account of this id, as it was read last."""
         return (self._known or {}).get(person)
@@ -123,6 +129,11 @@ class People(Rereading):
         """
         by = NamedActor(told.account_id, told.name, told.role, "sso")
         return await self.change(by, lambda one, known: one.vouched(known, told))
+
+    async def proven(self, account: Account, password: str) -> Account | None:
+        """The same account where the password is its own. Raises BusyError."""
+        fits = await self._passwords.fits(password, account.password)
+        return account if fits else None
 
     async def accept(self, invitation: str, password: str) -> Account | None:
         """Begin an account by its invitation; None where that is none any more.

@@ -11,10 +11,15 @@ import hashlib
 import secrets
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from typing import cast
+from typing import Any, cast
 
 from iveg.adapters.sessions import FileSessions, Session
-from iveg.domain.accounts import DEFAULT_NAME, LINK_PERSON, SignInMethod
+from iveg.domain.accounts import (
+    DEFAULT_NAME,
+    LINK_PERSON,
+    OF_ACCOUNTS,
+    SignInMethod,
+)
 from iveg.pipeline.ports import Clock
 from iveg.web.security.roles import Principal, Role
 
@@ -113,13 +118,19 @@ class Sessions:
             self._sessions.pop(principal.session, None)
             self._keep()
 
+    def proven(self, principal: Principal) -> None:
+        """Note that the person has proven anew who they are."""
+        self._change(principal, proven=self._clock().wall)
+
     def lower(self, principal: Principal) -> None:
         """Leave a session what a viewer may do, until somebody signs in anew."""
+        self._change(principal, role="viewer")
+
+    def _change(self, principal: Principal, **changes: Any) -> None:
         session = self._sessions.get(principal.session or b"")
         if session is not None:
-            self._sessions[bytes.fromhex(session.digest)] = replace(
-                session, role="viewer"
-            )
+            changed = replace(session, **changes)
+            self._sessions[bytes.fromhex(session.digest)] = changed
             self._keep()
 
     def _principal(self, digest: bytes, *, touch: bool) -> Principal | None:
@@ -128,7 +139,7 @@ class Sessions:
             return None
         now = self._clock().wall
         role = _role_at(session, now)
-        if role is not None and session.method in ("password", "sso"):
+        if role is not None and session.method in OF_ACCOUNTS:
             # Without accounts nobody can say whether the person still has one.
             role = self._role_now(session, role) if self._role_now else None
         if role is None:

@@ -26,7 +26,7 @@ from iveg.adapters.history.purge import (
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.recorder import Recorder
 from iveg.adapters.history.store import Store
-from iveg.adapters.history.tables import TABLE_MAPPINGS
+from iveg.adapters.history.table_mappings import TABLE_MAPPINGS
 from iveg.adapters.history.upkeep import RecordedHistory
 from iveg.domain.errors import HopError
 from iveg.domain.records import LatencyRecord, ReadingRecord, Record

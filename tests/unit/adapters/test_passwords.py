@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from iveg.adapters.passwords import BusyError, Passwords
+from iveg.adapters.passwords import Passwords
+from iveg.domain.errors import BusyError
 
 
 @pytest.fixture

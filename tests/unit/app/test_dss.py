@@ -20,6 +20,7 @@ async def test_mqtt_and_the_rule_loop_alone_share_the_fate_of_the_process(
     assert set(dss.comfort()) == {
         "accounts",
         "api-tokens",
+        "passkeys",
         "costmap",
         "coverage",
         "provisioner",

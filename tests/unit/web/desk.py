@@ -92,7 +92,7 @@ class WebDesk(Desk):
             views=self.views,
             authenticator=self.authenticator,
             orion=self.notifications,
-            site=Site("field", robots, "1", demo=True, laboratory=True),
+            site=Site("field", robots, "1", demo=True, laboratory=True, passkeys=True),
             boot="iveg-boot",
             queues=lambda: self.queues,
             clock=self.clock,

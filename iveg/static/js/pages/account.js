@@ -5,6 +5,7 @@
 import { readApi } from "../core/api.js";
 import { guarded } from "../core/hub.js";
 import { startFacts } from "./account_facts.js";
+import { startPasskeys } from "./account_passkeys.js";
 import { startPassword } from "./account_password.js";
 
 /** @typedef {import("../core/page.js").Page} Page */
@@ -14,6 +15,7 @@ import { startPassword } from "./account_password.js";
 const SECTIONS = [
   ["#account-facts", startFacts],
   ["#password-form", startPassword],
+  ["#account-passkeys", startPasskeys],
 ];
 
 /** @param {Page} page */

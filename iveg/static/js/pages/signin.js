@@ -4,15 +4,17 @@
  */
 
 import { sendApi } from "../core/api.js";
+import { askPasskey, hasPasskeys } from "../core/passkeys.js";
 import { need, setHidden } from "../panels/dom.js";
 
-/** @typedef {"link" | "password" | "invitation"} Way */
+/** @typedef {"link" | "password" | "invitation" | "passkey"} Way */
 
 /** @type {Record<Way, string>} what a refusal means */
 const WRONG = {
   link: "#signin-wrong",
   password: "#signin-refused",
   invitation: "#signin-uninvited",
+  passkey: "#signin-keyless",
 };
 const WAIT = "#signin-wait";
 const FAILED = "#signin-failed";
@@ -38,14 +40,16 @@ export function noticeFor(status, way = "link") {
   return status === 429 ? WAIT : FAILED;
 }
 
-/** @param {Record<string, string>} proof @param {Way} way */
+/** @param {Record<string, unknown>} proof @param {Way} way */
 async function post(proof, way) {
   const { status } = await sendApi("POST", "/signin", proof);
   const notice = noticeFor(status, way);
-  if (notice === null) {
-    location.replace("/");
-    return;
-  }
+  if (notice === null) location.replace("/");
+  else show(notice);
+}
+
+/** @param {string} notice */
+function show(notice) {
   for (const one of [...Object.values(WRONG), WAIT, FAILED]) {
     setHidden(need(one), one !== notice);
   }
@@ -58,6 +62,20 @@ function followLink() {
   history.replaceState(null, "", location.pathname);
   if (token !== null) post({ token }, "link");
   else invite(String(invitation));
+}
+
+async function enterByPasskey() {
+  const { status, body } = await askPasskey("/signin/passkey");
+  if (status === 200) post({ passkey: body }, "passkey");
+  // No answer of the device, or an address in numbers: there is no passkey here.
+  else show(status === 429 ? WAIT : WRONG.passkey);
+}
+
+function offerPasskey() {
+  const button = document.querySelector("#signin-passkey");
+  if (!button) return;
+  setHidden(need("#signin-by-passkey"), !hasPasskeys());
+  button.addEventListener("click", enterByPasskey);
 }
 
 /** @param {string} invitation */
@@ -83,5 +101,6 @@ if (document.body.dataset.route === "signin") {
     const name = fieldOf("#signin-name").value;
     post({ name, password: fieldOf("#signin-password").value }, "password");
   });
+  offerPasskey();
   followLink();
 }

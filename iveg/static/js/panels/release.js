@@ -11,6 +11,7 @@ import { sendApi } from "../core/api.js";
 import { ageOf } from "../core/clock.js";
 import { LIMITS } from "../core/limits.js";
 import { fill, make, need, needPart, setAttribute, setText } from "./dom.js";
+import { askProof, asksForProof } from "./proof.js";
 
 /** @typedef {import("../main.js").App} App */
 /** @typedef {import("../core/protocol.js").Robot} Robot */
@@ -20,6 +21,7 @@ import { fill, make, need, needPart, setAttribute, setText } from "./dom.js";
 const HOLD_MS = 2000;
 /** How far a finger that rests may roll: a fingertip is about this wide. */
 const SLIP_PX = 40;
+const OTHER = "release.failed.other";
 const RELEASERS = new Set(["operator", "admin"]);
 
 /**
@@ -145,12 +147,21 @@ export function createRelease(app, card, robotId) {
     order = undefined;
     draw(shown);
     const path = `robots/${encodeURIComponent(robotId)}/${verb}`;
-    ({ status } = await sendApi("POST", path, body));
+    const answer = await sendApi("POST", path, body);
+    ({ status } = answer);
     isBusy = false;
+    if (asksForProof(answer)) {
+      askProof(app, releaseButton, () => say("proof.given"));
+      return say("proof.needed");
+    }
     const isTaken = status === 202 || status === 200;
     const known = `release.failed.${status}`;
-    const failed = i18n.has(known) ? known : "release.failed.other";
-    outcome = isTaken ? "release.sent" : failed;
+    return say(isTaken ? "release.sent" : i18n.has(known) ? known : OTHER);
+  }
+
+  /** @param {string} key */
+  function say(key) {
+    outcome = key;
     draw(shown);
   }
 
@@ -160,8 +171,8 @@ export function createRelease(app, card, robotId) {
     begin: () => (shown?.holds ?? []).map(({ id }) => id),
     done: (holds) => send("release", { holds }),
     refused: () => {
-      [order, outcome] = [undefined, "release.failed.409"];
-      draw(shown);
+      order = undefined;
+      say("release.failed.409");
     },
   });
   resumeButton.addEventListener("click", () => send("resume", {}));

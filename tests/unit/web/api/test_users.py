@@ -21,8 +21,6 @@ class AdminsDesk(PeoplesDesk):
         super().__init__()
         self.accounts.known["P9"] = CHIEF
         self.app.include_router(users.router(self.people, self.clock))
-        # The audit asks the authenticator of the face.
-        self.face.authenticator.sessions = self.authenticator.sessions
 
     def admin(self) -> httpx.AsyncClient:
         token = self.authenticator.sessions.open("Chief", "admin", "P9", "password")
@@ -34,7 +32,7 @@ async def desk() -> AsyncIterator[AdminsDesk]:
     desk = AdminsDesk()
     await desk.people.refresh()
     yield desk
-    desk.people.close()
+    desk.close()
 
 
 async def test_an_invitation_is_shown_once_and_begins_the_account(

@@ -167,7 +167,7 @@ def test_a_flood_of_wrong_sign_ins_from_everywhere_writes_few_rows(
             )
 
     assert len(audited(desk)) == 5
-    assert desk.authenticator.refused == 500
+    assert desk.authenticator.attempts.refused == 500
 
 
 def _request(address: str = "10.0.0.7") -> Request:

@@ -157,7 +157,7 @@ async def test_a_wrong_token_is_told_once_a_minute_and_never_quoted(
     await client.get("/", params={"token": "guess-after-guess"})
 
     records = [r for r in caplog.records if r.levelno == logging.WARNING]
-    assert authenticator.refused == 6
+    assert authenticator.attempts.refused == 6
     assert len(records) == 2
     assert "guess" not in caplog.text
 

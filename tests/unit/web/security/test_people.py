@@ -5,21 +5,24 @@ import threading
 from collections.abc import AsyncIterator, Callable
 from dataclasses import replace
 from functools import partial
-from typing import TypeVar
+from typing import ParamSpec, TypeVar
 
 import httpx
 import pytest
 
+from iveg.adapters.bounded_thread import BoundedThread
 from iveg.adapters.passwords import Passwords
 from iveg.domain.accounts import Account, digest_of
 from iveg.domain.records import AuditRecord
 from iveg.web.pages.openapi import ApiDoc
 from iveg.web.pages.routes import router
 from iveg.web.security.authentication import Authenticator
+from iveg.web.security.passkeys import Passkeys
 from iveg.web.security.people import People
-from tests.fakes.accounts import FakeAccounts, FakePasswords
+from tests.fakes.accounts import FakeAccounts, FakePasskeys, FakePasswords
 from tests.unit.web.desk import HOST, WebDesk
 
+P = ParamSpec("P")
 T = TypeVar("T")
 OWN = {"X-IVEG": "1", "Sec-Fetch-Site": "same-origin"}
 ANA = Account("P1", "Ana Núñez", "operator", password="#acelga-1234")
@@ -35,13 +38,18 @@ class PeoplesDesk(WebDesk):
         self.accounts = FakeAccounts(ANA, replace(EVA, invited_until=now + 60.0))
         self.passwords = FakePasswords()
         self.people = People(self.accounts, real or self.passwords, self.clock)
+        self.stored_passkeys = FakePasskeys()
+        self.passkeys = Passkeys(self.stored_passkeys, self.clock)
         self.authenticator = Authenticator(
             sign_in_token="cd" * 32,
             api_token="",
             clock=self.clock,
             trail=self.trail,
             people=self.people,
+            passkeys=self.passkeys,
         )
+        # What stands before the routes asks the authenticator of the face.
+        self.face.authenticator.sessions = self.authenticator.sessions
         self.app.state.authenticator = self.authenticator
         self.app.include_router(
             router(
@@ -50,6 +58,10 @@ class PeoplesDesk(WebDesk):
                 rule=lambda: self.rules.current,
             )
         )
+
+    def close(self) -> None:
+        self.people.close()
+        self.passkeys.close()
 
     def page(self) -> httpx.AsyncClient:
         return self._client(OWN)
@@ -60,7 +72,7 @@ async def desk() -> AsyncIterator[PeoplesDesk]:
     desk = PeoplesDesk()
     await desk.people.refresh()
     yield desk
-    desk.people.close()
+    desk.close()
 
 
 async def enter(page: httpx.AsyncClient, **proof: str) -> int:
@@ -98,58 +110,59 @@ async def test_a_wrong_name_and_a_wrong_password_are_told_alike(
     assert len(desk.passwords.asked) == 2
 
 
-class HeldPasswords(Passwords):
-    """Real ones; ``computed`` says what, on which thread.  ``gate`` holds them up."""
+class HeldThread(BoundedThread):
+    """A real one; ``computed`` says what, on which thread.  ``gate`` holds it up."""
 
     def __init__(self) -> None:
-        super().__init__()
+        super().__init__("passwords")
         self.computed: list[tuple[str, str]] = []
         self.gate = threading.Event()
         self.gate.set()
 
-    async def _run(self, work: Callable[..., T], *words: str) -> T:
-        return await super()._run(partial(self._held, work), *words)
+    async def run(self, work: Callable[P, T], *args: P.args, **named: P.kwargs) -> T:
+        return await super().run(partial(self._held, work), *args, **named)
 
-    def _held(self, work: Callable[..., T], *words: str) -> T:
+    def _held(self, work: Callable[P, T], *args: P.args, **named: P.kwargs) -> T:
         self.computed.append((work.__name__, threading.current_thread().name))
         assert self.gate.wait(30)
-        return work(*words)
+        return work(*args, **named)
 
 
 @pytest.fixture
-async def held() -> AsyncIterator[tuple[PeoplesDesk, HeldPasswords]]:
-    passwords = HeldPasswords()
+async def held() -> AsyncIterator[tuple[PeoplesDesk, Passwords, HeldThread]]:
+    thread = HeldThread()
+    passwords = Passwords(thread)
     desk = PeoplesDesk(passwords)
     await desk.people.refresh()
-    yield desk, passwords
+    yield desk, passwords, thread
     desk.people.close()
 
 
 @pytest.mark.parametrize("name", ["Ana Núñez", "Eva", "Out", "nobody", "", "x" * 64])
 async def test_whoever_is_not_let_in_is_computed_as_often_and_by_the_same_path(
-    held: tuple[PeoplesDesk, HeldPasswords], name: str
+    held: tuple[PeoplesDesk, Passwords, HeldThread], name: str
 ) -> None:
-    desk, passwords = held
+    desk, passwords, thread = held
     desk.accounts.known["P1"] = replace(ANA, password=await passwords.hashed("right-1"))
     desk.accounts.known["P3"] = Account("P3", "Out", "viewer", disabled=True)
     await desk.people.refresh()
-    passwords.computed.clear()
+    thread.computed.clear()
 
     async with desk.page() as page:
         statuses = [await enter(page, name=name, password="wrong-1") for _ in range(2)]
 
     assert statuses == [401, 401]
     # The hash that stands for nobody's is made once, whoever comes first.
-    assert [work for work, _ in passwords.computed] == ["_hash", "_fits", "_fits"]
+    assert [work for work, _ in thread.computed] == ["_hash", "_fits", "_fits"]
 
 
 async def test_a_flood_of_sign_ins_waits_in_a_short_line_beside_the_loop(
-    held: tuple[PeoplesDesk, HeldPasswords],
+    held: tuple[PeoplesDesk, Passwords, HeldThread],
 ) -> None:
-    desk, passwords = held
+    desk, passwords, thread = held
     await passwords.fits("", "")
-    passwords.computed.clear()
-    passwords.gate.clear()
+    thread.computed.clear()
+    thread.gate.clear()
 
     async def flood(number: int) -> int:
         address = f"10.0.{number // 250}.{number % 250}"
@@ -164,15 +177,15 @@ async def test_a_flood_of_sign_ins_waits_in_a_short_line_beside_the_loop(
         await asyncio.wait(guesses[16:])
     async with desk.browser("viewer") as page:
         stop = await page.post("/api/v1/robots/AGI/stop")
-    computed_until_then = len(passwords.computed)
-    passwords.gate.set()
+    computed_until_then = len(thread.computed)
+    thread.gate.set()
 
     assert stop.status_code == 202
     assert [robot for robot, _ in desk.fleet.stops] == ["AGI"]
     # One is at work, fifteen wait; the others were refused before any computing.
     assert computed_until_then == 1
     assert sorted(await asyncio.gather(*guesses)) == [401] * 16 + [429] * 284
-    assert {thread for _, thread in passwords.computed} == {"passwords_0"}
+    assert {thread for _, thread in thread.computed} == {"passwords_0"}
 
 
 async def test_five_wrong_passwords_are_enough_for_a_minute_and_cost_no_more(

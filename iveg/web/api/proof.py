@@ -1,0 +1,102 @@
+"""Proving anew who one is, while signed in: what a release may ask for."""
+
+from collections.abc import Awaitable, Callable
+from typing import Annotated, Any, Final
+
+from fastapi import APIRouter, Depends, Request, Response
+from pydantic import BaseModel, ConfigDict, Field
+
+from iveg.adapters.passwords import MOST
+from iveg.domain.accounts import Account
+from iveg.models.signing_in import Proof
+from iveg.web.api.answers import Json
+from iveg.web.api.passkeys import account_of, authenticator_of
+from iveg.web.problems import Problem
+from iveg.web.security.answer import AnswerOfDevice
+from iveg.web.security.authentication import Principal, require
+from iveg.web.security.passkeys import Passkeys, site_of
+from iveg.web.security.people import People
+
+_WRONG: Final = Problem(403, "This does not prove who you are.", "proof-wrong")
+_PURPOSE: Final = "prove "
+_Reader = Annotated[Principal, Depends(require("read"))]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(strict=True, extra="forbid")
+
+
+class ByPassword(_Strict):
+    """The password of the account."""
+
+    password: Annotated[str, Field(max_length=MOST)]
+
+
+class ByPasskey(_Strict):
+    """What a device answered to the challenge of `GET /account/proof/options`."""
+
+    passkey: AnswerOfDevice
+
+
+ProofBody = ByPassword | ByPasskey
+
+
+def router(people: People, passkeys: Passkeys) -> APIRouter:
+    """The routes of a proof; `people` says whose account somebody's is."""
+    routes = APIRouter(prefix="/api/v1/account/proof", tags=["account"])
+
+    @routes.get("", response_model=Proof)
+    async def state(request: Request, who: _Reader) -> Response:
+        """Whether a release would ask for one, and by what it may be given."""
+        account = people.account(who.person)
+        ways = [] if account is None else _ways(account, passkeys)
+        freshness = authenticator_of(request).freshness
+        until, needed = freshness.until(who), freshness.is_stale(who)
+        return Json(Proof.of(until, ways, needed=needed))
+
+    @routes.get("/options", response_model=dict[str, Any])
+    async def begin(request: Request, who: _Reader) -> Response:
+        """Options of a proof by one of one's own passkeys."""
+        own = account_of(people, who).account_id
+        known = passkeys.of(own)
+        asked = await passkeys.ask_to_prove(
+            site_of(request), own, _PURPOSE + own, known
+        )
+        return Json(asked)
+
+    @routes.post("", status_code=204)
+    async def give(request: Request, body: ProofBody, who: _Reader) -> Response:
+        """Prove who is there; counts as a sign-in does."""
+        account = account_of(people, who)
+        authenticator = authenticator_of(request)
+        proof = _looking(request, body, account, people, passkeys)
+        found = await authenticator.attempts.weigh(request, "wrong proof", proof)
+        if isinstance(found, Problem):
+            return (_WRONG if found.status == 401 else found).response()
+        authenticator.sessions.proven(who)
+        return Response(status_code=204)
+
+    return routes
+
+
+def _ways(account: Account, passkeys: Passkeys) -> list[str]:
+    ways = {
+        "password": bool(account.password),
+        "passkey": bool(passkeys.of(account.account_id)),
+    }
+    return [way for way, there in ways.items() if there]
+
+
+def _looking(
+    request: Request,
+    body: ProofBody,
+    account: Account,
+    people: People,
+    passkeys: Passkeys,
+) -> Callable[[], Awaitable[object]]:
+    match body:
+        case ByPassword(password=password):
+            return lambda: people.proven(account, password)
+        case ByPasskey(passkey=answer):
+            site, purpose = site_of(request), _PURPOSE + account.account_id
+            return lambda: passkeys.prove(site, answer, purpose)
