@@ -210,9 +210,7 @@ def build(
         scans.newest,
         obstacles := Obstacles(world, people, Plan.of(greenhouse)),
     )
-    commander = _commander(
-        fleet.ids, ports, choices, event_log, health_monitor, supervision
-    )
+    commander = _commander(fleet.ids, ports, choices, event_log, health_monitor, guard)
     goals = _goals(world, greenhouse, commander, ports, event_log)
     totals = _totals(world, evaluator.people, event_log)
     loop = RuleLoop(
@@ -311,7 +309,7 @@ def _commander(
     choices: Choices,
     event_log: EventLog,
     health_monitor: HealthMonitor,
-    supervision: Supervision,
+    guard: Guard,
 ) -> Commander:
     return Commander(
         robots,
@@ -324,7 +322,7 @@ def _commander(
         drills=choices.drills,
         agent_lag_s=health_monitor.probe.lag,
         is_cut=lambda way, at: way == FIWARE.id and health_monitor.is_cut(at),
-        sent=supervision.guard("recordings", ports.trace.sent),
+        sent=guard("recordings", ports.trace.sent),
     )
 
 
