@@ -23,6 +23,7 @@ from iveg.web.api import (
     proof,
     sign_in_code,
     stop_records,
+    tokens,
     users,
 )
 from iveg.web.api.answers import Json
@@ -102,6 +103,7 @@ def _past_routers(dss: Dss, pages: routes.Pages) -> Iterator[APIRouter]:
         yield sign_in_code.router(dss.sign_in_token)
     yield account.router(dss.door.people)
     yield users.router(dss.door.people, clock)
+    yield tokens.router(dss.door.programs, clock)
     yield passkeys.router(dss.door.people, dss.door.passkeys)
     yield proof.router(dss.door.people, dss.door.passkeys)
     if dss.sign_on is not None:

@@ -118,8 +118,9 @@ def add_user(user: argparse.ArgumentParser) -> None:
         if action == "token":
             scopes = ("read", "stop", "operate")
             one.add_argument("--scope", choices=scopes, required=True)
-        if action == "add":
-            one.add_argument("--days", type=int, metavar="N", help="the account ends")
+        if action in ("add", "token"):
+            ends = "how long it is good for"
+            one.add_argument("--days", type=int, metavar="N", help=ends)
 
 
 def add_audit(audit: argparse.ArgumentParser) -> None:

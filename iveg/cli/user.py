@@ -1,28 +1,23 @@
 """``iveg user``: who may sign in, from the machine itself."""
 
 import argparse
-import secrets
 from collections.abc import Iterable
 from pathlib import Path
 
 from iveg.adapters import clock
-from iveg.adapters.admission import Admission, has_admin
+from iveg.adapters.admission import Admission, admit_program, has_admin
 from iveg.adapters.doctor import check_database
 from iveg.adapters.history.accounts import AccountStore
 from iveg.adapters.history.api_tokens import ApiTokenStore
 from iveg.adapters.history.engine import history_url
-from iveg.adapters.ids import new_id
 from iveg.cli.running import page_address
 from iveg.domain.accounts import (
     Account,
     ApiToken,
-    TokenScope,
-    digest_of,
-    is_name,
     name_key,
 )
 from iveg.domain.audit import CONSOLE
-from iveg.domain.errors import NotANameError, UnknownNameError
+from iveg.domain.errors import UnknownNameError
 from iveg.domain.retention import DAY_S
 from iveg.domain.stamps import format_stamp
 from iveg.settings import Settings
@@ -43,7 +38,9 @@ def run_user(options: argparse.Namespace, settings: Settings, data: Path) -> int
     store, tokens = AccountStore(url), ApiTokenStore(url)
     try:
         if options.action == "token":
-            print(add_token(tokens, options.name, options.scope))
+            now = clock.wall()
+            made = (options.name, options.scope, _end(options, now))
+            print(admit_program(tokens, *made, by=CONSOLE, now=now)[0])
         elif options.action == "revoke":
             tokens.revoke(options.name, CONSOLE)
             print(f"{options.name} is out within a second.")
@@ -63,8 +60,8 @@ def _act(options: argparse.Namespace, settings: Settings, store: AccountStore) -
     if options.action == "list":
         print(*_told(store.read().values()), sep="\n")
     elif options.action == "add":
-        ends_at = now + options.days * DAY_S if options.days else None
-        invitation, _ = admission.add(options.name, options.role, ends_at)
+        made = (options.name, options.role, _end(options, now))
+        invitation, _ = admission.add(*made)
         _print_invitation(settings, invitation)
     elif options.action == "reset":
         invitation, _ = admission.reset(_find(store, options.name))
@@ -77,19 +74,9 @@ def _act(options: argparse.Namespace, settings: Settings, store: AccountStore) -
         print(f"{off.name} is out within a second.")
 
 
-def add_token(store: ApiTokenStore, name: str, scope: TokenScope) -> str:
-    """Add a program; returns its token, which is stored nowhere.
-
-    Raises:
-        NotANameError: no program may be called so.
-        NameTakenError: one is called so already.
-    """
-    if not is_name(name):
-        raise NotANameError(name)
-    token = secrets.token_urlsafe(32)
-    made = ApiToken(new_id(), name, scope, digest_of(token), clock.wall())
-    store.add(made, CONSOLE)
-    return token
+def _end(options: argparse.Namespace, now: float) -> float | None:
+    """When what is made ends by itself (Unix s); None: never."""
+    return now + options.days * DAY_S if options.days else None
 
 
 def set_up(store: AccountStore, now: float) -> str | None:
@@ -134,7 +121,8 @@ def _told(accounts: Iterable[Account]) -> Iterable[str]:
 def _programs(tokens: Iterable[ApiToken]) -> Iterable[str]:
     for one in sorted(tokens, key=lambda token: name_key(token.name)):
         used = "never used" if one.used_at is None else format_stamp(one.used_at)
-        yield f"{one.name}  program  {one.scope}  {used}\n"
+        ends = "" if one.ends_at is None else f", ends {format_stamp(one.ends_at)}"
+        yield f"{one.name}  program  {one.scope}  {used}{ends}\n"
 
 
 def _state(account: Account, now: float) -> str:

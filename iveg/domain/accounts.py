@@ -97,6 +97,7 @@ class ApiToken:
     Attributes:
         digest: SHA-256 of the token (hex).
         made_at: When (Unix s); ``used_at`` when it was used last, to a minute.
+        ends_at: When it ends by itself (Unix s); None: never.
     """
 
     token_id: str
@@ -105,3 +106,8 @@ class ApiToken:
     digest: str
     made_at: float
     used_at: float | None = None
+    ends_at: float | None = None
+
+    def is_open(self, now: float) -> bool:
+        """Whether it lets the program in at this moment (Unix s)."""
+        return self.ends_at is None or now < self.ends_at

@@ -29,6 +29,7 @@ from iveg.models.reading import Reading
 from iveg.models.rule import Trial
 from iveg.models.signing_in import (
     Invitation,
+    NewToken,
     OwnAccount,
     PasskeyOfPerson,
     Proof,
@@ -59,6 +60,7 @@ TOLD: tuple[type[Model], ...] = (
     Invitation,
     PasskeyOfPerson,
     Proof,
+    NewToken,
     OwnAccount,
     Thing,
     Trial,

@@ -61,7 +61,7 @@ from iveg.pipeline.supervision import Supervision
 from iveg.pipeline.things import ThingMarks
 from iveg.pipeline.trace import Trace
 
-Guard = Callable[[str, Callable[[Instant], None]], Callable[[Instant], None]]
+Guard = Callable[[str, Callable[..., None]], Callable[..., None]]
 
 
 @dataclass(frozen=True, slots=True)

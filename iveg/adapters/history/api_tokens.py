@@ -23,7 +23,8 @@ class ApiTokenStore(NamedRows[ApiToken]):
         Raises:
             NameTakenError: a program is called so already.
         """
-        self._add(token, by, "token_added", {"scope": token.scope})
+        told = {"scope": token.scope, "ends_at": token.ends_at}
+        self._add(token, by, "token_added", told)
 
     def revoke(self, name: str, by: Actor) -> None:
         """Delete a token.

@@ -320,6 +320,7 @@ api_tokens = Table(
     *_texts("name", "name_key", "scope", "digest"),
     _number("made_at", null=False),
     _number("used_at"),
+    _number("ends_at"),
     UniqueConstraint("name_key"),
 )
 

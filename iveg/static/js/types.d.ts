@@ -717,6 +717,12 @@ export type NegativeMargin = {
   age_s: number | null;
 };
 
+/** A program with its token, which is shown this once. */
+export type NewToken = {
+  program: ProgramToken;
+  token: string;
+};
+
 /** Alerts that a robot did not answer in time, of those that it should have. */
 export type NotAcknowledged = {
   count: number;

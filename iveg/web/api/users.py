@@ -22,8 +22,6 @@ from iveg.web.refusals import refusals
 from iveg.web.security.authentication import Principal, require
 from iveg.web.security.people import People
 
-_MOST_DAYS = 3650
-
 _Admin = Annotated[Principal, Depends(require("admin"))]
 _Known = Mapping[str, Account]
 
@@ -35,6 +33,12 @@ def named(text: str) -> str:
     return text
 
 
+def end_of(days: int | None, now: float) -> float | None:
+    """When something ends by itself (Unix s), after so many days; None: never."""
+    return None if days is None else now + days * DAY_S
+
+
+Days = Annotated[int, Field(ge=1, le=3650)]
 Name = Annotated[str, Field(max_length=MOST_NAME), AfterValidator(named)]
 
 
@@ -47,7 +51,7 @@ class UserBody(_Body):
 
     name: Name
     role: PersonRole
-    days: Annotated[int, Field(ge=1, le=_MOST_DAYS)] | None = None
+    days: Days | None = None
 
 
 class RoleBody(_Body):
@@ -80,7 +84,7 @@ def router(people: People, clock: Clock) -> APIRouter:
     async def invite(request: Request, body: UserBody, who: _Admin) -> Response:
         """Add an account, and show its invitation this once."""
         now = clock().wall
-        ends_at = None if body.days is None else now + body.days * DAY_S
+        ends_at = end_of(body.days, now)
 
         def work(admission: Admission, known: _Known) -> tuple[str, Account]:
             if len(known) >= MOST_ACCOUNTS:

@@ -197,7 +197,8 @@ def router(
     for route, path in _SCRIPTED.items():
         add_scripted(routes, pages, route, path)
     add_scripted(routes, pages, "audit", "/audit", "release")
-    add_scripted(routes, pages, "users", "/users", "admin")
+    for route in ("users", "tokens"):
+        add_scripted(routes, pages, route, f"/{route}", "admin")
 
     @routes.get("/account", response_model=None)
     async def account(request: Request, visitor: _Reader) -> Response:

@@ -138,6 +138,12 @@ AUDITED: Final[Mapping[tuple[str, str], Audited]] = {
     ),
     ("PUT", f"{_API}/account/password"): Audited("password_changed", by_store=True),
     ("PUT", f"{_API}/account/language"): Audited("language", asked=("language",)),
+    ("POST", f"{_API}/tokens"): Audited(
+        "token_added", asked=("name", "scope", "days"), by_store=True
+    ),
+    ("DELETE", f"{_API}/tokens/{{token_id}}"): Audited(
+        "token_revoked", "token_id", by_store=True
+    ),
     ("POST", "/signin"): Audited(""),
     ("POST", "/signout"): Audited("sign_out"),
     ("POST", "/wall"): Audited("wall"),

@@ -18,6 +18,7 @@ from iveg.cli.user import run_user, set_up
 from iveg.domain.accounts import digest_of
 from iveg.domain.audit import CONSOLE
 from iveg.domain.errors import NameTakenError, NotANameError, UnknownNameError
+from iveg.domain.stamps import format_stamp
 from iveg.settings import Settings
 
 
@@ -166,7 +167,7 @@ def test_the_first_link_is_over_after_half_an_hour(console: Console) -> None:
 def test_a_programs_token_is_printed_once_listed_and_revoked(
     console: Console, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    console.call("token", "MES", scope="stop")
+    console.call("token", "MES", scope="stop", days=2)
     token = capsys.readouterr().out.strip()
     tokens = ApiTokenStore(console.settings.database_url)
     kept = tokens.read()[digest_of(token)]
@@ -176,7 +177,10 @@ def test_a_programs_token_is_printed_once_listed_and_revoked(
     console.call("revoke", "mes")
 
     assert (kept.name, kept.scope) == ("MES", "stop")
-    assert listed.splitlines()[-1] == "MES  program  stop  2023-11-14T22:13:20.000Z"
+    used, ends = listed.splitlines()[-1].split(", ends ")
+    assert used == "MES  program  stop  2023-11-14T22:13:20.000Z"
+    assert kept.ends_at == kept.made_at + 2 * 86_400.0
+    assert ends == format_stamp(kept.ends_at)
     assert token not in listed
     assert tokens.read() == {}
     with pytest.raises(UnknownNameError):

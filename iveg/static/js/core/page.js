@@ -45,6 +45,7 @@ const ROUTES = {
   day: () => import("../pages/day.js"),
   about: () => import("../pages/about.js"),
   audit: () => import("../pages/audit.js"),
+  tokens: () => import("../pages/tokens.js"),
   users: () => import("../pages/users.js"),
 };
 

@@ -6,7 +6,9 @@ from dataclasses import replace
 import httpx
 import pytest
 
-from iveg.domain.accounts import ApiToken, TokenScope, digest_of
+from iveg.domain.accounts import ApiToken, TokenScope, digest_of, name_key
+from iveg.domain.audit import Actor
+from iveg.domain.errors import HopError, NameTakenError
 from iveg.domain.records import AuditRecord
 from iveg.web.security.authentication import Authenticator
 from iveg.web.security.programs import Programs
@@ -26,8 +28,24 @@ class FakeTokens:
             for scope in SCOPES
         }
 
+        self.changes: list[tuple[str, str, str]] = []
+        self.is_away = False
+
     def read(self) -> Mapping[str, ApiToken]:
+        if self.is_away:
+            raise HopError("database", "away")
         return dict(self.known)
+
+    def add(self, token: ApiToken, by: Actor) -> None:
+        if name_key(token.name) in {name_key(one.name) for one in self.known.values()}:
+            raise NameTakenError(token.name)
+        self.known[token.digest] = token
+        self.changes.append(("token_added", token.name, by.name))
+
+    def revoke(self, name: str, by: Actor) -> None:
+        gone = next(one for one in self.known.values() if one.name == name)
+        del self.known[gone.digest]
+        self.changes.append(("token_revoked", name, by.name))
 
     def used(self, digests: Mapping[str, float]) -> None:
         for digest, at in digests.items():
@@ -116,6 +134,25 @@ async def test_a_revoked_token_is_nobodys_and_its_sockets_are_told(
 
     assert before == who
     assert desk.programs.find("operate") is None
+    # `/live` asks this twice a second and closes.
+    assert desk.authenticator.current(who) is None
+
+
+async def test_a_token_ends_by_itself_with_its_sockets(desk: ProgramsDesk) -> None:
+    (digest,) = (
+        one for one, known in desk.tokens.known.items() if known.name == "mes-stop"
+    )
+    ends_at = desk.clock().wall + 60.0
+    desk.tokens.known[digest] = replace(desk.tokens.known[digest], ends_at=ends_at)
+    await desk.programs.refresh()
+    who = desk.programs.find("stop")
+    assert who is not None
+    async with desk.caller("stop") as program:
+        before = await program.post("/api/v1/robots/AGI/stop")
+        desk.clock.now += 60.0
+        after = await program.post("/api/v1/robots/AGI/stop")
+
+    assert (before.status_code, after.status_code) == (202, 401)
     # `/live` asks this twice a second and closes.
     assert desk.authenticator.current(who) is None
 

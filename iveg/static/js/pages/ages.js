@@ -1,0 +1,27 @@
+/**
+ * Moments with their ages, which grow while the page is open.
+ */
+
+import { all, make, setText } from "../panels/dom.js";
+import { dayAndTime } from "./history/local_time.js";
+
+const EVERY_MS = 1000;
+
+/** @param {import("../core/page.js").Page} page */
+export function createAges({ line, i18n }) {
+  /** @param {HTMLElement} cell */
+  function draw(cell) {
+    const at = String(cell.dataset.ages);
+    const age = Math.max(0, line.serverNow() - Date.parse(at) / 1000);
+    setText(cell, i18n.t("rows.aged", { at: dayAndTime(at), age }));
+  }
+
+  setInterval(() => all("[data-ages]").forEach(draw), EVERY_MS);
+  /** A cell of a table. @param {string} at ISO-8601 */
+  return function cell(at) {
+    const made = make("td", "time");
+    made.dataset.ages = at;
+    draw(made);
+    return made;
+  };
+}
