@@ -21,6 +21,7 @@ from iveg.web.api import (
     notes,
     passkeys,
     proof,
+    sessions,
     sign_in_code,
     stop_records,
     tokens,
@@ -102,6 +103,7 @@ def _past_routers(dss: Dss, pages: routes.Pages) -> Iterator[APIRouter]:
     if dss.sign_in_token:
         yield sign_in_code.router(dss.sign_in_token)
     yield account.router(dss.door.people)
+    yield sessions.router()
     yield users.router(dss.door.people, clock)
     yield tokens.router(dss.door.programs, clock)
     yield passkeys.router(dss.door.people, dss.door.passkeys)

@@ -4,6 +4,7 @@ Written beside the requests: a slow or full disk holds up neither a sign-in nor 
 it only costs sessions after a restart.  The file holds no token, only its SHA-256.
 """
 
+import hashlib
 import logging
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
@@ -36,6 +37,7 @@ class Session:
         method: How they signed in.
         until: When it is over at the latest (Unix s); None: no earlier than others.
         proven: When the person proved who they are (Unix s); None: not told.
+        wall: It was left to a screen that everybody passes.
     """
 
     digest: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
@@ -47,6 +49,12 @@ class Session:
     method: SignInMethod = "link"
     until: _UnixTime | None = None
     proven: _UnixTime | None = None
+    wall: bool = False
+
+    @property
+    def session_id(self) -> str:
+        """Names it to people; tells nobody the digest, and lets nobody in."""
+        return hashlib.sha256(f"id:{self.digest}".encode()).hexdigest()[:16]
 
     __pydantic_config__ = ConfigDict(strict=True, extra="forbid")
 

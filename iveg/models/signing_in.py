@@ -1,5 +1,7 @@
 """The way in for another device, and for other people."""
 
+from typing import Literal
+
 from pydantic import Field
 
 from iveg.domain.accounts import (
@@ -13,6 +15,8 @@ from iveg.domain.accounts import (
 from iveg.domain.passkeys import Passkey
 from iveg.domain.stamps import format_stamp
 from iveg.models.base import Model, stamp
+
+SessionKind = Literal["link", "account", "wall"]
 
 
 class SignInCode(Model):
@@ -34,6 +38,24 @@ class OwnAccount(Model):
     account: bool = Field(description="They have one; else a link or a token.")
     signed_in_at: str | None = Field(description="Null for programs.")
     ends_at: str | None = Field(description="When it ends by itself; null: never.")
+
+
+class OpenSession(Model):
+    """A browser in which somebody is signed in."""
+
+    session_id: str
+    name: str
+    role: str = Field(description="That is left now; `expired`: STOP alone.")
+    kind: SessionKind = Field(description="`wall`: of a screen, it looks and stops.")
+    began_at: str
+    seen_at: str = Field(description="The last request.")
+    own: bool = Field(description="The one that asks.")
+
+
+class SessionsEnded(Model):
+    """How many sessions have ended."""
+
+    ended: int
 
 
 class UserAccount(Model):

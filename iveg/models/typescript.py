@@ -30,6 +30,7 @@ from iveg.models.rule import Trial
 from iveg.models.signing_in import (
     Invitation,
     NewToken,
+    OpenSession,
     OwnAccount,
     PasskeyOfPerson,
     Proof,
@@ -61,6 +62,7 @@ TOLD: tuple[type[Model], ...] = (
     PasskeyOfPerson,
     Proof,
     NewToken,
+    OpenSession,
     OwnAccount,
     Thing,
     Trial,

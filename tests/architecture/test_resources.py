@@ -16,6 +16,7 @@ from iveg.models.note import Note
 from iveg.models.odometry import OdometryRow
 from iveg.models.people import DetectionRow, KeptDetection
 from iveg.models.recordings import Recording
+from iveg.models.signing_in import SessionsEnded
 from iveg.models.typescript import TOLD
 from tests.architecture import documents
 from tests.processes import ROOT
@@ -34,6 +35,7 @@ _SHOWN: tuple[type[Model], ...] = (
     Recording,
     DictionaryColumn,
     Note,
+    SessionsEnded,
 )
 _, _DOCUMENT = models_json_schema([(model, "serialization") for model in _SHOWN])
 _SHAPES = _DOCUMENT["$defs"]

@@ -753,6 +753,21 @@ export type Occurrence = {
   told: Told[];
 };
 
+/** A browser in which somebody is signed in. */
+export type OpenSession = {
+  session_id: string;
+  name: string;
+  /** That is left now; `expired`: STOP alone. */
+  role: string;
+  /** `wall`: of a screen, it looks and stops. */
+  kind: "link" | "account" | "wall";
+  began_at: string;
+  /** The last request. */
+  seen_at: string;
+  /** The one that asks. */
+  own: boolean;
+};
+
 /** Whoever asks, as they are known here. */
 export type OwnAccount = {
   name: string;
@@ -875,6 +890,20 @@ export type Profile = {
   width: number;
   max_speed: number;
   turning_radius: number;
+};
+
+/** A program that may call, as admins see it. */
+export type ProgramToken = {
+  token_id: string;
+  name: string;
+  scope: "read" | "stop" | "operate";
+  made_at: string;
+  /** The last time; null: never. */
+  used_at: string | null;
+  /** When it ends by itself; null: never. */
+  ends_at: string | null;
+  /** It has ended by itself. */
+  over: boolean;
 };
 
 /** Whether a release would ask whoever asks to prove anew who they are. */

@@ -10,6 +10,7 @@ from iveg.domain.accounts import Language
 from iveg.models.base import stamp
 from iveg.models.signing_in import OwnAccount
 from iveg.web.api.answers import Json
+from iveg.web.api.sessions import refuse_walls
 from iveg.web.cookies import keep_language
 from iveg.web.problems import Problem
 from iveg.web.security.authentication import Authenticator, Principal, require
@@ -68,6 +69,7 @@ def router(people: People) -> APIRouter:
     @routes.put("/language", status_code=204)
     async def choose(body: LanguageBody, who: _Reader) -> Response:
         """Keep a language for every browser in which the person signs in."""
+        refuse_walls(who)
         if not who.has_account:
             raise HTTPException(409, "A link has no account; its browsers choose.")
         await people.choose_language(who.person, body.language)

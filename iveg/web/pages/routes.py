@@ -197,7 +197,7 @@ def router(
     for route, path in _SCRIPTED.items():
         add_scripted(routes, pages, route, path)
     add_scripted(routes, pages, "audit", "/audit", "release")
-    for route in ("users", "tokens"):
+    for route in ("users", "tokens", "sessions"):
         add_scripted(routes, pages, route, f"/{route}", "admin")
 
     @routes.get("/account", response_model=None)

@@ -144,6 +144,18 @@ AUDITED: Final[Mapping[tuple[str, str], Audited]] = {
     ("DELETE", f"{_API}/tokens/{{token_id}}"): Audited(
         "token_revoked", "token_id", by_store=True
     ),
+    **{
+        ("DELETE", f"{_API}{place}/sessions/{{session_id}}"): Audited(
+            "session_ended", "session_id", answered=("name",)
+        )
+        for place in ("", "/account")
+    },
+    **{
+        ("DELETE", f"{_API}{place}/sessions"): Audited(
+            "sessions_ended", answered=("ended",)
+        )
+        for place in ("", "/account")
+    },
     ("POST", "/signin"): Audited(""),
     ("POST", "/signout"): Audited("sign_out"),
     ("POST", "/wall"): Audited("wall"),

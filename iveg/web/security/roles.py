@@ -35,6 +35,7 @@ class Principal:
         signed_in_at: When (Unix s); None for programs, which do so at each request.
         proven_at: When the person last proved who they are (Unix s); later than that
             they were only let in again, by the provider's own session. None: unknown.
+        wall: The session was left to a screen that everybody passes.
     """
 
     name: str
@@ -44,6 +45,7 @@ class Principal:
     method: SignInMethod = "link"
     signed_in_at: float | None = None
     proven_at: float | None = None
+    wall: bool = False
 
     @property
     def has_account(self) -> bool:

@@ -9,7 +9,7 @@ Ages follow the wall clock, because no other goes on counting while iVeg is down
 
 import hashlib
 import secrets
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import replace
 from typing import Any, cast
 
@@ -122,9 +122,24 @@ class Sessions:
         """Note that the person has proven anew who they are."""
         self._change(principal, proven=self._clock().wall)
 
+    def standing(self) -> list[tuple[Session, Role]]:
+        """Those that are not over, each with the role that is left of it."""
+        found = []
+        for digest in [*self._sessions]:
+            who = self._principal(digest, touch=False)
+            if who is not None:
+                found.append((self._sessions[digest], who.role))
+        return found
+
+    def end(self, ended: Collection[Session]) -> None:
+        """End some at once, STOP included."""
+        for session in ended:
+            self._sessions.pop(bytes.fromhex(session.digest), None)
+        self._keep()
+
     def lower(self, principal: Principal) -> None:
         """Leave a session what a viewer may do, until somebody signs in anew."""
-        self._change(principal, role="viewer")
+        self._change(principal, role="viewer", wall=True)
 
     def _change(self, principal: Principal, **changes: Any) -> None:
         session = self._sessions.get(principal.session or b"")
@@ -158,6 +173,7 @@ class Sessions:
             session.method,
             session.began,
             session.proven,
+            session.wall,
         )
 
     def _remember(self, kept: Iterable[Session]) -> None:

@@ -38,6 +38,7 @@ const ROUTES = {
   climate: () => import("../pages/climate.js"),
   latency: () => import("../pages/hops.js"),
   experiments: () => import("../pages/experiments.js"),
+  sessions: () => import("../pages/sessions.js"),
   settings: () => import("../pages/settings.js"),
   decisions: () => import("../pages/decisions.js"),
   decision: () => import("../pages/decision.js"),

@@ -7,6 +7,7 @@ import { guarded } from "../core/hub.js";
 import { startFacts } from "./account_facts.js";
 import { startPasskeys } from "./account_passkeys.js";
 import { startPassword } from "./account_password.js";
+import { startOwnSessions } from "./sessions.js";
 
 /** @typedef {import("../core/page.js").Page} Page */
 /** @typedef {import("../core/api.js").Answer} Answer of `GET /account` */
@@ -16,6 +17,7 @@ const SECTIONS = [
   ["#account-facts", startFacts],
   ["#password-form", startPassword],
   ["#account-passkeys", startPasskeys],
+  ["#sessions", startOwnSessions],
 ];
 
 /** @param {Page} page */

@@ -2,10 +2,11 @@
  * Moments with their ages, which grow while the page is open.
  */
 
-import { all, make, setText } from "../panels/dom.js";
+import { all, make, need, setText } from "../panels/dom.js";
 import { dayAndTime } from "./history/local_time.js";
 
 const EVERY_MS = 1000;
+const FRESH_MS = 10_000;
 
 /** @param {import("../core/page.js").Page} page */
 export function createAges({ line, i18n }) {
@@ -24,4 +25,15 @@ export function createAges({ line, i18n }) {
     draw(made);
     return made;
   };
+}
+
+/**
+ * Reads a list anew again and again, but not under the finger of who works in it.
+ *
+ * @param {string} name of `_rows.html`
+ * @param {() => void} load
+ */
+export function keepFresh(name, load) {
+  const body = need(`#${name}-rows`);
+  setInterval(() => body.contains(document.activeElement) || load(), FRESH_MS);
 }

@@ -23,6 +23,8 @@ const GROUPS = {
   passkey_added: "signing",
   passkey_removed: "signing",
   password_changed: "signing",
+  session_ended: "signing",
+  sessions_ended: "signing",
   token_added: "signing",
   token_revoked: "signing",
   stop: "orders",

@@ -4,7 +4,7 @@
 
 import { sendApi } from "../core/api.js";
 import { make, need } from "../panels/dom.js";
-import { createAges } from "./ages.js";
+import { createAges, keepFresh } from "./ages.js";
 import { dayAndTime } from "./history/local_time.js";
 import { createRows } from "./rows.js";
 import { createShownOnce } from "./shown_once.js";
@@ -56,6 +56,7 @@ export function start(page) {
     once.say("tokenspage.given", { name });
     return once.show(answer.body.token);
   });
+  keepFresh("tokens", rows.load);
   rows.load();
 }
 

@@ -203,10 +203,13 @@ def test_a_session_that_was_lowered_is_a_viewers_and_stays_one(
     sessions.lower(Principal("program", "program"))
     store.close()
 
-    assert sessions.current(before) == replace(before, role="viewer")
+    assert sessions.current(before) == replace(before, role="viewer", wall=True)
     again = restarted(path, clock)
-    roles = [found.role for one in (token, other) if (found := again.find(one))]
-    assert roles == ["viewer", "operator"]
+    found = [one for token in (token, other) if (one := again.find(token))]
+    assert [(one.role, one.wall) for one in found] == [
+        ("viewer", True),
+        ("operator", False),
+    ]
 
 
 def test_sessions_of_earlier_versions_stay_and_get_the_name_of_the_links_person(
