@@ -24,6 +24,7 @@ from iveg.web.api import (
     sessions,
     sign_in_code,
     stop_records,
+    tablet,
     tokens,
     users,
 )
@@ -107,7 +108,8 @@ def _past_routers(dss: Dss, pages: routes.Pages) -> Iterator[APIRouter]:
     yield users.router(dss.door.people, clock)
     yield tokens.router(dss.door.programs, clock)
     yield passkeys.router(dss.door.people, dss.door.passkeys)
-    yield proof.router(dss.door.people, dss.door.passkeys)
+    yield proof.router(dss.door.people, dss.door.passkeys, dss.door.pins)
+    yield tablet.router(dss.door.people, dss.door.pins)
     if dss.sign_on is not None:
         yield sign_on.router(pages, dss.sign_on)
     yield service_worker.router()

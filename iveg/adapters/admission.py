@@ -88,7 +88,7 @@ class Admission:
             back = replace(account, disabled=False, since=self._now)
             self._store.change(back, "account_reset", self._by)
             return "", back
-        reset = replace(account, password="", disabled=False, since=self._now)
+        reset = replace(account, password="", pin="", disabled=False, since=self._now)
         invitation, invited = self._invited(reset, waits_s)
         self._store.change(invited, "account_reset", self._by)
         return invitation, invited
@@ -103,6 +103,13 @@ class Admission:
             raise ProvidedAccountError(account.name)
         changed = replace(account, role=role, since=self._now)
         self._store.change(changed, "account_role", self._by)
+        return changed
+
+    def give_pin(self, account: Account, pin: str) -> Account:
+        """Put the hash of a PIN in the place of the one before; empty: none."""
+        changed = replace(account, pin=pin)
+        action = "pin_changed" if pin else "pin_removed"
+        self._store.change(changed, action, self._by)
         return changed
 
     def disable(self, account: Account) -> Account:

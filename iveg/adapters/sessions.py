@@ -38,6 +38,8 @@ class Session:
         until: When it is over at the latest (Unix s); None: no earlier than others.
         proven: When the person proved who they are (Unix s); None: not told.
         wall: It was left to a screen that everybody passes.
+        holder: Id of the account that unlocked a tablet; empty: it is locked.
+        acted: When that person last did something (Unix s).
     """
 
     digest: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
@@ -50,6 +52,8 @@ class Session:
     until: _UnixTime | None = None
     proven: _UnixTime | None = None
     wall: bool = False
+    holder: str = ""
+    acted: _UnixTime = 0.0
 
     @property
     def session_id(self) -> str:

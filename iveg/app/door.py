@@ -16,15 +16,17 @@ from iveg.web.security.passkeys import Passkeys
 from iveg.web.security.people import People
 from iveg.web.security.programs import Programs
 from iveg.web.security.single_sign_on import SingleSignOn
+from iveg.web.security.tablets import Pins
 
 
 @dataclass(frozen=True, slots=True)
 class Door:
-    """People with accounts, their passkeys, and programs."""
+    """People with accounts, their passkeys and PINs, and programs."""
 
     people: People
     passkeys: Passkeys
     programs: Programs
+    pins: Pins
 
     def comfort(self) -> dict[str, Work]:
         """What reads them anew, by name."""
@@ -84,8 +86,10 @@ class Door:
 
 def open_door(stores: Stores, clock: Clock) -> Door:
     """The door with its stores."""
+    people = People(stores.accounts, Passwords(), clock)
     return Door(
-        People(stores.accounts, Passwords(), clock),
+        people,
         Passkeys(stores.passkeys, clock),
         Programs(stores.api_tokens, clock),
+        Pins(people, clock),
     )

@@ -9,8 +9,9 @@ import unicodedata
 from dataclasses import dataclass
 from typing import Final, Literal
 
-SignInMethod = Literal["link", "password", "passkey", "sso", "token"]
-"""Proof of an identity; ``sso`` is the identity provider's, ``token`` a program's."""
+SignInMethod = Literal["link", "password", "passkey", "pin", "sso", "tablet", "token"]
+"""Proof of an identity: ``sso`` is the identity provider's, ``token`` a program's,
+``tablet`` a shared browser's."""
 OF_ACCOUNTS: Final = frozenset({"password", "passkey", "sso"})
 """Methods of people with an account, which decides over their sessions."""
 PersonRole = Literal["viewer", "operator", "admin"]
@@ -61,6 +62,7 @@ class Account:
         since: Sessions that began before are over (Unix s): a new role or password.
         provider: Issuer that vouches for the person and gives the role; empty: none.
         language: What the person reads; empty: whatever their browser asks for.
+        pin: Hash of what unlocks a shared tablet; empty: nothing does.
     """
 
     account_id: str
@@ -74,6 +76,7 @@ class Account:
     since: float = 0.0
     provider: str = ""
     language: Language | Literal[""] = ""
+    pin: str = ""
 
     def is_open(self, now: float) -> bool:
         """Whether the person may be here at this moment (Unix s)."""

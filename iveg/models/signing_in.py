@@ -110,7 +110,7 @@ class Proof(Model):
 
     needed: bool
     until: str | None = Field(description="When it would; null: never.")
-    ways: list[str] = Field(description="`password`, `passkey`: how to prove it.")
+    ways: list[str] = Field(description="`password`, `passkey`, `pin`.")
 
     @classmethod
     def of(cls, until: float | None, ways: list[str], *, needed: bool) -> "Proof":
@@ -148,6 +148,24 @@ class NewToken(Model):
 
     program: ProgramToken
     token: str
+
+
+class TabletPerson(Model):
+    """Somebody who may unlock a shared tablet."""
+
+    person_id: str
+    name: str
+    blocked_s: int = Field(description="How long their PIN is refused; 0: not at all.")
+
+
+class Tablet(Model):
+    """A shared tablet as it is now."""
+
+    name: str
+    holder: str | None = Field(description="Who has unlocked it; null: it is locked.")
+    role: PersonRole = Field(description="What may be done on it now.")
+    left_s: float = Field(description="Until it locks by itself if nothing is done.")
+    people: list[TabletPerson]
 
 
 class Invitation(Model):

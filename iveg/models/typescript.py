@@ -35,6 +35,7 @@ from iveg.models.signing_in import (
     PasskeyOfPerson,
     Proof,
     SignInCode,
+    Tablet,
 )
 from iveg.models.snapshot import PastWorld, Snapshot
 from iveg.models.thing import Thing
@@ -63,6 +64,7 @@ TOLD: tuple[type[Model], ...] = (
     Proof,
     NewToken,
     OpenSession,
+    Tablet,
     OwnAccount,
     Thing,
     Trial,

@@ -9,10 +9,12 @@ Errors of this boundary alone, under the tree of ``domain/errors``::
     ├── NotSignedInError    401
     ├── ForeignOriginError  403
     ├── PasskeyAddressError 409
+    ├── PinRefusedError     403, 429
     ├── ProofNeededError    403
     └── NotJsonError        415
 """
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from http import HTTPStatus
@@ -67,6 +69,19 @@ class ProofNeededError(IvegError):
 
     def __init__(self) -> None:
         super().__init__("Prove again who you are: POST /api/v1/account/proof.")
+
+
+class PinRefusedError(IvegError):
+    """A PIN that is wrong, or comes while its person has to wait.
+
+    Attributes:
+        wait_s: How long it is refused (s); 0: not at all.
+        left: Tries until the next wait; None: it was not looked at.
+    """
+
+    def __init__(self, wait_s: float, left: int | None = None) -> None:
+        super().__init__("The PIN is refused.")
+        self.wait_s, self.left = wait_s, left
 
 
 class PasskeyAddressError(IvegError):
@@ -156,6 +171,8 @@ def problem_of(error: Exception) -> Problem:
             return Problem(409, str(error), _REFUSED[type(error)], {"why": error.why})
         case UnreadableError():
             return Problem(400, str(error), "unreadable", {"reason": error.reason})
+        case PinRefusedError():
+            return _refused_pin(error)
         case NotRecordedError():
             ends = {"before": stamp(error.before), "after": stamp(error.after)}
             return Problem(404, str(error), "not-recorded", ends)
@@ -170,6 +187,15 @@ def problem_of(error: Exception) -> Problem:
             return Problem(status, str(error), code, headers=headers)
     # The server logs the traceback: Starlette raises it again after this answer.
     return Problem(500, "Something failed inside iVeg; its log says what.")
+
+
+def _refused_pin(error: PinRefusedError) -> Problem:
+    wait_s = math.ceil(error.wait_s)
+    told = {"blocked_s": wait_s}
+    if error.left is None:
+        wait = {"Retry-After": str(wait_s)}
+        return Problem(429, str(error), "pin-blocked", told, wait)
+    return Problem(403, str(error), "pin-wrong", {**told, "left": error.left})
 
 
 _REFUSED: Mapping[type[IvegError], str] = {

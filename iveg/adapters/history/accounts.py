@@ -88,7 +88,7 @@ class AccountStore(NamedRows[Account]):
             row = connection.execute(wanted).mappings().first()
             if row is None or not digest:
                 return None
-            taken = {"password": password, "invitation": "", "since": now}
+            taken = {"password": password, "invitation": "", "since": now, "pin": ""}
             account = Account(**{**row, **taken})
             same = c.account_id == account.account_id
             connection.execute(update(accounts).where(same).values(**taken))

@@ -309,6 +309,7 @@ accounts = Table(
     *_numbers("invited_until", "since"),
     _text("provider", null=False),
     _text("language", null=False),
+    _text("pin", null=False),
     UniqueConstraint("name_key"),
 )
 

@@ -773,7 +773,7 @@ export type OwnAccount = {
   name: string;
   role: string;
   /** How they came in. */
-  method: "link" | "password" | "passkey" | "sso" | "token";
+  method: "link" | "password" | "passkey" | "pin" | "sso" | "tablet" | "token";
   /** They have one; else a link or a token. */
   account: boolean;
   /** Null for programs. */
@@ -911,7 +911,7 @@ export type Proof = {
   needed: boolean;
   /** When it would; null: never. */
   until: string | null;
-  /** `password`, `passkey`: how to prove it. */
+  /** `password`, `passkey`, `pin`. */
   ways: string[];
 };
 
@@ -1163,6 +1163,26 @@ export type SpeedLimit = {
   decision_id: string | null;
   /** Until it reaches the ring of the cause; null: it is inside. */
   foretold_s: number | null;
+};
+
+/** A shared tablet as it is now. */
+export type Tablet = {
+  name: string;
+  /** Who has unlocked it; null: it is locked. */
+  holder: string | null;
+  /** What may be done on it now. */
+  role: "viewer" | "operator" | "admin";
+  /** Until it locks by itself if nothing is done. */
+  left_s: number;
+  people: TabletPerson[];
+};
+
+/** Somebody who may unlock a shared tablet. */
+export type TabletPerson = {
+  person_id: string;
+  name: string;
+  /** How long their PIN is refused; 0: not at all. */
+  blocked_s: number;
 };
 
 /** One mark: who is born inside its circle and stays there slows nobody. */

@@ -90,7 +90,7 @@ def _add_own(routes: APIRouter, people: People, passkeys: Passkeys) -> None:
 
 def account_of(people: People, who: Principal) -> Account:
     """The account of whoever asks. Raises UnknownNameError: they have none."""
-    found = people.account(who.person)
+    found = people.account(who.person) if who.has_account else None
     if found is None:
         raise UnknownNameError("account", who.name)
     return found

@@ -8,6 +8,8 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from iveg.adapters.passwords import MOST
 from iveg.domain.accounts import Account
+from iveg.domain.errors import UnknownNameError
+from iveg.domain.pins import MOST_DIGITS
 from iveg.models.signing_in import Proof
 from iveg.web.api.answers import Json
 from iveg.web.api.passkeys import account_of, authenticator_of
@@ -16,6 +18,7 @@ from iveg.web.security.answer import AnswerOfDevice
 from iveg.web.security.authentication import Principal, require
 from iveg.web.security.passkeys import Passkeys, site_of
 from iveg.web.security.people import People
+from iveg.web.security.tablets import Pins
 
 _WRONG: Final = Problem(403, "This does not prove who you are.", "proof-wrong")
 _PURPOSE: Final = "prove "
@@ -38,10 +41,16 @@ class ByPasskey(_Strict):
     passkey: AnswerOfDevice
 
 
-ProofBody = ByPassword | ByPasskey
+class ByPin(_Strict):
+    """What unlocks a shared tablet as this person."""
+
+    pin: Annotated[str, Field(max_length=MOST_DIGITS)]
 
 
-def router(people: People, passkeys: Passkeys) -> APIRouter:
+ProofBody = ByPassword | ByPasskey | ByPin
+
+
+def router(people: People, passkeys: Passkeys, pins: Pins) -> APIRouter:
     """The routes of a proof; `people` says whose account somebody's is."""
     routes = APIRouter(prefix="/api/v1/account/proof", tags=["account"])
 
@@ -67,8 +76,15 @@ def router(people: People, passkeys: Passkeys) -> APIRouter:
     @routes.post("", status_code=204)
     async def give(request: Request, body: ProofBody, who: _Reader) -> Response:
         """Prove who is there; counts as a sign-in does."""
-        account = account_of(people, who)
+        account = people.account(who.person)
+        if account is None:
+            raise UnknownNameError("account", who.name)
         authenticator = authenticator_of(request)
+        if isinstance(body, ByPin):
+            # It is waited for by person, not by address.
+            await pins.look(account.account_id, body.pin)
+            authenticator.sessions.proven(who)
+            return Response(status_code=204)
         proof = _looking(request, body, account, people, passkeys)
         found = await authenticator.attempts.weigh(request, "wrong proof", proof)
         if isinstance(found, Problem):
@@ -83,13 +99,14 @@ def _ways(account: Account, passkeys: Passkeys) -> list[str]:
     ways = {
         "password": bool(account.password),
         "passkey": bool(passkeys.of(account.account_id)),
+        "pin": bool(account.pin),
     }
     return [way for way, there in ways.items() if there]
 
 
 def _looking(
     request: Request,
-    body: ProofBody,
+    body: ByPassword | ByPasskey,
     account: Account,
     people: People,
     passkeys: Passkeys,

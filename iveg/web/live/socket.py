@@ -215,7 +215,7 @@ async def _watch(websocket: WebSocket, principal: Principal, line: Line) -> None
     """
     while True:
         await asyncio.sleep(_CHECK_S)
-        if not _may_still(websocket, principal, "read"):
+        if _who_may(websocket, principal, "read") is None:
             await _sent(websocket.close(NO_SESSION))
             return
         if line.is_stuck:
@@ -235,10 +235,13 @@ async def _sent(sending: Coroutine[object, object, None]) -> None:
         raise ConnectionResetError(str(error)) from error
 
 
-def _may_still(websocket: WebSocket, principal: Principal, action: Action) -> bool:
+def _who_may(
+    websocket: WebSocket, principal: Principal, action: Action
+) -> Principal | None:
+    """The same session as of now, as a tablet changes hands; None: it may not."""
     authenticator: Authenticator = websocket.app.state.authenticator
     current = authenticator.current(principal)
-    return current is not None and current.may(action)
+    return current if current is not None and current.may(action) else None
 
 
 class ClientMessages:
@@ -296,10 +299,10 @@ class ClientMessages:
 
     async def _press(self, message: dict[str, object]) -> None:
         robot_id = message.get("robot_id")
-        allowed = _may_still(self._websocket, self._principal, "stop")
-        if allowed and (robot_id is None or isinstance(robot_id, str)):
+        who = _who_may(self._websocket, self._principal, "stop")
+        if who is not None and (robot_id is None or isinstance(robot_id, str)):
             try:
-                await self._stop(robot_id, self._principal, read_press(message))
+                await self._stop(robot_id, who, read_press(message))
             except UnknownRobotError as error:
                 reason = legible(str(error))
                 self._subscriber.append(topics.PROBLEM.name, {"reason": reason})

@@ -130,6 +130,15 @@ AUDITED: Final[Mapping[tuple[str, str], Audited]] = {
         "account_disabled", "user_id", by_store=True
     ),
     ("POST", f"{_API}/account/proof"): Audited("proof"),
+    ("PUT", f"{_API}/account/pin"): Audited("pin_changed", by_store=True),
+    ("DELETE", f"{_API}/account/pin"): Audited("pin_removed", by_store=True),
+    ("POST", f"{_API}/tablet"): Audited("tablet", asked=("name",)),
+    ("POST", f"{_API}/tablet/unlock"): Audited(
+        "tablet_unlocked",
+        asked=("person_id",),
+        answered=("holder", "left", "blocked_s"),
+    ),
+    ("POST", f"{_API}/tablet/lock"): Audited("tablet_locked"),
     ("POST", f"{_API}/account/passkeys"): Audited(
         "passkey_added", asked=("name",), by_store=True
     ),

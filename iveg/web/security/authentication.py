@@ -105,7 +105,13 @@ class Authenticator:
         self._passkeys = passkeys
         self.freshness = Freshness(proven_within_s, clock)
         role_now = None if people is None else people.role_now
-        self.sessions = Sessions(clock, store, link_name=link_name, role_now=role_now)
+        self.sessions = Sessions(
+            clock,
+            store,
+            link_name=link_name,
+            role_now=role_now,
+            account=(lambda _: None) if people is None else people.account,
+        )
 
     # --- people sign in ---------------------------------------------------------
 
@@ -283,6 +289,9 @@ class Authenticator:
             if principal.session is not None:
                 refuse_forgery(request)
             refuse_other_bodies(request)
+            # Anybody's STOP is no sign that the person is still there.
+            if principal.method == "pin" and action not in ("read", "stop"):
+                self.sessions.acted(principal)
         return principal
 
     async def authorise_websocket(self, websocket: WebSocket) -> Principal:

@@ -98,6 +98,12 @@ class People(Rereading):
             return None
         return left if session.began >= account.since else None
 
+    def present(self) -> list[Account]:
+        """Those who may be here and have begun."""
+        now = self._clock().wall
+        known = (self._known or {}).values()
+        return [one for one in known if one.state(now) == "active"]
+
     def account(self, account_id: str) -> Account | None:
         """Somebody's account; None where they may not be here, or have not begun."""
         account = self.find(account_id)
@@ -134,6 +140,21 @@ class People(Rereading):
         """The same account where the password is its own. Raises BusyError."""
         fits = await self._passwords.fits(password, account.password)
         return account if fits else None
+
+    async def has_pin(self, account: Account, pin: str) -> bool:
+        """Whether a PIN is this person's. Raises BusyError."""
+        return await self._passwords.fits(pin, account.pin)
+
+    async def give_pin(self, by: Actor, account: Account, pin: str) -> None:
+        """Let a PIN unlock tablets as this person; an empty one takes theirs away.
+
+        Raises:
+            BusyError: too many sign in at once.
+            HopError: the database is away; nothing was changed.
+        """
+        kept = await self._passwords.hashed(pin) if pin else ""
+        person = account.account_id
+        await self.change(by, lambda one, known: one.give_pin(known[person], kept))
 
     async def accept(self, invitation: str, password: str) -> Account | None:
         """Begin an account by its invitation; None where that is none any more.

@@ -11,7 +11,7 @@ from iveg.pipeline.ports import Clock
 from iveg.web.problems import ProofNeededError
 from iveg.web.security.roles import Principal
 
-_ASKED: Final = OF_ACCOUNTS
+_ASKED: Final = OF_ACCOUNTS | {"pin"}
 """Whoever has the link alone has nothing to prove by; programs do so at each call."""
 
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from iveg.domain.accounts import SignInMethod
+from iveg.domain.accounts import OF_ACCOUNTS, SignInMethod
 
 Role = Literal[
     "viewer", "operator", "admin", "reader", "program", "controller", "expired"
@@ -50,7 +50,12 @@ class Principal:
     @property
     def has_account(self) -> bool:
         """Whether it is a person by name, not whoever holds a link or a token."""
-        return self.method not in ("link", "token")
+        return self.method in OF_ACCOUNTS
+
+    @property
+    def is_tablet(self) -> bool:
+        """Whether it is a shared tablet, locked or not."""
+        return self.method in ("pin", "tablet")
 
     def may(self, action: Action) -> bool:
         """Whether the role's row holds this action."""

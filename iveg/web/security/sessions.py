@@ -18,10 +18,12 @@ from iveg.domain.accounts import (
     DEFAULT_NAME,
     LINK_PERSON,
     OF_ACCOUNTS,
+    Account,
     SignInMethod,
 )
 from iveg.pipeline.ports import Clock
 from iveg.web.security.roles import Principal, Role
+from iveg.web.security.tablets import TABLET, TABLET_S, left_s, tablet_principal
 
 IDLE_S, ABSOLUTE_S, STOP_ONLY_S = 12 * 3600.0, 24 * 3600.0, 12 * 3600.0
 _MOST_SESSIONS = 1000
@@ -41,6 +43,7 @@ class Sessions:
         most: How many there may be.
         link_name: Name of whoever holds the link of the environment.
         role_now: The role that an account leaves a session of its person; None: over.
+        account: Somebody's account while they may be here.
     """
 
     def __init__(
@@ -50,12 +53,14 @@ class Sessions:
         most: int = _MOST_SESSIONS,
         link_name: str = DEFAULT_NAME,
         role_now: Callable[[Session, Role], Role | None] | None = None,
+        account: Callable[[str], Account | None] = lambda _: None,
     ) -> None:
         self._clock = clock
         self._store = store
         self._most = most
         self._link_name = link_name
         self._role_now = role_now
+        self._account = account
         self._sessions: dict[bytes, Session] = {}
         self._kept_at = 0.0
         if store is not None:
@@ -137,6 +142,46 @@ class Sessions:
             self._sessions.pop(bytes.fromhex(session.digest), None)
         self._keep()
 
+    # --- a shared tablet ----------------------------------------------------------
+
+    def make_tablet(self, principal: Principal, name: str) -> None:
+        """Make a browser a tablet; it keeps nothing of whoever did."""
+        now = self._clock().wall
+        self._change(
+            principal,
+            name=name,
+            role="viewer",
+            person=TABLET,
+            method=TABLET,
+            began=now,
+            proven=None,
+        )
+
+    def unlock(self, principal: Principal, account_id: str) -> None:
+        """Have a tablet act as somebody."""
+        now = self._clock().wall
+        self._change(principal, holder=account_id, acted=now, proven=now)
+
+    def lock(self, principal: Principal) -> None:
+        """Have a tablet act as nobody."""
+        self._change(principal, holder="")
+
+    def acted(self, principal: Principal) -> None:
+        """Note that whoever unlocked a tablet has done something."""
+        self._change(principal, acted=self._clock().wall)
+
+    def unlocked_s(self, principal: Principal) -> float:
+        """How long a tablet stays unlocked if nothing is done (s)."""
+        session = self._sessions.get(principal.session or b"")
+        return 0.0 if session is None else left_s(session, self._clock().wall)
+
+    def tablet_name(self, principal: Principal) -> str:
+        """What a tablet is called, whoever has unlocked it."""
+        session = self._sessions.get(principal.session or b"")
+        return "" if session is None else session.name
+
+    # ------------------------------------------------------------------------------
+
     def lower(self, principal: Principal) -> None:
         """Leave a session what a viewer may do, until somebody signs in anew."""
         self._change(principal, role="viewer", wall=True)
@@ -165,6 +210,8 @@ class Sessions:
             self._sessions[digest] = replace(session, seen=now)
             if abs(now - self._kept_at) >= _KEEP_SEEN_S:
                 self._keep()
+        if session.method == TABLET and role != "expired":
+            return tablet_principal(session, now, self._account)
         return Principal(
             session.name,
             role,
@@ -208,6 +255,8 @@ class Sessions:
 def _role_at(session: Session, now: float) -> Role | None:
     """The role that is left at ``now`` (Unix s); None when all is over."""
     ends = min(session.seen + IDLE_S, session.began + ABSOLUTE_S)
+    if session.method == TABLET:
+        ends = session.began + TABLET_S
     over = now - (ends if session.until is None else min(ends, session.until))
     if over <= 0:
         return cast("Role", session.role)

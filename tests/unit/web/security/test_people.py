@@ -19,6 +19,7 @@ from iveg.web.pages.routes import router
 from iveg.web.security.authentication import Authenticator
 from iveg.web.security.passkeys import Passkeys
 from iveg.web.security.people import People
+from iveg.web.security.tablets import Pins
 from tests.fakes.accounts import FakeAccounts, FakePasskeys, FakePasswords
 from tests.unit.web.desk import HOST, WebDesk
 
@@ -38,6 +39,7 @@ class PeoplesDesk(WebDesk):
         self.accounts = FakeAccounts(ANA, replace(EVA, invited_until=now + 60.0))
         self.passwords = FakePasswords()
         self.people = People(self.accounts, real or self.passwords, self.clock)
+        self.pins = Pins(self.people, self.clock)
         self.stored_passkeys = FakePasskeys()
         self.passkeys = Passkeys(self.stored_passkeys, self.clock)
         self.authenticator = Authenticator(

@@ -23,7 +23,7 @@ class ProofsDesk(PasskeysDesk):
 
     def __init__(self) -> None:
         super().__init__()
-        self.app.include_router(proof.router(self.people, self.passkeys))
+        self.app.include_router(proof.router(self.people, self.passkeys, self.pins))
         self.ask_within(QUARTER_S)
 
     def ask_within(self, seconds: float) -> None:

@@ -4,7 +4,7 @@ import sqlalchemy as sa
 from alembic import op
 
 revision = "end_api_tokens"
-down_revision = "keep_language"
+down_revision = "keep_pins"
 branch_labels = None
 depends_on = None
 
