@@ -5,7 +5,9 @@
 
 import { readApi } from "../core/api.js";
 import { make, need } from "../panels/dom.js";
+import { createNotes } from "../panels/notes.js";
 import { readPast, spanOf } from "../panels/past.js";
+import { makePastLink } from "../panels/past_link.js";
 import { makePlots } from "../panels/record_plots.js";
 import { makeShare } from "../panels/share.js";
 import { makeTimeline } from "../panels/timeline.js";
@@ -28,6 +30,8 @@ export function start({ store, i18n }) {
   let order = null;
   /** @type {import("../panels/past.js").Past | null} */
   let past = null;
+  /** @type {ReturnType<typeof createNotes> | null} */
+  let notes = null;
   let status = 0;
   /** @type {Set<string>} */
   const opened = new Set([id]);
@@ -38,6 +42,12 @@ export function start({ store, i18n }) {
     if (status === 200) {
       past = await pastOf(answer.body);
       order = answer.body;
+      if (!notes) {
+        notes = createNotes(pinOf(answer.body), i18n);
+        // Beside what is drawn anew, so that a note that is being written stays.
+        place.after(notes.element);
+        notes.element.open = true;
+      }
     }
     place.setAttribute("aria-busy", "false");
     draw();
@@ -53,6 +63,7 @@ export function start({ store, i18n }) {
       ...(plots ? [plots] : []),
       makeTimeline(stepsOf(order, transports, i18n)),
       ...makeSteps(order, i18n, opened),
+      makePastLink(zeroOf(order.times), i18n),
       make("small", "", `${i18n.t("decision.id")} ${id}`),
       makeShare(`/commands/${encodeURIComponent(id)}`, i18n.t("record.link_to"), i18n),
     );
@@ -63,9 +74,15 @@ export function start({ store, i18n }) {
     if (told.command_id === id) again();
   });
   store.subscribe("snapshot", again);
-  i18n.onChange(draw);
+  i18n.onChange(() => {
+    notes?.draw();
+    draw();
+  });
   load();
 }
+
+/** What a note about it is pinned to. @param {Order} order */
+const pinOf = ({ robot_id, times }) => ({ at: zeroOf(times), robot_id });
 
 /** @param {Order} order */
 function pastOf({ robot_id, times }) {

@@ -118,6 +118,10 @@ export function createAlertList(list, i18n, send = acknowledge, stillMs = STILL_
     setText(need("b", item), `${priority}: ${sentenceOf(alert, i18n)}`);
     setText(need("small", item), factsOf(alert, i18n));
     need(".past-link", item).replaceWith(makePastLink(alert.raised_at, i18n));
+    const pack = /** @type {HTMLAnchorElement} */ (need(".incident-link", item));
+    pack.href = `/api/v1/incident?${new URLSearchParams({ alert: alert.alert_id })}`;
+    setText(pack, i18n.t("incident.get"));
+    setHidden(pack, !ACKNOWLEDGERS.has(role));
     members.get(alert.alert_id)?.draw(alert);
     const may = ACKNOWLEDGERS.has(role);
     setHidden(need("form", item), alert.acknowledged_at !== null || !may);
@@ -162,7 +166,11 @@ function makeItem(onAcknowledge) {
     event.preventDefault();
     onAcknowledge(input.value);
   });
-  body.append(make("b"), make("small"), make("a", "past-link"), form, make("p"));
+  const pack = make("a", "button incident-link");
+  pack.download = "";
+  const links = make("span", "alert-links");
+  links.append(make("a", "past-link"), pack);
+  body.append(make("b"), make("small"), links, form, make("p"));
   item.append(make("span", "shape"), body);
   return item;
 }

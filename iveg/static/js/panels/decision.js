@@ -7,6 +7,7 @@ import { readApi } from "../core/api.js";
 import { dayAndTime, millisecondsOf } from "../pages/history/local_time.js";
 import { drawDecision } from "./decision_map.js";
 import { make, need } from "./dom.js";
+import { createNotes } from "./notes.js";
 import { readPast, spanOf } from "./past.js";
 import { makePastLink } from "./past_link.js";
 import { makePlots } from "./record_plots.js";
@@ -51,6 +52,8 @@ export function createRecord(place, i18n) {
   let map = null;
   /** @type {import("./past.js").Past | null} */
   let past = null;
+  /** @type {ReturnType<typeof createNotes> | null} */
+  let notes = null;
   let asked = "";
 
   /** @param {string} decisionId */
@@ -69,6 +72,13 @@ export function createRecord(place, i18n) {
     if (asked !== decisionId) return;
     shown = status === 200 ? body : null;
     past = found;
+    notes?.element.remove();
+    notes = shown?.started_at ? createNotes(pinOf(shown), i18n) : null;
+    // Beside what is drawn anew, so that a note that is being written stays.
+    if (notes) {
+      place.after(notes.element);
+      notes.element.open = true;
+    }
     place.setAttribute("aria-busy", "false");
     if (shown) draw();
     else
@@ -105,9 +115,19 @@ export function createRecord(place, i18n) {
     );
   }
 
-  i18n.onChange(draw);
+  i18n.onChange(() => {
+    notes?.draw();
+    draw();
+  });
   return { show };
 }
+
+/** What a note about it is pinned to. @param {Decision} decision */
+const pinOf = ({ started_at, robot_id, decision_id }) => ({
+  at: String(started_at),
+  robot_id,
+  decision_id,
+});
 
 /** Date and time of day to the millisecond. @param {string | number | null} at */
 function momentSaid(at) {

@@ -5,7 +5,7 @@
  * @typedef {import("./plot.js").Sample} Sample
  * @typedef {import("./plot.js").Span} Span
  * @typedef {{at: string, x: number, y: number, linear: number,
- *   limit_factor: number, margin_m: number | null}} Pose a row of `/odometry`
+ *   limit_factor: number, margin_m: number | null, late?: boolean}} Pose a row of `/odometry`
  * @typedef {{at: string, x: number | null, y: number | null}} Sighting one of `/tracks`
  * @typedef {{span: Span, poses: Pose[], sightings: Sighting[],
  *   fastest: number | null}} Past rows oldest first; `fastest` in m/s

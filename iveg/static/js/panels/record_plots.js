@@ -41,6 +41,8 @@ export function makePlots(past, { shade, radiusM, speedSaid }, i18n) {
   if (!plots.length) return null;
   const section = make("section", "plots");
   section.append(...plots);
+  const late = past.poses.filter((pose) => pose.late).length;
+  if (late) section.append(make("small", "", i18n.t("plot.late", { count: late })));
   return section;
 }
 

@@ -12,6 +12,7 @@ import { TIME_ZONE } from "../core/messages.js";
 import { BEFORE_S, nextEvent, pastAddress } from "../core/moments.js";
 import { PastStore } from "../core/past_store.js";
 import { need, setAttribute, setHidden, setText } from "./dom.js";
+import { createNotes } from "./notes.js";
 
 const TICK_MS = 250;
 const WINDOW_S = 600;
@@ -28,6 +29,7 @@ const LIVE = "/";
 export function createTimeTravel(app, askedS) {
   const { i18n, line } = app;
   const world = new PastStore();
+  const notes = createNotes(pinOf(askedS - WINDOW_S), i18n);
   const viewer = crypto.randomUUID();
   const bar = makeBar();
   const slider = /** @type {HTMLInputElement} */ (need("[data-part=slider]", bar));
@@ -102,6 +104,7 @@ export function createTimeTravel(app, askedS) {
     setAttribute(play, "aria-pressed", String(isPlaying));
     if (document.activeElement !== slider || isPlaying) centre();
     setAttribute(slider, "aria-valuetext", said);
+    notes.move(pinOf(targetS));
   }
 
   let middleS = askedS;
@@ -132,6 +135,7 @@ export function createTimeTravel(app, askedS) {
     if (key === "Escape" && !isOpen && !defaultPrevented) location.assign(LIVE);
   });
   i18n.onChange(draw);
+  bar.append(notes.element);
   setInterval(tick, TICK_MS);
   seek(askedS);
   const past = { serverNow: () => targetS };
@@ -141,6 +145,9 @@ export function createTimeTravel(app, askedS) {
     line: /** @type {App["line"]} */ (/** @type {any} */ (past)),
   };
 }
+
+/** What a note about a moment is pinned to. @param {number} atS Unix time */
+const pinOf = (atS) => ({ at: new Date(1000 * atS).toISOString() });
 
 /**
  * The nearest event of the log before or after a moment.
