@@ -51,6 +51,8 @@ _SECRETS: Final = frozenset(
         "IVEG_API_TOKEN",
         "IVEG_SIGN_IN_TOKEN",
         "IVEG_MQTT_PASSWORD",
+        "IVEG_FIWARE_CLIENT_SECRET",
+        "IVEG_FIWARE_PASSWORD",
         "IVEG_SSO_CLIENT_SECRET",
     }
 )
@@ -122,6 +124,35 @@ class Settings:
     )
     fiware_servicepath: ServicePath = setting(
         "IVEG_FIWARE_SERVICEPATH", "/greenhouse", "Service path at Orion and the agent."
+    )
+    fiware_token_url: Url = setting(
+        "IVEG_FIWARE_TOKEN_URL",
+        "",
+        "Token endpoint for a PEP proxy before Orion and the agent "
+        "(docs/deployment.md); empty: none asks for a token.",
+    )
+    fiware_client_id: Line = setting(
+        "IVEG_FIWARE_CLIENT_ID", "", "Name of this iVeg at the token endpoint."
+    )
+    fiware_client_secret: Line = setting(
+        "IVEG_FIWARE_CLIENT_SECRET", "", "Its secret there."
+    )
+    fiware_user: Line = setting(
+        "IVEG_FIWARE_USER",
+        "",
+        "User as whom iVeg asks for a token (password grant); empty: as itself (client "
+        "credentials).",
+    )
+    fiware_password: Line = setting(
+        "IVEG_FIWARE_PASSWORD", "", "Password of that user."
+    )
+    fiware_scope: Line = setting(
+        "IVEG_FIWARE_SCOPE", "", "Scope that is asked for; empty: none."
+    )
+    fiware_token_header: Literal["Authorization", "X-Auth-Token"] = setting(
+        "IVEG_FIWARE_TOKEN_HEADER",
+        "Authorization",
+        "Header that carries it: `Authorization` (`Bearer …`) or `X-Auth-Token`.",
     )
     apikey: ApiKey = setting(
         "IVEG_APIKEY", "iveg", "First part of every measure topic."
@@ -362,6 +393,9 @@ class Settings:
             name, value = "IVEG_KEEP_AUDIT_DAYS", str(kept.audit)
             raise SettingsError(name, value, "no shorter than IVEG_KEEP_DECISIONS_DAYS")
 
+        if self.fiware_token_url and not self.fiware_client_id:
+            name = "IVEG_FIWARE_CLIENT_ID"
+            raise SettingsError(name, "", "set where IVEG_FIWARE_TOKEN_URL is")
         if self.sso_issuer and not self.sso_client_id:
             name = "IVEG_SSO_CLIENT_ID"
             raise SettingsError(name, "", "set where IVEG_SSO_ISSUER is")

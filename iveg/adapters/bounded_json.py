@@ -34,6 +34,13 @@ class JsonAnswer:
         """Whether the status is 2xx."""
         return 200 <= self.status < 300
 
+    @property
+    def refusal(self) -> str:
+        """Status and OAuth error code; a description may hold anything."""
+        told = self.body.get("error")
+        known = isinstance(told, str) and told.isascii() and told.isprintable()
+        return f"{self.status} {str(told)[:40]}" if known else str(self.status)
+
 
 class BoundedJson:
     """Asks one server.

@@ -2,12 +2,14 @@
 
 import asyncio
 import socket
-from collections.abc import Mapping, Sequence
-from typing import Any, Self
+from collections.abc import Awaitable, Callable, Mapping, Sequence
+from http import HTTPStatus
+from typing import Any, Self, TypeVar
 
 import httpx
 import orjson
 
+from iveg.adapters.fiware_token import FiwareToken
 from iveg.domain.errors import HopError, NoAnswerError
 
 _NODELAY = [(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)]
@@ -18,8 +20,12 @@ PROBE_TIMEOUT_S = 3.0
 """For a question that a healthy neighbour answers in milliseconds."""
 _MOST_PAGES = 100
 _COUNTED = {"options": "count"}
+NO_TOKEN = "token endpoint down"  # noqa: S105 - a cause
+"""Begins the cause where a request did not leave, as no token could be had."""
+_TOKEN_PART = 0.9
 
 Document = dict[str, Any]
+_T = TypeVar("_T")
 
 
 class FiwareHttp:
@@ -31,12 +37,20 @@ class FiwareHttp:
         service: Tenant.
         path: Service path.
         bearer: Token that is sent along; empty for none.
+        access: Where a proxy before the neighbour asks for a token; None: none does.
     """
 
     def __init__(
-        self, hop: str, url: str, service: str, path: str, bearer: str = ""
+        self,
+        hop: str,
+        url: str,
+        service: str,
+        path: str,
+        bearer: str = "",
+        access: FiwareToken | None = None,
     ) -> None:
         self._hop = hop
+        self._access = access
         headers = {"Fiware-Service": service, "Fiware-ServicePath": path}
         if bearer:
             headers["Authorization"] = f"Bearer {bearer}"
@@ -48,8 +62,10 @@ class FiwareHttp:
         )
 
     async def close(self) -> None:
-        """Close the kept connections."""
+        """Close the kept connections, and those of the token, which others share."""
         await self._client.aclose()
+        if self._access is not None:
+            await self._access.close()
 
     async def ask(
         self,
@@ -73,18 +89,22 @@ class FiwareHttp:
 
         Raises:
             NoAnswerError: no answer in time.
-            HopError: no connection, or another status.
+            HopError: no connection, no token for a proxy, or another status.
         """
+
+        async def send(token: Mapping[str, str]) -> httpx.Response:
+            return await self._client.request(
+                method,
+                path,
+                params=dict(query or {}),
+                json=body,
+                headers={"Accept": "application/json", **token},
+                timeout=timeout_s,
+            )
+
         try:
             async with asyncio.timeout(timeout_s):
-                response = await self._client.request(
-                    method,
-                    path,
-                    params=dict(query or {}),
-                    json=body,
-                    headers={"Accept": "application/json"},
-                    timeout=timeout_s,
-                )
+                response = await self._admitted(send, timeout_s)
         except (TimeoutError, httpx.TimeoutException) as error:
             raise NoAnswerError(
                 self._hop, f"no answer to {method} {path} in {timeout_s:g} s"
@@ -96,6 +116,35 @@ class FiwareHttp:
         if response.is_success or response.status_code in also:
             return response
         raise HopError(self._hop, _complaint(method, path, response))
+
+    async def _admitted(
+        self,
+        send: Callable[[Mapping[str, str]], Awaitable[httpx.Response]],
+        timeout_s: float,
+    ) -> httpx.Response:
+        """The answer with a token where one is asked for; once more after a 401.
+
+        What a proxy refused has not reached the neighbour: sent again, it comes once.
+        """
+        if self._access is None:
+            return await send({})
+        token = await self._token(self._access.current(), timeout_s)
+        response = await send(self._access.header(token))
+        if response.status_code != HTTPStatus.UNAUTHORIZED:
+            return response
+        other = await self._token(self._access.after(token), timeout_s)
+        return response if other is None else await send(self._access.header(other))
+
+    async def _token(self, asked: Awaitable[_T], timeout_s: float) -> _T:
+        # A little less than the whole, so that it is known what was waited for.
+        try:
+            # Not `wait_for`, which in Python 3.11 may swallow a cancellation.
+            async with asyncio.timeout(_TOKEN_PART * timeout_s):
+                return await asked
+        except TimeoutError as error:
+            raise HopError(self._hop, f"{NO_TOKEN}: no answer yet") from error
+        except HopError as error:
+            raise HopError(self._hop, f"{NO_TOKEN}: {error.detail}") from error
 
     def read(self, response: httpx.Response) -> Any:
         """The JSON of an answer.
@@ -175,10 +224,18 @@ class FiwareClient:
         url: Address without a path.
         service: ``Fiware-Service``.
         path: ``Fiware-ServicePath``.
+        access: Where a proxy before it asks for a token; None: none does.
     """
 
-    def __init__(self, hop: str, url: str, service: str, path: str) -> None:
-        self.http = FiwareHttp(hop, url, service, path)
+    def __init__(
+        self,
+        hop: str,
+        url: str,
+        service: str,
+        path: str,
+        access: FiwareToken | None = None,
+    ) -> None:
+        self.http = FiwareHttp(hop, url, service, path, access=access)
 
     async def __aenter__(self) -> Self:
         return self
@@ -192,13 +249,15 @@ class FiwareClient:
 
 
 def _complaint(method: str, path: str, response: httpx.Response) -> str:
-    """The reason of a refusal, short; Orion and the agent use different words."""
+    """The reason of a refusal, short; each neighbour uses another word."""
     said = ""
     try:
         told = orjson.loads(response.content)
     except ValueError:
         told = None
     if isinstance(told, dict):
-        said = str(told.get("description") or told.get("message") or "")[:160]
+        # ``detail`` is a PEP proxy's.
+        words = ("description", "message", "detail")
+        said = next((str(told[one]) for one in words if told.get(one)), "")[:160]
     refused = f"{response.status_code} to {method} {path}"
     return f"{refused}: {said}" if said else refused

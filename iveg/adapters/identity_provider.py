@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Final, Protocol
 from urllib.parse import urlencode
 
-from iveg.adapters.bounded_json import BoundedJson, JsonAnswer
+from iveg.adapters.bounded_json import BoundedJson
 from iveg.domain.errors import SignOnError
 from iveg.domain.records import Json
 
@@ -159,15 +159,8 @@ async def redeem(
         form["client_id"] = client.client_id
     answer = await http.post(url, form, client.login)
     if not answer.is_success:
-        raise SignOnError("untrusted", f"the code was refused: {refusal_of(answer)}")
+        raise SignOnError("untrusted", f"the code was refused: {answer.refusal}")
     return answer.body
-
-
-def refusal_of(answer: JsonAnswer) -> str:
-    """Status and OAuth error code of a refusal; its description may hold anything."""
-    told = answer.body.get("error")
-    known = isinstance(told, str) and told.isascii() and told.isprintable()
-    return f"{answer.status} {told[:40] if known else ''}".strip()  # type: ignore[index]
 
 
 def text_of(told: Mapping[str, object], name: str) -> str:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from iveg.adapters.fiware_http import PROBE_TIMEOUT_S, Document, FiwareClient
+from iveg.adapters.fiware_token import FiwareToken
 from iveg.adapters.orion import OrionClient
 from iveg.adapters.orphan_entities import remove_orphans
 from iveg.domain.equipment import Tile
@@ -27,10 +28,13 @@ class IotAgentClient(FiwareClient):
         url: Address of the north port, such as ``http://127.0.0.1:4041``.
         service: ``Fiware-Service``.
         path: ``Fiware-ServicePath``.
+        access: Where a proxy before it asks for a token; None: none does.
     """
 
-    def __init__(self, url: str, service: str, path: str) -> None:
-        super().__init__("iot_agent", url, service, path)
+    def __init__(
+        self, url: str, service: str, path: str, access: FiwareToken | None = None
+    ) -> None:
+        super().__init__("iot_agent", url, service, path, access)
 
     async def version(self) -> str:
         """The agent's version.

@@ -14,6 +14,7 @@ from iveg.adapters.fiware_http import (
     TIMEOUT_S,
     Document,
 )
+from iveg.adapters.fiware_token import FiwareToken
 from iveg.adapters.orion_subscriptions import OrionSubscriptions
 from iveg.domain.errors import HopError
 from iveg.ngsi import names
@@ -42,10 +43,13 @@ class OrionClient(OrionSubscriptions):
         url: Address of Orion, such as ``http://127.0.0.1:1026``.
         service: ``Fiware-Service``.
         path: ``Fiware-ServicePath``.
+        access: Where a proxy before it asks for a token; None: none does.
     """
 
-    def __init__(self, url: str, service: str, path: str) -> None:
-        super().__init__("orion", url, service, path)
+    def __init__(
+        self, url: str, service: str, path: str, access: FiwareToken | None = None
+    ) -> None:
+        super().__init__("orion", url, service, path, access)
 
     async def version(self) -> str:
         """Orion's version.

@@ -28,6 +28,7 @@ from iveg.adapters.tls import TlsFiles
 from iveg.adapters.trials import FileTrials
 from iveg.adapters.web_push import PushSender
 from iveg.adapters.webhook import WebhookSender
+from iveg.app.fiware import open_fiware
 from iveg.app.sign_on import open_provider
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.fleet import FleetDescription
@@ -141,7 +142,7 @@ def open_outside(
     settings: Settings, data_directory: Path, fleet: FleetDescription
 ) -> Outside:
     """Open the ports that the settings name; nothing is connected yet."""
-    tenant = settings.fiware_service, settings.fiware_servicepath
+    orion, agent = open_fiware(settings)
     broker = BrokerAddress.from_url(
         settings.mqtt_url,
         settings.mqtt_user,
@@ -151,8 +152,8 @@ def open_outside(
     return Outside(
         open_stores(settings, data_directory, fleet),
         MqttLink(broker, "iveg", apart_s=reading_apart_s(len(fleet.ids))),
-        OrionClient(settings.orion_url, *tenant),
-        IotAgentClient(settings.iota_url, *tenant),
+        orion,
+        agent,
         OutboundHttp(),
         open_provider(settings),
     )

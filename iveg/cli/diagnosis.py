@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from iveg.adapters.fiware_http import NO_TOKEN
 from iveg.domain.hops import NEEDS, Check, Hop
 from iveg.domain.probe import SLOW_S, lag_in_words
 
@@ -50,6 +51,7 @@ class Stack:
         user: User name at the broker; empty for anonymous.
         listener: Address that Orion was asked to post to.
         topics: The probe device's topics, up to the last slash.
+        token: Address of the token endpoint; empty: no proxy asks for one.
         lag: Delay of measures, where that is known to be the cause.
         waited_s: Time that the doctor waited for its measure (s).
     """
@@ -62,6 +64,7 @@ class Stack:
     database: str
     page: str
     topics: str
+    token: str = ""
     lag: Lag | None = None
     waited_s: float = 0.0
 
@@ -210,7 +213,31 @@ _NEVER_CAME = (
     "{least}, or never ({said}). First look whether the agent is overloaded: the "
     "processor time it takes, and whether this changes within a minute. If not, "
 )
+
+
+def _at_the_proxy(
+    check: Check, name: str, at: str
+) -> Sequence[tuple[Check, Case, str]]:
+    """What fails before a neighbour: the token endpoint, or a proxy that refuses."""
+    no_token = (
+        f"There is no bearer for {name} ({{said}}), and without one it is not asked: "
+        "look at the token endpoint {at.token} (IVEG_FIWARE_TOKEN_URL), and at client, "
+        "secret and user there."
+    )
+    refused = (
+        f"A proxy before {name} at {at} refuses iVeg ({{said}}): look at the roles "
+        "that it asks for, at IVEG_FIWARE_TOKEN_HEADER, and whether "
+        "IVEG_FIWARE_TOKEN_URL is set."
+    )
+    return (
+        (check, _says(NO_TOKEN), no_token),
+        (check, lambda said, _: said.startswith(("401 ", "403 ")), refused),
+    )
+
+
 _KNOWN_CAUSES: Sequence[tuple[Check, Case, str]] = (
+    *_at_the_proxy(Check.ORION, "Orion", "{at.orion}"),
+    *_at_the_proxy(Check.AGENT, "the IoT Agent", "{at.agent}"),
     (
         Check.BROKER,
         _says("not auth", "password"),

@@ -34,9 +34,8 @@ from iveg.adapters.doctor import (
 )
 from iveg.adapters.fiware_http import FiwareHttp
 from iveg.adapters.history.engine import describe, history_url
-from iveg.adapters.iot_agent import IotAgentClient
-from iveg.adapters.orion import OrionClient
 from iveg.adapters.post_listener import post_listener
+from iveg.app.fiware import open_fiware
 from iveg.cli.diagnosis import (
     Finding,
     Lag,
@@ -103,8 +102,7 @@ class Examination:
         self._patience_s = patience_s
         self._address = broker_of(settings)
         self._database = history_url(settings.database_url, data)
-        self._orion = OrionClient(settings.orion_url, *service)
-        self._agent = IotAgentClient(settings.iota_url, *service)
+        self._orion, self._agent = open_fiware(settings)
         self._page = FiwareHttp(
             Hop.PAGE, _page_url(settings), *service, bearer=settings.api_token
         )
@@ -133,6 +131,7 @@ class Examination:
             database=describe(self._database),
             page=_page_url(settings),
             topics=self._probe.topic(""),
+            token=settings.fiware_token_url,
             lag=self.lag,
             waited_s=self._waited_s,
         )

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 
 from iveg.adapters import clock
-from iveg.adapters.orion import OrionClient
+from iveg.app.fiware import open_fiware
 from iveg.settings import Settings
 
 _LIVE_S = 10.0
@@ -15,8 +15,8 @@ async def live_robot(settings: Settings, robots: Iterable[str]) -> str | None:
     Raises:
         HopError: Orion does not answer.
     """
-    tenant = settings.fiware_service, settings.fiware_servicepath
-    async with OrionClient(settings.orion_url, *tenant) as orion:
+    orion, agent = open_fiware(settings)
+    async with orion, agent:
         for robot_id in robots:
             heard = await orion.modified_at(robot_id)
             if heard is not None and clock.wall() - heard < _LIVE_S:

@@ -4,8 +4,8 @@ import asyncio
 
 from iveg.adapters.equipment_files import load_equipment
 from iveg.adapters.fleet_files import load_fleet
-from iveg.adapters.iot_agent import IotAgentClient, provision
-from iveg.adapters.orion import OrionClient
+from iveg.adapters.iot_agent import provision
+from iveg.app.fiware import open_fiware
 from iveg.settings import Settings
 
 
@@ -13,11 +13,8 @@ def provision_fleet(settings: Settings) -> int:
     """Create or repair the fleet's devices, and print the repairs."""
 
     async def work() -> None:
-        tenant = settings.fiware_service, settings.fiware_servicepath
-        async with (
-            OrionClient(settings.orion_url, *tenant) as orion,
-            IotAgentClient(settings.iota_url, *tenant) as agent,
-        ):
+        orion, agent = open_fiware(settings)
+        async with orion, agent:
             robots = load_fleet(settings.fleet, settings.robots).ids
             done = await provision(
                 agent,

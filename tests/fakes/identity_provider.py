@@ -20,7 +20,6 @@ from functools import cache
 from typing import Any
 from urllib.parse import parse_qs, urlencode, urlsplit
 
-import uvicorn
 from joserfc import jwt
 from joserfc.jwk import ECKey, OctKey, RSAKey
 from starlette.applications import Starlette
@@ -34,6 +33,7 @@ from starlette.responses import (
 )
 from starlette.routing import Route
 
+from tests.fakes.serving import served
 from tests.ports import free_ports
 
 CLIENT, SECRET = "iveg", "a-secret-of-the-client"
@@ -280,30 +280,9 @@ class FakeIdentityProvider:
 @contextlib.asynccontextmanager
 async def serving(provider: FakeIdentityProvider) -> AsyncIterator[None]:
     """The provider, while the test runs."""
-    port = urlsplit(provider.url).port
-    assert port is not None
-    config = uvicorn.Config(
-        provider.app(),
-        host=urlsplit(provider.url).hostname or "",
-        port=port,
-        log_config=None,
-        lifespan="off",
-        ws="none",
-    )
-    server = uvicorn.Server(config)
-    server.capture_signals = contextlib.nullcontext  # type: ignore[method-assign,assignment]
-    task = asyncio.create_task(server.serve())
-    while not server.started:  # noqa: ASYNC110 (uvicorn has no event for it)
-        await asyncio.sleep(0.005)
-    try:
+    address = urlsplit(provider.url)
+    async with served(provider.app(), address.port or 0, address.hostname or ""):
         yield
-    finally:
-        # Its own way to end sleeps for a tenth of a second.
-        task.cancel()
-        with contextlib.suppress(asyncio.CancelledError):
-            await task
-        server.force_exit = True
-        await server.shutdown()
 
 
 def own_url() -> str:

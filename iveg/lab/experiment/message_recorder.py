@@ -26,6 +26,7 @@ from iveg.adapters.subscriptions import (
     WantedSubscription,
     write_subscription,
 )
+from iveg.app.fiware import open_fiware
 from iveg.cli.nodes import broker_of
 from iveg.domain.errors import HopError, UnreadableError
 from iveg.domain.kinds import MEASURED
@@ -128,12 +129,13 @@ async def recorder(settings: Settings) -> AsyncIterator[MessageRecorder]:
         HopError: the broker or Orion does not take it.
     """
     recorded = MessageRecorder()
-    tenant = settings.fiware_service, settings.fiware_servicepath
+    orion, agent = open_fiware(settings)
     host = urlsplit(settings.notify_address).hostname
     async with (
         _hearing(settings, recorded),
         post_listener(recorded.notified, settings.host) as port,
-        OrionClient(settings.orion_url, *tenant) as orion,
+        orion,
+        agent,
     ):
         await _unsubscribe(orion)
         for document in _subscriptions(f"http://{host}:{port}/"):

@@ -9,7 +9,9 @@ import orjson
 import pytest
 
 from iveg.adapters import clock
+from iveg.adapters.bounded_json import BoundedJson
 from iveg.adapters.fiware_http import Document
+from iveg.adapters.fiware_token import HOP, FiwareToken, TokenGrant
 from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.adapters.orion import OrionClient
@@ -23,6 +25,7 @@ from iveg.ngsi import codec, names
 from iveg.pipeline.health_monitor import HealthMonitor
 from iveg.pipeline.ingest import Ingest
 from tests.builders import odometry
+from tests.ports import free_ports
 
 SERVICE = ("agroconnect", "/greenhouse")
 
@@ -62,12 +65,15 @@ class Site:
         orion_url: str = "",
         agent_url: str = "",
         orion: OrionClient | None = None,
+        access: FiwareToken | None = None,
     ) -> None:
         self.heard: list[tuple[str, bytes]] = []
         self.health_monitor = HealthMonitor(clock.now())
         self.ingest = Ingest({"AGI"}.__contains__)
-        self.orion = orion or OrionClient(orion_url or fiware.orion_url, *SERVICE)
-        self.agent = IotAgentClient(agent_url or fiware.iota_url, *SERVICE)
+        self.orion = orion or OrionClient(
+            orion_url or fiware.orion_url, *SERVICE, access
+        )
+        self.agent = IotAgentClient(agent_url or fiware.iota_url, *SERVICE, access)
         self.link = MqttLink(
             BrokerAddress("127.0.0.1", fiware.mqtt_port),
             "test",
@@ -120,6 +126,23 @@ async def test_an_empty_fiware_gets_devices_and_subscriptions(fiware: Running) -
     assert {one["id"] for one in kept} == site.provisioner.subscription_ids
     assert site.health_monitor.agent_error == ""
     assert site.health_monitor.orion_ok_at is not None
+
+
+async def test_without_a_token_for_the_proxy_the_endpoint_is_the_cause_of_both(
+    fiware: Running,
+) -> None:
+    (port,) = free_ports(1)
+    grant = TokenGrant(f"http://127.0.0.1:{port}/oauth2/token", "iveg", "secret")
+    access = FiwareToken(grant, clock.mono, BoundedJson(HOP))
+    async with Site(fiware, access=access).running() as site:
+        health = site.health_monitor
+        await until(lambda: health.orion_error and health.agent_error)
+        causes = (health.orion_error, health.agent_error)
+        cut = health.is_cut(clock.now())
+
+    assert causes == ("token endpoint down: cannot be reached: ConnectError",) * 2
+    # Orders through Orion do not go out: nobody may believe that they do.
+    assert cut
 
 
 async def test_a_subscription_is_ours_as_soon_as_orion_uses_it(

@@ -23,6 +23,7 @@ STACK = Stack(
     database="postgresql://db/iveg",
     page="http://here:8000",
     topics="/iveg/iveg-doctor/",
+    token="http://idm:3005/oauth2/token",
 )
 
 
@@ -94,6 +95,26 @@ def test_a_wrong_password_points_at_the_password_and_not_at_the_broker() -> None
     assert "IVEG_MQTT_PASSWORD" in refused.sentence
     assert "iveg_dss" in refused.sentence
     assert "IVEG_MQTT_URL" in away.sentence
+
+
+@pytest.mark.parametrize("name", ["ORION", "AGENT"])
+def test_a_token_that_cannot_be_had_is_told_from_one_that_a_proxy_refuses(
+    name: str,
+) -> None:
+    check = Check[name]
+    said = {
+        "no_token": "token endpoint down: no answer in 5 s",
+        "refused": "401 to GET /version: User access-token not authorized",
+        "no_role": "403 to GET /version",
+        "away": "cannot be reached: ConnectError",
+    }
+    rows = {one: row(check, found(**{name: why})).sentence for one, why in said.items()}
+
+    assert rows["no_token"].startswith("There is no bearer for ")
+    assert STACK.token in rows["no_token"]
+    assert rows["refused"].startswith("A proxy before ")
+    assert rows["no_role"].startswith("A proxy before ")
+    assert rows["away"].startswith("No ")
 
 
 def test_a_broker_without_echo_points_at_the_access_list() -> None:

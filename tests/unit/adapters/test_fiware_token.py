@@ -1,0 +1,244 @@
+"""The bearer for a PEP proxy: got, kept new, and never left out."""
+
+import asyncio
+import time
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+import pytest
+
+from iveg.adapters.bounded_json import BoundedJson
+from iveg.adapters.fiware_token import HOP, FiwareToken, TokenGrant
+from iveg.adapters.iot_agent import IotAgentClient
+from iveg.adapters.orion import OrionClient
+from iveg.adapters.transports import OrionTransport
+from iveg.domain.errors import HopError
+from iveg.lab.embedded.server import embedded_fiware
+from tests.fakes.clock import FakeClock
+from tests.fakes.pep_proxy import CLIENT, PASSWORD, SECRET, USER, FakePepProxy
+from tests.fakes.serving import served
+
+TENANT = ("agroconnect", "/greenhouse")
+
+
+class Place:
+    """FIWARE behind a proxy, and iVeg's two clients before it."""
+
+    def __init__(self, pep: FakePepProxy, url: str, clock: FakeClock) -> None:
+        self.pep, self.clock, self.url = pep, clock, url
+        self.grant = TokenGrant(f"{url}/oauth2/token", CLIENT, SECRET)
+        self.use(self.grant)
+
+    def use(self, grant: TokenGrant, agent_url: str = "") -> None:
+        """Ask for a token like this from now on."""
+        http = BoundedJson(HOP, timeout_s=2.0)
+        self.token = FiwareToken(grant, lambda: self.clock().mono, http)
+        self.orion = OrionClient(self.url, *TENANT, self.token)
+        self.agent = IotAgentClient(agent_url or self.url, *TENANT, self.token)
+
+
+@asynccontextmanager
+async def place_of(behind: str) -> AsyncIterator[Place]:
+    clock = FakeClock()
+    pep = FakePepProxy(behind, lambda: clock().mono)
+    async with served(pep.app()) as url:
+        place = Place(pep, url, clock)
+        yield place
+        pep.is_released.set()
+        await place.orion.close()
+        await place.agent.close()
+
+
+@pytest.fixture
+async def place() -> AsyncIterator[Place]:
+    async with embedded_fiware() as fiware, place_of(fiware.orion_url) as made:
+        yield made
+
+
+@pytest.mark.parametrize("header", ["Authorization", "X-Auth-Token"])
+async def test_orion_behind_a_proxy_is_read_and_written_with_one_token(
+    place: Place, header: str
+) -> None:
+    place.pep.header = header
+    place.use(TokenGrant(place.grant.url, CLIENT, SECRET, header=header))  # type: ignore[arg-type]
+
+    await asyncio.gather(*(place.orion.version() for _ in range(5)))
+    robots = await place.orion.read_robots()
+
+    assert robots == []
+    assert {token for token, _ in place.pep.seen} == {"token-1"}
+    assert place.pep.forms == [{"grant_type": "client_credentials"}]
+
+
+async def test_the_agent_behind_a_proxy_gets_the_same_header() -> None:
+    async with embedded_fiware() as fiware, place_of(fiware.iota_url) as place:
+        version = await place.agent.version()
+
+    assert version != "unknown"
+    assert place.pep.seen == [("token-1", 200)]
+
+
+async def test_keyrock_gives_a_user_s_token_by_the_password_grant(place: Place) -> None:
+    place.use(TokenGrant(place.grant.url, CLIENT, SECRET, USER, PASSWORD, "permanent"))
+
+    await place.orion.version()
+
+    assert place.pep.forms == [
+        {
+            "grant_type": "password",
+            "username": USER,
+            "password": PASSWORD,
+            "scope": "permanent",
+        }
+    ]
+
+
+async def test_a_token_is_renewed_beside_at_four_fifths_of_its_life(
+    place: Place,
+) -> None:
+    place.pep.life_s = 2.0
+    await place.orion.version()
+    place.clock.now += 1.5
+    await place.orion.version()
+    before = len(place.pep.forms)
+    place.clock.now += 0.2
+    place.pep.vice = "hangs"
+
+    await place.orion.version()  # while the next one hangs, the old one serves
+    place.pep.vice = ""
+    place.pep.is_released.set()
+    assert place.token._asking is not None
+    await asyncio.wait([place.token._asking])
+    place.clock.now += 1.0  # the old one is over
+    await place.orion.version()
+
+    assert before == 1
+    assert [token for token, _ in place.pep.seen] == [*["token-1"] * 3, "token-2"]
+    assert len(place.pep.forms) == 2
+
+
+async def test_a_token_that_is_over_is_never_sent(place: Place) -> None:
+    place.pep.life_s = 2.0
+    await place.orion.version()
+    place.clock.now += 60.0
+    await place.orion.version()
+
+    assert place.pep.seen == [("token-1", 200), ("token-2", 200)]
+
+
+async def test_a_token_that_was_revoked_is_replaced_once_for_all_who_ask(
+    place: Place,
+) -> None:
+    await place.orion.version()
+    place.pep.revoke()
+
+    await asyncio.gather(*(place.orion.version() for _ in range(5)))
+
+    assert len(place.pep.forms) == 2
+    assert place.pep.seen[-5:] == [("token-2", 200)] * 5
+
+
+@pytest.mark.parametrize("times", [1, 20])
+async def test_a_proxy_that_refuses_every_token_is_told_as_such_and_not_flooded(
+    place: Place, times: int
+) -> None:
+    place.pep.life_s = 0.0  # over as soon as given: 401 to each
+    errors = []
+    for _ in range(times):
+        with pytest.raises(HopError) as refused:
+            await place.orion.version()
+        errors.append(refused.value.detail)
+
+    assert set(errors) == {
+        "401 to GET /version: Invalid token: access token is invalid"
+    }
+    assert len(place.pep.forms) == 2
+
+
+async def test_who_has_no_role_at_the_proxy_is_told_by_its_words(place: Place) -> None:
+    place.pep.vice = "no_role"
+
+    with pytest.raises(HopError) as refused:
+        await place.orion.version()
+
+    assert refused.value.hop == "orion"
+    assert refused.value.detail == (
+        "403 to GET /version: User access-token not authorized"
+    )
+
+
+@pytest.mark.parametrize(
+    ("vice", "why"),
+    [
+        ("down", "503 server_error"),
+        ("no_token", "answered no token"),
+        ("wrong_secret", "401 invalid_client"),
+    ],
+)
+async def test_without_a_token_nothing_leaves_and_the_cause_is_the_endpoint_s(
+    place: Place, vice: str, why: str
+) -> None:
+    place.pep.vice = vice
+    if vice == "wrong_secret":
+        place.use(TokenGrant(place.grant.url, CLIENT, "wrong"))
+
+    for client, hop in ((place.orion, "orion"), (place.agent, "iot_agent")):
+        with pytest.raises(HopError) as refused:
+            await client.version()
+        assert (refused.value.hop, refused.value.detail) == (
+            hop,
+            f"token endpoint down: {why}",
+        )
+    assert place.pep.seen == []
+
+
+async def test_an_endpoint_that_is_down_is_asked_ever_less_and_found_again(
+    place: Place,
+) -> None:
+    place.pep.vice = "down"
+    for _ in range(100):  # ten seconds of requests, ten a second
+        with pytest.raises(HopError):
+            await place.orion.version()
+        place.clock.now += 0.1
+    asked = len(place.pep.forms)
+    place.pep.vice = ""
+    place.clock.now += 3.0
+
+    await place.orion.version()
+
+    assert asked == 6  # at 0, 0.5, 1.5, 3.5, 6.5 and 9.5 s
+    assert place.pep.seen == [("token-1", 200)]
+
+
+async def test_a_stop_over_fiware_waits_for_no_token_longer_than_for_orion(
+    place: Place,
+) -> None:
+    place.pep.vice = "hangs"
+    begun = time.monotonic()
+
+    with pytest.raises(HopError, match="token endpoint down: no answer yet"):
+        await OrionTransport(place.orion).stop("AGI", "01A", "ana")
+
+    assert time.monotonic() - begun < 3.0
+    assert place.pep.seen == []
+
+
+async def test_who_gives_up_takes_the_token_from_nobody_else(place: Place) -> None:
+    place.pep.vice = "hangs"
+    first = asyncio.create_task(place.orion.version())
+    second = asyncio.create_task(place.agent.version())
+    while not place.pep.forms:  # noqa: ASYNC110
+        await asyncio.sleep(0)
+    first.cancel()
+    place.pep.is_released.set()
+
+    with pytest.raises(HopError, match="400"):  # Orion has no such path: it was asked
+        await second
+    assert len(place.pep.forms) == 1
+
+
+def test_what_is_secret_stands_in_no_traceback() -> None:
+    shown = repr(TokenGrant("http://a/token", CLIENT, SECRET, USER, PASSWORD))
+
+    assert SECRET not in shown
+    assert PASSWORD not in shown
