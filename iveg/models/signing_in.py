@@ -68,6 +68,9 @@ class UserAccount(Model):
     ends_at: str | None = Field(description="When it ends by itself; null: never.")
     invited_until: str | None = Field(description="Null where no invitation waits.")
     own: bool = Field(description="Of whoever asks: another admin changes it.")
+    provided: bool = Field(
+        description="The identity provider vouches for the person and gives the role."
+    )
 
     @classmethod
     def of(cls, account: Account, now: float, *, own: bool = False) -> "UserAccount":
@@ -81,6 +84,7 @@ class UserAccount(Model):
             ends_at=stamp(account.ends_at),
             invited_until=stamp(account.invited_until if state == "invited" else None),
             own=own,
+            provided=bool(account.provider),
         )
 
 

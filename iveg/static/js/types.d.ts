@@ -1283,6 +1283,8 @@ export type UserAccount = {
   invited_until: string | null;
   /** Of whoever asks: another admin changes it. */
   own: boolean;
+  /** The identity provider vouches for the person and gives the role. */
+  provided: boolean;
 };
 
 /** The webhook; of its secret address only the host is shown, null without one. */

@@ -9,15 +9,22 @@ import pytest
 from sqlalchemy import Connection, text
 
 from iveg.adapters import clock
+from iveg.adapters.admission import Admission
 from iveg.adapters.history.accounts import AccountStore
 from iveg.adapters.history.api_tokens import ApiTokenStore
 from iveg.adapters.history.audit import faults
 from iveg.adapters.history.migrate import upgrade
 from iveg.cli.database import read_history
 from iveg.cli.user import run_user, set_up
-from iveg.domain.accounts import digest_of
+from iveg.domain.accounts import Account, PersonRole, digest_of
 from iveg.domain.audit import CONSOLE
-from iveg.domain.errors import NameTakenError, NotANameError, UnknownNameError
+from iveg.domain.errors import (
+    NameTakenError,
+    NotANameError,
+    ProvidedAccountError,
+    SignOnError,
+    UnknownNameError,
+)
 from iveg.domain.stamps import format_stamp
 from iveg.settings import Settings
 
@@ -89,6 +96,35 @@ def test_a_password_is_changed_by_who_has_the_one_that_is_kept(
     url = console.settings.database_url
     assert read_history(url, lambda one: list(faults(one))) == []
     assert read_history(url, _actions).count("password_changed") == 1
+
+
+def test_whom_a_provider_vouches_for_is_kept_by_id_and_shut_out_from_here(
+    console: Console, capsys: pytest.CaptureFixture[str]
+) -> None:
+    console.call("add", "Ana")
+    told = Account("sso-1a2b3c4d", "Ana", "operator", provider="https://idm.test")
+
+    def vouched(role: PersonRole) -> Account:
+        admission = Admission(console.store, CONSOLE, clock.wall())
+        return admission.vouched(console.store.read(), replace(told, role=role))
+
+    vouched("operator")
+    vouched("operator")
+    name = vouched("viewer").name
+    capsys.readouterr()
+    console.call("list")
+    listed = capsys.readouterr().out
+    console.call("disable", name)
+    with pytest.raises(SignOnError, match="disabled"):
+        vouched("viewer")
+    with pytest.raises(ProvidedAccountError):
+        console.call("role", name, role="admin")
+    console.call("reset", name)
+
+    assert name == "Ana 1a2b3c"
+    assert f"{name}  viewer  active" in listed
+    assert "#invitation=" not in capsys.readouterr().out
+    assert vouched("viewer").provider == "https://idm.test"
 
 
 def test_reset_role_and_disable_end_sessions_and_are_in_the_audit(

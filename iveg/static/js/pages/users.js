@@ -62,9 +62,10 @@ function cellsOf(user, i18n, change) {
   const at = ends[/** @type {keyof typeof ends} */ (state)];
   const ending = state === "active" && at ? "ending" : state;
   const said = i18n.t(`userspage.state.${ending}`);
+  const given = user.provided ? ` · ${i18n.t("userspage.provided")}` : "";
   return [
     make("td", "", name),
-    make("td", "", i18n.t(`header.role.${role}`)),
+    make("td", "", `${i18n.t(`header.role.${role}`)}${given}`),
     make("td", "", at ? `${said} ${dayAndTime(at)}` : said),
     user.own ? make("td", "", i18n.t("userspage.own")) : changesOf(user, i18n, change),
   ];
@@ -72,6 +73,31 @@ function cellsOf(user, i18n, change) {
 
 /** @param {User} user @param {I18n} i18n @param {Change} change */
 function changesOf(user, i18n, change) {
+  const { name } = user;
+  const label = (/** @type {string} */ key) => i18n.t(`userspage.${key}`, { name });
+  const line = make("div", "line");
+  if (!user.provided) line.append(...rolesOf(user, i18n, change));
+  if (!user.provided || user.state === "disabled") {
+    const reset = user.provided ? "let_in" : "reset";
+    line.append(
+      makeTwice(label(reset), label(`${reset}_sure`), () =>
+        change(user, "reset", "POST", {}),
+      ),
+    );
+  }
+  if (user.state !== "disabled")
+    line.append(
+      makeTwice(label("disable"), label("disable_sure"), () =>
+        change(user, "disable", "POST", {}),
+      ),
+    );
+  const cell = make("td");
+  cell.append(line);
+  return cell;
+}
+
+/** @param {User} user @param {I18n} i18n @param {Change} change */
+function rolesOf(user, i18n, change) {
   const { name } = user;
   const label = (/** @type {string} */ key) => i18n.t(`userspage.${key}`, { name });
   const role = make("select");
@@ -82,23 +108,8 @@ function changesOf(user, i18n, change) {
     option.selected = one === user.role;
     role.append(option);
   }
-  const line = make("div", "line");
-  line.append(
-    role,
-    makeTwice(label("give_role"), label("give_role_sure"), () =>
-      change(user, "role", "PUT", { role: role.value }),
-    ),
-    makeTwice(label("reset"), label("reset_sure"), () =>
-      change(user, "reset", "POST", {}),
-    ),
+  const give = makeTwice(label("give_role"), label("give_role_sure"), () =>
+    change(user, "role", "PUT", { role: role.value }),
   );
-  if (user.state !== "disabled")
-    line.append(
-      makeTwice(label("disable"), label("disable_sure"), () =>
-        change(user, "disable", "POST", {}),
-      ),
-    );
-  const cell = make("td");
-  cell.append(line);
-  return cell;
+  return [role, give];
 }

@@ -97,6 +97,25 @@ async def test_a_reset_lets_in_again_who_was_shut_out(desk: AdminsDesk) -> None:
     assert (old, begun) == (401, 204)
 
 
+async def test_whom_the_provider_vouches_for_keeps_its_role_and_is_let_in_again(
+    desk: AdminsDesk,
+) -> None:
+    sso = Account("sso-1", "Luz", "operator", provider="https://idm.test")
+    desk.accounts.known["sso-1"] = sso
+    async with desk.admin() as chief:
+        role = await chief.put("/api/v1/users/sso-1/role", json={"role": "admin"})
+        out = await chief.post("/api/v1/users/sso-1/disable", json={})
+        again = await chief.post("/api/v1/users/sso-1/reset", json={})
+
+    assert (role.status_code, role.json()["type"]) == (409, "urn:iveg:provided-account")
+    assert out.json()["state"] == "disabled"
+    # No invitation: a password would let in whom the provider does not know any more.
+    assert again.json()["code"] is None
+    assert again.json()["user"]["provided"]
+    kept = desk.accounts.known["sso-1"]
+    assert (kept.disabled, kept.invitation, kept.role) == (False, "", "operator")
+
+
 @pytest.mark.parametrize("change", ["reset", "disable", "role"])
 async def test_nobody_changes_their_own_account_so_that_an_admin_stays(
     desk: AdminsDesk, change: str
