@@ -35,8 +35,8 @@ class Session:
         began: Unix time of the sign-in (s); ``seen`` of the last sign of life.
         person: Id of the account; empty in sessions of earlier versions.
         method: How they signed in.
-        until: When it is over at the latest (Unix s); None: no earlier than others.
         proven: When the person proved who they are (Unix s); None: not told.
+        until: When it is over at the latest (Unix s); None: no earlier than others.
         wall: It was left to a screen that everybody passes.
         holder: Id of the account that unlocked a tablet; empty: it is locked.
         acted: When that person last did something (Unix s).
@@ -49,8 +49,8 @@ class Session:
     seen: _UnixTime
     person: str = ""
     method: SignInMethod = "link"
-    until: _UnixTime | None = None
     proven: _UnixTime | None = None
+    until: _UnixTime | None = None
     wall: bool = False
     holder: str = ""
     acted: _UnixTime = 0.0

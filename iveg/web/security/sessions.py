@@ -101,7 +101,7 @@ class Sessions:
         digest = _digest(token)
         proven = proven if method == "sso" else now
         began = Session(
-            digest.hex(), name, role, now, now, person, method, until, proven
+            digest.hex(), name, role, now, now, person, method, proven, until
         )
         self._sessions[digest] = began
         self._keep()

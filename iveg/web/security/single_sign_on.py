@@ -5,8 +5,9 @@ A browser goes to the provider and comes back with a code, which iVeg exchanges:
     begin ──> provider's page ──> finish ──> session, at most IVEG_SSO_HOURS
                                      └─────> refused: why, on the page and in the audit
 
-``begin(anew=True)`` has a person prove once more who they are, and ``finish`` looks at
-``auth_time``: what the session then tells as ``proven_at`` is the provider's word.
+``begin(anew=True)`` (``GET /signin/sso?anew=1&to=PATH``) has a person prove once more
+who they are, and ``finish`` looks at ``auth_time``: what the session then tells as
+``proven_at`` is the provider's word, and None where it gives none.
 """
 
 import asyncio

@@ -170,7 +170,7 @@ async def test_who_has_no_mapped_role_is_told_so_and_is_not_in(
     desk: SignOnDesk, language: str
 ) -> None:
     desk.provider.people["ana-1"] = {**KEYCLOAK, "realm_access": {"roles": ["guest"]}}
-    said = {"es": "no le da ningún papel en iVeg", "en": "gives you no role in iVeg"}
+    said = {"es": "no le da ningún rol en iVeg", "en": "gives you no role in iVeg"}
     async with desk.page() as page:
         page.headers["Accept-Language"] = language
         sent = await page.get("/signin/sso")
