@@ -90,6 +90,12 @@ class Settings:
         "File of the own certificate, by which the broker knows who comes. It and its "
         "key are read at each connection, and a new one connects anew.",
     )
+    broker_access_command: str = setting(
+        "IVEG_BROKER_ACCESS_COMMAND",
+        "",
+        "Program that has the broker follow where a robot is revoked or allowed: "
+        "`--revoke ROBOT` or `--allow ROBOT` is added. Empty: people do so.",
+    )
     mqtt_key: str = setting("IVEG_MQTT_KEY", "", "File of the key of `IVEG_MQTT_CERT`.")
     orion_url: Url = setting(
         "IVEG_ORION_URL", "http://127.0.0.1:1026", "Orion Context Broker, NGSI-v2."

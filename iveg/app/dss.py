@@ -45,13 +45,14 @@ from iveg.domain.stop.drills import Drills
 from iveg.domain.transports import DIRECT, FIWARE
 from iveg.pipeline.audit import AuditTrail
 from iveg.pipeline.backfill import PART as BACKFILL
-from iveg.pipeline.build import Choices, Ports, build, build_services
+from iveg.pipeline.build import Choices, Ports, build
 from iveg.pipeline.equipment import PART as EQUIPMENT
 from iveg.pipeline.latency import hours_of
 from iveg.pipeline.memory import Memory
 from iveg.pipeline.restore import remember
 from iveg.pipeline.retention import PART as RETENTION
 from iveg.pipeline.retention import HistoryUpkeep
+from iveg.pipeline.services import build_services
 from iveg.pipeline.trace import Chronicle, Trace
 from iveg.settings import Settings
 from iveg.web.api import messages

@@ -22,6 +22,7 @@ from iveg.adapters.orion import OrionClient
 from iveg.adapters.outbound import OutboundHttp
 from iveg.adapters.recordings.recorder import InputRecorder
 from iveg.adapters.recordings.writer import WriterSetup
+from iveg.adapters.revocations import BrokerAccessCommand, FileRevocations
 from iveg.adapters.rules import FileRules
 from iveg.adapters.sessions import FileSessions
 from iveg.adapters.tls import TlsFiles
@@ -33,10 +34,10 @@ from iveg.app.sign_on import open_provider
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.fleet import FleetDescription
 from iveg.domain.messages import Channel
-from iveg.pipeline.build import KeptChoices
 from iveg.pipeline.health_monitor import HopState
 from iveg.pipeline.loop import reading_apart_s
 from iveg.pipeline.ports import MessageSender
+from iveg.pipeline.services import KeptChoices
 from iveg.settings import Settings
 
 
@@ -56,6 +57,7 @@ class Stores:
     contacts: FileContacts
     detectors: FileDetectors
     trials: FileTrials
+    revocations: FileRevocations
     sessions: FileSessions
     accounts: AccountStore
     api_tokens: ApiTokenStore
@@ -85,10 +87,13 @@ class Stores:
             self.contacts,
             self.detectors,
             self.trials,
+            self.revocations,
+            BrokerAccessCommand(settings.broker_access_command),
             self.rules.load(first, clock.now()),
             self.contacts.load(),
             self.detectors.load(),
             self.trials.load(),
+            self.revocations.load(),
         )
 
     async def close(self) -> None:
@@ -176,6 +181,7 @@ def open_stores(
         FileContacts(directory / "contacts.jsonl"),
         FileDetectors(directory / "detectors.jsonl"),
         FileTrials(directory / "trial.jsonl"),
+        FileRevocations(directory / "revoked.jsonl"),
         FileSessions(directory / "sessions.jsonl"),
         AccountStore(url),
         ApiTokenStore(url),

@@ -27,6 +27,7 @@ from iveg.domain.observations import (
     UnreadScan,
     kind_of,
 )
+from iveg.domain.revocation import Revocation
 from iveg.domain.stream_order import OrderVerdict, PresentBoot, StreamOrder
 from iveg.domain.transports import FIWARE, TransportId
 
@@ -69,6 +70,7 @@ class RobotState:
         freed_at: When a report last said that it keeps to half speed no longer, by its
             arrival (monotonic, s).
         detector: Whether its pictures are read whole.
+        revoked: Whose word it was that it is heard no more.
         unlabelled: Whether boxes of its newest frame with any came without a frame.
         live_at: When a live safety node last spoke for a robot that the fleet calls a
             recording (monotonic, s): from then on it counts as live.
@@ -97,6 +99,7 @@ class RobotState:
     detections_at: float | None = None
     sighted_at: Instant | None = None
     detector: DetectorEvidence = field(default_factory=DetectorEvidence)
+    revoked: Revocation | None = None
     unlabelled: bool = False
     safety: SafetyReport | None = None
     safety_received: Instant | None = None

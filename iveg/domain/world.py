@@ -93,6 +93,11 @@ class World:
         robot = self.robots.get(robot_id)
         return robot is not None and robot.is_past(kind, boot, seq)
 
+    def is_revoked(self, robot_id: str) -> bool:
+        """Whether a robot is heard no more."""
+        robot = self.robots.get(robot_id)
+        return robot is not None and robot.revoked is not None
+
     def apply(self, received: Received) -> OrderVerdict:
         """Take one observation in.
 

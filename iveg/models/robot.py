@@ -10,6 +10,7 @@ from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.kinds import SENSED, Kind
 from iveg.domain.observations import Instant
 from iveg.domain.quantities import quantities_of, value_of
+from iveg.domain.revocation import BrokerTold
 from iveg.domain.robot_state import Link, RobotState
 from iveg.domain.rule import foresight
 from iveg.domain.stamps import format_stamp
@@ -180,6 +181,35 @@ class Detector(Model):
         )
 
 
+class Revoked(Model):
+    """Who had a robot heard no more."""
+
+    by: str
+    since: str
+    stood: bool = Field(description="Whether the STOP before it was confirmed.")
+
+    @classmethod
+    def of(cls, robot: RobotState) -> "Revoked | None":
+        """None of a robot that is heard."""
+        word = robot.revoked
+        if word is None:
+            return None
+        return cls(by=word.by, since=format_stamp(word.since), stood=word.stood)
+
+
+class RobotAccess(Model):
+    """What came of revoking a robot, or of allowing it again."""
+
+    robot_id: str
+    revoked: Revoked | None
+    broker: BrokerTold = Field(description="What came of asking the broker.")
+
+    @classmethod
+    def of(cls, robot: RobotState, told: BrokerTold) -> "RobotAccess":
+        """Of one robot."""
+        return cls(robot_id=robot.robot_id, revoked=Revoked.of(robot), broker=told)
+
+
 class SensorReading(Model):
     """The newest reading of a small sensor; its quantities by name."""
 
@@ -281,6 +311,7 @@ class _Robot(Model):
         description='What "clear" lacks, its reason first.'
     )
     detector: Detector
+    revoked: Revoked | None = Field(description="Null: it is heard.")
     holds: list[Hold]
     stop: Command | None
     stop_state: str

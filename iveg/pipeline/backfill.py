@@ -96,6 +96,7 @@ class Backfill:
         sink: The history.
         silences: When iVeg heard nothing of a robot.
         reject: Counts what cannot be used: source, reason, detail.
+        is_revoked: Whether a robot is heard no more.
     """
 
     def __init__(
@@ -105,7 +106,9 @@ class Backfill:
         sink: RecordSink,
         silences: Silences,
         reject: Callable[[str, str, str], None],
+        is_revoked: Callable[[str], bool] = lambda _: False,
     ) -> None:
+        self._is_revoked = is_revoked
         self.counters: Counter[str] = Counter()
         self._fleet, self._rule = fleet, rule
         self._sink, self._silences, self._reject = sink, silences, reject
@@ -113,6 +116,9 @@ class Backfill:
 
     def has_room(self, robot_id: str, now: Instant) -> bool:
         """Whether a robot may send another batch now; else it is counted as a flood."""
+        if self._is_revoked(robot_id):
+            self._reject(robot_id, "revoked", "is heard no more")
+            return False
         if self._robots[robot_id].has_room(now.mono):
             return True
         self._reject(robot_id, "late_flood", "")

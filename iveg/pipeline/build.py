@@ -6,16 +6,13 @@ from dataclasses import dataclass, field
 
 from iveg.domain.backfill import Silences
 from iveg.domain.detection_rule import DetectionRule
-from iveg.domain.detector import OutOfService
 from iveg.domain.equipment import Equipment, Tile
 from iveg.domain.events import LogEvent
 from iveg.domain.fleet import FleetDescription
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.latency.watch import LatencyWatch
-from iveg.domain.messages import Channel, Contacts
 from iveg.domain.observations import Instant, Received
 from iveg.domain.rule.obstacles import Obstacles
-from iveg.domain.rule.trial import Trial
 from iveg.domain.stop.drills import Drills
 from iveg.domain.tracking.calibration import Calibrations
 from iveg.domain.tracking.people import People
@@ -25,8 +22,6 @@ from iveg.domain.world import World
 from iveg.pipeline.backfill import PART as BACKFILL
 from iveg.pipeline.backfill import Backfill
 from iveg.pipeline.command import Commander
-from iveg.pipeline.coverage import CoverageMonitor
-from iveg.pipeline.detectors import Detectors
 from iveg.pipeline.equipment import EquipmentMonitor
 from iveg.pipeline.evaluate import Evaluator
 from iveg.pipeline.event_log import EventLog
@@ -35,30 +30,20 @@ from iveg.pipeline.health_monitor import HealthMonitor, HopState
 from iveg.pipeline.ingest import Ingest
 from iveg.pipeline.latency import LatencyMonitor
 from iveg.pipeline.loop import RuleLoop
-from iveg.pipeline.mapping import Mapper
 from iveg.pipeline.margins import MarginTotals
-from iveg.pipeline.messenger import Messenger
 from iveg.pipeline.peer_scans import PeerScans
 from iveg.pipeline.ports import (
-    Clock,
     CommandPort,
-    ContactStore,
-    DetectorStore,
     FleetPort,
-    MessageSender,
-    RuleStore,
     StopJournal,
-    TrialStore,
 )
 from iveg.pipeline.publish import Hub
 from iveg.pipeline.record import RecordSink
-from iveg.pipeline.rules import Rules
 from iveg.pipeline.scans import ScanReader
 from iveg.pipeline.second_witness import SecondWitness
-from iveg.pipeline.shadow import ShadowRule, Trials
+from iveg.pipeline.shadow import ShadowRule
 from iveg.pipeline.slow_time import SlowTime
 from iveg.pipeline.supervision import Supervision
-from iveg.pipeline.things import ThingMarks
 from iveg.pipeline.trace import Trace
 
 Guard = Callable[[str, Callable[..., None]], Callable[..., None]]
@@ -152,40 +137,6 @@ class Pipeline:
         return total
 
 
-@dataclass(frozen=True, slots=True)
-class KeptChoices:
-    """Choices that people made while iVeg ran, and their stores.
-
-    Attributes:
-        rules: Every version of the rule, oldest first.
-        contacts: People outside whom iVeg sends messages.
-        out_of_service: Detectors that nobody waits for, by robot.
-        trial: Of a candidate of the rule.
-    """
-
-    rule_store: RuleStore
-    contact_store: ContactStore
-    detector_store: DetectorStore
-    trial_store: TrialStore
-    rules: Sequence[DetectionRule] = ()
-    contacts: Contacts = field(default_factory=Contacts)
-    out_of_service: Mapping[str, OutOfService] = field(default_factory=dict)
-    trial: Trial | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Services:
-    """Parts beside the rule loop, for people; STOP and speed limits need none."""
-
-    rules: Rules
-    detectors: Detectors
-    things: ThingMarks
-    messenger: Messenger
-    mapper: Mapper
-    coverage: CoverageMonitor
-    trials: Trials
-
-
 def build(
     fleet: FleetDescription, greenhouse: Greenhouse, ports: Ports, choices: Choices
 ) -> Pipeline:
@@ -261,6 +212,7 @@ def _backfill(
         ports.sink,
         silences,
         ingest.reject,
+        evaluator.world.is_revoked,
     )
 
 
@@ -361,31 +313,5 @@ def _inputs(
         note_heard(received)
 
     is_robot = world.robots.__contains__
-    ingest = Ingest(is_robot, log_rejected, world.is_past, passed)
+    ingest = Ingest(is_robot, log_rejected, world.is_past, passed, world.is_revoked)
     return latency, ingest, silences
-
-
-def build_services(
-    parts: Pipeline,
-    kept: KeptChoices,
-    senders: Mapping[Channel, MessageSender],
-    clock: Clock,
-) -> Services:
-    """The parts beside a pipeline; raised alerts reach the messenger."""
-    evaluator, event_log = parts.evaluator, parts.event_log
-    greenhouse, alerts = evaluator.greenhouse, evaluator.alerts
-    messenger = Messenger(
-        kept.contacts, kept.contact_store, senders, alerts, event_log, clock
-    )
-    alerts.on_raised = parts.supervision.guard("messages", messenger.enqueue_raised)
-    rules = Rules(evaluator, kept.rule_store, event_log, kept.rules)
-    store = kept.trial_store
-    return Services(
-        rules,
-        Detectors(parts.world, kept.detector_store, event_log, kept.out_of_service),
-        ThingMarks(evaluator.people, event_log),
-        messenger,
-        Mapper(parts.world, greenhouse.bounds, parts.scans),
-        CoverageMonitor(parts.world, greenhouse),
-        Trials(parts.shadow, evaluator, rules, store, kept.trial, clock),
-    )

@@ -40,6 +40,7 @@ class Ingest:
         rejected: Called once for each new kind of rejection, with source and reason.
         is_past: Whether a message is too old to be read.
         passed: Called with each copy of a message of the fleet, before it is queued.
+        is_revoked: Whether a robot is heard no more.
     """
 
     def __init__(
@@ -48,7 +49,9 @@ class Ingest:
         rejected: Callable[[str, str], None] = lambda _source, _reason: None,
         is_past: Callable[[str, type[Observation], str, int], bool] = lambda *_: False,
         passed: Callable[[Received], None] = lambda _: None,
+        is_revoked: Callable[[str], bool] = lambda _: False,
     ) -> None:
+        self._is_revoked = is_revoked
         self._known = known
         self._passed = passed
         self._is_past = is_past
@@ -70,6 +73,9 @@ class Ingest:
         robot_id = received.observation.robot_id
         if robot_id and not self._known(robot_id):
             self.reject(robot_id, "unknown_robot", str(UnknownRobotError(robot_id)))
+            return
+        if self._is_revoked(robot_id):
+            self.reject(robot_id, "revoked", "is heard no more")
             return
         name = kind_of(received.observation).__name__
         # What we asked for is no message: it would hide that one was lost.

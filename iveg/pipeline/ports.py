@@ -10,6 +10,7 @@ from iveg.domain.goals import CancelOrder, GoalOrder
 from iveg.domain.messages import Contacts, MessageDelivery, OutboundMessage
 from iveg.domain.observations import Instant
 from iveg.domain.peer_scan import PeerScan
+from iveg.domain.revocation import BrokerTold, Revocation
 from iveg.domain.rule.trial import Trial
 
 
@@ -120,6 +121,20 @@ class DetectorStore(Protocol):
 
     async def save(self, out: Mapping[str, OutOfService]) -> None:
         """Put them in the place of those before; returns on disk. Raises HopError."""
+
+
+class RevocationStore(Protocol):
+    """Storage of the robots that are heard no more."""
+
+    async def save(self, revoked: Mapping[str, Revocation]) -> None:
+        """Put them in the place of those before; returns on disk. Raises HopError."""
+
+
+class BrokerAccess(Protocol):
+    """Who decides at the broker which robots come in."""
+
+    async def change(self, robot_id: str, *, admitted: bool) -> BrokerTold:
+        """Have a robot let in no more, or again. Raises HopError."""
 
 
 class ContactStore(Protocol):

@@ -12,8 +12,9 @@ from iveg.domain.stop import Press
 from iveg.models.snapshot import Server, Snapshot, User
 from iveg.pipeline import topics
 from iveg.pipeline.audit import AuditTrail
-from iveg.pipeline.build import Pipeline, Services
+from iveg.pipeline.build import Pipeline
 from iveg.pipeline.ports import Clock, Ids
+from iveg.pipeline.services import Services
 from iveg.web import notifications, problems
 from iveg.web.api import (
     alerts,
@@ -30,6 +31,7 @@ from iveg.web.api import (
     metrics,
     past,
     recordings,
+    revocations,
     robots,
     rule,
     things,
@@ -114,6 +116,7 @@ def live_routers(face: Face) -> Iterator[APIRouter]:
     yield rule.trial_router(beside.trials, beside.rules, clock)
     yield detections.router(evaluator.tracking.newest, face.worker)
     yield detectors.router(beside.detectors, clock)
+    yield revocations.router(beside.revocations)
     yield things.router(beside.things, clock)
     yield messages.router(messages.Desk(beside.messenger, face.new_id, clock))
     yield latency.router(watch, clock, face.worker)

@@ -36,6 +36,7 @@ from iveg.models.robot import (
     Navigation,
     Pose,
     Profile,
+    Revoked,
     Robot,
     SpeedLimit,
     Twist,
@@ -114,6 +115,7 @@ class Views:
                 for one in self._evaluator.missing(robot_id)
             ],
             detector=Detector.of(robot, now),
+            revoked=Revoked.of(robot),
             holds=[] if safety is None else [Hold.of(one) for one in safety.holds],
             stop=None if machine.stop is None else self.command(machine.stop, now),
             stop_state=machine.state,

@@ -49,6 +49,7 @@ export function robot(changes = {}) {
     robot_id: "AGI",
     link: "LIVE",
     situation: situation(),
+    revoked: null,
     mode: "RUNNING",
     pose: { x: 1, y: 2, yaw: 0 },
     twist: { linear: 0.5, angular: 0 },

@@ -155,6 +155,7 @@ GOOD = {
     "IVEG_MQTT_URL": "mqtts://user:pass@broker:8884",
     "IVEG_MQTT_USER": "iveg",
     "IVEG_MQTT_PASSWORD": "pa,ss wörd",
+    "IVEG_BROKER_ACCESS_COMMAND": "deploy/make-secrets",
     "IVEG_MQTT_CA": "/etc/iveg/ca.crt",
     "IVEG_MQTT_CERT": "/etc/iveg/iveg.crt",
     "IVEG_MQTT_KEY": "/etc/iveg/iveg.key",

@@ -50,6 +50,9 @@ def of_robot(robot: RobotState, now: Instant) -> Iterable[Condition]:
             yield Condition.of_robot("P1", "alert.moving_robot_lost", name)
         else:
             yield Condition.of_robot("P2", "alert.robot_lost", name)
+    if robot.revoked is not None:
+        by = robot.revoked.by
+        yield Condition.of_robot("P3", "alert.robot_revoked", name, by=by)
     offset = robot.clock.warning(now, _may_be_late_s(robot, now))
     if offset is not None:
         shown = round(offset, 2)

@@ -956,6 +956,14 @@ export type Recipient = {
   address: string;
 };
 
+/** Who had a robot heard no more. */
+export type Revoked = {
+  by: string;
+  since: string;
+  /** Whether the STOP before it was confirmed. */
+  stood: boolean;
+};
+
 /** One robot with the age of what is said of it. */
 export type Robot = {
   robot_id: string;
@@ -980,6 +988,8 @@ export type Robot = {
   /** What "clear" lacks, its reason first. */
   missing: MissingPremise[];
   detector: Detector;
+  /** Null: it is heard. */
+  revoked: Revoked | null;
   holds: Hold[];
   stop: Command | null;
   stop_state: string;
@@ -995,6 +1005,14 @@ export type Robot = {
   /** The agent's opinion, never believed. */
   cmd_status: string | null;
   battery: Battery | null;
+};
+
+/** What came of revoking a robot, or of allowing it again. */
+export type RobotAccess = {
+  robot_id: string;
+  revoked: Revoked | null;
+  /** What came of asking the broker. */
+  broker: "done" | "failed" | "not_asked";
 };
 
 /** One robot's STOPs: how many, and each step from the press on. */

@@ -82,6 +82,12 @@ AUDITED: Final[Mapping[tuple[str, str], Audited]] = {
     ("PUT", f"{_API}/robots/{{robot_id}}/detector"): Audited(
         "detector", "robot_id", ("in_service",)
     ),
+    ("POST", f"{_API}/robots/{{robot_id}}/revoke"): Audited(
+        "robot_revoked", "robot_id", answered=("revoked", "broker")
+    ),
+    ("POST", f"{_API}/robots/{{robot_id}}/allow"): Audited(
+        "robot_allowed", "robot_id", answered=("broker",)
+    ),
     ("POST", f"{_API}/alerts/{{alert_id}}/acknowledge"): Audited(
         "acknowledge", "alert_id", ("note",), ("key", "robot_id")
     ),

@@ -15,7 +15,7 @@ from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.messages import CHANNELS
 from iveg.domain.observations import Instant
 from iveg.pipeline.audit import AuditTrail
-from iveg.pipeline.build import KeptChoices, build_services
+from iveg.pipeline.services import KeptChoices, build_services
 from iveg.web import notifications
 from iveg.web.api import metrics
 from iveg.web.bounded_http import bounded_http
@@ -30,6 +30,7 @@ from iveg.web.views import Views
 from tests.fakes.detector_store import FakeDetectorStore
 from tests.fakes.messages import FakeContacts, FakeSender
 from tests.fakes.recordings import FakePast, FakeRecordings
+from tests.fakes.revocations import FakeBrokerAccess, FakeRevocations
 from tests.fakes.rule_store import FakeRuleStore, FakeTrialStore
 from tests.fakes.worker import FakeWorker
 from tests.unit.pipeline.desk import FIELD, Desk
@@ -62,13 +63,11 @@ class WebDesk(Desk):
             clock=self.clock,
             trail=self.trail,
         )
-        self.rule_store = FakeRuleStore()
-        self.contact_store = FakeContacts()
-        self.detector_store = FakeDetectorStore()
         self.senders = {name: FakeSender(name) for name in CHANNELS}
-        self.trial_store = FakeTrialStore()
-        kept = self._kept()
-        self.services = build_services(self.parts, kept, {**self.senders}, self.clock)
+        kept = self._kept_choices()
+        self.services = build_services(
+            self.parts, kept, {**self.senders}, self.clock, self.pause
+        )
         self.rules = self.services.rules
         self.counters = Counter({"some": 1})
         self.views = Views(self.parts, lambda: self.counters)
@@ -106,14 +105,22 @@ class WebDesk(Desk):
         self.pages = _pages(self.face.site)
         self.app = build_app(self.face, self.pages, live_routers(self.face))
 
-    def _kept(self) -> KeptChoices:
-        """Nothing yet, and the stores."""
+    def _kept_choices(self) -> KeptChoices:
+        self.rule_store, self.contact_store = FakeRuleStore(), FakeContacts()
+        self.detector_store, self.trial_store = FakeDetectorStore(), FakeTrialStore()
+        self.revocation_store, self.access = FakeRevocations(), FakeBrokerAccess()
         return KeptChoices(
             self.rule_store,
             self.contact_store,
             self.detector_store,
             self.trial_store,
+            self.revocation_store,
+            self.access,
         )
+
+    async def pause(self, seconds: float) -> None:
+        """Who waits for a robot lets time pass."""
+        await self.wait(seconds)
 
     # --- who asks -----------------------------------------------------------------
 

@@ -7,6 +7,7 @@
 import { aboutAge, ageOf, linkOfRobot } from "../core/clock.js";
 import { capitalised, markOf, phrasesOf, situationOf } from "../core/situation.js";
 import { slotOf } from "../core/slots.js";
+import { createAccess } from "./access.js";
 import { createDetector } from "./detector.js";
 import { all, setAttribute, setHidden, setText } from "./dom.js";
 import { createDrill } from "./drill.js";
@@ -39,6 +40,7 @@ export class RobotCard {
   #gauge = createGauge();
   #release;
   #drill;
+  #access;
   #detector;
   #goal;
 
@@ -53,6 +55,7 @@ export class RobotCard {
     app.stops.putOn(this.#parts.stop, this.#robotId);
     this.#release = createRelease(app, card, this.#robotId);
     this.#drill = createDrill(app, card, this.#robotId);
+    this.#access = createAccess(app, card, this.#robotId);
     this.#detector = createDetector(app, card, this.#robotId);
     this.#goal = createGoal(app, card, this.#robotId);
     this.#parts.gauge.append(this.#gauge.svg, this.#gauge.bar);
@@ -73,6 +76,7 @@ export class RobotCard {
     if (dialogs.isOpen(this.#panel)) this.#drawMarginParts(robot);
     this.#release.draw(robot);
     this.#drill.draw(this.#release.factsOf(robot));
+    this.#access.draw(robot);
     this.#detector.draw(robot);
     this.#goal.draw(this.#release.factsOf(robot));
   }
