@@ -27,6 +27,7 @@ from iveg.web.api import (
     tablet,
     tokens,
     users,
+    what_if,
 )
 from iveg.web.api.answers import Json
 from iveg.web.build import build_app, live_routers
@@ -100,6 +101,7 @@ def _past_routers(dss: Dss, pages: routes.Pages) -> Iterator[APIRouter]:
             find_browser(),
         )
     )
+    yield what_if.router(dss.what_ifs, dss.services.rules, clock, worker)
     yield notes.router(queries, dss.pipeline.event_log.log, clock)
     if dss.sign_in_token:
         yield sign_in_code.router(dss.sign_in_token)

@@ -36,6 +36,7 @@ from iveg.app.outside import Outside, open_outside
 from iveg.app.past import Site as PastSite
 from iveg.app.past import picture
 from iveg.app.viewers import Viewers
+from iveg.app.what_if import WhatIfs
 from iveg.domain.errors import HopError, VitalPartError
 from iveg.domain.fleet import FleetDescription
 from iveg.domain.latency.segments import WINDOW_S
@@ -137,6 +138,7 @@ class Dss:
         ]
         site = PastSite.of(settings, self.stores.inputs.folder)
         self.past = Viewers(site, clock.now, has_spare=settings.recordings)
+        self.what_ifs = WhatIfs(self.stores.queries.url, fleet, new_id, clock.now)
         self.worker = Worker(partial(self.pipeline.supervision.failed, "worker"))
         self._attach_reader()
         self.provisioner = self._provisioner()
@@ -283,12 +285,11 @@ class Dss:
             for close in self.on_close:
                 await close()
             self.pipeline.evaluator.leave(clock.now())
-            await self.pipeline.commander.close()
-            await self.pipeline.goals.close()
-            await self.outside.close()
-            self.worker.close()
-            await self.past.close()
-            self.door.close()
+            parts = self.pipeline.commander, self.pipeline.goals, self.outside
+            for part in (*parts, self.past):
+                await part.close()
+            for one in (self.worker, self.what_ifs, self.door):
+                one.close()
 
     async def _live(self) -> None:
         parts = self.pipeline
@@ -302,7 +303,7 @@ class Dss:
 
     def comfort(self) -> dict[str, Work]:
         """All other parts, by name; each may fail by itself."""
-        beside, supervision = self.services, self.pipeline.supervision
+        beside = self.services
         return {
             "costmap": lambda: beside.mapper.run(clock.now),
             "second-witness": lambda: self.pipeline.second_witness.run(clock.now),
@@ -315,10 +316,11 @@ class Dss:
             RECORDINGS: self.stores.inputs.run,
             "past": self.past.run,
             "shadow-rule": beside.trials.run,
+            "what-if": self.what_ifs.run,
             "messages": beside.messenger.run,
             **self.door.comfort(),
             "earlier": self._remember,
-            "loop-watch": LoopWatch(supervision.note_turn).run,
+            "loop-watch": LoopWatch(self.pipeline.supervision.note_turn).run,
         }
 
     async def _last_word(self) -> None:

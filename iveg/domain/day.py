@@ -127,11 +127,11 @@ def slowed_minutes(
         spans.setdefault(key, []).append((one.started_at, end))
     minutes: dict[tuple[str, str | None], float] = defaultdict(float)
     for (reason, lane, _), found in spans.items():
-        minutes[reason, lane] += _length(found) / 60.0
+        minutes[reason, lane] += length(found) / 60.0
     return dict(minutes)
 
 
-def _length(spans: list[tuple[float, float]]) -> float:
+def length(spans: Iterable[tuple[float, float]]) -> float:
     """Length of the union of these spans (s)."""
     total, covered = 0.0, float("-inf")
     for start, end in sorted(spans):

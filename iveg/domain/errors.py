@@ -171,6 +171,18 @@ class TrialRefusedError(IvegError):
         self.why = why
 
 
+class WhatIfRefusedError(IvegError):
+    """No further question about another rule is taken now.
+
+    Attributes:
+        why: ``yours`` (one of the same person is not over) or ``full``.
+    """
+
+    def __init__(self, why: str) -> None:
+        super().__init__(f"No further question is taken now: {why}.")
+        self.why = why
+
+
 class OutboundError(IvegError):
     """An address outside iVeg took no message.
 

@@ -40,6 +40,7 @@ from iveg.models.signing_in import (
 )
 from iveg.models.snapshot import PastWorld, Snapshot
 from iveg.models.thing import Thing
+from iveg.models.what_if import WhatIf
 
 TOLD: tuple[type[Model], ...] = (
     Snapshot,
@@ -70,6 +71,7 @@ TOLD: tuple[type[Model], ...] = (
     RobotAccess,
     Thing,
     Trial,
+    WhatIf,
 )
 """All that a page reads; what they are made of comes with them."""
 _PLAIN = {

@@ -43,6 +43,7 @@ from iveg.domain.errors import (
     UnknownRobotError,
     UnreadableError,
     VersionMissingError,
+    WhatIfRefusedError,
 )
 from iveg.models.base import stamp
 from iveg.ngsi.payloads import all_legible
@@ -167,6 +168,7 @@ def problem_of(error: Exception) -> Problem:
             | ExperimentRefusedError()
             | MarkRefusedError()
             | TrialRefusedError()
+            | WhatIfRefusedError()
         ):
             return Problem(409, str(error), _REFUSED[type(error)], {"why": error.why})
         case UnreadableError():
@@ -203,6 +205,7 @@ _REFUSED: Mapping[type[IvegError], str] = {
     ExperimentRefusedError: "experiment-refused",
     MarkRefusedError: "mark-refused",
     TrialRefusedError: "trial-refused",
+    WhatIfRefusedError: "what-if-refused",
 }
 _PLAIN: tuple[tuple[type[IvegError], int, str], ...] = (
     (NotSignedInError, 401, "not-signed-in"),

@@ -18,6 +18,7 @@ from iveg.adapters.history.cost import CostRows, cost_rows
 from iveg.adapters.history.engine import reading_engine
 from iveg.adapters.history.lists import Filter, Page, R, record_of
 from iveg.adapters.history.migrate import reason_of
+from iveg.adapters.history.rule_inputs import RuleInputs, rule_inputs
 from iveg.adapters.history.tables import (
     alerts,
     command_events,
@@ -224,6 +225,10 @@ class Queries:
         """Poses of robots and positions of people in each second of a range."""
         poses = await self._ask(lambda c: series.poses_of(c, since, until))
         return poses, await self._ask(lambda c: series.people_seen(c, since, until))
+
+    async def rule_inputs(self, since: float, until: float) -> RuleInputs:
+        """What judgements of a range rest on, and what was decided (Unix s)."""
+        return await self._ask(lambda c: rule_inputs(c, since, until))
 
     async def lost_of_day(
         self, since: float, until: float

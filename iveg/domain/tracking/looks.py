@@ -34,13 +34,13 @@ KEPT_FROM = 0.25
 LOOK_S = 0.3
 _SLACK_S = 0.01
 """Pictures at 10 or 30 Hz are a multiple of it apart, nearly."""
-_FORGOTTEN_S = 1.0
+FORGOTTEN_S = 1.0
 _MISS = 1.0
 """Log-odds that 0.3 s without a look cost."""
-_SUREST = 4.0
+SUREST = 4.0
 """Bound of the log-odds: no number of looks makes certain (0.982)."""
 _NEAR_M = 1.0
-_FARTHEST_M = _NEAR_M + LIMITS.walking_m_s * _FORGOTTEN_S
+_FARTHEST_M = _NEAR_M + LIMITS.walking_m_s * FORGOTTEN_S
 MOST_SUSPECTS = 64
 """Of each robot; the one not seen for longest gives way."""
 
@@ -119,7 +119,7 @@ class _Suspect:
 
     def is_over(self, now: float) -> bool:
         """Whether nothing is left of it."""
-        return now - self.seen_at > _FORGOTTEN_S or self.log_odds < 0.0
+        return now - self.seen_at > FORGOTTEN_S or self.log_odds < 0.0
 
     def reaches(self, one: FaintPerson, now: float) -> float | None:
         """How far from it a detection is (m); None: too far to be the same."""
@@ -130,7 +130,7 @@ class _Suspect:
     @property
     def log_odds(self) -> float:
         """As they stand, without other robots' looks."""
-        return min(_SUREST, self.odds + self.look)
+        return min(SUREST, self.odds + self.look)
 
 
 @dataclass(slots=True)
@@ -221,7 +221,7 @@ def _judged(
 ) -> Looks:
     """What all who look at a suspect know, which may confirm it."""
     seen_by = [suspect, *(one for one in others if one is not None)]
-    odds = min(_SUREST, sum(one.log_odds for one in seen_by))
+    odds = min(SUREST, sum(one.log_odds for one in seen_by))
     count, probability = sum(one.count for one in seen_by), 1 / (1 + math.exp(-odds))
     # One look alone is a box like any other.
     is_enough = count > 1 and probability >= least

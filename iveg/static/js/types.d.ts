@@ -1277,6 +1277,38 @@ export type TrialDifference = {
   ended: string | null;
 };
 
+/** What came of it, of the whole fleet. */
+export type TriedOutcome = {
+  /** Reason → seconds of a robot slowed. */
+  slowed_s: Record<string, number>;
+  /** Reason → how often a robot was slowed. */
+  encounters: Record<string, number>;
+  near_misses: number;
+  /** Unslowed near somebody (s). */
+  near_s: number;
+  /** Driving that was not driven (s). */
+  lost_s: number;
+};
+
+/** Parameters of the rule, those that people cannot change among them. */
+export type TriedParameters = {
+  confidence_threshold: number;
+  radius_m: number;
+  /** So far outside a robot is let go (m). */
+  release_beyond_m: number;
+  /** And so long after (s). */
+  release_after_s: number;
+  factor: number;
+  /** 0: it does not look ahead. */
+  foresight_s: number;
+};
+
+/** One point of the curve. */
+export type TriedPoint = {
+  value: number;
+  outcome: TriedOutcome;
+};
+
 /** Speed (m/s) and turn rate (rad/s). */
 export type Twist = {
   linear: number;
@@ -1312,6 +1344,35 @@ export type WebhookChannel = {
   host: string | null;
   least: "P1" | "P2";
   last: Told[];
+};
+
+/** A question about another rule, and how far its answer is. */
+export type WhatIf = {
+  id: string;
+  by: string;
+  state: "waiting" | "running" | "done" | "failed" | "cancelled";
+  /** 0 to 1. */
+  progress: number;
+  why: string | null;
+  since: string;
+  until: string;
+  vary: string;
+  in_force: TriedParameters;
+  candidate: TriedParameters;
+  answer: WhatIfAnswer | null;
+};
+
+/** The answer to a question. */
+export type WhatIfAnswer = {
+  /** Rows that it rests on; ``detections`` likewise. */
+  poses: number;
+  detections: number;
+  /** Reason → seconds by the decisions of then. */
+  recorded_slowed_s: Record<string, number>;
+  recorded_encounters: Record<string, number>;
+  in_force: TriedOutcome;
+  candidate: TriedOutcome;
+  curve: TriedPoint[];
 };
 
 /** The least margin of today, when it was, and of how many looks. */

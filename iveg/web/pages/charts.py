@@ -149,18 +149,36 @@ def confidence_figure(
     ]
     layout: dict[str, object] = {"barmode": "stack", "xaxis": {"range": [0, 1]}}
     if threshold is not None:
-        layout["shapes"] = [
-            {
-                "type": "line",
-                "name": "threshold",
-                "x0": threshold,
-                "x1": threshold,
-                "yref": "paper",
-                "y0": 0,
-                "y1": 1,
-            }
-        ]
+        layout["shapes"] = [_mark(threshold, "threshold")]
     return figure_of(traces, ("confidence", "count"), layout)
+
+
+def what_if_figure(
+    values: Sequence[float],
+    lines: Mapping[str, Sequence[float]],
+    axes: tuple[str, str],
+    in_force: float,
+) -> bytes:
+    """Lines over one parameter of the rule, whose value in force is marked; as JSON."""
+    traces = [
+        {
+            "type": "scatter",
+            "mode": "lines+markers",
+            "name": name,
+            "meta": {"kind": f"what_if_{name}", "is_plain": True},
+            "x": list(values),
+            "y": [round(one, 2) for one in line],
+        }
+        for name, line in lines.items()
+    ]
+    layout = {"yaxis": {"rangemode": "tozero"}, "shapes": [_mark(in_force, "in_force")]}
+    return figure_of(traces, axes, layout)
+
+
+def _mark(value: float, name: str) -> _Trace:
+    """A line over the whole height."""
+    height = {"yref": "paper", "y0": 0, "y1": 1}
+    return {"type": "line", "name": name, "x0": value, "x1": value, **height}
 
 
 def stop_figure(latencies: Sequence[CommandLatency]) -> bytes:

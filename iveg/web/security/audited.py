@@ -104,6 +104,10 @@ AUDITED: Final[Mapping[tuple[str, str], Audited]] = {
     ("POST", f"{_API}/rule/trial/promote"): Audited(
         "trial_promoted", asked=("version",), answered=("version",)
     ),
+    ("POST", f"{_API}/what-if"): Audited(
+        "what_if", asked=("since", "until", *_RULE, "vary"), answered=("id",)
+    ),
+    ("DELETE", f"{_API}/what-if/{{job_id}}"): Audited("what_if_ended", "job_id"),
     ("POST", f"{_API}/notes"): Audited(
         "note", asked=("text", "at", "x", "y", "robot_id", "decision_id")
     ),

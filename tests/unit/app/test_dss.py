@@ -35,4 +35,5 @@ async def test_mqtt_and_the_rule_loop_alone_share_the_fate_of_the_process(
         "past",
         "recordings",
         "shadow-rule",
+        "what-if",
     }

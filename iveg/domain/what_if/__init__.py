@@ -1,0 +1,1 @@
+"""What other parameters of the rule would have done with what was kept."""
