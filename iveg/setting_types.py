@@ -80,6 +80,7 @@ def _read_name(text: str) -> str:
 
 
 Port = Annotated[int, Interval(ge=1, le=65535), "a port from 1 to 65535"]
+FoxglovePort = Annotated[int, Interval(ge=0, le=65535), "a port, or 0 for none"]
 Switch = Annotated[
     bool,
     BeforeValidator(lambda text: {"on": True, "off": False}.get(text.lower())),

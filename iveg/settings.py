@@ -25,6 +25,7 @@ from iveg.setting_types import (
     Database,
     Days,
     DirectRead,
+    FoxglovePort,
     Gigabytes,
     Hex,
     Hours,
@@ -343,6 +344,12 @@ class Settings:
         "IVEG_KEEP_RECORDINGS_GB",
         10,
         "The same (10^9 bytes of all of them; 0: any).",
+    )
+    foxglove: FoxglovePort = setting(
+        "IVEG_FOXGLOVE",
+        0,
+        "Port on 127.0.0.1 where Foxglove looks on (docs/interfaces/recordings.md); "
+        "0: none.",
     )
     uplink: Literal["per-topic", "single"] = setting(
         "IVEG_UPLINK",

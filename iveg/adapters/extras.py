@@ -12,13 +12,14 @@ from iveg.domain.errors import MissingExtraError
 
 EXTRAS: Final = {
     "bags": "rosbags",
+    "foxglove": "foxglove",
     "parquet": "pyarrow",
     "passkeys": "webauthn",
     "postgresql": "psycopg",
     "ros2": "cyclonedds",
     "sso": "authlib",
 }
-"""Extra → the library that it brings."""
+"""Extra → the module of the library that it brings."""
 
 
 def has_extra(extra: str) -> bool:

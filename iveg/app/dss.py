@@ -313,7 +313,7 @@ class Dss:
             "history": self.stores.recorder.run,
             EQUIPMENT: lambda: self.pipeline.equipment.run(clock.now),
             RETENTION: lambda: self.upkeep.run(clock.now),
-            RECORDINGS: self.stores.inputs.run,
+            **self.stores.comfort(),
             "past": self.past.run,
             "shadow-rule": beside.trials.run,
             "what-if": self.what_ifs.run,

@@ -1,5 +1,6 @@
 """Ports of the server to the world outside its process: network and disk."""
 
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,6 +21,9 @@ from iveg.adapters.mail import MailSender, Write
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.adapters.orion import OrionClient
 from iveg.adapters.outbound import OutboundHttp
+from iveg.adapters.recordings.live_feed import PART as FOXGLOVE
+from iveg.adapters.recordings.live_feed import DoorSetup, LiveFeed
+from iveg.adapters.recordings.recorder import PART as RECORDINGS
 from iveg.adapters.recordings.recorder import InputRecorder
 from iveg.adapters.recordings.writer import WriterSetup
 from iveg.adapters.revocations import BrokerAccessCommand, FileRevocations
@@ -63,6 +67,7 @@ class Stores:
     api_tokens: ApiTokenStore
     passkeys: PasskeyStore
     inputs: InputRecorder
+    live: LiveFeed | None
 
     def history_state(self) -> HopState:
         """State of the history."""
@@ -76,6 +81,11 @@ class Stores:
             self.directory,
             drop_recording=self.inputs.drop_oldest,
         )
+
+    def comfort(self) -> dict[str, Callable[[], Awaitable[None]]]:
+        """Parts that take in what comes, by name."""
+        live = {} if self.live is None else {FOXGLOVE: self.live.run}
+        return {RECORDINGS: self.inputs.run, **live}
 
     def kept_choices(self, settings: Settings) -> KeptChoices:
         """Choices of earlier runs; the settings have the rule where there is none."""
@@ -172,6 +182,8 @@ def open_stores(
     database = sqlite_file(url)
     directory = data_directory if database is None else database.parent
     directory.mkdir(parents=True, exist_ok=True)
+    door = DoorSetup(settings.foxglove, settings.apikey, fleet.ids)
+    live = LiveFeed(door) if settings.foxglove else None
     return Stores(
         directory,
         Recorder(url, journal_file(url, directory)),
@@ -195,5 +207,7 @@ def open_stores(
             ),
             clock.now,
             is_on=settings.recordings,
+            live=live,
         ),
+        live,
     )

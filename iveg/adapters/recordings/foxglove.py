@@ -68,6 +68,29 @@ _ENTITY = _object(
     cubes=_list(_CUBE),
 )
 _SCENE = _object(deletions=_list(_object()), entities=_list(_ENTITY))
+_TRANSFORMS = Channel("/tf", "foxglove.FrameTransform", _TRANSFORM)
+
+
+def channels_of(robot_id: str) -> tuple[Channel, ...]:
+    """All channels that messages of a robot are told on."""
+    return (
+        _pose_channel(robot_id),
+        _TRANSFORMS,
+        _scan_channel(robot_id),
+        _scene_channel(robot_id),
+    )
+
+
+def _pose_channel(robot_id: str) -> Channel:
+    return Channel(f"/{robot_id}/pose", "foxglove.PoseInFrame", _POSE_IN_FRAME)
+
+
+def _scan_channel(robot_id: str) -> Channel:
+    return Channel(f"/{robot_id}/scan", "foxglove.LaserScan", _SCAN)
+
+
+def _scene_channel(robot_id: str) -> Channel:
+    return Channel(f"/{robot_id}/detections", "foxglove.SceneUpdate", _SCENE)
 
 
 def told(observation: Observation, wall: float) -> Iterator[Told]:
@@ -85,13 +108,13 @@ def told(observation: Observation, wall: float) -> Iterator[Told]:
 
 
 def _pose(robot_id: str, at: Mapping[str, int], pose: Pose2D) -> Told:
-    channel = Channel(f"/{robot_id}/pose", "foxglove.PoseInFrame", _POSE_IN_FRAME)
-    return channel, {"timestamp": at, "frame_id": _MAP, "pose": _as_pose(pose)}
+    told = {"timestamp": at, "frame_id": _MAP, "pose": _as_pose(pose)}
+    return _pose_channel(robot_id), told
 
 
 def _transform(base: str, at: Mapping[str, int], pose: Pose2D) -> Told:
     placed = _as_pose(pose)
-    return Channel("/tf", "foxglove.FrameTransform", _TRANSFORM), {
+    return _TRANSFORMS, {
         "timestamp": at,
         "parent_frame_id": _MAP,
         "child_frame_id": base,
@@ -102,8 +125,7 @@ def _transform(base: str, at: Mapping[str, int], pose: Pose2D) -> Told:
 
 def _scan(scan: LaserScan, base: str, at: Mapping[str, int]) -> Told:
     last = scan.angle_min + scan.angle_increment * max(0, scan.ranges.size - 1)
-    channel = Channel(f"/{scan.robot_id}/scan", "foxglove.LaserScan", _SCAN)
-    return channel, {
+    return _scan_channel(scan.robot_id), {
         "timestamp": at,
         "frame_id": base,
         "pose": _as_pose(scan.mount),
@@ -115,12 +137,11 @@ def _scan(scan: LaserScan, base: str, at: Mapping[str, int]) -> Told:
 
 
 def _scene(frame: DetectionFrame, base: str, at: Mapping[str, int]) -> Told:
-    channel = Channel(f"/{frame.robot_id}/detections", "foxglove.SceneUpdate", _SCENE)
     entities = [
         _entity(f"{frame.robot_id}-{number}", one, base, at)
         for number, one in enumerate(frame.detections)
     ]
-    return channel, {"deletions": [], "entities": entities}
+    return _scene_channel(frame.robot_id), {"deletions": [], "entities": entities}
 
 
 def _entity(

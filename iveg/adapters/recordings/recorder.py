@@ -20,6 +20,7 @@ import orjson
 from iveg.adapters.recordings.directory import RecordingDirectory, finish_broken
 from iveg.adapters.recordings.excerpt import write_excerpt
 from iveg.adapters.recordings.incoming import Sort, pack
+from iveg.adapters.recordings.live_feed import LiveFeed
 from iveg.adapters.recordings.writer import PRUNE_S, WriterSetup
 from iveg.adapters.recordings.writer_process import WriterProcess
 from iveg.adapters.worker import Worker
@@ -66,6 +67,7 @@ class InputRecorder:
         setup: Of the process that writes.
         clock: For the time of rows.
         is_on: Whether anything is recorded; what there is, is kept in bounds anyway.
+        live: Is shown all messages, too.
 
     Attributes:
         counters: Inputs ``recordings_written``, and ``recordings_dropped`` for want of
@@ -73,10 +75,18 @@ class InputRecorder:
         rule: Tells the rule in force, of which each version is recorded.
     """
 
-    def __init__(self, setup: WriterSetup, clock: Clock, *, is_on: bool = True) -> None:
-        self.counters: Counter[str] = Counter()
+    def __init__(
+        self,
+        setup: WriterSetup,
+        clock: Clock,
+        *,
+        is_on: bool = True,
+        live: LiveFeed | None = None,
+    ) -> None:
+        self.counters = Counter[str]() if live is None else live.counters
         self.rule: Callable[[], DetectionRule | None] = lambda: None
         self._setup, self._clock, self._is_on = setup, clock, is_on
+        self._live = live
         self._directory = RecordingDirectory(setup.folder)
         # What a crash left takes minutes: not in this process.
         self._apart = Worker(limit_s=RESCUE_S)
@@ -90,6 +100,8 @@ class InputRecorder:
 
     def measure(self, topic: str, payload: bytes, at: Instant) -> None:
         """A robot's own message, read from the broker."""
+        if self._live is not None:
+            self._live.measure(topic, payload, at)
         if self._is_on:
             self._queue(pack(Sort.MEASURE, at, topic, payload))
 
@@ -101,6 +113,8 @@ class InputRecorder:
         Of a scan that its twin has overtaken nothing but its identity was read, and
         nothing else is recorded: its numbers are those of its twin.
         """
+        if self._live is not None:
+            self._live.notification(body, at)
         if self._is_on:
             told = _NUMBERS.sub(b"[]", body) if _are_twins(observed) else body
             self._queue(pack(Sort.NOTIFICATION, at, "", told))

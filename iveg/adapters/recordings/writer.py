@@ -177,11 +177,16 @@ def _say(answers: BinaryIO, writer: RecordingWriter) -> None:
         answers.write(orjson.dumps(told) + b"\n")
 
 
-def main() -> None:
-    """Signals are the feeder's to heed; its end is the writer's."""
+def heed_no_signals() -> None:
+    """Of a process that ends with its feeder, and is less urgent than that."""
     for one in (signal.SIGINT, signal.SIGTERM):
         signal.signal(one, signal.SIG_IGN)
     give_way()
+
+
+def main() -> None:
+    """Signals are the feeder's to heed; its end is the writer's."""
+    heed_no_signals()
     with (
         open(0, "rb", buffering=0) as source,
         open(1, "wb", buffering=0) as answers,
