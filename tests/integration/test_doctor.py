@@ -10,6 +10,7 @@ import httpx
 import orjson
 import pytest
 
+from iveg.adapters import clock
 from iveg.adapters.history.migrate import upgrade
 from iveg.adapters.iot_agent import IotAgentClient, provision
 from iveg.adapters.orion import OrionClient
@@ -20,6 +21,8 @@ from iveg.domain.hops import Check
 from iveg.lab.embedded.http_server import Request, Response, http_server
 from iveg.lab.embedded.server import Running
 from iveg.settings import Settings
+from tests.fakes.pep_proxy import CLIENT, SECRET, FakePepProxy
+from tests.fakes.serving import served
 from tests.faulty_fiware import MODULE, Faults, fail, faulty_fiware, heard_late
 from tests.integration.emulator_cloud import until
 from tests.ports import free_ports
@@ -97,6 +100,34 @@ async def test_a_whole_chain_is_well_and_nothing_of_the_doctors_stays(
     assert states == dict.fromkeys(Check, "ok")
     assert examination.left_behind == []
     assert await leftovers(up) == []
+
+
+async def test_behind_pep_proxies_all_is_well_until_one_of_them_refuses(
+    up: Running, settings: Settings, tmp_path: Path
+) -> None:
+    orion = FakePepProxy(up.orion_url, clock.mono)
+    agent = FakePepProxy(up.iota_url, clock.mono, given=orion.given)
+    async with served(orion.app()) as orion_url, served(agent.app()) as agent_url:
+        behind = replace(
+            settings,
+            orion_url=orion_url,
+            iota_url=agent_url,
+            iota_cb_url=up.orion_url,
+            fiware_token_url=f"{orion_url}/oauth2/token",
+            fiware_client_id=CLIENT,
+            fiware_client_secret=SECRET,
+        )
+        whole, _ = await examine(behind, tmp_path)
+        orion.vice = "no_role"
+        refused, examination = await examine(behind, tmp_path)
+        rows = judge(examination.findings, examination.stack)
+        (said,) = (row.sentence for row in rows if row.check == Check.ORION)
+
+    assert whole == dict.fromkeys(Check, "ok")
+    assert (refused[Check.ORION], refused[Check.AGENT]) == ("failed", "ok")
+    assert said.startswith(f"A proxy before Orion at {orion_url} refuses iVeg (403")
+    assert await leftovers(up) == []
+    assert {status for token, status in agent.seen if not token} == set()
 
 
 async def test_a_group_that_was_there_stays(
