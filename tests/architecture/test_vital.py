@@ -4,7 +4,7 @@ import tomllib
 
 from tests.processes import ROOT
 
-_WIRES = {"iveg.pipeline.build"}
+_WIRES = {"iveg.pipeline.build", "iveg.pipeline.services"}
 """Gives comfort to what is vital; holds none of it."""
 
 

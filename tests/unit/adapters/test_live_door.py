@@ -64,14 +64,14 @@ async def test_a_client_sees_poses_in_map_and_every_write_is_refused(
         assert (await _said(line))["capabilities"] == []
         offered = {one["topic"]: one for one in (await _said(line))["channels"]}
         # Nobody looks on: nothing is packed.
-        inputs.measure(ODOM, pose, at(0.0), is_scan=False)
+        inputs.measure(ODOM, pose, at(0.0))
         assert not feed.waiting
         wanted = {"id": 7, "channelId": offered["/tf"]["id"]}
         await line.send(
             orjson.dumps({"op": "subscribe", "subscriptions": [wanted]}).decode()
         )
         await _until(feed, looked_on=True)
-        inputs.measure(ODOM, pose, at(1.0), is_scan=False)
+        inputs.measure(ODOM, pose, at(1.0))
         shown = await line.recv()
         assert isinstance(shown, bytes)
         assert _HEAD.unpack_from(shown)[:2] == (1, 7)
