@@ -7,7 +7,7 @@ from pathlib import Path
 from iveg.adapters import clock
 from iveg.adapters.admission import Admission, admit_program, has_admin
 from iveg.adapters.doctor import check_database
-from iveg.adapters.history.accounts import AccountStore
+from iveg.adapters.history.accounts import AccountRows, AccountStore
 from iveg.adapters.history.api_tokens import ApiTokenStore
 from iveg.adapters.history.engine import history_url
 from iveg.cli.running import page_address
@@ -45,7 +45,7 @@ def run_user(options: argparse.Namespace, settings: Settings, data: Path) -> int
             tokens.revoke(options.name, CONSOLE)
             print(f"{options.name} is out within a second.")
         else:
-            _act(options, settings, store)
+            print(store.together(lambda rows: _act(options, settings, rows)))
         if options.action == "list":
             print(*_programs(tokens.read().values()), sep="\n", end="")
     finally:
@@ -54,24 +54,22 @@ def run_user(options: argparse.Namespace, settings: Settings, data: Path) -> int
     return 0
 
 
-def _act(options: argparse.Namespace, settings: Settings, store: AccountStore) -> None:
+def _act(options: argparse.Namespace, settings: Settings, rows: AccountRows) -> str:
+    """One action on accounts; returns what is to be printed when it is kept."""
     now = clock.wall()
-    admission = Admission(store, CONSOLE, now)
+    admission = Admission(rows, CONSOLE, now)
     if options.action == "list":
-        print(*_told(store.read().values()), sep="\n")
-    elif options.action == "add":
+        return "\n".join(_told(rows.read().values()))
+    if options.action == "add":
         made = (options.name, options.role, _end(options, now))
-        invitation, _ = admission.add(*made)
-        _print_invitation(settings, invitation)
-    elif options.action == "reset":
-        invitation, _ = admission.reset(_find(store, options.name))
-        _print_invitation(settings, invitation)
-    elif options.action == "role":
-        changed = admission.give_role(_find(store, options.name), options.role)
-        print(f"{changed.name} is {changed.role}, and signs in anew.")
-    else:
-        off = admission.disable(_find(store, options.name))
-        print(f"{off.name} is out within a second.")
+        return _invited(settings, admission.add(*made)[0])
+    found = _find(rows, options.name)
+    if options.action == "reset":
+        return _invited(settings, admission.reset(found)[0])
+    if options.action == "role":
+        changed = admission.give_role(found, options.role)
+        return f"{changed.name} is {changed.role}, and signs in anew."
+    return f"{admission.disable(found).name} is out within a second."
 
 
 def _end(options: argparse.Namespace, now: float) -> float | None:
@@ -81,10 +79,14 @@ def _end(options: argparse.Namespace, now: float) -> float | None:
 
 def set_up(store: AccountStore, now: float) -> str | None:
     """An invitation for the first admin; None where somebody is admin already."""
-    known = store.read().values()
+    return store.together(lambda rows: _set_up(rows, now))
+
+
+def _set_up(rows: AccountRows, now: float) -> str | None:
+    known = rows.read().values()
     if has_admin(known, now):
         return None
-    admission = Admission(store, CONSOLE, now)
+    admission = Admission(rows, CONSOLE, now)
     waiting = [one for one in known if name_key(one.name) == FIRST_ADMIN]
     if waiting:
         return admission.reset(waiting[0], SET_UP_S)[0]
@@ -96,20 +98,19 @@ def invitation_link(settings: Settings, invitation: str) -> str:
     return f"{page_address(settings)}/signin#invitation={invitation}"
 
 
-def _find(store: AccountStore, name: str) -> Account:
+def _find(rows: AccountRows, name: str) -> Account:
     key = name_key(name)
-    for one in store.read().values():
+    for one in rows.read().values():
         if name_key(one.name) == key:
             return one
     raise UnknownNameError("account", name)
 
 
-def _print_invitation(settings: Settings, invitation: str) -> None:
+def _invited(settings: Settings, invitation: str) -> str:
     if not invitation:
-        print("They may sign in at the identity provider again.")
-        return
-    print("Their link, which works once and for 3 days:")
-    print(invitation_link(settings, invitation))
+        return "They may sign in at the identity provider again."
+    link = invitation_link(settings, invitation)
+    return f"Their link, which works once and for 3 days:\n{link}"
 
 
 def _told(accounts: Iterable[Account]) -> Iterable[str]:

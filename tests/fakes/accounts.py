@@ -1,13 +1,16 @@
 """Accounts and passkeys in memory, and passwords that are checked without Argon2."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from typing import TypeVar
 
 from iveg.adapters.passwords import Passwords
 from iveg.domain.accounts import Account, Language, name_key
 from iveg.domain.audit import Actor
 from iveg.domain.errors import HopError, NameTakenError, UnknownNameError
 from iveg.domain.passkeys import Passkey
+
+_T = TypeVar("_T")
 
 
 class FakeAccounts:
@@ -22,6 +25,9 @@ class FakeAccounts:
         if self.is_away:
             raise HopError("database", "away")
         return dict(self.known)
+
+    def together(self, work: Callable[["FakeAccounts"], _T]) -> _T:
+        return work(self)
 
     def add(self, account: Account, by: Actor) -> None:
         keys = {name_key(one.name) for one in self.known.values()}

@@ -1,20 +1,32 @@
 """Accounts in the history's database; each change with its row of the audit."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
+from typing import TypeVar
 
 from sqlalchemy import Connection, delete, select, update
 
-from iveg.adapters.history.named_rows import NamedRows, note_change
+from iveg.adapters.history.named_rows import NamedRows, add_row, note_change
 from iveg.adapters.history.tables import accounts, passkeys
 from iveg.domain.accounts import Account, Language
 from iveg.domain.audit import Actor
 
+_T = TypeVar("_T")
 
-class AccountStore(NamedRows[Account]):
-    """Reads, by id, and changes accounts."""
 
-    def __init__(self, database_url: str) -> None:
-        super().__init__(database_url, accounts, Account, "account_id")
+class AccountRows:
+    """Accounts within one transaction: what was read stays so until it is over."""
+
+    def __init__(self, connection: Connection) -> None:
+        self._connection = connection
+
+    def read(self) -> Mapping[str, Account]:
+        """All accounts, by id, which nobody else changes meanwhile."""
+        columns = [one for one in accounts.c if one.key != "name_key"]
+        # SQLite has one writer at a time, and no such words.
+        wanted = select(*columns).with_for_update()
+        rows = self._connection.execute(wanted).mappings()
+        return {row["account_id"]: Account(**row) for row in rows}
 
     def add(self, account: Account, by: Actor) -> None:
         """Keep a new account.
@@ -23,18 +35,24 @@ class AccountStore(NamedRows[Account]):
             NameTakenError: somebody is called so already.
         """
         told = {"role": account.role, "ends_at": account.ends_at}
-        self._add(account, by, "account_added", told)
+        add_row(self._connection, accounts, account, by, "account_added", told)
 
     def change(self, account: Account, action: str, by: Actor) -> None:
         """Put a new state of an account in the place of the one before."""
+        wanted = update(accounts).where(accounts.c.account_id == account.account_id)
+        self._connection.execute(wanted.values(**asdict(account)))
+        note_change(self._connection, by, action, account.name, {"role": account.role})
 
-        def work(connection: Connection) -> None:
-            wanted = update(accounts).where(accounts.c.account_id == account.account_id)
-            connection.execute(wanted.values(**asdict(account)))
-            told = {"role": account.role}
-            note_change(connection, by, action, account.name, told)
 
-        self._store.run(work)
+class AccountStore(NamedRows[Account]):
+    """Reads, by id, and changes accounts."""
+
+    def __init__(self, database_url: str) -> None:
+        super().__init__(database_url, accounts, Account, "account_id")
+
+    def together(self, work: Callable[[AccountRows], _T]) -> _T:
+        """Read and change in one transaction; what raises changes nothing."""
+        return self._store.run(lambda connection: work(AccountRows(connection)))
 
     def change_password(
         self, by: Actor, was: str, password: str, now: float

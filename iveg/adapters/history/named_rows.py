@@ -67,19 +67,26 @@ class NamedRows(KeyedRows[R]):
         Raises:
             NameTakenError: one is called so already.
         """
-        values = asdict(row) | {"name_key": name_key(row.name)}
+        self._store.run(
+            lambda connection: add_row(connection, self._table, row, by, action, told)
+        )
 
-        def work(connection: Connection) -> bool:
-            try:
-                with connection.begin_nested():
-                    connection.execute(insert(self._table).values(**values))
-            except IntegrityError:
-                return False
-            note_change(connection, by, action, row.name, told)
-            return True
 
-        if not self._store.run(work):
-            raise NameTakenError(row.name)
+def add_row(
+    connection: Connection, table: Table, row: R, by: Actor, action: str, told: Json
+) -> None:
+    """Keep a new row, with that of the audit.
+
+    Raises:
+        NameTakenError: one is called so already.
+    """
+    values = asdict(row) | {"name_key": name_key(row.name)}
+    try:
+        with connection.begin_nested():
+            connection.execute(insert(table).values(**values))
+    except IntegrityError as error:
+        raise NameTakenError(row.name) from error
+    note_change(connection, by, action, row.name, told)
 
 
 def note_change(

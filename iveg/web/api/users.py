@@ -3,15 +3,15 @@
 An invitation is a password until it is taken: it leaves by the one answer that made it.
 """
 
-from collections.abc import Mapping
-from typing import Annotated
+from collections.abc import Callable, Mapping
+from typing import Annotated, TypeVar
 
 from fastapi import APIRouter, Depends, HTTPException, Request, Response
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from iveg.adapters.admission import MOST_ACCOUNTS, Admission
 from iveg.domain.accounts import MOST_NAME, Account, PersonRole, is_name, name_key
-from iveg.domain.errors import UnknownNameError
+from iveg.domain.errors import NotAllowedError, UnknownNameError
 from iveg.domain.retention import DAY_S
 from iveg.models.base import Listing
 from iveg.models.signing_in import Invitation, UserAccount
@@ -24,6 +24,8 @@ from iveg.web.security.people import People
 
 _Admin = Annotated[Principal, Depends(require("admin"))]
 _Known = Mapping[str, Account]
+_T = TypeVar("_T")
+_Work = Callable[[Admission, _Known], _T]
 
 
 def named(text: str) -> str:
@@ -91,7 +93,7 @@ def router(people: People, clock: Clock) -> APIRouter:
                 raise HTTPException(409, f"There are {MOST_ACCOUNTS} accounts already.")
             return admission.add(body.name, body.role, ends_at)
 
-        return _invitation(request, await people.change(who, work), now, 201)
+        return _invitation(request, await _change(people, clock, who, work), now, 201)
 
     _add_changes(routes, people, clock)
     return routes
@@ -101,7 +103,9 @@ def _add_changes(routes: APIRouter, people: People, clock: Clock) -> None:
     @routes.put("/{user_id}/role", response_model=UserAccount)
     async def give_role(user_id: str, body: RoleBody, who: _Admin) -> Response:
         """Change a role; the person signs in anew."""
-        changed = await people.change(
+        changed = await _change(
+            people,
+            clock,
             who,
             lambda admission, known: admission.give_role(
                 _other(known, user_id, who), body.role
@@ -112,7 +116,9 @@ def _add_changes(routes: APIRouter, people: People, clock: Clock) -> None:
     @routes.post("/{user_id}/reset", response_model=Invitation)
     async def reset(request: Request, user_id: str, who: _Admin) -> Response:
         """Take a password away, let in who was shut out, and invite again."""
-        made = await people.change(
+        made = await _change(
+            people,
+            clock,
             who,
             lambda admission, known: admission.reset(_other(known, user_id, who)),
         )
@@ -121,11 +127,39 @@ def _add_changes(routes: APIRouter, people: People, clock: Clock) -> None:
     @routes.post("/{user_id}/disable", response_model=UserAccount)
     async def disable(user_id: str, who: _Admin) -> Response:
         """Shut somebody out at once, STOP included."""
-        off = await people.change(
+        off = await _change(
+            people,
+            clock,
             who,
             lambda admission, known: admission.disable(_other(known, user_id, who)),
         )
         return Json(UserAccount.of(off, clock().wall))
+
+
+async def _change(people: People, clock: Clock, who: Principal, work: _Work[_T]) -> _T:
+    """Change accounts as somebody who is admin still, when their turn comes.
+
+    Two who shut each other out at the same moment come one after the other, and the
+    second is admin no longer.  So is whoever is left: nobody changes their own.
+
+    Raises:
+        NotAllowedError: they are not.
+        HopError: the database is away.
+    """
+
+    def checked(admission: Admission, known: _Known) -> _T:
+        account, began = known.get(who.person), who.signed_in_at
+        if (
+            account is None
+            or account.role != "admin"
+            or not account.is_open(clock().wall)
+            or began is None
+            or began < account.since
+        ):
+            raise NotAllowedError("admin", "former admin")
+        return work(admission, known)
+
+    return await people.change(who, checked)
 
 
 def _other(known: _Known, user_id: str, who: Principal) -> Account:

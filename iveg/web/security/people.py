@@ -23,11 +23,21 @@ from iveg.web.security.roles import Role
 _T = TypeVar("_T")
 
 
-class Accounts(ChangingAccounts, Protocol):
+class AccountRows(ChangingAccounts, Protocol):
+    """Accounts within one transaction."""
+
+    def read(self) -> Mapping[str, Account]:
+        """All accounts, by id, which nobody else changes meanwhile."""
+
+
+class Accounts(Protocol):
     """Storage of accounts; blocks, and raises HopError while it is away."""
 
     def read(self) -> Mapping[str, Account]:
         """All accounts, by id."""
+
+    def together(self, work: Callable[[AccountRows], _T]) -> _T:
+        """Read and change in one transaction; what raises changes nothing."""
 
     def accept(self, digest: str, password: str, now: float) -> Account | None:
         """Exchange an invitation for a password, once; None where it is none."""
@@ -73,13 +83,17 @@ class People(Rereading):
 
         Args:
             by: Who changes them.
-            work: Called in a thread, one after the other, with all accounts by id.
+            work: Called in a thread and one transaction, with all accounts by id.
 
         Raises:
             HopError: the database is away; nothing was changed.
         """
-        admission = Admission(self._store, by, self._clock().wall)
-        done = await self._apart(lambda: work(admission, self._store.read()))
+        now = self._clock().wall
+
+        def change(rows: AccountRows) -> _T:
+            return work(Admission(rows, by, now), rows.read())
+
+        done = await self._apart(lambda: self._store.together(change))
         with contextlib.suppress(HopError):
             await self.refresh()
         return done

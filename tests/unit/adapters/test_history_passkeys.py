@@ -55,7 +55,7 @@ def test_who_begins_anew_has_no_passkey_of_before(
 ) -> None:
     accounts = AccountStore(database_url)
     ana = Account("P1", "Ana", "viewer", invitation="abc", invited_until=2000.0)
-    accounts.add(ana, CONSOLE)
+    accounts.together(lambda rows: rows.add(ana, CONSOLE))
     store.add(replace(KEY, credential_id="evas", account_id="P2"), CONSOLE)
     accounts.accept("abc", "#hash", 1500.0)
     accounts.close()

@@ -10,7 +10,7 @@ from sqlalchemy import Connection, text
 
 from iveg.adapters import clock
 from iveg.adapters.admission import Admission
-from iveg.adapters.history.accounts import AccountStore
+from iveg.adapters.history.accounts import AccountRows, AccountStore
 from iveg.adapters.history.api_tokens import ApiTokenStore
 from iveg.adapters.history.audit import faults
 from iveg.adapters.history.migrate import upgrade
@@ -105,8 +105,11 @@ def test_whom_a_provider_vouches_for_is_kept_by_id_and_shut_out_from_here(
     told = Account("sso-1a2b3c4d", "Ana", "operator", provider="https://idm.test")
 
     def vouched(role: PersonRole) -> Account:
-        admission = Admission(console.store, CONSOLE, clock.wall())
-        return admission.vouched(console.store.read(), replace(told, role=role))
+        def work(rows: AccountRows) -> Account:
+            admission = Admission(rows, CONSOLE, clock.wall())
+            return admission.vouched(rows.read(), replace(told, role=role))
+
+        return console.store.together(work)
 
     vouched("operator")
     vouched("operator")
@@ -125,6 +128,24 @@ def test_whom_a_provider_vouches_for_is_kept_by_id_and_shut_out_from_here(
     assert f"{name}  viewer  active" in listed
     assert "#invitation=" not in capsys.readouterr().out
     assert vouched("viewer").provider == "https://idm.test"
+
+
+def test_what_raises_within_a_change_leaves_the_accounts_and_the_audit_as_they_were(
+    console: Console,
+) -> None:
+    console.call("add", "Ana")
+    (ana,) = console.store.read().values()
+
+    def break_off(rows: AccountRows) -> None:
+        rows.change(replace(ana, disabled=True), "account_disabled", CONSOLE)
+        assert rows.read()[ana.account_id].disabled
+        raise UnknownNameError("account", "Eva")
+
+    with pytest.raises(UnknownNameError):
+        console.store.together(break_off)
+
+    assert console.store.read() == {ana.account_id: ana}
+    assert read_history(console.settings.database_url, _actions) == ["account_added"]
 
 
 def test_reset_role_and_disable_end_sessions_and_are_in_the_audit(

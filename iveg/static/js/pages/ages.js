@@ -20,7 +20,7 @@ export function createAges({ line, i18n }) {
   setInterval(() => all("[data-ages]").forEach(draw), EVERY_MS);
   /** A cell of a table. @param {string} at ISO-8601 */
   return function cell(at) {
-    const made = make("td", "time");
+    const made = make("td", "time named");
     made.dataset.ages = at;
     draw(made);
     return made;

@@ -36,7 +36,7 @@ function createSessions(page, path) {
       make("td", "", name),
       make("td", "", i18n.t(`header.role.${role}`)),
       make("td", "", label(`kind.${kind}`)),
-      make("td", "time", dayAndTime(began_at)),
+      make("td", "time named", dayAndTime(began_at)),
       aged(seen_at),
       change,
     ];

@@ -30,8 +30,8 @@ export function start(page) {
     return [
       make("td", "", name),
       make("td", "", i18n.t(`tokenspage.scope.${scope}`)),
-      used_at ? aged(used_at) : make("td", "", i18n.t("tokenspage.never")),
-      make("td", "time", over ? i18n.t("tokenspage.over", { at: ends }) : ends),
+      used_at ? aged(used_at) : make("td", "named", i18n.t("tokenspage.never")),
+      make("td", "time named", over ? i18n.t("tokenspage.over", { at: ends }) : ends),
       change,
     ];
   }

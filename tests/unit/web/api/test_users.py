@@ -86,6 +86,34 @@ async def test_who_is_changed_is_signed_out_before_the_answer(
     assert desk.accounts.changes == [(f"account_{word}", ANA.name, "Chief")]
 
 
+@pytest.mark.parametrize(
+    "now",
+    [
+        replace(CHIEF, disabled=True),
+        replace(CHIEF, role="operator"),
+        replace(CHIEF, since=9e9),
+        replace(CHIEF, ends_at=1.0),
+        None,
+    ],
+)
+async def test_of_two_who_shut_each_other_out_at_once_the_first_stays(
+    desk: AdminsDesk, now: Account | None
+) -> None:
+    async with desk.admin() as chief:
+        # The other's change is in the database, and the server has not read it yet.
+        del desk.accounts.known["P9"]
+        if now is not None:
+            desk.accounts.known["P9"] = now
+        body = {"name": "Mine", "role": "admin"}
+        refused = [
+            await chief.post("/api/v1/users/P1/disable"),
+            await chief.post("/api/v1/users", json=body),
+        ]
+
+    assert [one.status_code for one in refused] == [403, 403]
+    assert desk.accounts.changes == []
+
+
 async def test_a_reset_lets_in_again_who_was_shut_out(desk: AdminsDesk) -> None:
     desk.accounts.known["P1"] = replace(ANA, disabled=True)
     async with desk.admin() as chief, desk.page() as ana:
