@@ -37,7 +37,10 @@ from iveg.web.security.authentication import require
 
 def create_app(dss: Dss) -> FastAPI:
     """The web face of a DSS; its lifespan runs the rest."""
-    pages = routes.Pages(dss.face.site)
+    # Whoever has the link needs no admin.
+    pages = routes.Pages(
+        dss.face.site, lambda: dss.face.site.link or dss.people.is_led()
+    )
     app = build_app(
         dss.face,
         pages,

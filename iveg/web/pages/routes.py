@@ -6,7 +6,7 @@
 import asyncio
 import json
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from datetime import datetime
 from importlib.resources import files
 from typing import Annotated, Final
@@ -112,10 +112,12 @@ class Pages:
 
     Args:
         site: What every page of this server has in common.
+        is_ready: Whether somebody can see to who comes in; each page says where not.
     """
 
-    def __init__(self, site: Site) -> None:
+    def __init__(self, site: Site, is_ready: Callable[[], bool] = lambda: True) -> None:
         self._site = site
+        self._is_ready = is_ready
         self._environments = {
             language: _environment(read_translations(language))
             for language in LANGUAGES
@@ -125,12 +127,13 @@ class Pages:
         self, request: Request, route: str, visitor: Principal | None = None
     ) -> PageFrame:
         """The frame around a page for this reader."""
-        look = _look(request)
-        if visitor is None:
-            return PageFrame(self._site, look, route)
-        return PageFrame(
-            self._site, look, route, visitor.name, visitor.role, visitor.has_account
+        frame = PageFrame(
+            self._site, _look(request), route, unready=not self._is_ready()
         )
+        if visitor is None:
+            return frame
+        name, role, account = visitor.name, visitor.role, visitor.has_account
+        return replace(frame, name=name, role=role, account=account)
 
     def draw(self, page: Page, status: int = 200) -> HTMLResponse:
         """A page as a response.

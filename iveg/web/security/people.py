@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Protocol, TypeVar
 
-from iveg.adapters.admission import Admission, ChangingAccounts
+from iveg.adapters.admission import Admission, ChangingAccounts, has_admin
 from iveg.adapters.passwords import Passwords
 from iveg.adapters.sessions import Session
 from iveg.domain.accounts import Account, Language, digest_of, name_key
@@ -70,6 +70,12 @@ class People(Rereading):
     async def refresh(self) -> None:
         """Read them once. Raises HopError."""
         self._known = await self._apart(self._store.read)
+
+    def is_led(self) -> bool:
+        """Whether somebody can sign in as admin; before the first reading, too."""
+        if self._known is None:
+            return True
+        return has_admin(self._known.values(), self._clock().wall)
 
     async def known(self) -> Mapping[str, Account]:
         """All accounts as they are kept now, by id. Raises HopError."""
