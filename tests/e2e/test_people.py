@@ -1,13 +1,16 @@
 """People before a real browser: passkeys by an authenticator that Chromium emulates."""
 
+import re
 from collections.abc import Iterator
 
 import pytest
-from playwright.sync_api import Browser, CDPSession, Page, expect
+from playwright.sync_api import Browser, Page, expect
 
+from iveg.domain.records import AuditRecord
 from tests.e2e.desk import Served, served
-from tests.unit.web.security.test_passkeys import PasskeysDesk
+from tests.unit.web.api.test_commands import stopped
 from tests.unit.web.security.test_people import ANA
+from tests.unit.web.security.test_tablets import TabletsDesk
 
 pytestmark = pytest.mark.e2e
 
@@ -22,8 +25,8 @@ SECURITY_KEY = {
 
 
 @pytest.fixture(scope="module")
-def place() -> Iterator[Served[PasskeysDesk]]:
-    with served(PasskeysDesk) as found:
+def place() -> Iterator[Served[TabletsDesk]]:
+    with served(TabletsDesk) as found:
         yield found
 
 
@@ -33,23 +36,25 @@ def page(browser: Browser) -> Iterator[Page]:
         yield context.new_page()
 
 
-def with_authenticator(page: Page) -> CDPSession:
+def with_authenticator(page: Page) -> None:
     line = page.context.new_cdp_session(page)
     line.send("WebAuthn.enable")
     line.send("WebAuthn.addVirtualAuthenticator", {"options": SECURITY_KEY})
-    return line
 
 
-def test_a_passkey_is_registered_signs_in_and_is_refused_once_it_was_removed(
-    place: Served[PasskeysDesk], page: Page
-) -> None:
-    with_authenticator(page)
+def sign_in(place: Served[TabletsDesk], page: Page) -> None:
     page.goto(f"{place.url}/signin")
     page.locator("#signin-name").fill(ANA.name)
     page.locator("#signin-password").fill("acelga-1234")
     page.locator("#signin-form button").click()
     page.wait_for_url(f"{place.url}/")
 
+
+def test_a_passkey_is_registered_signs_in_and_is_refused_once_it_was_removed(
+    place: Served[TabletsDesk], page: Page
+) -> None:
+    with_authenticator(page)
+    sign_in(place, page)
     page.goto(f"{place.url}/account")
     page.locator("#passkey-name").fill("Phone")
     page.locator("#passkey-form button").click()
@@ -72,3 +77,41 @@ def test_a_passkey_is_registered_signs_in_and_is_refused_once_it_was_removed(
     page.locator("#signin-passkey").click()
     expect(page.locator("#signin-keyless")).to_be_visible()
     assert page.context.cookies(place.url) == []
+
+
+POST = """async ([path, body]) => {
+  const headers = {'X-IVEG': '1', 'Content-Type': 'application/json'};
+  const asked = {method: 'POST', headers, body: JSON.stringify(body)};
+  return (await fetch('/api/v1/' + path, asked)).status;
+}"""
+
+
+def test_a_tablet_releases_by_name_until_it_locks_by_itself_and_stops_always(
+    place: Served[TabletsDesk], page: Page
+) -> None:
+    desk = place.desk
+    sign_in(place, page)
+    page.evaluate("document.querySelector('[data-opens=wall-panel]').click()")
+    page.locator("#tablet-name").fill("Nave 2")
+    page.locator("#tablet-make button").click()
+    expect(page.locator("#tablet-said")).to_have_text("Locked")
+    hold = place.run(stopped(desk))
+    release = ["robots/AGI/release", {"holds": [hold]}]
+    assert page.evaluate(POST, release) == 403
+
+    page.locator("#tablet").click()
+    page.get_by_role("button", name=ANA.name, exact=True).click()
+    page.locator("#tablet-pin").fill("2580")
+    page.locator("#tablet-form button").click()
+    expect(page.locator("#tablet-said")).to_have_text(ANA.name)
+    expect(page.locator("#tablet-left")).to_have_text(re.compile(r"^[12]:\d\d$"))
+    expect(page.locator("body")).to_have_attribute("data-role", "operator")
+    assert page.evaluate(POST, release) == 202
+    rows = [one for one in desk.records(AuditRecord) if one.action == "release"]
+    assert [one.name for one in rows][-1] == ANA.name
+
+    desk.clock.now += 121.0
+    page.goto(f"{place.url}/commands")
+    expect(page.locator("#tablet-said")).to_have_text("Locked")
+    assert page.evaluate(POST, release) == 403
+    assert page.evaluate(POST, ["robots/AGI/stop", {}]) == 202

@@ -59,6 +59,9 @@ def router(people: People, passkeys: Passkeys, pins: Pins) -> APIRouter:
         """Whether a release would ask for one, and by what it may be given."""
         account = people.account(who.person)
         ways = [] if account is None else _ways(account, passkeys)
+        if who.is_tablet:
+            # Nobody types a password on a screen that is everybody's.
+            ways = [way for way in ways if way == "pin"]
         freshness = authenticator_of(request).freshness
         until, needed = freshness.until(who), freshness.is_stale(who)
         return Json(Proof.of(until, ways, needed=needed))

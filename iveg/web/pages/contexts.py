@@ -71,6 +71,7 @@ class PageFrame:
         role: ``viewer``, ``operator``, ``admin`` or ``program``.
         account: Whether they have one of their own.
         unready: Nobody can sign in as admin yet.
+        tablet: Whether this browser is shared, and unlocked by a PIN.
     """
 
     site: Site
@@ -80,6 +81,7 @@ class PageFrame:
     role: str | None = None
     account: bool = False
     unready: bool = False
+    tablet: bool = False
 
 
 @dataclass(frozen=True, slots=True)

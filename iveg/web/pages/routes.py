@@ -132,8 +132,13 @@ class Pages:
         )
         if visitor is None:
             return frame
-        name, role, account = visitor.name, visitor.role, visitor.has_account
-        return replace(frame, name=name, role=role, account=account)
+        return replace(
+            frame,
+            name=visitor.name,
+            role=visitor.role,
+            account=visitor.has_account,
+            tablet=visitor.is_tablet,
+        )
 
     def draw(self, page: Page, status: int = 200) -> HTMLResponse:
         """A page as a response.

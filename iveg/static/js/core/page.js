@@ -11,6 +11,7 @@ import { createHealthPanel } from "../panels/health.js";
 import { createHints } from "../panels/hints.js";
 import { createSignOut } from "../panels/signout.js";
 import { labelTables } from "../panels/tables.js";
+import { createTablet, createTabletMaker } from "../panels/tablet.js";
 import { createTone } from "../panels/tone.js";
 import { createWall } from "../panels/wall.js";
 import { readApi } from "./api.js";
@@ -59,6 +60,7 @@ export async function startPage(app) {
   guarded(() => createHealthPanel(app));
   guarded(() => createSignOut(app));
   guarded(() => createWall(app));
+  guarded(() => startTablet(app));
   guarded(wirePrinting);
   registerWorker();
   guarded(() => labelTables(app));
@@ -85,6 +87,12 @@ export async function startPage(app) {
   ]);
   for (const part of parts) if (part.status === "rejected") reportError(part.reason);
   guarded(() => goToAsked(app));
+}
+
+/** A shared tablet has its lock; elsewhere an operator may make one. @param {App} app */
+function startTablet(app) {
+  if (document.querySelector("#tablet")) createTablet(app);
+  if (document.querySelector("#tablet-make")) createTabletMaker(app);
 }
 
 /** What the live page shows: now, or the recorded moment that the address names.

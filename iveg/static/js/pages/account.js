@@ -7,6 +7,7 @@ import { guarded } from "../core/hub.js";
 import { startFacts } from "./account_facts.js";
 import { startPasskeys } from "./account_passkeys.js";
 import { startPassword } from "./account_password.js";
+import { startPin } from "./account_pin.js";
 import { startOwnSessions } from "./sessions.js";
 
 /** @typedef {import("../core/page.js").Page} Page */
@@ -16,6 +17,7 @@ import { startOwnSessions } from "./sessions.js";
 const SECTIONS = [
   ["#account-facts", startFacts],
   ["#password-form", startPassword],
+  ["#account-pin", startPin],
   ["#account-passkeys", startPasskeys],
   ["#sessions", startOwnSessions],
 ];

@@ -37,6 +37,8 @@ export async function askProof({ i18n, dialogs }, opener, done) {
   const panel = /** @type {HTMLDialogElement} */ (need("#proof-panel"));
   const form = /** @type {HTMLFormElement} */ (need("#proof-form"));
   const field = /** @type {HTMLInputElement} */ (need("#proof-password"));
+  const pinForm = /** @type {HTMLFormElement} */ (need("#proof-pin-form"));
+  const pin = /** @type {HTMLInputElement} */ (need("#proof-pin"));
   const passkey = /** @type {HTMLButtonElement} */ (need("#proof-passkey"));
   const note = need("#proof-note");
   const { body } = await readApi(PATH);
@@ -46,7 +48,7 @@ export async function askProof({ i18n, dialogs }, opener, done) {
   async function give(proof) {
     setText(note, "");
     const { status } = await sendApi("POST", PATH, proof);
-    field.value = "";
+    field.value = pin.value = "";
     const said = saidOfProof(status);
     if (said !== null) return setText(note, i18n.t(said));
     dialogs.close();
@@ -63,10 +65,15 @@ export async function askProof({ i18n, dialogs }, opener, done) {
     event.preventDefault();
     give({ password: field.value });
   };
+  pinForm.onsubmit = (event) => {
+    event.preventDefault();
+    give({ pin: pin.value });
+  };
   passkey.onclick = byPasskey;
+  setHidden(pinForm, !ways.has("pin"));
   setHidden(form, !ways.has("password"));
   setHidden(passkey, !ways.has("passkey") || !hasPasskeys());
   setText(note, "");
   dialogs.open(panel, opener);
-  (form.hidden ? passkey : field).focus();
+  (form.hidden ? pin : field).focus();
 }
