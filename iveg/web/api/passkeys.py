@@ -67,6 +67,8 @@ def _add_own(routes: APIRouter, people: People, passkeys: Passkeys) -> None:
         account = account_of(people, who)
         if len(passkeys.of(account.account_id)) >= MOST_PASSKEYS:
             raise HTTPException(409, f"You have {MOST_PASSKEYS} passkeys already.")
+        # Whoever finds a screen unattended must not leave a key of their own behind.
+        authenticator_of(request).freshness.refuse_stale(who)
         return Json(await passkeys.ask_to_register(site_of(request), account))
 
     @routes.post(own, response_model=PasskeyOfPerson, status_code=201)

@@ -5,6 +5,7 @@
 import { readApi, sendApi } from "../core/api.js";
 import { hasPasskeys, makePasskey } from "../core/passkeys.js";
 import { make, need, setHidden, setText } from "../panels/dom.js";
+import { askProof, asksForProof } from "../panels/proof.js";
 import { dayAndTime } from "./history/local_time.js";
 import { makeTwice } from "./twice.js";
 
@@ -20,7 +21,8 @@ const REFUSED = {
 };
 
 /** @param {import("../core/page.js").Page} page */
-export function startPasskeys({ i18n }) {
+export function startPasskeys(page) {
+  const { i18n } = page;
   const name = /** @type {HTMLInputElement} */ (need("#passkey-name"));
   const note = need("#passkeys-note");
   /** @type {Passkey[]} */
@@ -66,10 +68,9 @@ export function startPasskeys({ i18n }) {
     await load();
   }
 
-  /** @param {SubmitEvent} event */
-  async function add(event) {
-    event.preventDefault();
+  async function add() {
     const made = await makePasskey(`${PATH}/options`);
+    if (asksForProof(made)) return askProof(page, name, add);
     if (made.status !== 200) return refuse(made.status);
     const called = name.value.trim();
     const body = { name: called, passkey: made.body };
@@ -88,7 +89,10 @@ export function startPasskeys({ i18n }) {
 
   setHidden(need("#passkey-form"), !hasPasskeys());
   setHidden(need("#passkeys-unable"), hasPasskeys());
-  need("#passkey-form").addEventListener("submit", add);
+  need("#passkey-form").addEventListener("submit", (event) => {
+    event.preventDefault();
+    add();
+  });
   i18n.onChange(draw);
   load();
 }

@@ -18,7 +18,7 @@ from iveg.web.live.feed import TelemetryFeed
 from iveg.web.live.pacing import SUBPROTOCOL
 from iveg.web.live.painting import Painting
 from iveg.web.live.socket import Line
-from iveg.web.security.authentication import Role
+from iveg.web.security.authentication import Principal, Role
 from tests.builders import detection
 from tests.unit.pipeline.desk import settle
 from tests.unit.web.desk import API_TOKEN, WebDesk
@@ -350,6 +350,20 @@ async def test_a_revoked_session_can_no_longer_stop() -> None:
 
         assert await browser.close_code() == 4401
     assert desk.fleet.stops == []
+
+
+async def test_a_stop_on_a_tablet_has_the_name_of_whoever_holds_it_then() -> None:
+    desk = WebDesk()
+    async with desk.serving() as address, looking(desk, address) as browser:
+        await browser.read()
+        sessions = desk.authenticator.sessions
+        (digest,) = sessions._sessions
+        sessions.make_tablet(Principal("ana", "operator", digest), "Nave 2")
+        await browser.say(type="stop", robot_id="AGI")
+        await browser.read_until("log")
+
+    (command,) = desk.commander.commands.values()
+    assert command.requesters == ("Nave 2",)
 
 
 async def test_a_new_rule_is_told_to_every_browser() -> None:

@@ -135,6 +135,14 @@ async def test_a_wrong_proof_is_none_and_five_are_enough_for_a_minute(
     assert (right.status_code, refused, stop.status_code) == (429, NEEDED, 202)
 
 
+async def test_a_new_passkey_asks_for_a_fresh_proof_too(desk: ProofsDesk) -> None:
+    async with desk.ana() as ana:
+        desk.clock.now += QUARTER_S + 1.0
+        begun = await ana.get("/api/v1/account/passkeys/options")
+
+    assert (begun.status_code, begun.json()["type"]) == NEEDED
+
+
 async def test_a_challenge_of_a_sign_in_proves_nothing_here(desk: ProofsDesk) -> None:
     await desk.registered()
     answer = desk.key.prove(await desk.asked())
