@@ -10,6 +10,7 @@ from iveg.domain.records import AuditRecord
 from tests.e2e.desk import Served, served
 from tests.unit.web.api.test_commands import stopped
 from tests.unit.web.security.test_people import ANA
+from tests.unit.web.security.test_proofs import QUARTER_S
 from tests.unit.web.security.test_tablets import TabletsDesk
 
 pytestmark = pytest.mark.e2e
@@ -50,7 +51,7 @@ def sign_in(place: Served[TabletsDesk], page: Page) -> None:
     page.wait_for_url(f"{place.url}/")
 
 
-def test_a_passkey_is_registered_signs_in_and_is_refused_once_it_was_removed(
+def test_a_passkey_is_registered_proves_signs_in_and_is_refused_once_removed(
     place: Served[TabletsDesk], page: Page
 ) -> None:
     with_authenticator(page)
@@ -59,6 +60,13 @@ def test_a_passkey_is_registered_signs_in_and_is_refused_once_it_was_removed(
     page.locator("#passkey-name").fill("Phone")
     page.locator("#passkey-form button").click()
     expect(page.locator("#passkeys li b")).to_have_text("Phone")
+
+    place.desk.clock.now += QUARTER_S + 1.0
+    page.locator("#pin-new").fill("2580")
+    page.locator("#pin-form [type=submit]").click()
+    page.locator("#proof-passkey").click()
+    expect(page.locator("#pin-note")).to_have_text("PIN saved.")
+    expect(page.locator("#proof-panel")).to_be_hidden()
 
     page.context.clear_cookies()
     page.goto(f"{place.url}/signin")
