@@ -8,6 +8,8 @@ from playwright.sync_api import Browser, Page, expect
 
 from iveg.domain.records import AuditRecord
 from tests.e2e.desk import Served, served
+from tests.e2e.reading import serious
+from tests.processes import until
 from tests.unit.web.api.test_commands import stopped
 from tests.unit.web.security.test_people import ANA
 from tests.unit.web.security.test_proofs import QUARTER_S
@@ -61,6 +63,8 @@ def test_a_passkey_is_registered_proves_signs_in_and_is_refused_once_removed(
     page.locator("#passkey-form button").click()
     expect(page.locator("#passkeys li b")).to_have_text("Phone")
 
+    assert serious(page) == []
+
     place.desk.clock.now += QUARTER_S + 1.0
     page.locator("#pin-new").fill("2580")
     page.locator("#pin-form [type=submit]").click()
@@ -94,6 +98,11 @@ POST = """async ([path, body]) => {
 }"""
 
 
+def released_by(desk: TabletsDesk) -> list[str]:
+    rows = desk.records(AuditRecord)
+    return [one.name for one in rows if one.action == "release"]
+
+
 def test_a_tablet_releases_by_name_until_it_locks_by_itself_and_stops_always(
     place: Served[TabletsDesk], page: Page
 ) -> None:
@@ -109,14 +118,15 @@ def test_a_tablet_releases_by_name_until_it_locks_by_itself_and_stops_always(
 
     page.locator("#tablet").click()
     page.get_by_role("button", name=ANA.name, exact=True).click()
+    assert serious(page) == []
     page.locator("#tablet-pin").fill("2580")
     page.locator("#tablet-form button").click()
     expect(page.locator("#tablet-said")).to_have_text(ANA.name)
     expect(page.locator("#tablet-left")).to_have_text(re.compile(r"^[12]:\d\d$"))
     expect(page.locator("body")).to_have_attribute("data-role", "operator")
     assert page.evaluate(POST, release) == 202
-    rows = [one for one in desk.records(AuditRecord) if one.action == "release"]
-    assert [one.name for one in rows][-1] == ANA.name
+    # The audit's row follows the answer.
+    until(lambda: released_by(desk) == ["Nave 2", ANA.name], 20.0, "Ana's release")
 
     desk.clock.now += 121.0
     page.goto(f"{place.url}/commands")
