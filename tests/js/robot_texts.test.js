@@ -1,5 +1,6 @@
 import { isSilent } from "../../iveg/static/js/core/clock.js";
 import { createLabels } from "../../iveg/static/js/map/layers/labels.js";
+import { accessSaid } from "../../iveg/static/js/panels/access.js";
 import { detectorSaid } from "../../iveg/static/js/panels/detector.js";
 import { createGauge, readingOf } from "../../iveg/static/js/panels/gauge.js";
 import {
@@ -142,6 +143,16 @@ test("what a restart restored has an age that nobody knows, and says so on the m
     [labels.ago(12.4), labels.ago(Number.POSITIVE_INFINITY)],
     ["map.ghost 12", "? s"],
   );
+});
+
+test("a robot is heard, or revoked as one that stood or that may move", () => {
+  const since = "2026-05-01T10:00:00.000Z";
+  const said = (/** @type {boolean} */ stood) =>
+    accessSaid(robot({ revoked: { by: "Ana", since, stood } }), words);
+  equal(accessSaid(robot(), words), "access.state.heard");
+  equal(accessSaid(undefined, words), "access.state.heard");
+  equal(said(true).split(" ")[0], "access.state.stood");
+  equal(said(false).split(" ")[0], "access.state.unconfirmed");
 });
 
 test("a camera is read, not read, out of service or not there", () => {

@@ -49,6 +49,7 @@ async def test_a_robot_that_moves_is_stopped_first_and_its_standstill_awaited() 
 
     assert answer.status_code == 200
     assert answer.json()["revoked"]["stood"] is True
+    assert {robot_id for robot_id, _ in desk.fleet.stops} == {"AGI"}
     assert desk.commander.machine("AGI").state == "STANDING"
     assert desk.clock.now - began < 5.0
     assert "log.robot_revoked" in desk.sentences()
