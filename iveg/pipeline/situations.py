@@ -57,6 +57,7 @@ class Situations:
             stop=machine.state,
             is_resuming=once is not None and once.kind == "resume",
             is_replay=robot.is_replay,
+            is_revoked=robot.revoked is not None,
         )
         return situation_of(facts)
 

@@ -82,6 +82,7 @@ class RobotFacts:
     stop: State = "RUNNING"
     is_resuming: bool = False
     is_replay: bool = False
+    is_revoked: bool = False
 
     @property
     def applied(self) -> float:

@@ -89,8 +89,9 @@ def _silent(facts: RobotFacts) -> Iterator[Situation]:
     elif facts.age_s is None:
         yield Situation("doubt", "age_unknown", "link", action="check_network")
     else:
-        lost = Situation("doubt", "lost", "link", action="check_network")
-        yield _aged(lost, facts)
+        # The network is well where an admin had it heard no more.
+        action: Action = "none" if facts.is_revoked else "check_network"
+        yield _aged(Situation("doubt", "lost", "link", action=action), facts)
 
 
 def _late(live: Situation, facts: RobotFacts) -> Situation:

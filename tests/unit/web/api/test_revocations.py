@@ -101,7 +101,10 @@ async def test_it_is_shown_as_revoked_ages_like_a_lost_one_and_raises_an_alert()
 
     assert robot["revoked"]["by"] == "ana"
     assert robot["link"] == "LOST"
-    assert robot["situation"]["level"] != "clear"
+    situation = robot["situation"]
+    assert (situation["level"], situation["state"]) == ("doubt", "lost")
+    # Nobody is sent to look at a network that is well.
+    assert situation["action"] == "none"
     assert "alert.robot_revoked" in conditions_of(desk)
 
 
