@@ -9,6 +9,7 @@ server does it, hour by hour in one process, with the curve of the threshold.
 
 import argparse
 import asyncio
+import resource
 import tempfile
 import time
 from pathlib import Path
@@ -25,7 +26,7 @@ from iveg.adapters.worker import Worker
 from iveg.app.what_if import WhatIfs
 from iveg.domain.fleet import FleetDescription
 from iveg.domain.observations import Instant
-from iveg.domain.what_if.judging import Parameters
+from iveg.domain.what_if.crossings import Parameters
 from iveg.domain.what_if.questions import VALUES, Question
 
 ROBOTS = tuple(f"R{number}" for number in range(1, 6))
@@ -45,12 +46,12 @@ def main() -> None:
         took = asyncio.run(_ask(url, asked.hours * 3600.0))
     print(machine())
     cells = (f"{asked.hours:g}", f"{asked.work:g}", *map(str, rows), *took)
-    heads = "hours", "with people", "poses", "detections", "judgements", "s"
+    heads = ("hours", "with people", "poses", "detections", "judgements", "s", "CPU s")
     print_table("A question about another rule", heads, [cells])
 
 
-async def _ask(url: str, seconds: float) -> tuple[str, str]:
-    """How many judgements of the whole range, and how long they took (s)."""
+async def _ask(url: str, seconds: float) -> tuple[str, str, str]:
+    """Judgements of the whole range, how long they took, and their CPU (s)."""
     fleet = FleetDescription.undescribed(ROBOTS)
     what_ifs = WhatIfs(url, fleet, lambda: "Q", lambda: Instant(0.0, 0.0), Worker())
     rule, values = Parameters(), VALUES["threshold"]
@@ -65,8 +66,9 @@ async def _ask(url: str, seconds: float) -> tuple[str, str]:
     what_ifs.close()
     if job.answer is None:
         raise SystemExit(f"no answer: {job.why}")
-    print(job.answer.outcomes[0])
-    return str(len(question.tried)), f"{took:.1f}"
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    cpu = used.ru_utime + used.ru_stime
+    return str(len(question.tried)), f"{took:.1f}", f"{cpu:.1f}"
 
 
 def _fill(url: str, seconds: float, work_s: float) -> tuple[int, int]:

@@ -12,8 +12,9 @@ from iveg.adapters.history.queries import Queries
 from iveg.adapters.worker import Worker
 from iveg.domain.errors import HopError, UnknownNameError, WhatIfRefusedError
 from iveg.domain.fleet import FleetDescription
+from iveg.domain.what_if.crossings import Parameters
 from iveg.domain.what_if.inputs import Inputs, poses_of, sightings_of
-from iveg.domain.what_if.judging import Parameters, Range
+from iveg.domain.what_if.judging import Range
 from iveg.domain.what_if.outcome import outcome_of, recorded
 from iveg.domain.what_if.questions import Answer, Job, Question
 from iveg.pipeline.ports import Clock, Ids

@@ -10,8 +10,9 @@ import numpy as np
 
 from iveg.domain.day import length
 from iveg.domain.limits import LIMITS
+from iveg.domain.what_if.crossings import STEP_S, Grid, Parameters
 from iveg.domain.what_if.inputs import Flags
-from iveg.domain.what_if.judging import STEP_S, Grid, Parameters, Range, Stretch
+from iveg.domain.what_if.judging import Range, Stretch
 
 _REASONS: Final = "person", "robot"
 """The gravest first: of two causes at once that counts."""

@@ -6,7 +6,7 @@ from types import MappingProxyType
 from typing import Final, Literal
 
 from iveg.domain.observations import Instant
-from iveg.domain.what_if.judging import Parameters
+from iveg.domain.what_if.crossings import Parameters
 from iveg.domain.what_if.outcome import Outcome
 
 State = Literal["waiting", "running", "done", "failed", "cancelled"]

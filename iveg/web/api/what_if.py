@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from iveg.domain.detection_rule import FORESIGHT_MOST_S, DetectionRule
 from iveg.domain.limits import LIMITS
-from iveg.domain.what_if.judging import Parameters
+from iveg.domain.what_if.crossings import Parameters
 from iveg.domain.what_if.questions import VALUES, Job, Question, Varied
 from iveg.models.base import Listing, write_json
 from iveg.models.what_if import WhatIf

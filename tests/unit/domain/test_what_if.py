@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iveg.domain.records import DecisionRecord, DetectionRecord, OdometryRecord
+from iveg.domain.what_if.crossings import STEP_S, Parameters
 from iveg.domain.what_if.inputs import (
     Inputs,
     PoseRow,
@@ -19,7 +20,7 @@ from iveg.domain.what_if.inputs import (
     poses_of,
     sightings_of,
 )
-from iveg.domain.what_if.judging import STEP_S, Parameters, Range
+from iveg.domain.what_if.judging import Range
 from iveg.domain.what_if.outcome import Outcome, outcome_of
 from tests.builders import START, detection, odometry
 from tests.unit.pipeline.desk import Desk
