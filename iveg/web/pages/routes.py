@@ -204,6 +204,7 @@ def router(
     routes = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
     for route, path in _SCRIPTED.items():
         add_scripted(routes, pages, route, path)
+    add_scripted(routes, pages, "what_if", "/what-if")
     add_scripted(routes, pages, "audit", "/audit", "release")
     for route in ("users", "tokens", "sessions"):
         add_scripted(routes, pages, route, f"/{route}", "admin")

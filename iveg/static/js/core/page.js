@@ -49,6 +49,7 @@ const ROUTES = {
   audit: () => import("../pages/audit.js"),
   tokens: () => import("../pages/tokens.js"),
   users: () => import("../pages/users.js"),
+  what_if: () => import("../pages/what_if.js"),
 };
 
 /** @param {App} app */

@@ -135,7 +135,10 @@ function dressed(trace, index, i18n) {
     ? i18n.t("history.trace.class", { class: class_id })
     : i18n.t(`history.trace.${kind}`, { robot });
   if (trace.type === "bar") return { ...trace, name, marker: { color: colour } };
-  const x = trace.x.map((at) => (at === null ? null : wallText(at)));
+  const isPlain = trace.meta.is_plain === true;
+  const x = isPlain
+    ? trace.x
+    : trace.x.map((at) => (at === null ? null : wallText(at)));
   const line = { ...trace.line, color: colour, width: 2 };
   if (kind === "mandated") Object.assign(line, { width: 1.5, dash: "6px,3px" });
   const symbol = SYMBOLS[/** @type {keyof typeof SYMBOLS} */ (kind)];
