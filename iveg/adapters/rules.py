@@ -121,6 +121,7 @@ def _with_settings(
         threshold=settings.threshold,
         radius_m=settings.radius_m,
         version=last.version + 1,
+        comparison=None,
         author=_SETTINGS,
         since=wall,
     )
@@ -136,6 +137,7 @@ def _with_looks(versions: list[DetectionRule], wall: float) -> list[DetectionRul
         last,
         possible_people=True,
         version=last.version + 1,
+        comparison=None,
         # What was recovered stays to be checked.
         author=RECOVERED if last.author == RECOVERED else UPGRADED,
         since=wall,

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from iveg.adapters.rules import FileRules
+from iveg.domain.comparison import Comparison, Doings
 from iveg.domain.detection_rule import RECOVERED, UPGRADED, DetectionRule
 from iveg.domain.errors import DataFileError, HopError
 from tests.builders import START
@@ -17,6 +18,9 @@ CHANGED = DetectionRule(
     class_thresholds={"robot": 0.9},
     radius_m=3.0,
     foresight_s=2.0,
+    comparison=Comparison(
+        1.0, 2.0, 1, 0.5, Doings(), Doings({"person": 0.4}, {"person": 1}), 1, 0
+    ),
     aliases={"person": "person", "robot": "robot", "abuela": "person"},
     author="ana",
     since=START.wall,
@@ -51,6 +55,7 @@ async def test_changed_settings_are_a_newer_version(tmp_path: Path) -> None:
     assert (newest.version, newest.author) == (3, "settings")
     assert (newest.threshold, newest.radius_m) == (0.6, 2.0)
     assert newest.aliases == CHANGED.aliases
+    assert newest.comparison is None, "it came of no trial"
 
 
 async def test_the_same_settings_twice_are_no_new_version(tmp_path: Path) -> None:
@@ -78,7 +83,13 @@ async def test_a_version_in_which_looks_did_not_add_up_stays_and_the_next_has_th
 
     again = FileRules(tmp_path / "rules.jsonl").load(FIRST, START)
 
-    upgraded = replace(single, version=3, possible_people=True, author=next_author)
+    upgraded = replace(
+        single,
+        version=3,
+        possible_people=True,
+        comparison=None,
+        author=next_author,
+    )
     assert list(again) == [FIRST, single, upgraded]
     assert list(FileRules(tmp_path / "rules.jsonl").load(FIRST, START)) == list(again)
 
