@@ -39,7 +39,7 @@ def create_app(dss: Dss) -> FastAPI:
     """The web face of a DSS; its lifespan runs the rest."""
     # Whoever has the link needs no admin.
     pages = routes.Pages(
-        dss.face.site, lambda: dss.face.site.link or dss.people.is_led()
+        dss.face.site, lambda: dss.face.site.link or dss.door.people.is_led()
     )
     app = build_app(
         dss.face,
