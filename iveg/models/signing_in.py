@@ -114,7 +114,7 @@ class Proof(Model):
 
     needed: bool
     until: str | None = Field(description="When it would; null: never.")
-    ways: list[str] = Field(description="`password`, `passkey`, `pin`.")
+    ways: list[str] = Field(description="`password`, `passkey`, `pin`, `sso`.")
 
     @classmethod
     def of(cls, until: float | None, ways: list[str], *, needed: bool) -> "Proof":

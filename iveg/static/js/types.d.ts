@@ -911,7 +911,7 @@ export type Proof = {
   needed: boolean;
   /** When it would; null: never. */
   until: string | null;
-  /** `password`, `passkey`, `pin`. */
+  /** `password`, `passkey`, `pin`, `sso`. */
   ways: string[];
 };
 

@@ -58,7 +58,7 @@ def router(people: People, passkeys: Passkeys, pins: Pins) -> APIRouter:
     async def state(request: Request, who: _Reader) -> Response:
         """Whether a release would ask for one, and by what it may be given."""
         account = people.account(who.person)
-        ways = [] if account is None else _ways(account, passkeys)
+        ways = [] if account is None else _ways(who, account, passkeys)
         if who.is_tablet:
             # Nobody types a password on a screen that is everybody's.
             ways = [way for way in ways if way == "pin"]
@@ -98,11 +98,13 @@ def router(people: People, passkeys: Passkeys, pins: Pins) -> APIRouter:
     return routes
 
 
-def _ways(account: Account, passkeys: Passkeys) -> list[str]:
+def _ways(who: Principal, account: Account, passkeys: Passkeys) -> list[str]:
     ways = {
         "password": bool(account.password),
         "passkey": bool(passkeys.of(account.account_id)),
         "pin": bool(account.pin),
+        # The browser goes to the provider and comes back (web/pages/sign_on.py).
+        "sso": who.method == "sso",
     }
     return [way for way, there in ways.items() if there]
 

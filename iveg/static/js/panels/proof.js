@@ -40,6 +40,7 @@ export async function askProof({ i18n, dialogs }, opener, done) {
   const pinForm = /** @type {HTMLFormElement} */ (need("#proof-pin-form"));
   const pin = /** @type {HTMLInputElement} */ (need("#proof-pin"));
   const passkey = /** @type {HTMLButtonElement} */ (need("#proof-passkey"));
+  const provider = /** @type {HTMLAnchorElement} */ (need("#proof-sso"));
   const note = need("#proof-note");
   const { body } = await readApi(PATH);
   const ways = new Set(body?.ways ?? []);
@@ -73,6 +74,8 @@ export async function askProof({ i18n, dialogs }, opener, done) {
   setHidden(pinForm, !ways.has("pin"));
   setHidden(form, !ways.has("password"));
   setHidden(passkey, !ways.has("passkey") || !hasPasskeys());
+  provider.href = `/signin/sso?anew=1&to=${encodeURIComponent(location.pathname)}`;
+  setHidden(provider, !ways.has("sso"));
   setText(note, "");
   dialogs.open(panel, opener);
   (form.hidden ? pin : field).focus();
