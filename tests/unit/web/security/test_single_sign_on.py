@@ -13,15 +13,19 @@ from iveg.adapters.oidc import OpenIdProvider
 from iveg.domain.accounts import Account
 from iveg.domain.records import AuditRecord
 from iveg.domain.single_sign_on import ClaimReading, person_id
+from iveg.web.api import proof
 from iveg.web.pages import sign_on
 from iveg.web.pages.contexts import Site
 from iveg.web.pages.openapi import ApiDoc
 from iveg.web.pages.routes import Pages, router
 from iveg.web.security.authentication import Authenticator
+from iveg.web.security.passkeys import Passkeys
 from iveg.web.security.people import People
+from iveg.web.security.proofs import Freshness
 from iveg.web.security.roles import Principal
 from iveg.web.security.single_sign_on import SingleSignOn
-from tests.fakes.accounts import FakeAccounts, FakePasswords
+from iveg.web.security.tablets import Pins
+from tests.fakes.accounts import FakeAccounts, FakePasskeys, FakePasswords
 from tests.fakes.identity_provider import (
     CLIENT,
     KEYCLOAK,
@@ -30,6 +34,7 @@ from tests.fakes.identity_provider import (
     own_url,
     serving,
 )
+from tests.unit.web.api.test_commands import stopped
 from tests.unit.web.desk import HOST, WebDesk
 
 OWN = {"X-IVEG": "1", "Sec-Fetch-Site": "same-origin"}
@@ -361,6 +366,36 @@ async def test_a_silent_sign_in_is_not_taken_for_a_proof_and_a_new_one_is(
     )
     # Only the newest session is left.
     assert len(desk.authenticator.sessions) == 1
+
+
+async def test_a_release_asks_for_a_proof_at_the_provider_and_the_silent_way_is_none(
+    desk: SignOnDesk,
+) -> None:
+    desk.authenticator.freshness = Freshness(900.0, desk.clock)
+    desk.app.include_router(
+        proof.router(
+            desk.people,
+            Passkeys(FakePasskeys(), desk.clock),
+            Pins(desk.people, desk.clock),
+        )
+    )
+    body = {"holds": [await stopped(desk)]}
+    said = []
+    async with desk.page() as page:
+        for way in ("/signin/sso", "/signin/sso", "/signin/sso?anew=1"):
+            desk.clock.now += 901.0
+            await desk.through(page, way)
+            asked = (await page.get("/api/v1/account/proof")).json()
+            released = await page.post("/api/v1/robots/AGI/release", json=body)
+            said.append((asked["needed"], asked["ways"], released.json()["type"]))
+
+    # The provider asks for no password again where its own session still stands.
+    # Where nothing is asked of the person, a robot unheard for so long is refused.
+    assert said == [
+        (False, ["sso"], "urn:iveg:command-refused"),
+        (True, ["sso"], "urn:iveg:proof-needed"),
+        (False, ["sso"], "urn:iveg:command-refused"),
+    ]
 
 
 @pytest.mark.parametrize("vice", ["says_nothing", "old_proof", "somebody_else"])
