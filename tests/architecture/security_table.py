@@ -8,9 +8,15 @@ from pathlib import Path
 from fastapi import FastAPI
 from fastapi.routing import iter_route_contexts
 
+from iveg.adapters import admission
+from iveg.app import what_if
 from iveg.app.dss import open_dss
 from iveg.asgi import create_app
+from iveg.domain import messages, passkeys, pins
+from iveg.domain.tracking import things
+from iveg.pipeline import messenger
 from iveg.settings import Settings
+from iveg.web.api import alerts, notes, tokens
 from iveg.web.security.audited import AUDITED, READING, Audited
 from iveg.web.security.authentication import declared_action
 from iveg.web.security.roles import MAY
@@ -18,13 +24,50 @@ from tests.processes import ROOT
 
 PAGE = ROOT / "SECURITY.md"
 _BEGIN, _END = "<!-- routes -->\n", "<!-- end of routes -->\n"
-_HEAD = ("| route | who | audit |", "|---|---|---|")
+_HEAD = ("| route | who | audit | limit |", "|---|---|---|---|")
 _BY_ITSELF = "`sign_in`, `sign_in_refused`"
+_API = "/api/v1"
+_WRONG = "wrong ones as at sign-in"
+_MINUTES = round(Settings().release_proof_minutes)
+_FRESH = f"with an account a proof of the last {_MINUTES} min"
+_LIMITS = {
+    "POST /signin": "five wrong ones of an address are free, then one a minute",
+    f"POST {_API}/robots/{{robot_id}}/release": f"the holds that were seen; {_FRESH}",
+    f"POST {_API}/robots/{{robot_id}}/goal": "one of a robot, the newest",
+    f"PUT {_API}/rule": "upon the version that was seen",
+    f"POST {_API}/rule/trial": "one at a time",
+    f"POST {_API}/rule/trial/promote": "upon the version that was seen",
+    f"POST {_API}/what-if": f"one of each, {what_if.MOST_WAITING} in line",
+    f"POST {_API}/experiments": "one at a time, in a process of its own",
+    f"POST {_API}/notes": f"{notes.MOST_TEXT} characters",
+    f"POST {_API}/alerts/acknowledge": f"{alerts.MOST_TOGETHER} alerts",
+    f"POST {_API}/things": f"{things.MOST_THINGS}",
+    f"PUT {_API}/messages/email": f"{messages.MOST_RECIPIENTS} recipients",
+    f"POST {_API}/messages/devices": f"{messages.MOST_DEVICES} devices",
+    f"POST {_API}/messages/{{channel}}/test": f"{messenger.MOST_WAITING} waiting",
+    f"POST {_API}/users": f"{admission.MOST_ACCOUNTS} accounts",
+    f"POST {_API}/tokens": f"{tokens.MOST_TOKENS} tokens",
+    f"POST {_API}/account/passkeys": f"{passkeys.MOST_PASSKEYS} of each; {_FRESH}",
+    f"POST {_API}/account/proof": _WRONG,
+    f"PUT {_API}/account/password": _WRONG,
+    f"PUT {_API}/account/pin": _FRESH,
+    f"POST {_API}/tablet": _FRESH,
+    f"POST {_API}/tablet/unlock": f"{pins.TRIES} wrong PINs, then 1, 4, 16 … min",
+}
+"""What bounds a route beside its role; of all others the size of the body alone."""
 
 
 def table(app: FastAPI) -> str:
-    """Every route that changes something, and those that few may read."""
-    return "\n".join((*_HEAD, *sorted(_rows(app)))) + "\n"
+    """Every route that changes something, and those that few may read.
+
+    Raises:
+        LookupError: a limit is of a route that is none.
+    """
+    rows = sorted(_rows(app))
+    gone = [route for route in _LIMITS if not any(f"`{route}`" in row for row in rows)]
+    if gone:
+        raise LookupError(gone)
+    return "\n".join((*_HEAD, *rows)) + "\n"
 
 
 def _rows(app: FastAPI) -> Iterator[str]:
@@ -36,7 +79,8 @@ def _rows(app: FastAPI) -> Iterator[str]:
                 continue
             who = ", ".join(role for role in MAY if action in MAY[role])
             told = "all" if action == "open" else who
-            yield f"| `{method} {route.path}` | {told} | {_word(kept)} |"
+            limit = _LIMITS.get(f"{method} {route.path}", "–")
+            yield f"| `{method} {route.path}` | {told} | {_word(kept)} | {limit} |"
 
 
 def _word(kept: Audited | None) -> str:
