@@ -13,6 +13,7 @@ from iveg.web.api.answers import Json
 from iveg.web.api.sessions import refuse_walls
 from iveg.web.cookies import keep_language
 from iveg.web.problems import Problem
+from iveg.web.refusals import refusals
 from iveg.web.security.authentication import Authenticator, Principal, require
 from iveg.web.security.people import People
 
@@ -38,7 +39,9 @@ class LanguageBody(BaseModel):
 
 def router(people: People) -> APIRouter:
     """The routes of whoever asks, about themselves."""
-    routes = APIRouter(prefix="/api/v1/account", tags=["account"])
+    routes = APIRouter(
+        prefix="/api/v1/account", tags=["account"], responses=refusals(409, 429, 503)
+    )
 
     @routes.get("", response_model=OwnAccount)
     async def own(who: _Reader) -> Response:

@@ -13,6 +13,7 @@ from iveg.models.signing_in import PasskeyOfPerson
 from iveg.web.api.answers import Json
 from iveg.web.api.users import Name
 from iveg.web.problems import Problem
+from iveg.web.refusals import refusals
 from iveg.web.security.answer import AnswerOfDevice
 from iveg.web.security.authentication import Authenticator, Principal, require
 from iveg.web.security.passkeys import SIGN_IN, Passkeys, site_of
@@ -35,7 +36,7 @@ class PasskeyBody(BaseModel):
 
 def router(people: People, passkeys: Passkeys) -> APIRouter:
     """The routes of passkeys; `people` says whose account somebody's is."""
-    routes = APIRouter(tags=["account"])
+    routes = APIRouter(tags=["account"], responses=refusals(404, 409, 429, 501, 503))
 
     @routes.get(
         "/signin/passkey",

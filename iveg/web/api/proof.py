@@ -14,6 +14,7 @@ from iveg.models.signing_in import Proof
 from iveg.web.api.answers import Json
 from iveg.web.api.passkeys import account_of, authenticator_of
 from iveg.web.problems import Problem
+from iveg.web.refusals import refusals
 from iveg.web.security.answer import AnswerOfDevice
 from iveg.web.security.authentication import Principal, require
 from iveg.web.security.passkeys import Passkeys, site_of
@@ -52,7 +53,11 @@ ProofBody = ByPassword | ByPasskey | ByPin
 
 def router(people: People, passkeys: Passkeys, pins: Pins) -> APIRouter:
     """The routes of a proof; `people` says whose account somebody's is."""
-    routes = APIRouter(prefix="/api/v1/account/proof", tags=["account"])
+    routes = APIRouter(
+        prefix="/api/v1/account/proof",
+        tags=["account"],
+        responses=refusals(404, 409, 429, 501),
+    )
 
     @routes.get("", response_model=Proof)
     async def state(request: Request, who: _Reader) -> Response:

@@ -135,7 +135,9 @@ def router(rules: Rules, clock: Clock) -> APIRouter:
 
 def trial_router(trials: Trials, rules: Rules, clock: Clock) -> APIRouter:
     """The trial of a candidate: seen by all, begun, ended, promoted by operators."""
-    routes = APIRouter(prefix="/api/v1/rule/trial", tags=["rule"])
+    routes = APIRouter(
+        prefix="/api/v1/rule/trial", tags=["rule"], responses=refusals(409, 503)
+    )
     operator = Depends(require("release"))
 
     @routes.get(

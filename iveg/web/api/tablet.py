@@ -11,6 +11,7 @@ from iveg.models.signing_in import Tablet, TabletPerson
 from iveg.web.api.answers import Json
 from iveg.web.api.passkeys import account_of, authenticator_of
 from iveg.web.api.users import Name
+from iveg.web.refusals import refusals
 from iveg.web.security.authentication import Authenticator, Principal, require
 from iveg.web.security.people import People
 from iveg.web.security.tablets import Pins
@@ -50,7 +51,11 @@ class PinBody(_Strict):
 
 def router(people: People, pins: Pins) -> APIRouter:
     """The routes of tablets, and of the PIN of whoever asks."""
-    routes = APIRouter(prefix="/api/v1", tags=["tablet"])
+    routes = APIRouter(
+        prefix="/api/v1",
+        tags=["tablet"],
+        responses=refusals(404, 409, 429, 503),
+    )
 
     @routes.get("/tablet", response_model=Tablet)
     async def state(request: Request, who: _Reader) -> Response:

@@ -16,6 +16,7 @@ from iveg.models.signing_in import NewToken, ProgramToken
 from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.api.users import Days, Name, end_of
+from iveg.web.refusals import refusals
 from iveg.web.security.authentication import Principal, require
 from iveg.web.security.programs import ApiTokens, Programs
 
@@ -35,7 +36,9 @@ class TokenBody(BaseModel):
 
 def router(programs: Programs, clock: Clock) -> APIRouter:
     """The routes of tokens; all for admins."""
-    routes = APIRouter(prefix="/api/v1/tokens", tags=["users"])
+    routes = APIRouter(
+        prefix="/api/v1/tokens", tags=["users"], responses=refusals(409, 503)
+    )
 
     @routes.get(
         "",

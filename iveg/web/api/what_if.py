@@ -18,6 +18,7 @@ from iveg.pipeline.rules import Rules
 from iveg.web.api.answers import Apart, Json
 from iveg.web.api.history_filters import Moment
 from iveg.web.pages import charts
+from iveg.web.refusals import refusals
 from iveg.web.security.authentication import Principal, require
 
 LONGEST_S: Final = 7 * 86_400.0
@@ -109,7 +110,9 @@ class WhatIfs(Protocol):
 
 def router(what_ifs: WhatIfs, rules: Rules, clock: Clock, worker: Apart) -> APIRouter:
     """The routes; whoever may read may ask."""
-    routes = APIRouter(prefix="/api/v1/what-if", tags=["rule"])
+    routes = APIRouter(
+        prefix="/api/v1/what-if", tags=["rule"], responses=refusals(409, 503)
+    )
     reader = Depends(require("read"))
 
     @routes.post("", response_model=WhatIf, status_code=202)

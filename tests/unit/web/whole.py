@@ -87,6 +87,10 @@ class WholeServer:
     records: list[Record]
     headers: dict[str, dict[str, str]]
 
+    def sign_in_anew(self) -> None:
+        """Give everybody a session, whoever's was ended."""
+        self.headers.update(_headers_of_roles(self.app))
+
     def ask(
         self, role: str, method: str, path: str, **request: object
     ) -> httpx.Response:
