@@ -43,6 +43,7 @@ from iveg.web.pages.routes import Pages
 from iveg.web.refusals import DocumentedApp
 from iveg.web.security import audited, connections, headers, rate_limits
 from iveg.web.security.authentication import Authenticator, Principal
+from iveg.web.security.sign_in_gate import SignInGate
 from iveg.web.security.signin import SignInLink
 from iveg.web.views import Views
 
@@ -158,6 +159,7 @@ def build_app(
         SignInLink, authenticator=face.authenticator, refusal=pages.refused_link
     )
     app.add_middleware(connections.KnownConnections, identify=identify)
+    app.add_middleware(SignInGate, clock=clock)
     # Last is outermost: a refusal carries the headers, too.
     app.add_middleware(headers.SecurityHeaders)
     app.add_middleware(notifications.NotificationsFirst, endpoint=face.orion)

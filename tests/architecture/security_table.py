@@ -31,7 +31,7 @@ _WRONG = "wrong ones as at sign-in"
 _MINUTES = round(Settings().release_proof_minutes)
 _FRESH = f"with an account a proof of the last {_MINUTES} min"
 _LIMITS = {
-    "POST /signin": "five wrong ones of an address are free, then one a minute",
+    "POST /signin": "20 a second; of an address five wrong, then one a minute",
     f"POST {_API}/robots/{{robot_id}}/release": f"the holds that were seen; {_FRESH}",
     f"POST {_API}/robots/{{robot_id}}/goal": "one of a robot, the newest",
     f"PUT {_API}/rule": "upon the version that was seen",

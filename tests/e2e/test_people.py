@@ -7,6 +7,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from iveg.domain.records import AuditRecord
+from iveg.web.security.sessions import IDLE_S, STOP_ONLY_S
 from tests.e2e.desk import Served, served
 from tests.e2e.reading import serious
 from tests.processes import until
@@ -98,6 +99,9 @@ POST = """async ([path, body]) => {
 }"""
 
 
+STOP_FLEET = "[data-stop=fleet]"
+
+
 def released_by(desk: TabletsDesk) -> list[str]:
     rows = desk.records(AuditRecord)
     return [one.name for one in rows if one.action == "release"]
@@ -133,3 +137,22 @@ def test_a_tablet_releases_by_name_until_it_locks_by_itself_and_stops_always(
     expect(page.locator("#tablet-said")).to_have_text("Locked")
     assert page.evaluate(POST, release) == 403
     assert page.evaluate(POST, ["robots/AGI/stop", {}]) == 202
+
+
+def test_a_session_that_is_over_still_stops_and_its_pages_say_so(
+    place: Served[TabletsDesk], page: Page
+) -> None:
+    desk, stop = place.desk, ["robots/AGI/stop", {}]
+    sign_in(place, page)
+    hold = place.run(stopped(desk))
+    desk.clock.now += IDLE_S + 60.0
+
+    assert page.evaluate(POST, stop) == 202
+    assert page.evaluate(POST, ["robots/AGI/release", {"holds": [hold]}]) == 403
+    page.goto(f"{place.url}/alerts")
+    expect(page.locator(STOP_FLEET)).to_be_visible()
+    expect(page.locator("#alerts-page")).to_have_count(0)
+    assert page.evaluate(POST, stop) == 202
+
+    desk.clock.now += STOP_ONLY_S
+    assert page.evaluate(POST, stop) == 401

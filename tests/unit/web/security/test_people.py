@@ -190,6 +190,22 @@ async def test_a_flood_of_sign_ins_waits_in_a_short_line_beside_the_loop(
     assert {thread for _, thread in thread.computed} == {"passwords_0"}
 
 
+async def test_sign_ins_beyond_twenty_a_second_are_looked_at_by_nobody(
+    desk: PeoplesDesk,
+) -> None:
+    async with desk.page() as page:
+        junk = [await page.post("/signin", content=b"{") for _ in range(22)]
+        stop = await page.post("/api/v1/robots/AGI/stop")
+        desk.clock.now += 1.0
+        later = await enter(page, name=ANA.name, password="acelga-1234")
+
+    assert [one.status_code for one in junk] == [422] * 20 + [429] * 2
+    assert junk[-1].headers["Retry-After"] == "2"
+    # A stranger's STOP is refused for who they are, and not for how many there are.
+    assert stop.status_code == 401
+    assert later == 204
+
+
 async def test_five_wrong_passwords_are_enough_for_a_minute_and_cost_no_more(
     desk: PeoplesDesk,
 ) -> None:
