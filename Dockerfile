@@ -4,14 +4,12 @@
 # Two targets: `server` (the last, hence the usual one) carries the product alone;
 # `laboratory` adds iveg/lab, for `iveg emulator`.
 
-FROM python:3.12.11-slim-bookworm AS libraries
+FROM python:3.12.11-slim-bookworm@sha256:519591d6871b7bc437060736b9f7456b8731f1499a57e22e6c285135ae657bf7 AS libraries
 WORKDIR /build
-COPY requirements/run.lock requirements/dev.lock requirements/audit.lock ./
-# PostgreSQL's driver is locked among the developers' libraries; only it is taken.
-RUN awk '/^[^ #]/ { wanted = /^psycopg/ } wanted' dev.lock > postgresql.lock \
-    && python -m venv /opt/iveg \
+COPY requirements/image.lock requirements/audit.lock ./
+RUN python -m venv /opt/iveg \
     && /opt/iveg/bin/pip install --no-cache-dir --disable-pip-version-check \
-        --require-hashes -r run.lock -r postgresql.lock
+        --require-hashes -r image.lock
 # What is inside, as CycloneDX, told by a tool that does not come along.
 RUN python -m venv /build/audit \
     && /build/audit/bin/pip install --no-cache-dir --disable-pip-version-check \
@@ -20,13 +18,13 @@ RUN python -m venv /build/audit \
         --output-file /opt/iveg/sbom.cdx.json /opt/iveg/bin/python
 
 # Compiled here: the file system is read-only later.
-FROM python:3.12.11-slim-bookworm AS code
+FROM python:3.12.11-slim-bookworm@sha256:519591d6871b7bc437060736b9f7456b8731f1499a57e22e6c285135ae657bf7 AS code
 WORKDIR /app
 COPY iveg iveg
 COPY migrations migrations
 RUN python -m compileall -q iveg migrations && mv iveg/lab /lab
 
-FROM python:3.12.11-slim-bookworm AS product
+FROM python:3.12.11-slim-bookworm@sha256:519591d6871b7bc437060736b9f7456b8731f1499a57e22e6c285135ae657bf7 AS product
 RUN groupadd --gid 10001 iveg \
     && useradd --uid 10001 --gid iveg --no-create-home --shell /usr/sbin/nologin iveg \
     && install --directory --owner iveg --group iveg --mode 700 /data

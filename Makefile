@@ -11,7 +11,7 @@ AUDIT := $(VENV)/audit
 WORKERS ?= 3
 # A worker that dies ends the run: loadscope would wait for it for ever.
 SIDE_BY_SIDE = -n $(WORKERS) --dist loadscope --no-loadscope-reorder --max-worker-restart 0
-# What a site installs (run.lock), the demo and all that a test can ask for.
+# What a site installs (run.lock), the image, the demo and all that a test can ask for.
 LOCK = $(BIN)/uv pip compile --quiet --universal --generate-hashes --no-emit-index-url --no-header pyproject.toml
 ALL := bags foxglove parquet passkeys postgresql ros2 sso
 # No end for a test that takes hours.
@@ -38,10 +38,10 @@ mutants: $(DEV) ; $(BIN)/python -m tests.mutants
 experiment: $(RUN) ; @exec $(BIN)/python -m iveg experiment run --$(or $(SIZE),quick)
 soak: $(DEV) ; $(BIN)/python -m benchmarks.soak
 migration: $(DEV) ; $(BIN)/alembic revision --autogenerate -m "$(m)"
-lock: $(DEV) ; $(BIN)/python -m pip install --quiet uv && $(LOCK) -o requirements/run.lock && $(LOCK) --extra bags -o requirements/demo.lock && $(LOCK) $(ALL:%=--extra %) --extra dev -o requirements/dev.lock && $(LOCK) --extra bench -c requirements/dev.lock -o requirements/bench.lock && $(LOCK:pyproject.toml=requirements/audit.in) -o requirements/audit.lock
+lock: $(DEV) ; $(BIN)/python -m pip install --quiet uv && $(LOCK) -o requirements/run.lock && $(LOCK) --extra bags -o requirements/demo.lock && $(LOCK) $(ALL:%=--extra %) --extra dev -o requirements/dev.lock && $(LOCK) --extra passkeys --extra postgresql --extra sso -c requirements/dev.lock -o requirements/image.lock && $(LOCK) --extra bench -c requirements/dev.lock -o requirements/bench.lock && $(LOCK:pyproject.toml=requirements/audit.in) -o requirements/audit.lock
 # Known holes of what a site installs, and of what checks the page.
-audit: $(AUDIT) ; $(AUDIT)/bin/pip-audit --disable-pip --require-hashes --requirement requirements/run.lock --strict && npm audit --no-package-lock
-sbom: $(AUDIT) ; $(AUDIT)/bin/cyclonedx-py requirements --output-reproducible --output-file sbom.cdx.json requirements/run.lock
+audit: $(AUDIT) ; $(AUDIT)/bin/pip-audit --disable-pip --require-hashes --requirement requirements/image.lock --strict && npm audit --no-package-lock
+sbom: $(AUDIT) ; $(AUDIT)/bin/cyclonedx-py requirements --output-reproducible --output-file sbom.cdx.json requirements/image.lock
 clean: ; rm -rf $(VENV) node_modules .mypy_cache .ruff_cache .pytest_cache .hypothesis test-output sbom.cdx.json
 
 # The system's part: installed on Debian, named elsewhere.

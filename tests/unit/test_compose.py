@@ -307,19 +307,28 @@ def test_no_secret_gets_into_the_image() -> None:
     ]
 
 
-def test_the_image_takes_postgresqls_driver_from_the_lock_file() -> None:
-    program = re.findall(r"awk '(.+?)' dev\.lock", DOCKERFILE)
-    taken = subprocess.run(
-        ["/usr/bin/awk", *program, str(ROOT / "requirements/dev.lock")],
-        capture_output=True,
-        text=True,
-        check=True,
-        timeout=60,
-    ).stdout
+def test_the_image_has_the_libraries_of_the_product_and_of_every_way_in() -> None:
+    locked = {
+        name: _locked((ROOT / f"requirements/{name}.lock").read_text())
+        for name in ("run", "image", "dev")
+    }
 
-    wanted = re.findall(r"^([\w-]+)==", taken, re.MULTILINE)
-    assert wanted == ["psycopg", "psycopg-binary"]
-    assert taken.count("--hash=sha256:") > len(wanted)
+    beside = {name for name, _ in locked["image"] - locked["run"]}
+    assert locked["run"] < locked["image"] <= locked["dev"]
+    assert {"psycopg", "webauthn", "authlib"} <= beside
+    assert re.findall(r"-r (\S+)", DOCKERFILE) == ["image.lock", "audit.lock"]
+
+
+def _locked(text: str) -> set[tuple[str, str]]:
+    return set(re.findall(r"^([\w-]+)==(\S+)", text, re.MULTILINE))
+
+
+def test_the_base_of_the_image_is_one_by_its_digest() -> None:
+    bases = re.findall(r"^FROM (python:\S+) AS", DOCKERFILE, re.MULTILINE)
+
+    assert len(bases) == 3
+    assert len(set(bases)) == 1
+    assert re.search(r"@sha256:[0-9a-f]{64}$", bases[0])
 
 
 def test_the_image_lists_what_is_inside_by_a_tool_that_stays_outside() -> None:
