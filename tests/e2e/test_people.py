@@ -145,9 +145,15 @@ def test_a_session_that_is_over_still_stops_and_its_pages_say_so(
     desk, stop = place.desk, ["robots/AGI/stop", {}]
     sign_in(place, page)
     hold = place.run(stopped(desk))
+    connection = "data-connection"
+    expect(page.locator("body")).to_have_attribute(connection, "open")
     desk.clock.now += IDLE_S + 60.0
+    expect(page.locator("body")).to_have_attribute(connection, "signed-out")
+    before = len(desk.fleet.stops)
 
-    assert page.evaluate(POST, stop) == 202
+    page.locator(STOP_FLEET).click()
+
+    until(lambda: len(desk.fleet.stops) > before, 20.0, "STOP by the button")
     assert page.evaluate(POST, ["robots/AGI/release", {"holds": [hold]}]) == 403
     page.goto(f"{place.url}/alerts")
     expect(page.locator(STOP_FLEET)).to_be_visible()
