@@ -5,9 +5,7 @@ takes nothing that a client sends.  It says how many subscriptions there are, so
 is fed with nothing while there is none.
 """
 
-import contextlib
 import os
-import sys
 from threading import Lock
 from typing import BinaryIO
 
@@ -16,11 +14,11 @@ import orjson
 from foxglove.websocket import ChannelView, Client, ServerListener
 
 from iveg.adapters.recordings.drawing import Drawing
+from iveg.adapters.recordings.fed import answer, run_fed
 from iveg.adapters.recordings.foxglove import channels_of
 from iveg.adapters.recordings.incoming import Unpacking
 from iveg.adapters.recordings.live_feed import HOST, DoorSetup
 from iveg.adapters.recordings.mcap_file import Channel
-from iveg.adapters.recordings.writer import heed_no_signals
 
 BACKLOG = 64
 """Messages that wait for a slow viewer; the oldest gives way."""
@@ -47,7 +45,7 @@ class _Watchers(ServerListener):
     def _changed(self, by: int) -> None:
         with self._lock:
             self._count += by
-            _say(self._answers, {"subscriptions": self._count})
+            answer(self._answers, {"subscriptions": self._count})
 
 
 class Door:
@@ -104,24 +102,5 @@ def serve(source: BinaryIO, answers: BinaryIO) -> None:
     door.close()
 
 
-def _say(answers: BinaryIO, told: dict[str, object]) -> None:
-    with contextlib.suppress(BrokenPipeError):
-        answers.write(orjson.dumps(told) + b"\n")
-
-
-def main() -> None:
-    """Signals are the feeder's to heed; its end is this process's."""
-    heed_no_signals()
-    with (
-        open(0, "rb", buffering=0) as source,
-        open(1, "wb", buffering=0) as answers,
-    ):
-        try:
-            serve(source, answers)
-        except RuntimeError as error:
-            _say(answers, {"refused": str(error)})
-            sys.exit(1)
-
-
 if __name__ == "__main__":
-    main()
+    run_fed(serve, RuntimeError)

@@ -5,10 +5,7 @@ ends a chunk, so that its own end costs no more than that, and says what it has 
 What ails the disk is said once, and ends it.
 """
 
-import contextlib
 import os
-import signal
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -20,9 +17,9 @@ from iveg.adapters import clock
 from iveg.adapters.disk import disk_space
 from iveg.adapters.recordings.directory import RecordingDirectory
 from iveg.adapters.recordings.drawing import Drawing
+from iveg.adapters.recordings.fed import answer, run_fed
 from iveg.adapters.recordings.incoming import Incoming, Sort, Unpacking
 from iveg.adapters.recordings.mcap_file import McapFile
-from iveg.adapters.urgency import give_way
 from iveg.domain.disk_space import DiskSpace
 from iveg.domain.recordings import RecordingLimits
 
@@ -171,33 +168,8 @@ def serve(source: BinaryIO, answers: BinaryIO) -> None:
 
 
 def _say(answers: BinaryIO, writer: RecordingWriter) -> None:
-    told = {"written": writer.kept, "dropped": writer.dropped}
-    # Where nobody is left to be told, the source ends, too.
-    with contextlib.suppress(BrokenPipeError):
-        answers.write(orjson.dumps(told) + b"\n")
-
-
-def heed_no_signals() -> None:
-    """Of a process that ends with its feeder, and is less urgent than that."""
-    for one in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(one, signal.SIG_IGN)
-    give_way()
-
-
-def main() -> None:
-    """Signals are the feeder's to heed; its end is the writer's."""
-    heed_no_signals()
-    with (
-        open(0, "rb", buffering=0) as source,
-        open(1, "wb", buffering=0) as answers,
-    ):
-        try:
-            serve(source, answers)
-        except OSError as error:
-            told = {"refused": error.strerror or str(error)}
-            answers.write(orjson.dumps(told) + b"\n")
-            sys.exit(1)
+    answer(answers, {"written": writer.kept, "dropped": writer.dropped})
 
 
 if __name__ == "__main__":
-    main()
+    run_fed(serve, OSError)
