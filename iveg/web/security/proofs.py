@@ -15,11 +15,6 @@ _ASKED: Final = OF_ACCOUNTS | {"pin"}
 """Whoever has the link alone has nothing to prove by; programs do so at each call."""
 
 
-def last_proven_at(who: Principal) -> float | None:
-    """When this session was last proven (Unix s); None: nobody knows, or need to."""
-    return who.proven_at
-
-
 class Freshness:
     """Asks whose proof is too old.
 
@@ -36,7 +31,7 @@ class Freshness:
         """When the proof of a session is too old (Unix s); None: never."""
         if self._within_s <= 0.0 or who.method not in _ASKED:
             return None
-        return (last_proven_at(who) or 0.0) + self._within_s
+        return (who.proven_at or 0.0) + self._within_s
 
     def is_stale(self, who: Principal) -> bool:
         """Whether somebody has to prove anew who they are."""
