@@ -10,7 +10,7 @@ import { floodSaid } from "../../iveg/static/js/panels/alert_members.js";
 import { createAlertsPanel } from "../../iveg/static/js/panels/alerts.js";
 import { createHints } from "../../iveg/static/js/panels/hints.js";
 import { faultsSaid } from "../../iveg/static/js/panels/robot_texts.js";
-import { createTone } from "../../iveg/static/js/panels/tone.js";
+import { createTone, openWhenTouched } from "../../iveg/static/js/panels/tone.js";
 import { equal, near, test } from "./harness.js";
 
 const PROBE = "<img src=x onerror=window.probed=true>";
@@ -146,6 +146,29 @@ test("a chime can be silenced and that is remembered; a P1 cannot", () => {
 test("a browser that may not sound yet is told apart from one that did", () => {
   const tone = createTone({ beep: () => {}, canSound: () => false, storage: memory() });
   equal(tone.test(), false);
+});
+
+test("audio is started by the first touch and not by the first alert", async () => {
+  const page = new EventTarget();
+  let [made, suspended] = [0, 0];
+  const context = {
+    suspend: async () => {
+      suspended += 1;
+    },
+  };
+  const open = openWhenTouched(
+    () => {
+      made += 1;
+      return /** @type {AudioContext} */ (/** @type {unknown} */ (context));
+    },
+    /** @type {typeof globalThis} */ (page),
+  );
+  equal(made, 0);
+  page.dispatchEvent(new Event("click"));
+  equal(made, 0); // the touch may be a press of STOP
+  await new Promise((done) => setTimeout(done, 20));
+  equal([made, suspended], [1, 1]);
+  equal([open() === /** @type {unknown} */ (context), made], [true, 1]);
 });
 
 test("the screen stays on while somebody supervises, and not longer", async () => {

@@ -8,6 +8,7 @@
  * @typedef {(hertz: number, afterS: number) => void} Beep
  */
 
+import { whenResting } from "../core/rest.js";
 import { browserStorage } from "../map/layers/memory.js";
 
 const EVERY_MS = 1600;
@@ -23,7 +24,7 @@ const KEY = "iveg.chime";
  */
 export function createTone(options = {}) {
   const { canSound = wasTouched, storage = browserStorage() } = options;
-  const beep = options.beep ?? createBeep();
+  const beep = options.beep ?? createBeep(openWhenTouched());
   /** @type {ReturnType<typeof setInterval> | undefined} */
   let timer;
   let chimes = storage?.getItem(KEY) !== "off";
@@ -71,12 +72,10 @@ function wasTouched() {
   return navigator.userActivation?.hasBeenActive ?? true;
 }
 
-/** @returns {Beep} */
-function createBeep() {
-  /** @type {AudioContext | null} */
-  let context = null;
+/** @param {() => AudioContext} open @returns {Beep} */
+function createBeep(open) {
   return (hertz, afterS) => {
-    context ??= new AudioContext();
+    const context = open();
     context.resume();
     const oscillator = context.createOscillator();
     const gain = context.createGain();
@@ -88,4 +87,29 @@ function createBeep() {
     oscillator.start(start);
     oscillator.stop(start + LENGTH_S);
   };
+}
+
+/**
+ * The browser's audio, started once the page was touched and rests.
+ *
+ * The first one starts a service of the browser and holds up the page meanwhile: for
+ * seconds on a busy machine, and not when a P1 has just come.
+ */
+export function openWhenTouched(make = () => new AudioContext(), page = globalThis) {
+  /** @type {AudioContext | null} */
+  let context = null;
+  const open = () => {
+    context ??= make();
+    return context;
+  };
+  for (const touch of ["click", "keydown"])
+    page.addEventListener(
+      touch,
+      async () => {
+        await whenResting();
+        if (!context) await open().suspend();
+      },
+      { once: true },
+    );
+  return open;
 }
