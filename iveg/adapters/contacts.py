@@ -5,7 +5,6 @@ be read is put aside: nobody gets messages until an operator enters recipients a
 and iVeg starts all the same, for STOP does not depend on mail.
 """
 
-from dataclasses import asdict
 from pathlib import Path
 
 from pydantic import TypeAdapter
@@ -18,7 +17,7 @@ _READER = TypeAdapter(Contacts)
 
 
 class FileContacts:
-    """The contacts in one file; implements ``pipeline.ports.ContactStore``."""
+    """The contacts in one file; implements ``pipeline.ports.Store``."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -34,4 +33,4 @@ class FileContacts:
         Raises:
             HopError: the disk did not take them.
         """
-        await save_lines(self._path, FORM, [asdict(contacts)])
+        await save_lines(self._path, FORM, [contacts])

@@ -3,7 +3,6 @@
 One that cannot be read is put aside: then nothing is tried, and nothing else changes.
 """
 
-from dataclasses import asdict
 from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict
@@ -17,7 +16,7 @@ FORM = Form("trial")
 
 
 class FileTrials:
-    """The trial; implements ``pipeline.ports.TrialStore``."""
+    """The trial; implements ``pipeline.ports.Store``."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -54,11 +53,10 @@ def _read(line: bytes) -> Trial:
 
 
 def _fields(trial: Trial) -> dict[str, object]:
-    so_far = None if trial.so_far is None else asdict(trial.so_far)
     return {
         "rule": rule_fields(trial.rule),
         "by": trial.by,
         "since": trial.since,
-        "so_far": so_far,
-        "differences": [asdict(one) for one in trial.differences],
+        "so_far": trial.so_far,
+        "differences": trial.differences,
     }

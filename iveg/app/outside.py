@@ -4,9 +4,12 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from pydantic import TypeAdapter
+
 from iveg.adapters import clock
+from iveg.adapters.broker_access import BrokerAccessCommand
+from iveg.adapters.by_robot import FileByRobot
 from iveg.adapters.contacts import FileContacts
-from iveg.adapters.detectors import FileDetectors
 from iveg.adapters.history.accounts import AccountStore
 from iveg.adapters.history.api_tokens import ApiTokenStore
 from iveg.adapters.history.engine import history_url, sqlite_file
@@ -26,7 +29,6 @@ from iveg.adapters.recordings.live_feed import DoorSetup, LiveFeed
 from iveg.adapters.recordings.recorder import PART as RECORDINGS
 from iveg.adapters.recordings.recorder import InputRecorder
 from iveg.adapters.recordings.writer import WriterSetup
-from iveg.adapters.revocations import BrokerAccessCommand, FileRevocations
 from iveg.adapters.rules import FileRules
 from iveg.adapters.sessions import FileSessions
 from iveg.adapters.tls import TlsFiles
@@ -36,13 +38,18 @@ from iveg.adapters.webhook import WebhookSender
 from iveg.app.fiware import open_fiware
 from iveg.app.sign_on import open_provider
 from iveg.domain.detection_rule import DetectionRule
+from iveg.domain.detector import OutOfService
 from iveg.domain.fleet import FleetDescription
 from iveg.domain.messages import Channel
+from iveg.domain.revocation import Revocation
 from iveg.pipeline.health_monitor import HopState
 from iveg.pipeline.loop import reading_apart_s
 from iveg.pipeline.ports import MessageSender
 from iveg.pipeline.services import KeptChoices
 from iveg.settings import Settings
+
+_OUT = TypeAdapter(tuple[str, OutOfService])
+_REVOKED = TypeAdapter(tuple[str, Revocation])
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,9 +66,9 @@ class Stores:
     journal: FileJournal
     rules: FileRules
     contacts: FileContacts
-    detectors: FileDetectors
+    detectors: FileByRobot[OutOfService]
     trials: FileTrials
-    revocations: FileRevocations
+    revocations: FileByRobot[Revocation]
     sessions: FileSessions
     accounts: AccountStore
     api_tokens: ApiTokenStore
@@ -191,9 +198,9 @@ def open_stores(
         FileJournal(directory / "commands.jsonl"),
         FileRules(directory / "rules.jsonl"),
         FileContacts(directory / "contacts.jsonl"),
-        FileDetectors(directory / "detectors.jsonl"),
+        FileByRobot(directory / "detectors.jsonl", "detectors", _OUT),
         FileTrials(directory / "trial.jsonl"),
-        FileRevocations(directory / "revoked.jsonl"),
+        FileByRobot(directory / "revoked.jsonl", "revoked", _REVOKED),
         FileSessions(directory / "sessions.jsonl"),
         AccountStore(url),
         ApiTokenStore(url),

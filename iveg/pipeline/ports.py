@@ -1,17 +1,17 @@
 """Ports of the pipeline: what it needs of the outside, a few verbs each."""
 
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Literal, Protocol
+from collections.abc import Iterable, Sequence
+from typing import Literal, Protocol, TypeVar
 
 from iveg.domain.detection_rule import DetectionRule
-from iveg.domain.detector import OutOfService
 from iveg.domain.feedback import Feedback
 from iveg.domain.goals import CancelOrder, GoalOrder
 from iveg.domain.messages import Contacts, MessageDelivery, OutboundMessage
 from iveg.domain.observations import Instant
 from iveg.domain.peer_scan import PeerScan
-from iveg.domain.revocation import BrokerTold, Revocation
-from iveg.domain.rule.trial import Trial
+from iveg.domain.revocation import BrokerTold
+
+_Kept = TypeVar("_Kept", contravariant=True)
 
 
 class GoalPort(Protocol):
@@ -109,25 +109,11 @@ class RuleStore(Protocol):
         """Write a new version down; returns when it is on disk. Raises HopError."""
 
 
-class TrialStore(Protocol):
-    """Storage of the trial of a rule."""
+class Store(Protocol[_Kept]):
+    """Storage of what people chose, such as the trial of a rule."""
 
-    async def save(self, trial: Trial | None) -> None:
-        """Put it in the place of the one before; returns on disk. Raises HopError."""
-
-
-class DetectorStore(Protocol):
-    """Storage of the detectors out of service."""
-
-    async def save(self, out: Mapping[str, OutOfService]) -> None:
-        """Put them in the place of those before; returns on disk. Raises HopError."""
-
-
-class RevocationStore(Protocol):
-    """Storage of the robots that are heard no more."""
-
-    async def save(self, revoked: Mapping[str, Revocation]) -> None:
-        """Put them in the place of those before; returns on disk. Raises HopError."""
+    async def save(self, kept: _Kept, /) -> None:
+        """Put it in the place of what was before; returns on disk. Raises HopError."""
 
 
 class BrokerAccess(Protocol):
@@ -135,13 +121,6 @@ class BrokerAccess(Protocol):
 
     async def change(self, robot_id: str, *, admitted: bool) -> BrokerTold:
         """Have a robot let in no more, or again. Raises HopError."""
-
-
-class ContactStore(Protocol):
-    """Storage of the recipients outside iVeg."""
-
-    async def save(self, contacts: Contacts) -> None:
-        """Put them in the place of those before; returns on disk. Raises HopError."""
 
 
 class MessageSender(Protocol):

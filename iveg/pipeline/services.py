@@ -17,12 +17,9 @@ from iveg.pipeline.messenger import Messenger
 from iveg.pipeline.ports import (
     BrokerAccess,
     Clock,
-    ContactStore,
-    DetectorStore,
     MessageSender,
-    RevocationStore,
     RuleStore,
-    TrialStore,
+    Store,
 )
 from iveg.pipeline.revocations import Pause, Revocations
 from iveg.pipeline.rules import Rules
@@ -42,10 +39,10 @@ class KeptChoices:
     """
 
     rule_store: RuleStore
-    contact_store: ContactStore
-    detector_store: DetectorStore
-    trial_store: TrialStore
-    revocation_store: RevocationStore
+    contact_store: Store[Contacts]
+    detector_store: Store[Mapping[str, OutOfService]]
+    trial_store: Store[Trial | None]
+    revocation_store: Store[Mapping[str, Revocation]]
     broker_access: BrokerAccess
     rules: Sequence[DetectionRule] = ()
     contacts: Contacts = field(default_factory=Contacts)

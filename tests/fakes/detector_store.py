@@ -13,7 +13,7 @@ class FakeDetectorStore:
         self.written: Mapping[str, OutOfService] = {}
         self.full = False
 
-    async def save(self, out: Mapping[str, OutOfService]) -> None:
+    async def save(self, out: Mapping[str, OutOfService], /) -> None:
         if self.full:
             raise HopError("disk", "no space left")
         self.written = out

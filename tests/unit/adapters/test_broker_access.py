@@ -1,4 +1,4 @@
-"""Revoked robots on disk, and the site's own command that the broker follows."""
+"""The site's own command that the broker follows."""
 
 import shlex
 import sys
@@ -6,18 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from iveg.adapters.revocations import BrokerAccessCommand, FileRevocations
+from iveg.adapters.broker_access import BrokerAccessCommand
 from iveg.domain.errors import HopError
-from iveg.domain.revocation import Revocation
-
-
-async def test_what_is_saved_is_loaded(tmp_path: Path) -> None:
-    store = FileRevocations(tmp_path / "revoked.jsonl")
-    word = Revocation("ana", 12.5, stood=False)
-
-    await store.save({"AGI": word})
-
-    assert FileRevocations(tmp_path / "revoked.jsonl").load() == {"AGI": word}
 
 
 async def test_the_sites_command_is_told_which_robot(tmp_path: Path) -> None:

@@ -1,39 +1,15 @@
-"""Revoked robots on disk, and the site's own command that tells the broker of them."""
+"""The site's own command that tells the broker of revoked robots."""
 
 import asyncio
 import contextlib
 import shlex
-from collections.abc import Mapping
-from dataclasses import asdict
-from pathlib import Path
 
-from pydantic import TypeAdapter
-
-from iveg.adapters.files import Form, load_lines, save_lines
 from iveg.domain.errors import HopError
-from iveg.domain.revocation import BrokerTold, Revocation
+from iveg.domain.revocation import BrokerTold
 
-FORM = Form("revoked")
-_READER = TypeAdapter(tuple[str, Revocation])
 _LIMIT_S = 10.0
 _SAID = 200
 """Characters of a failed command's output that are told."""
-
-
-class FileRevocations:
-    """Implements ``pipeline.ports.RevocationStore``: JSON lines, replaced whole."""
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-
-    def load(self) -> Mapping[str, Revocation]:
-        """The stored ones, by robot."""
-        return dict(load_lines(self._path, FORM, _READER.validate_json))
-
-    async def save(self, revoked: Mapping[str, Revocation]) -> None:
-        """Replace the stored ones; returns when they are on disk. Raises HopError."""
-        lines = [(robot_id, asdict(word)) for robot_id, word in revoked.items()]
-        await save_lines(self._path, FORM, lines)
 
 
 class BrokerAccessCommand:
