@@ -13,13 +13,13 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import cache
 from types import TracebackType
-from typing import Any
 from xml.sax.saxutils import quoteattr
 
 from cyclonedds.builtin import (
     BuiltinDataReader,
     BuiltinTopicDcpsPublication,
     BuiltinTopicDcpsSubscription,
+    DcpsEndpoint,
 )
 from cyclonedds.core import (
     DDSException,
@@ -192,7 +192,7 @@ class Dds(AbstractContextManager["Dds"]):
                 self._note(sample, writes)
         return tuple(self._endpoints.values())
 
-    def _note(self, sample: Any, writes: bool) -> None:
+    def _note(self, sample: DcpsEndpoint, writes: bool) -> None:
         key = str(sample.key)
         if sample.sample_info.instance_state != InstanceState.Alive:
             self._endpoints.pop(key, None)
@@ -227,9 +227,9 @@ class DdsReader:
             found += self._take(_MOST_TAKEN)
         return [one.payload for one in found if one.sample_info.valid_data]
 
-    def _take(self, most: int) -> list[Any]:
+    def _take(self, most: int) -> list[IdlStruct]:
         try:
-            found: list[Any] = self.entity.take(most)
+            found: list[IdlStruct] = self.entity.take(most)
         except DDSException as error:
             raise HopError("dds", error.msg) from error
         return found
@@ -260,7 +260,7 @@ class DdsWriter:
 
     def __init__(self, writer: DataWriter, topic: Topic) -> None:
         self._writer: DataWriter | None = writer
-        self._kind: Any = topic.data_type
+        self._kind: type[IdlStruct] = topic.data_type
 
     def write(self, payload: bytes) -> None:
         """Send a message with its encapsulation.
@@ -311,7 +311,7 @@ def _leave_in_bytes(kind: type[IdlStruct]) -> None:
     a base of ours would be announced with it.
     """
 
-    def deserialize(cls: type[Any], data: bytes, /, **_: object) -> Any:
+    def deserialize(cls: type[IdlStruct], data: bytes, /, **_: object) -> IdlStruct:
         made = cls()
         made.payload = data
         return made
@@ -339,7 +339,7 @@ def announced(message: type[Message], *, decodes: bool = False) -> type[IdlStruc
     return kind
 
 
-def _idl_type(kind: One | Many | Text | Structure, decodes: bool) -> Any:
+def _idl_type(kind: One | Many | Text | Structure, decodes: bool) -> object:
     match kind:
         case One("boolean"):
             return bool

@@ -73,7 +73,7 @@ class FiwareHttp:
         path: str,
         *,
         query: Mapping[str, str] | None = None,
-        body: Any = None,
+        body: object = None,
         timeout_s: float = TIMEOUT_S,
         also: Sequence[int] = (),
     ) -> httpx.Response:
@@ -146,7 +146,7 @@ class FiwareHttp:
         except HopError as error:
             raise HopError(self._hop, f"{NO_TOKEN}: {error.detail}") from error
 
-    def read(self, response: httpx.Response) -> Any:
+    def read(self, response: httpx.Response) -> object:
         """The JSON of an answer.
 
         Raises:
@@ -205,7 +205,7 @@ class FiwareHttp:
 
     def _total(self, response: httpx.Response, *, of_agent: bool) -> int:
         """The total number, as the neighbour reports it."""
-        about = self.read(response) if of_agent else response.headers
+        about = self.read_object(response) if of_agent else response.headers
         counted = about.get("count" if of_agent else "Fiware-Total-Count", 0)
         try:
             return int(counted)

@@ -5,9 +5,8 @@ It keeps the way of commands to the robot clear; the traps are in docs/fiware.md
 "Provisioning".
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from iveg.adapters.fiware_http import PROBE_TIMEOUT_S, Document, FiwareClient
 from iveg.adapters.fiware_token import FiwareToken
@@ -15,6 +14,7 @@ from iveg.adapters.orion import OrionClient
 from iveg.adapters.orphan_entities import remove_orphans
 from iveg.domain.equipment import Tile
 from iveg.domain.errors import HopError
+from iveg.domain.records import Json
 from iveg.ngsi import names
 
 RESOURCE = "/iot/json"
@@ -230,7 +230,7 @@ async def _ensure_device(
     return [f"{verb} device {device_id}."]
 
 
-def _shape(device: Mapping[str, Any]) -> tuple[object, ...]:
+def _shape(device: Json) -> tuple[object, ...]:
     """The parts of a device that must be as wanted."""
     return (
         device.get("apikey"),

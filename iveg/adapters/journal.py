@@ -12,13 +12,14 @@ from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import orjson
 
 from iveg.adapters.files import AppendedFile, Form, read_lines, write_lines
 from iveg.domain.errors import DataFileError
 from iveg.domain.observations import Instant
+from iveg.domain.records import Json
 from iveg.domain.stop import DesiredRecord
 
 _log = logging.getLogger(__name__)
@@ -115,7 +116,7 @@ class FileJournal:
         entry = _entry(robot_id, "stopped", hold_id, by, at.wall, ids, challenge)
         await self._write(entry)
 
-    async def _write(self, entry: Mapping[str, Any]) -> None:
+    async def _write(self, entry: Json) -> None:
         robot_id, facts = entry["robot_id"], _facts_of(entry)
         async with self._lock:
             if self._newest.pop(robot_id, None) != facts:
@@ -133,7 +134,7 @@ class FileJournal:
         self._file.close()
 
 
-def _facts_of(entry: Mapping[str, Any]) -> _Facts:
+def _facts_of(entry: Json) -> _Facts:
     """What a line says of its robot; who said it again, and when, is in the audit."""
     return entry["desired"], entry["hold_id"], tuple(entry["named"]), entry["ch"]
 
@@ -168,7 +169,7 @@ class _Memory:
         self._asked: tuple[str, ...] = ()
         self._challenge: str | None = None
 
-    def take(self, entry: Mapping[str, Any], by: str, *, stopped: bool) -> None:
+    def take(self, entry: Json, by: str, *, stopped: bool) -> None:
         """Read one line more."""
         # A line of the earlier version does not say what a release has named.
         told = entry.get("named")

@@ -43,7 +43,7 @@ _MOST_KEYS: Final = 100
 _RSA_CHARACTERS: Final = range(342, 1367)
 """Of a modulus of 2048 to 8192 bits; a longer one takes a processor too long."""
 
-_Keys = list[dict[str, Any]]
+_Key = dict[str, Any]
 
 
 class OpenIdProvider:
@@ -59,7 +59,7 @@ class OpenIdProvider:
         self._clock = clock
         self._http = BoundedJson(HOP)
         self._about: Json = {}
-        self._keys: _Keys = []
+        self._keys: list[_Key] = []
         self._known_at = self._keys_at = -_KNOWN_S
         self._asking = asyncio.Lock()
 
@@ -155,7 +155,7 @@ class OpenIdProvider:
             raise SignOnError("untrusted", f"ID token: {why}") from error
         return dict(claims)
 
-    async def _key(self, header: Mapping[str, Any]) -> RSAKey | ECKey:
+    async def _key(self, header: Json) -> RSAKey | ECKey:
         """The key that must have signed; keys are read anew where it is unknown."""
         if header.get("alg") not in ALGORITHMS:
             raise SignOnError(
@@ -191,14 +191,14 @@ def _checked(about: Json, issuer: str) -> Json:
     return about
 
 
-def _keys_of(told: Json) -> _Keys:
+def _keys_of(told: Json) -> list[_Key]:
     keys = told.get("keys")
     if not isinstance(keys, list) or len(keys) > _MOST_KEYS:
         raise HopError(HOP, "its keys cannot be used")
     return [one for one in keys if isinstance(one, dict) and _is_usable(one)]
 
 
-def _is_usable(key: Mapping[str, Any]) -> bool:
+def _is_usable(key: Json) -> bool:
     if key.get("use", "sig") != "sig" or not isinstance(key.get("kid", ""), str):
         return False
     if key.get("kty") == "EC":
@@ -213,7 +213,7 @@ def _is_usable(key: Mapping[str, Any]) -> bool:
     )
 
 
-def _find(keys: _Keys, header: Mapping[str, Any]) -> dict[str, Any] | None:
+def _find(keys: list[_Key], header: Json) -> _Key | None:
     """The one key that a header means; without ``kid`` only where there is one."""
     kind = "EC" if header["alg"].startswith("ES") else "RSA"
     fitting = [one for one in keys if one["kty"] == kind]

@@ -6,7 +6,6 @@ nowhere (docs/fiware.md).  The evidence is the robot's own answer.
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime
-from typing import Any
 
 from iveg.adapters.fiware_http import (
     PAGE_SIZE,
@@ -103,7 +102,7 @@ class OrionClient(OrionSubscriptions):
 
     async def read_entities(
         self, entity_type: str, attributes: Sequence[str], options: str = ""
-    ) -> list[dict[str, Any]]:
+    ) -> list[Document]:
         """Entities of a type, page by page.
 
         Raises:
@@ -235,9 +234,9 @@ class OrionClient(OrionSubscriptions):
         return None if response.status_code == 404 else told
 
 
-def _date_modified(entity: Any, attribute: str) -> float | None:
+def _date_modified(entity: Document | None, attribute: str) -> float | None:
     try:
-        text = entity[attribute]["metadata"]["dateModified"]["value"]
+        text = (entity or {})[attribute]["metadata"]["dateModified"]["value"]
         return datetime.fromisoformat(text).timestamp()
     except (KeyError, TypeError, ValueError):
         return None

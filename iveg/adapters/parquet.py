@@ -5,7 +5,10 @@ Rows of some pages make one row group, so that any length takes the same memory.
 
 import io
 from collections.abc import Iterable, Sequence
-from typing import Any, Final
+from types import ModuleType
+from typing import Final
+
+from typing_extensions import Buffer
 
 from iveg.adapters.extras import require_extra
 from iveg.domain.errors import HopError
@@ -43,7 +46,7 @@ class ParquetTable:
         self._writer = parquet.ParquetWriter(
             self._sink, self._schema, compression="zstd"
         )
-        self._batches: list[Any] = []
+        self._batches: list[object] = []
         self._rows = 0
 
     def add(self, records: Sequence[Record]) -> bytes:
@@ -118,7 +121,7 @@ class _Sink(io.RawIOBase):
     def tell(self) -> int:
         return self._size
 
-    def write(self, piece: Any) -> int:
+    def write(self, piece: Buffer) -> int:
         told = bytes(piece)
         self._pieces.append(told)
         self._size += len(told)
@@ -130,7 +133,7 @@ class _Sink(io.RawIOBase):
         return b"".join(pieces)
 
 
-def _arrow_type(arrow: Any, type_: ColumnType) -> Any:
+def _arrow_type(arrow: ModuleType, type_: ColumnType) -> object:
     types = {
         "time": arrow.timestamp("us", tz="UTC"),
         "number": arrow.float64(),
@@ -144,9 +147,9 @@ def _cells(column: Column, records: Iterable[Record]) -> list[object]:
     return [_cell(column.type, column.read(one)) for one in records]
 
 
-def _cell(type_: ColumnType, value: Any) -> object:
+def _cell(type_: ColumnType, value: object) -> object:
     if value is None:
         return None
-    if type_ == "time":
+    if type_ == "time" and isinstance(value, float | int):
         return round(value * _MICROS)
     return write_json(value).decode() if type_ == "json" else value

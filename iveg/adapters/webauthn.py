@@ -7,13 +7,13 @@ itself, in the thread that calls it.  Algorithms and checks are the library's.
 import json
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 from iveg.adapters.extras import has_extra, require_extra
 from iveg.domain.accounts import Account
 from iveg.domain.passkeys import CHALLENGE_S, Passkey
 
-Credential = dict[str, Any]
+Credential = dict[str, object]
 """What a browser answers (``PublicKeyCredential.toJSON()``), not yet looked at."""
 _TIMEOUT_MS: Final = int(CHALLENGE_S * 1000)
 _NAME: Final = "iVeg"
@@ -41,7 +41,7 @@ class Asking:
     """What a browser is asked to answer: the challenge, and the options around it."""
 
     challenge: bytes
-    options: dict[str, Any]
+    options: dict[str, object]
 
 
 def require_passkeys() -> None:
@@ -170,7 +170,7 @@ def prove(site: Site, passkey: Passkey, credential: Credential) -> int:
     return count
 
 
-def _described(known: Iterable[Passkey]) -> list[Any]:
+def _described(known: Iterable[Passkey]) -> list[object]:
     from webauthn import base64url_to_bytes
     from webauthn.helpers.structs import PublicKeyCredentialDescriptor
 

@@ -14,13 +14,12 @@ twenty seconds, with the findings until then::
 import asyncio
 import contextlib
 import secrets
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
 from contextlib import AsyncExitStack
 from functools import partial
 from http import HTTPStatus
 from ipaddress import ip_address
 from pathlib import Path
-from typing import Any
 from urllib.parse import urlsplit
 
 import orjson
@@ -51,6 +50,7 @@ from iveg.cli.running import run_until_stopped
 from iveg.domain.errors import HopError, IvegError
 from iveg.domain.hops import Check, Hop
 from iveg.domain.probe import SLOW_S
+from iveg.domain.records import Json
 from iveg.ngsi import names
 from iveg.settings import Settings
 
@@ -209,7 +209,7 @@ class Examination:
         with contextlib.suppress(HopError):
             path, within_s = "/api/v1/health", self._patience_s
             answer = await self._page.ask("GET", path, timeout_s=within_s)
-            return _lag_told(self._page.read(answer))
+            return _lag_told(self._page.read_object(answer))
         return None
 
     async def _wait_for_the_measure(self) -> None:
@@ -319,7 +319,7 @@ class Examination:
             raise HopError(Hop.MQTT, "not connected")
         return self._device
 
-    async def _publish(self, last: str, payload: dict[str, Any]) -> None:
+    async def _publish(self, last: str, payload: Mapping[str, object]) -> None:
         body = orjson.dumps(payload)
         topic = self._probe.topic(last)
         await self._connected.publish(topic, body, self._patience_s)
@@ -332,7 +332,7 @@ class Examination:
                 await asyncio.sleep(_LOOK_EVERY_S)
 
 
-def _lag_told(health: Any) -> Lag | None:
+def _lag_told(health: Json) -> Lag | None:
     """Lag in ``GET /api/v1/health``; None if healthy or not reported."""
     try:
         agent = next(one for one in health["hops"] if one["hop"] == Hop.AGENT)

@@ -78,7 +78,7 @@ class Column:
     name: str
     type: ColumnType
     told: Told
-    read: Callable[[Any], object]
+    read: Callable[[Record], object]
 
 
 def _time(means: str, clock: str = "iVeg") -> Told:
@@ -222,11 +222,11 @@ def readers_of(kind: type[Any]) -> Iterator[tuple[str, Callable[[Any], object]]]
             yield name, partial(_of_transport, one.name, transport.id)
 
 
-def _of_transport(name: str, transport: TransportId, record: Any) -> object:
+def _of_transport(name: str, transport: TransportId, record: Record) -> object:
     return getattr(record, name).get(transport)
 
 
-def _type_of(name: str, hint: Any) -> ColumnType:
+def _type_of(name: str, hint: object) -> ColumnType:
     is_union = typing.get_origin(hint) in (UnionType, typing.Union)
     parts = set(typing.get_args(hint)) if is_union else {hint}
     if float in parts:

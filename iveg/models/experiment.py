@@ -1,10 +1,10 @@
 """The paper's evaluation as a page sees it (docs/experiment.md)."""
 
-from collections.abc import Mapping
-from typing import Any, Literal
+from typing import Literal
 
 from pydantic import Field
 
+from iveg.domain.records import Json
 from iveg.models.base import Model
 
 
@@ -23,7 +23,7 @@ class Protected(Model):
     )
 
     @classmethod
-    def of(cls, numbers: Mapping[str, Any]) -> "Protected":
+    def of(cls, numbers: Json) -> "Protected":
         """From the numbers of a result."""
         slowed = numbers["slowed"]["in_view"]
         counts = numbers["encounters"], numbers["never_slowed"]

@@ -9,12 +9,12 @@ import json
 from collections.abc import Callable, Iterator, Mapping
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
 
 from pydantic.json_schema import models_json_schema
 
 from iveg.domain.kinds import SENSED, Kind, Sensor
 from iveg.domain.quantities import flags_of, quantities_of
+from iveg.domain.records import Json
 from iveg.models.alert import AlertListing
 from iveg.models.audit import AuditEntry
 from iveg.models.base import Model
@@ -95,7 +95,7 @@ _SENSORS_HEAD = """\
 
 export const SENSORS = /** @type {const} */ ([
 """
-_Schema = Mapping[str, Any]
+_Schema = Json
 
 
 def write_types() -> str:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from functools import cached_property
-from typing import Any, NamedTuple, Self, TypeVar
+from typing import NamedTuple, Self, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -60,7 +60,7 @@ class _Provisioned(BaseModel):
     commands: list[Command] = []
     static_attributes: _NotDone = Field([], max_length=0)
 
-    def show(self) -> dict[str, Any]:
+    def show(self) -> dict[str, object]:
         """It as the agent shows it."""
         return self.model_dump(by_alias=True, exclude_none=True)
 
@@ -125,12 +125,13 @@ class Device(_Provisioned):
             one.object_id or one.name: (one.name, one.type) for one in self.attributes
         }
 
-    def show(self) -> dict[str, Any]:
+    def show(self) -> dict[str, object]:
         """The device as the agent shows it: with a name of each command at it."""
-        shown = super().show()
-        for one in shown["commands"]:
-            one["object_id"] = one["name"]
-        return shown
+        commands = [
+            {**one.model_dump(by_alias=True, exclude_none=True), "object_id": one.name}
+            for one in self.commands
+        ]
+        return {**super().show(), "commands": commands}
 
     @cached_property
     def commands_by_name(self) -> Mapping[str, Command]:

@@ -1,7 +1,7 @@
 """Documents that clients send: subscriptions, registrations, groups, devices."""
 
 import secrets
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic.alias_generators import to_camel
@@ -16,7 +16,7 @@ class Document(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, alias_generator=to_camel)
 
-    def show(self) -> dict[str, Any]:
+    def show(self) -> dict[str, object]:
         """The document as a client gets it, with its defaults."""
         return self.model_dump(by_alias=True, exclude_none=True)
 

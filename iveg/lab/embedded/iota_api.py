@@ -1,7 +1,6 @@
 """North port of the agent: groups, devices, and requests of the context broker."""
 
 from collections.abc import Awaitable, Callable, Mapping, Sequence
-from typing import Any
 
 import orjson
 
@@ -165,7 +164,7 @@ def _tenancy(request: Request) -> Tenancy:
     )
 
 
-def _object(request: Request) -> dict[str, Any]:
+def _object(request: Request) -> dict[str, object]:
     if not request.headers.get("content-type", "").startswith("application/json"):
         raise wrong_syntax()
     try:

@@ -101,9 +101,9 @@ class Subscription:
         shown = self.document.show()
         if not self.document.throttling:
             shown.pop("throttling", None)
-        shown["notification"] |= self._counters()
+        counted = self.document.notification.show() | self._counters()
         status = "expired" if self.expired(now) else self.status
-        return {"id": self.id, **shown, "status": status}
+        return {"id": self.id, **shown, "notification": counted, "status": status}
 
     def _counters(self) -> dict[str, object]:
         """What became of the notifications; nothing is said of what never was."""

@@ -1,13 +1,14 @@
 """People in a robot's costmap whom its own sensors could not see."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, Literal
+from typing import Final, Literal
 
 import numpy as np
 
 from iveg.domain.costmap import Grid, InflatedGrid
+from iveg.domain.records import Json
 from iveg.lab.experiment.scoring import Picture, SeenObject
 
 Held = Literal["nobody", "told", "own"]
@@ -29,7 +30,7 @@ def belief_of(own: InflatedGrid, told: InflatedGrid) -> Belief:
     return held
 
 
-def belief_in(answer: Mapping[str, Any]) -> Belief:
+def belief_in(answer: Json) -> Belief:
     """Belief of an API response, which combines both."""
     width, height, origin = answer["width"], answer["height"], answer["origin"]
     grid = Grid(answer["resolution"], origin["x"], origin["y"], width, height)

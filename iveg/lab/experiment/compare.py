@@ -1,13 +1,13 @@
 """Comparison of two results: better, worse, or undecided."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from statistics import fmean
-from typing import Any
 
 from iveg.domain.errors import DataFileError
 from iveg.domain.latency.account import Cell
 from iveg.domain.latency.segments import DATA
+from iveg.domain.records import Json
 from iveg.lab.experiment.outcome import slices_of, timed_runs
 from iveg.lab.experiment.paper_tables import CLASSES
 from iveg.lab.experiment.plan import FORMAT, read_json
@@ -21,7 +21,7 @@ from iveg.lab.experiment.resampling import (
 from iveg.lab.experiment.slices import HOPS, latency_changes, whole
 from iveg.lab.experiment.statistics import Interval, difference, verdict
 
-Result = Mapping[str, Any]
+Result = Json
 _OTHER_LOAD = "cannot tell: the machine had another load"
 
 

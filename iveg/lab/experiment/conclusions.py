@@ -1,12 +1,12 @@
 """What an experiment found, in sentences: the first thing of its report."""
 
 from collections.abc import Iterator, Mapping
-from typing import Any
 
+from iveg.domain.records import Json
 from iveg.lab.experiment.paper_tables import COMPLETION, P95_BELOW_MS, PRINTED
 from iveg.lab.experiment.tables import ms, percent, worst_p95
 
-Result = Mapping[str, Any]
+Result = Json
 
 
 def conclusions(result: Result) -> Iterator[str]:
@@ -25,7 +25,7 @@ def conclusions(result: Result) -> Iterator[str]:
     yield from _stops(result["stack"]["stops"])
 
 
-def _protection(protected: Mapping[str, Any]) -> str:
+def _protection(protected: Json) -> str:
     met, never = protected["encounters"], protected["never_slowed"]
     if not met:
         return "Nobody in a camera's view came within 2 m of a moving robot."
@@ -58,7 +58,7 @@ def _slow_downs(slowed: Mapping[str, int]) -> str:
     )
 
 
-def _detection(farmer: Mapping[str, Any]) -> Iterator[str]:
+def _detection(farmer: Json) -> Iterator[str]:
     if farmer["precision"] is None:
         return
     recall, precision = (
@@ -86,7 +86,7 @@ def _latency(result: Result) -> Iterator[str]:
         yield "All programs ran on one machine: no time is that of a radio link."
 
 
-def _stops(stops: list[Mapping[str, Any]]) -> Iterator[str]:
+def _stops(stops: list[Json]) -> Iterator[str]:
     answers = [one["answer"]["direct"]["p50_ms"] for one in stops]
     stood = [one["standing"]["p50_ms"] for one in stops]
     if not stops or None in (*answers, *stood):

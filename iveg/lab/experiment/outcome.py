@@ -13,6 +13,7 @@ from typing import Any
 from iveg import __version__
 from iveg.domain.latency.segments import DATA
 from iveg.domain.latency.sketch import Sketch
+from iveg.domain.records import Json
 from iveg.lab.experiment.beliefs import injections
 from iveg.lab.experiment.message_times import counts_of
 from iveg.lab.experiment.moments import moments_of
@@ -119,13 +120,13 @@ def machine() -> dict[str, object]:
     }
 
 
-def slices_of(result: Mapping[str, Any]) -> list[Slice]:
+def slices_of(result: Json) -> list[Slice]:
     """All slices of all runs."""
     stacks = (one["stack"] for one in result["runs"])
     return [piece for one in stacks if one is not None for piece in one["slices"]]
 
 
-def timed_runs(result: Mapping[str, Any]) -> list[Outcome]:
+def timed_runs(result: Json) -> list[Outcome]:
     """Its runs of the paper's scenarios, which have both halves."""
     return [one for one in result["runs"] if one["stack"] is not None]
 

@@ -12,12 +12,13 @@ stepped into view since, which leaves nobody the time to slow before, or who is 
 camera's view.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from statistics import quantiles
-from typing import Any, Final, Literal
+from typing import Final, Literal
 
 from iveg.domain.feedback import HALF_SPEED
+from iveg.domain.records import Json
 
 Sight = Literal["in_view", "behind_plants", "unseen"]
 """In view of some camera; hidden from the robot that is near; neither."""
@@ -118,12 +119,12 @@ class Protection:
     entries: list[Entry] = field(default_factory=list)
 
     @classmethod
-    def read(cls, stored: Mapping[str, Any]) -> "Protection":
+    def read(cls, stored: Json) -> "Protection":
         """What a result file has of it."""
         entries = [Entry(**one) for one in stored["entries"]]
         return cls(**{**stored, "entries": entries})
 
-    def row(self) -> dict[str, Any]:
+    def row(self) -> Json:
         """The numbers by name; None where there was nothing to count."""
         near, slowed = sum(self.near_s.values()), sum(self.slowed_s.values())
         delays = [one for one in self.delays_s if one is not None]
@@ -149,7 +150,7 @@ class Protection:
         }
 
 
-def _entered(entries: list[Entry]) -> dict[str, Any]:
+def _entered(entries: list[Entry]) -> Json:
     told = sum((one.foretold_s or 0.0) >= AHEAD_S - _ROUNDING_S for one in entries)
     slow = sum(one.speed_share <= SLOW_SHARE for one in entries)
     return {

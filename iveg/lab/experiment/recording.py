@@ -1,20 +1,20 @@
 """What is known of one half of a run, virtual or real."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import orjson
 
 from iveg.domain.geometry import Pose2D
+from iveg.domain.records import Json
 from iveg.domain.stamps import parse_stamp
 from iveg.lab.emulator.greenhouse import into
 from iveg.lab.experiment.beliefs import Belief, Question, questions
 from iveg.lab.experiment.plan import WATCHED
 from iveg.lab.experiment.scoring import Pair, Picture, SeenObject, paired
 
-Row = Mapping[str, Any]
+Row = Json
 
 
 @dataclass(slots=True)

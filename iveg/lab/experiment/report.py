@@ -14,6 +14,7 @@ import orjson
 
 from iveg.domain.latency.paper import PAPER
 from iveg.domain.latency.segments import DATA
+from iveg.domain.records import Json
 from iveg.lab.experiment import tables
 from iveg.lab.experiment.conclusions import conclusions
 from iveg.lab.experiment.outcome import slices_of
@@ -23,7 +24,7 @@ from iveg.lab.experiment.words import SAY, Language, Say
 from iveg.web.pages.charts import figure_of, library
 from iveg.web.pages.latency_figures import cdf_figure
 
-Result = Mapping[str, Any]
+Result = Json
 _EMULATED = (
     "Robots, their cameras and detector, laser, odometry, people and greenhouse are "
     "emulated; the detector makes mistakes at the rates of one of the paper's tables. "

@@ -4,17 +4,18 @@ What happens within one run is not independent, and neither is its load of the m
 so runs are drawn with replacement (Efron 1979), those of the same seeds in pairs.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
+from iveg.domain.records import Json
 from iveg.lab.experiment.paper_tables import CLASSES
 from iveg.lab.experiment.scoring import average_precision
 from iveg.lab.experiment.statistics import FEWEST_RUNS, Interval
 
-Run = Mapping[str, Any]
+Run = Json
 """One half of a run, as ``outcome.half_of`` has it."""
 Number = Callable[[Sequence[Run]], float | None]
 """Of some runs together; None where there is nothing to count."""

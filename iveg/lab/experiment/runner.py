@@ -17,9 +17,10 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from iveg.domain.errors import DataFileError, ExperimentRefusedError
+from iveg.domain.records import Json
 from iveg.domain.stamps import format_stamp
 from iveg.lab.experiment.plan import (
     PLAN,
@@ -195,7 +196,7 @@ def _began(directory: Path) -> float:
     return (file if file.exists() else directory).stat().st_mtime
 
 
-def _chosen(directory: Path) -> dict[str, Any]:
+def _chosen(directory: Path) -> Json:
     """Profile and seed of its plan; nothing before it is written."""
     try:
         plan = read_json(directory / PLAN)["plan"]
@@ -221,7 +222,7 @@ def _read_protected(result: Path, _written_ns: int) -> Protected | None:
     return None if numbers is None else Protected.of(numbers)
 
 
-def _progress(directory: Path) -> dict[str, Any]:
+def _progress(directory: Path) -> Json:
     try:
         progress = read_json(directory / PROGRESS)
     except DataFileError:

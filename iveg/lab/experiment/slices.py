@@ -8,7 +8,7 @@ the interval of a mean or a quantile: messages of one slice are not independent.
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Any, Final, TypedDict
+from typing import Final, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from iveg.domain.latency.account import Cell
 from iveg.domain.latency.segments import DATA, SEGMENTS, Segment
 from iveg.domain.latency.sketch import Sketch, from_bins, merged, sketch_of
+from iveg.domain.records import Json
 from iveg.lab.experiment.message_times import MessageTimes
 from iveg.lab.experiment.statistics import FEWEST_RUNS, Interval
 
@@ -39,7 +40,7 @@ _DRAWS: Final = 1000
 _SEED: Final = 14
 
 
-def slice_between(before: Sequence[Any], after: Sequence[Any]) -> Slice:
+def slice_between(before: Sequence[Json], after: Sequence[Json]) -> Slice:
     """Decisions (Δt₃) between two responses' ``rows``."""
     old = {row["data"]: row["bins"]["iveg"] for row in before}
     decided = {

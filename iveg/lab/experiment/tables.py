@@ -2,10 +2,11 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from statistics import fmean
-from typing import Any, Final
+from typing import Final
 
 from iveg.domain.latency.paper import PAPER, Place
 from iveg.domain.latency.segments import Data
+from iveg.domain.records import Json
 from iveg.lab.experiment.outcome import timed_runs
 from iveg.lab.experiment.paper_tables import (
     CLASSES,
@@ -21,7 +22,7 @@ from iveg.lab.experiment.paper_tables import (
 from iveg.lab.experiment.protection import AHEAD_S, AWAY_M, SIGHTS, SLOW_SHARE
 from iveg.lab.experiment.slices import HOPS
 
-Result = Mapping[str, Any]
+Result = Json
 Rows = Iterator[Sequence[object]]
 
 DETECTION: Final = ("class", "source", "TP", "FP", "FN", "precision", "recall", "AP")
@@ -52,7 +53,7 @@ def _printed(name: str, place: Place, row: PaperScore) -> Sequence[object]:
     return name, f"paper, {place}", row.tp, row.fp, row.fn, *rates, ap
 
 
-def _counts(name: str, source: str, told: Mapping[str, Any]) -> Sequence[object]:
+def _counts(name: str, source: str, told: Json) -> Sequence[object]:
     ap = "–" if told["ap"] is None else f"{told['ap']:.2f}"
     rates = (_interval(told["precision"]), _interval(told["recall"]))
     return name, source, told["tp"], told["fp"], told["fn"], *rates, ap

@@ -30,6 +30,7 @@ from iveg.robot.ros2.reading import read_pose, read_scan, read_twist
 from iveg.robot.ros2.rigid import IDENTITY, RigidTransform
 from iveg.ros2 import detector_messages as d
 from iveg.ros2 import messages as m
+from iveg.ros2.schema import Message
 
 _MAX_AGE_S = 1.0
 """Greatest age of a transform (s); maps are corrected less often in recordings."""
@@ -122,7 +123,7 @@ class BagPass:
         mount = self._places.on_robot(frame, stamp, now.mono)
         return None if mount is None else read_scan(message, mount)
 
-    def _detections(self, message: Any, now: Instant) -> DetectionFrame | None:
+    def _detections(self, message: Message, now: Instant) -> DetectionFrame | None:
         if type(message) in BOXES and (type(message) not in LOOKS or _is_3d(message)):
             return self._boxes.locate(message, now.mono)
         self._camera.replace_look(message, now)
@@ -205,8 +206,10 @@ def _link(odometry: m.Odometry, pose: RigidTransform) -> m.TFMessage:
     return m.TFMessage((one,))
 
 
-def _is_3d(message: d.DetectionArray) -> bool:
-    return any(one.bbox3d.frame_id for one in message.detections)
+def _is_3d(message: Message) -> bool:
+    return isinstance(message, d.DetectionArray) and any(
+        one.bbox3d.frame_id for one in message.detections
+    )
 
 
 def _bare(frame: str) -> str:

@@ -1,7 +1,5 @@
 """Detections with depth, of any family, as boxes in ``map``."""
 
-from typing import Any
-
 from iveg.domain.errors import UnreadableError
 from iveg.domain.observations import UNKNOWN_ORIGIN, Detection, DetectionFrame
 from iveg.robot.grounding.locate import Ungrounded, frame_of
@@ -11,6 +9,7 @@ from iveg.robot.ros2.input_faults import InputFaults
 from iveg.robot.ros2.places import Places
 from iveg.robot.ros2.rigid import RigidTransform
 from iveg.ros2 import messages as m
+from iveg.ros2.schema import Message
 
 
 class Boxes:
@@ -35,7 +34,7 @@ class Boxes:
         self._places = places
         self._input_faults = input_faults
 
-    def locate(self, message: Any, now: float) -> DetectionFrame:
+    def locate(self, message: Message, now: float) -> DetectionFrame:
         """The detection frame of a message of one of ``BOXES``; ``now`` monotonic."""
         found = BOXES[type(message)](message)
         usual, stamp = found.header.frame_id, found.header.stamp.seconds

@@ -2,7 +2,6 @@
 
 from collections import deque
 from collections.abc import Mapping
-from typing import Any
 
 from iveg.domain.errors import UnreadableError
 from iveg.domain.observations import UNKNOWN_ORIGIN, DetectionFrame, Instant
@@ -13,6 +12,7 @@ from iveg.robot.ros2.input_faults import InputFaults
 from iveg.robot.ros2.places import Places
 from iveg.robot.ros2.reading import class_id_of
 from iveg.ros2 import messages as m
+from iveg.ros2.schema import Message
 
 _PICTURES = 6
 _SAME_PICTURE_S = 0.05
@@ -60,7 +60,7 @@ class Camera:
         """Note the calibration."""
         self._info = info
 
-    def replace_look(self, look: Any, now: Instant) -> None:
+    def replace_look(self, look: Message, now: Instant) -> None:
         """Note a detection frame of one of ``LOOKS``; one that waits is replaced."""
         self._look = LOOKS[type(look)](look), now.mono
 

@@ -249,7 +249,7 @@ class SensorInputs:
         return None if place is None else reading.read_path(message, place)
 
     def _sensed(
-        self, name: str, sensor: RosSensor, message: Any, now: Instant
+        self, name: str, sensor: RosSensor, message: Message, now: Instant
     ) -> Observation | None:
         if now.mono - self._sent_at.get(name, -math.inf) < sensor.every_s:
             return None

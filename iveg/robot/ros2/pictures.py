@@ -8,7 +8,7 @@ whole box would include the wall behind a person.
 """
 
 from collections.abc import Iterable
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,8 @@ from iveg.robot.ros2.detectors import Look
 from iveg.robot.ros2.reading import class_id_of, read_hypothesis, within_world
 from iveg.robot.ros2.rigid import RigidTransform
 from iveg.ros2 import messages as m
+
+_Pixel = TypeVar("_Pixel", bound=np.generic)
 
 _SQUARE = 0.02
 _ANY = 255
@@ -86,7 +88,7 @@ def read_depth(image: m.Image, info: m.CameraInfo) -> DepthPicture:
     return DepthPicture(read_camera(info), depth)
 
 
-def _pixels(image: m.Image, kind: str) -> NDArray[Any]:
+def _pixels(image: m.Image, kind: str) -> NDArray[np.generic]:
     dtype = np.dtype((">" if image.is_bigendian else "<") + kind)
     width, height, step = image.width, image.height, image.step
     fits = 0 < width <= EDGE_LIMIT and 0 < height <= EDGE_LIMIT
@@ -137,7 +139,7 @@ def _place(
     number: int,
     seen: m.Detection2D,
     picture: DepthPicture,
-    owners: NDArray[Any] | None,
+    owners: NDArray[np.generic] | None,
     place: RigidTransform,
     classes: tuple[str, ...],
     settings: Grounding,
@@ -157,7 +159,7 @@ def _segment(
     number: int,
     seen: m.Detection2D,
     picture: DepthPicture,
-    owners: NDArray[Any] | None,
+    owners: NDArray[np.generic] | None,
     classes: tuple[str, ...],
 ) -> Segment:
     class_id, probability = read_hypothesis(seen.results, classes)
@@ -177,8 +179,8 @@ def _segment(
 
 
 def _cut(
-    picture: NDArray[Any], corner: tuple[int, int], width: int, height: int
-) -> NDArray[Any]:
+    picture: NDArray[_Pixel], corner: tuple[int, int], width: int, height: int
+) -> NDArray[_Pixel]:
     """Part of a picture, zero beyond its edges; shape (height, width)."""
     left, top = corner
     part = np.zeros((height, width), picture.dtype)

@@ -6,7 +6,7 @@ only the named keys are kept: the rest may be a password, or long.
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Final
+from typing import Final
 
 from starlette.datastructures import Headers
 from starlette.requests import HTTPConnection
@@ -290,7 +290,7 @@ def _keep(kept: bytearray, message: Message) -> None:
         kept += body
 
 
-def _named(body: bytearray, names: Iterable[str]) -> dict[str, Any]:
+def _named(body: bytearray, names: Iterable[str]) -> dict[str, object]:
     """Some members of a JSON object; none of what is no such object."""
     if not names:
         return {}

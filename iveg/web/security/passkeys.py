@@ -9,7 +9,7 @@ from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from ipaddress import ip_address
-from typing import Any, Final, Protocol
+from typing import Final, Protocol
 
 from starlette.requests import Request
 
@@ -81,7 +81,7 @@ class Passkeys(Rereading):
 
     # --- a new one ----------------------------------------------------------------
 
-    async def ask_to_register(self, site: Site, account: Account) -> dict[str, Any]:
+    async def ask_to_register(self, site: Site, account: Account) -> dict[str, object]:
         """Options of a new passkey, as ``parseCreationOptionsFromJSON`` reads them.
 
         Raises:
@@ -129,7 +129,7 @@ class Passkeys(Rereading):
 
     async def ask_to_prove(
         self, site: Site, of: str, purpose: str, known: Iterable[Passkey] = ()
-    ) -> dict[str, Any]:
+    ) -> dict[str, object]:
         """Options of a proof, as ``parseRequestOptionsFromJSON`` reads them.
 
         Args:
@@ -175,7 +175,7 @@ class Passkeys(Rereading):
 
     # --- challenges ---------------------------------------------------------------
 
-    def _await_answer(self, asking: Asking, of: str, purpose: str) -> dict[str, Any]:
+    def _await_answer(self, asking: Asking, of: str, purpose: str) -> dict[str, object]:
         now = self._clock().mono
         self._challenges.add(asking.challenge, of, purpose, now)
         return asking.options
