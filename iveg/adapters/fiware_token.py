@@ -31,7 +31,7 @@ _log = logging.getLogger(__name__)
 TokenHeader = Literal["Authorization", "X-Auth-Token"]
 
 
-class Answer(Protocol):
+class TokenAnswer(Protocol):
     """What an endpoint says."""
 
     @property
@@ -52,7 +52,7 @@ class TokenHttp(Protocol):
 
     async def post(
         self, url: str, form: Mapping[str, str], login: tuple[str, str] | None = None
-    ) -> Answer:
+    ) -> TokenAnswer:
         """POST a form. Raises HopError."""
 
     async def close(self) -> None:
@@ -213,7 +213,7 @@ def _is_token(text: str) -> bool:
     )
 
 
-def _life_of(answer: Answer) -> float:
+def _life_of(answer: TokenAnswer) -> float:
     told = answer.body.get("expires_in")
     if isinstance(told, str) and told.isdigit():
         told = int(told[:9])

@@ -288,7 +288,7 @@ def _thieves(devices: Iterable[Document], robot_id: str) -> list[str]:
     ]
 
 
-def _robot_device(robot_id: str, device: names.Device, apikey: str) -> Document:
+def _robot_device(robot_id: str, device: names.RobotDevice, apikey: str) -> Document:
     return write_device(
         robot_id + device.suffix,
         robot_id,

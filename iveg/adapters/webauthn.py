@@ -7,13 +7,13 @@ itself, in the thread that calls it.  Algorithms and checks are the library's.
 import json
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 from iveg.adapters.extras import has_extra, require_extra
 from iveg.domain.accounts import Account
 from iveg.domain.passkeys import CHALLENGE_S, Passkey
 
-Credential = dict[str, object]
+Credential = dict[str, Any]
 """What a browser answers (``PublicKeyCredential.toJSON()``), not yet looked at."""
 _TIMEOUT_MS: Final = int(CHALLENGE_S * 1000)
 _NAME: Final = "iVeg"

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from iveg.app.laboratory import find_laboratory
 from iveg.cli.arguments import (
-    Call,
-    Command,
+    CommandCall,
+    CommandWord,
     add_audit,
     add_db,
     add_export,
@@ -48,7 +48,7 @@ def main(arguments: Sequence[str]) -> int:
         data = settings.data_directory or default_data_directory(
             os.environ, Path.home()
         )
-        code: int = options.run(Call(options, settings, os.environ, Path(data)))
+        code: int = options.run(CommandCall(options, settings, os.environ, Path(data)))
     except (SettingsError, DataFileError, MissingExtraError) as error:
         print(f"iveg: {error}", file=sys.stderr)
         return UNUSABLE
@@ -58,7 +58,7 @@ def main(arguments: Sequence[str]) -> int:
     return code
 
 
-def _commands() -> Sequence[Command]:
+def _commands() -> Sequence[CommandWord]:
     """Commands of the product, and of the laboratory where it is installed."""
     laboratory = find_laboratory("commands")
     return COMMANDS if laboratory is None else (*COMMANDS, *laboratory.COMMANDS)
@@ -68,7 +68,7 @@ def _commands() -> Sequence[Command]:
 # of page and history.
 
 
-def _serve(call: Call) -> int:
+def _serve(call: CommandCall) -> int:
     from iveg.cli.serve import serve
 
     call.data.mkdir(parents=True, exist_ok=True)
@@ -76,76 +76,76 @@ def _serve(call: Call) -> int:
     return run_until_stopped(work, until_eof=call.options.until_eof)
 
 
-def _replay(call: Call) -> int:
+def _replay(call: CommandCall) -> int:
     from iveg.cli.replay import replay
 
     work = replay(call.options, call.settings)
     return run_until_stopped(work, until_eof=call.options.until_eof)
 
 
-def _robot(call: Call) -> int:
+def _robot(call: CommandCall) -> int:
     from iveg.cli.robot import run_robot
 
     return run_robot(call.options, call.settings, call.data, call.environment)
 
 
-def _provision(call: Call) -> int:
+def _provision(call: CommandCall) -> int:
     from iveg.cli.provision import provision_fleet
 
     return provision_fleet(call.settings)
 
 
-def _doctor(call: Call) -> int:
+def _doctor(call: CommandCall) -> int:
     from iveg.cli.doctor import run_doctor
 
     return run_doctor(call.settings, call.data)
 
 
-def _settings(_: Call) -> int:
+def _settings(_: CommandCall) -> int:
     print(describe(), end="")
     return 0
 
 
-def _db(call: Call) -> int:
+def _db(call: CommandCall) -> int:
     from iveg.cli.database import run_db
 
     return run_db(call.options, call.settings, call.data)
 
 
-def _incident(call: Call) -> int:
+def _incident(call: CommandCall) -> int:
     from iveg.cli.incident import run_incident
 
     return run_incident(call.options)
 
 
-def _export(call: Call) -> int:
+def _export(call: CommandCall) -> int:
     from iveg.cli.export import run_export
 
     return run_export(call.options, call.settings, call.data)
 
 
-def _audit(call: Call) -> int:
+def _audit(call: CommandCall) -> int:
     from iveg.cli.audit import run_audit
 
     return run_audit(call.options, call.settings, call.data)
 
 
-def _user(call: Call) -> int:
+def _user(call: CommandCall) -> int:
     from iveg.cli.user import run_user
 
     return run_user(call.options, call.settings, call.data)
 
 
 COMMANDS = (
-    Command("serve", "the DSS and its page", _serve, add_serve),
-    Command("replay", "recorded logs as robots", _replay, add_replay),
-    Command("robot", "a ROS 2 robot joins", _robot, add_robot),
-    Command("provision", "make devices and subscriptions", _provision),
-    Command("doctor", "try every hop once and say what is broken", _doctor),
-    Command("settings", "print docs/settings.md", _settings),
-    Command("db", "the history's database", _db, add_db),
-    Command("export", "a list of the history as a file", _export, add_export),
-    Command("incident", "verify an incident pack", _incident, add_incident),
-    Command("user", "who may sign in", _user, add_user),
-    Command("audit", "whether the audit is whole", _audit, add_audit),
+    CommandWord("serve", "the DSS and its page", _serve, add_serve),
+    CommandWord("replay", "recorded logs as robots", _replay, add_replay),
+    CommandWord("robot", "a ROS 2 robot joins", _robot, add_robot),
+    CommandWord("provision", "make devices and subscriptions", _provision),
+    CommandWord("doctor", "try every hop once and say what is broken", _doctor),
+    CommandWord("settings", "print docs/settings.md", _settings),
+    CommandWord("db", "the history's database", _db, add_db),
+    CommandWord("export", "a list of the history as a file", _export, add_export),
+    CommandWord("incident", "verify an incident pack", _incident, add_incident),
+    CommandWord("user", "who may sign in", _user, add_user),
+    CommandWord("audit", "whether the audit is whole", _audit, add_audit),
 )

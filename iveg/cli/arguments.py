@@ -17,7 +17,7 @@ AddArguments = Callable[[argparse.ArgumentParser], None]
 
 
 @dataclass(frozen=True, slots=True)
-class Call:
+class CommandCall:
     """One call of the command line.
 
     Attributes:
@@ -33,7 +33,7 @@ class Call:
 
 
 @dataclass(frozen=True, slots=True)
-class Command:
+class CommandWord:
     """One word of the command line.
 
     Attributes:
@@ -44,11 +44,11 @@ class Command:
 
     name: str
     help: str
-    run: Callable[[Call], int]
+    run: Callable[[CommandCall], int]
     add_arguments: AddArguments = lambda _: None
 
 
-def parser(commands: Iterable[Command]) -> argparse.ArgumentParser:
+def parser(commands: Iterable[CommandWord]) -> argparse.ArgumentParser:
     """The parser of these commands, in the order of ``iveg --help``."""
     parser = argparse.ArgumentParser(
         prog="iveg", description="Supervise mixed robot fleets in greenhouses."

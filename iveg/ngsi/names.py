@@ -61,7 +61,7 @@ _RESERVED = frozenset({CLIMATE_DEVICE, HEARTBEAT_ID, DOCTOR_ID})
 
 
 @dataclass(frozen=True, slots=True)
-class Device:
+class RobotDevice:
     """One IoT Agent device: what it measures and whether it takes commands.
 
     Attributes:
@@ -81,10 +81,10 @@ class Device:
 
 
 ROBOT_DEVICES = (
-    Device(
+    RobotDevice(
         "", (*ALGORITHM_1.items(), *(a for one in MEASURED for a in one.attributes))
     ),
-    *(Device(one.suffix or "", one.attributes, one.of) for one in MEASURED),
+    *(RobotDevice(one.suffix or "", one.attributes, one.of) for one in MEASURED),
 )
 """The command device sorts before its sensors, and is provisioned last where the agent
 keeps its registry in memory, so that either registry picks it (docs/fiware.md)."""

@@ -29,7 +29,7 @@ class Persist:
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class SendAnswer:
     """Answer a command on ``cmdexe``; the uplink fills in the origin."""
 
     answer: CommandAnswer
@@ -47,4 +47,4 @@ class Report:
     is_measure: bool = True
 
 
-Effect = Drive | Persist | Answer | Report
+Effect = Drive | Persist | SendAnswer | Report

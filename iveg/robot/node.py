@@ -40,7 +40,7 @@ from iveg.ngsi import names
 from iveg.ngsi.codec import read_feedback
 from iveg.robot.caps import FREE, Cap
 from iveg.robot.echo import Echo
-from iveg.robot.effects import Answer, Drive, Effect, Persist, Report
+from iveg.robot.effects import Drive, Effect, Persist, Report, SendAnswer
 from iveg.robot.goals import Facts, Navigate, RobotGoals, read_goal
 from iveg.robot.hold_file import read_holds, write_holds
 from iveg.robot.judgement import Limits
@@ -346,7 +346,7 @@ class RobotNode:
                     self._command_drive(twist, now)
                 case Persist(holds):
                     self._lane.persist(holds)
-                case Answer(answer):
+                case SendAnswer(answer):
                     self._answer(answer)
                 case Report(report, is_measure):
                     self._report(report, is_measure=is_measure)

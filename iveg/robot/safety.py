@@ -30,7 +30,7 @@ from iveg.domain.observations import (
     SafetyReport,
 )
 from iveg.robot.caps import Cap
-from iveg.robot.effects import Answer, AnswerCode, Drive, Effect, Persist, Report
+from iveg.robot.effects import AnswerCode, Drive, Effect, Persist, Report, SendAnswer
 from iveg.robot.gate import Gate
 from iveg.robot.holds import HoldSet
 from iveg.robot.judgement import DEFAULT_LIMITS, Judgement, Limits
@@ -361,7 +361,7 @@ class SafetyMachine:
         if self._holds != self._persisted:
             self._persisted = self._holds
             effects.append(Persist(self._holds))
-        effects += [Answer(answer) for answer in answers]
+        effects += [SendAnswer(answer) for answer in answers]
         applied = self._limit, self._holds, self._challenge
         is_news = applied != self._said
         every = REPORT_HELD_EVERY_S if self._holds.holds else REPORT_EVERY_S

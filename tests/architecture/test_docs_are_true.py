@@ -30,7 +30,7 @@ def test_every_setting_has_its_heading(variable: str) -> None:
 
 
 @pytest.mark.parametrize("device", names.ROBOT_DEVICES, ids=lambda d: d.suffix or "-")
-def test_every_measure_topic_has_its_heading(device: names.Device) -> None:
+def test_every_measure_topic_has_its_heading(device: names.RobotDevice) -> None:
     topic = names.measure_topic("{apikey}", "{robot}" + device.suffix)
 
     assert topic in TOPICS

@@ -257,9 +257,9 @@ class StopOverBadTransports(RuleBasedStateMachine):
             else:
                 self._say(effect)
 
-    def _say(self, effect: robot.Answer | robot.Report) -> None:
+    def _say(self, effect: robot.SendAnswer | robot.Report) -> None:
         origin = self.rig.stamp(self.now)
-        if isinstance(effect, robot.Answer):
+        if isinstance(effect, robot.SendAnswer):
             payload = codec.write_answer(replace(effect.answer, origin=origin))
             reading = codec.read_answer("AGI", payload)
         else:

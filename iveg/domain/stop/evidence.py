@@ -15,7 +15,7 @@ from iveg.domain.stop.commands import State
 from iveg.domain.stop.standstill import Standstill
 
 
-class Evidence:
+class StopEvidence:
     """The newest report of one robot.
 
     Attributes:

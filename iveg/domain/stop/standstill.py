@@ -22,7 +22,7 @@ from iveg.domain.observations import UNKNOWN_ORIGIN, Instant, Origin
 
 
 @dataclass(frozen=True, slots=True)
-class Moment:
+class StandstillMoment:
     """Time of a measurement, on the robot's clock if it is comparable.
 
     Attributes:
@@ -33,7 +33,7 @@ class Moment:
     boot: str | None
     at: float
 
-    def since(self, earlier: "Moment") -> float | None:
+    def since(self, earlier: "StandstillMoment") -> float | None:
         """Seconds from one moment to this; None where they cannot be compared."""
         return self.at - earlier.at if self.boot == earlier.boot else None
 
@@ -49,10 +49,10 @@ class TopicOrder:
     _newest: Origin = field(default=UNKNOWN_ORIGIN)
     _broken: str | None = None
 
-    def moment(self, origin: Origin, arrived: Instant) -> Moment:
+    def moment(self, origin: Origin, arrived: Instant) -> StandstillMoment:
         """Time of measurement of a message of this topic."""
         before, self._newest = self._newest, origin
-        unknown = Moment(None, arrived.mono)
+        unknown = StandstillMoment(None, arrived.mono)
         if origin.boot is None or origin.seq is None or origin.mono is None:
             return unknown
         if before.boot == origin.boot:
@@ -61,7 +61,9 @@ class TopicOrder:
             elif _fell(before.stamp_s, origin.stamp_s):
                 return unknown
         return (
-            unknown if self._broken == origin.boot else Moment(origin.boot, origin.mono)
+            unknown
+            if self._broken == origin.boot
+            else StandstillMoment(origin.boot, origin.mono)
         )
 
 
@@ -78,12 +80,12 @@ class Standstill:
 
     def __init__(self) -> None:
         self.since: Instant | None = None
-        self._began: Moment | None = None
-        self._stood: tuple[Moment, Instant] | None = None
+        self._began: StandstillMoment | None = None
+        self._stood: tuple[StandstillMoment, Instant] | None = None
         self._count = 0
-        self._newest = Moment(None, float("-inf"))
+        self._newest = StandstillMoment(None, float("-inf"))
         self._moving_samples = 0
-        self._moved: Moment | None = None
+        self._moved: StandstillMoment | None = None
         self._moved_at = float("-inf")
         self._reports, self._odometry = TopicOrder(), TopicOrder()
 
@@ -121,7 +123,7 @@ class Standstill:
             self._stood = self._began, self.since
         return measured
 
-    def _moved_lately(self, moment: Moment, at: Instant) -> bool:
+    def _moved_lately(self, moment: StandstillMoment, at: Instant) -> bool:
         """Whether a wheel moved in the last half second."""
         if self._moved is None:
             return False
@@ -152,7 +154,7 @@ class Standstill:
             self._moved, self._moved_at = moment, at.mono
         return self._moving_samples >= LIMITS.standing_contradicted_by
 
-    def _is_before_the_rest(self, moment: Moment, not_before: float) -> bool:
+    def _is_before_the_rest(self, moment: StandstillMoment, not_before: float) -> bool:
         """Whether the robot's own clock says so, and nothing proves it wrong."""
         began, since = self._stood or (self._began, self.since)
         if began is None or since is None or moment.boot is None:

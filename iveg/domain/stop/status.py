@@ -9,7 +9,7 @@ from iveg.domain.observations import Instant
 from iveg.domain.stop.attempt import Attempt
 from iveg.domain.stop.commands import FollowedCommand, State
 from iveg.domain.stop.effects import Changed, Closed, Key
-from iveg.domain.stop.evidence import Evidence
+from iveg.domain.stop.evidence import StopEvidence
 from iveg.domain.stop.sends import Sends
 from iveg.domain.stop.wanted import NEW_HOLD, Kept
 from iveg.domain.transports import Transport
@@ -30,7 +30,7 @@ class StopStatus:
         self.state: State = "RUNNING"
         self.stop: FollowedCommand | None = None
         self.attempt: Attempt | None = None
-        self.evidence = Evidence(robot_id)
+        self.evidence = StopEvidence(robot_id)
         self._transports = {one.id: one for one in transports}
         self._sends = Sends(self._transports.values())
         self._joined_at = self._begun_at = -inf

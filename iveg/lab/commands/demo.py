@@ -16,7 +16,7 @@ from urllib.parse import urlsplit
 from iveg.adapters.equipment_files import DEMO
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.free_ports import bind_once
-from iveg.cli.arguments import Call
+from iveg.cli.arguments import CommandCall
 from iveg.cli.running import LOOPBACK, print_sign_in_link, run_until_stopped
 from iveg.domain.errors import SettingsError
 from iveg.lab.commands.processes import Parts
@@ -31,7 +31,7 @@ _FIWARE = (
 """Setting of each address, its variable and its scheme's port."""
 
 
-def demo(call: Call) -> int:
+def demo(call: CommandCall) -> int:
     """Run the demo; returns the exit code."""
     settings, environment = call.settings, call.environment
     directory = call.data / "demo"

@@ -18,7 +18,7 @@ from urllib.parse import urlsplit
 import httpx
 
 from iveg.adapters import clock
-from iveg.cli.arguments import Call
+from iveg.cli.arguments import CommandCall
 from iveg.cli.live_robots import live_robot
 from iveg.cli.running import run_until_stopped
 from iveg.domain.detection_rule import DetectionRule
@@ -55,7 +55,7 @@ _LIVE_WITHIN_S = 30.0
 T = TypeVar("T")
 
 
-def experiment(call: Call) -> int:
+def experiment(call: CommandCall) -> int:
     """Run or compare; returns the exit code."""
     options, settings, environment = call.options, call.settings, call.environment
     if options.word == "compare":

@@ -8,7 +8,7 @@ from iveg.lab.embedded.context_broker import ContextBroker
 from iveg.lab.embedded.documents import Document, read_document
 from iveg.lab.embedded.errors import not_supported
 from iveg.lab.embedded.http_server import Response
-from iveg.lab.embedded.ngsi_request import Call, read_id
+from iveg.lab.embedded.ngsi_request import NgsiCall, read_id
 from iveg.lab.embedded.outcomes import raise_for_batch
 
 _NOT_DONE = ("appendStrict", "delete", "replace")
@@ -19,7 +19,7 @@ class _Batch(Document):
     action_type: Literal["append", "update"]
 
 
-async def batch_update(broker: ContextBroker, call: Call) -> Response:
+async def batch_update(broker: ContextBroker, call: NgsiCall) -> Response:
     """``POST /v2/op/update``: executes what is possible and reports what is not."""
     raw = call.read_object()
     if raw.get("actionType") in _NOT_DONE:

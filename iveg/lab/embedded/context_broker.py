@@ -10,7 +10,7 @@ from iveg.adapters import clock
 from iveg.lab.embedded.entities import Entity, EntityChange, Scope, Touched, apply
 from iveg.lab.embedded.errors import ATTRIBUTE_NOT_FOUND, FiwareError, not_found
 from iveg.lab.embedded.outbox import Outbox
-from iveg.lab.embedded.outcomes import Outcome
+from iveg.lab.embedded.outcomes import UpdateOutcome
 from iveg.lab.embedded.providers import forward_updates
 from iveg.lab.embedded.subscriptions import Subscription
 from iveg.lab.embedded.tenants import Tenant
@@ -147,7 +147,7 @@ class ContextBroker:
         changes: Mapping[str, EntityChange],
         *,
         forced: bool = False,
-    ) -> Outcome:
+    ) -> UpdateOutcome:
         """Change existing attributes; forward registered ones to their providers.
 
         Does the possible part and reports the rest.
@@ -163,7 +163,7 @@ class ContextBroker:
         passed, failed = await forward_updates(
             tenant.registrations, scope, entity_id, kind, rest
         )
-        return Outcome(
+        return UpdateOutcome(
             entity_id,
             entity_type,
             kind,

@@ -32,7 +32,7 @@ class DeviceAttribute(BaseModel):
     type: str = "Text"
 
 
-class Command(BaseModel):
+class DeviceCommand(BaseModel):
     """A command; ``mqtt`` says how it is published."""
 
     name: str
@@ -57,7 +57,7 @@ class _Provisioned(BaseModel):
     entity_type: str
     attributes: list[DeviceAttribute] = []
     lazy: _NotDone = Field([], max_length=0)
-    commands: list[Command] = []
+    commands: list[DeviceCommand] = []
     static_attributes: _NotDone = Field([], max_length=0)
 
     def show(self) -> dict[str, object]:
@@ -99,7 +99,7 @@ class Group(_Provisioned):
         return f"{self.entity_type}:{device_id}"
 
 
-class Device(_Provisioned):
+class AgentDevice(_Provisioned):
     """One device.
 
     Attributes:
@@ -134,7 +134,7 @@ class Device(_Provisioned):
         return {**super().show(), "commands": commands}
 
     @cached_property
-    def commands_by_name(self) -> Mapping[str, Command]:
+    def commands_by_name(self) -> Mapping[str, DeviceCommand]:
         """Its commands."""
         return {one.name: one for one in self.commands}
 
@@ -168,7 +168,7 @@ def read_group(raw: Mapping[str, object], tenancy: Tenancy) -> Group:
 
 def read_device(
     raw: Mapping[str, object], tenancy: Tenancy, group: Group | None
-) -> Device:
+) -> AgentDevice:
     """Read a device from a ``POST``; a group completes it.
 
     Raises:
@@ -193,4 +193,4 @@ def read_device(
         "registration_id": "",
     }
     given = {name: one for name, one in raw.items() if name not in defaults or one}
-    return _read(Device, {**defaults, **given, **own})
+    return _read(AgentDevice, {**defaults, **given, **own})

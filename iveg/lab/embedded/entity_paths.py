@@ -15,7 +15,7 @@ from iveg.lab.embedded.errors import (
     too_many,
 )
 from iveg.lab.embedded.http_server import Response
-from iveg.lab.embedded.ngsi_request import Call, read_id, read_value, split_names
+from iveg.lab.embedded.ngsi_request import NgsiCall, read_id, read_value, split_names
 from iveg.lab.embedded.orion_text import load_json, looks_clean, read_pattern
 from iveg.lab.embedded.providers import bare_entities, foreign
 from iveg.lab.embedded.views import write_entity
@@ -24,7 +24,7 @@ _NOT_DONE = ("q", "mq", "georel", "typePattern")
 _ORDERS = ("", "id", "!id")
 
 
-async def list_entities(broker: ContextBroker, call: Call) -> Response:
+async def list_entities(broker: ContextBroker, call: NgsiCall) -> Response:
     """``GET /v2/entities``.
 
     A requested attribute may be missing: the entity is then listed without it, but one
@@ -55,7 +55,7 @@ class _Wanted:
     id_pattern: re.Pattern[str] | None
 
     @classmethod
-    def read(cls, call: Call) -> "_Wanted":
+    def read(cls, call: NgsiCall) -> "_Wanted":
         """Read the filter from the query.
 
         Raises:
@@ -80,7 +80,7 @@ class _Wanted:
         )
 
 
-async def create_entity(broker: ContextBroker, call: Call) -> Response:
+async def create_entity(broker: ContextBroker, call: NgsiCall) -> Response:
     """``POST /v2/entities``."""
     raw = call.read_object()
     entity_id, kind = read_id(raw)
@@ -96,20 +96,20 @@ async def create_entity(broker: ContextBroker, call: Call) -> Response:
     return Response(201, headers=location)
 
 
-async def get_entity(broker: ContextBroker, call: Call) -> Response:
+async def get_entity(broker: ContextBroker, call: NgsiCall) -> Response:
     """``GET /v2/entities/{id}``."""
     entity, told = await _whole(broker, call)
     return Response(200, write_entity(entity, call.view(), told))
 
 
-async def get_attributes(broker: ContextBroker, call: Call) -> Response:
+async def get_attributes(broker: ContextBroker, call: NgsiCall) -> Response:
     """``GET /v2/entities/{id}/attrs``."""
     entity, told = await _whole(broker, call)
     return Response(200, write_entity(entity, call.view(), told, attributes_only=True))
 
 
 async def _whole(
-    broker: ContextBroker, call: Call
+    broker: ContextBroker, call: NgsiCall
 ) -> tuple[Entity, Mapping[str, Attribute]]:
     """One entity with the attributes of its providers."""
     entity_id, view = call.parts[1], call.view()
@@ -129,7 +129,7 @@ async def _whole(
 
 
 async def _ask_providers(
-    broker: ContextBroker, call: Call, entity_id: str, names: tuple[str, ...]
+    broker: ContextBroker, call: NgsiCall, entity_id: str, names: tuple[str, ...]
 ) -> Mapping[tuple[str, str], Mapping[str, Attribute]]:
     """Attributes that providers return for an entity, by its id and type."""
     if "skipForwarding" in call.options:
@@ -138,14 +138,14 @@ async def _ask_providers(
     return await foreign(tenant.registrations, call.scope, entity_id, call.kind, names)
 
 
-async def delete_entity(broker: ContextBroker, call: Call) -> Response:
+async def delete_entity(broker: ContextBroker, call: NgsiCall) -> Response:
     """``DELETE /v2/entities/{id}``."""
     entity = broker.find(call.scope, call.parts[1], call.kind)
     broker.delete(call.scope, entity)
     return Response(204)
 
 
-async def append_attributes(broker: ContextBroker, call: Call) -> Response:
+async def append_attributes(broker: ContextBroker, call: NgsiCall) -> Response:
     """``POST /v2/entities/{id}/attrs``."""
     changes = call.changes(call.read_object())
     entity = broker.find(call.scope, call.parts[1], call.kind)
@@ -153,7 +153,7 @@ async def append_attributes(broker: ContextBroker, call: Call) -> Response:
     return Response(204)
 
 
-async def update_attributes(broker: ContextBroker, call: Call) -> Response:
+async def update_attributes(broker: ContextBroker, call: NgsiCall) -> Response:
     """``PATCH /v2/entities/{id}/attrs``."""
     changes = call.changes(call.read_object())
     if not changes:
@@ -162,7 +162,7 @@ async def update_attributes(broker: ContextBroker, call: Call) -> Response:
     return Response(204)
 
 
-async def replace_attributes(broker: ContextBroker, call: Call) -> Response:
+async def replace_attributes(broker: ContextBroker, call: NgsiCall) -> Response:
     """``PUT /v2/entities/{id}/attrs``."""
     changes = call.changes(call.read_object())
     entity = broker.find(call.scope, call.parts[1], call.kind)
@@ -170,13 +170,13 @@ async def replace_attributes(broker: ContextBroker, call: Call) -> Response:
     return Response(204)
 
 
-async def get_attribute(broker: ContextBroker, call: Call) -> Response:
+async def get_attribute(broker: ContextBroker, call: NgsiCall) -> Response:
     """``GET /v2/entities/{id}/attrs/{name}``."""
     attribute = await _attribute(broker, call, call.parts[1])
     return Response(200, attribute.normalized(call.view().metadata))
 
 
-async def get_value(broker: ContextBroker, call: Call) -> Response:
+async def get_value(broker: ContextBroker, call: NgsiCall) -> Response:
     """``GET /v2/entities/{id}/attrs/{name}/value``.
 
     Orion 4.3 to 4.7 takes the id for a pattern here, so that ``AGI`` is also
@@ -196,7 +196,9 @@ async def get_value(broker: ContextBroker, call: Call) -> Response:
     )
 
 
-async def _attribute(broker: ContextBroker, call: Call, entity_id: str) -> Attribute:
+async def _attribute(
+    broker: ContextBroker, call: NgsiCall, entity_id: str
+) -> Attribute:
     name = call.parts[3]
     entity = broker.known(call.scope, entity_id, call.kind)
     if entity is not None and name in entity.attributes:
@@ -208,7 +210,7 @@ async def _attribute(broker: ContextBroker, call: Call, entity_id: str) -> Attri
     raise not_found(ATTRIBUTE_NOT_FOUND) if entity is not None else not_found()
 
 
-async def put_attribute(broker: ContextBroker, call: Call) -> Response:
+async def put_attribute(broker: ContextBroker, call: NgsiCall) -> Response:
     """``PUT /v2/entities/{id}/attrs/{name}``."""
     await _update(
         broker, call, call.changes({call.parts[3]: load_json(call.request.body)})
@@ -216,7 +218,7 @@ async def put_attribute(broker: ContextBroker, call: Call) -> Response:
     return Response(204)
 
 
-async def put_value(broker: ContextBroker, call: Call) -> Response:
+async def put_value(broker: ContextBroker, call: NgsiCall) -> Response:
     """``PUT /v2/entities/{id}/attrs/{name}/value``."""
     changes = read_changes(
         {call.parts[3]: read_value(call.request)},
@@ -227,7 +229,7 @@ async def put_value(broker: ContextBroker, call: Call) -> Response:
     return Response(204)
 
 
-async def delete_attribute(broker: ContextBroker, call: Call) -> Response:
+async def delete_attribute(broker: ContextBroker, call: NgsiCall) -> Response:
     """``DELETE /v2/entities/{id}/attrs/{name}``."""
     entity = broker.find(call.scope, call.parts[1], call.kind)
     broker.delete_attribute(call.scope, entity, call.parts[3])
@@ -235,7 +237,7 @@ async def delete_attribute(broker: ContextBroker, call: Call) -> Response:
 
 
 async def _update(
-    broker: ContextBroker, call: Call, changes: Mapping[str, EntityChange]
+    broker: ContextBroker, call: NgsiCall, changes: Mapping[str, EntityChange]
 ) -> None:
     """Update attributes here or at providers; what is possible is done."""
     outcome = await broker.update(

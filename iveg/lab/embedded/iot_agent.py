@@ -14,8 +14,8 @@ import orjson
 from iveg.adapters import clock
 from iveg.lab.embedded.context_broker import ContextBroker
 from iveg.lab.embedded.devices import (
-    Command,
-    Device,
+    AgentDevice,
+    DeviceCommand,
     Publishing,
     Tenancy,
     read_device,
@@ -48,7 +48,7 @@ def _read_topic(topic: str) -> _Topic | None:
 
 
 def _read_answer(
-    device: Device, payload: bytes, now: float
+    device: AgentDevice, payload: bytes, now: float
 ) -> list[dict[str, EntityChange]]:
     """Read the payload of a ``cmdexe`` topic; answers to unknown commands are left."""
     answers = load_json(payload)
@@ -112,13 +112,13 @@ class IotAgent:
             self._write(device, changes, now)
 
     def _write(
-        self, device: Device, changes: Mapping[str, EntityChange], now: float
+        self, device: AgentDevice, changes: Mapping[str, EntityChange], now: float
     ) -> None:
         # A correlator is made if somebody is notified.
         scope = Scope(device.service, device.service_path, "", now)
         self._broker.upsert(scope, device.entity_name, device.entity_type, changes)
 
-    def _autoprovision(self, apikey: str, device_id: str) -> Device | None:
+    def _autoprovision(self, apikey: str, device_id: str) -> AgentDevice | None:
         group = self.registry.group_of(apikey)
         if group is None or group.autoprovision is False:
             return None
@@ -143,13 +143,13 @@ class IotAgent:
             )
         self._keep(device)
 
-    def _keep(self, device: Device) -> Device:
+    def _keep(self, device: AgentDevice) -> AgentDevice:
         if device.commands:
             device = self._register(device)
         self.registry.put(device)
         return device
 
-    def _register(self, device: Device) -> Device:
+    def _register(self, device: AgentDevice) -> AgentDevice:
         """Register the commands of an entity at the context broker."""
         entity = {"type": device.entity_type, "id": device.entity_name}
         document = {
@@ -163,7 +163,7 @@ class IotAgent:
         self._registrations(device)[registration.id] = registration
         return device.model_copy(update={"registration_id": registration.id})
 
-    def change(self, old: Device, new: Device) -> None:
+    def change(self, old: AgentDevice, new: AgentDevice) -> None:
         """Replace a device; new attributes are written as null."""
         self.forget(old)
         self._keep(new)
@@ -174,12 +174,12 @@ class IotAgent:
             nothing = {name: EntityChange(kind, None) for name, kind in gained}
             self._write(new, nothing, clock.wall())
 
-    def forget(self, device: Device) -> None:
+    def forget(self, device: AgentDevice) -> None:
         """Delete a device and its registration."""
         self._registrations(device).pop(device.registration_id, None)
         self.registry.remove(device)
 
-    def _registrations(self, device: Device) -> dict[str, Registration]:
+    def _registrations(self, device: AgentDevice) -> dict[str, Registration]:
         return self._broker.tenant(device.service).registrations
 
     # --- commands ----------------------------------------------------------------
@@ -205,7 +205,9 @@ class IotAgent:
             pending = dict.fromkeys(known, ("PENDING", None))
             self._write(device, status_changes(pending, now), now)
 
-    def _publish(self, device: Device, command: Command, value: object) -> None:
+    def _publish(
+        self, device: AgentDevice, command: DeviceCommand, value: object
+    ) -> None:
         how = command.mqtt or Publishing()
         topic = f"/{device.apikey}/{device.device_id}/cmd"
         payload = orjson.dumps({command.name: value})

@@ -4,7 +4,7 @@ from collections.abc import Awaitable, Callable, Mapping, Sequence
 
 import orjson
 
-from iveg.lab.embedded.devices import Device, Group, Tenancy, read_group
+from iveg.lab.embedded.devices import AgentDevice, Group, Tenancy, read_group
 from iveg.lab.embedded.errors import FiwareError, wrong_syntax
 from iveg.lab.embedded.http_server import Request, Response, Routes
 from iveg.lab.embedded.iot_agent import IotAgent
@@ -193,7 +193,7 @@ def _entity_key(entity: Mapping[str, object]) -> tuple[str, str]:
 
 
 def _page(
-    request: Request, name: str, listed: Sequence[Group] | Sequence[Device]
+    request: Request, name: str, listed: Sequence[Group] | Sequence[AgentDevice]
 ) -> Response:
     limit, offset = request.query.get("limit", "20"), request.query.get("offset", "0")
     if not (limit.isdigit() and offset.isdigit()):

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 
 import orjson
 
-from iveg.lab.embedded.devices import Device
+from iveg.lab.embedded.devices import AgentDevice
 from iveg.lab.embedded.entities import (
     EntityChange,
     Value,
@@ -31,7 +31,7 @@ _NOTHING: dict[str, object] = {"undefined": None}
 
 
 def read_measures(
-    device: Device, payload: bytes, now: float
+    device: AgentDevice, payload: bytes, now: float
 ) -> list[dict[str, EntityChange]]:
     """Read the payload of an ``attrs`` topic.
 
@@ -62,7 +62,7 @@ def read_measures(
 
 
 def read_single(
-    device: Device, name: str, payload: bytes, now: float
+    device: AgentDevice, name: str, payload: bytes, now: float
 ) -> list[dict[str, EntityChange]]:
     """Read the payload of ``attrs/{name}``; invalid JSON is stored as hexadecimal.
 
@@ -90,7 +90,7 @@ def _check(payload: bytes) -> bool:
 
 
 def _read_one(
-    device: Device, measure: Mapping[str, object], now: float, *, clean: bool
+    device: AgentDevice, measure: Mapping[str, object], now: float, *, clean: bool
 ) -> dict[str, EntityChange] | None:
     given = measure.get(_INSTANT)
     try:

@@ -36,7 +36,7 @@ class Publication(NamedTuple):
     retain: bool
 
 
-class Client:
+class BrokerClient:
     """One client: its subscriptions, and what is sent to it.
 
     Attributes:
@@ -99,11 +99,11 @@ class MqttBroker:
     def __init__(self) -> None:
         self.port = 0
         self.table = ConnectionTable(clock.mono, ConnectionCaps.on_loopback())
-        self.clients: dict[str, Client] = {}
-        self.lines: set[Client] = set()
+        self.clients: dict[str, BrokerClient] = {}
+        self.lines: set[BrokerClient] = set()
         self._listeners: list[Listener] = []
         self._retained: dict[str, Publication] = {}
-        self._known_audience: dict[str, tuple[tuple[Client, int], ...]] = {}
+        self._known_audience: dict[str, tuple[tuple[BrokerClient, int], ...]] = {}
 
     async def close(self) -> None:
         """Disconnect every client."""
@@ -138,14 +138,14 @@ class MqttBroker:
                 _log.exception("a message on %s could not be taken", publication.topic)
         self._spread(publication, packet)
 
-    def admit(self, line: Client) -> None:
+    def admit(self, line: BrokerClient) -> None:
         """Add a client; an older connection of the same identifier is closed."""
         older = self.clients.get(line.client_id)
         self.clients[line.client_id] = line
         if older is not None:
             older.hang_up()
 
-    def leave(self, line: Client) -> None:
+    def leave(self, line: BrokerClient) -> None:
         """Remove a connection that is closed."""
         self.lines.discard(line)
         if self.clients.get(line.client_id) is line:
@@ -177,7 +177,7 @@ class MqttBroker:
         elif retain:
             self._retained.pop(topic, None)
 
-    def _audience(self, topic: str) -> tuple[tuple[Client, int], ...]:
+    def _audience(self, topic: str) -> tuple[tuple[BrokerClient, int], ...]:
         """Subscribers of a topic with their quality of service."""
         known = self._known_audience.get(topic)
         if known is None:

@@ -19,7 +19,7 @@ from iveg.adapters.mqtt_packets import (
 )
 from iveg.lab.embedded.mqtt_broker import (
     LARGEST_PACKET,
-    Client,
+    BrokerClient,
     MqttBroker,
     Publication,
 )
@@ -58,7 +58,7 @@ async def mqtt_broker(host: str, port: int) -> AsyncIterator[MqttBroker]:
         await broker.close()
 
 
-class _ClientLine(Client, asyncio.Protocol):
+class _ClientLine(BrokerClient, asyncio.Protocol):
     """Splits the bytes of one client into packets and answers them.
 
     Anything but CONNECT at first, and what cannot be read, ends the connection.

@@ -10,7 +10,7 @@ from iveg.lab.embedded.context_broker import ContextBroker
 from iveg.lab.embedded.errors import FiwareError, bad_request
 from iveg.lab.embedded.http_server import Request, Response, Routes
 from iveg.lab.embedded.ngsi_request import (
-    Call,
+    NgsiCall,
     check_accept,
     check_content,
     read_options,
@@ -23,7 +23,7 @@ _URLS = {
     "subscriptions_url": "/v2/subscriptions",
     "registrations_url": "/v2/registrations",
 }
-_Route = Callable[[ContextBroker, Call], Awaitable[Response]]
+_Route = Callable[[ContextBroker, NgsiCall], Awaitable[Response]]
 
 
 class NgsiApi:
@@ -62,18 +62,18 @@ class NgsiApi:
         check_content(request)
         check_accept(request)
         scope = read_scope(request, correlator, clock.wall())
-        call = Call(request, scope, read_options(request), request.parts[1:])
+        call = NgsiCall(request, scope, read_options(request), request.parts[1:])
         return await route(self._broker, call)
 
 
-async def _version(broker: ContextBroker, call: Call) -> Response:
+async def _version(broker: ContextBroker, call: NgsiCall) -> Response:
     up = int(call.scope.now - broker.started)
     uptime = f"{up // 86400} d, {up // 3600 % 24} h, {up // 60 % 60} m, {up % 60} s"
     about = {"version": "4.7.0-iveg-embedded", "uptime": uptime}
     return Response(200, orjson.dumps({"orion": about}))
 
 
-async def _urls(_: ContextBroker, __: Call) -> Response:
+async def _urls(_: ContextBroker, __: NgsiCall) -> Response:
     return Response(200, orjson.dumps(_URLS))
 
 

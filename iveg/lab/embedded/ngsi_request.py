@@ -33,7 +33,7 @@ _OPTIONS_NOT_DONE = {
 
 
 @dataclass(frozen=True, slots=True)
-class Call:
+class NgsiCall:
     """One parsed request.
 
     Attributes:

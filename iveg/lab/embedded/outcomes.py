@@ -18,7 +18,7 @@ _MISSING = "do not exist: "
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class UpdateOutcome:
     """Result of an update of one entity.
 
     Attributes:
@@ -68,7 +68,7 @@ class Outcome:
         raise _refused(bool(self.updated), _MISSING + _complaint(self, first=True))
 
 
-def raise_for_batch(outcomes: Sequence[Outcome]) -> None:
+def raise_for_batch(outcomes: Sequence[UpdateOutcome]) -> None:
     """Raise Orion's error for ``op/update``, if there is one.
 
     Raises:
@@ -91,7 +91,7 @@ def raise_for_batch(outcomes: Sequence[Outcome]) -> None:
     raise _refused(some, description)
 
 
-def _complaint(outcome: Outcome, *, first: bool) -> str:
+def _complaint(outcome: UpdateOutcome, *, first: bool) -> str:
     named = f"{outcome.entity_id}/{outcome.asked_kind}".removesuffix("/")
     if outcome.exists:
         return f"{named} - [ {', '.join(outcome.refused)} ]"
@@ -103,7 +103,7 @@ def _refused(some: bool, description: str) -> FiwareError:
     return FiwareError("PartialUpdate" if some else "Unprocessable", description)
 
 
-def _not_passed_on(outcomes: Iterable[Outcome]) -> FiwareError:
+def _not_passed_on(outcomes: Iterable[UpdateOutcome]) -> FiwareError:
     named = ", ".join(
         f"{one.entity_id}-{one.kind} : [{', '.join((*one.refused, *one.failed))}]"
         for one in outcomes

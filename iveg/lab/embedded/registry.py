@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from iveg.lab.embedded.devices import Device, Group, Tenancy
+from iveg.lab.embedded.devices import AgentDevice, Group, Tenancy
 from iveg.lab.embedded.errors import FiwareError, no_device
 
 
@@ -11,8 +11,8 @@ class Registry:
 
     def __init__(self) -> None:
         self._groups: dict[tuple[Tenancy, str, str], Group] = {}
-        self._devices: dict[tuple[Tenancy, str, str], Device] = {}
-        self._by_topic: dict[tuple[str, str], Device] = {}
+        self._devices: dict[tuple[Tenancy, str, str], AgentDevice] = {}
+        self._by_topic: dict[tuple[str, str], AgentDevice] = {}
 
     # --- groups -----------------------------------------------------------------
 
@@ -79,11 +79,11 @@ class Registry:
 
     # --- devices ----------------------------------------------------------------
 
-    def devices(self, tenancy: Tenancy) -> list[Device]:
+    def devices(self, tenancy: Tenancy) -> list[AgentDevice]:
         """The devices of a tenancy, oldest first."""
         return [one for one in self._devices.values() if one.tenancy == tenancy]
 
-    def device(self, tenancy: Tenancy, device_id: str) -> Device:
+    def device(self, tenancy: Tenancy, device_id: str) -> AgentDevice:
         """One device of a tenancy.
 
         Raises:
@@ -94,25 +94,25 @@ class Registry:
                 return one
         raise no_device(device_id)
 
-    def is_known(self, device: Device) -> bool:
+    def is_known(self, device: AgentDevice) -> bool:
         """Whether a device with this id, API key and tenant is stored."""
         return (device.tenancy, device.apikey, device.device_id) in self._devices
 
-    def put(self, device: Device) -> None:
+    def put(self, device: AgentDevice) -> None:
         """Store a device; it replaces an older one with the same key."""
         self._devices[device.tenancy, device.apikey, device.device_id] = device
         self._by_topic[device.apikey, device.device_id] = device
 
-    def remove(self, device: Device) -> None:
+    def remove(self, device: AgentDevice) -> None:
         """Delete a device."""
         del self._devices[device.tenancy, device.apikey, device.device_id]
         self._by_topic.pop((device.apikey, device.device_id), None)
 
-    def device_of(self, apikey: str, device_id: str) -> Device | None:
+    def device_of(self, apikey: str, device_id: str) -> AgentDevice | None:
         """The device of a topic."""
         return self._by_topic.get((apikey, device_id))
 
-    def device_for(self, tenancy: Tenancy, name: str, kind: str) -> Device:
+    def device_for(self, tenancy: Tenancy, name: str, kind: str) -> AgentDevice:
         """The device that commands for an entity are sent to.
 
         Several may share the entity; MongoDB answers in the order of its index, so it

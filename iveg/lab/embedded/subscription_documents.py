@@ -80,7 +80,7 @@ class SubscribedEntity(Document):
         return re.search(self.id_pattern or "", entity_id) is not None
 
 
-class Condition(Document):
+class SubscriptionCondition(Document):
     """Changes that lead to a notification."""
 
     attrs: tuple[str, ...] = ()
@@ -121,7 +121,7 @@ class Subject(Document):
     """Entities, and their changes."""
 
     entities: list[SubscribedEntity] = Field(min_length=1)
-    condition: Condition = Condition()
+    condition: SubscriptionCondition = SubscriptionCondition()
 
 
 class Endpoint(Document):

@@ -159,7 +159,7 @@ class _Encounter:
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class FoundTarget:
     """A detected target and its confidence (0 to 1)."""
 
     target: Target
@@ -167,13 +167,13 @@ class Found:
 
 
 Place = Callable[
-    [Pose2D, Sequence[Found], Sequence[Target], Scenery],
+    [Pose2D, Sequence[FoundTarget], Sequence[Target], Scenery],
     tuple[tuple[Detection, ...], tuple[str | None, ...]],
 ]
 """Locates detected targets: boxes, and the number of targets without a position."""
 
 
-class Detector:
+class EmulatedDetector:
     """Camera of one robot with its detector.
 
     Args:
@@ -218,7 +218,7 @@ class Detector:
         """
         camera = pose.compose(self._profile.camera)
         drawn: list[Detection] = []
-        found: list[Found] = []
+        found: list[FoundTarget] = []
         for target in targets:
             seen = self.part_seen(camera, target.body, scenery)
             encounter = self._encounter(now, camera, target, seen > 0.0)
@@ -228,7 +228,7 @@ class Detector:
                 if self._place is None:
                     drawn.append(self._box(pose, target, encounter, seen))
                 else:
-                    found.append(Found(target, self._certainty(encounter, seen)))
+                    found.append(FoundTarget(target, self._certainty(encounter, seen)))
             if encounter.ghost is not None:
                 drawn.append(self._ghost_box(pose, encounter.ghost))
         if self._place is None or not found:

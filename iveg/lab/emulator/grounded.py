@@ -14,7 +14,7 @@ import numpy as np
 from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import Pose2D
 from iveg.domain.observations import Detection, Origin
-from iveg.lab.emulator.camera import PERSON, Found, Target
+from iveg.lab.emulator.camera import PERSON, FoundTarget, Target
 from iveg.lab.emulator.depth import (
     DepthCamera,
     Foliage,
@@ -53,7 +53,7 @@ class GroundedCamera:
     def place(
         self,
         pose: Pose2D,
-        found: Sequence[Found],
+        found: Sequence[FoundTarget],
         targets: Sequence[Target],
         scenery: Scenery,
     ) -> tuple[tuple[Detection, ...], tuple[str | None, ...]]:
@@ -78,7 +78,7 @@ class GroundedCamera:
         return tuple(placed), tuple(lost)
 
     def _one(
-        self, pose: Pose2D, one: Found, others: Sequence[Target], scenery: Scenery
+        self, pose: Pose2D, one: FoundTarget, others: Sequence[Target], scenery: Scenery
     ) -> tuple[tuple[Detection, ...], tuple[str | None, ...]]:
         sensor = pose.compose(self._mount.pose)
         lens = _about(self._camera, sensor, one.target)

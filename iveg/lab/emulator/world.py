@@ -24,8 +24,8 @@ from iveg.domain.observations import (
 )
 from iveg.lab.emulator.camera import (
     PERSON,
-    Detector,
     DetectorModel,
+    EmulatedDetector,
     Target,
     person_target,
     robot_target,
@@ -79,7 +79,7 @@ class RobotHardware:
         place = None
         if camera == "grounding":
             place = GroundedCamera(profile, rng.spawn(1)[0]).place
-        self._detector = Detector(profile, detector, rng, place)
+        self._detector = EmulatedDetector(profile, detector, rng, place)
         self.vehicle = Vehicle(self.profile, script.start)
         self._believed = script.start
         self._navigator = Navigator(profile, script)

@@ -40,7 +40,7 @@ def belief_in(answer: Json) -> Belief:
 
 
 @dataclass(frozen=True, slots=True)
-class Question:
+class InjectionQuestion:
     """A person whom others had in view and a robot's camera had not, and its costmap.
 
     Attributes:
@@ -60,17 +60,17 @@ class Question:
 
 def questions(
     truth: Sequence[Picture], beliefs: Iterable[tuple[float, Belief]], robot_id: str
-) -> Iterator[Question]:
+) -> Iterator[InjectionQuestion]:
     """Every person out of the robot's sight at every moment of its costmap."""
     sighted = _first_sights(truth, robot_id)
     for at, belief in beliefs:
         for one in _hidden(truth, at, robot_id):
             is_first = sighted.get(one.key, float("inf")) > at
             held = belief(one.x, one.y)
-            yield Question(at, one.key, one.x, one.y, held, is_first)
+            yield InjectionQuestion(at, one.key, one.x, one.y, held, is_first)
 
 
-def injections(asked: Sequence[Question]) -> dict[str, int]:
+def injections(asked: Sequence[InjectionQuestion]) -> dict[str, int]:
     """How often the costmap contained a person whom the robot could not see.
 
     ``asked``: moments at which another robot had a person in view and this robot's

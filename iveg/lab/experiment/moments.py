@@ -10,7 +10,7 @@ from math import dist
 from operator import itemgetter
 from typing import Final
 
-from iveg.lab.experiment.protection import Moment, NearPerson, Sight
+from iveg.lab.experiment.protection import NearMoment, NearPerson, Sight
 from iveg.lab.experiment.recording import Row
 
 _STILL_S: Final = 0.25
@@ -19,7 +19,7 @@ _SAME_M: Final = 1.0
 """Who is farther from where iVeg has somebody is somebody else (m)."""
 
 
-def moments_of(truth: Iterable[Row], told: Sequence[Row] = ()) -> Iterator[Moment]:
+def moments_of(truth: Iterable[Row], told: Sequence[Row] = ()) -> Iterator[NearMoment]:
     """Every robot at each of its pictures, in the order of time.
 
     Args:
@@ -37,7 +37,7 @@ def moments_of(truth: Iterable[Row], told: Sequence[Row] = ()) -> Iterator[Momen
         for row in rows:
             places = encounters.get((row["robot"], at), ())
             last_at = before.get(row["robot"], row)["at"]
-            yield Moment(
+            yield NearMoment(
                 row["robot"],
                 at,
                 min(at - last_at, _STILL_S),

@@ -16,7 +16,7 @@ from websockets.typing import Subprotocol
 from iveg.adapters import clock
 from iveg.lab.experiment.beliefs import belief_in
 from iveg.lab.experiment.message_times import MessageTimes
-from iveg.lab.experiment.recording import Recording, Row, picture_of
+from iveg.lab.experiment.recording import Row, RunRecording, picture_of
 from iveg.lab.experiment.slices import Slice, slice_between
 
 _MAP_EVERY_S = 1.0
@@ -26,7 +26,7 @@ _PATIENCE_S = 20.0
 
 
 @dataclass(slots=True)
-class ObservedRun(Recording):
+class ObservedRun(RunRecording):
     """Recorded output of ``/live`` and the API.
 
     Attributes:

@@ -19,10 +19,10 @@ from iveg.lab.experiment.message_times import counts_of
 from iveg.lab.experiment.moments import moments_of
 from iveg.lab.experiment.observer import ObservedRun
 from iveg.lab.experiment.paper_tables import CLASSES
-from iveg.lab.experiment.plan import FORMAT, Plan, PlannedRun
+from iveg.lab.experiment.plan import FORMAT, ExperimentPlan, PlannedRun
 from iveg.lab.experiment.protection import Protection, protection_of
 from iveg.lab.experiment.protection import whole as all_protection
-from iveg.lab.experiment.recording import Recording
+from iveg.lab.experiment.recording import RunRecording
 from iveg.lab.experiment.scoring import Tally, score, tally
 from iveg.lab.experiment.slices import HOPS, Slice, whole, with_messages
 from iveg.lab.experiment.statistics import thinned
@@ -30,7 +30,7 @@ from iveg.lab.experiment.statistics import thinned
 Outcome = dict[str, Any]
 
 
-def half_of(run: Recording) -> Outcome:
+def half_of(run: RunRecording) -> Outcome:
     """Result of one half; that of the virtual one is reproducible."""
     pairs = run.pairs
     return {
@@ -80,7 +80,7 @@ def outcome_of(
 
 
 def result_of(
-    plan: Plan,
+    plan: ExperimentPlan,
     outcomes: Sequence[Outcome],
     chosen: Mapping[str, object],
     why: str = "",
@@ -131,7 +131,7 @@ def timed_runs(result: Json) -> list[Outcome]:
     return [one for one in result["runs"] if one["stack"] is not None]
 
 
-def _summed(plan: Plan, runs: Sequence[Outcome]) -> dict[str, object]:
+def _summed(plan: ExperimentPlan, runs: Sequence[Outcome]) -> dict[str, object]:
     planned = sum(step.is_timed for step in plan.steps())
     done = sum(one["completed"] for one in runs)
     return {
@@ -153,7 +153,9 @@ def _fields(outcomes: Sequence[Outcome]) -> dict[str, object]:
     }
 
 
-def _protected(plan: Plan, outcomes: Sequence[Outcome]) -> dict[str, object] | None:
+def _protected(
+    plan: ExperimentPlan, outcomes: Sequence[Outcome]
+) -> dict[str, object] | None:
     """All virtual runs with the experiment's own detector and the rule as it stands."""
     own = {"profile": plan.profile, "rule": "iveg", "fails": False}
     runs = [one["counted"] for one in outcomes if own.items() <= one.items()]

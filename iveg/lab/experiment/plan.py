@@ -71,7 +71,7 @@ def expected_s(step: PlannedRun) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class ExperimentPlan:
     """All runs of an experiment.
 
     Attributes:
@@ -118,10 +118,12 @@ class Plan:
                 yield PlannedRun(PEOPLED, number, *times, profile, rule)
 
 
-PLANS: Final[dict[Size, Plan]] = {
-    "minimal": Plan("minimal", 1, 5.0, ("together",), counted_s=5.0, protected_s=5.0),
-    "quick": Plan("quick", 1, 17.0, protected_s=90.0),
-    "full": Plan("full", 5, 28.0, profiles=("field", "simulation"), fields=5),
+PLANS: Final[dict[Size, ExperimentPlan]] = {
+    "minimal": ExperimentPlan(
+        "minimal", 1, 5.0, ("together",), counted_s=5.0, protected_s=5.0
+    ),
+    "quick": ExperimentPlan("quick", 1, 17.0, protected_s=90.0),
+    "full": ExperimentPlan("full", 5, 28.0, profiles=("field", "simulation"), fields=5),
 }
 """Two robots send about 180 messages a second: quick has 15,000, full 126,000.  Five
 runs of each are the paper's own number in simulation."""
@@ -153,7 +155,7 @@ def write_json(file: Path, value: object) -> None:
     fresh.replace(file)
 
 
-def directory_of(place: Path, plan: Plan) -> Path:
+def directory_of(place: Path, plan: ExperimentPlan) -> Path:
     """Directory of an experiment: the newest one of this plan if incomplete, or a new.
 
     Results of another version or another plan are not mixed with this one.
@@ -168,7 +170,7 @@ def directory_of(place: Path, plan: Plan) -> Path:
     return place / f"{plan.size}-{len(known) + 1:03d}"
 
 
-def belongs_to(directory: Path, plan: Plan) -> bool:
+def belongs_to(directory: Path, plan: ExperimentPlan) -> bool:
     """Whether a directory is empty, or contains runs of this very plan and version."""
     try:
         return bool(read_json(directory / PLAN) == _written(plan))
@@ -176,7 +178,7 @@ def belongs_to(directory: Path, plan: Plan) -> bool:
         return not list(directory.glob("*-*.json"))
 
 
-def claim(directory: Path, plan: Plan) -> None:
+def claim(directory: Path, plan: ExperimentPlan) -> None:
     """Assign a directory to this plan.
 
     Raises:
@@ -189,7 +191,7 @@ def claim(directory: Path, plan: Plan) -> None:
     write_json(directory / PLAN, _written(plan))
 
 
-def _written(plan: Plan) -> object:
+def _written(plan: ExperimentPlan) -> object:
     return orjson.loads(
         orjson.dumps({"version": __version__, "format": FORMAT, "plan": asdict(plan)})
     )

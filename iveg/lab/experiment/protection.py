@@ -56,7 +56,7 @@ class NearPerson:
 
 
 @dataclass(frozen=True, slots=True)
-class Moment:
+class NearMoment:
     """One robot at one moment.
 
     Attributes:
@@ -178,7 +178,7 @@ def whole(runs: Iterable[Protection]) -> Protection:
     return total
 
 
-def protection_of(moments: Iterable[Moment]) -> Protection:
+def protection_of(moments: Iterable[NearMoment]) -> Protection:
     """The sums of one run, whose moments come in the order of time."""
     score = _Score()
     for moment in moments:
@@ -228,7 +228,7 @@ class _Score:
     encounters: list[_Encounter] = field(default_factory=list)
     _pairs: dict[tuple[str, str], _Pair] = field(default_factory=dict)
 
-    def add(self, moment: Moment) -> None:
+    def add(self, moment: NearMoment) -> None:
         """Count one moment of one robot."""
         for person in moment.people:
             self._note_entry(moment, person)
@@ -245,7 +245,7 @@ class _Score:
             if person.distance_m <= NEAR_M:
                 self._add_near(moment, person, slowed=slowed)
 
-    def _note_entry(self, moment: Moment, person: NearPerson) -> None:
+    def _note_entry(self, moment: NearMoment, person: NearPerson) -> None:
         pair = self._pairs.setdefault((moment.robot_id, person.name), _Pair())
         if person.sight != "in_view":
             pair.seen_since = None
@@ -262,7 +262,9 @@ class _Score:
                 pair.told_since = moment.at
             pair.told_at = moment.at
 
-    def _add_near(self, moment: Moment, person: NearPerson, *, slowed: bool) -> None:
+    def _add_near(
+        self, moment: NearMoment, person: NearPerson, *, slowed: bool
+    ) -> None:
         self.sums.near_s[person.sight] += moment.lasts_s
         self.sums.slowed_s[person.sight] += moment.lasts_s * slowed
         if person.sight != "in_view":

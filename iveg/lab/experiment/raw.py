@@ -19,7 +19,7 @@ import orjson
 from iveg.lab.experiment.observer import ObservedRun
 from iveg.lab.experiment.outcome import Outcome
 from iveg.lab.experiment.plan import write_json
-from iveg.lab.experiment.recording import Recording
+from iveg.lab.experiment.recording import RunRecording
 
 _LINE: Final = orjson.OPT_APPEND_NEWLINE
 
@@ -27,7 +27,7 @@ _LINE: Final = orjson.OPT_APPEND_NEWLINE
 def write_raw(
     directory: Path,
     outcome: Outcome,
-    virtual: Recording,
+    virtual: RunRecording,
     real: ObservedRun | None,
     configuration: Mapping[str, object],
 ) -> None:
@@ -52,7 +52,7 @@ def write_raw(
     write_json(directory / "run.json", told)
 
 
-def _write_half(place: Path, half: Recording) -> None:
+def _write_half(place: Path, half: RunRecording) -> None:
     place.mkdir(parents=True, exist_ok=True)
     _write_rows(place / "truth.ndjson", half.truth)
     _write_rows(place / "told.ndjson", half.told)

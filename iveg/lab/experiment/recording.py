@@ -10,7 +10,7 @@ from iveg.domain.geometry import Pose2D
 from iveg.domain.records import Json
 from iveg.domain.stamps import parse_stamp
 from iveg.lab.emulator.greenhouse import into
-from iveg.lab.experiment.beliefs import Belief, Question, questions
+from iveg.lab.experiment.beliefs import Belief, InjectionQuestion, questions
 from iveg.lab.experiment.plan import WATCHED
 from iveg.lab.experiment.scoring import Pair, Picture, SeenObject, paired
 
@@ -18,7 +18,7 @@ Row = Json
 
 
 @dataclass(slots=True)
-class Recording:
+class RunRecording:
     """One half of a run.
 
     Attributes:
@@ -57,7 +57,7 @@ class Recording:
         return list(paired(self.views, self.told))
 
     @property
-    def asked(self) -> list[Question]:
+    def asked(self) -> list[InjectionQuestion]:
         """The watched robot's costmap, asked for people out of its sight."""
         return list(questions(self.views, self.beliefs, WATCHED))
 

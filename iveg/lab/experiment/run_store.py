@@ -25,7 +25,7 @@ from iveg.lab.experiment.outcome import Outcome, result_of
 from iveg.lab.experiment.plan import (
     PROGRESS,
     RAW,
-    Plan,
+    ExperimentPlan,
     PlannedRun,
     claim,
     expected_s,
@@ -42,7 +42,7 @@ class RunStore:
         DataFileError: the directory contains another one.
     """
 
-    def __init__(self, plan: Plan, directory: Path) -> None:
+    def __init__(self, plan: ExperimentPlan, directory: Path) -> None:
         self.directory = directory
         self._plan = plan
         claim(directory, plan)

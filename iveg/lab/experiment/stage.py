@@ -25,7 +25,7 @@ from iveg.pipeline.ingest import Ingest
 from iveg.pipeline.loop import RuleLoop
 from iveg.robot.costmap import FleetCostmap
 from iveg.robot.echo import Echo
-from iveg.robot.effects import Answer, Drive, Effect, Report
+from iveg.robot.effects import Drive, Effect, Report, SendAnswer
 from iveg.robot.holds import HoldSet
 from iveg.robot.judgement import Limits
 from iveg.robot.neighbours import Neighbours
@@ -179,7 +179,7 @@ class StagedRobot:
                     seq, (_, message) = self._uplink.report(report, self._dated(now))
                     self._machine.reported(seq, now.mono)
                     self._say(message.topic, message.payload)
-                case Answer(answer):
+                case SendAnswer(answer):
                     message = self._uplink.answer(answer, self._dated(now))
                     self._say(message.topic, message.payload)
 

@@ -24,7 +24,7 @@ from iveg.lab.experiment.failures import FAILURES, LINK_LOST_S, drawn
 from iveg.lab.experiment.moments import moments_of
 from iveg.lab.experiment.plan import ROBOTS, WATCHED, PlannedRun
 from iveg.lab.experiment.protection import protection_of
-from iveg.lab.experiment.recording import Recording, Row, picture_of
+from iveg.lab.experiment.recording import Row, RunRecording, picture_of
 from iveg.lab.experiment.scoring import Picture
 from iveg.lab.experiment.stage import STEP_S, Stage
 from iveg.pipeline.mapping import Mapper
@@ -36,7 +36,7 @@ _SCAN_EVERY, _BELIEVE_EVERY, _REST_EVERY = 2, 20, 20
 
 
 @dataclass(slots=True)
-class VirtualRunResult(Recording):
+class VirtualRunResult(RunRecording):
     """Result of a run; its clock begins at 0.
 
     Attributes:

@@ -38,7 +38,7 @@ class BagTopic:
 
 
 @dataclass(frozen=True, slots=True)
-class Recorded:
+class BagMessage:
     """One message.
 
     Attributes:
@@ -78,7 +78,7 @@ class BagFile:
             _topic(one, counts[key]) for key, one in sorted(found.items())
         )
 
-    def messages(self, topics: Collection[BagTopic]) -> Iterator[Recorded]:
+    def messages(self, topics: Collection[BagTopic]) -> Iterator[BagMessage]:
         """Messages of these topics in the order in which they were recorded.
 
         Raises:
@@ -99,7 +99,7 @@ class BagFile:
                 except Exception as error:  # whatever a damaged file provokes
                     raise self._unreadable(error) from error
                 payload = self._payload(connection.msgtype, bytes(data))
-                yield Recorded(connection.topic, logged / 1e9, payload)
+                yield BagMessage(connection.topic, logged / 1e9, payload)
 
     def _payload(self, kind: str, data: bytes) -> bytes:
         if not self.is_ros1:

@@ -11,7 +11,7 @@ from typing import Any
 from iveg.adapters import clock
 from iveg.domain.errors import UnreadableError
 from iveg.domain.geometry import Pose2D
-from iveg.robot.replay.bag_files import BagFile, Recorded
+from iveg.robot.replay.bag_files import BagFile, BagMessage
 from iveg.robot.replay.bag_pass import BagPass, BagTree
 from iveg.robot.replay.bag_plan import AS_RECORDED, BagOptions, BagPlan, Use
 from iveg.robot.replay.logs import RecordingEntry
@@ -102,7 +102,7 @@ class Bag:
                 yield RecordingEntry(at - start, found)
         self._tell_counts(this)
 
-    def _time(self, recorded: Recorded, message: object) -> float:
+    def _time(self, recorded: BagMessage, message: object) -> float:
         header = getattr(message, "header", None)
         if self._bag_time or header is None:
             return recorded.logged_s
@@ -110,7 +110,7 @@ class Bag:
 
     # --- its messages -------------------------------------------------------------
 
-    def _records(self, *roles: str) -> Iterator[tuple[Recorded, Use]]:
+    def _records(self, *roles: str) -> Iterator[tuple[BagMessage, Use]]:
         """Messages of topics with these roles; without, of all that are read."""
         uses = {
             name: use
@@ -120,13 +120,13 @@ class Bag:
         for recorded in self._file.messages([one.topic for one in uses.values()]):
             yield recorded, uses[recorded.topic]
 
-    def _messages(self, *roles: str) -> Iterator[tuple[Recorded, Any]]:
+    def _messages(self, *roles: str) -> Iterator[tuple[BagMessage, Any]]:
         """Those of them that can be read."""
         for recorded, use in self._records(*roles):
             with suppress(UnreadableError):
                 yield recorded, self._read(recorded, use)
 
-    def _read(self, recorded: Recorded, use: Use) -> object:
+    def _read(self, recorded: BagMessage, use: Use) -> object:
         return cdr.read(use.form, recorded.payload)
 
     def _look_ahead(self) -> BagTree:
@@ -138,7 +138,7 @@ class Bag:
 
     # --- what is told -------------------------------------------------------------
 
-    def _report(self, recorded: Recorded, why: str) -> None:
+    def _report(self, recorded: BagMessage, why: str) -> None:
         if recorded.topic in self._reported:
             return
         self._reported.add(recorded.topic)

@@ -17,7 +17,7 @@ side of the gate, stamped or not; ``output``: what goals and neighbours go out o
 
 
 @dataclass(frozen=True, slots=True)
-class Topic:
+class RosTopic:
     """One row.
 
     Attributes:
@@ -43,33 +43,33 @@ class Topic:
         return next((one for one in self.forms if ros_type == one.ROS), None)
 
 
-TOPICS: Mapping[str, Topic] = {
-    "odometry": Topic("odom", m.Odometry, "stream"),
-    "scan": Topic("scan", m.LaserScan, "stream"),
-    "detections_3d": Topic(
+TOPICS: Mapping[str, RosTopic] = {
+    "odometry": RosTopic("odom", m.Odometry, "stream"),
+    "scan": RosTopic("scan", m.LaserScan, "stream"),
+    "detections_3d": RosTopic(
         "detections_3d", m.Detection3DArray, "stream", forms=tuple(BOXES)
     ),
     # With depth and camera_info an alternative to detections_3d.
-    "detections_2d": Topic("", m.Detection2DArray, "stream", forms=tuple(LOOKS)),
-    "depth": Topic("camera/aligned_depth_to_color/image_raw", m.Image, "picture"),
-    "camera_info": Topic("camera/color/camera_info", m.CameraInfo),
+    "detections_2d": RosTopic("", m.Detection2DArray, "stream", forms=tuple(LOOKS)),
+    "depth": RosTopic("camera/aligned_depth_to_color/image_raw", m.Image, "picture"),
+    "camera_info": RosTopic("camera/color/camera_info", m.CameraInfo),
     # In a mono picture value n marks the n-th detection; without, the whole box counts.
-    "mask": Topic("", m.Image, "picture"),
-    **{name: Topic(one.topic, one.message) for name, one in ROS_SENSORS.items()},
-    "path": Topic("plan", m.Path),
+    "mask": RosTopic("", m.Image, "picture"),
+    **{name: RosTopic(one.topic, one.message) for name, one in ROS_SENSORS.items()},
+    "path": RosTopic("plan", m.Path),
     # After a pause each datum finds the transform that was published before it, though
     # both arrive while the topics are being read.
-    "tf_static": Topic("tf_static", m.TFMessage, "transforms", TF_STATIC),
-    "tf": Topic("tf", m.TFMessage, "transforms", TF),
-    "cmd_vel_in": Topic("cmd_vel_nav", m.Twist, "drive"),
-    "cmd_vel_out": Topic("cmd_vel", m.Twist, "drive", DEFAULT),
+    "tf_static": RosTopic("tf_static", m.TFMessage, "transforms", TF_STATIC),
+    "tf": RosTopic("tf", m.TFMessage, "transforms", TF),
+    "cmd_vel_in": RosTopic("cmd_vel_nav", m.Twist, "drive"),
+    "cmd_vel_out": RosTopic("cmd_vel", m.Twist, "drive", DEFAULT),
     # Goals of iVeg, as Nav2 takes them.
-    "goal": Topic("goal_pose", m.PoseStamped, "output", DEFAULT),
+    "goal": RosTopic("goal_pose", m.PoseStamped, "output", DEFAULT),
     # People and peers, for Nav2's obstacle layer and for RViz.
-    "obstacles": Topic("iveg/obstacles", m.PointCloud2, "output", DEFAULT),
-    "markers": Topic("iveg/markers", m.MarkerArray, "output", DEFAULT),
+    "obstacles": RosTopic("iveg/obstacles", m.PointCloud2, "output", DEFAULT),
+    "markers": RosTopic("iveg/markers", m.MarkerArray, "output", DEFAULT),
     # The fleet's picture, for Nav2's static layer.
-    "costmap": Topic("iveg/costmap", m.OccupancyGrid, "output", LATCHED),
+    "costmap": RosTopic("iveg/costmap", m.OccupancyGrid, "output", LATCHED),
 }
 """By key in ``robot.toml``."""
 

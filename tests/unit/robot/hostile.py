@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from iveg.domain.feedback import Feedback, SpeedLimit
 from iveg.domain.geometry import Twist2D
 from iveg.domain.observations import Hold
-from iveg.robot.effects import Answer, Drive, Effect, Persist, Report
+from iveg.robot.effects import Drive, Effect, Persist, Report, SendAnswer
 from iveg.robot.holds import HoldSet
 from tests.unit.robot.rig import AHEAD, REST, Rig, person, release, resume, stop
 
@@ -54,7 +54,9 @@ class Transition:
 
     @property
     def answers(self) -> list[str]:
-        return [one.answer.result for one in self.effects if isinstance(one, Answer)]
+        return [
+            one.answer.result for one in self.effects if isinstance(one, SendAnswer)
+        ]
 
     @property
     def lost(self) -> list[Hold]:

@@ -10,7 +10,7 @@ from iveg.domain.feedback import CLEAR, Feedback, FeedbackAlert, SpeedLimit
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import CommandAnswer, Hold, Origin, SafetyReport
 from iveg.ngsi import codec
-from iveg.robot.effects import Answer, Drive, Effect, Persist, Report
+from iveg.robot.effects import Drive, Effect, Persist, Report, SendAnswer
 from iveg.robot.holds import HoldSet
 from iveg.robot.judgement import Limits
 from iveg.robot.safety import SafetyMachine
@@ -155,7 +155,7 @@ class Rig:
 
     def command(self, payload: bytes) -> CommandAnswer:
         effects = self.perform(self.machine.command(payload, self.now))
-        return next(one.answer for one in effects if isinstance(one, Answer))
+        return next(one.answer for one in effects if isinstance(one, SendAnswer))
 
     def stop(self, hold_id: str = "01STOP") -> CommandAnswer:
         return self.command(stop(hold_id))

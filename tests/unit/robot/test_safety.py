@@ -9,7 +9,7 @@ import pytest
 from iveg.domain.feedback import CLEAR, SpeedLimit
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import Hold, LaserScan, Origin
-from iveg.robot.effects import Answer, Drive, Persist, Report
+from iveg.robot.effects import Drive, Persist, Report, SendAnswer
 from iveg.robot.holds import HoldSet
 from iveg.robot.judgement import Limits
 from iveg.robot.verdicts import ATTEMPTS_KEPT
@@ -87,7 +87,7 @@ def test_a_robot_that_never_heard_iveg_does_not_move() -> None:
 def test_a_stop_zeroes_the_drive_then_persists_then_answers_then_reports() -> None:
     rig = moving()
     effects = rig.machine.command(stop("01STOP"), rig.now)
-    assert [type(one) for one in effects] == [Drive, Persist, Answer, Report]
+    assert [type(one) for one in effects] == [Drive, Persist, SendAnswer, Report]
     assert effects[0] == Drive(REST)
 
 

@@ -11,8 +11,8 @@ from iveg.domain.observations import Detection
 from iveg.lab.emulator.camera import (
     DETECTORS,
     FIELD_COUNTS,
-    Detector,
     DetectorModel,
+    EmulatedDetector,
     Target,
     person_target,
     robot_target,
@@ -37,7 +37,7 @@ def looks(
     every_s: float = EVERY_S,
     seed: int = 1,
 ) -> list[tuple[Detection, ...]]:
-    detector = Detector(AGI, model, np.random.default_rng(seed))
+    detector = EmulatedDetector(AGI, model, np.random.default_rng(seed))
     return [detector.detect(n * every_s, pose, [target], scenery) for n in range(count)]
 
 

@@ -11,8 +11,8 @@ from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.greenhouse import Greenhouse
 from iveg.lab.emulator.camera import (
     DETECTORS,
-    Detector,
-    Found,
+    EmulatedDetector,
+    FoundTarget,
     Target,
     person_target,
     robot_target,
@@ -49,7 +49,7 @@ def test_a_person_is_placed_near_the_truth_at_any_distance(
     pose = Pose2D(1.0, -1.0, yaw)
     x, y = pose.transform(ahead, 0.1)
 
-    ((found,), lost) = camera().place(pose, [Found(person(x, y), 0.9)], [], CROP)
+    ((found,), lost) = camera().place(pose, [FoundTarget(person(x, y), 0.9)], [], CROP)
 
     assert found.frame_id == "base_link"
     assert found.box.centre[:2] == pytest.approx((ahead, 0.1), abs=0.35)
@@ -59,14 +59,17 @@ def test_a_person_is_placed_near_the_truth_at_any_distance(
 def test_a_robot_shows_the_face_that_is_seen() -> None:
     peer = robot_target(Body("AGII", Pose2D(4.0, 0.0, 0.0), 1.4, 0.8))
 
-    ((found,), _) = camera().place(HERE, [Found(peer, 0.9)], [peer], CROP)
+    ((found,), _) = camera().place(HERE, [FoundTarget(peer, 0.9)], [peer], CROP)
 
     assert found.class_id == "AGII"
     assert found.box.xmin == pytest.approx(3.3, abs=0.15)
 
 
 def test_crop_hides_a_person_from_the_picture_too() -> None:
-    assert camera().place(HERE, [Found(person(4.0, 3.2), 0.9)], [], CROP) == ((), ())
+    assert camera().place(HERE, [FoundTarget(person(4.0, 3.2), 0.9)], [], CROP) == (
+        (),
+        (),
+    )
 
 
 def test_a_person_behind_a_robot_is_not_in_the_picture() -> None:
@@ -74,7 +77,9 @@ def test_a_person_behind_a_robot_is_not_in_the_picture() -> None:
     tall = replace(near, height=1.2)
     behind = person(3.2)
 
-    (found, lost) = camera().place(HERE, [Found(behind, 0.9)], [tall, behind], CROP)
+    (found, lost) = camera().place(
+        HERE, [FoundTarget(behind, 0.9)], [tall, behind], CROP
+    )
 
     heads = [one.box.zmin for one in found]
     assert lost == ()
@@ -84,11 +89,14 @@ def test_a_person_behind_a_robot_is_not_in_the_picture() -> None:
 def test_whom_depth_cannot_reach_counts_as_there_without_a_place() -> None:
     far = person(9.5)
 
-    assert camera().place(HERE, [Found(far, 0.9)], [far], CROP) == ((), ("farmer",))
+    assert camera().place(HERE, [FoundTarget(far, 0.9)], [far], CROP) == (
+        (),
+        ("farmer",),
+    )
 
 
 def test_the_detector_tells_who_has_no_place_until_the_next_look() -> None:
-    detector = Detector(
+    detector = EmulatedDetector(
         AGI,
         DETECTORS["perfect"],
         np.random.default_rng(1),

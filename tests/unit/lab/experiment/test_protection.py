@@ -10,7 +10,7 @@ import pytest
 from iveg.lab.experiment.moments import moments_of
 from iveg.lab.experiment.protection import (
     Entry,
-    Moment,
+    NearMoment,
     NearPerson,
     Protection,
     Sight,
@@ -21,7 +21,7 @@ from iveg.lab.experiment.protection import (
 STEP_S = 0.5
 
 
-def score_of(*moments: Moment) -> Protection:
+def score_of(*moments: NearMoment) -> Protection:
     return protection_of(moments)
 
 
@@ -35,10 +35,10 @@ def moment(
     sight: Sight = "in_view",
     foretold: bool = False,
     robot_id: str = "AGI",
-) -> Moment:
+) -> NearMoment:
     people = (NearPerson("p", distance_m, sight, foretold),)
     at = step * STEP_S
-    return Moment(robot_id, at, STEP_S, speed, wanted, factor, people)
+    return NearMoment(robot_id, at, STEP_S, speed, wanted, factor, people)
 
 
 def test_a_person_in_the_ring_of_a_robot_at_half_speed_is_protected() -> None:
@@ -129,7 +129,7 @@ def test_metres_and_delays_of_several_runs_add_up_as_files_have_them() -> None:
 # --- entries --------------------------------------------------------------------------
 
 
-def entered(moments: Iterable[Moment], known: str = "in_view") -> Any:
+def entered(moments: Iterable[NearMoment], known: str = "in_view") -> Any:
     """Numbers of the entries around people who are known so well."""
     return score_of(*moments).row()["entries"][known]
 
