@@ -152,7 +152,7 @@ class ReadAhead:
         self._held = memoryview(b"")
         self._has_ended = False
 
-    def __getattr__(self, name: str) -> object:
+    def __getattr__(self, name: str) -> Any:
         """Everything else is the socket's own."""
         return getattr(self._inner, name)
 

@@ -143,7 +143,7 @@ class OrionClient(OrionSubscriptions):
             },
             timeout_s=PROBE_TIMEOUT_S,
         )
-        told = self.http.read(response)
+        told = self.http.read_object(response)
         try:
             left = datetime.fromisoformat(told["probe"]["value"]["stamp"])
         except (KeyError, TypeError, ValueError) as error:

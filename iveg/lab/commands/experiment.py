@@ -9,10 +9,10 @@ import asyncio
 import os
 import secrets
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 from urllib.parse import urlsplit
 
 import httpx
@@ -23,7 +23,6 @@ from iveg.cli.live_robots import live_robot
 from iveg.cli.running import run_until_stopped
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import DataFileError, HopError, SettingsError
-from iveg.domain.records import Json
 from iveg.domain.stamps import format_stamp
 from iveg.lab.commands.demo import on_free_ports
 from iveg.lab.commands.processes import Parts
@@ -246,7 +245,7 @@ class Lab:
         robots = (await self._ask("robots"))["items"]
         return bool(robots) and all(one["link"] == "LIVE" for one in robots)
 
-    async def _stop(self) -> Sequence[Json]:
+    async def _stop(self) -> Any:
         """Stop the fleet; time until each robot stood (ms)."""
         self._stops = []
         pressed = await self._ask("fleet/stop", "POST")
@@ -263,7 +262,7 @@ class Lab:
     def _url(self) -> str:
         return f"http://{self.settings.host}:{self.settings.port}"
 
-    async def _ask(self, path: str, method: str = "GET") -> Json:
+    async def _ask(self, path: str, method: str = "GET") -> Any:
         """One response of the API.
 
         Raises:

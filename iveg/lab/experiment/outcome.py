@@ -153,9 +153,7 @@ def _fields(outcomes: Sequence[Outcome]) -> dict[str, object]:
     }
 
 
-def _protected(
-    plan: ExperimentPlan, outcomes: Sequence[Outcome]
-) -> dict[str, object] | None:
+def _protected(plan: ExperimentPlan, outcomes: Sequence[Outcome]) -> Json | None:
     """All virtual runs with the experiment's own detector and the rule as it stands."""
     own = {"profile": plan.profile, "rule": "iveg", "fails": False}
     runs = [one["counted"] for one in outcomes if own.items() <= one.items()]
