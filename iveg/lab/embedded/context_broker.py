@@ -112,14 +112,6 @@ class ContextBroker:
             touched = apply(entity, changes, scope.now, forced=forced)
             self._tell(scope, entity, touched, "entityChange")
 
-    def replace(
-        self, scope: Scope, entity: Entity, changes: Mapping[str, EntityChange]
-    ) -> None:
-        """Replace all attributes."""
-        entity.attributes = {}
-        entity.modified = scope.now
-        self.append(scope, entity, changes)
-
     def delete(self, scope: Scope, entity: Entity) -> None:
         """Delete an entity and notify its subscriptions."""
         tenant = self.tenant(scope.service)

@@ -4,19 +4,16 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from iveg.lab.embedded.changes import read_changes
 from iveg.lab.embedded.context_broker import ContextBroker
 from iveg.lab.embedded.entities import Attribute, Entity, EntityChange, Scope
 from iveg.lab.embedded.errors import (
-    ATTRIBUTE_NOT_FOUND,
     bad_request,
     not_found,
     not_supported,
-    too_many,
 )
 from iveg.lab.embedded.http_server import Response
-from iveg.lab.embedded.ngsi_request import NgsiCall, read_id, read_value, split_names
-from iveg.lab.embedded.orion_text import load_json, looks_clean, read_pattern
+from iveg.lab.embedded.ngsi_request import NgsiCall, read_id, split_names
+from iveg.lab.embedded.orion_text import read_pattern
 from iveg.lab.embedded.providers import bare_entities, foreign
 from iveg.lab.embedded.views import write_entity
 
@@ -102,12 +99,6 @@ async def get_entity(broker: ContextBroker, call: NgsiCall) -> Response:
     return Response(200, write_entity(entity, call.view(), told))
 
 
-async def get_attributes(broker: ContextBroker, call: NgsiCall) -> Response:
-    """``GET /v2/entities/{id}/attrs``."""
-    entity, told = await _whole(broker, call)
-    return Response(200, write_entity(entity, call.view(), told, attributes_only=True))
-
-
 async def _whole(
     broker: ContextBroker, call: NgsiCall
 ) -> tuple[Entity, Mapping[str, Attribute]]:
@@ -145,86 +136,11 @@ async def delete_entity(broker: ContextBroker, call: NgsiCall) -> Response:
     return Response(204)
 
 
-async def append_attributes(broker: ContextBroker, call: NgsiCall) -> Response:
-    """``POST /v2/entities/{id}/attrs``."""
-    changes = call.changes(call.read_object())
-    entity = broker.find(call.scope, call.parts[1], call.kind)
-    broker.append(call.scope, entity, changes, forced="forcedUpdate" in call.options)
-    return Response(204)
-
-
 async def update_attributes(broker: ContextBroker, call: NgsiCall) -> Response:
     """``PATCH /v2/entities/{id}/attrs``."""
     changes = call.changes(call.read_object())
     if not changes:
         raise bad_request("empty payload")
-    await _update(broker, call, changes)
-    return Response(204)
-
-
-async def replace_attributes(broker: ContextBroker, call: NgsiCall) -> Response:
-    """``PUT /v2/entities/{id}/attrs``."""
-    changes = call.changes(call.read_object())
-    entity = broker.find(call.scope, call.parts[1], call.kind)
-    broker.replace(call.scope, entity, changes)
-    return Response(204)
-
-
-async def get_attribute(broker: ContextBroker, call: NgsiCall) -> Response:
-    """``GET /v2/entities/{id}/attrs/{name}``."""
-    attribute = await _attribute(broker, call, call.parts[1])
-    return Response(200, attribute.normalized(call.view().metadata))
-
-
-async def get_value(broker: ContextBroker, call: NgsiCall) -> Response:
-    """``GET /v2/entities/{id}/attrs/{name}/value``.
-
-    Orion 4.3 to 4.7 takes the id for a pattern here, so that ``AGI`` is also
-    ``AGI2``; a client must be able to meet that.
-    """
-    near = [
-        one.id
-        for one in broker.tenant(call.scope.service).entities.all(call.scope.path)
-        if re.search(call.parts[1], one.id) and (not call.kind or one.type == call.kind)
-    ]
-    if len(near) > 1:
-        raise too_many()
-    json = (await _attribute(broker, call, near[0] if near else call.parts[1])).json
-    structured = json[:1] in b"[{"
-    return Response(
-        200, json, content_type="application/json" if structured else "text/plain"
-    )
-
-
-async def _attribute(
-    broker: ContextBroker, call: NgsiCall, entity_id: str
-) -> Attribute:
-    name = call.parts[3]
-    entity = broker.known(call.scope, entity_id, call.kind)
-    if entity is not None and name in entity.attributes:
-        return entity.attributes[name]
-    told = await _ask_providers(broker, call, entity_id, (name,))
-    for attributes in told.values():
-        if name in attributes:
-            return attributes[name]
-    raise not_found(ATTRIBUTE_NOT_FOUND) if entity is not None else not_found()
-
-
-async def put_attribute(broker: ContextBroker, call: NgsiCall) -> Response:
-    """``PUT /v2/entities/{id}/attrs/{name}``."""
-    await _update(
-        broker, call, call.changes({call.parts[3]: load_json(call.request.body)})
-    )
-    return Response(204)
-
-
-async def put_value(broker: ContextBroker, call: NgsiCall) -> Response:
-    """``PUT /v2/entities/{id}/attrs/{name}/value``."""
-    changes = read_changes(
-        {call.parts[3]: read_value(call.request)},
-        key_values=True,
-        clean=looks_clean(call.request.body),
-    )
     await _update(broker, call, changes)
     return Response(204)
 

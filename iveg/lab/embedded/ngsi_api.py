@@ -17,12 +17,6 @@ from iveg.lab.embedded.ngsi_request import (
     read_scope,
 )
 
-_URLS = {
-    "entities_url": "/v2/entities",
-    "types_url": "/v2/types",
-    "subscriptions_url": "/v2/subscriptions",
-    "registrations_url": "/v2/registrations",
-}
 _Route = Callable[[ContextBroker, NgsiCall], Awaitable[Response]]
 
 
@@ -73,27 +67,15 @@ async def _version(broker: ContextBroker, call: NgsiCall) -> Response:
     return Response(200, orjson.dumps({"orion": about}))
 
 
-async def _urls(_: ContextBroker, __: NgsiCall) -> Response:
-    return Response(200, orjson.dumps(_URLS))
-
-
 _ROUTES: Routes[_Route] = Routes(
     {
         "GET /version": _version,
-        "GET /v2": _urls,
         "POST /v2/entities": entity_paths.create_entity,
         "GET /v2/entities": entity_paths.list_entities,
         "GET /v2/entities/*": entity_paths.get_entity,
         "DELETE /v2/entities/*": entity_paths.delete_entity,
-        "GET /v2/entities/*/attrs": entity_paths.get_attributes,
-        "PUT /v2/entities/*/attrs": entity_paths.replace_attributes,
-        "POST /v2/entities/*/attrs": entity_paths.append_attributes,
         "PATCH /v2/entities/*/attrs": entity_paths.update_attributes,
-        "GET /v2/entities/*/attrs/*": entity_paths.get_attribute,
-        "PUT /v2/entities/*/attrs/*": entity_paths.put_attribute,
         "DELETE /v2/entities/*/attrs/*": entity_paths.delete_attribute,
-        "GET /v2/entities/*/attrs/*/value": entity_paths.get_value,
-        "PUT /v2/entities/*/attrs/*/value": entity_paths.put_value,
         "POST /v2/op/update": batch_path.batch_update,
         "POST /v2/subscriptions": subscription_paths.create_subscription,
         "GET /v2/subscriptions": subscription_paths.list_subscriptions,

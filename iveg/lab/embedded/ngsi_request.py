@@ -119,13 +119,14 @@ def check_content(request: Request) -> None:
             "ContentLengthRequired", "Zero/No Content-Length in PUT/POST/PATCH request"
         )
     kind = request.headers.get("content-type", "").partition(";")[0].strip()
-    if kind not in _readable(request):
+    if kind != _JSON:
         raise FiwareError(
             "UnsupportedMediaType",
             f"not supported content type: {kind}" if kind else _NO_CONTENT_TYPE,
         )
 
 
+_JSON = "application/json"
 _NO_CONTENT_TYPE = (
     "Content-Type header not used, default application/octet-stream is not supported"
 )
@@ -139,15 +140,9 @@ def check_accept(request: Request) -> None:
     """
     accepted = request.headers.get("accept", "*/*").split(",")
     kinds = {one.partition(";")[0].strip() for one in accepted}
-    usable = {"*/*", "application/*", *_readable(request)}
+    usable = {"*/*", "application/*", _JSON}
     if kinds.isdisjoint(usable):
         raise FiwareError("NotAcceptable", "no acceptable mime-type in accept header")
-
-
-def _readable(request: Request) -> tuple[str, ...]:
-    if request.path.endswith("/value"):
-        return ("application/json", "text/plain")
-    return ("application/json",)
 
 
 def read_scope(request: Request, correlator: str, now: float) -> Scope:
@@ -216,20 +211,3 @@ def read_id(raw: Mapping[str, object]) -> tuple[str, str]:
     if "type" not in raw:
         return entity_id, ""
     return entity_id, check_given_name(raw["type"], "entity type")
-
-
-def read_value(request: Request) -> object:
-    """The body of ``PUT …/value``.
-
-    Raises:
-        FiwareError: 400.
-    """
-    if request.headers.get("content-type", "").startswith("application/json"):
-        value = load_json(request.body)
-        if not isinstance(value, dict | list):
-            raise bad_request("Neither JSON Object nor JSON Array for attribute::value")
-        return value
-    try:
-        return load_json(request.body)
-    except FiwareError:
-        raise bad_request("attribute value type not recognized") from None

@@ -31,8 +31,6 @@ def write_entity(
     view: EntityView,
     foreign: Mapping[str, Attribute] = _NONE,
     alteration: str = "",
-    *,
-    attributes_only: bool = False,
 ) -> bytes:
     """JSON text of one entity.
 
@@ -41,15 +39,12 @@ def write_entity(
         view: Its representation.
         foreign: Attributes of context providers, shown after the own ones.
         alteration: Kind of change, where attributes request it.
-        attributes_only: Whether id and type are left out.
     """
     chosen = _chosen(entity, view, foreign, alteration)
     if view.form == "values":
         return b"[%b]" % b",".join([one.json for _, one in chosen])
-    parts = _named(chosen, view)
-    if not attributes_only:
-        parts.insert(0, b'"id":%b,"type":%b' % (quoted(entity.id), quoted(entity.type)))
-    return b"{%b}" % b",".join(parts)
+    key = b'"id":%b,"type":%b' % (quoted(entity.id), quoted(entity.type))
+    return b"{%b}" % b",".join((key, *_named(chosen, view)))
 
 
 def _named(chosen: Sequence[tuple[str, Attribute]], view: EntityView) -> list[bytes]:
