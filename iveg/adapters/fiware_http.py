@@ -4,7 +4,7 @@ import asyncio
 import socket
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from http import HTTPStatus
-from typing import Any, Self, TypeVar
+from typing import Any, ClassVar, Self, TypeVar
 
 import httpx
 import orjson
@@ -29,27 +29,32 @@ _T = TypeVar("_T")
 
 
 class FiwareHttp:
-    """HTTP to one FIWARE service: its headers, and failures as ``HopError``.
+    """HTTP to one neighbour, as FIWARE speaks it; ``async with`` closes it.
+
+    Failures are ``HopError``.
 
     Args:
-        hop: Names the neighbour in errors.
         url: Address without a path.
-        service: Tenant.
-        path: Service path.
+        service: ``Fiware-Service``.
+        path: ``Fiware-ServicePath``.
+        access: Where a proxy before it asks for a token; None: none does.
         bearer: Token that is sent along; empty for none.
-        access: Where a proxy before the neighbour asks for a token; None: none does.
+
+    Attributes:
+        HOP: Names the neighbour in errors.
     """
+
+    HOP: ClassVar[str]
 
     def __init__(
         self,
-        hop: str,
         url: str,
         service: str,
         path: str,
-        bearer: str = "",
         access: FiwareToken | None = None,
+        *,
+        bearer: str = "",
     ) -> None:
-        self._hop = hop
         self._access = access
         headers = {"Fiware-Service": service, "Fiware-ServicePath": path}
         if bearer:
@@ -60,6 +65,12 @@ class FiwareHttp:
             timeout=TIMEOUT_S,
             transport=httpx.AsyncHTTPTransport(socket_options=_NODELAY),
         )
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        await self.close()
 
     async def close(self) -> None:
         """Close the kept connections, and those of the token, which others share."""
@@ -107,15 +118,15 @@ class FiwareHttp:
                 response = await self._admitted(send, timeout_s)
         except (TimeoutError, httpx.TimeoutException) as error:
             raise NoAnswerError(
-                self._hop, f"no answer to {method} {path} in {timeout_s:g} s"
+                self.HOP, f"no answer to {method} {path} in {timeout_s:g} s"
             ) from error
         except httpx.HTTPError as error:
             raise HopError(
-                self._hop, f"cannot be reached: {str(error) or type(error).__name__}"
+                self.HOP, f"cannot be reached: {str(error) or type(error).__name__}"
             ) from error
         if response.is_success or response.status_code in also:
             return response
-        raise HopError(self._hop, _complaint(method, path, response))
+        raise HopError(self.HOP, _complaint(method, path, response))
 
     async def _admitted(
         self,
@@ -142,9 +153,9 @@ class FiwareHttp:
             async with asyncio.timeout(_TOKEN_PART * timeout_s):
                 return await asked
         except TimeoutError as error:
-            raise HopError(self._hop, f"{NO_TOKEN}: no answer yet") from error
+            raise HopError(self.HOP, f"{NO_TOKEN}: no answer yet") from error
         except HopError as error:
-            raise HopError(self._hop, f"{NO_TOKEN}: {error.detail}") from error
+            raise HopError(self.HOP, f"{NO_TOKEN}: {error.detail}") from error
 
     def read(self, response: httpx.Response) -> object:
         """The JSON of an answer.
@@ -155,7 +166,7 @@ class FiwareHttp:
         try:
             return orjson.loads(response.content)
         except ValueError as error:
-            raise HopError(self._hop, "answered something that is not JSON") from error
+            raise HopError(self.HOP, "answered something that is not JSON") from error
 
     def read_object(self, response: httpx.Response) -> Document:
         """The object that is an answer.
@@ -210,42 +221,10 @@ class FiwareHttp:
         try:
             return int(counted)
         except (TypeError, ValueError) as error:
-            raise HopError(self._hop, f"counted {counted!r} of something") from error
+            raise HopError(self.HOP, f"counted {counted!r} of something") from error
 
     def _meaningless(self) -> HopError:
-        return HopError(self._hop, "answered JSON that means nothing here")
-
-
-class FiwareClient:
-    """A client of one FIWARE service; ``async with`` closes its connections.
-
-    Args:
-        hop: Names the neighbour in errors.
-        url: Address without a path.
-        service: ``Fiware-Service``.
-        path: ``Fiware-ServicePath``.
-        access: Where a proxy before it asks for a token; None: none does.
-    """
-
-    def __init__(
-        self,
-        hop: str,
-        url: str,
-        service: str,
-        path: str,
-        access: FiwareToken | None = None,
-    ) -> None:
-        self.http = FiwareHttp(hop, url, service, path, access=access)
-
-    async def __aenter__(self) -> Self:
-        return self
-
-    async def __aexit__(self, *_: object) -> None:
-        await self.close()
-
-    async def close(self) -> None:
-        """Close the kept connections."""
-        await self.http.close()
+        return HopError(self.HOP, "answered JSON that means nothing here")
 
 
 def _complaint(method: str, path: str, response: httpx.Response) -> str:

@@ -8,8 +8,7 @@ It keeps the way of commands to the robot clear; the traps are in docs/fiware.md
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from iveg.adapters.fiware_http import PROBE_TIMEOUT_S, Document, FiwareClient
-from iveg.adapters.fiware_token import FiwareToken
+from iveg.adapters.fiware_http import PROBE_TIMEOUT_S, Document, FiwareHttp
 from iveg.adapters.orion import OrionClient
 from iveg.adapters.orphan_entities import remove_orphans
 from iveg.domain.equipment import Tile
@@ -21,20 +20,10 @@ RESOURCE = "/iot/json"
 _COMMANDS = [{"name": name, "type": "command"} for name in names.COMMANDS]
 
 
-class IotAgentClient(FiwareClient):
-    """Requests to the IoT Agent JSON.
+class IotAgentClient(FiwareHttp):
+    """Requests to the IoT Agent JSON."""
 
-    Args:
-        url: Address of the north port, such as ``http://127.0.0.1:4041``.
-        service: ``Fiware-Service``.
-        path: ``Fiware-ServicePath``.
-        access: Where a proxy before it asks for a token; None: none does.
-    """
-
-    def __init__(
-        self, url: str, service: str, path: str, access: FiwareToken | None = None
-    ) -> None:
-        super().__init__("iot_agent", url, service, path, access)
+    HOP = "iot_agent"
 
     async def version(self) -> str:
         """The agent's version.
@@ -42,8 +31,8 @@ class IotAgentClient(FiwareClient):
         Raises:
             HopError: the agent does not answer.
         """
-        response = await self.http.ask("GET", "/iot/about", timeout_s=PROBE_TIMEOUT_S)
-        told = self.http.read_object(response)
+        response = await self.ask("GET", "/iot/about", timeout_s=PROBE_TIMEOUT_S)
+        told = self.read_object(response)
         return str(told.get("version", "unknown"))
 
     async def read_groups(self) -> list[Document]:
@@ -52,7 +41,7 @@ class IotAgentClient(FiwareClient):
         Raises:
             HopError: the agent does not answer.
         """
-        return await self.http.read_all("/iot/services", {}, "services")
+        return await self.read_all("/iot/services", {}, "services")
 
     async def create_group(self, group: Document) -> bool:
         """Make a group; False where there is one with this key already.
@@ -61,7 +50,7 @@ class IotAgentClient(FiwareClient):
             HopError: the agent does not take it.
         """
         body = {"services": [group]}
-        response = await self.http.ask("POST", "/iot/services", body=body, also=(409,))
+        response = await self.ask("POST", "/iot/services", body=body, also=(409,))
         return response.status_code != 409
 
     async def change_group(self, apikey: str, changes: Document) -> None:
@@ -71,7 +60,7 @@ class IotAgentClient(FiwareClient):
             HopError: the agent does not take it.
         """
         query = {"resource": RESOURCE, "apikey": apikey}
-        await self.http.ask("PUT", "/iot/services", query=query, body=changes)
+        await self.ask("PUT", "/iot/services", query=query, body=changes)
 
     async def read_devices(self) -> list[Document]:
         """The devices of our tenant.
@@ -79,7 +68,7 @@ class IotAgentClient(FiwareClient):
         Raises:
             HopError: the agent does not answer.
         """
-        return await self.http.read_all("/iot/devices", {}, "devices")
+        return await self.read_all("/iot/devices", {}, "devices")
 
     async def create_device(self, device: Document) -> bool:
         """Make a device; False where there is one with this id already.
@@ -88,7 +77,7 @@ class IotAgentClient(FiwareClient):
             HopError: the agent does not take it.
         """
         body = {"devices": [device]}
-        response = await self.http.ask("POST", "/iot/devices", body=body, also=(409,))
+        response = await self.ask("POST", "/iot/devices", body=body, also=(409,))
         return response.status_code != 409
 
     async def delete_device(self, device_id: str) -> bool:
@@ -98,7 +87,7 @@ class IotAgentClient(FiwareClient):
             HopError: the agent does not answer.
         """
         path = f"/iot/devices/{device_id}"
-        response = await self.http.ask("DELETE", path, also=(404,))
+        response = await self.ask("DELETE", path, also=(404,))
         return response.status_code != 404
 
 

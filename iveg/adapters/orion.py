@@ -12,9 +12,8 @@ from iveg.adapters.fiware_http import (
     PROBE_TIMEOUT_S,
     TIMEOUT_S,
     Document,
+    FiwareHttp,
 )
-from iveg.adapters.fiware_token import FiwareToken
-from iveg.adapters.orion_subscriptions import OrionSubscriptions
 from iveg.domain.errors import HopError
 from iveg.ngsi import names
 
@@ -35,20 +34,10 @@ ROBOT_ATTRIBUTES = (
 query the agent."""
 
 
-class OrionClient(OrionSubscriptions):
-    """Requests to Orion.
+class OrionClient(FiwareHttp):
+    """Requests to Orion."""
 
-    Args:
-        url: Address of Orion, such as ``http://127.0.0.1:1026``.
-        service: ``Fiware-Service``.
-        path: ``Fiware-ServicePath``.
-        access: Where a proxy before it asks for a token; None: none does.
-    """
-
-    def __init__(
-        self, url: str, service: str, path: str, access: FiwareToken | None = None
-    ) -> None:
-        super().__init__("orion", url, service, path, access)
+    HOP = "orion"
 
     async def version(self) -> str:
         """Orion's version.
@@ -56,7 +45,7 @@ class OrionClient(OrionSubscriptions):
         Raises:
             HopError: Orion does not answer.
         """
-        told = self.http.read(await self.http.ask("GET", "/version"))
+        told = self.read(await self.ask("GET", "/version"))
         about = told.get("orion", {}) if isinstance(told, dict) else {}
         return str(about.get("version", "unknown"))
 
@@ -82,7 +71,7 @@ class OrionClient(OrionSubscriptions):
         Raises:
             HopError: Orion did not take it; 404 also means that the agent is away.
         """
-        await self.http.ask(
+        await self.ask(
             "PATCH",
             f"/v2/entities/{robot_id}/attrs",
             query={"type": names.ROBOT_TYPE},
@@ -110,7 +99,7 @@ class OrionClient(OrionSubscriptions):
         """
         asked = ",".join(part for part in (options, "count") if part)
         query = {"type": entity_type, "attrs": ",".join(attributes), "orderBy": "id"}
-        return await self.http.read_all("/v2/entities", {**query, "options": asked})
+        return await self.read_all("/v2/entities", {**query, "options": asked})
 
     async def read_probe(self) -> Document | None:
         """The heartbeat probe as Orion has it; None where none ever came so far.
@@ -133,7 +122,7 @@ class OrionClient(OrionSubscriptions):
         Raises:
             HopError: Orion does not answer, or its probe has no times.
         """
-        response = await self.http.ask(
+        response = await self.ask(
             "GET",
             f"/v2/entities/{names.HEARTBEAT_ID}",
             query={
@@ -143,7 +132,7 @@ class OrionClient(OrionSubscriptions):
             },
             timeout_s=PROBE_TIMEOUT_S,
         )
-        told = self.http.read_object(response)
+        told = self.read_object(response)
         try:
             left = datetime.fromisoformat(told["probe"]["value"]["stamp"])
         except (KeyError, TypeError, ValueError) as error:
@@ -165,8 +154,8 @@ class OrionClient(OrionSubscriptions):
             "options": "keyValues,skipForwarding",
             "limit": str(PAGE_SIZE),
         }
-        response = await self.http.ask("GET", "/v2/entities", query=query)
-        found = self.http.read_list(response)
+        response = await self.ask("GET", "/v2/entities", query=query)
+        found = self.read_list(response)
         return [(str(one["id"]), str(one["type"])) for one in found if one.get("id")]
 
     async def delete_entity(self, entity_id: str, entity_type: str) -> None:
@@ -176,7 +165,7 @@ class OrionClient(OrionSubscriptions):
             HopError: Orion does not answer.
         """
         path, query = f"/v2/entities/{entity_id}", {"type": entity_type}
-        await self.http.ask("DELETE", path, query=query, also=(404,))
+        await self.ask("DELETE", path, query=query, also=(404,))
 
     async def modified_at(self, robot_id: str) -> float | None:
         """When Orion last changed a robot's odometry.
@@ -201,7 +190,7 @@ class OrionClient(OrionSubscriptions):
         Raises:
             HopError: Orion does not answer.
         """
-        response = await self.http.ask(
+        response = await self.ask(
             "DELETE",
             f"/v2/entities/{robot_id}/attrs/{name}",
             query={"type": names.ROBOT_TYPE},
@@ -227,11 +216,70 @@ class OrionClient(OrionSubscriptions):
     ) -> Document | None:
         """An entity as Orion has it; None where it has none."""
         path = f"/v2/entities/{entity_id}"
-        response = await self.http.ask(
+        response = await self.ask(
             "GET", path, query=query, timeout_s=timeout_s, also=(404,)
         )
-        told = self.http.read_object(response)
+        told = self.read_object(response)
         return None if response.status_code == 404 else told
+
+    # --- subscriptions and registrations ------------------------------------------
+
+    async def read_registrations(self) -> list[Document]:
+        """Every registration of our tenant.
+
+        Raises:
+            HopError: Orion does not answer.
+        """
+        return await self.read_all("/v2/registrations")
+
+    async def delete_registration(self, registration_id: str) -> None:
+        """Delete a registration; one that is gone already is no error.
+
+        Raises:
+            HopError: Orion does not answer.
+        """
+        path = f"/v2/registrations/{registration_id}"
+        await self.ask("DELETE", path, also=(404,))
+
+    async def read_subscriptions(self) -> list[Document]:
+        """Every subscription of our tenant.
+
+        Raises:
+            HopError: Orion does not answer.
+        """
+        return await self.read_all("/v2/subscriptions")
+
+    async def create_subscription(self, document: Document) -> str:
+        """Subscribe; the id of the subscription.
+
+        Raises:
+            HopError: Orion does not take it.
+        """
+        response = await self.ask("POST", "/v2/subscriptions", body=dict(document))
+        made = str(response.headers.get("Location", "").rpartition("/")[2])
+        if not made:
+            raise HopError("orion", "took a subscription and did not say where it is")
+        return made
+
+    async def update_subscription(
+        self, subscription_id: str, changes: Document
+    ) -> None:
+        """Change a subscription; each part that is named replaces the old one whole.
+
+        Raises:
+            HopError: Orion does not take it.
+        """
+        path = f"/v2/subscriptions/{subscription_id}"
+        await self.ask("PATCH", path, body=dict(changes))
+
+    async def delete_subscription(self, subscription_id: str) -> None:
+        """Delete a subscription; one that is gone already is no error.
+
+        Raises:
+            HopError: Orion does not answer.
+        """
+        path = f"/v2/subscriptions/{subscription_id}"
+        await self.ask("DELETE", path, also=(404,))
 
 
 def _date_modified(entity: Document | None, attribute: str) -> float | None:

@@ -76,6 +76,10 @@ def run_doctor(settings: Settings, data: Path) -> int:
     return exit_code(rows)
 
 
+class _Page(FiwareHttp):
+    HOP = Hop.PAGE
+
+
 class Examination:
     """One examination: every hop tested once, everything removed afterwards.
 
@@ -103,9 +107,7 @@ class Examination:
         self._address = broker_of(settings)
         self._database = history_url(settings.database_url, data)
         self._orion, self._agent = open_fiware(settings)
-        self._page = FiwareHttp(
-            Hop.PAGE, _page_url(settings), *service, bearer=settings.api_token
-        )
+        self._page = _Page(_page_url(settings), *service, bearer=settings.api_token)
         self._probe = Probe(self._orion, self._agent, settings.apikey)
         self._device: ProbeDevice | None = None
         self._listening_at = ""

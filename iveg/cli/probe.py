@@ -92,7 +92,7 @@ class Probe:
         attribute = {"type": "object", "value": {"mark": mark}}
         body = {"id": PROBE_ID, "type": PROBE_TYPE, "notified": attribute}
         query = {"options": "upsert"}
-        await self._orion.http.ask("POST", "/v2/entities", query=query, body=body)
+        await self._orion.ask("POST", "/v2/entities", query=query, body=body)
 
     async def command(self, mark: str) -> None:
         """Command it: ``cmd`` alone, with its type, or Orion drops it without an error.
@@ -102,7 +102,7 @@ class Probe:
         """
         command = {names.COMMAND: {"type": "command", "value": {"probe": mark}}}
         path = f"{_ENTITY}/attrs"
-        await self._orion.http.ask("PATCH", path, query=_TYPE, body=command)
+        await self._orion.ask("PATCH", path, query=_TYPE, body=command)
 
     async def holds(self, attribute: str, mark: str) -> bool:
         """Whether the attribute at Orion contains the mark.
@@ -111,7 +111,7 @@ class Probe:
             HopError: Orion does not answer.
         """
         query = {**_TYPE, "attrs": attribute, "options": "skipForwarding"}
-        found = await self._orion.http.ask("GET", _ENTITY, query=query, also=(404,))
+        found = await self._orion.ask("GET", _ENTITY, query=query, also=(404,))
         return mark in found.text
 
     async def why_not_notified(self, subscription_id: str) -> str:
@@ -168,7 +168,7 @@ class Probe:
     async def _delete_group(self) -> None:
         query = {"resource": RESOURCE, "apikey": self._apikey}
         path = "/iot/services"
-        await self._agent.http.ask("DELETE", path, query=query, also=(404,))
+        await self._agent.ask("DELETE", path, query=query, also=(404,))
 
     async def _delete_subscriptions(self) -> None:
         for one in await self._orion.read_subscriptions():

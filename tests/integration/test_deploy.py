@@ -681,7 +681,7 @@ def end_children(pid: int) -> None:
 async def sing(up: Running) -> None:
     """One heartbeat probe reaches Orion."""
     async with OrionClient(up.orion_url, "agroconnect", "/greenhouse") as orion:
-        await orion.http.ask(
+        await orion.ask(
             "POST",
             "/v2/entities",
             query={"options": "upsert"},

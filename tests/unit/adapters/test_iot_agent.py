@@ -152,9 +152,7 @@ async def test_a_command_that_was_never_registered_gets_its_road(site: Site) -> 
 async def test_a_shadow_of_the_command_at_orion_is_deleted(site: Site) -> None:
     await site.provision("AGI")
     body = {"id": "AGI", "type": "Robot", "cmd": {"type": "command", "value": ""}}
-    await site.orion.http.ask(
-        "POST", "/v2/entities", query={"options": "upsert"}, body=body
-    )
+    await site.orion.ask("POST", "/v2/entities", query={"options": "upsert"}, body=body)
     assert not await site.command_arrives("AGI")
     (told,) = (await site.provision("AGI")).mended
     assert told.startswith("Deleted attribute cmd of AGI")
@@ -164,9 +162,7 @@ async def test_a_shadow_of_the_command_at_orion_is_deleted(site: Site) -> None:
 async def test_a_shadow_of_the_goal_at_orion_is_deleted_too(site: Site) -> None:
     await site.provision("AGI")
     body = {"id": "AGI", "type": "Robot", "goal": {"type": "command", "value": ""}}
-    await site.orion.http.ask(
-        "POST", "/v2/entities", query={"options": "upsert"}, body=body
-    )
+    await site.orion.ask("POST", "/v2/entities", query={"options": "upsert"}, body=body)
     (told,) = (await site.provision("AGI")).mended
     assert told.startswith("Deleted attribute goal of AGI")
 
@@ -194,7 +190,7 @@ async def test_registrations_of_an_agent_that_forgot_are_cleared(site: Site) -> 
         "provider": {"http": {"url": "http://127.0.0.1:1"}},
     }
     await site.agent.delete_device("AGI")
-    await site.orion.http.ask("POST", "/v2/registrations", body=stale)
+    await site.orion.ask("POST", "/v2/registrations", body=stale)
     mended = (await site.provision("AGI")).mended
     assert "Removed an old registration of the command of AGI." in mended
     assert await site.command_arrives("AGI")

@@ -30,7 +30,7 @@ async def orion(up: Running) -> AsyncIterator[OrionClient]:
 
 
 async def put(orion: OrionClient, robot_id: str, **attributes: object) -> None:
-    await orion.http.ask(
+    await orion.ask(
         "POST",
         "/v2/entities",
         query={"options": "upsert"},
@@ -63,11 +63,11 @@ async def test_reading_robots_never_waits_for_a_stuck_agent(
     async with IotAgentClient(up.iota_url, *TENANT) as agent:
         await provision(agent, orion, ["AGI"], "iveg", up.orion_url)
         await put(orion, "AGI", base_pose_ground_truth=ODOMETRY)
-        await agent.http.ask("POST", "/test/faults", body={"stuck": True})
+        await agent.ask("POST", "/test/faults", body={"stuck": True})
         async with asyncio.timeout(30):
             robots = await orion.read_robots()
             modified = await orion.modified_at("AGI")
-        await agent.http.ask("POST", "/test/faults", body={})
+        await agent.ask("POST", "/test/faults", body={})
     assert [one["id"] for one in robots] == ["AGI"]
     assert modified is not None
 

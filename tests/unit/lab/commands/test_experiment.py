@@ -62,7 +62,7 @@ async def test_a_fiware_at_which_a_robot_of_that_name_is_live_is_refused() -> No
         await refuse_live_robots(settings)
         tenant = settings.fiware_service, settings.fiware_servicepath
         async with OrionClient(up.orion_url, *tenant) as orion:
-            await orion.http.ask("POST", "/v2/entities", body=entity)
+            await orion.ask("POST", "/v2/entities", body=entity)
 
         with pytest.raises(DataFileError, match="AGII is live there"):
             await refuse_live_robots(settings)

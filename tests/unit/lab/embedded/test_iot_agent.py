@@ -100,7 +100,7 @@ async def test_a_command_with_quality_and_retain_is_published_so(
     }
     async with IotAgentClient(up.iota_url, *TENANT) as agent:
         await agent.create_device(device)
-    await orion.http.ask(
+    await orion.ask(
         "PATCH",
         "/v2/entities/TB3/attrs",
         query={"type": "Robot"},
