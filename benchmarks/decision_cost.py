@@ -42,6 +42,7 @@ from iveg.pipeline.evaluate import Evaluator
 from iveg.pipeline.event_log import EventLog
 from iveg.pipeline.mapping import Mapper
 from iveg.pipeline.publish import Hub
+from iveg.pipeline.record import RecordSink
 from iveg.pipeline.scans import ScanReader
 from iveg.pipeline.second_witness import SecondWitness
 from iveg.pipeline.supervision import Supervision
@@ -111,7 +112,7 @@ class Telling:
 
 
 def assessor_of(
-    robots: tuple[str, ...], fleet: Telling
+    robots: tuple[str, ...], fleet: Telling, sink: RecordSink | None = None
 ) -> tuple[Evaluator, SecondWitness]:
     """The rule with everything round it but the network and the disk."""
     numbers = itertools.count()
@@ -124,7 +125,7 @@ def assessor_of(
         people,
         DetectionRule(),
         fleet,
-        EventLog(Hub(), Sink(), start, Supervision(lambda: start)),
+        EventLog(Hub(), sink or Sink(), start, Supervision(lambda: start)),
         lambda: f"{next(numbers):026d}",
         "bench",
         obstacles=obstacles,

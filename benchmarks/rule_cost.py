@@ -5,9 +5,13 @@ robot sends odometry, a scan and four boxes at 30 Hz, feedback is written as for
 ``calm``: one person before each robot.  ``storm``: no two pictures alike.  Messages are
 taken one by one, as on an idle machine, and eight at a time, as when it is busy.  The
 second witness looks at scans beside it.
+
+``decisions`` is a digest of all feedback and of all rows of the history: two trees that
+decide alike, to the last digit, have the same.
 """
 
 import argparse
+import hashlib
 import math
 import random
 import time
@@ -15,8 +19,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from benchmarks.decision_cost import TICK_S, WALL, Telling, assessor_of
+from benchmarks.decision_cost import TICK_S, WALL, Sink, Telling, assessor_of
 from benchmarks.process import print_table
+from iveg.domain.feedback import Feedback
 from iveg.domain.geometry import Box3D, Pose2D, Twist2D
 from iveg.domain.observations import (
     Detection,
@@ -28,6 +33,7 @@ from iveg.domain.observations import (
     Origin,
     Received,
 )
+from iveg.domain.records import Record
 from iveg.domain.transports import FIWARE
 from iveg.pipeline.second_witness import TICK_S as LOOK_S
 
@@ -38,10 +44,12 @@ SCAN = np.minimum(1.0 / np.maximum(np.abs(np.sin(_BEAMS)), 0.01), 30.0).astype("
 """An aisle two metres wide: most of what a laser sees is near."""
 
 
-def story(robots: tuple[str, ...], *, storm: bool) -> Iterator[Received]:
+def story(
+    robots: tuple[str, ...], *, storm: bool, seconds: float = SECONDS
+) -> Iterator[Received]:
     """What arrives, in order: robots two lanes apart, sends spread over the period."""
     draw = random.Random(3)  # noqa: S311 - the same each time
-    for tick in range(round(SECONDS * RATE_HZ)):
+    for tick in range(round(seconds * RATE_HZ)):
         for place in range(3 * len(robots)):
             at = (tick + place / 3 / len(robots)) / RATE_HZ
             number, kind = divmod(place, 3)
@@ -79,11 +87,39 @@ def _told(
     return DetectionFrame(robot_id, origin, found)
 
 
-def cost(count: int, batch: int, *, storm: bool) -> float:
-    """CPU seconds per 1,000 messages."""
+class Kept(Telling, Sink):
+    """Keeps all that is decided, to be compared when the time is taken."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.all: list[Feedback | Record] = []
+
+    def publish_feedback(self, feedback: Feedback) -> None:
+        """Write one feedback, and keep it."""
+        super().publish_feedback(feedback)
+        self.all.append(feedback)
+
+    def enqueue(self, record: Record) -> None:
+        """Keep one row."""
+        self.all.append(record)
+
+    @property
+    def digest(self) -> str:
+        """Of everything, in its order."""
+        whole = hashlib.sha256()
+        for one in self.all:
+            whole.update(repr(one).encode())
+        return whole.hexdigest()[:8]
+
+
+def cost(
+    count: int, batch: int, *, storm: bool, seconds: float = SECONDS
+) -> tuple[float, str]:
+    """CPU seconds per 1,000 messages, and the digest of what was decided."""
     robots = tuple(f"R{number:02d}" for number in range(count))
-    evaluator, witness = assessor_of(robots, Telling())
-    everything = list(story(robots, storm=storm))
+    kept = Kept()
+    evaluator, witness = assessor_of(robots, kept, kept)
+    everything = list(story(robots, storm=storm, seconds=seconds))
     ticked = looked = 0.0
     began = time.process_time()
     for start in range(0, len(everything), batch):
@@ -98,22 +134,27 @@ def cost(count: int, batch: int, *, storm: bool) -> float:
         if now.mono - ticked >= TICK_S:
             ticked = now.mono
             evaluator.tick(now)
-    return (time.process_time() - began) / len(everything) * 1000
+    took_s = time.process_time() - began
+    return took_s / len(everything) * 1000, kept.digest
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--robots", type=int, nargs="+", default=[5, 10, 20])
-    rows = [
-        [
-            str(count),
-            "storm" if storm else "calm",
-            *(f"{cost(count, batch, storm=storm):.3f}" for batch in (1, 8)),
-        ]
-        for count in parser.parse_args().robots
-        for storm in (False, True)
-    ]
-    head = ("robots", "scene", "one by one", "eight at a time")
+    parser.add_argument("--seconds", type=float, default=SECONDS)
+    asked = parser.parse_args()
+    rows = []
+    for count in asked.robots:
+        for storm in (False, True):
+            found = [
+                cost(count, batch, storm=storm, seconds=asked.seconds)
+                for batch in (1, 8)
+            ]
+            costs = [f"{took:.3f}" for took, _ in found]
+            digests = " ".join(digest for _, digest in found)
+            scene = "storm" if storm else "calm"
+            rows.append([str(count), scene, *costs, digests])
+    head = ("robots", "scene", "one by one", "eight at a time", "decisions")
     print_table("Rule loop, CPU seconds per 1,000 messages", head, rows)
 
 

@@ -244,9 +244,10 @@ class Evaluator:
         changed = [
             robot_id
             for robot_id, speed_limit in speed_limits.items()
-            if speed_limit.speed_factor != before[robot_id].speed_factor
-            or speed_limit.reason != before[robot_id].reason
-            or speed_limit.cause != before[robot_id].cause
+            # Of most it is the very same, and this is asked of all at each judgement.
+            if speed_limit is not (was := before[robot_id])
+            and (speed_limit.speed_factor, speed_limit.reason, speed_limit.cause)
+            != (was.speed_factor, was.reason, was.cause)
         ]
         for robot_id in changed:
             self._event_log.changed(topics.ROBOT.of(robot_id))

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from iveg.domain.rule import zones
 from iveg.domain.rule.speed_limits import LimitChange
+from tests.builders import at
 from tests.unit.domain.scene import Scene, person
 
 FLEET = tuple(f"R{number}" for number in range(6))
@@ -84,6 +85,32 @@ def test_neighbours_of_half_a_second_ago_are_all_that_looking_at_each_finds(
     steps: Steps,
 ) -> None:
     assert_alike(steps, 4.0)
+
+
+WAITS = st.lists(st.sampled_from([0.0, 0.05, 0.2, 0.31, 1.0, 2.7]), max_size=3)
+
+
+@given(DRIFTS, WAITS, st.sampled_from([-1, 10**9]))
+def test_judging_anew_only_whose_premises_changed_is_judging_everybody(
+    steps: Steps, waits: list[float], few_pairs: int
+) -> None:
+    scene = Scene(FLEET)
+    with pytest.MonkeyPatch.context() as compared:
+        compared.setattr(zones, "_FEW_PAIRS", few_pairs)
+        for pause, robot_id, (x, y), seen in steps:
+            scene.now += pause
+            scene.drive(robot_id, x / 4, y / 4)
+            scene.look(robot_id, *(person(px / 4, py / 4) for px, py in seen))
+            scene.navigate(robot_id, "hauling" if x > y else "scouting")
+            for wait in (0.0, *waits):
+                scene.now += wait
+                afresh = scene.speed_limits.copy()
+                known = scene.world, scene.people, scene.rule, at(scene.now), "d"
+                expected = afresh.evaluate(*known)
+                found = scene.speed_limits.evaluate(*known)
+                assert found == expected
+                assert scene.speed_limits.crossings == afresh.crossings
+                assert scene.speed_limits.limited_since == afresh.limited_since
 
 
 def test_a_peer_that_comes_back_where_it_was_lost_is_found() -> None:

@@ -14,12 +14,13 @@ from typing import Literal
 
 import numpy as np
 
+from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.geometry import Pose2D
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant, LaserScan
 from iveg.domain.obstacle import Obstacle
 from iveg.domain.robot_state import RobotState
-from iveg.domain.rule.foresight import Encounter, path_of
+from iveg.domain.rule.foresight import Encounter, Foretold, path_of
 from iveg.domain.rule.paths import HORIZON_S, MOVES_M_S, Circles
 from iveg.domain.rule.zones import Zone
 from iveg.domain.tracking.people import People
@@ -93,6 +94,18 @@ def fault_of(scan: LaserScan, pose: Pose2D, plan: Plan) -> Fault | None:
 
 Walkers = tuple[str, Instant, Sequence[tuple[float, float]]]
 """A robot, when its laser saw them, and where each is in ``map`` (m)."""
+
+
+def with_obstacles(
+    foretold: Foretold, seen: Mapping[str, SeenObstacle], rule: DetectionRule
+) -> Foretold:
+    """Encounters with those whom lasers see before robots, too."""
+    met = {
+        name: {**foretold.get(name, {}), CAUSE: one.ahead}
+        for name, one in seen.items()
+        if one.ahead is not None and rule.foresees(one.ahead.in_s)
+    }
+    return {**foretold, **met} if met else foretold
 
 
 class Obstacles:

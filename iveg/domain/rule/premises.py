@@ -37,16 +37,19 @@ class Missing:
 
 def missing_premises(world: World, now: Instant) -> Mapping[str, tuple[Missing, ...]]:
     """What is missing for each robot, the reason for its limit first."""
+    robots = world.robots.values()
+    # Of most nothing lacks, and this is asked of all at each judgement.
     gaps = [
         (observer, premise)
-        for observer in world.robots.values()
+        for observer in robots
+        if not _is_plainly_whole(observer, now)
         for premise in _gaps(observer, now)
     ]
     return {
-        robot.robot_id: ()
+        name: ()
         if not gaps and _is_pose_young(robot, now)
         else tuple(_missing_of(robot, gaps, now))
-        for robot in world.robots.values()
+        for name, robot in world.robots.items()
     }
 
 
@@ -63,6 +66,14 @@ def _missing_of(
     for observer, premise in gaps:
         if _concerns(observer, robot):
             yield Missing(premise, observer.robot_id)
+
+
+def _is_plainly_whole(observer: RobotState, now: Instant) -> bool:
+    """Whether a robot was never doubted, and its newest frame is young and whole."""
+    detector, whole_at = observer.detector, observer.detector.whole_at
+    if whole_at is None or detector.flawed_at or observer.doubts.were_raised:
+        return False
+    return now.mono - whole_at <= LIMITS.silence_s
 
 
 def _gaps(observer: RobotState, now: Instant) -> Iterator[Premise]:

@@ -10,6 +10,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from copy import copy
 from dataclasses import dataclass, replace
 from itertools import count
+from operator import is_
 from types import MappingProxyType
 
 from iveg.domain.detection_rule import DetectionRule
@@ -18,20 +19,17 @@ from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
 from iveg.domain.robot_state import RobotState
+from iveg.domain.rule.entering import is_ahead, is_slow_already, is_speeding_up
 from iveg.domain.rule.foresight import Encounter, Foresight, Foretold
-from iveg.domain.rule.obstacles import CAUSE, SeenBy, SeenObstacle
+from iveg.domain.rule.obstacles import CAUSE, SeenBy, SeenObstacle, with_obstacles
 from iveg.domain.rule.paths import HOLDS_S, slows_within_s
 from iveg.domain.rule.premises import Missing, missing_premises
 from iveg.domain.rule.right_of_way import gives_way_to
-from iveg.domain.rule.zones import NOT_FAR_M, Zone, ZoneFinder
+from iveg.domain.rule.zones import Found, Zone, ZoneFinder, deepest
 from iveg.domain.tracking.people import People
 from iveg.domain.world import World
 
-SPEEDING_UP = 0.05
-"""Faster than in the mean of its last second by more than this (m/s)."""
 _GRAVEST = ("person", "robot", "obstacle")
-_FREED_S = 1.0
-"""So long after it was let go a robot may still be about as slow as before."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,6 +95,11 @@ class SpeedLimits:
         self._zones = ZoneFinder()
         self._foresight = Foresight()
         self.foretold: Foretold = {}
+        self._rule: DetectionRule | None = None
+        self._judged: dict[str, tuple[object, ...]] = {}
+        """Robot → what its last judgement rested on, where the same changes nothing."""
+        self._limits: dict[str, SpeedLimit] = {}
+        """Of the last judgement."""
 
     def copy(self) -> "SpeedLimits":
         """Another with the same crossings and forecasts."""
@@ -120,30 +123,73 @@ class SpeedLimits:
         new_id: str,
     ) -> tuple[dict[str, SpeedLimit], list[LimitChange]]:
         """Judge the whole fleet; ``new_id`` begins the ids of new decisions."""
+        if rule is not self._rule:
+            self._rule = rule
+            self._judged.clear()
         near = self._zones.near(world, people, rule, now, self._open)
         seen, ids = self._seen(now), (f"{new_id}-{number}" for number in count())
-        self.foretold = self._foretell(world, people, rule, seen, now)
-        changes: list[LimitChange] = []
-        for robot in world.robots.values():
+        ahead = self._foretell(world, people, rule, now)
+        self.foretold = with_obstacles(ahead, seen, rule)
+        again, changes = self._foresight.if_released, list[LimitChange]()
+        # Should anything fail, everybody is judged anew.
+        before, self._judged = self._judged, {}
+        anew, judged = set[str](), dict[str, tuple[object, ...]]()
+        for name, robot in world.robots.items():
             if robot.odometry is None:
                 continue
-            mine = self._open.setdefault(robot.robot_id, {})
-            met = _nearest(robot, near(robot), mine)
-            met |= _beside(seen.get(robot.robot_id))
+            zones = near(robot)
+            known = seen.get(name), ahead.get(name), again.get(name)
+            rests_on = (*_premises_of(robot), *known, *zones)
+            if _are_same(rests_on, before.get(name)):
+                judged[name] = rests_on
+                continue
+            mine = self._open.setdefault(name, {})
+            met = deepest(robot, zones, mine)
+            met |= _beside(seen.get(name))
             met |= self._foreseen(robot, mine, world, now)
-            if met or mine:
-                changes += self._cross(robot, mine, met, now, ids)
-        self.missing = missing_premises(world, now)
-        return self._limit(world, now), changes
+            crossed = list(self._cross(robot, mine, met, now, ids))
+            changes += crossed
+            anew.add(name)
+            if not crossed and self._is_settled(name, world):
+                judged[name] = rests_on
+        missing, self.missing = self.missing, missing_premises(world, now)
+        limits = self._limit(anew, missing, now)
+        self._judged = judged
+        return limits, changes
 
-    def _limit(self, world: World, now: Instant) -> dict[str, SpeedLimit]:
-        """The limit of every robot; notes since when it is limited."""
-        limits = {name: self._speed_limit(name) for name in world.robots}
-        for name, limit in limits.items():
+    def _is_settled(self, robot_id: str, world: World) -> bool:
+        """Whether the same judgement again would change nothing, however much later.
+
+        Who is about to be let go waits for the time, and right of way for a task.
+        """
+        mine = self._open[robot_id].values()
+        return all(one.outside_since is None for one in mine) and (
+            world.robots.keys().isdisjoint(self.foretold.get(robot_id, _NOBODY))
+        )
+
+    def _limit(
+        self,
+        anew: Collection[str],
+        missing: Mapping[str, tuple[Missing, ...]],
+        now: Instant,
+    ) -> dict[str, SpeedLimit]:
+        """The limit of every robot; notes since when it is limited.
+
+        Args:
+            anew: Who was judged anew; the others keep their limits.
+            missing: What was missing as those were made.
+            now: This judgement.
+        """
+        limits = {**self._limits}
+        for name, lacks in self.missing.items():
+            if name in limits and name not in anew and lacks == missing.get(name):
+                continue
+            limit = limits[name] = self._speed_limit(name)
             if limit.speed_factor > HALF_SPEED:
                 self.limited_since.pop(name, None)
             else:
                 self.limited_since.setdefault(name, now.mono)
+        self._limits = limits
         return limits
 
     def _foretell(
@@ -151,15 +197,14 @@ class SpeedLimits:
         world: World,
         people: People,
         rule: DetectionRule,
-        seen: Mapping[str, SeenObstacle],
         now: Instant,
     ) -> Foretold:
+        """Encounters with people and peers."""
         if not rule.foresight:
             self._foresight = Foresight()
             return {}
         before = self._speeds_before() if self._foresight.is_due(now) else {}
-        ahead = self._foresight.look(world, people, rule, now, before)
-        return _with_obstacles(ahead, seen, rule)
+        return self._foresight.look(world, people, rule, now, before)
 
     def _speeds_before(self) -> Mapping[str, float]:
         """Of the robots that are slow now (m/s)."""
@@ -175,7 +220,7 @@ class SpeedLimits:
         mine: Mapping[str, Crossing],
         world: World,
         now: Instant,
-    ) -> "_Found":
+    ) -> Found:
         """Rings that a robot will reach, as if it were at their border now.
 
         In time to be slow there; who gives way does not wait for that.  Who is slow for
@@ -222,7 +267,7 @@ class SpeedLimits:
         self,
         robot: RobotState,
         mine: dict[str, Crossing],
-        met: "_Found",
+        met: Found,
         now: Instant,
         ids: Iterator[str],
     ) -> Iterator[LimitChange]:
@@ -258,9 +303,9 @@ class SpeedLimits:
             in_sight=zone.observer == robot.robot_id
             or self._greenhouse.in_sight(pose.x, pose.y, zone.x, zone.y),
             distance_m=distance,
-            already_slow=_is_slow_already(robot, zone, speed),
-            ahead=_is_ahead(robot, zone),
-            speeding_up=_is_speeding_up(robot, now),
+            already_slow=is_slow_already(robot, zone, speed),
+            ahead=is_ahead(robot, zone),
+            speeding_up=is_speeding_up(robot, now),
             foretold_s=self._foretold_s(robot.robot_id, zone, distance),
         )
 
@@ -294,52 +339,23 @@ class SpeedLimits:
 
 
 _NOBODY: Mapping[str, Encounter] = MappingProxyType({})
-_Found = dict[str, tuple[float, float, Zone]]
-"""Cause → the deepest of its circles: how far outside (m), distance (m), the circle."""
 
 
-def _beside(seen: SeenObstacle | None) -> _Found:
+def _premises_of(robot: RobotState) -> tuple[object, ...]:
+    """What of a robot itself its judgement rests on."""
+    return robot.odometry, robot.description, robot.live_at, robot.map_frame
+
+
+def _are_same(one: tuple[object, ...], other: tuple[object, ...] | None) -> bool:
+    """Whether both hold the very same values, which are frozen."""
+    return other is not None and len(one) == len(other) and all(map(is_, one, other))
+
+
+def _beside(seen: SeenObstacle | None) -> Found:
     """What its laser sees within two metres of a robot's outline."""
     if seen is None or seen.ahead is not None:
         return {}
     return {CAUSE: (0.0, seen.distance_m, seen.zone)}
-
-
-def _with_obstacles(
-    foretold: Foretold, seen: Mapping[str, SeenObstacle], rule: DetectionRule
-) -> Foretold:
-    """Encounters with those whom lasers see before robots, too."""
-    met = {
-        name: {**foretold.get(name, {}), CAUSE: one.ahead}
-        for name, one in seen.items()
-        if one.ahead is not None and rule.foresees(one.ahead.in_s)
-    }
-    return {**foretold, **met} if met else foretold
-
-
-def _nearest(
-    robot: RobotState, zones: Iterable[Zone], mine: Mapping[str, Crossing]
-) -> _Found:
-    """The deepest circle of each cause: how far outside (m), distance (m), the circle.
-
-    Causes that the robot is far from and was not near to are left out.
-    """
-    nearest: _Found = {}
-    if robot.odometry is None:
-        return nearest
-    pose, robot_id = robot.odometry.pose, robot.robot_id
-    for zone in zones:
-        cause, reach = zone.cause, zone.radius_m + NOT_FAR_M
-        dx, dy = zone.x - pose.x, zone.y - pose.y
-        if dx * dx + dy * dy > reach * reach and cause not in mine:
-            continue
-        if cause == robot_id or zone.recording not in (None, robot.recording):
-            continue
-        distance = pose.distance_to(zone.x, zone.y)
-        depth = distance - zone.radius_m
-        if cause not in nearest or depth < nearest[cause][0]:
-            nearest[cause] = depth, distance, zone
-    return nearest
 
 
 def _leave(
@@ -363,34 +379,3 @@ def _still(crossing: Crossing, depth: float, distance: float, now: Instant) -> C
     if distance == crossing.distance_m and since == crossing.outside_since:
         return crossing
     return replace(crossing, distance_m=distance, outside_since=since)
-
-
-def _is_speeding_up(robot: RobotState, now: Instant) -> bool:
-    """Whether a robot has not reached the speed that it wants."""
-    was_freed = now.mono - robot.freed_at < _FREED_S
-    return was_freed or robot.speed_gained() > SPEEDING_UP
-
-
-def _is_slow_already(robot: RobotState, zone: Zone, speed: float) -> bool:
-    """Whether a robot will show no slow-down, because it drives slowly already.
-
-    A robot judges alerts by its own pose, too, and may report this very zone a few
-    milliseconds before it is found here; while it is still fast, its slow-down is yet
-    to be seen.
-    """
-    if robot.safety is None or robot.safety.speed_factor > HALF_SPEED:
-        return False
-    slow = HALF_SPEED * robot.profile.max_speed
-    return not _is_ahead(robot, zone) or speed <= slow
-
-
-def _is_ahead(robot: RobotState, zone: Zone) -> bool:
-    """Whether the robot already reports that it is slow for this very hazard."""
-    report = robot.safety
-    if report is None or report.speed_factor > HALF_SPEED:
-        return False
-    if zone.reason == report.reason == "obstacle":
-        return True
-    # A peer's own ring has no alert, and a robot may name none: that is no match.
-    ours = {zone.alert_id, zone.cause} - {None}
-    return report.decision_id in ours or report.cause in ours

@@ -1,35 +1,29 @@
 """Circles that slow robots, and which of them each robot is near.
 
-Few circles are compared with every robot one by one.  Many are compared as arrays, with
-room for how far all may go in half a second; until then, or until somebody appears or
-goes farther, only what was within reach is looked at (Verlet's neighbour list).
+Few circles are compared with every robot one by one; of many only those that may be
+near by now (``neighbours``).
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+import math
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from types import MappingProxyType
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
 from iveg.domain.detection_rule import DetectionRule
-from iveg.domain.limits import LIMITS, ring_radius
+from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant, Odometry
 from iveg.domain.obstacle import Obstacle
 from iveg.domain.robot_state import RobotState
+from iveg.domain.rule.neighbours import NOT_FAR_M, Neighbours
 from iveg.domain.tracking.people import People
 from iveg.domain.tracking.person import Sighting, TrackedPerson
 from iveg.domain.world import World
 
-_Floats = NDArray[np.float64]
-NOT_FAR_M = 0.01
-"""So far outside a ring nobody can be inside, whatever rounding does."""
 _FEW_PAIRS = 150
 """Robots times circles; beyond, arrays are quicker."""
-_ROOM_M, _HOLDS_S = 0.5, 0.5
-"""So far anybody may go, and so much older get, before all are compared again."""
+_ROUNDING_S = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,8 +98,37 @@ def _zones_of(
         )
 
 
-def _circle_of(peer: RobotState, rule: DetectionRule, now: Instant) -> Iterator[Zone]:
-    """The circle of a peer, if one gives way to it."""
+Found = dict[str, tuple[float, float, Zone]]
+"""Cause → the deepest of its circles: how far outside (m), distance (m), the circle."""
+
+
+def deepest(robot: RobotState, zones: Iterable[Zone], mine: Container[str]) -> Found:
+    """The deepest circle of each cause: how far outside (m), distance (m), the circle.
+
+    Causes that the robot is far from and was not near to are left out.
+    """
+    nearest: Found = {}
+    if robot.odometry is None:
+        return nearest
+    pose, robot_id = robot.odometry.pose, robot.robot_id
+    for zone in zones:
+        cause, reach = zone.cause, zone.radius_m + NOT_FAR_M
+        dx, dy = zone.x - pose.x, zone.y - pose.y
+        if dx * dx + dy * dy > reach * reach and cause not in mine:
+            continue
+        if cause == robot_id or zone.recording not in (None, robot.recording):
+            continue
+        distance = pose.distance_to(zone.x, zone.y)
+        depth = distance - zone.radius_m
+        if cause not in nearest or depth < nearest[cause][0]:
+            nearest[cause] = depth, distance, zone
+    return nearest
+
+
+def _circle_of(
+    peer: RobotState, rule: DetectionRule, now: Instant, before: Sequence[Zone] = ()
+) -> Iterator[Zone]:
+    """The circle of a peer, if one gives way to it; the one ``before``, if the same."""
     since = peer.likely_pose_at()
     # A recording cannot yield, and nobody yields to it.
     if peer.odometry is None or since is None or peer.is_replay:
@@ -115,20 +138,39 @@ def _circle_of(peer: RobotState, rule: DetectionRule, now: Instant) -> Iterator[
     at_rest = peer.stands and known is not None and known <= LIMITS.silence_s
     if at_rest or age > LIMITS.ring_lasts_s:
         return
-    pose, name = peer.odometry.pose, peer.robot_id
-    yield Zone("robot", name, name, pose.x, pose.y, rule.radius_at(age))
+    pose, name, radius = peer.odometry.pose, peer.robot_id, rule.radius_at(age)
+    for same in before:
+        if (same.x, same.y, same.radius_m) == (pose.x, pose.y, radius):
+            yield same
+            return
+    yield Zone("robot", name, name, pose.x, pose.y, radius)
 
 
 Near = Callable[[RobotState], Iterable[Zone]]
 """A robot → every circle that it is in or was in, and perhaps others; in order."""
 
 
+@dataclass(frozen=True, slots=True)
+class _Made:
+    """The circles of one cause, as they were made.
+
+    Attributes:
+        of: Who or what they are round, by which all but their age is known.
+        until: So long they stay as they are (monotonic, s).
+    """
+
+    of: TrackedPerson | Odometry | None
+    zones: Sequence[Zone]
+    until: float
+
+
 class ZoneFinder:
     """Finds the circles near each robot."""
 
     def __init__(self) -> None:
-        self._known: _Neighbours | None = None
-        self._made: dict[str, Sequence[Zone]] = {}
+        self._known: Neighbours | None = None
+        self._rule: DetectionRule | None = None
+        self._made: dict[str, _Made] = {}
         """The circles of the last judgement, by cause."""
 
     def near(
@@ -153,180 +195,82 @@ class ZoneFinder:
             return lambda _: everything
         known = self._known
         if known is None or not known.hold(world, people, rule, now):
-            known = self._known = _Neighbours.of(world, people, rule, now)
+            known = self._known = Neighbours.of(world, people, rule, now)
         before, self._made = self._made, {}
-        circles = before, self._made
-        return partial(_near, known, world, people, rule, now, inside, circles)
-
-
-def _near(
-    neighbours: "_Neighbours",
-    world: World,
-    people: People,
-    rule: DetectionRule,
-    now: Instant,
-    inside: Mapping[str, Mapping[str, object]],
-    circles: tuple[Mapping[str, Sequence[Zone]], dict[str, Sequence[Zone]]],
-    robot: RobotState,
-) -> Sequence[Zone]:
-    """``Near``: people, then peers, each in their order; then what it was in before.
-
-    ``circles``: those of the judgement before, and of this one, each made once and
-    only if a robot may be near.
-    """
-    (before, made), name = circles, robot.robot_id
-    causes, mine = neighbours.causes.get(name, _NOBODY), inside.get(name, _NOBODY)
-    found: list[Zone] = []
-    for cause in (*causes, *(one for one in mine if one not in causes)):
-        if cause not in made:
-            last = before.get(cause, ())
-            made[cause] = tuple(_of_cause(cause, world, people, rule, now, last))
-        found += made[cause]
-    return found
-
-
-def _of_cause(
-    cause: str,
-    world: World,
-    people: People,
-    rule: DetectionRule,
-    now: Instant,
-    before: Sequence[Zone],
-) -> Iterator[Zone]:
-    if cause in people.known:
-        yield from _zones_of(people.known[cause], people, world, rule, now, before)
-    elif cause in world.robots:
-        yield from _circle_of(world.robots[cause], rule, now)
-
-
-_NOBODY: Mapping[str, None] = MappingProxyType({})
-_Place = tuple[float, float, float]
-"""Of a robot: x, y (m), and the moment of its pose (monotonic, s)."""
+        if rule is not self._rule:
+            self._rule, before = rule, {}
+        look = _Look(world, people, rule, now, before, self._made)
+        return partial(_near, known, look, inside)
 
 
 @dataclass(frozen=True, slots=True)
-class _Neighbours:
-    """Pairs that may come near each other within half a second.
+class _Look:
+    """One judgement: the world, and the circles that were made by the one before.
 
     Attributes:
-        at: When all were compared (monotonic, s).
-        places: Places of the robots then; ``persons`` likewise.
-        causes: Robot → people, then robots, in their order.
-        checked: The newest odometry and the newest of each person that are still
-            within reach of that, so that nobody is compared twice.
+        made: By this one, each once and only if a robot may be near.
     """
 
-    at: float
-    radius_m: float
-    places: Mapping[str, _Place]
-    persons: Mapping[str, TrackedPerson]
-    causes: Mapping[str, Mapping[str, None]]
-    checked: dict[str, Odometry | TrackedPerson]
+    world: World
+    people: People
+    rule: DetectionRule
+    now: Instant
+    before: Mapping[str, _Made]
+    made: dict[str, _Made]
 
-    @classmethod
-    def of(
-        cls, world: World, people: People, rule: DetectionRule, now: Instant
-    ) -> "_Neighbours":
-        """Compare everybody with everybody."""
-        places = {
-            robot.robot_id: place
-            for robot in world.robots.values()
-            if (place := _place_of(robot)) is not None
-        }
-        robots = np.array(list(places.values())).reshape(-1, 3).T
-        names = list(places)
-        seen = [
-            (person.person_id, look)
-            for person in people.known.values()
-            for look in person.sightings
-        ]
-        spots = [(look.x, look.y, look.at.mono, look.reach_m) for _, look in seen]
-        x, y, since, reach = np.array(spots).reshape(-1, 4).T
-        near = dict[str, dict[str, None]]()
-        age, limit = _reach(rule, now, since, reach)
-        limit[age > LIMITS.ring_lasts_s] = -1.0
-        for row, column in _within(robots, x, y, limit):
-            near.setdefault(names[row], {})[seen[column][0]] = None
-        x, y, since = robots
-        # A peer that has long been silent may speak again.
-        for row, column in _within(robots, x, y, _reach(rule, now, since)[1]):
-            # A robot is near itself, which does not slow it.
-            if row != column:
-                near.setdefault(names[row], {})[names[column]] = None
-        persons = dict(people.known)
-        return cls(now.mono, rule.radius_m, places, persons, near, {**persons})
+    def circles_of(self, cause: str) -> Sequence[Zone]:
+        """The circles of a cause; while they stay the same, the very same."""
+        made = self.made.get(cause)
+        if made is None:
+            made = self.made[cause] = self._make(cause)
+        return made.zones
 
-    def hold(
-        self, world: World, people: People, rule: DetectionRule, now: Instant
-    ) -> bool:
-        """Whether nobody else can be near anybody by now."""
-        return (
-            0.0 <= now.mono - self.at <= _HOLDS_S
-            and rule.radius_m == self.radius_m
-            and all(map(self._is_still_there, world.robots.values()))
-            and all(map(self._is_still_seen_there, people.known.values()))
+    def _make(self, cause: str) -> _Made:
+        before, now = self.before.get(cause), self.now
+        person = self.people.known.get(cause)
+        peer = self.world.robots.get(cause) if person is None else None
+        of = person if peer is None else peer.odometry
+        # What an operator marks as a thing has no ring from then on.
+        is_same = before is not None and before.of is of and now.mono <= before.until
+        if before is not None and is_same and not self.people.things.known:
+            return before
+        last = () if before is None else before.zones
+        if person is not None:
+            about = person, self.people, self.world, self.rule, now, last
+            return _Made(of, tuple(_zones_of(*about)), self._ages_at(person))
+        if peer is not None:
+            return _Made(of, tuple(_circle_of(peer, self.rule, now, last)), -math.inf)
+        return _Made(None, (), -math.inf)
+
+    def _ages_at(self, person: TrackedPerson) -> float:
+        """Until when no ring of somebody grows or changes its map (monotonic, s)."""
+        robots, now = self.world.robots, self.now.mono
+        rings = [one for one in person.sightings if now - one.at.mono <= one.lasts_s]
+        if self.people.things.known or any(
+            robots[one.observer].description.kind == "recording" for one in rings
+        ):
+            return -math.inf
+        return min(
+            (one.at.mono + LIMITS.growth_grace_s - _ROUNDING_S for one in rings),
+            default=math.inf,
         )
 
-    def _is_still_there(self, robot: RobotState) -> bool:
-        # Its moment is known or estimated once, as it comes.
-        odometry, name = robot.odometry, robot.robot_id
-        if odometry is None or self.checked.get(name) is odometry:
-            return True
-        place, now = self.places.get(name), _place_of(robot)
-        if place is None or now is None or not _is_as_near(now, place):
-            return False
-        self.checked[name] = odometry
-        return True
 
-    def _is_still_seen_there(self, person: TrackedPerson) -> bool:
-        if self.checked.get(person.person_id) is person:
-            return True
-        before = self.persons.get(person.person_id)
-        if before is None:
-            return False
-        spots = [
-            (one.x, one.y, one.at.mono, one.reach_m)
-            for one in before.sightings
-            if self.at - one.at.mono <= LIMITS.ring_lasts_s
-        ]
-        for look in person.sightings:
-            here = look.x, look.y, look.at.mono
-            if not any(
-                _is_as_near(here, spot[:3]) and look.reach_m <= spot[3]
-                for spot in spots
-            ):
-                return False
-        self.checked[person.person_id] = person
-        return True
+def _near(
+    neighbours: Neighbours,
+    look: _Look,
+    inside: Mapping[str, Mapping[str, object]],
+    robot: RobotState,
+) -> Sequence[Zone]:
+    """``Near``: people, then peers, each in their order; then what it was in before."""
+    name = robot.robot_id
+    causes, mine = neighbours.causes.get(name, _NOBODY), inside.get(name, _NOBODY)
+    if not (causes or mine):
+        return ()
+    found: list[Zone] = []
+    for cause in (*causes, *[one for one in mine if one not in causes]):
+        found += look.circles_of(cause)
+    return found
 
 
-def _place_of(robot: RobotState) -> _Place | None:
-    """The place of a robot; None where it is unknown."""
-    since = robot.likely_pose_at()
-    if robot.odometry is None or since is None:
-        return None
-    return robot.odometry.pose.x, robot.odometry.pose.y, since
-
-
-def _is_as_near(now: _Place, before: _Place) -> bool:
-    """Whether something is not far from where it was, and not older than that."""
-    dx, dy = now[0] - before[0], now[1] - before[1]
-    return dx * dx + dy * dy <= _ROOM_M * _ROOM_M and now[2] >= before[2]
-
-
-def _reach(
-    rule: DetectionRule, now: Instant, since: _Floats, reach: _Floats | float = 0.0
-) -> tuple[_Floats, _Floats]:
-    """Ages (s), and how near a robot must be to come into such a ring soon (m)."""
-    age: _Floats = np.maximum(0.0, now.mono - since)
-    ring = ring_radius(rule.radius_m, age + _HOLDS_S, np.minimum, np.maximum)
-    return age, np.maximum(reach, ring) + 2 * _ROOM_M + 2 * NOT_FAR_M
-
-
-def _within(
-    robots: _Floats, x: _Floats, y: _Floats, limit: _Floats
-) -> Iterator[tuple[int, int]]:
-    """Which robots (columns of x, y, …) are within ``limit`` (m) of which places."""
-    dx, dy = x - robots[0][:, None], y - robots[1][:, None]
-    rows, columns = np.nonzero((dx * dx + dy * dy <= limit * limit) & (limit > 0.0))
-    return zip(rows.tolist(), columns.tolist(), strict=True)
+_NOBODY: Mapping[str, None] = MappingProxyType({})
