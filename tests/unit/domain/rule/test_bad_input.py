@@ -1,0 +1,77 @@
+"""What no robot or detector should say: doubt or a bound, never a higher factor.
+
+Plans are in ``test_foresight``, lasers in ``test_obstacles`` and ``test_witness``.
+"""
+
+import math
+
+import numpy as np
+import pytest
+
+from iveg.domain.alerts import conditions
+from iveg.domain.geometry import Pose2D
+from tests.builders import at
+from tests.unit.domain.scene import Scene, person
+
+
+@pytest.mark.parametrize("speed", [3.0, 50.0, 1e9, -50.0])
+def test_a_twist_above_the_profile_frees_nobody_and_ends_no_slow_down(
+    speed: float,
+) -> None:
+    scene, factors = Scene(("AGI", "AGII")), []
+    for tenth in range(40):
+        scene.now = tenth / 10
+        lies = tenth >= 10
+        scene.drive("AGI", 0.05 * min(tenth, 10), linear=speed if lies else 0.5)
+        scene.drive("AGII", 50.0)
+        scene.look("AGI", person(1.9))
+        scene.look("AGII")
+        factors.append(scene.judge()["AGI"].speed_factor)
+    assert set(factors) == {0.5}
+
+
+@pytest.mark.parametrize("speed", [50.0, 1e9, -50.0])
+def test_a_robot_with_such_a_twist_is_slow_though_nobody_is_near(speed: float) -> None:
+    scene = Scene()
+    for tenth in range(20):
+        scene.now = tenth / 10
+        scene.drive("AGI", 0.0, linear=speed)
+        scene.drive("AGII", 50.0, 60.0, linear=0.0)
+        scene.look("AGI")
+        scene.look("AGII")
+        limit = scene.judge()["AGI"]
+    assert (limit.speed_factor, limit.reason) == (0.5, "doubt")
+
+
+def test_of_a_hundred_people_the_one_within_reach_slows_the_robot() -> None:
+    crowd = np.random.default_rng(5).uniform(8.0, 30.0, (99, 2)).tolist()
+    scene = Scene()
+    for there, factor in ((9.0, 1.0), (1.8, 0.5)):
+        scene.now += 0.2
+        scene.drive("AGI", 0.0, linear=0.0)
+        scene.drive("AGII", -50.0, linear=0.0)
+        scene.look("AGII")
+        scene.look("AGI", person(-there), *(person(x, y) for x, y in crowd))
+        assert scene.judge()["AGI"].speed_factor == factor
+    assert len(scene.everyone) >= 90
+
+
+def test_a_ghost_that_moves_with_the_robot_slows_it_all_the_time_and_is_told() -> None:
+    scene, factors = Scene(), set()
+    for fifth in range(60):
+        scene.now, x = fifth / 5, 0.1 * fifth
+        scene.drive("AGI", x)
+        scene.drive("AGII", 90.0, linear=0.0)
+        scene.look("AGII")
+        here = Pose2D(x, 0.0, 0.0)
+        for one in scene.look("AGI", person(x + 1.2, 0.3)):
+            place = here.inverse(*one.position[:2])
+            assert math.dist(place, (1.2, 0.3)) < 1e-6
+            carried = scene.world.robot("AGI").detector.carried
+            carried.note(here, [place], at(scene.now).mono)
+        factors.add(scene.judge()["AGI"].speed_factor)
+    told = conditions.of_detector(
+        scene.world.robot("AGI"), at(scene.now), started=at(0.0)
+    )
+    assert factors == {0.5}
+    assert "alert.carried" in [one.key for one in told]
