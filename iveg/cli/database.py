@@ -110,6 +110,9 @@ def _told(stats: HistoryStats) -> Iterable[str]:
         )
         yield "  ".join((first.ljust(widths[0]), *cells))
     yield f"{stats.robot_hours:.1f} robot-hours of odometry."
+    for one in stats.tables:
+        if one.days:
+            yield f"{one.name}: a table for each of {one.days} days."
     if stats.inside:
         yield f"{_megabytes(stats.inside)} MB of it are free for new rows."
 

@@ -77,6 +77,9 @@ class RetainedHistory(Protocol):
     async def audit_end(self) -> ChainEnd:
         """The newest row of the audit."""
 
+    async def prepare_days(self, now: float) -> None:
+        """Have tables of days that come, where it keeps one for each (Unix s)."""
+
     async def purge(self, step: PurgeStep, before: float) -> PurgeBatch:
         """One batch of a step, of rows older than this (Unix s)."""
 
@@ -142,8 +145,11 @@ class HistoryUpkeep:
         """
         await self._look_at_disk()
         if self._purges_at is None:
+            await self._history.prepare_days(now.wall)
             self._purges_at = now.mono + SETTLES_S
         is_due = now.mono >= self._purges_at
+        if is_due:
+            await self._history.prepare_days(now.wall)
         squeezes = self._is_low and await self._squeezes_history()
         if is_due or squeezes:
             await self._purge(now, squeezes=squeezes)

@@ -26,12 +26,14 @@ from sqlalchemy import (
     select,
     text,
     true,
+    tuple_,
     update,
 )
 
 from iveg.adapters import clock
 from iveg.adapters.history import partial_indexes, tables
 from iveg.adapters.history.audit import is_over, seal
+from iveg.adapters.history.day_partitions import drop_day, is_partitioned, over_before
 from iveg.domain.retention import PurgeStep
 
 BOUND_S = 0.015
@@ -101,7 +103,12 @@ def purge_batch(
     """
     if step.table == "audit":
         seal(connection, before, clock.wall())
-    statement = _statement(step, before, connection.dialect.name)
+    if step.kind == "telemetry":
+        dropped = drop_day(connection, step.table, before)
+        if dropped is not None:
+            return PurgeBatch(dropped, is_last=False)
+        before = over_before(connection, step.table, before)
+    statement = _statement(connection, step, before)
     began, rows = stopwatch(), 0
     while True:
         found = connection.execute(statement).rowcount
@@ -112,7 +119,9 @@ def purge_batch(
 
 def count_due(connection: Connection, step: PurgeStep, before: float) -> int:
     """Number of rows that a step would change."""
-    due = _due(step, before, connection.dialect.name)
+    if step.kind == "telemetry":
+        before = over_before(connection, step.table, before)
+    due = _due(connection, step, before)
     return connection.scalar(select(func.count()).select_from(due.subquery())) or 0
 
 
@@ -145,23 +154,29 @@ def _free_pages(connection: Connection) -> int:
     return int(connection.exec_driver_sql("PRAGMA freelist_count").scalar() or 0)
 
 
-def _statement(step: PurgeStep, before: float, dialect: str) -> Delete | Update:
-    table, (_, key) = tables.metadata.tables[step.table], _ROW[step.table]
-    due = key.in_(_due(step, before, dialect).limit(CHUNK))
+def _statement(
+    connection: Connection, step: PurgeStep, before: float
+) -> Delete | Update:
+    table, dialect = tables.metadata.tables[step.table], connection.dialect.name
+    some = _due(connection, step, before).limit(CHUNK)
+    due = tuple_(*some.selected_columns).in_(some)
     if step.kind != "positions":
         return delete(table).where(due)
     return update(table).where(due).values(_without_place(table, dialect))
 
 
-def _due(step: PurgeStep, before: float, dialect: str) -> Select[Any]:
+def _due(connection: Connection, step: PurgeStep, before: float) -> Select[Any]:
     """Keys of the rows of a step, oldest first."""
     at, key = age_of(step.table), _ROW[step.table][1]
     if step.table == "audit":
         return select(key).where(is_over(before)).order_by(key)
     which = _OVER.get(step.table, true())
     if step.kind == "positions":
+        dialect = connection.dialect.name
         which = _PLACED[step.table].dialect_options[dialect]["where"]
-    return select(key).where(at < before, which).order_by(at)
+    # A day's table is found by the time, and has no index of keys alone.
+    keys = (at, key) if is_partitioned(connection, step.table) else (key,)
+    return select(*keys).where(at < before, which).order_by(at)
 
 
 def _without_place(table: Table, dialect: str) -> dict[str, Any]:

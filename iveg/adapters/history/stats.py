@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from sqlalchemy import Connection, Integer, Table, cast, func, select, text
 from sqlalchemy.exc import OperationalError
 
+from iveg.adapters.history.day_partitions import days_of
 from iveg.adapters.history.purge import age_of, room_inside
 from iveg.adapters.history.tables import metadata, odometry
 
@@ -13,6 +14,11 @@ _PAGES_OF = """
 SELECT m.tbl_name, sum(d.pgsize) FROM dbstat AS d JOIN sqlite_master AS m USING (name)
 WHERE d.aggregate = TRUE GROUP BY m.tbl_name
 """
+_SIZE_OF = text(
+    "SELECT sum(pg_total_relation_size(one)) FROM ("
+    "SELECT to_regclass(:name)::oid "
+    "UNION SELECT relid FROM pg_partition_tree(to_regclass(:name))) AS parts (one)"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +30,7 @@ class TableStats:
         oldest: (Unix s); None of an empty table, as ``newest``.
         hourly: Bytes for each hour of each robot, of rows since the oldest odometry;
             None without any.
+        days: Days that have a table of their own; 0 of a table that is one.
     """
 
     name: str
@@ -32,6 +39,7 @@ class TableStats:
     oldest: float | None
     newest: float | None
     hourly: float | None
+    days: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +94,8 @@ def _stats(
     if hours and rows:
         recent = connection.scalar(select(func.count()).where(at >= since)) or 0
         hourly = size / rows * recent / hours
-    return TableStats(table.name, rows, size, oldest, newest, hourly)
+    days = len(days_of(connection, table.name))
+    return TableStats(table.name, rows, size, oldest, newest, hourly, days)
 
 
 def _robot_hours(connection: Connection) -> float:
@@ -99,8 +108,7 @@ def _robot_hours(connection: Connection) -> float:
 
 def _sizes(connection: Connection, rows: dict[str, int]) -> dict[str, int]:
     if connection.dialect.name == "postgresql":
-        size = text("SELECT pg_total_relation_size(to_regclass(:name))")
-        return {n: connection.scalar(size, {"name": n}) or 0 for n in rows}
+        return {n: int(connection.scalar(_SIZE_OF, {"name": n}) or 0) for n in rows}
     try:
         return {row[0]: row[1] for row in connection.execute(text(_PAGES_OF))}
     except OperationalError:

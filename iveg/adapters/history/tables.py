@@ -120,7 +120,7 @@ detections = Table(
     _json("box", null=True),
     Column("late", Boolean, nullable=False, server_default=false()),
     Index(None, "at", "row_id"),
-    Index(None, "robot_id", "at"),
+    Index(None, "robot_id", "at", postgresql_include=["class_id", "probability"]),
     sqlite_autoincrement=True,
 )
 
@@ -194,6 +194,10 @@ log = Table(
     sqlite_autoincrement=True,
 )
 
+_CHARTED = ["linear", "limit_factor", "applied_factor", "margin_m"]
+"""A chart of a robot's day reads them from the index: each page of the table holds a
+few of its rows."""
+
 odometry = Table(
     "odometry",
     metadata,
@@ -205,7 +209,7 @@ odometry = Table(
     _text("link"),
     _number("margin_m"),
     Column("late", Boolean, nullable=False, server_default=false()),
-    Index(None, "robot_id", "at"),
+    Index(None, "robot_id", "at", postgresql_include=_CHARTED),
     Index(None, "at"),
     sqlite_autoincrement=True,
 )

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from iveg.adapters import clock
 from iveg.adapters.disk import disk_space
+from iveg.adapters.history.day_partitions import prepare_days
 from iveg.adapters.history.engine import sqlite_file
 from iveg.adapters.history.purge import (
     PurgeBatch,
@@ -59,6 +60,12 @@ class RecordedHistory:
     def is_busy(self) -> bool:
         """Whether rows wait that go first."""
         return self._recorder.is_busy
+
+    async def prepare_days(self, now: float) -> None:
+        """Have tables of days that come, on PostgreSQL (Unix s)."""
+        await self._recorder.between_batches(
+            lambda connection: prepare_days(connection, now)
+        )
 
     async def purge(self, step: PurgeStep, before: float) -> PurgeBatch:
         """One batch of a step, of rows older than this (Unix s)."""

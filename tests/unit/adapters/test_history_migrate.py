@@ -6,10 +6,13 @@ from alembic.autogenerate import compare_metadata
 from alembic.runtime.migration import MigrationContext
 from sqlalchemy import Connection, text
 
+from iveg.adapters.history.day_partitions import PARTITIONED
 from iveg.adapters.history.engine import describe, sqlite_url, writing_engine
 from iveg.adapters.history.migrate import upgrade
 from iveg.adapters.history.partial_indexes import metadata
 from iveg.domain.errors import DataFileError, HopError, SettingsError
+
+PARTS = tuple(f"{name}_" for name in PARTITIONED)
 
 
 def execute(database_url: str, statement: str) -> None:
@@ -20,7 +23,11 @@ def execute(database_url: str, statement: str) -> None:
 
 
 def differences(connection: Connection) -> list[object]:
-    migrated = MigrationContext.configure(connection, opts={"compare_type": True})
+    def is_whole(name: str, kind: str, _: object) -> bool:
+        return kind != "table" or not name.startswith(PARTS)
+
+    opts = {"compare_type": True, "include_name": is_whole}
+    migrated = MigrationContext.configure(connection, opts=opts)
     return list(compare_metadata(migrated, metadata))
 
 

@@ -38,6 +38,7 @@ class FakeHistory:
         away: Whether the database does not answer.
         freed: Batches of room that was given back.
         recordings: Recordings of inputs.
+        prepared: Moments at which tables of days were asked for (Unix s).
     """
 
     def __init__(self, today: int) -> None:
@@ -50,6 +51,7 @@ class FakeHistory:
         self.away = False
         self.recordings = 0
         self.oldest: float | None = None
+        self.prepared: list[float] = []
 
     @property
     def is_busy(self) -> bool:
@@ -66,6 +68,9 @@ class FakeHistory:
 
     async def audit_end(self) -> ChainEnd:
         return ChainEnd(7, "ab" * 32)
+
+    async def prepare_days(self, now: float) -> None:
+        self.prepared.append(now)
 
     async def purge(self, step: PurgeStep, before: float) -> PurgeBatch:
         rows = min(10, self.due.get(step, 0))
