@@ -1,9 +1,9 @@
 """Telemetry as a table for each day (UTC), on PostgreSQL alone.
 
-What is over then goes by dropping a table, in the time of a few files, however many
-rows it had.  ``odometry_20261125`` holds a day, ``odometry_before_20261125`` all that is
-older than the first of them, and ``odometry_rest`` what came for a day without a table:
-no row is refused for its time.
+What is over goes by dropping a table, in a moment, however many rows it had.
+``odometry_20261125`` holds a day, ``odometry_before_20261125`` all that is older than
+the first of them, and ``odometry_rest`` what came for a day without a table: no row is
+refused for its time.
 """
 
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ day are thousands, which batches take in seconds."""
 AHEAD_DAYS = 7
 """Tables are there so long before their day: an upkeep that fails is noticed first."""
 _EPOCH = date(1970, 1, 1).toordinal()
-_PATIENCE = text("SET LOCAL lock_timeout = '200ms'")
+_PATIENCE = "SET LOCAL lock_timeout = '200ms'"
 """Readers wait behind one who waits to drop or attach: not for longer than this."""
 _PARTS = text(
     "SELECT inhrelid::regclass::text FROM pg_inherits "
@@ -54,11 +54,8 @@ def prepare_days(connection: Connection, now: float) -> None:
         if not is_partitioned(connection, table):
             return
         wanted = {*range(max(first, _start(connection, table)), end)}
-        missed = text(
-            f"SELECT DISTINCT floor(at / {DAY_S})::integer FROM {table}_rest "
-            f"WHERE at < {end * DAY_S}"
-        )
-        wanted.update(connection.scalars(missed))
+        missed = f"SELECT DISTINCT floor(at / {DAY_S})::integer FROM {table}_rest"  # noqa: S608 - names of ours
+        wanted.update(connection.scalars(text(f"{missed} WHERE at < {end * DAY_S}")))
         for day in sorted(wanted.difference(days_of(connection, table))):
             _make(connection, table, day)
 
@@ -82,7 +79,7 @@ def drop_day(connection: Connection, table: str, before: float) -> int | None:
         return None
     name = _name(table, oldest)
     rows = connection.scalar(text(f"SELECT count(*) FROM {name}"))  # noqa: S608
-    connection.execute(_PATIENCE)
+    connection.execute(text(_PATIENCE))
     connection.execute(text(f"DROP TABLE {name}"))
     return rows or 0
 
@@ -114,11 +111,12 @@ def _start(connection: Connection, table: str) -> int:
 def _make(connection: Connection, table: str, day: int) -> None:
     name, since, until = _name(table, day), day * DAY_S, (day + 1) * DAY_S
     for statement in (
-        _PATIENCE.text,
+        _PATIENCE,
         f"CREATE TABLE {name} (LIKE {table} INCLUDING DEFAULTS)",
         # A table cannot have a day of which the rest still has rows.
-        f"WITH moved AS (DELETE FROM {table}_rest WHERE at >= {since} AND at < {until} "
-        f"RETURNING *) INSERT INTO {name} SELECT * FROM moved",
+        f"WITH moved AS (DELETE FROM {table}_rest "  # noqa: S608 - as above
+        f"WHERE at >= {since} AND at < {until} RETURNING *) "
+        f"INSERT INTO {name} SELECT * FROM moved",
         f"ALTER TABLE {table} ATTACH PARTITION {name} "
         f"FOR VALUES FROM ({since}) TO ({until})",
     ):
