@@ -182,7 +182,7 @@ def fill(url: str, robots: int, days: int) -> None:
     start = first_day(days)
     for table in PARTITIONED:
         with engine.begin() as connection:
-            _begin_at(connection, table, start)
+            begin_at(connection, table, start)
     for day in range(start, start + days):
         began = time.monotonic()
         with engine.begin() as connection:
@@ -202,7 +202,7 @@ def fill(url: str, robots: int, days: int) -> None:
     engine.dispose()
 
 
-def _begin_at(connection: Connection, table: str, day: int) -> None:
+def begin_at(connection: Connection, table: str, day: int) -> None:
     """Have days since this one, where a new database has those since today."""
     (older,) = connection.scalars(
         text(

@@ -145,6 +145,16 @@ async def test_the_first_purge_waits_until_the_server_has_settled() -> None:
     assert [step for step, _ in upkeep.history.done] == list(PURGE_STEPS)
 
 
+async def test_tables_of_days_are_there_from_the_start_and_looked_after_hourly() -> (
+    None
+):
+    upkeep = await settled()
+    for minute in range(1, 10):
+        await upkeep.look(60.0 * minute)
+
+    assert upkeep.history.prepared == [START.wall, START.wall + SETTLES_S]
+
+
 async def test_each_kind_goes_by_its_own_horizon_once_an_hour() -> None:
     upkeep = await settled()
     await upkeep.look(SETTLES_S)
