@@ -2,6 +2,7 @@ import {
   dayAndTime,
   momentOf,
   offsetAt,
+  typedText,
   wallText,
 } from "../../iveg/static/js/pages/history/local_time.js";
 import { equal, test } from "./harness.js";
@@ -39,8 +40,16 @@ test("an hour that summer time skips is the hour after", () => {
   equal(momentOf("2026-03-29T02:30:00"), Date.parse("2026-03-29T01:30:00Z"));
 });
 
+test("people type a moment as it is shown to them, seconds at will", () => {
+  const moment = Date.parse("2026-07-15T21:05:06Z");
+  equal(typedText(moment), "2026-07-15 23:05:06");
+  equal(momentOf(typedText(moment)), moment);
+  equal(momentOf("  2026-07-15  23:05 "), moment - 6000);
+});
+
 test("what is no time is no moment", () => {
   equal(Number.isNaN(momentOf("")), true);
+  equal(Number.isNaN(momentOf("20/11/2026 09:00")), true);
 });
 
 test("times for people have 24 hours and the greenhouse's clock", () => {

@@ -336,7 +336,7 @@ def _clock(stamp: str) -> str:
 def _wall(stamp: str) -> str:
     """Day and time in Madrid of an ISO-8601 stamp, as a form has them."""
     at = datetime.fromisoformat(stamp).timestamp()
-    return in_madrid(at).isoformat(timespec="seconds")
+    return in_madrid(at).isoformat(" ", "seconds")
 
 
 def _before(stamp: str) -> str:

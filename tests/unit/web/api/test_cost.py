@@ -174,7 +174,7 @@ async def test_two_ranges_stand_side_by_side_and_what_is_unknown_is_said(
 ) -> None:
     # A form tells the wall clock of Madrid, a link any offset.
     asked = {
-        "since": "2026-11-20T08:00:00",
+        "since": "2026-11-20 08:00",
         "until": "2026-11-20T10:30:00+02:00",
         "than_since": "2026-11-01T00:00:00",
         "than_until": "2026-11-02T00:00:00",
@@ -189,6 +189,9 @@ async def test_two_ranges_stand_side_by_side_and_what_is_unknown_is_said(
     assert f'href="/?t={format_stamp(MORNING + 61.0)}"' in page
     assert 'href="/commands/G1"' in page
     assert page.count("Not known: the history") == 2
+    # The form repeats it, in words of the page's own and not of the browser's.
+    assert 'name="since" value="2026-11-20 08:00:00"' in page
+    assert "Year-month-day hour:minute, Europe/Madrid time" in page
 
 
 @pytest.mark.parametrize("path", ["/api/v1/cost", "/compare"])

@@ -6,7 +6,7 @@
  */
 
 import { all, need, setAttribute, setHidden } from "../../panels/dom.js";
-import { momentOf, wallText } from "./local_time.js";
+import { momentOf, typedText } from "./local_time.js";
 
 const SPANS_MS = { "15m": 900_000, "1h": 3_600_000, "24h": 86_400_000 };
 const LONGEST_MS = 31 * 86_400_000;
@@ -25,8 +25,7 @@ export function createAsked(onChange) {
   function read() {
     /** @type {Asked} */
     const asked = { ...spanOf(range), robot };
-    const length = asked.until - asked.since;
-    return length > 0 && length <= LONGEST_MS ? asked : null;
+    return canBeUsed(asked) ? asked : null;
   }
 
   /** @param {string} name @returns {{since: number, until: number}} */
@@ -99,12 +98,18 @@ export function createAsked(onChange) {
 
   /** @param {{since: number, until: number}} span */
   function fill(span) {
-    since.value = wallText(span.since).slice(0, 19);
-    until.value = wallText(span.until).slice(0, 19);
+    since.value = typedText(span.since);
+    until.value = typedText(span.until);
   }
 
   show();
   return { read };
+}
+
+/** Whether a range can be asked for. @param {{since: number, until: number}} span */
+export function canBeUsed({ since, until }) {
+  const length = until - since;
+  return length > 0 && length <= LONGEST_MS;
 }
 
 /**

@@ -38,7 +38,7 @@ export function offsetAt(at) {
 }
 
 /**
- * The wall clock's text, as `datetime-local` and Plotly read it: no zone in it.
+ * The wall clock's text, as Plotly reads it: no zone in it.
  *
  * @param {number} at Unix milliseconds
  * @returns {string} `2026-11-20T09:00:00.000`
@@ -47,15 +47,20 @@ export function wallText(at) {
   return new Date(at + offsetAt(at)).toISOString().slice(0, 23);
 }
 
+/** The same as people type it: `2026-11-20 09:00:00`. @param {number} at Unix ms */
+export function typedText(at) {
+  return wallText(at).slice(0, 19).replace("T", " ");
+}
+
 /**
  * The moment that a wall clock's text names; the hour that a change to winter time
  * repeats is taken as its first round, the one that a change skips as the hour after.
  *
- * @param {string} text as from `datetime-local`
+ * @param {string} text as people type it: `2026-11-20 09:00`, seconds at will
  * @returns {number} Unix milliseconds; NaN where the text is none
  */
 export function momentOf(text) {
-  const wall = Date.parse(`${text}Z`);
+  const wall = Date.parse(`${text.trim().replace(/\s+/, "T")}Z`);
   if (Number.isNaN(wall)) return Number.NaN;
   // Three hours back lies before any change that could make this text ambiguous.
   const before = wall - offsetAt(wall - 3 * HOUR_MS);
