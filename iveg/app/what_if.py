@@ -13,9 +13,9 @@ from iveg.adapters.worker import Worker
 from iveg.domain.errors import HopError, UnknownNameError, WhatIfRefusedError
 from iveg.domain.fleet import FleetDescription
 from iveg.domain.what_if.crossings import Parameters
-from iveg.domain.what_if.inputs import Inputs, poses_of, sightings_of
+from iveg.domain.what_if.inputs import Inputs, sightings_of
 from iveg.domain.what_if.judging import Range
-from iveg.domain.what_if.outcome import outcome_of, recorded
+from iveg.domain.what_if.outcome import outcomes_of, recorded
 from iveg.domain.what_if.questions import Answer, Job, Question
 from iveg.pipeline.ports import Clock, Ids
 
@@ -46,18 +46,16 @@ async def _judge_part(
 ) -> Answer:
     queries = Queries(url)
     try:
-        found = await queries.rule_inputs(since - _LEAD_S, until)
+        found = await queries.rule_inputs(braking, since - _LEAD_S, until)
     finally:
         queries.close()
-    poses = [row for row in found.poses if row[0] in braking]
-    seen = [row for row in found.seen if row[0] in braking]
-    inputs = Inputs(poses_of(poses), sightings_of(seen), braking)
+    inputs = Inputs(found.poses, sightings_of(found.seen), braking)
     range_ = Range(inputs, since - _LEAD_S, until)
     return Answer(
-        tuple(outcome_of(range_, one, _LEAD_S) for one in tried),
-        recorded(found.decided, braking, since, until),
-        sum(row[1] >= since for row in poses),
-        sum(row[1] >= since for row in seen),
+        outcomes_of(range_, tried, _LEAD_S),
+        recorded(found.decided, since, until),
+        sum(int((one.at >= since).sum()) for one in found.poses.values()),
+        sum(row[1] >= since for row in found.seen),
     )
 
 

@@ -5,7 +5,7 @@ up the event loop nor takes the threads that a STOP's journal needs.
 """
 
 import asyncio
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Literal, TypeVar
 
@@ -226,9 +226,11 @@ class Queries:
         poses = await self._ask(lambda c: series.poses_of(c, since, until))
         return poses, await self._ask(lambda c: series.people_seen(c, since, until))
 
-    async def rule_inputs(self, since: float, until: float) -> RuleInputs:
+    async def rule_inputs(
+        self, robots: Collection[str], since: float, until: float
+    ) -> RuleInputs:
         """What judgements of a range rest on, and what was decided (Unix s)."""
-        return await self._ask(lambda c: rule_inputs(c, since, until))
+        return await self._ask(lambda c: rule_inputs(c, robots, since, until))
 
     async def lost_of_day(
         self, since: float, until: float

@@ -1,61 +1,76 @@
 """What the history keeps of the rule's inputs, and what the rule decided."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
-from sqlalchemy import Connection, and_, false, or_, select
+from sqlalchemy import Connection, Select, and_, false, or_, select
 
 from iveg.adapters.history.tables import decisions, detections, odometry
-from iveg.domain.what_if.inputs import PoseRow, SeenRow
+from iveg.domain.what_if.inputs import Poses, SeenRow, poses_of
 from iveg.domain.what_if.outcome import Decided
 
 
 @dataclass(frozen=True, slots=True)
 class RuleInputs:
-    """Of a range, in order of time; of robots that were there, recordings too."""
+    """Of a range and some robots, in order of time."""
 
-    poses: Sequence[PoseRow]
+    poses: Mapping[str, Poses]
     seen: Sequence[SeenRow]
     decided: Sequence[Decided]
 
 
-def rule_inputs(connection: Connection, since: float, until: float) -> RuleInputs:
+def rule_inputs(
+    connection: Connection, robots: Collection[str], since: float, until: float
+) -> RuleInputs:
     """Everything of a range that judgements rest on (Unix s)."""
-    o, d, c = odometry.c, detections.c, decisions.c
-    poses = (
-        select(o.robot_id, o.at, o.x, o.y, o.yaw, o.linear, o.angular)
-        .where(o.at >= since, o.at < until, o.late == false())
-        .order_by(o.at)
+    poses = {name: _poses(connection, name, since, until) for name in sorted(robots)}
+    there = {name: one for name, one in poses.items() if len(one.at)}
+    seen, decided = _seen(robots, since, until), _decided(robots, since, until)
+    return RuleInputs(
+        there,
+        *([tuple(row) for row in connection.execute(one)] for one in (seen, decided)),
     )
+
+
+def _poses(connection: Connection, robot: str, since: float, until: float) -> Poses:
+    c = odometry.c
+    wanted = (
+        select(c.at, c.x, c.y, c.yaw, c.linear, c.angular)
+        .where(c.robot_id == robot, c.at >= since, c.at < until, c.late == false())
+        .order_by(c.at)
+    )
+    # A day has a million: rows of the library would double the time.
+    told = str(wanted.compile(connection, compile_kwargs={"literal_binds": True}))
+    cursor = connection.connection.cursor()
+    cursor.execute(told)
+    return poses_of(cursor.fetchall())
+
+
+def _seen(
+    robots: Collection[str], since: float, until: float
+) -> Select[tuple[object, ...]]:
+    c = detections.c
     # A robot without a track is one of the fleet, whose own odometry counts.
     somebody = or_(
-        d.class_ == "person", and_(d.class_ == "robot", d.person_id.is_not(None))
+        c.class_ == "person", and_(c.class_ == "robot", c.person_id.is_not(None))
     )
-    seen = (
-        select(
-            d.robot_id,
-            d.at,
-            d.x,
-            d.y,
-            d.probability,
-            d.class_,
-            d.person_id,
-            d.confident,
-        )
-        .where(d.at >= since, d.at < until, d.late == false(), d.x.is_not(None))
-        .where(somebody)
-        .order_by(d.at)
+    return (
+        select(c.robot_id, c.at, c.x, c.y, c.probability, c.class_, c.person_id)
+        .where(c.at >= since, c.at < until, c.late == false(), c.x.is_not(None))
+        .where(somebody, c.robot_id.in_(sorted(robots)))
+        .order_by(c.at)
     )
-    decided = select(c.robot_id, c.reason, c.started_at, c.ended_at).where(
+
+
+def _decided(
+    robots: Collection[str], since: float, until: float
+) -> Select[tuple[object, ...]]:
+    c = decisions.c
+    return select(c.robot_id, c.reason, c.started_at, c.ended_at).where(
         c.kind == "mandate",
+        c.robot_id.in_(sorted(robots)),
         c.started_at < until,
         or_(c.ended_at.is_(None), c.ended_at >= since),
         # An index finds those: no slow-down lasts for so long.
         c.started_at >= since - 86_400.0,
-    )
-    return RuleInputs(
-        *(
-            [tuple(row) for row in connection.execute(asked)]
-            for asked in (poses, seen, decided)
-        )
     )

@@ -1,7 +1,7 @@
 """Where a robot crosses into circles, as arrays: the rule of many moments at once."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Collection
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -20,8 +20,10 @@ from iveg.domain.what_if.inputs import Flags, Floats, Indices
 STEP_S: Final = EVERY_S
 """Of the grid: as often as the rule looks ahead."""
 _PATH_STEP_S: Final = float(AHEAD_S[1] - AHEAD_S[0])
-_AT_ONCE: Final = 20_000
-"""Paths that are compared at once."""
+_AT_ONCE: Final = 4_000
+"""Paths that are compared at once: what a core keeps near."""
+_COARSE: Final = 5
+"""Of so many moments of a path one is looked at first."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +66,11 @@ class Grid:
     fastest: Floats
 
     @property
+    def top(self) -> float:
+        """Its greatest speed (m/s)."""
+        return float(self.fastest.max(initial=0.0))
+
+    @property
     def stands(self) -> Flags:
         """Whether its newest pose shows no motion."""
         still: Flags = (np.abs(self.linear) < LIMITS.standing_speed) & (
@@ -74,7 +81,7 @@ class Grid:
 
 @dataclass(frozen=True, slots=True)
 class Rings:
-    """Circles, each at one step; each of shape (n,)."""
+    """Circles, each at one step; each of shape (n,), by cause and then by step."""
 
     step: Indices
     cause: Indices
@@ -98,53 +105,85 @@ class Rings:
 
 
 class Crossings:
-    """Slow-downs of one robot."""
+    """Slow-downs of one robot, for parameters that have one radius in common.
 
-    def __init__(self, grid: Grid, tried: Parameters, braking: float) -> None:
-        self._grid, self._tried, self._braking = grid, tried, braking
+    Where it meets which ring is found once for all of them.
+
+    Args:
+        grid: Of the robot.
+        rings: Of others.
+        tried: All that will be asked for.
+        braking: What the robot's brakes can do (m/s²).
+    """
+
+    def __init__(
+        self, grid: Grid, rings: Rings, tried: Collection[Parameters], braking: float
+    ) -> None:
+        self._grid = grid
+        self._tried = widest(tried)
+        self._rows = self._reached(rings)
+        self._near = rings.where(self._rows)
+        self._speed = grid.linear[self._near.step]
+        self._soon = _soon(braking, self._speed)
+        within_s = np.maximum(HOLDS_S, self._soon)
+        self._depth, self._met_in_s = self._meet(
+            self._near, self._speed, np.minimum(within_s, self._tried.foresight_s)
+        )
+
+    def _reached(self, rings: Rings) -> Indices:
+        """Rows of rings that may matter to the robot."""
+        grid = self._grid
+        speed = grid.top + np.hypot(rings.vx, rings.vy)
+        reach = reach_m(self._tried, rings.age, speed)
+        east, north = rings.x - grid.x[rings.step], rings.y - grid.y[rings.step]
+        near = east * east + north * north <= reach * reach
         # A robot of which nothing was heard for long is no robot that drives.
-        self._is_there = grid.age <= LIMITS.ring_lasts_s
+        return np.flatnonzero(near & (grid.age[rings.step] <= LIMITS.ring_lasts_s))
 
-    def of(self, rings: Rings) -> Iterator[tuple[int, int, int]]:
-        """First step, end and cause of each."""
-        grid, tried = self._grid, self._tried
-        away = np.hypot(rings.x - grid.x[rings.step], rings.y - grid.y[rings.step])
-        top = float(grid.fastest.max(initial=0.0)) + LIMITS.walking_m_s
-        reach = LIMITS.ring_most_m + top * tried.foresight_s + tried.release_beyond_m
-        near = rings.where((away <= reach) & self._is_there[rings.step])
+    def _radius(self, age: Floats) -> Floats:
+        return ring_radius(self._tried.radius_m, age, np.minimum, np.maximum)
+
+    def of(
+        self, tried: Parameters, wanted: Flags | None = None
+    ) -> list[tuple[int, int, int]]:
+        """First step, end and cause of each; ``wanted``: of these rings alone."""
+        rows = slice(None) if wanted is None else np.flatnonzero(wanted[self._rows])
+        near = self._near if wanted is None else self._near.where(rows)
         if not len(near.step):
-            return
-        near = near.where(np.lexsort((near.step, near.cause)))
-        speed = grid.linear[near.step]
-        soon = _soon(self._braking, speed)
-        depth, in_s = self._meet(near, speed, np.maximum(HOLDS_S, soon))
+            return []
+        depth, soon, in_s = self._depth[rows], self._soon[rows], self._met_in_s[rows]
+        within = np.minimum(np.maximum(HOLDS_S, soon), tried.foresight_s)
+        in_s = np.where((in_s <= within + 1e-6) & (within > 0.0), in_s, np.inf)
         enters = (depth <= 0.0) | (in_s <= soon)
         holds = (depth <= tried.release_beyond_m) | np.isfinite(in_s)
         groups = _groups(near, enters, holds, tried.release_after_s)
-        again = self._again(near, groups, holds)
+        again = self._again(near, groups, holds, tried)
         if again.any():
             groups = _groups(near, enters, holds | again, tried.release_after_s)
-        yield from groups
+        return groups
 
     def _again(
-        self, near: Rings, groups: list[tuple[int, int, int]], holds: Flags
+        self,
+        near: Rings,
+        groups: list[tuple[int, int, int]],
+        holds: Flags,
+        tried: Parameters,
     ) -> Flags:
         """Whether who is slow would meet it again at the speed of before."""
         again = np.zeros(len(near.step), np.bool_)
-        if not groups or not self._tried.foresight_s:
+        if not groups or not tried.foresight_s:
             return again
         # Causes in order, and steps in order for each: one key that rises.
         span = int(near.step.max()) + 2
-        begun = np.array([cause * span + first for first, _, cause in groups])
-        firsts = np.array([first for first, _, _ in groups])
-        causes = np.array([cause for _, _, cause in groups])
+        firsts, _, causes = np.array(groups, np.intp).T
+        begun = causes * span + firsts
         of = np.searchsorted(begun, near.cause * span + near.step, "right") - 1
         slow = (of >= 0) & (causes[np.maximum(of, 0)] == near.cause) & ~holds
         rows = np.flatnonzero(slow)
         before = self._grid.fastest[firsts[of[rows]]]
         speed = self._grid.linear[near.step[rows]]
         faster = np.maximum(1.0, before / np.maximum(np.abs(speed), MOVES_M_S))
-        within = np.full(len(rows), HORIZON_S)
+        within = np.full(len(rows), tried.foresight_s)
         _, in_s = self._meet(near.where(rows), speed, within, faster)
         again[rows] = np.isfinite(in_s)
         return again
@@ -158,37 +197,54 @@ class Crossings:
     ) -> tuple[Floats, Floats]:
         """How far outside each ring (m), and how soon it is met (s).
 
-        inf: not within that time, nor within the horizon, or it is there already.
+        inf: not within that time, or it is there already.
         """
-        grid, tried = self._grid, self._tried
-        radius = ring_radius(tried.radius_m, rings.age, np.minimum, np.maximum)
+        grid, radius = self._grid, self._radius(rings.age)
         x, y = grid.x[rings.step], grid.y[rings.step]
         depth: Floats = np.hypot(rings.x - x, rings.y - y) - radius
         in_s = np.full(len(rings.step), np.inf)
         goes = np.abs(speed) * faster + np.hypot(rings.vx, rings.vy)
-        within = np.minimum(within_s, tried.foresight_s) + 1e-6
+        within = within_s + 1e-6
         asked = np.flatnonzero(
             (np.abs(speed) >= MOVES_M_S)
             & (rings.age <= LIMITS.seen_s)
             & (depth > 0.0)
             & (depth <= goes * (within + rings.age))
-            & (tried.foresight_s > 0.0)
+            & (within_s > 0.0)
         )
         factors = np.broadcast_to(faster, speed.shape)
-        ahead = AHEAD_S[
-            : np.searchsorted(AHEAD_S, within.max(initial=0.0) + _PATH_STEP_S)
-        ]
+        most = within.max(initial=0.0) + _PATH_STEP_S
+        ahead = AHEAD_S[: np.searchsorted(AHEAD_S, most)]
         for begin in range(0, len(asked), _AT_ONCE):
             some = asked[begin : begin + _AT_ONCE]
-            found = self._in_s(rings.where(some), radius[some], factors[some], ahead)
-            in_s[some] = found
+            in_s[some] = self._in_s(
+                rings.where(some), radius[some], factors[some], goes[some], ahead
+            )
         in_s[in_s > within] = np.inf
         return depth, in_s
 
     def _in_s(
-        self, rings: Rings, radius: Floats, faster: Floats, ahead: Floats
+        self, rings: Rings, radius: Floats, faster: Floats, goes: Floats, ahead: Floats
     ) -> Floats:
         """When the arc of each robot's twist meets each ring that goes on (s)."""
+        found = np.full(len(radius), np.inf)
+        # Nobody comes nearer between two moments than both can go meanwhile.
+        looks = np.append(ahead[:-1:_COARSE], ahead[-1])
+        apart = self._apart(rings, radius, faster, looks)
+        may = apart.min(1, initial=np.inf) <= goes * (_COARSE * _PATH_STEP_S / 2 + 1e-6)
+        rows = np.flatnonzero(may)
+        apart = self._apart(rings.where(rows), radius[rows], faster[rows], ahead)
+        inside = apart <= 0.0
+        met = np.flatnonzero(inside.any(1) & ~inside[:, 0])
+        at = inside[met].argmax(1)
+        before, after = apart[met, at - 1], apart[met, at]
+        found[rows[met]] = ahead[at - 1] + _PATH_STEP_S * before / (before - after)
+        return found
+
+    def _apart(
+        self, rings: Rings, radius: Floats, faster: Floats, ahead: Floats
+    ) -> Floats:
+        """How far outside each ring at each moment of its path (m)."""
         grid, step = self._grid, rings.step
         x, y = _arcs(
             grid.x[step],
@@ -199,21 +255,34 @@ class Crossings:
             ahead,
         )
         on = ahead + rings.age[:, None]
-        apart = np.hypot(
-            rings.x[:, None] + rings.vx[:, None] * on - x,
-            rings.y[:, None] + rings.vy[:, None] * on - y,
-        )
-        apart -= radius[:, None]
-        inside = apart <= 0.0
-        met = inside.any(1) & ~inside[:, 0]
-        at = np.maximum(inside.argmax(1), 1)
-        rows = np.arange(len(at))
-        before, after = apart[rows, at - 1], apart[rows, at]
-        gap = np.where(met, before - after, 1.0)
-        found: Floats = np.where(
-            met, ahead[at - 1] + _PATH_STEP_S * before / gap, np.inf
-        )
-        return found
+        east = rings.x[:, None] + rings.vx[:, None] * on - x
+        north = rings.y[:, None] + rings.vy[:, None] * on - y
+        apart: Floats = np.sqrt(east * east + north * north) - radius[:, None]
+        return apart
+
+
+def widest(tried: Collection[Parameters]) -> Parameters:
+    """One of the same radius that holds robots wherever one of these does."""
+    return replace(
+        next(iter(tried)),
+        foresight_s=max(one.foresight_s for one in tried),
+        release_beyond_m=max(one.release_beyond_m for one in tried),
+    )
+
+
+def reach_m(tried: Parameters, age: Floats, speed: Floats) -> Floats:
+    """How far from its middle a ring may matter to a robot (m).
+
+    Args:
+        tried: Parameters.
+        age: Of rings (s).
+        speed: Of both towards each other, at most (m/s).
+    """
+    radius = ring_radius(tried.radius_m, age, np.minimum, np.maximum)
+    goes_on = tried.foresight_s + np.minimum(age, LIMITS.seen_s)
+    ahead = speed * goes_on * (age <= LIMITS.seen_s)
+    reach: Floats = radius + np.maximum(tried.release_beyond_m, ahead) + 1e-6
+    return reach
 
 
 def _soon(braking: float, speed: Floats) -> Floats:

@@ -6,8 +6,9 @@ their task, and what lasers saw is no part of it.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -80,19 +81,16 @@ class Inputs:
     braking: Mapping[str, float]
 
 
-PoseRow = tuple[str, float, float, float, float, float, float]
-"""Robot, when, x, y, yaw, linear, angular."""
-SeenRow = tuple[str, float, float, float, float, str, str | None, bool]
-"""Robot, when, x, y, probability, class, person, whether it is confident."""
+PoseRow = Sequence[float]
+"""When, x, y, yaw, linear, angular."""
+SeenRow = tuple[str, float, float, float, float, str, str | None]
+"""Robot, when, x, y, probability, class, person."""
 
 
-def poses_of(rows: Sequence[PoseRow]) -> Mapping[str, Poses]:
-    """Rows in order of time, by robot."""
-    names = np.array([row[0] for row in rows])
-    numbers = np.array([row[1:] for row in rows], np.float64).reshape(-1, 6)
-    return {
-        str(name): Poses(*numbers[names == name].T.copy()) for name in np.unique(names)
-    }
+def poses_of(rows: Iterable[PoseRow]) -> Poses:
+    """Rows of one robot in order of time."""
+    numbers = np.fromiter(chain.from_iterable(rows), np.float64).reshape(-1, 6)
+    return Poses(*numbers.T.copy())
 
 
 def sightings_of(rows: Sequence[SeenRow]) -> Sightings:
@@ -101,8 +99,8 @@ def sightings_of(rows: Sequence[SeenRow]) -> Sightings:
     found = [chains.take(row) for row in rows]
     numbers = np.array(
         [
-            (*row[1:5], max(row[4], chain.belief), chain.number, chain.subject)
-            for row, chain in zip(rows, found, strict=True)
+            (*row[1:5], max(row[4], one.belief), one.number, one.subject)
+            for row, one in zip(rows, found, strict=True)
         ],
         np.float64,
     ).reshape(-1, 7)
@@ -110,9 +108,9 @@ def sightings_of(rows: Sequence[SeenRow]) -> Sightings:
         [(row[5] == "person", row[6] is not None) for row in rows], np.bool_
     ).reshape(-1, 2)
     order = np.lexsort((numbers[:, 0], numbers[:, 5]))
-    at, x, y, probability, belief, chain, subject = numbers[order].T.copy()
-    vx, vy = _velocities(at, x, y, chain)
-    links, who = chain.astype(np.intp), subject.astype(np.intp)
+    at, x, y, probability, belief, link, subject = numbers[order].T.copy()
+    vx, vy = _velocities(at, x, y, link)
+    links, who = link.astype(np.intp), subject.astype(np.intp)
     person, counted = flags[order].T.copy()
     return Sightings(at, x, y, vx, vy, probability, belief, links, who, person, counted)
 
@@ -146,7 +144,7 @@ class _Chains:
 
     def take(self, row: SeenRow) -> _Chain:
         """The chain of a detection, with it as its newest."""
-        robot, at, x, y, probability, class_, person, _ = row
+        robot, at, x, y, probability, class_, person = row
         of = self._newest.setdefault((robot, class_), {})
         before = _nearest(of, at, x, y, self._subjects.get(person))
         if before is None:
@@ -201,23 +199,23 @@ def _believed(
     return odds, looks, max(before.belief, probability, together)
 
 
-def _velocities(
-    at: Floats, x: Floats, y: Floats, chain: Floats
-) -> tuple[Floats, Floats]:
+def _velocities(at: Floats, x: Floats, y: Floats, of: Floats) -> tuple[Floats, Floats]:
     """Of each chain (m/s), smoothed as the tracker does, of a walker at most."""
-    vx, vy = np.zeros(len(at)), np.zeros(len(at))
-    goes = (0.0, 0.0)
-    for one in range(1, len(at)):
-        after = at[one] - at[one - 1]
-        if chain[one] != chain[one - 1] or not 0.0 < after <= LIMITS.seen_s:
-            goes = 0.0, 0.0
+    found = np.zeros((len(at), 2))
+    after = np.diff(at)
+    goes_on = (np.diff(of) == 0) & (after > 0.0) & (after <= LIMITS.seen_s)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        steps = np.column_stack((np.diff(x) / after, np.diff(y) / after))
+        gains = after / (_SMOOTHED_S + after)
+    vx = vy = 0.0
+    # Each from the one before: numbers of Python are faster here than arrays.
+    each = zip(goes_on.tolist(), gains.tolist(), steps.tolist(), strict=True)
+    for row, (is_next, gain, (to_x, to_y)) in enumerate(each, 1):
+        if not is_next:
+            vx = vy = 0.0
             continue
-        gain = after / (_SMOOTHED_S + after)
-        to = (x[one] - x[one - 1]) / after, (y[one] - y[one - 1]) / after
-        goes = tuple(
-            was + gain * (now - was) for was, now in zip(goes, to, strict=True)
-        )
-        least = min(1.0, LIMITS.walking_m_s / max(math.hypot(*goes), 1e-9))
-        goes = goes[0] * least, goes[1] * least
-        vx[one], vy[one] = goes
-    return vx, vy
+        vx, vy = vx + gain * (to_x - vx), vy + gain * (to_y - vy)
+        least = min(1.0, LIMITS.walking_m_s / max(math.hypot(vx, vy), 1e-9))
+        vx, vy = vx * least, vy * least
+        found[row] = vx, vy
+    return found[:, 0], found[:, 1]

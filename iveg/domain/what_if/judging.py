@@ -4,14 +4,25 @@ The same facts as ``iveg.domain.rule``, five times a second, as often as that lo
 ahead; ``tests/unit/domain/test_what_if`` compares both.
 """
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from iveg.domain.limits import LIMITS
-from iveg.domain.what_if.crossings import STEP_S, Crossings, Grid, Parameters, Rings
+from iveg.domain.what_if.crossings import (
+    STEP_S,
+    Crossings,
+    Grid,
+    Parameters,
+    Rings,
+    reach_m,
+    widest,
+)
 from iveg.domain.what_if.inputs import Flags, Floats, Indices, Inputs, Poses, Sightings
+
+_Thresholds = tuple[float, float]
+"""Of people and of strange robots."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,44 +50,71 @@ class Range:
         self.steps = max(0, round((until - since) / STEP_S))
         at: Floats = since + STEP_S * np.arange(self.steps, dtype=np.float64)
         self.grids = {name: _grid(one, at) for name, one in inputs.poses.items()}
-        seen = inputs.sightings
-        self._people = set(seen.subject[seen.is_person].tolist())
-        self._near: dict[str, Flags] = {}
-        self._for_peers: dict[Parameters, Sequence[Stretch]] = {}
-
-    def judge(self, tried: Parameters) -> Iterator[Stretch]:
-        """Every slow-down, by robot and cause."""
-        seen = self.inputs.sightings
-        least = np.where(seen.is_person, tried.threshold, tried.robot_threshold)
-        counted = np.flatnonzero(seen.belief >= least)
-        sure = seen.probability[counted] >= least[counted]
-        rings = self._rings(seen, counted, sure)
-        for robot_id, grid in self.grids.items():
-            for first, end, cause in self._crossings(robot_id, grid, tried).of(rings):
-                reason = "person" if cause in self._people else "robot"
-                yield Stretch(robot_id, f"s{cause}", reason, first, end)
-        yield from self._peers_of(
-            replace(tried, threshold=0, robot_threshold=0, factor=0)
+        self._people = set(
+            inputs.sightings.subject[inputs.sightings.is_person].tolist()
         )
+        self._near: dict[str, Flags] = {}
 
-    def _peers_of(self, tried: Parameters) -> Sequence[Stretch]:
+    def judge(self, tried: Parameters) -> Sequence[Stretch]:
+        """Every slow-down, by robot and cause."""
+        return self.judge_all([tried])[tried]
+
+    def judge_all(
+        self, tried: Collection[Parameters]
+    ) -> Mapping[Parameters, Sequence[Stretch]]:
+        """Of each; what some of them have in common is looked at once."""
+        found: dict[Parameters, list[Stretch]] = {one: [] for one in tried}
+        for radius_m in {one.radius_m for one in tried}:
+            alike = [one for one in found if one.radius_m == radius_m]
+            rings, counted = self._seen(alike)
+            for robot_id in self.grids:
+                for one, stretch in self._seen_by(robot_id, rings, counted, alike):
+                    found[one].append(stretch)
+                for one, stretch in self._peers_of(robot_id, alike):
+                    found[one].append(stretch)
+        return found
+
+    def _seen_by(
+        self,
+        robot_id: str,
+        rings: Rings,
+        counted: Mapping[_Thresholds, Flags],
+        tried: Collection[Parameters],
+    ) -> Iterator[tuple[Parameters, Stretch]]:
+        """Slow-downs for people and strange robots."""
+        crossings = self._crossings(robot_id, rings, tried)
+        for one in tried:
+            wanted = counted[one.threshold, one.robot_threshold]
+            for first, end, cause in crossings.of(one, wanted):
+                reason = "person" if cause in self._people else "robot"
+                yield one, Stretch(robot_id, f"s{cause}", reason, first, end)
+
+    def _peers_of(
+        self, robot_id: str, tried: Collection[Parameters]
+    ) -> Iterator[tuple[Parameters, Stretch]]:
         """Slow-downs for peers, which no threshold and no factor changes."""
-        if tried not in self._for_peers:
-            circles = {
-                peer: self._circle(peer, number)
-                for number, peer in enumerate(self.grids)
-            }
-            self._for_peers[tried] = [
-                Stretch(robot_id, peer, "robot", first, end)
-                for robot_id, grid in self.grids.items()
-                for peer, circle in circles.items()
-                if peer != robot_id
-                for first, end, _ in self._crossings(robot_id, grid, tried).of(circle)
-            ]
-        return self._for_peers[tried]
+        peers = list(self.grids)
+        circles = [
+            self._circle(number, self.grids[peer], self.grids[robot_id], widest(tried))
+            for number, peer in enumerate(peers)
+            if peer != robot_id
+        ]
+        if not circles:
+            return
+        crossings = self._crossings(robot_id, _together(circles), tried)
+        known: dict[Parameters, Sequence[tuple[int, int, int]]] = {}
+        for one in tried:
+            bare = replace(one, threshold=0, robot_threshold=0, factor=0)
+            if bare not in known:
+                known[bare] = crossings.of(bare)
+            for first, end, peer in known[bare]:
+                yield one, Stretch(robot_id, peers[peer], "robot", first, end)
 
-    def _crossings(self, robot_id: str, grid: Grid, tried: Parameters) -> Crossings:
-        return Crossings(grid, tried, self.inputs.braking[robot_id])
+    def _crossings(
+        self, robot_id: str, rings: Rings, tried: Collection[Parameters]
+    ) -> Crossings:
+        braking = self.inputs.braking[robot_id]
+        return Crossings(self.grids[robot_id], rings, tried, braking)
 
     def near(self, robot_id: str) -> Flags:
         """Whether somebody whom the rule of then saw within a second is within 2 m."""
@@ -86,52 +124,90 @@ class Range:
 
     def _find_near(self, grid: Grid) -> Flags:
         seen = self.inputs.sightings
-        counted = np.flatnonzero(seen.counted & seen.is_person)
-        rings = self._rings(seen, counted, np.ones(len(counted), np.bool_))
-        rings = rings.where(rings.age <= LIMITS.seen_s)
+        counted = seen.counted & seen.is_person
+        end = _ends(seen, counted, counted, LIMITS.seen_s)
+        rings, _ = self._rings(seen, end)
         apart = np.hypot(rings.x - grid.x[rings.step], rings.y - grid.y[rings.step])
         near = np.zeros(self.steps, np.bool_)
         near[rings.step[apart <= LIMITS.ring_default_m]] = True
         return near
 
-    def _rings(self, seen: Sightings, counted: Indices, sure: Flags) -> Rings:
-        """The circles of each chain at each step, for ten seconds.
+    def _seen(
+        self, tried: Collection[Parameters]
+    ) -> tuple[Rings, Mapping[_Thresholds, Flags]]:
+        """The circles that count by any of them; and which by which thresholds."""
+        seen = self.inputs.sightings
+        ends = {
+            pair: _ends_by(seen, *pair)
+            for pair in {(one.threshold, one.robot_threshold) for one in tried}
+        }
+        rings, of = self._rings(seen, np.max(list(ends.values()), axis=0))
+        return rings, {
+            pair: rings.step < self._step_from(end)[of] for pair, end in ends.items()
+        }
 
-        What counts by looks alone takes no ring from what counts by its box.
-        """
-        at, chain = seen.at[counted], seen.chain[counted]
-        end = at + LIMITS.ring_lasts_s
-        _end_with_next(at, chain, end, np.arange(len(at)))
-        boxes = np.flatnonzero(sure)
-        end[boxes] = at[boxes] + LIMITS.ring_lasts_s
-        _end_with_next(at, chain, end, boxes)
-        first, last = (self._step_from(one) for one in (at, end))
-        rows, step = _spread(first, last)
-        of = counted[rows]
+    def _rings(self, seen: Sightings, end: Floats) -> tuple[Rings, Indices]:
+        """The circles of each sighting until its end; and of which each is."""
+        rows, step = _spread(self._step_from(seen.at), self._step_from(end))
+        order = np.lexsort((step, seen.subject[rows]))
+        of, step = rows[order], step[order]
         age = self.since + STEP_S * step - seen.at[of]
         subject, x, y = seen.subject[of], seen.x[of], seen.y[of]
-        return Rings(step, subject, x, y, seen.vx[of], seen.vy[of], age)
+        return Rings(step, subject, x, y, seen.vx[of], seen.vy[of], age), of
 
     def _step_from(self, at: Floats) -> Indices:
         step = np.ceil((at - self.since) / STEP_S - 1e-9)
         return np.clip(step, 0, self.steps).astype(np.intp)
 
-    def _circle(self, peer: str, number: int) -> Rings:
-        """A peer's own circle at each step at which one gives way to it."""
-        grid = self.grids[peer]
-        rests = grid.stands & (grid.age <= LIMITS.silence_s)
-        step = np.flatnonzero(~rests & (grid.age <= LIMITS.ring_lasts_s))
-        goes = grid.linear * np.cos(grid.yaw), grid.linear * np.sin(grid.yaw)
-        columns = (grid.x, grid.y, *goes, grid.age)
+    def _circle(self, number: int, peer: Grid, robot: Grid, tried: Parameters) -> Rings:
+        """A peer's own circle at each step at which a robot may give way to it."""
+        rests = peer.stands & (peer.age <= LIMITS.silence_s)
+        reach = reach_m(tried, peer.age, robot.top + np.abs(peer.linear))
+        east, north = peer.x - robot.x, peer.y - robot.y
+        near = east * east + north * north <= reach * reach
+        step = np.flatnonzero(near & ~rests & (peer.age <= LIMITS.ring_lasts_s))
+        speed, yaw = peer.linear[step], peer.yaw[step]
         causes = np.full(len(step), number, np.intp)
-        return Rings(step, causes, *(one[step] for one in columns))
+        goes = speed * np.cos(yaw), speed * np.sin(yaw)
+        return Rings(step, causes, peer.x[step], peer.y[step], *goes, peer.age[step])
 
 
-def _end_with_next(at: Floats, chain: Indices, end: Floats, some: Indices) -> None:
+def _ends_by(seen: Sightings, threshold: float, robot_threshold: float) -> Floats:
+    """When the ring of each sighting ends by these thresholds (Unix s)."""
+    least = np.where(seen.is_person, threshold, robot_threshold)
+    return _ends(seen, seen.belief >= least, seen.probability >= least)
+
+
+def _ends(
+    seen: Sightings, counted: Flags, sure: Flags, lasts_s: float = LIMITS.ring_lasts_s
+) -> Floats:
+    """When the ring of each sighting ends (Unix s); -inf: it does not count.
+
+    What counts by looks alone takes no ring from what counts by its box.
+    """
+    end = np.where(counted, seen.at + lasts_s, -np.inf)
+    _end_with_next(seen, end, np.flatnonzero(counted))
+    boxes = np.flatnonzero(counted & sure)
+    end[boxes] = seen.at[boxes] + lasts_s
+    _end_with_next(seen, end, boxes)
+    return end
+
+
+def _end_with_next(seen: Sightings, end: Floats, some: Indices) -> None:
     """Let the ring of each of these end where the next of its chain begins."""
     this, following = some[:-1], some[1:]
-    same = chain[this] == chain[following]
-    end[this[same]] = np.minimum(end[this], at[following])[same]
+    same = seen.chain[this] == seen.chain[following]
+    end[this[same]] = np.minimum(end[this], seen.at[following])[same]
+
+
+def _together(rings: Sequence[Rings]) -> Rings:
+    """All of them, whose causes rise."""
+    return Rings(
+        *(
+            np.concatenate([getattr(one, field.name) for one in rings])
+            for field in fields(Rings)
+        )
+    )
 
 
 def _grid(poses: Poses, at: Floats) -> Grid:

@@ -1,7 +1,7 @@
 """What came of a judgement over a range: time slowed, encounters, near misses."""
 
 from collections import Counter, defaultdict
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import reduce
 from typing import Final
@@ -52,17 +52,26 @@ class Outcome:
         )
 
 
-def outcome_of(range_: Range, tried: Parameters, leads_s: float = 0.0) -> Outcome:
-    """What the parameters would have done, without the first ``leads_s`` seconds."""
-    lead, found = round(leads_s / STEP_S), list(range_.judge(tried))
+def outcomes_of(
+    range_: Range, tried: Sequence[Parameters], leads_s: float = 0.0
+) -> tuple[Outcome, ...]:
+    """What each would have done, without the first ``leads_s`` seconds."""
+    lead = round(leads_s / STEP_S)
+    each = {
+        one: _outcome(range_, one, found, lead)
+        for one, found in range_.judge_all(tried).items()
+    }
+    return tuple(each[one] for one in tried)
+
+
+def _outcome(
+    range_: Range, tried: Parameters, found: Iterable[Stretch], lead: int
+) -> Outcome:
+    of: dict[str, list[Stretch]] = defaultdict(list)
+    for one in found:
+        of[one.robot_id].append(one)
     each = (
-        _of_robot(
-            grid,
-            [one for one in found if one.robot_id == robot_id],
-            range_.near(robot_id),
-            tried,
-            lead,
-        )
+        _of_robot(grid, of[robot_id], range_.near(robot_id), tried, lead)
         for robot_id, grid in range_.grids.items()
     )
     return reduce(lambda one, other: one + other, each, Outcome())
@@ -111,17 +120,14 @@ Decided = tuple[str, str, float, float | None]
 """Of a decision: robot, reason, begin and end (Unix s; None: it goes on)."""
 
 
-def recorded(
-    decided: Iterable[Decided], robots: Collection[str], since: float, until: float
-) -> Outcome:
+def recorded(decided: Iterable[Decided], since: float, until: float) -> Outcome:
     """What was decided in a range; near misses and lost time are not known of it."""
     spans: dict[tuple[str, str], list[tuple[float, float]]] = defaultdict(list)
     met = Counter[str]()
     for robot_id, reason, began, ended in decided:
-        if robot_id in robots:
-            end = until if ended is None else min(ended, until)
-            spans[reason, robot_id].append((max(began, since), end))
-            met[reason] += since <= began < until
+        end = until if ended is None else min(ended, until)
+        spans[reason, robot_id].append((max(began, since), end))
+        met[reason] += since <= began < until
     slowed: defaultdict[str, float] = defaultdict(float)
     for (reason, _), found in spans.items():
         slowed[reason] += length(found)

@@ -17,7 +17,7 @@ from iveg.domain.what_if.questions import Job, Question
 from tests.builders import START, fleet_of
 from tests.fakes.clock import FakeClock
 from tests.fakes.ids import FakeIds
-from tests.unit.domain.test_what_if import Aisle, decided, lasting
+from tests.unit.domain.test_what_if import Aisle, decided, lasting, ran
 
 WALL = START.wall
 RULE = Parameters()
@@ -65,9 +65,7 @@ async def until(condition: Callable[[], bool]) -> None:
 
 @pytest.fixture(scope="module")
 def aisle() -> Aisle:
-    found = Aisle(2)
-    found.run(165.0)
-    return found
+    return ran(2)
 
 
 @pytest.fixture

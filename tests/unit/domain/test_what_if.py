@@ -2,9 +2,11 @@
 
 import math
 import random
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
+from functools import cache
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
@@ -21,9 +23,15 @@ from iveg.domain.what_if.inputs import (
     sightings_of,
 )
 from iveg.domain.what_if.judging import Range
-from iveg.domain.what_if.outcome import Outcome, outcome_of
+from iveg.domain.what_if.outcome import Outcome, outcomes_of
 from tests.builders import START, detection, odometry
 from tests.unit.pipeline.desk import Desk
+
+
+def outcome_of(judged: Range, tried: Parameters, leads_s: float = 0.0) -> Outcome:
+    (found,) = outcomes_of(judged, [tried], leads_s)
+    return found
+
 
 BRAKING = {"AGI": 1.0, "AGII": 1.0}
 BEGINS_S, ENDS_S = 0.3, 0.45
@@ -32,10 +40,10 @@ BEGINS_S, ENDS_S = 0.3, 0.45
 
 def inputs_of(desk: Desk) -> Inputs:
     """What the history has of a run."""
-    poses: list[PoseRow] = [
-        (one.robot_id, one.at, one.x, one.y, one.yaw, one.linear, one.angular)
-        for one in desk.records(OdometryRecord)
-    ]
+    poses: dict[str, list[PoseRow]] = defaultdict(list)
+    for said in desk.records(OdometryRecord):
+        row = said.at, said.x, said.y, said.yaw, said.linear, said.angular
+        poses[said.robot_id].append(row)
     seen: list[SeenRow] = [
         (
             one.robot_id,
@@ -45,12 +53,12 @@ def inputs_of(desk: Desk) -> Inputs:
             one.probability,
             one.class_ or "",
             one.person_id,
-            one.confident,
         )
         for one in desk.records(DetectionRecord)
     ]
     braking = {name: robot.profile.braking for name, robot in desk.world.robots.items()}
-    return Inputs(poses_of(poses), sightings_of(seen), braking)
+    told = {name: poses_of(rows) for name, rows in poses.items()}
+    return Inputs(told, sightings_of(seen), braking)
 
 
 def decided(desk: Desk) -> list[tuple[str, str, float, float]]:
@@ -112,6 +120,14 @@ class Aisle:
         self.desk.hear(odometry(robot_id, x, 0.0, yaw, linear=speed, origin=origin))
 
 
+@cache
+def ran(seed: int) -> Aisle:
+    """What happened in an aisle in 165 s."""
+    aisle = Aisle(seed)
+    aisle.run(165.0)
+    return aisle
+
+
 def would(judged: Range, tried: Parameters) -> list[tuple[str, str, float, float]]:
     """The same as ``decided``, of a judgement by what was kept."""
     return sorted(
@@ -129,8 +145,7 @@ def lasting(
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_with_the_parameters_in_force_it_is_what_was_decided(seed: int) -> None:
-    aisle = Aisle(seed)
-    aisle.run(165.0)
+    aisle = ran(seed)
     judged = Range(inputs_of(aisle.desk), START.wall, START.wall + 165.0)
 
     was, now = lasting(decided(aisle.desk)), lasting(would(judged, Parameters()))
@@ -153,10 +168,21 @@ def test_of_many_faint_looks_the_time_is_right_to_a_tenth() -> None:
     assert now == pytest.approx(was, rel=0.1)
 
 
+def test_many_at_once_are_each_alone() -> None:
+    judged = Range(inputs_of(ran(3).desk), START.wall, START.wall + 165.0)
+    tried = [
+        Parameters(*one)
+        for one in product((0.8, 0.85, 0.95), (0.8,), (1.0, 2.5), (0.3, 1.0))
+    ] + [Parameters(foresight_s=one) for one in (0.0, 1.0, 3.0)]
+
+    together = judged.judge_all(tried)
+
+    assert len({tuple(found) for found in together.values()}) > 5
+    assert [together[one] for one in tried] == [judged.judge(one) for one in tried]
+
+
 def test_a_range_in_parts_is_the_whole_range() -> None:
-    aisle = Aisle(2)
-    aisle.run(160.0)
-    inputs = inputs_of(aisle.desk)
+    inputs = inputs_of(ran(2).desk)
     whole = outcome_of(Range(inputs, START.wall, START.wall + 160.0), Parameters())
     parts = [
         outcome_of(Range(inputs, START.wall + since - lead, until), Parameters(), lead)
@@ -182,17 +208,19 @@ _PEOPLE = st.lists(
 
 def scene(people: Sequence[tuple[float, float]], speed: float) -> Range:
     """AGI drives along an aisle in which people stand; AGII comes towards it."""
-    moments = np.arange(0.0, 20.0, 0.5)
-    poses: list[PoseRow] = []
-    for at in moments.tolist():
-        poses.append(("AGI", at, speed * at, 0.0, 0.0, speed, 0.01))
-        poses.append(("AGII", at, 9.0 - speed * at, 3.0, math.pi, speed, 0.0))
+    moments = np.arange(0.0, 20.0, 0.5).tolist()
+    poses = {
+        "AGI": poses_of([(at, speed * at, 0.0, 0.0, speed, 0.01) for at in moments]),
+        "AGII": poses_of(
+            [(at, 9.0 - speed * at, 3.0, math.pi, speed, 0.0) for at in moments]
+        ),
+    }
     seen: list[SeenRow] = [
-        ("AGII", at, x, 1.0, sure, "person", None, False)
-        for at in moments.tolist()
+        ("AGII", at, x, 1.0, sure, "person", None)
+        for at in moments
         for x, sure in people
     ]
-    return Range(Inputs(poses_of(poses), sightings_of(seen), BRAKING), 0.0, 20.0)
+    return Range(Inputs(poses, sightings_of(seen), BRAKING), 0.0, 20.0)
 
 
 def slow_steps(judged: Range, tried: Parameters) -> set[tuple[str, int]]:
@@ -248,9 +276,9 @@ def test_more_hysteresis_and_a_farther_horizon_never_slow_less(
 
 def test_slowed_time_lost_time_and_near_misses_are_counted() -> None:
     moments = np.arange(0.0, 20.0, 0.5).tolist()
-    poses = poses_of([("AGI", at, at, 0.0, 0.0, 1.0, 0.0) for at in moments])
+    poses = {"AGI": poses_of([(at, at, 0.0, 0.0, 1.0, 0.0) for at in moments])}
     seen = sightings_of(
-        [("AGI", at, 10.0, 0.0, 0.85, "person", "P1", True) for at in moments]
+        [("AGI", at, 10.0, 0.0, 0.85, "person", "P1") for at in moments]
     )
     judged = Range(Inputs(poses, seen, BRAKING), 0.0, 20.0)
 
@@ -266,7 +294,7 @@ def test_slowed_time_lost_time_and_near_misses_are_counted() -> None:
 
 
 def test_of_nothing_comes_nothing() -> None:
-    nothing = Range(Inputs(poses_of([]), sightings_of([]), {}), 0.0, 60.0)
+    nothing = Range(Inputs({}, sightings_of([]), {}), 0.0, 60.0)
 
     assert list(nothing.judge(Parameters())) == []
     assert outcome_of(nothing, Parameters()) == Outcome()
