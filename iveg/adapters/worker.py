@@ -72,6 +72,13 @@ class Worker:
         finally:
             self._waiting -= 1
 
+    def interrupt(self) -> None:
+        """End the process, whatever it does; the next question has another."""
+        # Whoever waits for it sees its line closed.
+        process = self._process
+        if process is not None:
+            process.kill()
+
     def close(self) -> None:
         """End the process, whatever it does."""
         self._thread.shutdown(wait=False, cancel_futures=True)

@@ -1,11 +1,13 @@
 """Questions "what if the rule were another": asked over HTTP, answered in a process.
 
 One question of each person at a time, few in line, each hour of a range a piece of work
-of its own: so its progress is known, and it can be ended between two pieces.
+of its own: so first curves come early, and long ranges use two processes.
 """
 
 import asyncio
-from collections.abc import Mapping
+import os
+from collections import deque
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 from iveg.adapters.history.queries import Queries
@@ -22,6 +24,7 @@ from iveg.pipeline.ports import Clock, Ids
 MOST_WAITING: Final = 8
 _KEPT: Final = 32
 _PART_S: Final = 3600.0
+_PROCESSES: Final = min(2, os.cpu_count() or 1)
 _LEAD_S: Final = 120.0
 """So long before a part begins who was seen and slowed then still counts."""
 
@@ -65,7 +68,7 @@ class WhatIfs:
     Args:
         url: The history's database.
         fleet: Its live robots are judged.
-        worker: The process; tests pass another.
+        workers: Processes, all of low priority; more than one work at a long range.
     """
 
     def __init__(
@@ -74,7 +77,7 @@ class WhatIfs:
         fleet: FleetDescription,
         new_id: Ids,
         clock: Clock,
-        worker: Worker | None = None,
+        workers: Sequence[Worker] | None = None,
     ) -> None:
         self._url = url
         self._braking = {
@@ -83,7 +86,7 @@ class WhatIfs:
             if one.kind == "live"
         }
         self._new_id, self._clock = new_id, clock
-        self._worker = worker or Worker()
+        self._workers = workers or [Worker() for _ in range(_PROCESSES)]
         self._jobs: dict[str, Job] = {}
         self._is_asked = asyncio.Event()
 
@@ -129,8 +132,10 @@ class WhatIfs:
         job = self.find(job_id)
         if by not in (None, job.by):
             raise UnknownNameError("question", job_id)
+        if job.state == "running":
+            self._end_processes()
         if not job.is_over:
-            job.state = "cancelled"
+            job.state, job.answer = "cancelled", None
         return job
 
     async def run(self) -> None:
@@ -142,8 +147,13 @@ class WhatIfs:
                 await self._work_off(job)
 
     def close(self) -> None:
-        """End the process."""
-        self._worker.close()
+        """End the processes."""
+        for worker in self._workers:
+            worker.close()
+
+    def _end_processes(self) -> None:
+        for worker in self._workers:
+            worker.interrupt()
 
     def _next(self) -> Job | None:
         waiting = (one for one in self._jobs.values() if one.state == "waiting")
@@ -151,31 +161,46 @@ class WhatIfs:
 
     async def _work_off(self, job: Job) -> None:
         job.state = "running"
+        parts = _parts(job.asked.since, job.asked.until)
+        share, left = 1.0 / len(parts), deque(parts)
+        workers = self._workers[: len(parts)]
+        lines = [
+            asyncio.create_task(self._judge(job, worker, left, share))
+            for worker in workers
+        ]
         try:
-            answer = await self._answer(job)
+            await asyncio.gather(*lines)
         except HopError as error:
-            job.state, job.why = "failed", error.hop
+            if not job.is_over:
+                job.state, job.why, job.answer = "failed", error.hop, None
+                self._end_processes()
+        finally:
+            for line in lines:
+                line.cancel()
+            await asyncio.gather(*lines, return_exceptions=True)
+        if job.is_over:
             return
-        if job.is_over or answer is None:
+        job.progress = 1.0
+        if job.answer is None or not job.answer.poses:
+            job.state, job.why, job.answer = "failed", "no_data", None
             return
-        if not answer.poses:
-            job.state, job.why = "failed", "no_data"
-            return
-        job.state, job.answer = "done", answer
+        job.state = "done"
+        # One process stays for the next question, the memory of others is let go.
+        for spare in workers[1:]:
+            spare.interrupt()
 
-    async def _answer(self, job: Job) -> Answer | None:
-        """Of the whole range; None: it was cancelled."""
-        asked, total = job.asked, None
-        parts = _parts(asked.since, asked.until)
-        for number, (since, until) in enumerate(parts, 1):
-            part = await self._worker.run(
-                judge_part, self._url, self._braking, since, until, asked.tried
+    async def _judge(
+        self, job: Job, worker: Worker, left: deque[tuple[float, float]], share: float
+    ) -> None:
+        """Judge one piece after the other until none is left.  Raises HopError."""
+        while left and not job.is_over:
+            piece = await worker.run(
+                judge_part, self._url, self._braking, *left.popleft(), job.asked.tried
             )
             if job.is_over:
-                return None
-            total = part if total is None else total + part
-            job.progress = number / len(parts)
-        return total
+                return
+            job.answer = piece if job.answer is None else job.answer + piece
+            job.progress += share
 
 
 def _parts(since: float, until: float) -> list[tuple[float, float]]:

@@ -90,6 +90,7 @@ class Job:
     Attributes:
         progress: Share of the range that is judged (0 to 1).
         why: Of a failure: ``no_data``, or the neighbour that did not answer.
+        answer: Of what is judged by now.
     """
 
     job_id: str

@@ -2,7 +2,9 @@
 
 import asyncio
 import os
+import time
 from collections.abc import AsyncIterator
+from pathlib import Path
 
 import pytest
 
@@ -24,6 +26,11 @@ def fail() -> None:
     raise HopError("database", "locked")
 
 
+def fall_asleep(sign: Path) -> None:
+    sign.touch()
+    time.sleep(3600.0)
+
+
 def stumble() -> object:
     return lambda: None  # No other process can be sent this.
 
@@ -38,6 +45,21 @@ async def worker(failures: list[Exception]) -> AsyncIterator[Worker]:
     worker = Worker(failures.append)
     yield worker
     worker.close()
+
+
+async def test_what_a_worker_does_can_be_ended_at_once(
+    worker: Worker, tmp_path: Path
+) -> None:
+    first = await worker.run(process_id)
+    asleep = asyncio.create_task(worker.run(fall_asleep, tmp_path / "asleep"))
+    await asyncio.sleep(0)
+    until((tmp_path / "asleep").exists, 10.0, "it is asleep")
+
+    worker.interrupt()
+
+    with pytest.raises(HopError, match="ended"):
+        await asleep
+    assert await worker.run(process_id) != first
 
 
 async def test_a_worker_that_died_is_made_anew_and_ends_with_the_server(

@@ -30,6 +30,7 @@ class InPlace(Worker):
     def __init__(self, happens: Callable[[int], None] = lambda _: None) -> None:
         super().__init__()
         self.asked: list[tuple[float, float]] = []
+        self.interrupted = 0
         self._happens = happens
 
     async def run(self, work: Any, *args: Any, **kwargs: Any) -> Any:
@@ -37,6 +38,9 @@ class InPlace(Worker):
         self._happens(len(self.asked))
         await asyncio.sleep(0)
         return await asyncio.to_thread(work, *args, **kwargs)
+
+    def interrupt(self) -> None:
+        self.interrupted += 1
 
 
 def question(since: float = WALL, until: float = WALL + 165.0) -> Question:
@@ -46,7 +50,7 @@ def question(since: float = WALL, until: float = WALL + 165.0) -> Question:
 
 def asking(url: str, worker: Worker) -> WhatIfs:
     fleet = fleet_of("AGI", "AGII")
-    return WhatIfs(url, fleet, FakeIds(), FakeClock(), worker)
+    return WhatIfs(url, fleet, FakeIds(), FakeClock(), [worker])
 
 
 async def answered(what_ifs: WhatIfs, job: Job) -> Job:
@@ -125,8 +129,36 @@ async def test_a_long_range_goes_hour_by_hour_and_can_be_ended(url: str) -> None
         (WALL - 5400.0, WALL - 1800.0),
     ]
     assert (job.state, job.answer) == ("cancelled", None)
+    assert worker.interrupted == 1
     assert job.progress == pytest.approx(1 / 3)
     assert what_ifs.cancel(job.job_id, "ana").state == "cancelled"
+
+
+async def test_two_processes_share_a_long_range_whose_first_curve_comes_early(
+    url: str,
+) -> None:
+    early: list[tuple[str, float, bool]] = []
+
+    def happens(piece: int) -> None:
+        if piece == 2:
+            early.append((job.state, round(job.progress, 2), job.answer is not None))
+
+    first, second = InPlace(happens), InPlace()
+    fleet = fleet_of("AGI", "AGII")
+    what_ifs = WhatIfs(url, fleet, FakeIds(), FakeClock(), [first, second])
+    job = what_ifs.ask(question(WALL - 15_000.0, WALL + 600.0), "ana")
+    await answered(what_ifs, job)
+    alone = asking(url, InPlace())
+    same = await answered(alone, alone.ask(job.asked, "ana"))
+
+    assert first.asked
+    assert second.asked
+    assert len({*first.asked, *second.asked}) == 5
+    assert early[0][0] == "running"
+    assert early[0][2]
+    assert job.answer == same.answer
+    # The memory of the second is let go.
+    assert (first.interrupted, second.interrupted) == (0, 1)
 
 
 async def test_each_person_asks_one_at_a_time_and_the_line_is_short() -> None:

@@ -72,12 +72,16 @@ export function start({ store, i18n }) {
       const { status, body } = await readApi(`what-if/${asked.id}`);
       if (status === 200) asked = body;
       else if (status === 404) asked = null;
-    }
-    if (asked?.state === "done") {
-      const { status, body } = await readApi(`what-if/${asked.id}/figures`);
-      figures = status === 200 ? body : null;
+      // The first hours have a curve already, which grows.
+      if (asked?.answer) await readFigures(asked.id);
     }
     draw();
+  }
+
+  /** @param {string} id */
+  async function readFigures(id) {
+    const { status, body } = await readApi(`what-if/${id}/figures`);
+    if (status === 200) figures = body;
   }
 
   async function cancel() {
