@@ -1,5 +1,6 @@
 import { Store } from "../../iveg/static/js/core/store.js";
 import { createRuleForm } from "../../iveg/static/js/pages/rule.js";
+import { questionOf } from "../../iveg/static/js/pages/yesterday.js";
 import { make } from "../../iveg/static/js/panels/dom.js";
 import { equal, test } from "./harness.js";
 
@@ -8,6 +9,8 @@ const RULE = {
   version: 1,
   confidence_threshold: 0.855,
   radius_m: 2,
+  foresight: true,
+  foresight_s: 3,
 };
 const i18n = /** @type {import("../../iveg/static/js/core/i18n.js").I18n} */ (
   /** @type {unknown} */ ({
@@ -19,7 +22,7 @@ const i18n = /** @type {import("../../iveg/static/js/core/i18n.js").I18n} */ (
 /** A form that shows `RULE`, and what it has sent. */
 function makeForm() {
   const form = make("form");
-  const fields = ["threshold", "radius"].map((name) => {
+  const fields = ["threshold", "radius", "foresight"].map((name) => {
     const field = make("input");
     field.type = "number";
     field.step = "any";
@@ -33,7 +36,9 @@ function makeForm() {
   });
   form.id = "rule-form";
   form.append(...fields);
-  document.body.replaceChildren(form, ...lines);
+  const preview = make("button");
+  preview.id = "rule-preview";
+  document.body.replaceChildren(form, preview, ...lines);
   const store = new Store({ schedule: (flush) => flush() });
   store.apply("rule", { ...RULE });
   /** @type {object[]} */
@@ -43,8 +48,8 @@ function makeForm() {
     return null;
   };
   createRuleForm(store, i18n, { put });
-  const [threshold, radius] = fields;
-  return { form, threshold, radius, sent };
+  const [threshold, radius, horizon] = fields;
+  return { form, threshold, radius, horizon, sent };
 }
 
 test("a press on a rule that nobody edited changes nothing and says so", () => {
@@ -60,4 +65,26 @@ test("only what was edited is sent: the threshold in force is finer than shown",
   radius.value = "2.5";
   form.requestSubmit();
   equal(sent, [{ radius_m: 2.5, version: 1 }]);
+});
+
+test("how far the rule looks ahead is changed here, too", () => {
+  const { form, horizon, sent } = makeForm();
+  horizon.value = "1.5";
+  form.requestSubmit();
+  equal(sent, [{ foresight_s: 1.5, version: 1 }]);
+});
+
+test("yesterday is asked about with what was typed, midnight to midnight in Madrid", () => {
+  // The day after summer time ended: yesterday had 25 hours.
+  const now = Date.parse("2026-10-26T09:00:00Z");
+  const rule = /** @type {any} */ ({ ...RULE, class_thresholds: { person: 0.7 } });
+  equal(questionOf(rule, { foresight_s: 1.5 }, now), {
+    since: "2026-10-24T22:00:00.000Z",
+    until: "2026-10-25T23:00:00.000Z",
+    confidence_threshold: 0.7,
+    radius_m: 2,
+    foresight_s: 1.5,
+    vary: "foresight_s",
+  });
+  equal(questionOf(rule, { foresight: false }, now).foresight_s, 0);
 });

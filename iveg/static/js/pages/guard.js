@@ -6,6 +6,7 @@
 import { readApi, sendApi } from "../core/api.js";
 import { need, setHidden, setText } from "../panels/dom.js";
 import { foreseen, loweringsOf, personShare, sightingsLost } from "./lowering.js";
+import { askYesterday } from "./yesterday.js";
 
 /** @typedef {import("../core/protocol.js").Rule} Rule */
 /** @typedef {import("./lowering.js").Change} Change */
@@ -37,6 +38,11 @@ export function createGuard(store, i18n) {
       before.foresight && change.foresight === false ? encountersSaid() : "",
     ]);
     setText(need("#guard-says"), [...told, ...counts].filter(Boolean).join(" "));
+    setText(need("#guard-yesterday"), "");
+    // It takes seconds: whoever is sure need not wait.
+    askYesterday(before, change, ({ key, slots }) =>
+      setText(need("#guard-yesterday"), i18n.t(key, slots)),
+    );
     setHidden(box, false);
     need("#guard-no").focus();
     return new Promise((resolve) => {

@@ -5,6 +5,7 @@
 import { need, setHidden, setText } from "../panels/dom.js";
 import { tellAnswer } from "./guard.js";
 import { dayAndTime } from "./history/local_time.js";
+import { askYesterday } from "./yesterday.js";
 
 /** @typedef {import("../core/protocol.js").Rule} Rule */
 
@@ -17,9 +18,10 @@ const WRITERS = new Set(["operator", "admin"]);
  */
 export function createRuleForm(store, i18n, guard) {
   const form = /** @type {HTMLFormElement} */ (need("#rule-form"));
-  const [threshold, radius] = /** @type {HTMLInputElement[]} */ (
-    ["threshold", "radius"].map((name) => need(`#rule-new-${name}`))
+  const [threshold, radius, horizon] = /** @type {HTMLInputElement[]} */ (
+    ["threshold", "radius", "foresight"].map((name) => need(`#rule-new-${name}`))
   );
+  const preview = /** @type {HTMLButtonElement} */ (need("#rule-preview"));
   /** @type {Rule | null} the version that the person at the form has seen */
   let seen = null;
   /** @type {string | null} null while nobody knows */
@@ -37,7 +39,9 @@ export function createRuleForm(store, i18n, guard) {
   /** Whether the form holds a version as it is. @param {Rule} rule */
   function shows(rule) {
     return (
-      threshold.value === percentOf(rule) && radius.value === String(rule.radius_m)
+      threshold.value === percentOf(rule) &&
+      radius.value === String(rule.radius_m) &&
+      horizon.value === String(rule.foresight_s)
     );
   }
 
@@ -46,6 +50,8 @@ export function createRuleForm(store, i18n, guard) {
     seen = rule;
     threshold.value = percentOf(rule);
     radius.value = String(rule.radius_m);
+    horizon.value = String(rule.foresight_s);
+    horizon.disabled = rule.foresight !== true;
   }
 
   /** @param {string} key @param {Record<string, string | number>} [slots] */
@@ -58,7 +64,7 @@ export function createRuleForm(store, i18n, guard) {
     const may = WRITERS.has(document.body.dataset.role ?? "");
     const who = may ? "editable" : "role";
     note = verbs.has("put") ? who : "readonly";
-    setHidden(form, !verbs.has("put") || !may);
+    for (const part of [form, preview]) setHidden(part, !verbs.has("put") || !may);
     draw();
   }
 
@@ -70,6 +76,9 @@ export function createRuleForm(store, i18n, guard) {
         confidence_threshold: threshold.valueAsNumber / 100,
       }),
       ...(radius.value !== String(rule.radius_m) && { radius_m: radius.valueAsNumber }),
+      ...(horizon.value !== String(rule.foresight_s) && {
+        foresight_s: horizon.valueAsNumber,
+      }),
     };
   }
 
@@ -79,6 +88,14 @@ export function createRuleForm(store, i18n, guard) {
     // The server detects an outdated version by its number.
     const answer = await guard.put({ ...typed(seen), version: seen.version });
     tellAnswer(answer, { fill, renew, say });
+  }
+
+  /** Says what the values of the form would have cost yesterday; changes nothing. */
+  async function look() {
+    if (!seen || !form.reportValidity()) return;
+    preview.disabled = true;
+    await askYesterday(seen, typed(seen), ({ key, slots }) => say(key, slots));
+    preview.disabled = false;
   }
 
   function renew() {
@@ -100,6 +117,7 @@ export function createRuleForm(store, i18n, guard) {
     event.preventDefault();
     save();
   });
+  preview.addEventListener("click", look);
   store.subscribe("rule", take);
   i18n.onChange(draw);
   take(store.get("rule"));
