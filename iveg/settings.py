@@ -370,6 +370,12 @@ class Settings:
         'File of docs/safety.md, "Calibration", or `paper`; '
         "empty: confidences count as told.",
     )
+    truth: str = setting(
+        "IVEG_TRUTH",
+        "",
+        "File that `iveg emulator --truth` writes: questions about another rule then "
+        "count who was missed and who slowed for nobody; empty: nobody knows.",
+    )
 
     @classmethod
     def from_environment(cls, environment: Mapping[str, str]) -> "Settings":

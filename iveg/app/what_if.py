@@ -8,17 +8,25 @@ import asyncio
 import os
 from collections import deque
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Final
 
 from iveg.adapters.history.queries import Queries
+from iveg.adapters.truth_files import read_nearest
 from iveg.adapters.worker import Worker
-from iveg.domain.errors import HopError, UnknownNameError, WhatIfRefusedError
+from iveg.domain.errors import (
+    DataFileError,
+    HopError,
+    UnknownNameError,
+    WhatIfRefusedError,
+)
 from iveg.domain.fleet import FleetDescription
 from iveg.domain.what_if.crossings import Parameters
 from iveg.domain.what_if.inputs import Inputs, sightings_of
 from iveg.domain.what_if.judging import Range
 from iveg.domain.what_if.outcome import outcomes_of, recorded
 from iveg.domain.what_if.questions import Answer, Job, Question
+from iveg.domain.what_if.truth import Nearest
 from iveg.pipeline.ports import Clock, Ids
 
 MOST_WAITING: Final = 8
@@ -35,9 +43,14 @@ def judge_part(
     since: float,
     until: float,
     tried: tuple[Parameters, ...],
+    truth: Path | None = None,
 ) -> Answer:
-    """One piece of a range; in the process."""
-    return asyncio.run(_judge_part(url, braking, since, until, tried))
+    """One piece of a range; in the process.
+
+    Raises:
+        HopError: the database does not answer, or the file of the truth.
+    """
+    return asyncio.run(_judge_part(url, braking, since, until, tried, truth))
 
 
 async def _judge_part(
@@ -46,6 +59,7 @@ async def _judge_part(
     since: float,
     until: float,
     tried: tuple[Parameters, ...],
+    truth: Path | None,
 ) -> Answer:
     queries = Queries(url)
     try:
@@ -53,7 +67,8 @@ async def _judge_part(
     finally:
         queries.close()
     inputs = Inputs(found.poses, sightings_of(found.seen), braking)
-    range_ = Range(inputs, since - _LEAD_S, until)
+    nearest = {} if truth is None else _truth(truth, since, until)
+    range_ = Range(inputs, since - _LEAD_S, until, nearest)
     return Answer(
         outcomes_of(range_, tried, _LEAD_S),
         recorded(found.decided, since, until),
@@ -62,12 +77,20 @@ async def _judge_part(
     )
 
 
+def _truth(file: Path, since: float, until: float) -> Mapping[str, Nearest]:
+    try:
+        return read_nearest(file, since, until)
+    except DataFileError as error:
+        raise HopError("truth", str(error)) from error
+
+
 class WhatIfs:
     """Takes questions and works them off, one after the other.
 
     Args:
         url: The history's database.
         fleet: Its live robots are judged.
+        truth: File of ``iveg emulator --truth``; None: nobody knows.
         workers: Processes, all of low priority; more than one work at a long range.
     """
 
@@ -77,9 +100,10 @@ class WhatIfs:
         fleet: FleetDescription,
         new_id: Ids,
         clock: Clock,
+        truth: Path | None = None,
         workers: Sequence[Worker] | None = None,
     ) -> None:
-        self._url = url
+        self._url, self._truth = url, truth
         self._braking = {
             name: one.profile.braking
             for name, one in fleet.members.items()
@@ -195,7 +219,12 @@ class WhatIfs:
         """Judge one piece after the other until none is left.  Raises HopError."""
         while left and not job.is_over:
             piece = await worker.run(
-                judge_part, self._url, self._braking, *left.popleft(), job.asked.tried
+                judge_part,
+                self._url,
+                self._braking,
+                *left.popleft(),
+                job.asked.tried,
+                self._truth,
             )
             if job.is_over:
                 return

@@ -7,7 +7,7 @@ from pydantic import Field
 from iveg.domain.stamps import format_stamp
 from iveg.domain.what_if import crossings, outcome
 from iveg.domain.what_if.questions import Job
-from iveg.models.base import Model
+from iveg.models.base import Model, rounded
 
 
 class TriedParameters(Model):
@@ -45,6 +45,12 @@ class TriedOutcome(Model):
     near_misses: int
     near_s: float = Field(description="Unslowed near somebody (s).")
     lost_s: float = Field(description="Driving that was not driven (s).")
+    missed_s: float | None = Field(
+        description="Unslowed with somebody really within 2 m (s); null: not known."
+    )
+    false_s: float | None = Field(
+        description="Slowed for a person with nobody really within 2.3 m (s)."
+    )
 
     @classmethod
     def of(cls, found: outcome.Outcome) -> "TriedOutcome":
@@ -55,6 +61,8 @@ class TriedOutcome(Model):
             near_misses=found.near_misses,
             near_s=round(found.near_s, 1),
             lost_s=round(found.lost_s, 1),
+            missed_s=rounded(found.missed_s, 1),
+            false_s=rounded(found.false_s, 1),
         )
 
 

@@ -215,6 +215,7 @@ GOOD = {
     "IVEG_GREENHOUSE": "none",
     "IVEG_EQUIPMENT": "demo",
     "IVEG_CALIBRATION": "paper",
+    "IVEG_TRUTH": "truth.ndjson",
     "IVEG_FLEET": "/etc/iveg/fleet.toml",
 }
 

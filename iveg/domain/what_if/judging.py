@@ -6,6 +6,7 @@ ahead; ``tests/unit/domain/test_what_if`` compares both.
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from iveg.domain.what_if.crossings import (
     widest,
 )
 from iveg.domain.what_if.inputs import Flags, Floats, Indices, Inputs, Poses, Sightings
+from iveg.domain.what_if.truth import Nearest
 
 _Thresholds = tuple[float, float]
 """Of people and of strange robots."""
@@ -43,13 +45,24 @@ class Range:
         inputs: Those of some seconds before, too: who was seen then has a ring yet.
         since: First step (Unix s).
         until: End (Unix s).
+        truth: Of robots of which it is known.
+
+    Attributes:
+        away: How near somebody really was at each step (m); nan: not known.
     """
 
-    def __init__(self, inputs: Inputs, since: float, until: float) -> None:
+    def __init__(
+        self,
+        inputs: Inputs,
+        since: float,
+        until: float,
+        truth: Mapping[str, Nearest] = MappingProxyType({}),
+    ) -> None:
         self.inputs, self.since = inputs, since
         self.steps = max(0, round((until - since) / STEP_S))
         at: Floats = since + STEP_S * np.arange(self.steps, dtype=np.float64)
         self.grids = {name: _grid(one, at) for name, one in inputs.poses.items()}
+        self.away = {name: one.on(at) for name, one in truth.items()}
         self._people = set(
             inputs.sightings.subject[inputs.sightings.is_person].tolist()
         )

@@ -11,8 +11,9 @@ import numpy as np
 from iveg.domain.day import length
 from iveg.domain.limits import LIMITS
 from iveg.domain.what_if.crossings import STEP_S, Grid, Parameters
-from iveg.domain.what_if.inputs import Flags
+from iveg.domain.what_if.inputs import Flags, Floats
 from iveg.domain.what_if.judging import Range, Stretch
+from iveg.domain.what_if.truth import false_alarms, missed
 
 _REASONS: Final = "person", "robot"
 """The gravest first: of two causes at once that counts."""
@@ -30,6 +31,8 @@ class Outcome:
         near_misses: How often a robot drove unslowed within two metres of where
             somebody had been seen within a second; ``near_s`` for how long (s).
         lost_s: What slowing cost: seconds of driving that were not driven.
+        missed_s: Unslowed while somebody really was near (s); None: truth is not known.
+        false_s: Slowed for a person while nobody really was (s).
     """
 
     slowed_s: Mapping[str, float] = field(default_factory=dict)
@@ -37,6 +40,8 @@ class Outcome:
     near_misses: int = 0
     near_s: float = 0.0
     lost_s: float = 0.0
+    missed_s: float | None = None
+    false_s: float | None = None
 
     def __add__(self, other: "Outcome") -> "Outcome":
         """Of both ranges together."""
@@ -49,7 +54,13 @@ class Outcome:
             self.near_misses + other.near_misses,
             self.near_s + other.near_s,
             self.lost_s + other.lost_s,
+            _both(self.missed_s, other.missed_s),
+            _both(self.false_s, other.false_s),
         )
+
+
+def _both(one: float | None, other: float | None) -> float | None:
+    return other if one is None else one + (other or 0.0)
 
 
 def outcomes_of(
@@ -71,7 +82,14 @@ def _outcome(
     for one in found:
         of[one.robot_id].append(one)
     each = (
-        _of_robot(grid, of[robot_id], range_.near(robot_id), tried, lead)
+        _of_robot(
+            grid,
+            of[robot_id],
+            range_.near(robot_id),
+            range_.away.get(robot_id),
+            tried,
+            lead,
+        )
         for robot_id, grid in range_.grids.items()
     )
     return reduce(lambda one, other: one + other, each, Outcome())
@@ -81,6 +99,7 @@ def _of_robot(
     grid: Grid,
     stretches: Iterable[Stretch],
     near: Flags,
+    away: Floats | None,
     tried: Parameters,
     lead: int,
 ) -> Outcome:
@@ -95,12 +114,20 @@ def _of_robot(
     slowed["robot"] &= ~slowed["person"]
     drives = heard & (np.abs(grid.linear) >= LIMITS.standing_speed)
     unslowed = drives & near & ~any_of
+    truth: tuple[float | None, float | None] = (None, None)
+    if away is not None and not np.isnan(away[lead:]).all():
+        judged = (
+            missed(away, drives, any_of),
+            false_alarms(away, drives, slowed["person"]),
+        )
+        truth = _seconds(judged[0]), _seconds(judged[1])
     return Outcome(
         {why: _seconds(mask & heard) for why, mask in slowed.items()},
         {why: count for why, count in met.items() if count},
         _runs(unslowed),
         _seconds(unslowed),
         (1.0 - tried.factor) * _seconds(drives & any_of),
+        *truth,
     )
 
 

@@ -1288,6 +1288,10 @@ export type TriedOutcome = {
   near_s: number;
   /** Driving that was not driven (s). */
   lost_s: number;
+  /** Unslowed with somebody really within 2 m (s); null: not known. */
+  missed_s: number | null;
+  /** Slowed for a person with nobody really within 2.3 m (s). */
+  false_s: number | null;
 };
 
 /** Parameters of the rule, those that people cannot change among them. */

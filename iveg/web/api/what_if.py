@@ -160,7 +160,15 @@ def draw(found: WhatIf) -> bytes:
         why: [point.outcome.slowed_s.get(why, 0.0) / 60.0 for point in curve]
         for why in ("person", "robot")
     }
-    near = {"near_misses": [point.outcome.near_misses for point in curve]}
+    shown = {
+        "minutes": minutes,
+        "near_misses": {"near_misses": [one.outcome.near_misses for one in curve]},
+    }
+    if any(one.outcome.missed_s is not None for one in curve):
+        shown["truth"] = {
+            "missed": [(one.outcome.missed_s or 0.0) / 60.0 for one in curve],
+            "false": [(one.outcome.false_s or 0.0) / 60.0 for one in curve],
+        }
     values, in_force = [one.value for one in curve], getattr(found.in_force, found.vary)
     figures = {
         name: Fragment(
@@ -168,6 +176,6 @@ def draw(found: WhatIf) -> bytes:
                 values, lines, (f"what_if_{found.vary}", f"what_if_{name}"), in_force
             )
         )
-        for name, lines in (("minutes", minutes), ("near_misses", near))
+        for name, lines in shown.items()
     }
     return write_json({**charts.library_facts(), "figures": figures})

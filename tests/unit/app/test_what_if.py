@@ -50,7 +50,7 @@ def question(since: float = WALL, until: float = WALL + 165.0) -> Question:
 
 def asking(url: str, worker: Worker) -> WhatIfs:
     fleet = fleet_of("AGI", "AGII")
-    return WhatIfs(url, fleet, FakeIds(), FakeClock(), [worker])
+    return WhatIfs(url, fleet, FakeIds(), FakeClock(), workers=[worker])
 
 
 async def answered(what_ifs: WhatIfs, job: Job) -> Job:
@@ -145,7 +145,7 @@ async def test_two_processes_share_a_long_range_whose_first_curve_comes_early(
 
     first, second = InPlace(happens), InPlace()
     fleet = fleet_of("AGI", "AGII")
-    what_ifs = WhatIfs(url, fleet, FakeIds(), FakeClock(), [first, second])
+    what_ifs = WhatIfs(url, fleet, FakeIds(), FakeClock(), None, [first, second])
     job = what_ifs.ask(question(WALL - 15_000.0, WALL + 600.0), "ana")
     await answered(what_ifs, job)
     alone = asking(url, InPlace())
@@ -178,6 +178,17 @@ async def test_each_person_asks_one_at_a_time_and_the_line_is_short() -> None:
     assert what_ifs.newest()[0].by == "late"
     with pytest.raises(UnknownNameError):
         what_ifs.find("none")
+
+
+async def test_a_file_of_the_truth_that_is_away_fails_the_question(
+    url: str, tmp_path: Path
+) -> None:
+    fleet = fleet_of("AGI", "AGII")
+    away = tmp_path / "away"
+    what_ifs = WhatIfs(url, fleet, FakeIds(), FakeClock(), away, [InPlace()])
+    job = await answered(what_ifs, what_ifs.ask(question(), "ana"))
+
+    assert (job.state, job.why, job.answer) == ("failed", "truth", None)
 
 
 async def test_a_process_that_dies_fails_its_question_alone(url: str) -> None:

@@ -24,6 +24,7 @@ from iveg.domain.what_if.inputs import (
 )
 from iveg.domain.what_if.judging import Range
 from iveg.domain.what_if.outcome import Outcome, outcomes_of
+from iveg.domain.what_if.truth import nearest_of
 from tests.builders import START, detection, odometry
 from tests.unit.pipeline.desk import Desk
 
@@ -291,6 +292,29 @@ def test_slowed_time_lost_time_and_near_misses_are_counted() -> None:
     assert (held.near_misses, held.near_s) == (0, 0.0)
     assert blind == Outcome({"person": 0.0, "robot": 0.0}, {}, 1, blind.near_s, 0.0)
     assert blind.near_s == pytest.approx(4.5, abs=0.2)
+
+
+def test_against_the_truth_missed_people_and_false_alarms_are_counted() -> None:
+    moments = np.arange(0.0, 20.0, 0.5).tolist()
+    poses = {"AGI": poses_of([(at, at, 0.0, 0.0, 1.0, 0.0) for at in moments])}
+    # One is seen at 10 m, where nobody is; another at 15 m is seen by nobody.
+    seen = sightings_of(
+        [("AGI", at, 10.0, 0.0, 0.85, "person", "P1") for at in moments]
+    )
+    truth = {"AGI": nearest_of([(at, abs(15.0 - at)) for at in moments])}
+    judged = Range(Inputs(poses, seen, BRAKING), 0.0, 20.0, truth)
+    quick = Parameters(release_after_s=0.0, foresight_s=0.0)
+
+    found = outcome_of(judged, quick)
+    blind = outcome_of(judged, replace(quick, threshold=0.999))
+    unknown = outcome_of(Range(judged.inputs, 0.0, 20.0), quick)
+
+    # From 13 to 17 s it is near the one, from 8 to 12.3 s slow for the other.
+    assert found.missed_s == pytest.approx(4.0, abs=0.6)
+    assert found.false_s == pytest.approx(4.3, abs=0.6)
+    assert (blind.missed_s, blind.false_s) == (found.missed_s, 0.0)
+    assert (unknown.missed_s, unknown.false_s) == (None, None)
+    assert (found + unknown).missed_s == found.missed_s
 
 
 def test_of_nothing_comes_nothing() -> None:

@@ -25,7 +25,7 @@ const PARTS = /** @type {const} */ ([
   "release_after_s",
   "factor",
 ]);
-const FIGURES = /** @type {const} */ (["minutes", "near_misses"]);
+const FIGURES = /** @type {const} */ (["minutes", "near_misses", "truth"]);
 
 /** @param {import("../core/page.js").Page} page */
 export function start({ store, i18n }) {
@@ -114,7 +114,8 @@ export function start({ store, i18n }) {
     setText(need("#whatif-rests"), i18n.t("whatif.rests", { poses, detections }));
     need("#whatif-rows").replaceChildren(...rowsOf(answer, i18n));
     if (!figures) return;
-    for (const name of FIGURES)
+    setHidden(need("#whatif-truth-section"), !figures.figures.truth);
+    for (const name of FIGURES.filter((one) => one in figures.figures))
       await drawFigure(
         need(`#whatif-${name}`),
         figures.figures[name],
@@ -212,6 +213,12 @@ function rowsOf(answer, i18n) {
     row("near_misses", null, (one) => count(one.near_misses)),
     row("lost_min", null, (one) => minutes(one.lost_s)),
   ];
+  // Against the truth, where there is one.
+  if (in_force.missed_s !== null)
+    rows.push(
+      row("missed_min", null, (one) => minutes(one.missed_s ?? 0)),
+      row("false_min", null, (one) => minutes(one.false_s ?? 0)),
+    );
   return rows.map(([head, ...cells]) => {
     const line = make("tr");
     const th = make("th", "", head);

@@ -1,5 +1,6 @@
 """What is written down is what is in view, whatever the detector makes of it."""
 
+import math
 from contextlib import closing
 from pathlib import Path
 
@@ -7,6 +8,7 @@ import orjson
 import pytest
 
 from iveg.adapters.greenhouses import load_greenhouse
+from iveg.adapters.truth_files import read_nearest
 from iveg.lab.emulator.camera import Counts, DetectorModel
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.scenarios import scenario_named
@@ -60,3 +62,8 @@ def test_everybody_is_in_the_truth_with_the_robot_s_true_pose(tmp_path: Path) ->
     assert [one["hidden"] for one in told["people"]] == [False, False, True, False]
     assert [one["key"] for one in told["robots"]] == ["AGI", "AGII"]
     assert told["robots"][0] == {"key": "AGI", **told["pose"]}
+
+    # What if: the same file tells how near the nearest of them was.
+    nearest = read_nearest(tmp_path / "truth.jsonl", 1000.0, 1001.0)["AGI"]
+    away = min(math.hypot(one.x - pose.x, one.y - pose.y) for one in world.discs())
+    assert nearest.away == pytest.approx([away], abs=0.002)

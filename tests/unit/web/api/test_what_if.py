@@ -124,7 +124,9 @@ async def test_an_answer_has_its_curve_and_its_figures(
     body = {**HOUR, "confidence_threshold": 0.6}
     job = asked.find((await browser.post(PATH, json=body)).json()["id"])
     each = (
-        Outcome({"person": 60.0 * n, "robot": 30.0}, {"person": n}, n, 1.0, 2.0)
+        Outcome(
+            {"person": 60.0 * n, "robot": 30.0}, {"person": n}, n, 1.0, 2.0, 90.0, 6.04
+        )
         for n in range(len(job.asked.tried))
     )
     job.answer = Answer(tuple(each), Outcome({"stale": 5.04}, {"stale": 1}), 7, 9)
@@ -142,4 +144,7 @@ async def test_an_answer_has_its_curve_and_its_figures(
     assert minutes["data"][0]["x"] == near["data"][0]["x"] == values
     assert (minutes["data"][0]["y"][0], near["data"][0]["y"][0]) == (2.0, 2)
     assert minutes["layout"]["shapes"][0]["x0"] == 0.75
+    missed, false = figures["truth"]["data"]
+    assert (missed["y"][0], false["y"][0]) == (1.5, 0.1)
+    assert (answer["candidate"]["missed_s"], answer["in_force"]["false_s"]) == (90, 6)
     assert START.wall > job.asked.until
