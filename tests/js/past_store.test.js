@@ -7,6 +7,7 @@ const world = (at_s, x) =>
   /** @type {any} */ ({
     at_s,
     verified: true,
+    recorded_twice: false,
     robots: [
       {
         robot_id: "AGI",
@@ -48,4 +49,6 @@ test("what stands still grows no older, and says where it may differ", () => {
   equal(past.isUnequal, false);
   past.take({ ...world(101, 1), verified: false });
   equal(past.isUnequal, true);
+  past.take({ ...world(102, 1), recorded_twice: true });
+  equal(past.isTwice, true);
 });

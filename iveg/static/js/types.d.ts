@@ -816,6 +816,8 @@ export type PastWorld = {
   at_s: number;
   /** Whether it has the hash that iVeg had then; null: none was passed. */
   verified: boolean | null;
+  /** Whether another recording has this moment, too: the server's clock was set back. */
+  recorded_twice: boolean;
   scans: Scan[];
 };
 

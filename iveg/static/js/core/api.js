@@ -7,10 +7,11 @@
 
 /**
  * @param {string} path below `/api/v1/`, or from the root with a leading slash
+ * @param {AbortSignal} [signal] ends the question
  * @returns {Promise<Answer>}
  */
-export function readApi(path) {
-  return ask(path, { headers: { Accept: "application/json" } });
+export function readApi(path, signal) {
+  return ask(path, { headers: { Accept: "application/json" }, signal });
 }
 
 /**

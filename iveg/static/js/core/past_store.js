@@ -15,9 +15,19 @@ export class PastStore {
     this.store.setConnection("open");
   }
 
+  /** Whether there is a world to be drawn. */
+  get isShown() {
+    return this.#shown !== null;
+  }
+
   /** Whether it is known to differ from what stood on the screen then. */
   get isUnequal() {
     return this.#shown?.verified === false;
+  }
+
+  /** Whether the moment came twice, as the server's clock was set back. */
+  get isTwice() {
+    return this.#shown?.recorded_twice === true;
   }
 
   /** @param {PastWorld} world */

@@ -10,6 +10,7 @@
 import { readApi } from "../core/api.js";
 import { TIME_ZONE } from "../core/messages.js";
 import { BEFORE_S, nextEvent, pastAddress } from "../core/moments.js";
+import { PastLine, waitSaid } from "../core/past_line.js";
 import { PastStore } from "../core/past_store.js";
 import { need, setAttribute, setHidden, setText } from "./dom.js";
 import { createNotes } from "./notes.js";
@@ -30,45 +31,34 @@ export function createTimeTravel(app, askedS) {
   const { i18n, line } = app;
   const world = new PastStore();
   const notes = createNotes(pinOf(askedS - WINDOW_S), i18n);
-  const viewer = crypto.randomUUID();
   const bar = makeBar();
   const slider = /** @type {HTMLInputElement} */ (need("[data-part=slider]", bar));
   const rate = /** @type {HTMLSelectElement} */ (need("[data-part=rate]", bar));
   let targetS = askedS;
   let isPlaying = false;
-  let isAsking = false;
   let playedAtMs = performance.now();
-  let wantedS = Number.NaN;
   let problem = "";
+  /** Whether asking again may help. */
+  let isTransient = false;
+  const question = new PastLine(({ status, body }) => {
+    if (status === 200) world.take(body);
+    if (status === 200) problem = "";
+    else refuse(status, body);
+    draw();
+  });
 
   /** @param {number} atS */
   function seek(atS) {
     targetS = Math.min(atS, line.serverNow() - NEWEST_S);
     history.replaceState(null, "", pastAddress(targetS));
+    question.want(targetS);
     draw();
-    void bring();
-  }
-
-  /** Asks for the newest target, one question at a time. */
-  async function bring() {
-    if (isAsking || wantedS === targetS) return;
-    isAsking = true;
-    wantedS = targetS;
-    const at = new Date(1000 * wantedS).toISOString();
-    const { status, body } = await readApi(
-      `world?${new URLSearchParams({ at, viewer })}`,
-    );
-    isAsking = false;
-    if (status === 200) world.take(body);
-    if (status === 200) problem = "";
-    else refuse(status, body);
-    draw();
-    void bring();
   }
 
   /** @param {number} status @param {any} body */
   function refuse(status, body) {
     isPlaying = false;
+    isTransient = status === 0 || status >= 500;
     const key = status === 404 ? "gap" : status === 400 ? "other" : "failed";
     problem = i18n.t(`past.problem.${key}`, {
       before: body?.before ? i18n.time(body.before) : "—",
@@ -79,8 +69,9 @@ export function createTimeTravel(app, askedS) {
   /** @param {1 | -1} way */
   async function stepEvent(way) {
     const at = await findEvent(targetS, way);
-    if (at === null) problem = i18n.t("past.problem.no_event");
-    else seek(at);
+    if (at !== null) return seek(at);
+    isTransient = false;
+    problem = i18n.t("past.problem.no_event");
     draw();
   }
 
@@ -89,22 +80,47 @@ export function createTimeTravel(app, askedS) {
     const passedS = (nowMs - playedAtMs) / 1000;
     playedAtMs = nowMs;
     // A slow server is waited for: what plays is what is shown.
-    if (isPlaying && !isAsking) seek(targetS + passedS * Number(rate.value));
+    const isWaiting = question.waitedMs !== null;
+    if (isPlaying && !isWaiting) seek(targetS + passedS * Number(rate.value));
     else world.freshen();
+    drawState();
+  }
+
+  function again() {
+    problem = "";
+    question.again();
+    drawState();
   }
 
   function draw() {
     const said = whenSaid(targetS, i18n.language());
     setText(need("[data-part=when]", bar), said);
-    const state = problem || (world.isUnequal ? i18n.t("past.unequal") : "");
-    setText(need("[data-part=said]", bar), state);
-    setAttribute(bar, "data-problem", String(problem !== ""));
     const play = need("[data-part=play]", bar);
     setText(play, i18n.t(isPlaying ? "past.pause" : "past.play"));
     setAttribute(play, "aria-pressed", String(isPlaying));
     if (document.activeElement !== slider || isPlaying) centre();
     setAttribute(slider, "aria-valuetext", said);
     notes.move(pinOf(targetS));
+    drawState();
+  }
+
+  /** What is awaited, or why there is no picture, or how far one may be trusted. */
+  function drawState() {
+    const waitedMs = question.waitedMs;
+    const wait = waitSaid(waitedMs, world.isShown);
+    const waited = wait && i18n.t("past.waited", { seconds: (waitedMs ?? 0) / 1000 });
+    const trust = [
+      world.isTwice && i18n.t("past.twice"),
+      world.isUnequal && i18n.t("past.unequal"),
+    ].filter(Boolean);
+    setText(need("[data-part=waited]", bar), waited);
+    setText(
+      need("[data-part=said]", bar),
+      wait ? i18n.t(`past.${wait}`) : problem || trust.join(" "),
+    );
+    setAttribute(bar, "data-problem", String(problem !== "" || wait === "slow"));
+    const helps = wait === "slow" || (!wait && problem !== "" && isTransient);
+    setHidden(need("[data-part=retry]", bar), !helps);
   }
 
   let middleS = askedS;
@@ -125,6 +141,7 @@ export function createTimeTravel(app, askedS) {
     on: () => seek(targetS + BEFORE_S),
     "event-back": () => void stepEvent(-1),
     "event-on": () => void stepEvent(1),
+    retry: again,
   };
   for (const [part, act] of Object.entries(actions)) {
     need(`[data-part=${part}]`, bar).addEventListener("click", act);

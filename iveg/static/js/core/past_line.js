@@ -1,0 +1,95 @@
+/**
+ * Questions about the past: one at a time, then the moment that is wanted by then.
+ *
+ * @typedef {import("./api.js").Answer} Answer
+ * @typedef {(atS: number, signal: AbortSignal) => Promise<Answer>} Ask
+ */
+
+import { readApi } from "./api.js";
+
+/** Longer than this an answer is slow. */
+export const SLOW_MS = 5000;
+/** While one moment is shown, the next may take so long before anything is said. */
+const SOON_MS = 1000;
+const KEPT = "iveg.past";
+
+export class PastLine {
+  #ask;
+  #answered;
+  #now;
+  #wantedS = Number.NaN;
+  #askedS = Number.NaN;
+  #askedAtMs = 0;
+  /** @type {AbortController | null} */
+  #question = null;
+
+  /**
+   * @param {(answer: Answer) => void} answered
+   * @param {Ask} ask
+   * @param {() => number} now ms
+   */
+  constructor(answered, ask = askWorld, now = () => performance.now()) {
+    this.#answered = answered;
+    this.#ask = ask;
+    this.#now = now;
+  }
+
+  /** Since the question that is out was asked (ms); null: none is. */
+  get waitedMs() {
+    return this.#question && this.#now() - this.#askedAtMs;
+  }
+
+  /** @param {number} atS Unix time of the moment that is wanted from now on */
+  want(atS) {
+    this.#wantedS = atS;
+    if (this.#question === null && atS !== this.#askedS) void this.#bring();
+  }
+
+  /** Ask anew, and wait no longer for what is out. */
+  again() {
+    this.#question?.abort();
+    void this.#bring();
+  }
+
+  async #bring() {
+    const question = new AbortController();
+    this.#question = question;
+    this.#askedS = this.#wantedS;
+    this.#askedAtMs = this.#now();
+    const answer = await this.#ask(this.#askedS, question.signal);
+    if (this.#question !== question) return;
+    this.#question = null;
+    this.#answered(answer);
+    this.want(this.#wantedS);
+  }
+}
+
+/**
+ * What is said while an answer is awaited.
+ *
+ * @param {number | null} waitedMs @param {boolean} isShown whether any moment is
+ * @returns {"" | "opening" | "slow"}
+ */
+export function waitSaid(waitedMs, isShown) {
+  if (waitedMs === null) return "";
+  if (waitedMs >= SLOW_MS) return "slow";
+  return isShown && waitedMs < SOON_MS ? "" : "opening";
+}
+
+/** @param {number} atS @param {AbortSignal} signal */
+function askWorld(atS, signal) {
+  const at = new Date(1000 * atS).toISOString();
+  return readApi(`world?${new URLSearchParams({ at, viewer: viewer() })}`, signal);
+}
+
+/** The same for each page of a tab, which finds its process ready. */
+function viewer() {
+  try {
+    const name = sessionStorage.getItem(KEPT) ?? crypto.randomUUID();
+    sessionStorage.setItem(KEPT, name);
+    return name;
+  } catch {
+    // A browser that keeps nothing asks a process anew.
+    return "nobody";
+  }
+}
