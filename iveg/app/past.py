@@ -34,6 +34,7 @@ from iveg.pipeline import topics
 from iveg.pipeline.memory import Memory
 from iveg.pipeline.topics import StateReader
 from iveg.pipeline.trace import (
+    HASHES_S,
     JUDGED,
     KEYFRAMES_S,
     LOOK,
@@ -49,9 +50,14 @@ from iveg.web.views import Views
 
 STEPS, MEMORY = "/iveg/steps", "/iveg/memory"
 _NS = 10**9
-_GAP_S: Final = 2.0
+_GAP_NS: Final = 2 * _NS
 """Where the loop told nothing for longer, nothing was recorded."""
-_PLAY_ON_S: Final = 20.0
+_REACH_NS: Final = 7 * _NS
+"""A memory that is older leads nowhere; one may be late where the loop has no time."""
+_PLAY_ON_NS: Final = 2 * round(KEYFRAMES_S * _NS)
+"""What is farther on is reached sooner from a memory."""
+_COMPARED_NS: Final = 2 * round(HASHES_S * _NS)
+"""Of what leads to a moment the newest hashes are compared: one costs a picture."""
 _NOT_HASHED = topics.LOG, topics.HEALTH, topics.MAP
 """They tell of the server, and not of the world."""
 
@@ -163,15 +169,9 @@ class Past:
         self.parts = parts = self._pipeline.parts
         self._memory = Memory(parts)
         self.views = Views(parts)
-        self._reader = DirectReader(
-            site.apikey,
-            fleet.ids,
-            lambda: self._heard_at,
-            parts.ingest.enqueue,
-            parts.ingest.reject,
-            site.direct_read,
-            parts.ingest.is_past,
-        )
+        self._apikey, self._direct_read = site.apikey, site.direct_read
+        self._robots = fleet.ids
+        self._reader = self._new_reader()
         self._heard = self._reader.subscriptions()
         self._orion = NotificationEndpoint(
             parts.ingest,
@@ -185,7 +185,28 @@ class Past:
             parts.equipment.receive,
         )
 
+    def _new_reader(self) -> DirectReader:
+        ingest = self.parts.ingest
+        return DirectReader(
+            self._apikey,
+            self._robots,
+            lambda: self._heard_at,
+            ingest.enqueue,
+            ingest.reject,
+            self._direct_read,
+            ingest.is_past,
+        )
+
     # --- moving -------------------------------------------------------------------
+
+    @property
+    def is_recorded_twice(self) -> bool:
+        """Whether another file has this moment, too: the wall clock was set back."""
+        return self._timeline.holding(round(self.now.wall * _NS)) > 1
+
+    def look_through(self) -> None:
+        """Know where what is in the file that is being written."""
+        self._timeline.look_through()
 
     def move(self, wall: float) -> None:
         """Go to a moment (Unix s).
@@ -196,16 +217,18 @@ class Past:
             DataFileError: a file cannot be read.
         """
         at = round(wall * _NS)
-        if self._place is None or not 0 <= at - self._at_ns <= _PLAY_ON_S * _NS:
+        plays_on = self._place is not None and 0 <= at - self._at_ns <= _PLAY_ON_NS
+        if plays_on:
+            self._play(at)
+        if not plays_on or at - self._at_ns > _GAP_NS:
             self._begin(at)
-        self._play(at)
-        if at - self._at_ns > _GAP_S * _NS:
+            self._play(at)
+        if at - self._at_ns > _GAP_NS:
             raise self._gap(at)
 
     def _begin(self, at: int) -> None:
         """Take over the last memory by a moment."""
-        within = round((KEYFRAMES_S + _GAP_S) * _NS)
-        found = self._timeline.latest(MEMORY, at, within)
+        found = self._timeline.latest(MEMORY, at, _REACH_NS)
         self._place = None
         if found is None:
             raise self._gap(at)
@@ -217,6 +240,8 @@ class Past:
         if version != __version__:
             raise UnreadableError("other_version", f"recorded by iVeg {version}")
         self._waiting.messages.clear()
+        # The one before would wait for the moments that it has heard to come again.
+        self._reader = self._new_reader()
         self._memory.read(b64decode(told["memory"]))
         self._ids.seed, self._ids.count = bytes.fromhex(told["seed"]), told["ids"]
         self._pass_to(Instant(told["mono"] / _NS, told["wall"]))
@@ -228,15 +253,19 @@ class Past:
             message = found.message
             if message.topic in (STEPS, MEMORY) and message.log_time > at:
                 return
-            self._take(found)
+            self._take(found, compares=at - message.log_time < _COMPARED_NS)
             self._place = found.behind
             if message.topic == STEPS:
                 self._at_ns = message.log_time
 
-    def _take(self, found: Found) -> None:
+    def _take(self, found: Found, *, compares: bool) -> None:
         topic, log_time, payload = found.message
         if topic == STEPS:
-            self._repeat(orjson.loads(payload))
+            told = orjson.loads(payload)
+            self._repeat(told)
+            if compares and "hash" in told:
+                now = digest(picture(self.views, self.now))
+                self.agreement.note(told["hash"] == now)
         elif topic == MEMORY:
             told = orjson.loads(payload)
             if told["by_hand"] or self.agreement.newest is False:
@@ -246,10 +275,9 @@ class Past:
             self._waiting.messages.append((mono, topic, payload))
 
     def _gap(self, at: int) -> NotRecordedError:
-        files = self._timeline.files()
-        before = max((one.last for one in files if one.first <= at), default=None)
-        after = min((one.first for one in files if one.first > at), default=None)
-        seconds = [None if one is None else one / _NS for one in (before, after)]
+        seconds = [
+            None if one is None else one / _NS for one in self._timeline.around(at)
+        ]
         return NotRecordedError(at / _NS, *seconds)
 
     # --- what the loop did --------------------------------------------------------
@@ -278,8 +306,6 @@ class Past:
             )
         # A press that joined a STOP has drawn one, and was no input.
         self._ids.count = told["ids"]
-        if "hash" in told:
-            self.agreement.note(told["hash"] == digest(picture(self.views, self.now)))
 
     def _hear(self, at: Instant, topic: str, payload: bytes) -> None:
         self._heard_at = at

@@ -30,7 +30,9 @@ MOST_VIEWERS: Final = 3
 IDLE_S: Final = 60.0
 _IN_USE_S: Final = 10.0
 _LIMIT_S: Final = 60.0
-_CHECK_S: Final = 5.0
+_CHECK_S: Final = 1.0
+_LOOKED_S: Final = 60.0
+"""How often who stands ready looks at what was recorded meanwhile."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +56,9 @@ def world_at(site: Site, wall: float) -> Shown:
 def make_ready(site: Site) -> None:
     """Make the world before anybody asks for it; in the process of a viewer."""
     with contextlib.suppress(DataFileError):
-        _past.setdefault(site, Past(site))
+        if site not in _past:
+            _past[site] = Past(site)
+        _past[site].look_through()
 
 
 async def _world_at(site: Site, wall: float) -> Shown:
@@ -79,6 +83,7 @@ def picture_of(past: Past) -> PastWorld:
         at=format_stamp(past.now.wall),
         at_s=past.now.wall,
         verified=past.agreement.newest,
+        recorded_twice=past.is_recorded_twice,
         scans=[past.views.scan(one) for one in past.parts.world.robots],
         **topics.read_all(past.views, past.now),
     )
@@ -118,6 +123,7 @@ class Viewers:
         self._work = work
         self._viewers: dict[str, Viewer] = {}
         self._spare: Worker | None = None
+        self._looked_at = float("-inf")
 
     @property
     def count(self) -> int:
@@ -161,15 +167,18 @@ class Viewers:
     async def run(self) -> None:
         """End what nobody asks any more, and keep one ready, until cancelled."""
         while True:
-            await asyncio.sleep(_CHECK_S)
             self.tick(self._clock())
             await self.keep_ready()
+            await asyncio.sleep(_CHECK_S)
 
     async def keep_ready(self) -> None:
         """Have a process for the next viewer, where one is wanted."""
-        if not self._has_spare or self._spare is not None:
+        now = self._clock().mono
+        is_ready = self._spare is not None and now - self._looked_at < _LOOKED_S
+        if not self._has_spare or is_ready:
             return
-        spare = self._spare = _worker()
+        self._looked_at = now
+        spare = self._spare = self._spare or _worker()
         # Who comes meanwhile has this one, and waits in its line.
         with contextlib.suppress(HopError):
             await spare.run(make_ready, self._site)

@@ -65,4 +65,8 @@ class PastWorld(World):
     verified: bool | None = Field(
         description="Whether it has the hash that iVeg had then; null: none was passed."
     )
+    recorded_twice: bool = Field(
+        description="Whether another recording has this moment, too: the server's clock"
+        " was set back."
+    )
     scans: list[Scan]

@@ -16,7 +16,7 @@ import orjson
 from iveg.domain.observations import Instant, Received
 from iveg.domain.records import CommandRecord, LogRecord, Record
 
-KEYFRAMES_S, HASHES_S = 5.0, 1.0
+KEYFRAMES_S, HASHES_S = 2.0, 1.0
 """Between two memories, and between two hashes (s)."""
 JUDGED, TAKEN, LOOK = 1, 0, 2
 """A step that judges, one that does not, and a look of the second witness."""

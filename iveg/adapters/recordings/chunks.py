@@ -1,14 +1,17 @@
 """A recording from any moment on, also while it is still written.
 
-A file that is open has no index, but each chunk tells its first and last moment in its
-head (https://mcap.dev/spec#chunk-op0x06), so that all others are passed over unread.
+A finished file ends with an index of its chunks and channels.  One that is open has
+none, but each chunk tells its first and last moment in its head, and the records behind
+it which channels it has (https://mcap.dev/spec#records), so that all others are passed
+over unread.
 """
 
 import io
+import os
 import struct
 import zlib
 from bisect import bisect_right
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import IO, NamedTuple
 
@@ -24,8 +27,13 @@ from iveg.domain.observations import Instant
 
 _RECORD = struct.Struct("<BQ")
 _SPAN = struct.Struct("<QQ")
+_CHUNK_INDEX = struct.Struct("<QQQQ")
+_FOOTER = struct.Struct("<BQQQI8s")
+_NUMBER = struct.Struct("<H")
 _MESSAGE = struct.Struct("<HIQQ")
-_MAGIC_BYTES = 8
+_MAGIC = b"\x89MCAP0\r\n"
+_WINDOW = 1 << 14
+"""Read at once of what is passed over: an index behind a chunk fits."""
 _LARGEST = 1 << 26
 
 
@@ -54,7 +62,6 @@ class ChunkedRecording:
 
     Attributes:
         start: Its beginning, on both clocks.
-        chunks: In the order of the file.
 
     Raises:
         DataFileError: it cannot be read, or no iVeg wrote it.
@@ -64,36 +71,84 @@ class ChunkedRecording:
         self.path = path
         with read_messages(path) as reading:
             self.start = reading.start
-        self.chunks: list[ChunkPlace] = []
+        self._chunks: list[ChunkPlace] = []
         self._topics: dict[int, str] = {}
-        self._begins = _MAGIC_BYTES
-        self.refresh()
+        self._first_in: dict[int, int] = {}
+        """Number of the first chunk with messages of a channel; of an open file."""
+        self._begins = len(_MAGIC)
+        self._is_known = False
 
     def refresh(self) -> None:
-        """Find chunks that were added.  Raises DataFileError."""
-        try:
-            with self.path.open("rb") as stream:
-                ends = stream.seek(0, io.SEEK_END)
-                while self._pass(stream, ends):
-                    pass
-        except OSError as error:
-            raise self._unusable(f"cannot be read: {error}.") from error
+        """Look for chunks that were added, when they are asked for."""
+        self._is_known = False
 
-    def _pass(self, stream: IO[bytes], ends: int) -> bool:
-        """Pass over a record; whether it was there as a whole."""
-        stream.seek(self._begins)
-        head = stream.read(_RECORD.size)
-        if len(head) < _RECORD.size:
+    @property
+    def chunks(self) -> list[ChunkPlace]:
+        """Those that are there as a whole, in the order of the file.
+
+        Raises:
+            DataFileError: the file is away.
+        """
+        if not self._is_known:
+            try:
+                with self.path.open("rb") as stream:
+                    if self._chunks or not self._read_index(stream):
+                        self._pass_over(stream)
+            except (OSError, struct.error) as error:
+                raise self._unusable(f"cannot be read: {error}.") from error
+            self._is_known = True
+        return self._chunks
+
+    # --- where what is ------------------------------------------------------------
+
+    def _read_index(self, stream: IO[bytes]) -> bool:
+        """Read the index at the end of a finished file; whether it is whole."""
+        ends = stream.seek(0, io.SEEK_END) - _FOOTER.size
+        if ends < self._begins:
             return False
-        opcode, size = _RECORD.unpack(head)
-        begins = self._begins + _RECORD.size
-        if begins + size > ends or opcode == Opcode.DATA_END:
+        stream.seek(ends)
+        footer = _FOOTER.unpack(stream.read(_FOOTER.size))
+        opcode, _, begins, _, crc, magic = footer
+        if opcode != Opcode.FOOTER or magic != _MAGIC or not 0 < begins <= ends:
             return False
-        if opcode == Opcode.CHUNK:
-            first, last = _SPAN.unpack(stream.read(_SPAN.size))
-            self.chunks.append(ChunkPlace(first, last, begins, size))
-        self._begins = begins + size
+        stream.seek(begins)
+        summary = stream.read(ends - begins)
+        told = zlib.crc32(
+            _FOOTER.pack(*footer)[: -len(_MAGIC) - 4], zlib.crc32(summary)
+        )
+        if crc != told:
+            return False
+        head = _RECORD.size
+        for opcode, body, size in _records(summary):
+            if opcode == Opcode.CHUNK_INDEX:
+                first, last, offset, whole = _CHUNK_INDEX.unpack_from(summary, body)
+                place = ChunkPlace(first, last, offset + head, whole - head)
+                self._chunks.append(place)
+            elif opcode == Opcode.CHANNEL:
+                self._learn(summary[body : body + size])
         return True
+
+    def _pass_over(self, stream: IO[bytes]) -> None:
+        """Find chunks by the heads of all records, from where it ended before."""
+        ends = stream.seek(0, io.SEEK_END)
+        window, begun = b"", 0
+        while self._begins + _RECORD.size <= ends:
+            at = self._begins - begun
+            if at + _RECORD.size + _SPAN.size > len(window):
+                begun, at = self._begins, 0
+                window = os.pread(stream.fileno(), _WINDOW, begun)
+            opcode, size = _RECORD.unpack_from(window, at)
+            if self._begins + _RECORD.size + size > ends or opcode == Opcode.DATA_END:
+                return
+            at += _RECORD.size
+            if opcode == Opcode.CHUNK:
+                first, last = _SPAN.unpack_from(window, at)
+                begins = self._begins + _RECORD.size
+                self._chunks.append(ChunkPlace(first, last, begins, size))
+            elif opcode == Opcode.MESSAGE_INDEX:
+                (number,) = _NUMBER.unpack_from(window, at)
+                self._first_in.setdefault(number, len(self._chunks) - 1)
+            self._begins += _RECORD.size + size
 
     @property
     def first(self) -> int:
@@ -106,7 +161,7 @@ class ChunkedRecording:
         return self.chunks[-1].last if self.chunks else self.first
 
     def instant(self, log_time: int) -> Instant:
-        """The moment on both clocks, where the wall clock was not set meanwhile.
+        """The moment on both clocks.
 
         A monotonic clock counts nanoseconds, so that this is the very same number.
         """
@@ -117,31 +172,36 @@ class ChunkedRecording:
         """The number of the last chunk that begins by then; -1: none does."""
         return bisect_right(self.chunks, log_time, key=lambda one: one.first) - 1
 
+    # --- what is in a chunk -------------------------------------------------------
+
     def read(self, number: int) -> list[Recorded]:
         """The messages of a chunk, in their order; none where it is damaged.
 
         Raises:
             DataFileError: the file is away.
         """
-        data = self._data(number)
-        found = list(self._messages(data))
-        if any(topic is None for topic, *_ in found):
-            self._learn_all()
-            found = list(self._messages(data))
+        found = list(self._messages(self._data(self.chunks[number])))
+        self._find_out({channel for channel, *_ in found} - self._topics.keys())
+        topics = self._topics
         return [
-            Recorded(topic, log_time, payload)
-            for topic, log_time, payload in found
-            if topic is not None and topic != PADDING.topic
+            Recorded(topics[channel], log_time, payload)
+            for channel, log_time, payload in found
+            if topics.get(channel, PADDING.topic) != PADDING.topic
         ]
 
-    def _learn_all(self) -> None:
-        """Read the channels of all chunks: one says them where it first used them."""
-        for number in range(len(self.chunks)):
-            for _ in self._messages(self._data(number)):
-                pass
+    def _find_out(self, unknown: Collection[int]) -> None:
+        """Learn channels where a file that is open says them: before their first use.
 
-    def _data(self, number: int) -> bytes:
-        place = self.chunks[number]
+        That is in the chunk of the message, or in the one before, which it filled.
+        """
+        for channel in unknown:
+            used = self._first_in.get(channel, 0)
+            for number in (used, used - 1):
+                if number >= 0 and channel not in self._topics:
+                    for _ in self._messages(self._data(self.chunks[number])):
+                        pass
+
+    def _data(self, place: ChunkPlace) -> bytes:
         if place.size > _LARGEST:
             return b""
         try:
@@ -157,21 +217,29 @@ class ChunkedRecording:
             return b""
         return data if zlib.crc32(data) == chunk.uncompressed_crc else b""
 
-    def _messages(self, data: bytes) -> Iterator[tuple[str | None, int, bytes]]:
-        begins = 0
-        while begins + _RECORD.size <= len(data):
-            opcode, size = _RECORD.unpack_from(data, begins)
-            begins += _RECORD.size
+    def _messages(self, data: bytes) -> Iterator[tuple[int, int, bytes]]:
+        for opcode, body, size in _records(data):
             if opcode == Opcode.MESSAGE:
-                number, _, log_time, _ = _MESSAGE.unpack_from(data, begins)
-                payload = data[begins + _MESSAGE.size : begins + size]
-                yield self._topics.get(number), log_time, payload
+                channel, _, log_time, _ = _MESSAGE.unpack_from(data, body)
+                yield channel, log_time, data[body + _MESSAGE.size : body + size]
             elif opcode == Opcode.CHANNEL:
-                told = Channel.read(
-                    ReadDataStream(io.BytesIO(data[begins : begins + size]))
-                )
-                self._topics[told.id] = told.topic
-            begins += size
+                self._learn(data[body : body + size])
+
+    def _learn(self, channel: bytes) -> None:
+        told = Channel.read(ReadDataStream(io.BytesIO(channel)))
+        self._topics[told.id] = told.topic
 
     def _unusable(self, reason: str) -> DataFileError:
         return DataFileError(str(self.path), "", reason)
+
+
+def _records(data: bytes) -> Iterator[tuple[int, int, int]]:
+    """Opcode, beginning and size of the body of each record that is whole."""
+    begins, head = 0, _RECORD.size
+    while begins + head <= len(data):
+        opcode, size = _RECORD.unpack_from(data, begins)
+        begins += head
+        if begins + size > len(data):
+            return
+        yield opcode, begins, size
+        begins += size

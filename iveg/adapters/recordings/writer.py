@@ -21,11 +21,14 @@ from iveg.adapters.recordings.fed import answer, run_fed
 from iveg.adapters.recordings.incoming import Incoming, Sort, Unpacking
 from iveg.adapters.recordings.mcap_file import McapFile
 from iveg.domain.disk_space import DiskSpace
+from iveg.domain.observations import Instant
 from iveg.domain.recordings import RecordingLimits
 
 SETTLE_S, PRUNE_S = 2.0, 60.0
 KEPT_ANEW = frozenset({"Rule"})
 """Rows whose newest also stands at the beginning of each file."""
+CLOCK_SET_S, SHORTEST_S = 1.0, 10.0
+"""A wall clock that is farther off was set: a file begins, if this one is as old."""
 _HOUR_S = 3600.0
 _PIECE = 1 << 18
 
@@ -142,9 +145,9 @@ class RecordingWriter:
             self.finish()
 
     def _file_of(self, came: Incoming) -> McapFile:
-        """The file of this hour."""
+        """The file of this hour; another one where the wall clock was set."""
         file, at = self._file, came.at
-        if file is not None and at.wall // _HOUR_S == file.start.wall // _HOUR_S:
+        if file is not None and _is_of(file.start, at):
             return file
         self.finish()
         self._file = file = self._directory.begin(at)
@@ -152,6 +155,13 @@ class RecordingWriter:
             if one is not came:
                 file.add(one.channel, at, one.message)
         return file
+
+
+def _is_of(start: Instant, at: Instant) -> bool:
+    """Whether a file that began at ``start`` has the hour and clock of a moment."""
+    age_s = at.mono - start.mono
+    was_set = abs(at.wall - start.wall - age_s) > CLOCK_SET_S and age_s > SHORTEST_S
+    return not was_set and at.wall // _HOUR_S == start.wall // _HOUR_S
 
 
 def serve(source: BinaryIO, answers: BinaryIO) -> None:

@@ -107,7 +107,7 @@ async def test_what_came_in_is_there_byte_for_byte_with_its_time(site: Site) -> 
     body = b'{ "subscriptionId": "1", "data": [] }'
     site.hear(0.0, b'{"x":  1}')
     site.recorder.notification(body, at(0.125), ())
-    site.recorder.tick(Instant(START.mono + 0.25, START.wall + 1000.25))
+    site.recorder.tick(Instant(START.mono + 0.25, START.wall + 100.25))
     site.write(0.3)
     site.close()
 
@@ -116,7 +116,7 @@ async def test_what_came_in_is_there_byte_for_byte_with_its_time(site: Site) -> 
     assert privately(path) == [
         (ODOM, 0.0, b'{"x":  1}'),
         ("/ngsi/notifications", 0.125, body),
-        ("/iveg/ticks", 0.25, b'{"wall":1700001000.25,"mono":1000.25}'),
+        ("/iveg/ticks", 0.25, b'{"wall":1700000100.25,"mono":1000.25}'),
     ]
     assert [one[:2] for one in publicly(path)] == [
         (ODOM, "iveg.Measure"),
@@ -215,13 +215,20 @@ async def test_an_hour_has_a_file_of_its_own_and_a_clock_set_back_spoils_none(
     ]
 
 
-async def test_a_clock_that_is_set_within_an_hour_reorders_nothing(site: Site) -> None:
-    for n, wall in enumerate((0.0, 100.0, 50.0)):
-        then = Instant(START.mono + n, START.wall + wall)
+async def test_a_clock_that_is_set_within_an_hour_begins_a_file_and_reorders_nothing(
+    site: Site,
+) -> None:
+    set_by = {0.0: 0.0, 10.5: 0.9, 21.0: 100.0, 25.0: 50.0, 32.0: 50.0, 33.0: 50.0}
+    for mono, wall in set_by.items():
+        then = Instant(START.mono + mono, START.wall + mono + wall)
         site.recorder.measure(ODOM, b"{}", then)
-    site.write(3.0)
+    site.write(34.0)
     site.close()
-    assert [seconds for _, seconds, _ in privately(site.only())] == [0.0, 1.0, 2.0]
+
+    found = [privately(site.path / one) for one in site.names()]
+    # 25 s is too soon for another file.
+    told = [[seconds for _, seconds, _ in one] for one in found]
+    assert told == [[0.0, 10.5], [0.0, 1.0], [0.0, 4.0]]
 
 
 async def test_a_crash_costs_the_open_chunk_and_nothing_before(site: Site) -> None:

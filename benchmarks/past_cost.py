@@ -1,0 +1,174 @@
+"""How soon any second of the past is on the screen, beside a server that records.
+
+    python -m benchmarks.past_cost --robots 10 --hz 30 --record 120 --asked 40
+
+A real server records a fleet that talks.  A finished hour and 22 shorter files are
+made of what it recorded so far: the same messages under earlier times, so that the
+number of files and the size of one are those of a day; seconds are asked for where a
+file holds what was recorded then.  Half of them are in the file that is being written.
+
+*ready*: by a new viewer, for whom a process stands ready.  *none ready*: by another at
+once.  *next*: by the same, anywhere.  *page*: from the address to the robots' places.
+"""
+
+import argparse
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from random import Random
+
+import httpx
+from playwright.sync_api import Browser
+
+from benchmarks.glass import APIKEY, Place, talking_fleet
+from benchmarks.process import machine, percentile, print_table
+from iveg.adapters.recordings.mcap_file import McapFile
+from iveg.adapters.recordings.reading import RecordedMessage, read_messages
+from iveg.domain.observations import Instant
+from iveg.domain.stamps import format_stamp
+from tests.browsers import running_browser
+from tests.fleet import names
+from tests.processes import Site, site
+
+HEAD = ("question", "n", "P50 s", "P95 s", "worst s", "failed")
+HOURS = 24
+EVERY_S = 11.0
+"""Between two that come anew: a viewer is in use for ten seconds after a question."""
+_HOUR_S, _NS = 3600.0, 10**9
+_EDGE_S = 8.0
+"""At both ends of a file something may be missing, such as the first memory."""
+_WHOLE = "() => [...document.querySelectorAll('.card [data-field=x]')]" + (
+    ".filter((one) => one.textContent.trim() !== '—').length > 0 && performance.now()"
+)
+
+
+class Asked:
+    """Answers to one kind of question."""
+
+    def __init__(self) -> None:
+        self.took_s: list[float] = []
+        self.failed = 0
+
+    def row(self, name: str) -> list[str]:
+        """Of the table."""
+        took = sorted(self.took_s) or [float("nan")]
+        figures = percentile(took, 0.5), percentile(took, 0.95), took[-1]
+        told = [f"{one:.2f}" for one in figures]
+        return [name, str(len(self.took_s)), *told, str(self.failed)]
+
+
+def main() -> None:
+    """Measure what the command line asks for."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--robots", type=int, default=10)
+    parser.add_argument("--hz", type=float, default=30.0)
+    parser.add_argument("--record", type=float, default=120.0, help="at first (s)")
+    parser.add_argument("--asked", type=int, default=40)
+    parser.add_argument("--scene", default="calm")
+    asked = parser.parse_args()
+    settings = {
+        "IVEG_RECORDINGS": "on",
+        "IVEG_ROBOTS": ",".join(names(asked.robots)),
+        "IVEG_GREENHOUSE": "none",
+        "IVEG_APIKEY": APIKEY,
+    }
+    with (
+        tempfile.TemporaryDirectory() as name,
+        site(Path(name), **settings) as there,
+        running_browser() as browser,
+    ):
+        there.start("demo", "--no-emulator")
+        there.wait_until_whole()
+        port = int(there.settings["IVEG_MQTT_URL"].rpartition(":")[2])
+        place = Place(there.sign_in_link, port, [], [])
+        with talking_fleet(place, asked.robots, asked.scene, asked.hz):
+            time.sleep(asked.record)
+            folder = next(Path(name).rglob("*.mcap.open")).parent
+            _report(there, browser, _Day(folder), asked.asked)
+
+
+class _Day:
+    """Recordings of a day, of which one is being written."""
+
+    def __init__(self, folder: Path) -> None:
+        (self._written,) = folder.glob("*.mcap.open")
+        with read_messages(self._written) as reading:
+            self._start = reading.start
+            messages = list(reading)
+        self._length_s = (messages[-1][1] - messages[0][1]) / _NS
+        for hour in range(1, HOURS):
+            self._make(folder, hour, messages, _HOUR_S if hour == 1 else 0.0)
+        sizes = [one.stat().st_size for one in folder.glob("*.mcap*")]
+        print(
+            f"{len(sizes)} files, {sum(sizes) / 1e9:.2f} GB, of which a whole hour"
+            f" {max(sizes) / 1e9:.2f} GB; of {self._length_s:.0f} s"
+        )
+
+    def moments(self, rnd: Random) -> Iterator[float]:
+        """Unix seconds without end, every other one in the file that is written."""
+        while True:
+            since = self._start.wall
+            yield rnd.uniform(since + _EDGE_S, time.time() - _EDGE_S)
+            hour = rnd.choice((1, rnd.randrange(2, HOURS)))
+            ends = since - hour * _HOUR_S + self._length_s
+            yield rnd.uniform(ends - self._length_s + _EDGE_S, ends - _EDGE_S)
+
+    def _make(
+        self, folder: Path, hour: int, messages: list[RecordedMessage], before_s: float
+    ) -> None:
+        """A file of what was recorded, as of so many hours ago.
+
+        The same comes for ``before_s`` before it, under the wrong moments: it is to be
+        passed over.
+        """
+        turns = int(before_s / self._length_s)
+        length = round(self._length_s * _NS)
+        begun = self._start.later(-turns * self._length_s)
+        start = Instant(begun.mono, begun.wall - hour * _HOUR_S)
+        stem = format_stamp(start.wall)[: len("2026-11-24T10:00:00")]
+        path = folder / f"{stem.replace(':', '-')}Z.mcap"
+        file = McapFile(path.with_suffix(".making"), start)
+        for turn in range(turns, -1, -1):
+            shift = turn * length + round(hour * _HOUR_S * _NS)
+            for channel, log_time, payload in messages:
+                file.add_at(channel, log_time - shift, payload)
+        file.finish()
+        file.path.rename(path)
+
+
+def _report(there: Site, browser: Browser, day: _Day, count: int) -> None:
+    moments = day.moments(Random(7))  # noqa: S311 - repeatable on purpose
+    told = {name: Asked() for name in ("ready", "none ready", "next", "page")}
+    with there.api() as api:
+        for number in range(count):
+            time.sleep(EVERY_S)
+            for name in ("ready", "none ready"):
+                _ask(api, told[name], next(moments), f"{name[0]}-{number}")
+            _ask(api, told["next"], next(moments), f"r-{number}")
+    context = browser.new_context()
+    page = context.new_page()
+    page.goto(there.sign_in_link)
+    for _ in range(count):
+        time.sleep(EVERY_S)
+        page.goto(f"{there.url}/?t={format_stamp(next(moments))}")
+        found = page.wait_for_function(_WHOLE, timeout=60_000)
+        told["page"].took_s.append(found.json_value() / 1000.0)
+    context.close()
+    print_table(
+        f"First picture; {machine()}", HEAD, [a.row(n) for n, a in told.items()]
+    )
+
+
+def _ask(api: httpx.Client, to: Asked, wall: float, viewer: str) -> None:
+    began = time.monotonic()
+    asked = {"at": format_stamp(wall), "viewer": viewer}
+    answer = api.get("world", params=asked)
+    to.took_s.append(time.monotonic() - began)
+    if answer.status_code != 200:
+        to.failed += 1
+        print(answer.status_code, answer.text[:200])
+
+
+if __name__ == "__main__":
+    main()
