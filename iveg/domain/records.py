@@ -23,7 +23,8 @@ class DecisionRecord:
     """Cause and consequences of an alert or speed limit (docs/dashboard.md).
 
     Attributes:
-        kind: ``alert`` (somebody was confirmed) or ``mandate`` (a robot was told).
+        kind: ``alert`` (somebody was confirmed), ``mandate`` (a robot was told) or
+            ``late`` (made afterwards of what a robot kept in a gap; nothing acted).
         robot_id: The robot that was told; for an alert its observer.
         class_: Canonical (``person``, ``robot``); ``class_id`` as the detector said.
         confidence: 0 to 1.
@@ -39,7 +40,7 @@ class DecisionRecord:
     """
 
     decision_id: str
-    kind: Literal["alert", "mandate"]
+    kind: Literal["alert", "mandate", "late"]
     robot_id: str
     started_at: float
     person_id: str | None = None

@@ -41,7 +41,9 @@ class Decision(Model):
     """One decision: detection, observer, rule, and the robot's reaction."""
 
     decision_id: str
-    kind: Literal["alert", "mandate"]
+    kind: Literal["alert", "mandate", "late"] = Field(
+        description="`late`: made afterwards of what a robot kept during a gap."
+    )
     robot_id: str
     person_id: str | None
     observer: str | None
@@ -141,6 +143,8 @@ def sentence_of(record: DecisionRecord) -> Sentence:
     reason = "walker" if is_walker else record.reason or "default"
     if record.kind == "alert":
         key = "log.person_seen"
+    elif record.kind == "late":
+        key = "decision.late"
     elif record.in_sight is False:
         key = f"log.speed_down.{reason}_nlos"
     else:

@@ -188,7 +188,9 @@ MEANINGS_APART: Final[Mapping[tuple[str, str], Meaning]] = {
     ("odometry", "x"): Meaning("Position of the robot.", "m", "map"),
     ("odometry", "y"): Meaning("Position of the robot.", "m", "map"),
     ("log", "at"): _time("It happened."),
-    ("decisions", "kind"): Meaning("`alert` or `mandate` (a speed limit)."),
+    ("decisions", "kind"): Meaning(
+        "`alert`, `mandate` (a speed limit) or `late` (made after a gap)."
+    ),
     ("commands", "kind"): Meaning("`stop`, `release`, `resume` or `goal`."),
     ("readings", "kind"): Meaning("The sensor, such as `battery`."),
     ("readings", "value"): Meaning("By name of its fields (docs/interfaces/mqtt.md)."),

@@ -1,9 +1,10 @@
 """What robots kept during a gap, on its way into the history and nowhere else.
 
-Nothing here reaches the world, the rule or a STOP.  A message becomes a row only where
-iVeg itself heard nothing of the robot, so that nobody can write over what was live.
-Its moment is the batch's arrival less its age on the robot's monotonic clock: a wall
-clock that is wrong dates nothing.
+Nothing here reaches the world, the rule or a STOP.  What the rule would have decided of
+it is a record of its own kind, made afterwards (``late_decision.py``).  A message
+becomes a row only where iVeg itself heard nothing of the robot, so that nobody can
+write over what was live.  Its moment is the batch's arrival less its age on the robot's
+monotonic clock: a wall clock that is wrong dates nothing.
 """
 
 from collections import Counter, OrderedDict, defaultdict
@@ -26,6 +27,7 @@ from iveg.domain.observations import (
 )
 from iveg.domain.records import DetectionRecord, OdometryRecord
 from iveg.domain.transports import DIRECT
+from iveg.pipeline.late_decision import LateDecisions
 from iveg.pipeline.record import RecordSink
 
 PART = "backfill"
@@ -54,6 +56,7 @@ class _Robot:
     due: dict[type[Observation], float] = field(default_factory=dict)
     pose: tuple[Pose2D, float] | None = None
     applied: float | None = None
+    decisions: LateDecisions = field(default_factory=LateDecisions)
     room: float = _MOST_AT_ONCE
     room_at: float = float("-inf")
 
@@ -159,11 +162,17 @@ class Backfill:
         pose = None
         if robot.pose is not None and abs(at.mono - robot.pose[1]) <= _POSE_LASTS_S:
             pose = robot.pose[0]
+        seen: list[DetectionRecord] = []
         for one in frame.detections:
             if rule.class_of(one.class_id) is not None:
                 framed = next(filter(None, resolve_box(one, description)), None)
                 place = _place(framed, pose)
-                self._sink.enqueue(_detection_row(one, frame, framed, place, rule, at))
+                seen.append(_detection_row(one, frame, framed, place, rule, at))
+        decided = robot.decisions.judge(seen, pose, robot.applied, rule, frame.origin)
+        for row in seen:
+            self._sink.enqueue(row)
+        for decision in decided:
+            self._sink.enqueue(decision)
 
 
 def _pose_row(one: Odometry, applied: float | None, at: Instant) -> OdometryRecord:

@@ -50,7 +50,7 @@ def record_of(decision: SlowdownDecision) -> DecisionRecord:
         ended_at=wall_of(decision.ended),
         speed_before=crossing.speed_before,
         speed_after=decision.speed_after,
-        links=[_link(link) for link in decision.links()],
+        links=[write_link(link) for link in decision.links()],
     )
 
 
@@ -76,7 +76,7 @@ def left_behind(record: DecisionRecord, found: float) -> DecisionRecord:
         {**link, "verdict": "unknown"} if link["verdict"] == "open" else link
         for link in record.links
     ]
-    links.append(_link(Link("interrupted", "unknown", found)))
+    links.append(write_link(Link("interrupted", "unknown", found)))
     return replace(record, ended_at=found, links=links)
 
 
@@ -113,7 +113,8 @@ def _looks(looks: Looks) -> dict[str, object]:
     return told
 
 
-def _link(link: Link) -> dict[str, object]:
+def write_link(link: Link) -> dict[str, object]:
+    """A link as it is stored."""
     return {
         "link": link.name,
         "at": link.at,

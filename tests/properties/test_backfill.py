@@ -3,12 +3,18 @@
 from typing import Any
 
 import orjson
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from iveg.adapters.backfill import BackfillReader
 from iveg.domain.observations import Origin, Received
-from iveg.domain.records import DetectionRecord, OdometryRecord
+from iveg.domain.records import (
+    AlertRecord,
+    DecisionRecord,
+    DetectionRecord,
+    OdometryRecord,
+)
 from iveg.domain.transports import DIRECT
 from iveg.ngsi import codec
 from tests.builders import detection, detection_frame, odometry, safety_report
@@ -111,6 +117,8 @@ class Played:
             [desk.commander.machine(one).state for one in ("AGI", "AGII")],
             [(one.link(now), one.odometry) for one in desk.world.live_robots()],
             dict(desk.world.counters),
+            [one for one in desk.records(DecisionRecord) if one.kind != "late"],
+            desk.records(AlertRecord),
         )
 
     def rows(self, kind: type[Any]) -> list[Any]:
@@ -155,6 +163,33 @@ def test_a_gap_is_filled_in_its_place_and_once() -> None:
     assert counters["backfill.taken"] == 3
     assert counters["backfill.heard_live"] == 4
     assert counters["backfill.duplicate"] == 3
+
+
+def test_what_nobody_could_decide_in_a_gap_is_decided_afterwards_and_once() -> None:
+    messages = [kept("report", 1, 90.0, 0.0, "b"), kept("pose", 2, 90.0, 7.0, "b")]
+    # Somebody 1, 1.5, 5 and 1 m ahead, the last one after 4 s.
+    for seq, (at, ahead) in enumerate(
+        ((90.1, 1.0), (91.0, 1.5), (92.0, 5.0), (95.0, 1.0)), 3
+    ):
+        pose = kept("pose", 2 * seq, at - 0.1, 7.0, "b")
+        messages += [pose, kept("picture", 2 * seq + 1, at, 7.0 + ahead, "b")]
+    whole = batch(messages)
+
+    run = Played(whole, whole)
+
+    rows = [one for one in run.desk.records(DecisionRecord) if one.kind == "late"]
+    first, second = {one.decision_id: one for one in rows}.values()
+    began = run.desk.clock().wall - 17.75 + 6.1
+    assert (first.robot_id, first.class_, first.speed_factor) == ("AGI", "person", 0.5)
+    assert (first.started_at, first.ended_at) == pytest.approx((began, began + 0.9))
+    assert (second.started_at, second.ended_at) == pytest.approx((began + 4.9,) * 2)
+    assert first.distance_m == pytest.approx(1.0)
+    verdicts = {one["link"]: one["verdict"] for one in first.links}
+    assert verdicts == {
+        **dict.fromkeys(("detection", "filter", "geometry", "rule", "applied"), "ok"),
+        **dict.fromkeys(("feedback", "observed"), "n/a"),
+    }
+    assert run.told == _PLAIN.told
 
 
 def test_bad_batches_are_counted_and_a_flood_ends() -> None:

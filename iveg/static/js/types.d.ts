@@ -245,7 +245,8 @@ export type Coverage = {
 /** One decision: detection, observer, rule, and the robot's reaction. */
 export type Decision = {
   decision_id: string;
-  kind: "alert" | "mandate";
+  /** `late`: made afterwards of what a robot kept during a gap. */
+  kind: "alert" | "mandate" | "late";
   robot_id: string;
   person_id: string | null;
   observer: string | null;
