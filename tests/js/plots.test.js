@@ -1,5 +1,6 @@
 import {
   distancesOf,
+  lateSpansOf,
   limitsOf,
   marginsOf,
   ringsOf,
@@ -71,6 +72,25 @@ test("28.6: a margin that was not known breaks its line", () => {
   const samples = marginsOf(past({})).map((one) => ({ ...one, at: one.at - T0 }));
   const line = { kind: "", name: "", samples, gapMs: 9000 };
   equal(pathOf(line, place), "M0 -2h0M4000 2h0");
+});
+
+test("what came after a gap is framed in each plot, and named beside it", () => {
+  const poses = [0, 0.5, 1, 3, 3.5, 9].map((s) => ({ ...pose(s, s), late: s > 0.2 }));
+  const spans = lateSpansOf(past({ poses }));
+  const told = spans.map(({ since, until }) => [since - T0, until - T0]);
+  equal(told, [
+    [500, 1000],
+    [3000, 3500],
+    [9000, 9000],
+  ]);
+
+  const i18n = /** @type {any} */ ({ number: String, time: String, t: String });
+  const lines = [{ kind: "speed", name: "speed", samples: [{ at: T0, value: 1 }] }];
+  const late = spans.map((one) => ({ ...one, name: "came late" }));
+  const drawn = { title: "", says: "", span: { since: T0, until: T0 + 10_000 }, lines };
+  const plot = makePlot({ ...drawn, late }, i18n);
+  equal(plot?.querySelectorAll(".plot__late").length, 3);
+  equal(plot?.querySelector('[data-kind="late"]')?.textContent, "came late");
 });
 
 test("28.6: of what goes on for long the beginning is told, with what was before", () => {

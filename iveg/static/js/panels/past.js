@@ -115,6 +115,25 @@ export function ringsOf({ sightings, span }, radiusM) {
   return rings;
 }
 
+/**
+ * The times whose poses the robot sent after a gap.
+ *
+ * @param {Past} past
+ * @returns {Span[]}
+ */
+export function lateSpansOf({ poses }) {
+  /** @type {Span[]} */
+  const spans = [];
+  for (const { at, late } of poses) {
+    if (!late) continue;
+    const moment = Date.parse(at);
+    const last = spans.at(-1);
+    if (last && moment - last.until <= POSE_GAP_MS) last.until = moment;
+    else spans.push({ since: moment, until: moment });
+  }
+  return spans;
+}
+
 /** @param {Pose[]} poses @param {number} moment */
 function poseAt(poses, moment) {
   const after = poses.findIndex(({ at }) => Date.parse(at) >= moment);

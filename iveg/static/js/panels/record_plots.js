@@ -7,7 +7,14 @@
  */
 
 import { make } from "./dom.js";
-import { distancesOf, limitsOf, marginsOf, ringsOf, speedsOf } from "./past.js";
+import {
+  distancesOf,
+  lateSpansOf,
+  limitsOf,
+  marginsOf,
+  ringsOf,
+  speedsOf,
+} from "./past.js";
 import { makePlot } from "./plot.js";
 
 /** Nobody is between two looks for longer. */
@@ -32,6 +39,7 @@ export function makePlots(past, { shade, radiusM, speedSaid }, i18n) {
           { ...lineOf("limit", limitsOf(past), i18n), isStep: true },
         ],
         shade,
+        late: lateOf(past, i18n),
       },
       i18n,
     ),
@@ -63,6 +71,7 @@ function makeDistance(past, radiusM, shade, i18n) {
       span: past.span,
       lines: [away, lineOf("ring", ringsOf(past, radiusM), i18n)],
       shade,
+      late: lateOf(past, i18n),
     },
     i18n,
   );
@@ -81,10 +90,15 @@ function makeMargin(past, shade, i18n) {
       span: past.span,
       lines: [{ ...lineOf("margin", margins, i18n), gapMs: UNSEEN_MS }],
       shade,
+      late: lateOf(past, i18n),
     },
     i18n,
   );
 }
+
+/** @param {Past} past @param {I18n} i18n */
+const lateOf = (past, i18n) =>
+  lateSpansOf(past).map((one) => ({ ...one, name: i18n.t("plot.key.late") }));
 
 /** @param {string} kind @param {import("./plot.js").Sample[]} samples @param {I18n} i18n */
 const lineOf = (kind, samples, i18n) => ({
