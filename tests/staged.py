@@ -7,6 +7,7 @@ from iveg.domain.events import Condition
 from iveg.domain.feedback import CLEAR, SpeedLimit
 from iveg.domain.margins import SafetyMargin
 from iveg.domain.observations import Hold
+from iveg.domain.rule.premises import Missing
 from iveg.domain.situation.facts import Near, RobotFacts
 from iveg.domain.situation.judge import situation_of
 from iveg.models.situation import Situation
@@ -36,6 +37,10 @@ UNSEEN = replace(AISLE_3, unseen_s=4.1)
 HALF = safety_report("AGI", speed_factor=0.5, reason="person")
 TOLD = SpeedLimit(0.5, "person", "P1", 1.4)
 LOCKED = safety_report("AGI", Hold("x", "hw", "local"))
+AHEAD = replace(AISLE_3, distance_m=3.4, foretold_s=1.8)
+WALL_OF_CRATES = Near("obstacle", None, 0.9)
+AT_THE_NORTH_END = replace(AISLE_3, lane="Cabecera norte", unseen_s=1.2)
+"""The place with the longest name."""
 MARGIN = SafetyMargin("AGI", "P1", 1.4, 1.3, 0.8, 1.2, 0.1, 0.5)
 
 STAGED = {
@@ -73,13 +78,65 @@ STAGED = {
         facts(report=HALF, near=UNSEEN, limit=TOLD, told_near=UNSEEN),
         "caution",
         ("a media velocidad", "hubo una persona en el pasillo 3", "hace 4 s"),
-        ("at half speed", "a person was in aisle 3", "unseen for 4 s"),
+        ("at half speed", "a person was in aisle 3", "4 s ago"),
     ),
     "too close to stop": (
         facts(margin=MARGIN, margin_near=AISLE_3),
         "caution",
         ("faltan 2,3 m para parar a tiempo", "persona en el pasillo 3"),
         ("2.3 m short of a safe stop", "person in aisle 3"),
+    ),
+    "too close to where somebody was": (
+        facts(margin=MARGIN, margin_near=AT_THE_NORTH_END),
+        "caution",
+        ("faltan 2,3 m", "hubo una persona en la cabecera norte hace 1 s"),
+        ("2.3 m short", "a person was at the north end, 1 s ago"),
+    ),
+    "a zone ahead": (
+        facts(report=HALF, near=AHEAD, limit=TOLD, told_near=AHEAD),
+        "caution",
+        ("a media velocidad", "persona a 3,4 m, su zona en 1,8 s"),
+        ("at half speed", "person at 3.4 m, its zone in 1.8 s"),
+    ),
+    "something that only a laser sees": (
+        facts(
+            report=safety_report("AGI", speed_factor=0.5, reason="obstacle"),
+            near=WALL_OF_CRATES,
+        ),
+        "caution",
+        ("a media velocidad", "alguien o algo a 0,9 m (láser)"),
+        ("at half speed", "somebody or something at 0.9 m (laser)"),
+    ),
+    "stands for what a laser sees": (
+        facts(
+            report=safety_report("AGI", speed_factor=0.0, reason="obstacle"),
+            near=WALL_OF_CRATES,
+            stands=True,
+        ),
+        "caution",
+        ("se ha parado por sí mismo", "alguien o algo a 0,9 m (láser)"),
+        ("stands by itself", "somebody or something at 0.9 m (laser)"),
+    ),
+    "nobody supervises": (
+        facts(report=safety_report("AGI", speed_factor=0.5, reason="unsupervised")),
+        "doubt",
+        ("a media velocidad", "nadie lo supervisa"),
+        ("at half speed", "nobody supervises it"),
+    ),
+    "hears no server": (
+        facts(report=safety_report("AGI", speed_factor=0.5, reason="watchdog")),
+        "doubt",
+        ("a media velocidad", "no le llega nada del servidor", "mire la batería"),
+        ("at half speed", "hears nothing from the server", "check battery"),
+    ),
+    "a camera is silent": (
+        facts(
+            report=safety_report("AGI", speed_factor=0.5, reason="stale"),
+            missing=(Missing("detector", "AGII"),),
+        ),
+        "doubt",
+        ("a media velocidad", "no se lee la cámara de AGII", "revise esa cámara"),
+        ("at half speed", "the camera of AGII is not being read", "check that camera"),
     ),
     "stopping": (
         facts(stop="SENT"),

@@ -97,6 +97,26 @@ def test_every_word_that_templates_ask_for_exists() -> None:
     assert missing(asked) == []
 
 
+_ANY_NAME = re.compile(r"[a-zA-Z]\w*(?:\.[\w/-]+)+")
+_FAMILY = re.compile(
+    r"""["'`]([a-z]\w*(?:\.[\w-]*)+)(?:\$?\{|["']\ ~)"""  # then something else
+    r"""|named\(\s*"([\w.]+)"|["'`]([a-z]\w*(?:\.\w+)*\.)["'`]"""
+)
+
+
+def test_no_word_is_kept_that_nothing_asks_for() -> None:
+    """A family that is asked for by a prefix, as ``log.stop.``, counts as a whole."""
+    text = sources("iveg", ".js", ".html", ".py")
+    named = set(_ANY_NAME.findall(text))
+    families = tuple(
+        before or inside or f"{block}."
+        for before, block, inside in _FAMILY.findall(text)
+        if before or inside or block
+    )
+    idle = [key for key in ES.sentences if key not in named]
+    assert [key for key in idle if not key.startswith(families)] == []
+
+
 def test_every_sentence_that_the_server_names_exists() -> None:
     asked = _IN_PYTHON.findall(sources("iveg/pipeline", ".py"))
     assert len(asked) > 10

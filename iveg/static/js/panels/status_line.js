@@ -20,8 +20,10 @@ const TICK_MS = 200;
 const BACK_SHOWN_MS = 3000;
 /** A first connection quicker than this is not worth a word (ms). */
 const PATIENCE_MS = 1500;
-/** More letters than this are smaller on a phone. */
+/** More letters than this are smaller on a phone; than that, everywhere: long names of
+ * robots, and a sentence of now over a map of then. */
 const LONG = 64;
+const VERY_LONG = 86;
 /** What lasts less than this is not told (ms). */
 export const LASTS_MS = 1000;
 
@@ -53,6 +55,7 @@ export function createStatusLine({ store, i18n }) {
     const isPast = document.body.hasAttribute("data-past");
     const said = isPast ? i18n.t("past.now", { said: shown.said }) : shown.said;
     place.toggleAttribute("data-long", said.length > LONG);
+    place.toggleAttribute("data-very-long", said.length > VERY_LONG);
     setText(need("#status-said"), said);
     if (shown.robotId) setAttribute(place, "href", addressOf(shown.robotId));
     else place.removeAttribute("href");
