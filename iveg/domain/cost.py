@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import floor
 
+from iveg.domain.fleet import as_counted
 from iveg.domain.greenhouse import Greenhouse
 
 SLOT_S = 10.0
@@ -247,7 +248,10 @@ def costs(
             outside[robot] = _with(before, slot)
         else:
             found[task.task_id] = _with(found[task.task_id], slot)
-    return [*found.values(), *(outside[robot] for robot in sorted(outside))]
+    return [
+        *found.values(),
+        *(outside[robot] for robot in sorted(outside, key=as_counted)),
+    ]
 
 
 def _with(cost: TaskCost, slot: SlowSlot) -> TaskCost:

@@ -18,8 +18,16 @@ Frame = Literal["map", "base_link", "camera_link", "camera_optical_frame"]
 """Frames that a box may be in (REP-105); the last has optical axes (REP-103)."""
 
 ROBOT_ID = re.compile(r"[A-Za-z0-9-]{1,64}")
+_NUMBER = re.compile(r"(\d+)")
 RESERVED_IDS = frozenset({"climate", "iveg-canary", "iveg-doctor"})
 """Ids of devices that are no robots (docs/interfaces/README.md)."""
+
+
+def as_counted(robot_id: str) -> tuple[tuple[str, int], ...]:
+    """Sorts names as people count: R2 before R10."""
+    parts = _NUMBER.split(robot_id)
+    numbers = [int(number) for number in parts[1::2]]
+    return tuple(zip(parts[::2], [*numbers, 0], strict=True))
 
 
 @dataclass(frozen=True, slots=True)

@@ -80,7 +80,7 @@ def frozen_page(
     context.add_cookies(
         [{"name": name, "value": look, "url": past.url} for name, look in looks.items()]
     )
-    page.clock.install(time=NOW - 1.0)
+    page.clock.install(time=NOW - 60.0)
     page.clock.pause_at(NOW)
 
     def answer(line: WebSocketRoute) -> None:

@@ -12,12 +12,19 @@ from itertools import groupby
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from playwright.sync_api import Browser, Page, WebSocketRoute
+from playwright.sync_api import (
+    Browser,
+    Error,
+    Page,
+    StorageState,
+    WebSocketRoute,
+)
 
 from tests.browsers import running_browser
 from tests.e2e.frozen import Frozen, frozen_page, past_site, settle
 from tests.e2e.reading import COVERED_STOPS, OVERFLOW, RUN_OVER, evaluate
 from tests.pictures.pairs import Case, covering
+from tests.pictures.people import signed_in_admin
 from tests.pictures.scenes import IDS, SITUATIONS, fleet
 from tests.pictures.sheet import Picture, sheet_of
 from tests.processes import Site
@@ -35,6 +42,14 @@ PAGES = {
     "day": "/day",
     "compare": "/compare",
     "fleet": "/fleet",
+    "command": "/commands/C1",
+    "experiments": "/experiments",
+    "what-if": "/what-if",
+    "account": "/account",
+    "users": "/users",
+    "tokens": "/tokens",
+    "sessions": "/sessions",
+    "audit": "/audit",
     "climate": "/climate",
     "latency": "/latency",
     "settings": "/settings",
@@ -57,6 +72,10 @@ READY = {
     "commands": "#orders-rows tbody tr",
     "decision": ".chain li",
     "history": "#chart-stops .main-svg",
+    **{
+        name: f"#{name}-rows tbody tr"
+        for name in ("users", "tokens", "sessions", "audit")
+    },
     "climate": "#trend-co2 .main-svg",
 }
 """What a page is about; of the others their frame will do."""
@@ -74,8 +93,10 @@ def main(folder: Path) -> None:
     with running_browser() as browser:
         for robots, some in groupby(cases, key=lambda case: case["robots"]):
             with _site(int(robots)) as past:
+                admin = signed_in_admin(browser, past)
                 for case in some:
-                    pictures.append(_take(browser, past, case, folder, len(pictures)))
+                    taken = _take(browser, past, admin, case, folder, len(pictures))
+                    pictures.append(taken)
                     print(pictures[-1].said, flush=True)
     sheet_of(pictures).save(folder / "sheet.png", optimize=True)
     wrong = [one.said for one in pictures if one.found]
@@ -91,7 +112,14 @@ def _site(robots: int) -> Iterator[Site]:
             yield past
 
 
-def _take(browser: Browser, past: Site, case: Case, folder: Path, n: int) -> Picture:
+def _take(
+    browser: Browser,
+    past: Site,
+    admin: StorageState,
+    case: Case,
+    folder: Path,
+    n: int,
+) -> Picture:
     """One picture of a page that has come to rest."""
     wide, high = (int(side) for side in case["window"].split("x"))
     told = fleet(int(case["robots"]), case["situation"])
@@ -102,12 +130,13 @@ def _take(browser: Browser, past: Site, case: Case, folder: Path, n: int) -> Pic
         browser, past, (wide, high), *look, tell=lambda: told, lines=lines
     ) as page:
         page.on("pageerror", lambda error: errors.append(str(error)))
-        page.goto(past.url + PAGES[case["page"]])
+        page.context.add_cookies(admin["cookies"])
         try:
+            page.goto(past.url + PAGES[case["page"]])
             settle(page, READY.get(case["page"], "body"))
-        except AssertionError as error:
+        except (AssertionError, Error) as error:
             # One page that is late, or broken, is no reason to take no more pictures.
-            errors.append(str(error))
+            errors.append(str(error).splitlines()[0])
         if case["situation"] == "no server" and lines:
             _lose(page, lines)
         elif lines:

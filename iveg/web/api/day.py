@@ -16,6 +16,7 @@ from iveg.domain.day import (
     slowed_minutes,
     worked_minutes,
 )
+from iveg.domain.fleet import as_counted
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.records import CommandRecord, DecisionRecord
 from iveg.domain.stamps import format_stamp
@@ -102,11 +103,13 @@ class _Reading:
             day=day.isoformat(),
             since=format_stamp(since),
             until=format_stamp(until),
-            robots=sorted({pose.robot_id for pose in poses}),
+            robots=sorted({pose.robot_id for pose in poses}, key=as_counted),
             worked=[
                 Worked(lane=lane, robot_id=robot, minutes=round(minutes, 1))
                 for lane, robots in worked.items()
-                for robot, minutes in sorted(robots.items())
+                for robot, minutes in sorted(
+                    robots.items(), key=lambda one: as_counted(one[0])
+                )
             ],
             slowed=[
                 Slowed(cause=cause, lane=lane, minutes=round(minutes, 1))

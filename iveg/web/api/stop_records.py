@@ -12,6 +12,7 @@ from fastapi import APIRouter, Depends, HTTPException, Path, Query, Response
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.series import CommandLatency
 from iveg.domain.errors import HopError
+from iveg.domain.fleet import as_counted
 from iveg.domain.observations import Instant
 from iveg.domain.records import ByTransport, CommandRecord
 from iveg.domain.stamps import format_stamp
@@ -105,7 +106,8 @@ def _by_robot(found: Iterable[CommandLatency]) -> list[RobotLatency]:
     by_robot: dict[str, list[CommandLatency]] = defaultdict(list)
     for one in found:
         by_robot[one.robot_id].append(one)
-    return [_robot(robot_id, stops) for robot_id, stops in sorted(by_robot.items())]
+    robots = sorted(by_robot, key=as_counted)
+    return [_robot(robot_id, by_robot[robot_id]) for robot_id in robots]
 
 
 def _robot(robot_id: str, stops: list[CommandLatency]) -> RobotLatency:

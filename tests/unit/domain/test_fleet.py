@@ -5,6 +5,7 @@ from iveg.domain.fleet import (
     CAUTIOUS,
     FleetDescription,
     RobotDescription,
+    as_counted,
     split_word,
 )
 
@@ -23,6 +24,11 @@ def test_nobody_whom_iveg_describes_is_larger_or_brakes_worse_than_the_unknown()
 def test_a_robot_outside_the_fleet_is_one_that_nobody_described() -> None:
     assert FleetDescription().of_robot("X1") == RobotDescription("X1")
     assert not FleetDescription().of_robot("X1").is_described
+
+
+def test_names_of_robots_are_sorted_as_people_count() -> None:
+    counted = ["AGI", "AGII", "R1", "R2", "R2b", "R10", "bay2-R3", "bay10-R1"]
+    assert sorted(sorted(counted), key=as_counted) == counted
 
 
 @pytest.mark.parametrize(
