@@ -16,7 +16,7 @@ _T = TypeVar("_T")
 
 
 class FileByRobot(Generic[_T]):
-    """Implements ``pipeline.ports.Store``.
+    """Implements ``pipeline.ports.ChoiceStore``.
 
     Args:
         path: The file.

@@ -17,7 +17,7 @@ _READER = TypeAdapter(Contacts)
 
 
 class FileContacts:
-    """The contacts in one file; implements ``pipeline.ports.Store``."""
+    """The contacts in one file; implements ``pipeline.ports.ChoiceStore``."""
 
     def __init__(self, path: Path) -> None:
         self._path = path

@@ -58,7 +58,7 @@ class FileJournal:
                 entry = orjson.loads(line)
                 robot_id, by = str(entry["robot_id"]), str(entry["by"])
                 stopped = _STOPPED[entry["desired"]]
-                memory[robot_id].take(entry, by, stopped=stopped)
+                memory[robot_id].read_line(entry, by, stopped=stopped)
             except (orjson.JSONDecodeError, KeyError, TypeError):
                 _log.warning("%s, line %d: not readable, skipped", self._path, number)
         if not self._is_newer:
@@ -169,7 +169,7 @@ class _Memory:
         self._asked: tuple[str, ...] = ()
         self._challenge: str | None = None
 
-    def take(self, entry: Json, by: str, *, stopped: bool) -> None:
+    def read_line(self, entry: Json, by: str, *, stopped: bool) -> None:
         """Read one line more."""
         # A line of the earlier version does not say what a release has named.
         told = entry.get("named")

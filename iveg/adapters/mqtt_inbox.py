@@ -111,7 +111,7 @@ class InboxClient(aiomqtt.Client):
     def _read(self, line: "ReadAhead") -> None:
         """Read what is there; then rest, or wait for an event if there was nothing."""
         try:
-            has_come = line.take()
+            has_come = line.read_ahead()
             while line is self._client._sock and line.pending():
                 self._client.loop_read()
         except Exception as error:  # as aiomqtt: the connection broke
@@ -160,7 +160,7 @@ class ReadAhead:
         """Whether the library has something to read: its packets, or the end."""
         return self._has_ended or bool(self._held)
 
-    def take(self) -> bool:
+    def read_ahead(self) -> bool:
         """Take what has come from the wire; whether anything had, or it has ended."""
         came = self._came()
         if came is None:

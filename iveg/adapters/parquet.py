@@ -60,13 +60,13 @@ class ParquetTable:
         self._rows += len(records)
         if self._rows >= ROWS_A_GROUP:
             self._write_group()
-        return self._sink.take()
+        return self._sink.drain()
 
     def end(self) -> bytes:
         """The rest of the file."""
         self._write_group()
         self._writer.close()
-        return self._sink.take()
+        return self._sink.drain()
 
     def _write_group(self) -> None:
         batches, self._batches, self._rows = self._batches, [], 0
@@ -127,7 +127,7 @@ class _Sink(io.RawIOBase):
         self._size += len(told)
         return len(told)
 
-    def take(self) -> bytes:
+    def drain(self) -> bytes:
         """What came since the last time."""
         pieces, self._pieces = self._pieces, []
         return b"".join(pieces)

@@ -16,7 +16,7 @@ FORM = Form("trial")
 
 
 class FileTrials:
-    """The trial; implements ``pipeline.ports.Store``."""
+    """The trial; implements ``pipeline.ports.ChoiceStore``."""
 
     def __init__(self, path: Path) -> None:
         self._path = path

@@ -14,7 +14,7 @@ from iveg.domain.robot_state import RobotState
 from iveg.domain.world import World
 from iveg.pipeline import topics
 from iveg.pipeline.event_log import EventLog
-from iveg.pipeline.ports import Store
+from iveg.pipeline.ports import ChoiceStore
 
 
 class Detectors:
@@ -30,7 +30,7 @@ class Detectors:
     def __init__(
         self,
         world: World,
-        store: Store[Mapping[str, OutOfService]],
+        store: ChoiceStore[Mapping[str, OutOfService]],
         event_log: EventLog,
         kept: Mapping[str, OutOfService],
     ) -> None:

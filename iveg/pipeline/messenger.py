@@ -30,7 +30,7 @@ from iveg.domain.messages import (
 )
 from iveg.pipeline.alerting import Alerting
 from iveg.pipeline.event_log import EventLog
-from iveg.pipeline.ports import Clock, MessageSender, Store
+from iveg.pipeline.ports import ChoiceStore, Clock, MessageSender
 
 _log = logging.getLogger(__name__)
 
@@ -55,7 +55,7 @@ class Messenger:
     def __init__(
         self,
         contacts: Contacts,
-        store: Store[Contacts],
+        store: ChoiceStore[Contacts],
         senders: Mapping[Channel, MessageSender],
         alerts: Alerting,
         event_log: EventLog,

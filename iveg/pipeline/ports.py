@@ -109,7 +109,7 @@ class RuleStore(Protocol):
         """Write a new version down; returns when it is on disk. Raises HopError."""
 
 
-class Store(Protocol[_Kept]):
+class ChoiceStore(Protocol[_Kept]):
     """Storage of what people chose, such as the trial of a rule."""
 
     async def save(self, kept: _Kept, /) -> None:

@@ -19,7 +19,7 @@ from iveg.domain.world import World
 from iveg.pipeline import topics
 from iveg.pipeline.command import Commander
 from iveg.pipeline.event_log import EventLog
-from iveg.pipeline.ports import BrokerAccess, Clock, Store
+from iveg.pipeline.ports import BrokerAccess, ChoiceStore, Clock
 
 Pause = Callable[[float], Awaitable[None]]
 STOOD_WITHIN_S = 3.0
@@ -45,7 +45,7 @@ class Revocations:
         self,
         world: World,
         commander: Commander,
-        store: Store[Mapping[str, Revocation]],
+        store: ChoiceStore[Mapping[str, Revocation]],
         access: BrokerAccess,
         event_log: EventLog,
         clock: Clock,

@@ -16,10 +16,10 @@ from iveg.pipeline.mapping import Mapper
 from iveg.pipeline.messenger import Messenger
 from iveg.pipeline.ports import (
     BrokerAccess,
+    ChoiceStore,
     Clock,
     MessageSender,
     RuleStore,
-    Store,
 )
 from iveg.pipeline.revocations import Pause, Revocations
 from iveg.pipeline.rules import Rules
@@ -39,10 +39,10 @@ class KeptChoices:
     """
 
     rule_store: RuleStore
-    contact_store: Store[Contacts]
-    detector_store: Store[Mapping[str, OutOfService]]
-    trial_store: Store[Trial | None]
-    revocation_store: Store[Mapping[str, Revocation]]
+    contact_store: ChoiceStore[Contacts]
+    detector_store: ChoiceStore[Mapping[str, OutOfService]]
+    trial_store: ChoiceStore[Trial | None]
+    revocation_store: ChoiceStore[Mapping[str, Revocation]]
     broker_access: BrokerAccess
     rules: Sequence[DetectionRule] = ()
     contacts: Contacts = field(default_factory=Contacts)

@@ -25,7 +25,7 @@ from iveg.domain.tracking.sight import AllClear
 from iveg.domain.witness import Plan
 from iveg.domain.world import World
 from iveg.pipeline.evaluate import Evaluator
-from iveg.pipeline.ports import Clock, Store
+from iveg.pipeline.ports import ChoiceStore, Clock
 from iveg.pipeline.rules import Rules
 from iveg.pipeline.supervision import Supervision
 
@@ -182,7 +182,7 @@ class Trials:
         shadow: ShadowRule,
         evaluator: Evaluator,
         rules: Rules,
-        store: Store[Trial | None],
+        store: ChoiceStore[Trial | None],
         kept: Trial | None,
         clock: Clock,
     ) -> None:

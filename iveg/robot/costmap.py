@@ -94,7 +94,7 @@ class FleetCostmap:
         """Note iVeg's clock, by which scans are stamped too."""
         self._iveg_s = feedback.origin.stamp_s or self._iveg_s
 
-    def take(self) -> list[PeerScan]:
+    def drain_scans(self) -> list[PeerScan]:
         """The newest scan of each peer since the last time."""
         waiting, self._waiting = self._waiting, {}
         return list(waiting.values())

@@ -107,7 +107,7 @@ class RobotGoals:
         self._is_there = False
         self._judged: dict[str, GoalAnswer] = {}
 
-    def take(self, order: GoalOrder | CancelOrder, facts: Facts) -> list[GoalAnswer]:
+    def answer(self, order: GoalOrder | CancelOrder, facts: Facts) -> list[GoalAnswer]:
         """Judge the first copy of an order; give every other the same answer."""
         if isinstance(order, CancelOrder):
             return self._cancel(order.goal_id)

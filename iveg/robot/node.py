@@ -316,7 +316,7 @@ class RobotNode:
             else:
                 # First what the machine knows by now: the link may have just been lost.
                 self._perform(self._machine.tick(now), now)
-                self._tell_goal(self._goals.take(order, self._facts(now)))
+                self._tell_goal(self._goals.answer(order, self._facts(now)))
         elif topic == self._desired_topic:
             self._perform(self._machine.desired(payload, now), now)
         elif self._on_peer_scan is not None and topic.endswith(_PEER_SCAN):

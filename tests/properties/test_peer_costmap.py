@@ -83,7 +83,7 @@ def test_nothing_is_free_that_the_senders_scan_does_not_say_is_free(
 ) -> None:
     pose = Pose2D(0.4, -0.3, yaw)
     costmap = hear(one, pose)
-    found = costmap.draw(costmap.take(), (), FAR_OFF, 0.0)
+    found = costmap.draw(costmap.drain_scans(), (), FAR_OFF, 0.0)
 
     laser = pose.compose(one.mount)
     free = np.argwhere(found.data == 0)
@@ -137,7 +137,7 @@ def test_whatever_a_peers_scan_says_no_factor_changes(
 
     for payload in payloads:
         node._on_message(TOPIC, payload)
-    drawn = costmap.draw(costmap.take(), (), FAR_OFF, 0.0)
+    drawn = costmap.draw(costmap.drain_scans(), (), FAR_OFF, 0.0)
 
     assert (node.speed_factor, node.state, node.holds) == before
     assert drawn.data.min() >= -1

@@ -156,7 +156,7 @@ class StagedRobot:
             return None
         own = self._rig.odometry().pose
         present = self._neighbours.present(own, now.mono)
-        return self.costmap.draw(self.costmap.take(), present, own, now.mono)
+        return self.costmap.draw(self.costmap.drain_scans(), present, own, now.mono)
 
     @property
     def speed(self) -> float:

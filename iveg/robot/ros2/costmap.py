@@ -70,7 +70,7 @@ class CostmapTopic:
         wanted = self._writer.readers > 0
         self._ask(wanted)
         if wanted and own is not None:
-            now, scans = clock.now(), self._costmap.take()
+            now, scans = clock.now(), self._costmap.drain_scans()
             present = self._neighbours.present(own, now.mono)
             self._newest = await asyncio.to_thread(
                 self._costmap.draw, scans, present, own, now.mono

@@ -44,7 +44,7 @@ def test_an_event_takes_from_the_wire_once_however_much_there_is(
 ) -> None:
     far, near = line
     far.sendall(2 * PONG)
-    assert near.take()
+    assert near.read_ahead()
     assert near.recv(1) == PONG[:1]
     far.sendall(PONG)
     assert near.pending()
@@ -52,19 +52,19 @@ def test_an_event_takes_from_the_wire_once_however_much_there_is(
     assert not near.pending()
     with pytest.raises(BlockingIOError):
         near.recv(1)
-    assert near.take()
+    assert near.read_ahead()
     assert near.recv(9) == PONG
-    assert not near.take()
+    assert not near.read_ahead()
 
 
 def test_an_end_of_the_line_is_an_end(line: tuple[socket.socket, ReadAhead]) -> None:
     far, near = line
     far.sendall(PONG)
     far.close()
-    assert near.take()
+    assert near.read_ahead()
     assert near.recv(9) == PONG
     assert not near.pending()
-    assert near.take()
+    assert near.read_ahead()
     assert near.pending()
     assert near.recv(9) == b""
 
@@ -77,7 +77,7 @@ def test_a_line_that_was_reset_has_ended() -> None:
     there.close()
     with here:
         near = ReadAhead(here, lambda *_: None)
-        assert near.take()
+        assert near.read_ahead()
         assert near.recv(9) == b""
 
 
@@ -296,7 +296,7 @@ def test_paho_reads_from_the_socket_that_it_was_given() -> None:
         near.setblocking(False)
         read = client._sock = ReadAhead(near, lambda _: None)
         far.sendall(b"\xe0\x00")
-        assert read.take()
+        assert read.read_ahead()
 
         client.loop_read()
 

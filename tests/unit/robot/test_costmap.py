@@ -51,7 +51,7 @@ def costmap(area: Rectangle | None = ROOM) -> FleetCostmap:
 def drawn(
     one: FleetCostmap, *near: Neighbour, own: Pose2D = HERE, now: float = 0.0
 ) -> InflatedGrid:
-    return one.draw(one.take(), near, own, now)
+    return one.draw(one.drain_scans(), near, own, now)
 
 
 def at(found: InflatedGrid, x: float, y: float) -> int:
@@ -175,7 +175,7 @@ def test_a_robot_that_knows_no_place_takes_no_scan() -> None:
     one.hear(TOPIC, payload(), None)
     one.hear("/AGI/iveg/peer_scan", payload().replace(b"AGII", b"AGI"), HERE)
 
-    assert one.take() == []
+    assert one.drain_scans() == []
 
 
 def test_a_clock_of_iveg_that_is_set_is_followed() -> None:
@@ -184,4 +184,4 @@ def test_a_clock_of_iveg_that_is_set_is_followed() -> None:
     one.note(Feedback("AGII", later))
     one.hear(TOPIC, payload(after=900.0), HERE)
 
-    assert len(one.take()) == 1
+    assert len(one.drain_scans()) == 1

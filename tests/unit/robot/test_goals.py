@@ -32,7 +32,7 @@ class Robot:
         return self._knows
 
     def take(self, order: GoalOrder | CancelOrder, facts: Facts = FREE) -> list[str]:
-        return said(self.goals.take(order, facts))
+        return said(self.goals.answer(order, facts))
 
     def settle(self, facts: Facts) -> list[str]:
         return said(self.goals.settle(facts))
@@ -78,7 +78,7 @@ def test_a_goal_without_a_way_is_refused() -> None:
 
 
 def test_a_robot_without_navigation_refuses() -> None:
-    assert said(RobotGoals("AGI").take(ORDER, FREE)) == ["01G REFUSED no_way"]
+    assert said(RobotGoals("AGI").answer(ORDER, FREE)) == ["01G REFUSED no_way"]
 
 
 @pytest.mark.parametrize("facts", [FREE, THERE])
