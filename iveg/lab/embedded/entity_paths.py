@@ -1,10 +1,14 @@
-"""``/v2/entities`` and the paths below it."""
+"""``/v2/entities`` and the paths below it, and many of them in ``/v2/op/update``."""
 
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Literal
+
+from pydantic import Field
 
 from iveg.lab.embedded.context_broker import ContextBroker
+from iveg.lab.embedded.documents import Document, read_document
 from iveg.lab.embedded.entities import Attribute, Entity, EntityChange, Scope
 from iveg.lab.embedded.errors import (
     bad_request,
@@ -14,6 +18,7 @@ from iveg.lab.embedded.errors import (
 from iveg.lab.embedded.http_server import Response
 from iveg.lab.embedded.ngsi_request import NgsiCall, read_id, split_names
 from iveg.lab.embedded.orion_text import read_pattern
+from iveg.lab.embedded.outcomes import raise_for_batch
 from iveg.lab.embedded.providers import bare_entities, foreign
 from iveg.lab.embedded.views import write_entity
 
@@ -169,3 +174,29 @@ async def _update(
 def _ghost(scope: Scope, entity_id: str, kind: str) -> Entity:
     """An entity that is known only to a provider."""
     return Entity(entity_id, kind, scope.path, scope.now, scope.now)
+
+
+# --- many entities in one request --------------------------------------------------
+
+_BATCHES_NOT_DONE = ("appendStrict", "delete", "replace")
+
+
+class _Batch(Document):
+    entities: list[dict[str, object]] = Field(min_length=1)
+    action_type: Literal["append", "update"]
+
+
+async def batch_update(broker: ContextBroker, call: NgsiCall) -> Response:
+    """``POST /v2/op/update``: executes what is possible and reports what is not."""
+    raw = call.read_object()
+    if raw.get("actionType") in _BATCHES_NOT_DONE:
+        raise not_supported(f"actionType {raw['actionType']}")
+    batch = read_document(_Batch, raw)
+    items = [(*read_id(one), call.changes(one)) for one in batch.entities]
+    if batch.action_type == "append":
+        for entity_id, kind, changes in items:
+            broker.upsert(call.scope, entity_id, kind or "Thing", changes)
+    else:
+        outcomes = [await broker.update(call.scope, *item) for item in items]
+        raise_for_batch(outcomes)
+    return Response(204)

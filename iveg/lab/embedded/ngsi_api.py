@@ -5,7 +5,7 @@ from collections.abc import Awaitable, Callable
 import orjson
 
 from iveg.adapters import clock
-from iveg.lab.embedded import batch_path, entity_paths, subscription_paths
+from iveg.lab.embedded import entity_paths, subscription_paths
 from iveg.lab.embedded.context_broker import ContextBroker
 from iveg.lab.embedded.errors import FiwareError, bad_request
 from iveg.lab.embedded.http_server import Request, Response, Routes
@@ -76,7 +76,7 @@ _ROUTES: Routes[_Route] = Routes(
         "DELETE /v2/entities/*": entity_paths.delete_entity,
         "PATCH /v2/entities/*/attrs": entity_paths.update_attributes,
         "DELETE /v2/entities/*/attrs/*": entity_paths.delete_attribute,
-        "POST /v2/op/update": batch_path.batch_update,
+        "POST /v2/op/update": entity_paths.batch_update,
         "POST /v2/subscriptions": subscription_paths.create_subscription,
         "GET /v2/subscriptions": subscription_paths.list_subscriptions,
         "GET /v2/subscriptions/*": subscription_paths.get_subscription,
