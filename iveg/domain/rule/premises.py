@@ -8,8 +8,10 @@ an empty list is the only way to 1.0.
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal
 
+from iveg.domain.geometry import Pose2D
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
 from iveg.domain.robot_state import RobotState
@@ -62,10 +64,17 @@ def _missing_of(
     robot: RobotState, gaps: list[tuple[RobotState, Premise]], now: Instant
 ) -> Iterator[Missing]:
     if not _is_pose_young(robot, now):
-        yield Missing("pose", robot.robot_id)
+        yield _missing("pose", robot.robot_id)
+    ours = robot.possible_poses()
     for observer, premise in gaps:
-        if _concerns(observer, robot):
-            yield Missing(premise, observer.robot_id)
+        if _concerns(observer, robot, ours):
+            yield _missing(premise, observer.robot_id)
+
+
+@lru_cache(maxsize=1024)
+def _missing(premise: Premise, robot_id: str) -> Missing:
+    """The same value each time: of a fleet that is blind hundreds are compared."""
+    return Missing(premise, robot_id)
 
 
 def _is_plainly_whole(observer: RobotState, now: Instant) -> bool:
@@ -86,8 +95,12 @@ def _gaps(observer: RobotState, now: Instant) -> Iterator[Premise]:
         yield "detector"
 
 
-def _concerns(observer: RobotState, robot: RobotState) -> bool:
+def _concerns(
+    observer: RobotState, robot: RobotState, ours: tuple[Pose2D, ...]
+) -> bool:
     """Whether a robot is where the observer's camera would protect it.
+
+    ``ours``: where that may be.
 
     A robot of unknown place may be anywhere.  What a recording lacks concerns
     recordings of its own frame.
@@ -97,9 +110,11 @@ def _concerns(observer: RobotState, robot: RobotState) -> bool:
     if observer.recording != robot.recording:
         return False
     reach = observer.profile.camera_range + LIMITS.ring_most_m
-    theirs, ours = observer.possible_poses(), robot.possible_poses()
-    return (
-        not theirs
-        or not ours
-        or any(one.distance_to(two.x, two.y) <= reach for one in theirs for two in ours)
-    )
+    theirs = observer.possible_poses()
+    if not theirs or not ours:
+        return True
+    for one in theirs:
+        for two in ours:
+            if one.distance_to(two.x, two.y) <= reach:
+                return True
+    return False

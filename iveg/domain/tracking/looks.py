@@ -209,7 +209,12 @@ def _nearest(
     found, least = None, math.inf
     for suspect in suspects:
         # First what nearly all fail: every box asks every other robot's suspects.
-        if abs(suspect.x - one.x) <= _FARTHEST_M and not suspect.is_over(now):
+        if (
+            abs(suspect.x - one.x) <= _FARTHEST_M
+            # Of a late picture it may have gone farther.
+            and (abs(suspect.y - one.y) <= _FARTHEST_M or now < suspect.seen_at)
+            and not suspect.is_over(now)
+        ):
             apart = suspect.reaches(one, now)
             if apart is not None and apart < least:
                 found, least = suspect, apart

@@ -73,7 +73,9 @@ class Sighting:
 
     def age_s(self, now: Instant) -> float:
         """Seconds since the sighting."""
-        return max(0.0, now.mono - self.at.mono)
+        # Asked thousands of times a second: ``max`` takes three times as long.
+        age_s = now.mono - self.at.mono
+        return age_s if age_s > 0.0 else 0.0
 
     def in_chain(self, chain: int, before: "Sighting | None" = None) -> "Sighting":
         """The same sighting as the newest of a chain, after the one ``before``."""

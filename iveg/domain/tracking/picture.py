@@ -82,16 +82,19 @@ def live_cost(one: PlacedDetection, person: TrackedPerson, at: Instant) -> float
     Where two robots see one person with noise, a detection that lies far from the one
     sighting seldom lies far from both.
     """
-    if not is_alike(person, one) or one.sighting.reach_m:
+    here = one.sighting
+    if not is_alike(person, one) or here.reach_m:
         return math.inf
     return min(
         (
             distance
             for earlier in person.sightings
-            if not earlier.reach_m
+            # First what nearly all fail: in a storm this is asked of everybody.
+            if abs(earlier.x - here.x) <= GATE_CAP_M
+            and abs(earlier.y - here.y) <= GATE_CAP_M
+            and not earlier.reach_m
             and earlier.age_s(at) <= LIMITS.seen_s
-            and (distance := distance_between(earlier, one.sighting))
-            <= _gate(earlier, at)
+            and (distance := distance_between(earlier, here)) <= _gate(earlier, at)
         ),
         default=math.inf,
     )

@@ -198,7 +198,7 @@ class Tracker:
             for person in self.known.values()
             if person.person_id not in taken
             and (person.age_s(at) <= LIMITS.seen_s) is is_live
-            and person.stage(at) != "gone"
+            and (is_live or person.stage(at) != "gone")
         ]
         cost = live_cost if is_live else partial(lost_cost, way=self.way)
         costs = [[cost(picture[i], person, at) for person in offered] for i in wanting]
