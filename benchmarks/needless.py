@@ -4,8 +4,7 @@
 
 The demo's greenhouse on the virtual clock, as in ``benchmarks.protection``, detector of
 the field.  Seconds of robots that move; *over*: the reason has ended, and its second
-runs; *no truth*: nobody really is where who
-was seen can have walked to since.
+runs; *no truth*: nobody really is where who was seen can have walked to since.
 """
 
 import argparse
@@ -18,6 +17,7 @@ from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import HALF_SPEED
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
+from iveg.lab.emulator.scripts import EXACT, SiteErrors
 from iveg.lab.emulator.world import SimulatedWorld
 from iveg.lab.experiment.protection import AWAY_M, MOVES_M_S
 from iveg.lab.experiment.stage import STEP_S
@@ -26,9 +26,9 @@ from iveg.pipeline.evaluate import Evaluator
 _TRUE_M = 1.0
 
 
-def causes(seed: int, seconds: float) -> Counter[str]:
+def causes(seed: int, seconds: float, errors: SiteErrors = EXACT) -> Counter[str]:
     """Seconds of needless slowness by cause; ``driving``: of all that they moved."""
-    stage, world, iveg = staged("field", seed, DetectionRule())
+    stage, world, iveg = staged("field", seed, DetectionRule(), errors=errors)
     found = Counter[str]()
     for _ in range(round(seconds / STEP_S)):
         stage.step()
@@ -80,10 +80,13 @@ def main() -> None:
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--seeds", default="11,12,13,14")
     options.add_argument("--seconds", type=float, default=300.0)
+    options.add_argument("--plan-off", type=float, default=0.0)
+    options.add_argument("--pose-error", type=float, default=1.0)
     asked = options.parse_args()
+    errors = SiteErrors(asked.plan_off, asked.pose_error)
     found = Counter[str]()
     for seed in asked.seeds.split(","):
-        found += causes(int(seed), asked.seconds)
+        found += causes(int(seed), asked.seconds, errors)
     driving = found.pop("driving", 0)
     rows = [
         [cause, f"{steps * STEP_S:.1f}", f"{100 * steps / max(1, driving):.1f} %"]

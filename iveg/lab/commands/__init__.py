@@ -61,6 +61,20 @@ def _add_emulator(emulator: argparse.ArgumentParser) -> None:
         help="draw boxes about the truth, or ground masks in depth pictures",
     )
     emulator.add_argument(
+        "--plan-off",
+        type=float,
+        default=0.0,
+        metavar="M",
+        help="everything stands so far east of where the plan draws it (m)",
+    )
+    emulator.add_argument(
+        "--pose-error",
+        type=float,
+        default=1.0,
+        metavar="TIMES",
+        help="how many times its usual error odometry makes",
+    )
+    emulator.add_argument(
         "--held", action="store_true", help="robots stay held after they boot"
     )
     emulator.add_argument(

@@ -16,6 +16,7 @@ from iveg.domain.witness import Plan
 from iveg.lab.emulator.emulated_robot import FleetSettings
 from iveg.lab.emulator.fleet import run_emulator
 from iveg.lab.emulator.orders import read_fault_arguments
+from iveg.lab.emulator.scripts import SiteErrors
 from iveg.lab.emulator.truth import TruthLog
 from iveg.settings import Settings
 
@@ -56,6 +57,7 @@ async def emulator(options: argparse.Namespace, settings: Settings) -> None:
             network=network,
             description=fleet,
             camera=options.camera,
+            errors=SiteErrors(options.plan_off, options.pose_error),
         )
         report_ready()
         await work

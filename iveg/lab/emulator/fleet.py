@@ -7,6 +7,7 @@ bursts.  A late slot is skipped, never repeated.
 import asyncio
 import logging
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -26,7 +27,7 @@ from iveg.lab.emulator.radio import Radio
 from iveg.lab.emulator.relay import Relay
 from iveg.lab.emulator.ros2_base import Ros2Base
 from iveg.lab.emulator.scenarios import scenario_named
-from iveg.lab.emulator.scripts import Incident
+from iveg.lab.emulator.scripts import EXACT, Incident, SiteErrors
 from iveg.lab.emulator.world import Camera, RobotHardware, SimulatedWorld, climate_at
 from iveg.ngsi import names
 from iveg.ngsi.codec import write_climate
@@ -57,6 +58,7 @@ async def run_emulator(
     network: Network | None = None,
     description: FleetDescription | None = None,
     camera: Camera = "boxes",
+    errors: SiteErrors = EXACT,
 ) -> None:
     """Run a scenario until cancelled.
 
@@ -75,6 +77,7 @@ async def run_emulator(
             topics are below ``/`` and the robot's id in lower case.
         description: Fleet description; None: the built-in one.
         camera: Source of the boxes: drawn about the truth, or by grounding.
+        errors: Of the plan and of poses.
 
     Raises:
         DataFileError: no such scenario or profile, or too many robots for the
@@ -84,7 +87,8 @@ async def run_emulator(
     if profile not in DETECTORS:
         known = ", ".join(DETECTORS)
         raise DataFileError(f"profile {profile!r}", "", f"is not one of {known}.")
-    layout = lay_out(scenario_named(scenario), robots, greenhouse, description)
+    played = replace(scenario_named(scenario), errors=errors)
+    layout = lay_out(played, robots, greenhouse, description)
     detector = DETECTORS[layout.detector or profile]
     world = SimulatedWorld(greenhouse, layout, detector, seed, camera)
     incidents = (*(Incident(0.0, order) for order in faults), *layout.incidents)

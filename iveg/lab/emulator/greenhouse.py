@@ -6,7 +6,7 @@ The domain's ``Greenhouse`` names objects; this module only has rectangles and d
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -118,6 +118,20 @@ class Scenery:
             plan.posts,
             np.empty((0, 3)) if rng is None else _leaves(greenhouse.rows, rng),
             screens,
+        )
+
+    def moved(self, east_m: float) -> "Scenery":
+        """The same with all that stands within the walls so far to the east."""
+        along = np.array([east_m, 0.0, east_m, 0.0])
+        return replace(
+            self,
+            rectangles=self.rectangles + along,
+            posts=self.posts + along[:3] * (1.0, 0.0, 0.0),
+            leaves=self.leaves + along[:3] * (1.0, 0.0, 0.0),
+            screens=tuple(
+                replace(one, xmin=one.xmin + east_m, xmax=one.xmax + east_m)
+                for one in self.screens
+            ),
         )
 
     def hides(self, ax: float, ay: float, bx: float, by: float) -> bool:

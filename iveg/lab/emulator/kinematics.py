@@ -89,6 +89,7 @@ class Odometer:
         along: Standard deviation, part of the way driven; ``across`` likewise.
         turning: Standard deviation, part of the angle turned.
         memory_m: Distance (m) over which an error decays; ``memory_rad`` likewise.
+        times: How many times these errors it makes.
     """
 
     rng: np.random.Generator
@@ -97,6 +98,7 @@ class Odometer:
     turning: float = 0.03
     memory_m: float = 2.0
     memory_rad: float = 1.0
+    times: float = 1.0
     _error: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
 
     def measure(self, truth: Pose2D, twist: Twist2D, dt: float) -> Pose2D:
@@ -114,6 +116,6 @@ class Odometer:
         # Ornstein-Uhlenbeck over the distance, not over time; its deviation is
         # part × memory, e.g. 2 % of 2 m = 4 cm.
         keep = math.exp(-moved / memory)
-        spread = part * memory * math.sqrt(1.0 - keep * keep)
+        spread = self.times * part * memory * math.sqrt(1.0 - keep * keep)
         fresh = float(self.rng.normal(0.0, spread)) if moved else 0.0
         self._error[which] = self._error[which] * keep + fresh

@@ -15,7 +15,15 @@ from iveg.domain.fleet import FleetDescription, RobotProfile
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.greenhouse import DriveLane, Greenhouse
 from iveg.lab.emulator.people import WalkStop
-from iveg.lab.emulator.scripts import TESTBED, Incident, RobotScript, Scenario, route_of
+from iveg.lab.emulator.scripts import (
+    EXACT,
+    TESTBED,
+    Incident,
+    RobotScript,
+    Scenario,
+    SiteErrors,
+    route_of,
+)
 
 _RING_CORNERS = ((18.0, 2.0), (18.0, 18.0), (2.0, 18.0), (2.0, 2.0))
 _END_M, _KEEP_OFF_M = 0.5, 0.9
@@ -32,6 +40,7 @@ class Layout:
     people: tuple[tuple[WalkStop, ...], ...]
     incidents: tuple[Incident, ...] = ()
     detector: str | None = None
+    errors: SiteErrors = EXACT
 
 
 def lay_out(
@@ -52,7 +61,7 @@ def lay_out(
         DataFileError: the greenhouse has no room for so many robots, or does not fit
             the scenario.
     """
-    extra = scenario.incidents, scenario.detector
+    extra = scenario.incidents, scenario.detector, scenario.errors
     profiles = {robot_id: _body(robot_id, fleet or built_in()) for robot_id in robots}
     if scenario.greenhouse not in (TESTBED, greenhouse.name):
         about = f"is about {scenario.greenhouse}, not {greenhouse.name}"

@@ -160,6 +160,22 @@ class Incident:
 
 
 @dataclass(frozen=True, slots=True)
+class SiteErrors:
+    """What a site gets wrong.
+
+    Attributes:
+        plan_off_m: How far east of where the plan draws it everything stands (m).
+        pose_error: How many times its usual error odometry makes.
+    """
+
+    plan_off_m: float = 0.0
+    pose_error: float = 1.0
+
+
+EXACT = SiteErrors()
+
+
+@dataclass(frozen=True, slots=True)
 class Scenario:
     """One named run.
 
@@ -170,6 +186,7 @@ class Scenario:
         people: Stops of each person.
         detector: Replaces the requested detector profile.
         greenhouse: The greenhouse that it is written for.
+        errors: Of its plan and poses.
     """
 
     name: str
@@ -180,3 +197,4 @@ class Scenario:
     incidents: tuple[Incident, ...] = ()
     detector: str | None = None
     greenhouse: str = TESTBED
+    errors: SiteErrors = EXACT

@@ -66,6 +66,7 @@ class RobotHardware:
         detector: DetectorModel,
         rng: np.random.Generator,
         camera: Camera = "boxes",
+        pose_error: float = 1.0,
     ) -> None:
         self.robot_id = robot_id
         self.profile = profile
@@ -75,7 +76,7 @@ class RobotHardware:
         self.hides_people = False
         self.is_stuck = False
         self._rng = rng
-        self._odometer = Odometer(rng)
+        self._odometer = Odometer(rng, times=pose_error)
         place = None
         if camera == "grounding":
             place = GroundedCamera(profile, rng.spawn(1)[0]).place
@@ -193,10 +194,17 @@ class SimulatedWorld:
             len(layout.robots) + len(layout.people) + 1
         )
         generators = [np.random.default_rng(stream) for stream in streams]
-        self.scenery = Scenery.of(greenhouse, generators.pop())
+        errors = layout.errors
+        self.scenery = Scenery.of(greenhouse, generators.pop()).moved(errors.plan_off_m)
         self.rigs: Mapping[str, RobotHardware] = {
             robot_id: RobotHardware(
-                robot_id, layout.profiles[robot_id], script, detector, rng, camera
+                robot_id,
+                layout.profiles[robot_id],
+                script,
+                detector,
+                rng,
+                camera,
+                errors.pose_error,
             )
             for (robot_id, script), rng in zip(
                 layout.robots.items(), generators, strict=False

@@ -1,5 +1,6 @@
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 import pytest
 
@@ -10,6 +11,7 @@ from iveg.domain.greenhouse import Greenhouse
 from iveg.lab.emulator.camera import DETECTORS, PERSON
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.scenarios import SCENARIOS, scenario_named
+from iveg.lab.emulator.scripts import SiteErrors
 from iveg.lab.emulator.world import SimulatedWorld, climate_at
 from tests.touching import bodies_touch, touches
 
@@ -28,6 +30,30 @@ def world_of(
 ) -> SimulatedWorld:
     layout = lay_out(scenario_named(scenario), robots, greenhouse)
     return SimulatedWorld(greenhouse, layout, DETECTORS[detector], seed)
+
+
+def test_a_plan_may_be_off_and_poses_err_more_than_usual() -> None:
+    errors = SiteErrors(plan_off_m=0.2, pose_error=3.0)
+    scenario = replace(scenario_named("demo"), errors=errors)
+    layout = lay_out(scenario, FLEET, TESTBED)
+    off = SimulatedWorld(TESTBED, layout, DETECTORS["perfect"], 1)
+    exact = world_of("demo")
+
+    row = TESTBED.rows[0]
+    just_east = row.xmax + 0.1, (row.ymin + row.ymax) / 2
+    assert exact.scenery.free(*just_east, 0.01)
+    assert not off.scenery.free(*just_east, 0.01)
+    assert off.scenery.bounds == exact.scenery.bounds
+    for one in (off, exact):
+        rig = one.rigs["AGI"]
+        rig.drive(Twist2D(0.5, 0.0))
+        rig.move(1.0)
+    missed = [
+        one.rigs["AGI"].vehicle.pose.distance_to(said.x, said.y)
+        for one in (off, exact)
+        if (said := one.rigs["AGI"].odometry().pose)
+    ]
+    assert missed[0] == pytest.approx(3.0 * missed[1], rel=1e-6)
 
 
 def run(world: SimulatedWorld, seconds: float, dt: float = 0.1) -> Iterator[float]:
