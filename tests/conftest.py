@@ -47,7 +47,7 @@ _FIRST = [name for pair in zip(_BUSY, _WAITING, strict=True) for name in pair]
 """So browsers run beside modules that wait for processes, and no worker ends with a
 long module alone."""
 _MEEK = 5
-_REAL = {"browser", "postgresql", "postgresql_url", "database_url"}
+_REAL = {"browser", "postgresql", "postgresql_url", "database_url", "empty_url"}
 """Fixtures that start programs."""
 
 

@@ -21,10 +21,17 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 from typing import BinaryIO
 
 PROGRAMS = ("serve", "fiware", "emulator", "robot")
+_PARTS = (
+    *("iveg.cli.robot", "iveg.cli.serve", "iveg.lab.pages"),
+    *("iveg.lab.commands.emulator", "iveg.lab.commands.fiware"),
+    *("anyio._backends._asyncio", "httpcore", "numpy.ma"),
+)
+"""What is there when it forks; the last are libraries that are else loaded late."""
 _PARENT_DIES = 1
 """``PR_SET_PDEATHSIG`` of Linux: what dies with its parent (tests/bonds.py)."""
 _MOST_BYTES = 1 << 17
@@ -104,11 +111,9 @@ def _end(requests: socket.socket, process: subprocess.Popen[bytes]) -> None:
 def main() -> None:
     """Fork what is asked for, and say of each how it ended."""
     import iveg.__main__ as program
-    import iveg.cli.robot
-    import iveg.cli.serve
-    import iveg.lab.commands.emulator
-    import iveg.lab.commands.fiware  # noqa: F401 - all of them are there when it forks
 
+    for part in _PARTS:
+        import_module(part)
     # A process that is spawned begins with the main module, as it does in earnest.
     sys.modules["__main__"] = program
     asked = _become_what_is_asked()

@@ -17,6 +17,7 @@ from typing import BinaryIO, TypeVar
 import httpx
 
 from tests.bonds import bound
+from tests.databases import lay_history
 from tests.forge import PROGRAMS, Forked, fork
 from tests.ports import free_ports
 
@@ -140,6 +141,8 @@ class Site:
 
     def start(self, *words: str, module: str = "iveg") -> Program:
         """Start ``python -m iveg WORD …`` here, or another module."""
+        if words[0] == "serve":
+            lay_history(self.settings["IVEG_DATABASE_URL"])
         log = self.directory / f"{len(self.programs)}-{words[0]}.log"
         with log.open("wb") as output:
             program = Program(words, self._begin(module, words, output), log)

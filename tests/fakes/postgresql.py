@@ -12,7 +12,9 @@ from types import TracebackType
 from typing import Any, Self
 
 import psycopg
+from psycopg.sql import SQL, Identifier
 
+from iveg.adapters.history.migrate import upgrade
 from tests.bonds import bound
 from tests.ports import free_ports
 from tests.processes import until
@@ -34,6 +36,7 @@ class PostgreSQL:
     def __init__(self, directory: Path, bin_: Path) -> None:
         self._data, self._bin, self._directory = directory / "data", bin_, directory
         (self._port,) = free_ports(1)
+        self._copies: list[Identifier] = []
 
     def __enter__(self) -> Self:
         self._run(
@@ -84,7 +87,10 @@ class PostgreSQL:
 
     @property
     def _address(self) -> str:
-        return f"postgresql://postgres@127.0.0.1:{self._port}/postgres"
+        return self._address_of("postgres")
+
+    def _address_of(self, database: str) -> str:
+        return f"postgresql://postgres@127.0.0.1:{self._port}/{database}"
 
     def empty_database(self) -> str:
         """The address of the one database, emptied: far cheaper than a new one."""
@@ -92,6 +98,24 @@ class PostgreSQL:
             connection.execute("DROP SCHEMA public CASCADE")
             connection.execute("CREATE SCHEMA public")
         return self._address
+
+    def newest_database(self) -> str:
+        """The address of a database of its own with an empty history in it.
+
+        The one before is gone.
+        """
+        with psycopg.connect(self._address, autocommit=True) as connection:
+            if not self._copies:
+                connection.execute("CREATE DATABASE newest")
+                upgrade(self._address_of("newest"))
+            for old in self._copies[-1:]:
+                connection.execute(SQL("DROP DATABASE {} WITH (FORCE)").format(old))
+            copy = f"copy{len(self._copies)}"
+            self._copies.append(Identifier(copy))
+            connection.execute(
+                SQL("CREATE DATABASE {} TEMPLATE newest").format(self._copies[-1])
+            )
+        return self._address_of(copy)
 
     def _run(self, program: str, *words: str) -> None:
         subprocess.run(

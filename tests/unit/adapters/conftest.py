@@ -1,4 +1,4 @@
-"""Databases for the history's tests: every test begins with an empty one."""
+"""Databases for the history's tests: every test begins with one of its own."""
 
 import os
 from collections.abc import Iterator
@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.databases import lay_history
 from tests.fakes.postgresql import PostgreSQL, programs, running_postgresql
 
 
@@ -30,5 +31,17 @@ def postgresql_url(postgresql: PostgreSQL) -> str:
 
 
 @pytest.fixture(params=["sqlite", "postgresql"])
-def database_url(request: pytest.FixtureRequest) -> str:
+def empty_url(request: pytest.FixtureRequest) -> str:
+    """A database without tables."""
     return str(request.getfixturevalue(f"{request.param}_url"))
+
+
+@pytest.fixture(params=["sqlite", "postgresql"])
+def database_url(request: pytest.FixtureRequest, tmp_path: Path) -> str:
+    """An empty history of the newest shape."""
+    if request.param == "postgresql":
+        server: PostgreSQL = request.getfixturevalue("postgresql")
+        return server.newest_database()
+    url = f"sqlite:///{tmp_path / 'history.db'}"
+    lay_history(url)
+    return url

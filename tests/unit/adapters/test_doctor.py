@@ -21,14 +21,14 @@ def test_a_history_of_the_newest_shape_is_well(database_url: str) -> None:
     check_database(database_url)
 
 
-def test_a_history_that_is_empty_is_to_be_upgraded(database_url: str) -> None:
-    engine = writing_engine(database_url)
+def test_a_history_that_is_empty_is_to_be_upgraded(empty_url: str) -> None:
+    engine = writing_engine(empty_url)
     with engine.connect():
         pass
     engine.dispose()
 
     with pytest.raises(HopError, match=r"migration none and the newest .* db upgrade"):
-        check_database(database_url)
+        check_database(empty_url)
 
 
 def test_a_history_of_a_newer_iveg_is_told_from_an_old_one(database_url: str) -> None:

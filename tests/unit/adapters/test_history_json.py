@@ -61,18 +61,18 @@ LOOK = (
 
 
 @pytest.fixture
-def old(database_url: str) -> str:
+def old(empty_url: str) -> str:
     """A history that the version before wrote, one row of it spoilt."""
-    with connected(database_url) as connection:
+    with connected(empty_url) as connection:
         command.upgrade(alembic_config(connection), BEFORE)
         for row in OLD_ROWS:
             connection.execute(text(row.replace(":", "\\:")))
-    return database_url
+    return empty_url
 
 
 @pytest.fixture
-def queries(database_url: str) -> Iterator[Queries]:
-    queries = Queries(database_url)
+def queries(empty_url: str) -> Iterator[Queries]:
+    queries = Queries(empty_url)
     yield queries
     queries.close()
 
@@ -111,7 +111,7 @@ def test_the_way_back_gives_the_version_before_its_texts(old: str) -> None:
 
 
 async def test_what_is_stored_is_found_by_its_members(
-    database_url: str, queries: Queries
+    empty_url: str, queries: Queries
 ) -> None:
     records: tuple[Record, ...] = (
         alert_record(),
@@ -119,7 +119,7 @@ async def test_what_is_stored_is_found_by_its_members(
         detection_record(),
         log_record(),
     )
-    store = Store(database_url)
+    store = Store(empty_url)
     store.write([Waiting(record, n, 0.0) for n, record in enumerate(records, 1)])
     store.close()
     member = {
@@ -127,7 +127,7 @@ async def test_what_is_stored_is_found_by_its_members(
         "postgresql": "slots ->> 'robot'",
     }
 
-    with connected(database_url) as connection:
+    with connected(empty_url) as connection:
         wanted = f"SELECT {member[connection.dialect.name]} FROM log"  # noqa: S608
         robot = connection.scalar(text(wanted))
 
@@ -136,9 +136,9 @@ async def test_what_is_stored_is_found_by_its_members(
 
 
 async def test_a_row_whose_json_has_another_shape_hides_no_other(
-    database_url: str, queries: Queries
+    empty_url: str, queries: Queries
 ) -> None:
-    store = Store(database_url)
+    store = Store(empty_url)
     rows = log_record(id=2, slots=["a list"]), log_record()
     store.write([Waiting(record, n, 0.0) for n, record in enumerate(rows, 1)])
     store.close()
@@ -148,9 +148,9 @@ async def test_a_row_whose_json_has_another_shape_hides_no_other(
 
 
 @contextmanager
-def connected(database_url: str) -> Iterator[Connection]:
+def connected(empty_url: str) -> Iterator[Connection]:
     """A transaction of its own."""
-    engine = writing_engine(database_url)
+    engine = writing_engine(empty_url)
     with engine.begin() as connection:
         yield connection
     engine.dispose()

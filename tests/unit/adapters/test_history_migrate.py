@@ -15,8 +15,8 @@ from iveg.domain.errors import DataFileError, HopError, SettingsError
 PARTS = tuple(f"{name}_" for name in PARTITIONED)
 
 
-def execute(database_url: str, statement: str) -> None:
-    engine = writing_engine(database_url)
+def execute(empty_url: str, statement: str) -> None:
+    engine = writing_engine(empty_url)
     with engine.begin() as connection:
         connection.execute(text(statement))
     engine.dispose()
@@ -31,61 +31,61 @@ def differences(connection: Connection) -> list[object]:
     return list(compare_metadata(migrated, metadata))
 
 
-def test_migrations_make_the_tables_that_the_code_describes(database_url: str) -> None:
-    upgrade(database_url)
+def test_migrations_make_the_tables_that_the_code_describes(empty_url: str) -> None:
+    upgrade(empty_url)
 
-    engine = writing_engine(database_url)
+    engine = writing_engine(empty_url)
     with engine.connect() as connection:
         assert differences(connection) == []
     engine.dispose()
 
 
-def test_a_missing_column_would_be_noticed(database_url: str) -> None:
-    upgrade(database_url)
-    execute(database_url, "ALTER TABLE log DROP COLUMN decision_id")
+def test_a_missing_column_would_be_noticed(empty_url: str) -> None:
+    upgrade(empty_url)
+    execute(empty_url, "ALTER TABLE log DROP COLUMN decision_id")
 
-    engine = writing_engine(database_url)
+    engine = writing_engine(empty_url)
     with engine.connect() as connection:
         assert len(differences(connection)) == 1
     engine.dispose()
 
 
-def test_upgrading_twice_keeps_what_is_there(database_url: str) -> None:
-    upgrade(database_url)
+def test_upgrading_twice_keeps_what_is_there(empty_url: str) -> None:
+    upgrade(empty_url)
     execute(
-        database_url,
+        empty_url,
         "INSERT INTO command_events (command_id, robot_id, at, state, why) "
         "VALUES ('C1', 'AGI', 1.0, 'SENT', '')",
     )
 
-    upgrade(database_url)
+    upgrade(empty_url)
 
-    engine = writing_engine(database_url)
+    engine = writing_engine(empty_url)
     with engine.connect() as connection:
         count = connection.scalar(text("SELECT count(*) FROM command_events"))
     engine.dispose()
     assert count == 1
 
 
-def test_a_newer_database_is_refused_with_one_sentence(database_url: str) -> None:
-    upgrade(database_url)
-    execute(database_url, "UPDATE alembic_version SET version_num = 'from_the_future'")
+def test_a_newer_database_is_refused_with_one_sentence(empty_url: str) -> None:
+    upgrade(empty_url)
+    execute(empty_url, "UPDATE alembic_version SET version_num = 'from_the_future'")
 
     with pytest.raises(DataFileError, match=r"newer iVeg .*from_the_future") as caught:
-        upgrade(database_url)
+        upgrade(empty_url)
 
     assert "\n" not in str(caught.value)
 
 
 def test_an_unfinished_migration_is_refused_and_left_as_it_was(
-    database_url: str,
+    empty_url: str,
 ) -> None:
-    execute(database_url, "CREATE TABLE log (id INTEGER)")
+    execute(empty_url, "CREATE TABLE log (id INTEGER)")
 
     with pytest.raises(DataFileError, match=r"cannot be finished .*log"):
-        upgrade(database_url)
+        upgrade(empty_url)
 
-    engine = writing_engine(database_url)
+    engine = writing_engine(empty_url)
     with engine.connect() as connection:
         found = MigrationContext.configure(connection).get_current_revision()
     engine.dispose()

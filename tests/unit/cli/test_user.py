@@ -13,7 +13,6 @@ from iveg.adapters.admission import Admission
 from iveg.adapters.history.accounts import AccountRows, AccountStore
 from iveg.adapters.history.api_tokens import ApiTokenStore
 from iveg.adapters.history.audit import faults
-from iveg.adapters.history.migrate import upgrade
 from iveg.cli.database import read_history
 from iveg.cli.user import run_user, set_up
 from iveg.domain.accounts import Account, PersonRole, digest_of
@@ -27,6 +26,7 @@ from iveg.domain.errors import (
 )
 from iveg.domain.stamps import format_stamp
 from iveg.settings import Settings
+from tests.databases import lay_history
 
 
 class Console:
@@ -35,7 +35,7 @@ class Console:
     def __init__(self, data: Path, database_url: str) -> None:
         self.settings = Settings(database_url=database_url)
         self._data = data
-        upgrade(database_url)
+        lay_history(database_url)
         self.store = AccountStore(database_url)
 
     def call(self, action: str, name: str = "", **options: object) -> int:

@@ -30,6 +30,7 @@ from iveg.web.security.authentication import Authenticator, Principal, require
 from iveg.web.security.headers import SecurityHeaders
 from tests.browsers import running_browser
 from tests.builders import START
+from tests.databases import lay_history
 from tests.fakes.records import (
     command_record,
     decision_record,
@@ -54,6 +55,7 @@ class Server:
     def __init__(self, directory: Path) -> None:
         url = f"sqlite:///{directory / 'history.db'}"
         self.file = directory / "history.db"
+        lay_history(url)
         self._store = Store(url)
         self._queries = Queries(f"{url}?timeout=0.1")
         config = uvicorn.Config(self._app(), port=0, log_level="warning")

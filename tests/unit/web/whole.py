@@ -12,7 +12,6 @@ from fastapi import FastAPI
 
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.history.engine import history_url
-from iveg.adapters.history.migrate import upgrade
 from iveg.adapters.history.recorder import Recorder, journal_file
 from iveg.adapters.mail import Write
 from iveg.app.dss import Dss
@@ -27,6 +26,7 @@ from iveg.pipeline.ports import CommandPort, MessageSender
 from iveg.settings import Settings
 from iveg.web.security.roles import MAY
 from iveg.web.security.sessions import IDLE_S
+from tests.databases import lay_history
 from tests.fakes.context_broker import FakeContextBroker
 from tests.fakes.fleet import FakeFleet
 from tests.fakes.messages import FakeSender
@@ -104,7 +104,7 @@ class WholeServer:
 def whole_server(folder: Path) -> Iterator[WholeServer]:
     """A server with its files in ``folder``."""
     url = history_url(None, folder)
-    upgrade(url)
+    lay_history(url)
     chosen = Settings(api_token=API_TOKEN)
     fleet = load_fleet(chosen.fleet, chosen.robots)
     real = open_outside(chosen, folder, fleet)

@@ -30,6 +30,7 @@ from iveg.web.api import exports
 from iveg.web.api.history import router
 from iveg.web.pages import charts
 from iveg.web.security.authentication import require
+from tests.databases import lay_history
 from tests.fakes.records import (
     NOON,
     alert_record,
@@ -56,6 +57,7 @@ class Past:
     def __init__(self, directory: Path, *, open_: bool = True) -> None:
         self._file = directory / "history.db"
         url = f"sqlite:///{self._file}"
+        lay_history(url)
         self._store = Store(url)
         self._queries = Queries(url)
         self._open = open_

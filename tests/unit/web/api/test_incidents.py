@@ -29,6 +29,7 @@ from iveg.web import problems
 from iveg.web.api import notes
 from iveg.web.api.incidents import Sources, router
 from iveg.web.security.authentication import Principal, require
+from tests.databases import lay_history
 from tests.fakes.clock import FakeClock
 from tests.fakes.recordings import WriterInPlace
 from tests.fakes.records import (
@@ -59,6 +60,7 @@ class Desk:
 
     def __init__(self, folder: Path, browser: str | None = None) -> None:
         url = f"sqlite:///{folder / 'history.db'}"
+        lay_history(url)
         self.store, self.queries = Store(url), Queries(url)
         setup = WriterSetup(folder / "recordings")
         self.recorder = InputRecorder(setup, FakeClock())
