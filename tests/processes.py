@@ -17,7 +17,6 @@ from typing import BinaryIO, TypeVar
 import httpx
 
 from tests.bonds import bound
-from tests.databases import lay_history
 from tests.forge import PROGRAMS, Forked, fork
 from tests.ports import free_ports
 
@@ -142,6 +141,9 @@ class Site:
     def start(self, *words: str, module: str = "iveg") -> Program:
         """Start ``python -m iveg WORD …`` here, or another module."""
         if words[0] == "serve":
+            # Loads Alembic, which who only wants a path from here does not need.
+            from tests.databases import lay_history
+
             lay_history(self.settings["IVEG_DATABASE_URL"])
         log = self.directory / f"{len(self.programs)}-{words[0]}.log"
         with log.open("wb") as output:
