@@ -16,7 +16,7 @@ from iveg.cli.running import tune_garbage_collection
 pytest.register_assert_rewrite("tests.processes")
 
 # A busy machine may be slow without being wrong; the suite has its own time limits.
-settings.register_profile("iveg", deadline=None, max_examples=100)
+settings.register_profile("iveg", deadline=None, max_examples=50)
 settings.register_profile("quick", deadline=None, max_examples=15)
 settings.register_profile("thorough", deadline=None, max_examples=2000)
 expect.set_options(timeout=20_000)
