@@ -12,19 +12,25 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
-from sqlalchemy import create_engine
+from sqlalchemy import create_engine, text
 
 from benchmarks.process import machine, print_table
-from iveg.adapters.history import tables
 from iveg.adapters.history.engine import sqlite_url
 from iveg.adapters.history.migrate import upgrade
 from tests.processes import ROOT
 
 FORMS = ("csv", "ndjson", "parquet")
-AT_ONCE = 50_000
+_ROWS = """
+WITH RECURSIVE numbers (n) AS (
+  SELECT 0 UNION ALL SELECT n + 1 FROM numbers WHERE n < :count - 1
+)
+INSERT INTO odometry (at, robot_id, x, y, yaw, linear, angular, limit_factor,
+  applied_factor, link)
+SELECT 1.7e9 + n / 20.0, printf('R%02d', n % 10), n % 977 / 100.0, n % 991 / 100.0,
+  n % 314 / 100.0, 0.5, 0.0, 1.0, 1.0, 'LIVE' FROM numbers
+"""
 
 
 def main() -> None:
@@ -49,27 +55,9 @@ def _fill(folder: Path, count: int) -> None:
     url = sqlite_url(folder / "iveg.sqlite")
     upgrade(url)
     engine = create_engine(url)
-    for first in range(0, count, AT_ONCE):
-        rows = list(_rows(first, min(AT_ONCE, count - first)))
-        with engine.begin() as connection:
-            connection.execute(tables.odometry.insert(), rows)
+    with engine.begin() as connection:
+        connection.execute(text(_ROWS), {"count": count})
     engine.dispose()
-
-
-def _rows(first: int, count: int) -> Iterator[dict[str, object]]:
-    for n in range(first, first + count):
-        yield {
-            "at": 1.7e9 + n / 20.0,
-            "robot_id": f"R{n % 10:02d}",
-            "x": n % 977 / 100.0,
-            "y": n % 991 / 100.0,
-            "yaw": n % 314 / 100.0,
-            "linear": 0.5,
-            "angular": 0.0,
-            "limit_factor": 1.0,
-            "applied_factor": 1.0,
-            "link": "LIVE",
-        }
 
 
 def _export(folder: Path, form: str) -> tuple[float, float, int]:

@@ -61,7 +61,7 @@ def count(engine: Engine, table: str) -> int:
 
 
 def purge(engine: Engine, before: float) -> list[PurgeBatch]:
-    found = []
+    found: list[PurgeBatch] = []
     while not found or not found[-1].is_last:
         with engine.begin() as connection:
             found.append(purge_batch(connection, ODOMETRY, before, clock.mono))
@@ -147,8 +147,8 @@ def test_a_history_of_before_keeps_every_row_there_and_back(engine: Engine) -> N
 
     first = days(engine)[0], days(engine, "detections")[0]
     with engine.begin() as connection:
-        numbers = connection.scalars(text("SELECT row_id FROM odometry ORDER BY 1"))
-        numbers = [*numbers]
+        found = connection.scalars(text("SELECT row_id FROM odometry ORDER BY 1"))
+        numbers = [*found]
         command.downgrade(alembic_config(connection), "end_api_tokens")
     assert numbers == [1, 2, 3, 4]
     assert first == (TODAY + 1, TODAY)
