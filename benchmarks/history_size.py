@@ -119,7 +119,7 @@ FLEET: Mapping[str, Question] = {
     "speed of all robots": lambda q, _, at: q.speed_series(at, at + DAY_S),
     "confidence of all robots": lambda q, _, at: q.confidence_counts(at, at + DAY_S),
     "odometry of all robots": lambda q, f, _: q.odometry(replace(f, robot=None)),
-    "cost": lambda q, _, at: q.cost_rows(at, at + DAY_S, {}),
+    "cost": lambda q, f, at: q.cost_rows(at, at + DAY_S, {str(f.robot): 0.5}),
     "evening sheet": lambda q, _, at: q.day_series(at, at + DAY_S),
 }
 """Of all robots' day: told beside, without a goal."""
