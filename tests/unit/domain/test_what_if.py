@@ -309,8 +309,8 @@ def test_against_the_truth_missed_people_and_false_alarms_are_counted() -> None:
     blind = outcome_of(judged, replace(quick, threshold=0.999))
     unknown = outcome_of(Range(judged.inputs, 0.0, 20.0), quick)
 
-    # From 13 to 17 s it is near the one, from 8 to 12.3 s slow for the other.
-    assert found.missed_s == pytest.approx(4.0, abs=0.6)
+    # From 13 to 17.4 s it is near the one, from 8 to 12.3 s slow for the other.
+    assert found.missed_s == pytest.approx(4.4, abs=0.6)
     assert found.false_s == pytest.approx(4.3, abs=0.6)
     assert (blind.missed_s, blind.false_s) == (found.missed_s, 0.0)
     assert (unknown.missed_s, unknown.false_s) == (None, None)

@@ -1,29 +1,18 @@
 """Issue 25, 5: what two ranges cost and how near it was, from rows of the history."""
 
 from collections.abc import AsyncIterator
-from datetime import date
+from functools import partial
 from pathlib import Path
 
 import httpx
 import pytest
-from fastapi import FastAPI
 
 from iveg.adapters.history.engine import writing_engine
 from iveg.adapters.history.purge import purge_batch
-from iveg.adapters.history.store import Store
-from iveg.domain.geometry import Rectangle
-from iveg.domain.greenhouse import DriveLane, Greenhouse
-from iveg.domain.observations import Instant
 from iveg.domain.records import Record
 from iveg.domain.retention import DAY_S, PURGE_STEPS
 from iveg.domain.stamps import format_stamp
-from iveg.pipeline.record import Waiting
 from iveg.web.api import cost
-from iveg.web.pages.contexts import Site
-from iveg.web.pages.local_time import start_of
-from iveg.web.pages.routes import Pages
-from iveg.web.problems import install
-from iveg.web.security.authentication import Authenticator
 from tests.fakes.records import (
     alert_record,
     command_event_record,
@@ -34,11 +23,7 @@ from tests.fakes.records import (
     odometry_record,
 )
 from tests.fakes.worker import FakeWorker
-
-GREENHOUSE = Greenhouse(
-    "house", Rectangle(0, 0, 20, 20), lanes=(DriveLane("1", Rectangle(0, 0, 20, 4)),)
-)
-MORNING = start_of(date(2026, 11, 20)) + 9 * 3600.0
+from tests.unit.web.api.sheets import GREENHOUSE, MORNING, reader
 
 
 def _speed(at: float, factor: float, reason: str, **more: str) -> Record:
@@ -83,27 +68,8 @@ def url(tmp_path: Path) -> str:
 
 @pytest.fixture
 async def browser(url: str) -> AsyncIterator[httpx.AsyncClient]:
-    store = Store(url)
-    store.write([Waiting(one, n, 0.0) for n, one in enumerate(RECORDS, 1)])
-    store.close()
-
-    def now() -> Instant:
-        return Instant(0.0, MORNING + 3600.0)
-
-    app = FastAPI()
-    install(app)
-    app.state.authenticator = Authenticator(
-        sign_in_token="cd" * 32, api_token="", clock=now
-    )
-    pages = Pages(Site("house", ("AGI",), "1", demo=False))
     costs = cost.Costs(url, GREENHOUSE, {"AGI": 1.0}, FakeWorker())
-    app.include_router(cost.router(costs, pages, now))
-    cookie = app.state.authenticator.sessions.open("ana", "viewer")
-    async with httpx.AsyncClient(
-        transport=httpx.ASGITransport(app=app),
-        base_url="http://iveg",
-        headers={"Cookie": f"iveg={cookie}"},
-    ) as client:
+    async with reader(url, RECORDS, partial(cost.router, costs)) as client:
         yield client
 
 

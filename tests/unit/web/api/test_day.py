@@ -2,27 +2,17 @@
 
 import re
 from collections.abc import AsyncIterator
-from datetime import date
+from functools import partial
 from pathlib import Path
 
 import httpx
 import pytest
-from fastapi import FastAPI
 
 from iveg.adapters.history.engine import writing_engine
 from iveg.adapters.history.purge import purge_batch
-from iveg.adapters.history.store import Store
-from iveg.domain.geometry import Rectangle
-from iveg.domain.greenhouse import DriveLane, Greenhouse
-from iveg.domain.observations import Instant
 from iveg.domain.records import Record
 from iveg.domain.retention import DAY_S, PURGE_STEPS
-from iveg.pipeline.record import Waiting
 from iveg.web.api import day
-from iveg.web.pages.contexts import Site
-from iveg.web.pages.local_time import start_of
-from iveg.web.pages.routes import Pages
-from iveg.web.security.authentication import Authenticator
 from tests.fakes.records import (
     alert_record,
     command_record,
@@ -31,11 +21,8 @@ from tests.fakes.records import (
     odometry_record,
 )
 from tests.fakes.worker import FakeWorker
+from tests.unit.web.api.sheets import GREENHOUSE, MORNING, reader
 
-GREENHOUSE = Greenhouse(
-    "house", Rectangle(0, 0, 20, 20), lanes=(DriveLane("1", Rectangle(0, 0, 20, 4)),)
-)
-MORNING = start_of(date(2026, 11, 20)) + 9 * 3600.0
 RECORDS: tuple[Record, ...] = (
     *(odometry_record(at=MORNING + n / 2, x=5.0, y=2.0) for n in range(240)),
     detection_record(at=MORNING + 10.0, x=6.0, y=2.0, person_id="P1"),
@@ -53,28 +40,8 @@ def url(tmp_path: Path) -> str:
 
 @pytest.fixture
 async def browser(url: str) -> AsyncIterator[httpx.AsyncClient]:
-    store = Store(url)
-    store.write([Waiting(one, n, 0.0) for n, one in enumerate(RECORDS, 1)])
-    store.close()
-
-    def now() -> Instant:
-        return Instant(0.0, MORNING + 3600.0)
-
-    app = FastAPI()
-    app.state.authenticator = Authenticator(
-        sign_in_token="cd" * 32, api_token="", clock=now
-    )
-    pages = Pages(Site("house", ("AGI",), "1", demo=False))
-    app.include_router(
-        day.router(day.Days(url, GREENHOUSE, 30.0, FakeWorker()), pages, now)
-    )
-    cookie = {
-        "Cookie": f"iveg={app.state.authenticator.sessions.open('ana', 'viewer')}"
-    }
-    transport = httpx.ASGITransport(app=app)
-    async with httpx.AsyncClient(
-        transport=transport, base_url="http://iveg", headers=cookie
-    ) as client:
+    days = day.Days(url, GREENHOUSE, 30.0, FakeWorker())
+    async with reader(url, RECORDS, partial(day.router, days)) as client:
         yield client
 
 

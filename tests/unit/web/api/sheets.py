@@ -1,0 +1,53 @@
+"""A greenhouse with one aisle, the morning of its history, and who reads its sheets."""
+
+from collections.abc import AsyncIterator, Callable, Sequence
+from contextlib import asynccontextmanager
+from datetime import date
+
+import httpx
+from fastapi import APIRouter, FastAPI
+
+from iveg.adapters.history.store import Store
+from iveg.domain.geometry import Rectangle
+from iveg.domain.greenhouse import DriveLane, Greenhouse
+from iveg.domain.observations import Instant
+from iveg.domain.records import Record
+from iveg.pipeline.ports import Clock
+from iveg.pipeline.record import Waiting
+from iveg.web.pages.contexts import Site
+from iveg.web.pages.local_time import start_of
+from iveg.web.pages.routes import Pages
+from iveg.web.problems import install
+from iveg.web.security.authentication import Authenticator
+
+GREENHOUSE = Greenhouse(
+    "house", Rectangle(0, 0, 20, 20), lanes=(DriveLane("1", Rectangle(0, 0, 20, 4)),)
+)
+MORNING = start_of(date(2026, 11, 20)) + 9 * 3600.0
+
+
+@asynccontextmanager
+async def reader(
+    url: str, records: Sequence[Record], routes: Callable[[Pages, Clock], APIRouter]
+) -> AsyncIterator[httpx.AsyncClient]:
+    """A viewer an hour later, of a history that holds the records."""
+    store = Store(url)
+    store.write([Waiting(one, n, 0.0) for n, one in enumerate(records, 1)])
+    store.close()
+
+    def now() -> Instant:
+        return Instant(0.0, MORNING + 3600.0)
+
+    app = FastAPI()
+    install(app)
+    app.state.authenticator = Authenticator(
+        sign_in_token="cd" * 32, api_token="", clock=now
+    )
+    app.include_router(routes(Pages(Site("house", ("AGI",), "1", demo=False)), now))
+    cookie = app.state.authenticator.sessions.open("ana", "viewer")
+    async with httpx.AsyncClient(
+        transport=httpx.ASGITransport(app=app),
+        base_url="http://iveg",
+        headers={"Cookie": f"iveg={cookie}"},
+    ) as client:
+        yield client
