@@ -138,10 +138,7 @@ class Dss:
         ]
         site = PastSite.of(settings, self.stores.inputs.folder)
         self.past = Viewers(site, clock.now, has_spare=settings.recordings)
-        truth = Path(settings.truth) if settings.truth else None
-        self.what_ifs = WhatIfs(
-            self.stores.queries.url, fleet, new_id, clock.now, truth
-        )
+        self.what_ifs = WhatIfs.of(settings, self.stores.queries.url, fleet)
         self.worker = Worker(partial(self.pipeline.supervision.failed, "worker"))
         self._attach_reader()
         self.provisioner = self._provisioner()

@@ -11,7 +11,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
+from iveg.adapters import clock
 from iveg.adapters.history.queries import Queries
+from iveg.adapters.ids import new_id
 from iveg.adapters.truth_files import read_nearest
 from iveg.adapters.worker import Worker
 from iveg.domain.errors import (
@@ -28,6 +30,7 @@ from iveg.domain.what_if.outcome import outcomes_of, recorded
 from iveg.domain.what_if.questions import Answer, Job, Question
 from iveg.domain.what_if.truth import Nearest
 from iveg.pipeline.ports import Clock, Ids
+from iveg.settings import Settings
 
 MOST_WAITING: Final = 8
 _KEPT: Final = 32
@@ -98,8 +101,8 @@ class WhatIfs:
         self,
         url: str,
         fleet: FleetDescription,
-        new_id: Ids,
-        clock: Clock,
+        ids: Ids,
+        read_clock: Clock,
         truth: Path | None = None,
         workers: Sequence[Worker] | None = None,
     ) -> None:
@@ -109,10 +112,16 @@ class WhatIfs:
             for name, one in fleet.members.items()
             if one.kind == "live"
         }
-        self._new_id, self._clock = new_id, clock
+        self._new_id, self._clock = ids, read_clock
         self._workers = workers or [Worker() for _ in range(_PROCESSES)]
         self._jobs: dict[str, Job] = {}
         self._is_asked = asyncio.Event()
+
+    @classmethod
+    def of(cls, settings: Settings, url: str, fleet: FleetDescription) -> "WhatIfs":
+        """The server's."""
+        truth = Path(settings.truth) if settings.truth else None
+        return cls(url, fleet, new_id, clock.now, truth)
 
     def ask(self, question: Question, by: str) -> Job:
         """Take a question.

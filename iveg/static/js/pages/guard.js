@@ -27,6 +27,7 @@ export function createGuard(store, i18n) {
   const undo = /** @type {HTMLButtonElement} */ (need("#rule-undo"));
   /** @type {(isMeant: boolean) => void} */
   let answer = () => {};
+  let preview = new AbortController();
 
   /** @param {Change} change @param {Rule} before */
   async function isMeant(change, before) {
@@ -40,9 +41,11 @@ export function createGuard(store, i18n) {
     setText(need("#guard-says"), [...told, ...counts].filter(Boolean).join(" "));
     setText(need("#guard-yesterday"), "");
     // It takes seconds: whoever is sure need not wait.
-    askYesterday(before, change, ({ key, slots }) =>
-      setText(need("#guard-yesterday"), i18n.t(key, slots)),
-    );
+    const tell = (/** @type {import("./yesterday.js").Said} */ { key, slots }) =>
+      setText(need("#guard-yesterday"), i18n.t(key, slots));
+    preview.abort();
+    preview = new AbortController();
+    askYesterday(before, change, tell, preview.signal);
     setHidden(box, false);
     need("#guard-no").focus();
     return new Promise((resolve) => {
@@ -75,6 +78,7 @@ export function createGuard(store, i18n) {
   /** @param {boolean} isYes */
   function close(isYes) {
     setHidden(box, true);
+    preview.abort();
     answer(isYes);
     answer = () => {};
   }

@@ -102,8 +102,9 @@ export function start({ store, i18n }) {
     /** @type {HTMLProgressElement} */ (need("#whatif-progress")).value =
       asked?.progress ?? 0;
     say(asked ? stateSaid(asked, i18n) : said);
-    setHidden(need("#whatif-answer"), !asked?.answer);
-    if (asked?.answer) drawAnswer(asked);
+    // The first hours may have nothing.
+    setHidden(need("#whatif-answer"), !asked?.answer?.poses);
+    if (asked?.answer?.poses) drawAnswer(asked);
   }
 
   /** @param {WhatIf} found */

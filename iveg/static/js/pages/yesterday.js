@@ -20,23 +20,28 @@ const LOOK_MS = 500;
  * @param {Rule} before in force
  * @param {Change} change
  * @param {(said: Said) => void} tell called anew whenever there is more to say
- * @returns {Promise<boolean>} whether there is an answer
+ * @param {AbortSignal} [signal] nobody wants to know any more
  */
-export async function askYesterday(before, change, tell) {
-  const asked = await sendApi(
-    "POST",
-    "what-if",
-    questionOf(before, change, Date.now()),
-  );
-  let { status, body } = asked;
+export async function askYesterday(before, change, tell, signal) {
+  const wanted = questionOf(before, change, Date.now());
+  let { status, body } = await sendApi("POST", "what-if", wanted);
   while (body?.id && ["waiting", "running"].includes(body.state)) {
+    // A person has one question at a time.
+    if (signal?.aborted) return void sendApi("DELETE", `what-if/${body.id}`, {});
     tell({ key: "preview.going", slots: { percent: Math.round(body.progress * 100) } });
-    await new Promise((resolve) => setTimeout(resolve, LOOK_MS));
+    await pause(signal);
     ({ status, body } = await readApi(`what-if/${body.id}`));
   }
   const said = status < 300 && body?.id ? answerSaid(body) : null;
   tell(said ?? { key: refusal(status, body), slots: {} });
-  return said?.key === "preview.said";
+}
+
+/** Ends early where nobody waits. @param {AbortSignal} [signal] */
+function pause(signal) {
+  return new Promise((resolve) => {
+    setTimeout(resolve, LOOK_MS);
+    signal?.addEventListener("abort", resolve, { once: true });
+  });
 }
 
 /**
