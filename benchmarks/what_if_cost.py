@@ -45,11 +45,9 @@ def main() -> None:
         took = asyncio.run(_ask(url, asked.hours * 3600.0))
     print(machine())
     cells = (f"{asked.hours:g}", f"{asked.work:g}", *map(str, rows), *took)
-    heads = ("hours", "with people", "poses", "detections", "judgements")
-    heads += (
-        "first curve s",
-        "all s",
-        "CPU s",
+    heads = (
+        *("hours", "with people", "poses", "detections", "judgements"),
+        *("first curve s", "all s", "CPU s"),
     )
     print_table("A question about another rule", heads, [cells])
 

@@ -226,7 +226,7 @@ class WhatIfs:
         self, job: Job, worker: Worker, left: deque[tuple[float, float]], share: float
     ) -> None:
         """Judge one piece after the other until none is left.  Raises HopError."""
-        while left and not job.is_over:
+        while left:
             piece = await worker.run(
                 judge_part,
                 self._url,

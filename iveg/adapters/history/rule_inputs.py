@@ -3,7 +3,7 @@
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
-from sqlalchemy import Connection, Select, and_, false, or_, select
+from sqlalchemy import Connection, and_, false, or_, select
 
 from iveg.adapters.history.tables import decisions, detections, odometry
 from iveg.domain.what_if.inputs import Poses, SeenRow, poses_of
@@ -25,11 +25,8 @@ def rule_inputs(
     """Everything of a range that judgements rest on (Unix s)."""
     poses = {name: _poses(connection, name, since, until) for name in sorted(robots)}
     there = {name: one for name, one in poses.items() if len(one.at)}
-    seen, decided = _seen(robots, since, until), _decided(robots, since, until)
-    return RuleInputs(
-        there,
-        *([tuple(row) for row in connection.execute(one)] for one in (seen, decided)),
-    )
+    seen = _seen(connection, robots, since, until)
+    return RuleInputs(there, seen, _decided(connection, robots, since, until))
 
 
 def _poses(connection: Connection, robot: str, since: float, until: float) -> Poses:
@@ -47,26 +44,27 @@ def _poses(connection: Connection, robot: str, since: float, until: float) -> Po
 
 
 def _seen(
-    robots: Collection[str], since: float, until: float
-) -> Select[tuple[object, ...]]:
+    connection: Connection, robots: Collection[str], since: float, until: float
+) -> Sequence[SeenRow]:
     c = detections.c
     # A robot without a track is one of the fleet, whose own odometry counts.
     somebody = or_(
         c.class_ == "person", and_(c.class_ == "robot", c.person_id.is_not(None))
     )
-    return (
+    wanted = (
         select(c.robot_id, c.at, c.x, c.y, c.probability, c.class_, c.person_id)
         .where(c.at >= since, c.at < until, c.late == false(), c.x.is_not(None))
         .where(somebody, c.robot_id.in_(sorted(robots)))
         .order_by(c.at)
     )
+    return [tuple(row) for row in connection.execute(wanted)]
 
 
 def _decided(
-    robots: Collection[str], since: float, until: float
-) -> Select[tuple[object, ...]]:
+    connection: Connection, robots: Collection[str], since: float, until: float
+) -> Sequence[Decided]:
     c = decisions.c
-    return select(c.robot_id, c.reason, c.started_at, c.ended_at).where(
+    wanted = select(c.robot_id, c.reason, c.started_at, c.ended_at).where(
         c.kind == "mandate",
         c.robot_id.in_(sorted(robots)),
         c.started_at < until,
@@ -74,3 +72,4 @@ def _decided(
         # An index finds those: no slow-down lasts for so long.
         c.started_at >= since - 86_400.0,
     )
+    return [tuple(row) for row in connection.execute(wanted)]

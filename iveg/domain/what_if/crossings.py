@@ -147,8 +147,10 @@ class Crossings:
         self, tried: Parameters, wanted: Flags | None = None
     ) -> list[tuple[int, int, int]]:
         """First step, end and cause of each; ``wanted``: of these rings alone."""
-        rows = slice(None) if wanted is None else np.flatnonzero(wanted[self._rows])
-        near = self._near if wanted is None else self._near.where(rows)
+        rows = np.arange(len(self._rows))
+        if wanted is not None:
+            rows = np.flatnonzero(wanted[self._rows])
+        near = self._near.where(rows)
         if not len(near.step):
             return []
         depth, soon, in_s = self._depth[rows], self._soon[rows], self._met_in_s[rows]

@@ -1,5 +1,6 @@
 """What another rule would have done: asked, watched, drawn and ended over HTTP."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Annotated, Final, Literal, Protocol, Self
 
@@ -160,7 +161,7 @@ def draw(found: WhatIf) -> bytes:
         why: [point.outcome.slowed_s.get(why, 0.0) / 60.0 for point in curve]
         for why in ("person", "robot")
     }
-    shown = {
+    shown: dict[str, Mapping[str, Sequence[float]]] = {
         "minutes": minutes,
         "near_misses": {"near_misses": [one.outcome.near_misses for one in curve]},
     }
