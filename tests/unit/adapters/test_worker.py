@@ -2,7 +2,7 @@
 
 import asyncio
 import os
-import time
+import signal
 from collections.abc import AsyncIterator
 from pathlib import Path
 
@@ -28,7 +28,7 @@ def fail() -> None:
 
 def fall_asleep(sign: Path) -> None:
     sign.touch()
-    time.sleep(3600.0)
+    signal.pause()
 
 
 def stumble() -> object:
