@@ -1,4 +1,8 @@
-import { createNotes, notesAbout } from "../../iveg/static/js/panels/notes.js";
+import {
+  createNotes,
+  notesAbout,
+  sharedNotes,
+} from "../../iveg/static/js/panels/notes.js";
 import { equal, test } from "./harness.js";
 
 const at = "2026-11-24T10:00:00.000Z";
@@ -71,4 +75,23 @@ test("25.7: who may not write is offered nothing", async () => {
     await soon();
     equal(element.hidden, true);
   });
+});
+
+test("notes of many alerts are asked for once, and anew where one was written", async () => {
+  /** @type {number[]} */
+  const asked = [];
+  const read = sharedNotes(async (sinceMs) => {
+    asked.push(sinceMs);
+    return { status: 200, body: { items: [] } };
+  });
+  const first = read(10_000_000);
+  equal(read(20_000_000) === first, true);
+  equal(read(9_000_000) === first, true);
+  equal(asked.length, 1);
+  equal(asked[0] <= 9_000_000, true);
+
+  read(20_000_000, true);
+  equal(asked, [asked[0], asked[0]]);
+  read(0);
+  equal(asked.length, 3);
 });

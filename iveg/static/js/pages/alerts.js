@@ -2,10 +2,11 @@
  * The Alerts page: all active alerts, whatever the window of time; the sound; the past.
  */
 
-import { createAlertList, sentenceOf } from "../panels/alert_list.js";
+import { createAlertList, pinOf, sentenceOf } from "../panels/alert_list.js";
 import { createMembers, writeFlood } from "../panels/alert_members.js";
 import { earlierUnknown, isKnown } from "../panels/alerts.js";
 import { make, need, setHidden } from "../panels/dom.js";
+import { createNotes, sharedNotes } from "../panels/notes.js";
 import { createSoundPanel } from "../panels/sound.js";
 import { toldSaid } from "../panels/told.js";
 import { createTogether } from "./alerts_together.js";
@@ -20,12 +21,13 @@ export function start({ store, i18n, tone }) {
   const together = createTogether(i18n);
   /** @type {Set<string>} alerts whose occurrences somebody reads */
   const opened = new Set();
+  const notes = createNotesOf(i18n);
   const isChosen = createChips("data-priority-chip", () => rows.draw());
   const rows = createRows({
     name: "past",
     path: "alerts",
     i18n,
-    cells: (alert) => cellsOf(alert, i18n, opened),
+    cells: (alert) => cellsOf(alert, i18n, opened, notes),
     admits: ({ priority, cleared_at }) => cleared_at !== null && isChosen(priority),
   });
   const reload = soon(rows.load);
@@ -55,20 +57,39 @@ export function start({ store, i18n, tone }) {
   rows.load();
 }
 
+/**
+ * Notes of alerts that are over; what is being written stays when rows are read anew.
+ *
+ * @param {import("../core/i18n.js").I18n} i18n
+ */
+function createNotesOf(i18n) {
+  const read = sharedNotes();
+  /** @type {Map<string, ReturnType<typeof createNotes>>} */
+  const known = new Map();
+  return (/** @type {Alert} */ alert) => {
+    const notes = known.get(alert.alert_id) ?? createNotes(pinOf(alert), i18n, read);
+    known.set(alert.alert_id, notes);
+    notes.draw();
+    return notes.element;
+  };
+}
+
 /** @param {Alert} alert @param {import("../core/i18n.js").I18n} i18n
- * @param {Set<string>} opened */
-function cellsOf(alert, i18n, opened) {
+ * @param {Set<string>} opened @param {ReturnType<typeof createNotesOf>} notes */
+function cellsOf(alert, i18n, opened, notes) {
   const priority = make("td");
   priority.dataset.priority = alert.priority;
   priority.append(
     make("span", "shape"),
     make("span", "", i18n.t(`alert.priority.${alert.priority}`)),
   );
+  const what = whatOf(alert, i18n, opened);
+  what.append(notes(alert));
   const over = alert.cleared_at ? dayAndTime(alert.cleared_at) : "—";
   return [
     make("td", "time", timesOf(alert, i18n)),
     priority,
-    whatOf(alert, i18n, opened),
+    what,
     make("td", "time", over),
     make("td", "", seenBy(alert, i18n)),
     make("td", "number", i18n.number(alert.count, 0)),

@@ -8,6 +8,7 @@
 import { sendApi } from "../core/api.js";
 import { createMembers, endOf } from "./alert_members.js";
 import { make, need, setAttribute, setHidden, setText } from "./dom.js";
+import { createNotes, sharedNotes } from "./notes.js";
 import { makePastLink } from "./past_link.js";
 
 /** @typedef {import("../core/protocol.js").Alert} Alert */
@@ -29,6 +30,9 @@ export function createAlertList(list, i18n, send = acknowledge, stillMs = STILL_
   const items = new Map();
   /** @type {Map<string, ReturnType<typeof createMembers>>} */
   const members = new Map();
+  /** @type {Map<string, ReturnType<typeof createNotes>>} */
+  const notes = new Map();
+  const readNotes = sharedNotes();
   /** @type {Map<string, number>} HTTP status of acknowledgements that failed */
   const failures = new Map();
   /** @type {Map<string, string>} what an item was drawn from */
@@ -83,6 +87,7 @@ export function createAlertList(list, i18n, send = acknowledge, stillMs = STILL_
     items.delete(id);
     drawn.delete(id);
     members.delete(id);
+    notes.delete(id);
     failures.delete(id);
   }
 
@@ -99,6 +104,9 @@ export function createAlertList(list, i18n, send = acknowledge, stillMs = STILL_
     });
     const past = createMembers(i18n);
     need("small", item).after(past.element);
+    const written = createNotes(pinOf(alert), i18n, readNotes);
+    need("p", item).after(written.element);
+    notes.set(alert.alert_id, written);
     members.set(alert.alert_id, past);
     items.set(alert.alert_id, item);
     return item;
@@ -123,6 +131,7 @@ export function createAlertList(list, i18n, send = acknowledge, stillMs = STILL_
     setText(pack, i18n.t("incident.get"));
     setHidden(pack, !ACKNOWLEDGERS.has(role));
     members.get(alert.alert_id)?.draw(alert);
+    notes.get(alert.alert_id)?.draw();
     const may = ACKNOWLEDGERS.has(role);
     setHidden(need("form", item), alert.acknowledged_at !== null || !may);
     const input = /** @type {HTMLInputElement} */ (need("input", item));
@@ -137,6 +146,9 @@ export function createAlertList(list, i18n, send = acknowledge, stillMs = STILL_
 
   return { draw };
 }
+
+/** What a note about an alert is pinned to. @param {Alert} alert */
+export const pinOf = ({ raised_at, robot_id }) => ({ at: raised_at, robot_id });
 
 /** What an alert says. @param {Alert} alert @param {import("../core/i18n.js").I18n} i18n */
 export function sentenceOf({ key, slots }, i18n) {

@@ -14,13 +14,44 @@ import { make, setHidden, setText } from "./dom.js";
 const WRITERS = new Set(["operator", "admin"]);
 /** As far to both sides as an incident pack reaches. */
 const NEAR_MS = 30_000;
+/** Who shows notes of several moments asks once for all of them. */
+const SHARED_MS = 5000;
+const EARLIER_MS = 3_600_000;
 const MOST_TEXT = 1000;
+
+/** @param {number} sinceMs */
+const readNotes = (sinceMs) => {
+  const since = new Date(sinceMs).toISOString();
+  return readApi(`notes?${new URLSearchParams({ since })}`);
+};
+
+/**
+ * Reads once for all who ask within seconds; `isAnew`: somebody has just written one.
+ *
+ * @param {(sinceMs: number) => Promise<import("../core/api.js").Answer>} [read]
+ */
+export function sharedNotes(read = readNotes) {
+  let sinceMs = Number.POSITIVE_INFINITY;
+  let askedAtMs = Number.NEGATIVE_INFINITY;
+  /** @type {ReturnType<typeof readNotes> | null} */
+  let answer = null;
+  return (/** @type {number} */ wantedMs, isAnew = false) => {
+    const nowMs = performance.now();
+    const isOld = nowMs - askedAtMs > SHARED_MS;
+    if (answer && !isAnew && !isOld && wantedMs >= sinceMs) return answer;
+    if (isOld || wantedMs < sinceMs) sinceMs = wantedMs - EARLIER_MS;
+    askedAtMs = nowMs;
+    answer = read(sinceMs);
+    return answer;
+  };
+}
 
 /**
  * @param {About} about
  * @param {import("../core/i18n.js").I18n} i18n
+ * @param {ReturnType<typeof sharedNotes>} [read]
  */
-export function createNotes(about, i18n) {
+export function createNotes(about, i18n, read = readNotes) {
   const element = make("details", "notes");
   const title = make("summary");
   const list = make("ul", "notes__list");
@@ -40,10 +71,9 @@ export function createNotes(about, i18n) {
   let asked = about;
   let failure = 0;
 
-  async function load() {
+  async function load(isAnew = false) {
     // A note is written after what it is about.
-    const since = new Date(Date.parse(asked.at) - NEAR_MS).toISOString();
-    const { status, body } = await readApi(`notes?${new URLSearchParams({ since })}`);
+    const { status, body } = await read(Date.parse(asked.at) - NEAR_MS, isAnew);
     failure = status === 200 ? 0 : status || -1;
     if (status === 200) notes = body.items;
     draw();
@@ -76,7 +106,7 @@ export function createNotes(about, i18n) {
     failure = status === 201 ? 0 : status || -1;
     if (status !== 201) return draw();
     input.value = "";
-    await load();
+    await load(true);
   });
   draw();
   void load();
