@@ -8,7 +8,8 @@ number of files and the size of one are those of a day; seconds are asked for wh
 file holds what was recorded then.  Half of them are in the file that is being written.
 
 *ready*: by a new viewer, for whom a process stands ready.  *none ready*: by another at
-once.  *next*: by the same, anywhere.  *page*: from the address to the robots' places.
+once.  *next*: by the same, anywhere.  *page*: from the address to the robots' places.  CPU is
+that of the viewer's process, which differs less with what else the machine does.
 """
 
 import argparse
@@ -21,17 +22,17 @@ from random import Random
 import httpx
 from playwright.sync_api import Browser
 
-from benchmarks.glass import APIKEY, Place, talking_fleet
-from benchmarks.process import machine, percentile, print_table
+from benchmarks.glass import APIKEY, Place, talking_fleet, words_of
+from benchmarks.process import Usage, machine, pause, percentile, print_table
 from iveg.adapters.recordings.mcap_file import McapFile
 from iveg.adapters.recordings.reading import RecordedMessage, read_messages
 from iveg.domain.observations import Instant
 from iveg.domain.stamps import format_stamp
 from tests.browsers import running_browser
 from tests.fleet import names
-from tests.processes import Site, site
+from tests.processes import Site, children_of, site
 
-HEAD = ("question", "n", "P50 s", "P95 s", "worst s", "failed")
+HEAD = ("question", "n", "P50 s", "P95 s", "CPU P50 s", "CPU P95 s", "failed")
 HOURS = 24
 EVERY_S = 11.0
 """Between two that come anew: a viewer is in use for ten seconds after a question."""
@@ -48,13 +49,16 @@ class Asked:
 
     def __init__(self) -> None:
         self.took_s: list[float] = []
+        self.cpu_s: list[float] = []
         self.failed = 0
 
     def row(self, name: str) -> list[str]:
         """Of the table."""
-        took = sorted(self.took_s) or [float("nan")]
-        figures = percentile(took, 0.5), percentile(took, 0.95), took[-1]
-        told = [f"{one:.2f}" for one in figures]
+        told = [
+            f"{percentile(sorted(values) or [float('nan')], share):.2f}"
+            for values in (self.took_s, self.cpu_s)
+            for share in (0.5, 0.95)
+        ]
         return [name, str(len(self.took_s)), *told, str(self.failed)]
 
 
@@ -65,6 +69,7 @@ def main() -> None:
     parser.add_argument("--hz", type=float, default=30.0)
     parser.add_argument("--record", type=float, default=120.0, help="at first (s)")
     parser.add_argument("--asked", type=int, default=40)
+    parser.add_argument("--hour", type=float, default=3600.0, help="of that (s)")
     parser.add_argument("--scene", default="calm")
     asked = parser.parse_args()
     settings = {
@@ -78,27 +83,32 @@ def main() -> None:
         site(Path(name), **settings) as there,
         running_browser() as browser,
     ):
-        there.start("demo", "--no-emulator")
+        demo = there.start("demo", "--no-emulator")
         there.wait_until_whole()
         port = int(there.settings["IVEG_MQTT_URL"].rpartition(":")[2])
         place = Place(there.sign_in_link, port, [], [])
         with talking_fleet(place, asked.robots, asked.scene, asked.hz):
-            time.sleep(asked.record)
+            pause(asked.record)
             folder = next(Path(name).rglob("*.mcap.open")).parent
-            _report(there, browser, _Day(folder), asked.asked)
+            day = _Day(folder, asked.hour)
+            _report(there, browser, day, asked.asked, demo.pid)
 
 
 class _Day:
-    """Recordings of a day, of which one is being written."""
+    """Recordings of a day, of which one is being written.
 
-    def __init__(self, folder: Path) -> None:
+    Args:
+        hour_s: Length of the one that stands for a whole hour (s).
+    """
+
+    def __init__(self, folder: Path, hour_s: float) -> None:
         (self._written,) = folder.glob("*.mcap.open")
         with read_messages(self._written) as reading:
             self._start = reading.start
             messages = list(reading)
         self._length_s = (messages[-1][1] - messages[0][1]) / _NS
         for hour in range(1, HOURS):
-            self._make(folder, hour, messages, _HOUR_S if hour == 1 else 0.0)
+            self._make(folder, hour, messages, hour_s if hour == 1 else 0.0)
         sizes = [one.stat().st_size for one in folder.glob("*.mcap*")]
         print(
             f"{len(sizes)} files, {sum(sizes) / 1e9:.2f} GB, of which a whole hour"
@@ -137,20 +147,20 @@ class _Day:
         file.path.rename(path)
 
 
-def _report(there: Site, browser: Browser, day: _Day, count: int) -> None:
+def _report(there: Site, browser: Browser, day: _Day, count: int, pid: int) -> None:
     moments = day.moments(Random(7))  # noqa: S311 - repeatable on purpose
     told = {name: Asked() for name in ("ready", "none ready", "next", "page")}
     with there.api() as api:
         for number in range(count):
-            time.sleep(EVERY_S)
+            pause(EVERY_S)
             for name in ("ready", "none ready"):
-                _ask(api, told[name], next(moments), f"{name[0]}-{number}")
-            _ask(api, told["next"], next(moments), f"r-{number}")
+                _ask(api, told[name], next(moments), f"{name[0]}-{number}", pid)
+            _ask(api, told["next"], next(moments), f"r-{number}", pid)
     context = browser.new_context()
     page = context.new_page()
     page.goto(there.sign_in_link)
     for _ in range(count):
-        time.sleep(EVERY_S)
+        pause(EVERY_S)
         page.goto(f"{there.url}/?t={format_stamp(next(moments))}")
         found = page.wait_for_function(_WHOLE, timeout=60_000)
         told["page"].took_s.append(found.json_value() / 1000.0)
@@ -160,14 +170,24 @@ def _report(there: Site, browser: Browser, day: _Day, count: int) -> None:
     )
 
 
-def _ask(api: httpx.Client, to: Asked, wall: float, viewer: str) -> None:
+def _ask(api: httpx.Client, to: Asked, wall: float, viewer: str, pid: int) -> None:
+    before = _workers(pid)
     began = time.monotonic()
     asked = {"at": format_stamp(wall), "viewer": viewer}
     answer = api.get("world", params=asked)
     to.took_s.append(time.monotonic() - began)
+    # The next one, which begins at once, takes less meanwhile.
+    after = _workers(pid).items()
+    to.cpu_s.append(max(cpu - before.get(one, 0.0) for one, cpu in after))
     if answer.status_code != 200:
         to.failed += 1
         print(answer.status_code, answer.text[:200])
+
+
+def _workers(pid: int) -> dict[int, float]:
+    """Processor time of the server's processes for others (s), by their ids."""
+    found = [one for one in children_of(pid) if "-c" in words_of(one)]
+    return {one: Usage.of(one).cpu_s for one in found}
 
 
 if __name__ == "__main__":
