@@ -8,8 +8,8 @@ number of files and the size of one are those of a day; seconds are asked for wh
 file holds what was recorded then.  Half of them are in the file that is being written.
 
 *ready*: by a new viewer, for whom a process stands ready.  *none ready*: by another at
-once.  *next*: by the same, anywhere.  *page*: from the address to the robots' places.  CPU is
-that of the viewer's process, which differs less with what else the machine does.
+once.  *next*: by the same, anywhere.  *page*: from the address to the robots' places.
+CPU is of the viewer's process: it differs less with what else the machine does.
 """
 
 import argparse
