@@ -1,3 +1,5 @@
+import { createI18n } from "../../iveg/static/js/core/i18n.js";
+import { detailsSaid } from "../../iveg/static/js/pages/audit.js";
 import { stepsOf } from "../../iveg/static/js/pages/command.js";
 import {
   judgeDataPath,
@@ -179,4 +181,16 @@ test("28.6: the moments of an order stand in time from the press; one that is mi
     release.map(({ name }) => name),
     ["accepted", "sent_direct"],
   );
+});
+
+test("a row of the audit tells its details in the reader's words", async () => {
+  const i18n = createI18n(async () => ({
+    auditpage: { detail: { ends_at: "hasta", role: "rol:" } },
+    header: { role: { viewer: "solo ver" } },
+  }));
+  await i18n.use("es");
+  const details = { ends_at: 1796249745.05, role: "viewer", scope: null, odd: 3 };
+
+  equal(detailsSaid(details, i18n), "hasta 02/12 23:15:45 · rol: solo ver · odd 3");
+  equal(detailsSaid({ ends_at: null }, i18n), "—");
 });

@@ -83,17 +83,38 @@ function cellsOf(entry, i18n) {
       name ? i18n.t("rows.by", { by: name }) : i18n.t("auditpage.stranger", { role }),
     ),
     make("td", "what", i18n.t(`auditpage.action.${action}`)),
-    make("td", "", subject || "—"),
-    make("td", "what", detailsSaid(details)),
+    make("td", "", worded(`auditpage.of.${subject}`, subject || "—", i18n)),
+    make("td", "what", detailsSaid(details, i18n)),
     make("td", "number", i18n.number(seq, 0)),
   ];
 }
 
-/** @param {Record<string, unknown>} details */
-function detailsSaid(details) {
-  const parts = Object.entries(details).map(([key, value]) => {
-    const said = typeof value === "string" ? value : JSON.stringify(value);
-    return `${key} ${said}`;
+/** Numbers from here on are moments: Unix seconds. */
+const A_MOMENT = 1e9;
+
+/**
+ * What a row tells besides: in the reader's words where there are some, without what it
+ * does not know.
+ *
+ * @param {Record<string, unknown>} details @param {I18n} i18n
+ */
+export function detailsSaid(details, i18n) {
+  const known = Object.entries(details).filter(([, value]) => value !== null);
+  const parts = known.map(([key, value]) => {
+    const name = worded(`auditpage.detail.${key}`, key, i18n);
+    return `${name} ${valueSaid(key, value, i18n)}`;
   });
   return parts.join(" · ") || "—";
 }
+
+/** @param {string} key @param {unknown} value @param {I18n} i18n */
+function valueSaid(key, value, i18n) {
+  if (typeof value === "number" && value > A_MOMENT)
+    return dayAndTime(new Date(value * 1000).toISOString());
+  if (key === "role") return worded(`header.role.${value}`, String(value), i18n);
+  if (key === "scope") return worded(`tokenspage.scope.${value}`, String(value), i18n);
+  return typeof value === "string" ? value : JSON.stringify(value);
+}
+
+/** @param {string} key @param {string} otherwise @param {I18n} i18n */
+const worded = (key, otherwise, i18n) => (i18n.has(key) ? i18n.t(key) : otherwise);

@@ -33,7 +33,7 @@ function createSessions(page, path) {
     const end = () => finish(`${path}/${session_id}`, "ended", { name });
     if (!own) change.append(makeTwice(label("end"), label("end_sure", { name }), end));
     return [
-      make("td", "", name),
+      make("td", "", i18n.t("rows.by", { by: name })),
       make("td", "", i18n.t(`header.role.${role}`)),
       make("td", "", label(`kind.${kind}`)),
       make("td", "time named", dayAndTime(began_at)),
