@@ -174,6 +174,13 @@ def test_stop_says_what_the_product_says(key: str, es: str, en: str | None) -> N
     assert en in (None, EN.sentences[f"stop.{key}"])
 
 
+def test_a_column_is_named_for_what_its_rows_hold() -> None:
+    """Alerts are acknowledged, sessions make requests: neither has the other's word."""
+    assert EN.sentences["rows.column.seen"] == "Acknowledged"
+    lists = [ROOT / f"iveg/templates/{name}.html" for name in ("alerts", "_sessions")]
+    assert ['"seen"' in one.read_text() for one in lists] == [True, False]
+
+
 def test_no_control_is_called_an_emergency_stop() -> None:
     named = [
         key

@@ -215,7 +215,7 @@ def test_the_fleet_page_draws_the_whole_chain_and_each_device(
         box = page.locator(f'.hop-box[data-hop="{hop}"]')
         expect(box).to_have_attribute("data-state", "ok", timeout=30_000)
     expect(page.locator("#data-path-sentence")).to_have_text(
-        re.compile("Todo funciona")
+        re.compile("Cada dato llega")
     )
     expect(page.locator("#machines tbody tr")).to_have_count(2)
     lidar = page.locator("#devices tr", has_text="AGI_lidar2D")
