@@ -130,7 +130,12 @@ def _take(
         browser, past, (wide, high), *look, tell=lambda: told, lines=lines
     ) as page:
         page.on("pageerror", lambda error: errors.append(str(error)))
-        page.context.add_cookies(admin["cookies"])
+        page.context.add_cookies(
+            [
+                {"name": one["name"], "value": one["value"], "url": past.url}
+                for one in admin["cookies"]
+            ]
+        )
         try:
             page.goto(past.url + PAGES[case["page"]])
             settle(page, READY.get(case["page"], "body"))
