@@ -11,7 +11,7 @@ from math import sqrt
 from statistics import median
 from typing import Any
 
-from sqlalchemy import Connection, and_, case, func, select, text
+from sqlalchemy import Connection, and_, case, func, literal, select, text
 
 from iveg.adapters.history.partial_indexes import IS_NEAR, IS_SLOWED
 from iveg.adapters.history.series import whole
@@ -131,7 +131,9 @@ def _near(
     # What the margin leaves with the shortest reaction: no gap was less, so that few
     # seconds are left of which places must be read.
     second, speed = whole(connection, c.at), func.abs(c.linear)
-    brakes = case(dict(braking), value=c.robot_id, else_=LIMITS.least_braking_m_s2)
+    least = literal(LIMITS.least_braking_m_s2)
+    # SQL has no case without a branch.
+    brakes = case(dict(braking), value=c.robot_id, else_=least) if braking else least
     gap = c.margin_m + (
         LIMITS.walking_m_s * (LIMITS.reaction_s + speed / brakes)
         + speed * LIMITS.reaction_s

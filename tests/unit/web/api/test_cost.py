@@ -99,6 +99,16 @@ async def test_a_near_miss_is_where_people_were_and_leads_to_its_decision(
     assert told["heat"] == [{"x": 5.0, "y": 2.0, "seconds": 2}]
 
 
+async def test_robots_of_which_nothing_is_described_brake_as_the_worst(
+    url: str,
+) -> None:
+    costs = cost.Costs(url, GREENHOUSE, {}, FakeWorker())
+    async with reader(url, RECORDS, partial(cost.router, costs)) as client:
+        told = (await client.get("/api/v1/cost", params=_asked())).json()
+
+    assert [one["distance_m"] for one in told["near"]] == [1.0]
+
+
 async def test_lost_time_is_counted_against_the_robots_own_free_speed(
     browser: httpx.AsyncClient,
 ) -> None:
