@@ -109,7 +109,8 @@ def _opened(browser: Browser, link: str, slower: float) -> Iterator[Page]:
     with browser.new_context() as context:
         context.add_init_script(f"({WATCH})()")
         page = context.new_page()
-        page.goto(link)
+        # Through a long line, beside a page that paints twenty robots.
+        page.goto(link, timeout=90_000)
         tools = context.new_cdp_session(page)
         tools.send("Emulation.setCPUThrottlingRate", {"rate": slower})
         yield page
