@@ -8,7 +8,7 @@
  */
 
 /** Named by what is in it, so that a change of any part reaches every device. */
-const CACHE = "iveg-offline-0e2c1aac";
+const CACHE = "iveg-offline-b62a53ef";
 const OFFLINE = "/static/offline.html";
 /** What the offline page alone asks for in this way: answered from the cache. */
 const OF_OFFLINE = "?offline";

@@ -415,7 +415,7 @@ def may_resume(one: Transition) -> bool:
 
 @given(EVENTS)
 def test_the_order_of_effects_is_zero_disk_answer_report(events: list[Event]) -> None:
-    rank = {"Drive": 0, "Persist": 1, "Answer": 2, "Report": 3}
+    rank = {"Drive": 0, "Persist": 1, "SendAnswer": 2, "Report": 3}
     for one in played(events).transitions:
         order = [rank[type(effect).__name__] for effect in one.effects]
         assert order == sorted(order)

@@ -129,7 +129,7 @@ class SpeedLimits:
         near = self._zones.near(world, people, rule, now, self._open)
         seen, ids = self._seen(now), (f"{new_id}-{number}" for number in count())
         ahead = self._foretell(world, people, rule, now)
-        self.foretold = with_obstacles(ahead, seen, rule)
+        self.foretold = with_obstacles(ahead, seen, rule) if rule.foresight else ahead
         again, changes = self._foresight.if_released, list[LimitChange]()
         # Should anything fail, everybody is judged anew.
         before, self._judged = self._judged, {}

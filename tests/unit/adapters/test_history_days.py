@@ -26,8 +26,12 @@ from iveg.domain.retention import DAY_S, PurgeStep
 from iveg.pipeline.record import Waiting
 from tests.fakes.records import NOON, detection_record, odometry_record
 
-TODAY = int(clock.wall() // DAY_S)
 ODOMETRY = PurgeStep("telemetry", "odometry")
+
+
+def today() -> int:
+    """Asked anew each time: the suite may run through midnight."""
+    return int(clock.wall() // DAY_S)
 
 
 @pytest.fixture
@@ -69,11 +73,11 @@ def purge(engine: Engine, before: float) -> list[PurgeBatch]:
 
 
 def test_tables_of_days_are_made_ahead_and_once(engine: Engine) -> None:
-    prepare(engine, TODAY)
-    prepare(engine, TODAY)
-    prepare(engine, TODAY + 1)
+    prepare(engine, today())
+    prepare(engine, today())
+    prepare(engine, today() + 1)
 
-    assert [*days(engine)] == [*range(TODAY, TODAY + AHEAD_DAYS + 2)]
+    assert [*days(engine)] == [*range(today(), today() + AHEAD_DAYS + 2)]
     assert days(engine, "detections") == days(engine)
     assert days(engine, "climate") == ()
 
@@ -81,8 +85,8 @@ def test_tables_of_days_are_made_ahead_and_once(engine: Engine) -> None:
 def test_what_is_over_goes_as_whole_days_and_the_day_of_the_horizon_stays(
     engine: Engine,
 ) -> None:
-    prepare(engine, TODAY)
-    noons = [(TODAY + n + 0.5) * DAY_S for n in range(3)]
+    prepare(engine, today())
+    noons = [(today() + n + 0.5) * DAY_S for n in range(3)]
     write(engine, *(odometry_record(at=at + n) for at in noons for n in range(120)))
     before = noons[2]
 
@@ -94,7 +98,7 @@ def test_what_is_over_goes_as_whole_days_and_the_day_of_the_horizon_stays(
     # A day is one batch, which no bound of rows cuts.
     assert [one.rows for one in batches] == [120, 120, 0]
     assert count(engine, "odometry") == 120
-    assert days(engine)[0] == TODAY + 2
+    assert days(engine)[0] == today() + 2
 
 
 def test_rows_of_before_go_one_by_one_up_to_the_very_moment(engine: Engine) -> None:
@@ -107,7 +111,7 @@ def test_rows_of_before_go_one_by_one_up_to_the_very_moment(engine: Engine) -> N
 def test_a_row_of_a_day_without_a_table_is_kept_and_gets_it_later(
     engine: Engine,
 ) -> None:
-    ahead = TODAY + 100
+    ahead = today() + 100
     write(engine, odometry_record(at=ahead * DAY_S + 5.0))
     assert count(engine, "odometry_rest") == 1
 
@@ -118,21 +122,21 @@ def test_a_row_of_a_day_without_a_table_is_kept_and_gets_it_later(
 
 
 def test_a_day_that_somebody_reads_is_dropped_another_time(engine: Engine) -> None:
-    prepare(engine, TODAY)
+    prepare(engine, today())
     with engine.connect() as reader, reader.begin():
         assert oldest_telemetry(reader) is None
         with pytest.raises(OperationalError, match="lock"), engine.begin() as writer:
-            drop_day(writer, "odometry", (TODAY + 2) * DAY_S)
+            drop_day(writer, "odometry", (today() + 2) * DAY_S)
 
-    assert days(engine)[0] == TODAY
+    assert days(engine)[0] == today()
     with engine.begin() as connection:
-        assert drop_day(connection, "odometry", (TODAY + 2) * DAY_S) == 0
+        assert drop_day(connection, "odometry", (today() + 2) * DAY_S) == 0
 
 
 def test_a_history_of_before_keeps_every_row_there_and_back(engine: Engine) -> None:
     with engine.begin() as connection:
         command.downgrade(alembic_config(connection), "end_api_tokens")
-        for at in (NOON, TODAY * DAY_S + 1.0, (TODAY + 300) * DAY_S):
+        for at in (NOON, today() * DAY_S + 1.0, (today() + 300) * DAY_S):
             connection.execute(
                 text(
                     "INSERT INTO odometry (at, robot_id, x, y, yaw, linear, angular, "
@@ -143,7 +147,7 @@ def test_a_history_of_before_keeps_every_row_there_and_back(engine: Engine) -> N
     upgrade(engine.url.render_as_string(hide_password=False))
     write(engine, odometry_record(at=NOON + 1.0), detection_record(at=NOON))
     # Today has rows in the table of before: the first with its own is tomorrow.
-    prepare(engine, TODAY)
+    prepare(engine, today())
 
     first = days(engine)[0], days(engine, "detections")[0]
     with engine.begin() as connection:
@@ -151,13 +155,13 @@ def test_a_history_of_before_keeps_every_row_there_and_back(engine: Engine) -> N
         numbers = [*found]
         command.downgrade(alembic_config(connection), "end_api_tokens")
     assert numbers == [1, 2, 3, 4]
-    assert first == (TODAY + 1, TODAY)
+    assert first == (today() + 1, today())
     assert (count(engine, "odometry"), count(engine, "detections")) == (4, 1)
 
 
 def test_sizes_count_every_day(engine: Engine) -> None:
-    prepare(engine, TODAY)
-    write(engine, *(odometry_record(at=TODAY * DAY_S + n) for n in range(2000)))
+    prepare(engine, today())
+    write(engine, *(odometry_record(at=today() * DAY_S + n) for n in range(2000)))
 
     with engine.connect() as connection:
         found = {one.name: one for one in read_stats(connection).tables}
@@ -168,8 +172,8 @@ def test_sizes_count_every_day(engine: Engine) -> None:
 
 
 def test_charts_of_a_day_read_its_index_alone(engine: Engine) -> None:
-    prepare(engine, TODAY)
-    write(engine, *(odometry_record(at=TODAY * DAY_S + n) for n in range(500)))
+    prepare(engine, today())
+    write(engine, *(odometry_record(at=today() * DAY_S + n) for n in range(500)))
 
     with engine.connect() as connection:
         connection.execute(text("SET enable_seqscan = off"))
@@ -180,7 +184,7 @@ def test_charts_of_a_day_read_its_index_alone(engine: Engine) -> None:
                 "min(margin_m) FROM odometry WHERE robot_id = 'AGI' "
                 "AND at >= :since AND at < :until"
             ),
-            {"since": TODAY * DAY_S, "until": (TODAY + 1) * DAY_S},
+            {"since": today() * DAY_S, "until": (today() + 1) * DAY_S},
         )
         told = "\n".join(plan)
 
