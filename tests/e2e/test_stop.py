@@ -96,12 +96,15 @@ def test_a_press_in_the_past_stops_the_robot_of_now(
     page: Page, stack: Site, open_page: OpenPage
 ) -> None:
     wait_for_mode(page, "AGI", "RUNNING")
-    at = format_stamp(time.time())
+    # What people did is in the memory that is recorded a moment later.
+    moment = time.time() + 1.0
+    at = format_stamp(moment)
     with stack.api() as api:
         asked = {"at": at, "viewer": "test"}
 
         def answers() -> bool:
-            return api.get("world", params=asked).status_code == 200
+            told = api.get("world", params=asked)
+            return told.is_success and told.json()["at_s"] > moment - 0.3
 
         until(answers, 60.0, "the past answers")
     past = open_page(route=f"/?t={at}")
@@ -117,7 +120,7 @@ def test_a_press_in_the_past_stops_the_robot_of_now(
         "data-mode", "STOPPED", timeout=WITHIN_MS
     )
     expect(strip_stop(past, "AGI")).to_contain_text(STANDING, timeout=WITHIN_MS)
-    expect(card(past, "AGI")).to_have_attribute("data-mode", "RUNNING")
+    expect(card(past, "AGI")).to_have_attribute("data-mode", re.compile("RUNNING|SLOW"))
     assert evaluate(past, COVERED_STOPS) == []
     past.keyboard.press("Escape")
     wait_for_mode(past, "AGI", "STOPPED")
