@@ -17,14 +17,18 @@ import contextlib
 import time
 from collections.abc import Awaitable, Callable, Iterator, Mapping
 from dataclasses import replace
-from datetime import UTC, datetime
 
 from sqlalchemy import Connection, Engine, event, text
 from sqlalchemy.engine.interfaces import DBAPICursor
 
 from benchmarks.process import machine, percentile, print_table
 from iveg.adapters.history import lists
-from iveg.adapters.history.day_partitions import PARTITIONED, days_of
+from iveg.adapters.history.day_partitions import (
+    PARTITIONED,
+    days_of,
+    part_of,
+    start_of,
+)
 from iveg.adapters.history.engine import writing_engine
 from iveg.adapters.history.lists import Filter
 from iveg.adapters.history.migrate import upgrade
@@ -135,7 +139,7 @@ def main() -> None:
     parser.add_argument("--fleet", action="store_true", help="questions of all robots")
     asked = parser.parse_args()
     for rows in map(int, asked.rows.split(",")):
-        with _database(asked.url) as url:
+        with contextlib.nullcontext(asked.url) if asked.url else own_database() as url:
             days = max(1, rows // (MOST_ROBOTS * 250_000))
             robots = max(1, rows // (days * 250_000))
             fill(url, robots, days)
@@ -154,10 +158,8 @@ def main() -> None:
 
 
 @contextlib.contextmanager
-def _database(url: str | None) -> Iterator[str]:
-    if url is not None:
-        yield url
-        return
+def own_database() -> Iterator[str]:
+    """An empty database of a server that ends with it."""
     bin_ = programs()
     if bin_ is None:
         raise SystemExit("PostgreSQL is not installed.")
@@ -195,24 +197,17 @@ def fill(url: str, robots: int, days: int) -> None:
             for table in ("log", "decisions"):
                 _insert(connection, table, table, day, robots, start)
         for table in PARTITIONED:
-            _vacuum(engine, _part(table, day))
+            run_alone(engine, f"VACUUM (ANALYZE) {part_of(table, day)}")
         print(f"day {day - start + 1} of {days}: {time.monotonic() - began:.0f} s")
     for table in ("log", "decisions"):
-        _vacuum(engine, table)
+        run_alone(engine, f"VACUUM (ANALYZE) {table}")
     engine.dispose()
 
 
 def begin_at(connection: Connection, table: str, day: int) -> None:
     """Have days since this one, where a new database has those since today."""
-    (older,) = connection.scalars(
-        text(
-            "SELECT inhrelid::regclass::text FROM pg_inherits "
-            "WHERE inhparent = to_regclass(:name) "
-            "AND inhrelid::regclass::text LIKE '%before%'"
-        ),
-        {"name": table},
-    )
-    wanted = _part(f"{table}_before", day)
+    before = f"{table}_before"
+    older, wanted = (part_of(before, one) for one in (start_of(connection, table), day))
     if older == wanted:
         return
     for statement in (
@@ -227,7 +222,7 @@ def begin_at(connection: Connection, table: str, day: int) -> None:
 def _fill_day(
     connection: Connection, table: str, day: int, robots: int, start: int
 ) -> None:
-    part = _part(table, day)
+    part = part_of(table, day)
     if connection.scalar(text("SELECT to_regclass(:name)"), {"name": part}) is None:
         copy = f"CREATE TABLE {part} (LIKE {table} INCLUDING DEFAULTS)"
         connection.execute(text(copy))
@@ -255,15 +250,11 @@ def _insert(
     connection.execute(text(_ROWS[table].format(into=into, names=names)), values)
 
 
-def _part(table: str, day: int) -> str:
-    return f"{table}_{datetime.fromtimestamp(day * DAY_S, UTC):%Y%m%d}"
-
-
-def _vacuum(engine: Engine, table: str) -> None:
-    """As autovacuum does it, which may not have come yet."""
+def run_alone(engine: Engine, statement: str) -> None:
+    """Outside of a transaction: what autovacuum does, which may not have come yet."""
     with engine.connect() as connection:
         alone = connection.execution_options(isolation_level="AUTOCOMMIT")
-        alone.exec_driver_sql(f"VACUUM (ANALYZE) {table}")
+        alone.exec_driver_sql(statement)
 
 
 async def measure(

@@ -26,7 +26,7 @@ import aiomqtt
 from sqlalchemy import Connection, func, insert, select, text
 
 import iveg.pipeline.retention
-from benchmarks.history_size import begin_at
+from benchmarks.history_size import begin_at, own_database, run_alone
 from benchmarks.process import machine, percentile, print_table
 from iveg.adapters.history import tables
 from iveg.adapters.history.day_partitions import prepare_days
@@ -35,7 +35,6 @@ from iveg.adapters.history.migrate import upgrade
 from iveg.adapters.mqtt import BrokerAddress
 from iveg.cli import main as run_iveg
 from iveg.domain.retention import DAY_S
-from tests.fakes.postgresql import programs, running_postgresql
 from tests.fleet import names
 from tests.processes import Site, site
 
@@ -124,11 +123,8 @@ def _database(kind: str, directory: Path) -> Iterator[str]:
     if kind == "sqlite":
         yield f"sqlite:///{directory / 'history.sqlite'}"
         return
-    bin_ = programs()
-    if bin_ is None:
-        raise SystemExit("PostgreSQL is not installed.")
-    with running_postgresql(bin_) as server:
-        yield server.empty_database()
+    with own_database() as url:
+        yield url
 
 
 def _fill(url: str, kind: str, rows: int) -> None:
@@ -146,9 +142,7 @@ def _fill(url: str, kind: str, rows: int) -> None:
         if rows:
             _insert(connection, rows, old * DAY_S)
     if sqlite_file(url) is None:
-        with engine.connect() as connection:
-            alone = connection.execution_options(isolation_level="AUTOCOMMIT")
-            alone.execute(text("ANALYZE"))
+        run_alone(engine, "ANALYZE")
     engine.dispose()
 
 

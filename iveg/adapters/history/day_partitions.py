@@ -53,7 +53,7 @@ def prepare_days(connection: Connection, now: float) -> None:
     for table in PARTITIONED:
         if not is_partitioned(connection, table):
             return
-        wanted = {*range(max(first, _start(connection, table)), end)}
+        wanted = {*range(max(first, start_of(connection, table)), end)}
         missed = f"SELECT DISTINCT floor(at / {DAY_S})::integer FROM {table}_rest"  # noqa: S608 - names of ours
         wanted.update(connection.scalars(text(f"{missed} WHERE at < {end * DAY_S}")))
         for day in sorted(wanted.difference(days_of(connection, table))):
@@ -77,7 +77,7 @@ def drop_day(connection: Connection, table: str, before: float) -> int | None:
     oldest = next(iter(days_of(connection, table)), None)
     if oldest is None or (oldest + 1) * DAY_S > before:
         return None
-    name = _name(table, oldest)
+    name = part_of(table, oldest)
     rows = connection.scalar(text(f"SELECT count(*) FROM {name}"))  # noqa: S608
     connection.execute(text(_PATIENCE))
     connection.execute(text(f"DROP TABLE {name}"))
@@ -94,12 +94,12 @@ def over_before(connection: Connection, table: str, before: float) -> float:
     """
     if not is_partitioned(connection, table):
         return before
-    start = _start(connection, table) * DAY_S
+    start = start_of(connection, table) * DAY_S
     return max(before // DAY_S * DAY_S, min(before, start))
 
 
-def _start(connection: Connection, table: str) -> int:
-    """The first day that can have a table of its own."""
+def start_of(connection: Connection, table: str) -> int:
+    """The first day (UTC, since 1970) that can have a table of its own."""
     older = f"{table}_before_"
     names = connection.scalars(_PARTS, {"name": table})
     return max(
@@ -109,7 +109,7 @@ def _start(connection: Connection, table: str) -> int:
 
 
 def _make(connection: Connection, table: str, day: int) -> None:
-    name, since, until = _name(table, day), day * DAY_S, (day + 1) * DAY_S
+    name, since, until = part_of(table, day), day * DAY_S, (day + 1) * DAY_S
     for statement in (
         _PATIENCE,
         f"CREATE TABLE {name} (LIKE {table} INCLUDING DEFAULTS)",
@@ -123,7 +123,8 @@ def _make(connection: Connection, table: str, day: int) -> None:
         connection.execute(text(statement))
 
 
-def _name(table: str, day: int) -> str:
+def part_of(table: str, day: int) -> str:
+    """Name of the table of a day (UTC, since 1970)."""
     return f"{table}_{date.fromordinal(_EPOCH + day):%Y%m%d}"
 
 

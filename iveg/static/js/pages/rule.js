@@ -64,7 +64,7 @@ export function createRuleForm(store, i18n, guard) {
     const may = WRITERS.has(document.body.dataset.role ?? "");
     const who = may ? "editable" : "role";
     note = verbs.has("put") ? who : "readonly";
-    for (const part of [form, preview]) setHidden(part, !verbs.has("put") || !may);
+    setHidden(form, !verbs.has("put") || !may);
     draw();
   }
 

@@ -11,10 +11,11 @@ import { readApi, sendApi } from "../core/api.js";
 import { make, need, setHidden, setText } from "../panels/dom.js";
 import { onThemeChange } from "../panels/theme.js";
 import { drawFigure } from "./history/charts.js";
+import { personShare } from "./lowering.js";
+import { endQuestion, isGoing, lookAgain, refusalKey } from "./question.js";
 import { startTrial } from "./trial.js";
 
 const HOUR_MS = 3_600_000;
-const LOOK_MS = 500;
 /** Shares are typed in percent. */
 const SHARES = new Set(["confidence_threshold", "factor"]);
 const PARTS = /** @type {const} */ ([
@@ -66,10 +67,9 @@ export function start({ store, i18n }) {
   }
 
   async function follow() {
-    while (asked && ["waiting", "running"].includes(asked.state)) {
+    while (asked && isGoing(asked)) {
       draw();
-      await new Promise((resolve) => setTimeout(resolve, LOOK_MS));
-      const { status, body } = await readApi(`what-if/${asked.id}`);
+      const { status, body } = await lookAgain(asked);
       if (status === 200) asked = body;
       else if (status === 404) asked = null;
       // The first hours have a curve already, which grows.
@@ -85,7 +85,7 @@ export function start({ store, i18n }) {
   }
 
   async function cancel() {
-    if (asked) await sendApi("DELETE", `what-if/${asked.id}`, {});
+    if (asked) await endQuestion(asked);
   }
 
   /** @param {string} text */
@@ -95,10 +95,10 @@ export function start({ store, i18n }) {
   }
 
   function draw() {
-    const isGoing = asked !== null && ["waiting", "running"].includes(asked.state);
-    setHidden(need("#whatif-cancel"), !isGoing);
-    setHidden(need("#whatif-progress"), !isGoing);
-    /** @type {HTMLButtonElement} */ (need("#whatif-ask")).disabled = isGoing;
+    const isAwaited = isGoing(asked);
+    setHidden(need("#whatif-cancel"), !isAwaited);
+    setHidden(need("#whatif-progress"), !isAwaited);
+    /** @type {HTMLButtonElement} */ (need("#whatif-ask")).disabled = isAwaited;
     /** @type {HTMLProgressElement} */ (need("#whatif-progress")).value =
       asked?.progress ?? 0;
     say(asked ? stateSaid(asked, i18n) : said);
@@ -128,9 +128,8 @@ export function start({ store, i18n }) {
 
   /** @param {number} status @param {any} body */
   function refusal(status, body) {
-    if (status === 0) return i18n.t("rows.offline");
-    if (status === 409) return i18n.t(`whatif.refused.${body?.why}`);
-    return i18n.t("rule.refused", { why: String(body?.detail ?? status) });
+    const key = refusalKey(status, body);
+    return i18n.t(key ?? "rule.refused", { why: String(body?.detail ?? status) });
   }
 
   need("#whatif-form").addEventListener("submit", (event) =>
@@ -157,7 +156,7 @@ function typed() {
 /** @param {Rule} rule @returns {Record<string, number>} */
 function inForce(rule) {
   return {
-    confidence_threshold: rule.class_thresholds?.person ?? rule.confidence_threshold,
+    confidence_threshold: personShare(rule),
     radius_m: rule.radius_m,
     foresight_s: rule.foresight_s,
     release_beyond_m: 0.3,

@@ -7,12 +7,12 @@
  * @typedef {{key: string, slots: Record<string, string | number>}} Said
  */
 
-import { readApi, sendApi } from "../core/api.js";
+import { sendApi } from "../core/api.js";
 import { momentOf, wallText } from "./history/local_time.js";
 import { personShare } from "./lowering.js";
+import { endQuestion, isGoing, lookAgain, refusalKey } from "./question.js";
 
 const DAY_MS = 86_400_000;
-const LOOK_MS = 500;
 
 /**
  * Asks, and tells how far the answer is.
@@ -25,23 +25,14 @@ const LOOK_MS = 500;
 export async function askYesterday(before, change, tell, signal) {
   const wanted = questionOf(before, change, Date.now());
   let { status, body } = await sendApi("POST", "what-if", wanted);
-  while (body?.id && ["waiting", "running"].includes(body.state)) {
+  while (body?.id && isGoing(body)) {
     // A person has one question at a time.
-    if (signal?.aborted) return void sendApi("DELETE", `what-if/${body.id}`, {});
+    if (signal?.aborted) return void endQuestion(body);
     tell({ key: "preview.going", slots: { percent: Math.round(body.progress * 100) } });
-    await pause(signal);
-    ({ status, body } = await readApi(`what-if/${body.id}`));
+    ({ status, body } = await lookAgain(body, signal));
   }
   const said = status < 300 && body?.id ? answerSaid(body) : null;
-  tell(said ?? { key: refusal(status, body), slots: {} });
-}
-
-/** Ends early where nobody waits. @param {AbortSignal} [signal] */
-function pause(signal) {
-  return new Promise((resolve) => {
-    setTimeout(resolve, LOOK_MS);
-    signal?.addEventListener("abort", resolve, { once: true });
-  });
+  tell(said ?? { key: refusalKey(status, body) ?? "preview.failed", slots: {} });
 }
 
 /**
@@ -81,10 +72,4 @@ function answerSaid({ state, why, answer }) {
       would_meet: candidate.encounters.person ?? 0,
     },
   };
-}
-
-/** @param {number} status @param {any} body */
-function refusal(status, body) {
-  if (status === 0) return "rows.offline";
-  return status === 409 ? `whatif.refused.${body?.why}` : "preview.failed";
 }
