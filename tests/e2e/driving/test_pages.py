@@ -353,7 +353,7 @@ def test_28_7_settings_on_a_phone_are_folded_and_an_address_opens_one(
 
     expect(opened).to_have_attribute("id", "rule-section")
     expect(page.locator("#rule-form")).to_be_visible()
-    assert page.evaluate("document.documentElement.scrollHeight") < 1550
+    assert page.evaluate("document.documentElement.scrollHeight") < 1500
     page.locator("#sound-section summary").press("Enter")
     expect(page.locator("#sound-section")).to_have_attribute("open", "")
 

@@ -174,7 +174,7 @@ def test_an_operator_changes_the_rule_and_sees_its_version(
     before = int(page.locator("#rule-version").inner_text())
 
     radius.fill("2.5")
-    page.locator("#rule-form button").click()
+    page.locator("#rule-form button[type=submit]").click()
 
     expect(page.locator("#rule-radius")).to_have_text("2,5 m")
     expect(page.locator("#rule-version")).to_have_text(str(before + 1))
@@ -248,10 +248,10 @@ def test_a_rule_that_somebody_else_has_changed_is_not_overwritten(
 
     first.locator("#rule-new-radius").fill("4")
     second.locator("#rule-new-radius").fill("3")
-    second.locator("#rule-form button").click()
+    second.locator("#rule-form button[type=submit]").click()
     expect(second.locator("#rule-result")).to_contain_text("Cambiada")
     expect(first.locator("#rule-radius")).to_have_text("3,0 m")
-    first.locator("#rule-form button").click()
+    first.locator("#rule-form button[type=submit]").click()
 
     expect(first.locator("#rule-result")).to_contain_text("Otra persona")
     expect(first.locator("#rule-new-radius")).to_have_value("4")
@@ -265,7 +265,7 @@ def test_a_new_rule_is_seen_in_every_browser_at_once(open_page: OpenPage) -> Non
     expect(settings.locator("#rule-new-radius")).not_to_have_value("")
 
     writer.locator("#rule-new-radius").fill("3.4")
-    writer.locator("#rule-form button").click()
+    writer.locator("#rule-form button[type=submit]").click()
 
     soon = 5000.0
     expect(settings.locator("#rule-radius")).to_have_text("3,4 m", timeout=soon)
