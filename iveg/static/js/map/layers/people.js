@@ -18,7 +18,8 @@ import { drawSign } from "./sprites.js";
  * @typedef {import("../scene.js").ScenePerson} ScenePerson
  */
 
-const WORDS_FROM_SCALE = 24;
+/** From this scale on (px/m) there is room for words, and a ring grows by a pixel a frame. */
+const NEAR_SCALE = 24;
 /** Of a figure, with its outline; and the width of a ring's line. */
 const FIGURE_PX = 12;
 const RING_PX = 2;
@@ -65,20 +66,21 @@ function drawPerson(paint, person) {
   const { ctx, view } = paint;
   const place = { x: screenX(view, person.x), y: screenY(view, person.y) };
   const ring = Math.round(person.ringM * view.scale);
-  // A ring that grows is like no other.
-  const kept = person.stage === "seen" ? paint.sprites : undefined;
+  const isSeen = person.stage === "seen";
+  // From near, a ring that grows is in each frame like no other.
+  const kept = isSeen || view.scale < NEAR_SCALE ? paint.sprites : undefined;
   if (person.stage !== "last_seen" && !person.isThing) {
-    const sign = { name: `ring ${ring}`, reach: ring + RING_PX, ...place };
+    const name = `ring ${ring} ${isSeen}`;
+    const sign = { name, reach: ring + RING_PX, ...place };
     drawSign(paint, kept, sign, (there) => drawRing(there, person));
   }
-  isolated(ctx, () => {
-    ctx.globalAlpha = strengthOf(person);
-    const kind = person.unknown ? "unknown" : person.peer ? "peer" : "person";
-    const name = `${kind} ${person.isThing} ${person.stage === "last_seen"}`;
-    const sign = { name, reach: FIGURE_PX, ...place };
-    const drawn = FIGURES[kind];
-    drawSign(paint, paint.sprites, sign, (there) => drawn(there, person));
-  });
+  ctx.globalAlpha = strengthOf(person);
+  const kind = person.unknown ? "unknown" : person.peer ? "peer" : "person";
+  const name = `${kind} ${person.isThing} ${person.stage === "last_seen"}`;
+  const drawn = FIGURES[kind];
+  const figure = { name, reach: FIGURE_PX, ...place };
+  drawSign(paint, paint.sprites, figure, (there) => drawn(there, person));
+  ctx.globalAlpha = 1;
 }
 
 /** Opacity of a figure. @param {ScenePerson} person */
@@ -92,7 +94,7 @@ function drawAge(paint, person) {
   const { view, labels } = paint;
   const isGone = person.stage === "last_seen";
   // At a small scale, the labels of several people would overlap.
-  const isNear = view.scale >= WORDS_FROM_SCALE;
+  const isNear = view.scale >= NEAR_SCALE;
   const said = isGone ? labels.lastSeen(person.ageS) : labels.ago(person.ageS);
   const text = isNear ? said : labels.age(person.ageS);
   const [x, y] = [screenX(view, person.x), screenY(view, person.y)];

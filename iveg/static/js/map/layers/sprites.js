@@ -12,14 +12,21 @@ import { isolated } from "./paint.js";
 
 /** Larger signs (device pixels each way) are drawn themselves. */
 const LARGEST_PX = 512;
-/** A zoom leaves sizes behind that are not wanted again. */
-const KEPT = 64;
+/** A zoom leaves sizes behind that are not wanted again (device pixels of all images). */
+const KEPT_PX = 6e6;
 
 export function createSprites() {
   /** @type {Map<string, ImageBitmap>} */
   const images = new Map();
   /** @type {import("./theme.js").Theme | null} */
   let theme = null;
+  let keptPx = 0;
+
+  function clear() {
+    for (const image of images.values()) image.close();
+    images.clear();
+    keptPx = 0;
+  }
 
   /** @param {Paint} paint @param {number} size @param {(paint: Paint) => void} draw */
   function imageOf(paint, size, draw) {
@@ -45,16 +52,19 @@ export function createSprites() {
       const { ctx, ratio = 1 } = paint;
       const size = 2 * Math.ceil(reach * ratio);
       if (size > LARGEST_PX) return drawItself(paint, { x, y }, draw);
-      isolated(ctx, () => {
-        if (theme !== paint.theme || images.size > KEPT) images.clear();
-        theme = paint.theme;
-        const key = `${name} ${size} ${ratio}`;
-        const image = images.get(key) ?? imageOf(paint, size, draw);
+      if (theme !== paint.theme || keptPx > KEPT_PX) clear();
+      theme = paint.theme;
+      const key = `${name} ${size} ${ratio}`;
+      let image = images.get(key);
+      if (!image) {
+        image = imageOf(paint, size, draw);
         images.set(key, image);
-        ctx.setTransform(1, 0, 0, 1, 0, 0);
-        const [left, top] = [x, y].map((at) => Math.round(at * ratio) - size / 2);
-        ctx.drawImage(image, left, top);
-      });
+        keptPx += size ** 2;
+      }
+      const [left, top] = [x, y].map((at) => Math.round(at * ratio) - size / 2);
+      // The context's unit is a CSS pixel.
+      const [aside, down, across] = [left / ratio, top / ratio, size / ratio];
+      ctx.drawImage(image, aside, down, across, across);
     },
   };
 }
