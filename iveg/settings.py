@@ -332,7 +332,7 @@ class Settings:
     )
     recordings: Switch = setting(
         "IVEG_RECORDINGS",
-        False,
+        True,
         "Keep what comes in, byte for byte (docs/interfaces/recordings.md).",
     )
     keep_recordings_days: Days = setting(
