@@ -46,6 +46,7 @@ class SpeedSeries:
         limited to: Strictest factor that iVeg limited to in a slice.
         applied: Strictest factor that the robot reported; None where it was silent.
         margin: Least margin (m); None where it was unknown or there was none.
+        late: Whether the robot sent some of it after a gap: nobody acted on it.
         slice_s: Length of a slice (s); 0 where each point is one row.
     """
 
@@ -55,6 +56,7 @@ class SpeedSeries:
     limit: tuple[float, ...]
     applied: tuple[float | None, ...]
     margin: tuple[float | None, ...]
+    late: tuple[bool, ...]
     slice_s: float = field(default=0.0, kw_only=True)
 
 
@@ -305,7 +307,7 @@ def _one(
         )
     ).one()
     if count <= most:
-        rows = (o.at, o.linear, o.limit_factor, o.applied_factor, o.margin_m)
+        rows = (o.at, o.linear, o.limit_factor, o.applied_factor, o.margin_m, o.late)
         return SpeedSeries(robot, *_columns(connection, rows, asked))
     # One slice fewer than asked for: the last row may stand on the last edge.
     slice_s = (last - first) / (most - 1) or 1.0
@@ -316,6 +318,7 @@ def _one(
         func.min(o.limit_factor),
         func.min(o.applied_factor),
         func.min(o.margin_m),
+        func.max(cast(o.late, Integer)),
     )
     return SpeedSeries(
         robot, *_columns(connection, slices, asked, place), slice_s=slice_s

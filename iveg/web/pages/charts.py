@@ -44,7 +44,7 @@ def speed_figure(series: Sequence[SpeedSeries], fleet: FleetDescription) -> byte
 
     The limit is the factor times the robot's greatest speed; while it is lower the
     strip is shaded.  Lines break where no data came for 5 s: a line through silence
-    would be invented.
+    would be invented.  What a robot sent after a gap has a mark at each point.
     """
     traces: list[_Trace] = []
     layout: dict[str, object] = {}
@@ -273,6 +273,17 @@ def _speed_traces(series: SpeedSeries, fleet: FleetDescription) -> Iterator[_Tra
             "y": _broken(values, gaps, [None] * len(at)),
             "line": line,
             "connectgaps": False,
+        }
+    late = [n for n, was_late in enumerate(series.late) if was_late]
+    if late:
+        yield {
+            "type": "scatter",
+            "mode": "markers",
+            "name": f"{robot} late",
+            "meta": {"kind": "late", "robot": robot, "slice_s": series.slice_s},
+            "x": [at[n] for n in late],
+            "y": [round(series.linear[n], 3) for n in late],
+            "marker": {"size": 6},
         }
 
 

@@ -593,6 +593,7 @@ def test_13_19_each_robot_has_a_strip_whose_slow_downs_are_shaded() -> None:
         limit=(1.0, 0.5, 0.5, 1.0),
         applied=(1.0, 0.5, 0.5, 1.0),
         margin=(None,) * 4,
+        late=(False,) * 4,
         slice_s=0.0,
     )
     free = replace(slowed, robot_id="AGII", limit=(1.0,) * 4)
@@ -608,11 +609,23 @@ def test_13_19_each_robot_has_a_strip_whose_slow_downs_are_shaded() -> None:
     assert (slow["yref"], slow["x0"], slow["x1"]) == ("y domain", 11_000.0, 13_000.0)
 
 
+def test_25_2_what_a_robot_sent_after_a_gap_is_marked() -> None:
+    at, same = (10.0, 11.0, 12.0), (0.8, 0.4, 0.8)
+    series = SpeedSeries("AGI", at, same, same, same, same, (False, True, True))
+    fleet = FleetDescription.undescribed(["AGI"])
+
+    traces = orjson.loads(charts.speed_figure([series], fleet))["data"]
+
+    *_, marks = traces
+    assert (marks["meta"]["kind"], marks["mode"]) == ("late", "markers")
+    assert (marks["x"], marks["y"]) == ([11_000.0, 12_000.0], [0.4, 0.8])
+
+
 def test_28_6_a_margin_is_drawn_as_long_as_it_was_measured_and_no_longer() -> None:
     at = (0.0, 0.5, 1.0, 1.5, 9.0, 9.5)
     margin = (2.0, 1.5, None, -0.5, 3.0, None)
     same = (1.0,) * len(at)
-    measured = SpeedSeries("AGI", at, same, same, same, margin)
+    measured = SpeedSeries("AGI", at, same, same, same, margin, (False,) * len(at))
     unknown = replace(measured, robot_id="AGII", margin=(None,) * len(at))
 
     (line,) = orjson.loads(charts.margin_figure([measured, unknown]))["data"]

@@ -34,7 +34,12 @@ const TICKS = [
 ];
 const PEOPLE = new Set(["person", "farmer", "human", "operator"]);
 const AIR = new Set(["temperature", "humidity", "co2", "measurement"]);
-const SYMBOLS = { direct: "circle", fiware: "diamond", standstill: "square" };
+const SYMBOLS = {
+  direct: "circle",
+  fiware: "diamond",
+  standstill: "square",
+  late: "circle-open",
+};
 
 /** @type {Promise<any> | null} */
 let library = null;
@@ -248,9 +253,10 @@ function noteOf(name, data, i18n) {
   if (data.length === 0) return "";
   if (name === "speed") {
     const seconds = Math.max(...data.map((trace) => trace.meta.slice_s));
-    return i18n.t(seconds > 0 ? "history.note.sliced" : "history.note.exact", {
-      seconds,
-    });
+    const drawn = seconds > 0 ? "history.note.sliced" : "history.note.exact";
+    const late = data.some(({ meta }) => meta.kind === "late");
+    const said = [drawn, ...(late ? ["history.note.late"] : [])];
+    return said.map((key) => i18n.t(key, { seconds })).join(" ");
   }
   const sum = (/** @type {Trace} */ trace) =>
     trace.y.reduce((/** @type {number} */ total, n) => total + (n ?? 0), 0);
