@@ -3,6 +3,7 @@
 import asyncio
 import os
 import signal
+import sys
 from collections.abc import AsyncIterator
 from pathlib import Path
 
@@ -16,6 +17,10 @@ from tests.processes import is_alive, until
 
 def process_id() -> int:
     return os.getpid()
+
+
+def place_in_line() -> int:
+    return int(Path("/proc/self/oom_score_adj").read_text())
 
 
 def die() -> None:
@@ -45,6 +50,13 @@ async def worker(failures: list[Exception]) -> AsyncIterator[Worker]:
     worker = Worker(failures.append)
     yield worker
     worker.close()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="Linux has such a place")
+async def test_where_memory_runs_out_a_worker_goes_before_the_server(
+    worker: Worker,
+) -> None:
+    assert await worker.run(place_in_line) == 1000 > place_in_line()
 
 
 async def test_what_a_worker_does_can_be_ended_at_once(
