@@ -127,7 +127,7 @@ class Backfill:
         self._reject(robot_id, "late_flood", "")
         return False
 
-    def record_batch(self, batch: Batch, arrived: Instant) -> None:
+    def record(self, batch: Batch, arrived: Instant) -> None:
         """Write a batch into the history."""
         sent = batch.origin.mono or 0.0
         for one in batch.kept:
