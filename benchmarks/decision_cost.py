@@ -86,9 +86,9 @@ class Telling:
         self._writer.write(feedback)
         self.left = time.perf_counter()
 
-    def publish_peer_scan(self, told: PeerScan) -> None:
+    def publish_peer_scan(self, scan: PeerScan) -> None:
         """Write one scan for peers."""
-        codec.write_peer_scan(told)
+        codec.write_peer_scan(scan)
 
     def taken(self) -> float | None:
         """When the newest left since the last time of asking (s)."""

@@ -183,7 +183,7 @@ class Dss:
             self.fleet.ids,
             clock.now,
             self.pipeline.backfill.has_room,
-            self.pipeline.supervision.guard(BACKFILL, self.pipeline.backfill.take),
+            self.pipeline.supervision.guard(BACKFILL, self.pipeline.backfill.record),
             ingest.reject,
             self.pipeline.supervision.guard(RECORDINGS, self.stores.inputs.measure),
         )

@@ -104,10 +104,10 @@ def canonical(details: Json) -> str:
 
 def hash_of(row: AuditRecord) -> str:
     """The hash that a row must have (hex)."""
-    told: dict[str, Any] = {
+    values: dict[str, Any] = {
         one.name: getattr(row, one.name) for one in fields(row) if one.name != "hash"
     }
-    return hashlib.sha256(canonical(told).encode()).hexdigest()
+    return hashlib.sha256(canonical(values).encode()).hexdigest()
 
 
 def chained(

@@ -266,5 +266,5 @@ class RobotClock:
             and not -OFFSET_WARN_S <= offset <= OFFSET_WARN_S + late_s
         ):
             self._warned = (now.mono + _WARNED_S, offset)
-        until, told = self._warned
-        return told if now.mono < until else None
+        until, warned = self._warned
+        return warned if now.mono < until else None

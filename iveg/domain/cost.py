@@ -142,10 +142,10 @@ class SpeedChanges:
         for one in sorted(changes, key=lambda it: it.at):
             self._of[one.robot_id].append(one)
         self._slow = {
-            robot: [one for one in told if 0.0 < one.factor < 1.0]
-            for robot, told in self._of.items()
+            robot: [one for one in own if 0.0 < one.factor < 1.0]
+            for robot, own in self._of.items()
         }
-        self._at = {r: [one.at for one in told] for r, told in self._slow.items()}
+        self._at = {r: [one.at for one in own] for r, own in self._slow.items()}
 
     def why_slow(self, robot_id: str, at: float) -> SpeedChange | None:
         """The newest limit, none that held it, that it told until then."""
@@ -154,11 +154,11 @@ class SpeedChanges:
 
     def held_s(self, robot_id: str, since: float, until: float) -> float:
         """How long it was held between two moments (s)."""
-        told = self._of.get(robot_id, [])
-        ends = [one.at for one in told[1:]] + [until]
+        changes = self._of.get(robot_id, [])
+        ends = [one.at for one in changes[1:]] + [until]
         return sum(
             max(0.0, min(end, until) - max(one.at, since))
-            for one, end in zip(told, ends, strict=bool(told))
+            for one, end in zip(changes, ends, strict=bool(changes))
             if one.factor <= 0.0
         )
 

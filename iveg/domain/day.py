@@ -77,7 +77,7 @@ class EncounterCounts:
 def encounter_counts(decisions: Iterable[DecisionRecord]) -> EncounterCounts:
     """The encounters with people among these decisions."""
     met = [one for one in decisions if one.kind == "mandate" and one.reason == "person"]
-    told = [
+    foretold = [
         float(ahead_s)
         for one in met
         if (ahead_s := one.rule_parameters.get("foretold_s")) is not None
@@ -85,8 +85,8 @@ def encounter_counts(decisions: Iterable[DecisionRecord]) -> EncounterCounts:
     return EncounterCounts(
         len(met),
         sum(one.applied_at is not None for one in met),
-        len(told),
-        fmean(told) if told else None,
+        len(foretold),
+        fmean(foretold) if foretold else None,
     )
 
 

@@ -121,7 +121,7 @@ class Equipment:
         Returns:
             The tiles that have a new number.
         """
-        told = []
+        renewed = []
         for tile in self.tiles:
             value = values.get(tile.attribute)
             # Null is what Orion has of a device that knows no value: nothing was heard.
@@ -133,8 +133,8 @@ class Equipment:
             if number is not None:
                 status.value, status.received = number, at
                 status.beyond = _beyond(tile, number, status.beyond)
-                told.append(tile)
-        return told
+                renewed.append(tile)
+        return renewed
 
     def state(self, tile: Tile, now: Instant) -> State:
         """The state of a tile now."""

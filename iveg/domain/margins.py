@@ -135,8 +135,8 @@ class LeastMargins:
         """Of each column: the least rank, its row, and the column."""
         rank = self._pairs.rank
         rows, columns = rank.argmin(axis=0), np.arange(rank.shape[1])
-        told = rank[rows, columns].tolist(), rows.tolist(), columns.tolist()
-        return list(zip(*told, strict=True))
+        lists = rank[rows, columns].tolist(), rows.tolist(), columns.tolist()
+        return list(zip(*lists, strict=True))
 
     def telling(self) -> list[SafetyMargin]:
         """The least of all pairs that are known now, and one that is not, if any.

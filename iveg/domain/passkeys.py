@@ -66,7 +66,7 @@ class Challenges:
             self._waiting.popitem(last=False)
         self._waiting[challenge] = _Waiting(of, purpose, now)
 
-    def take(self, challenge: bytes, purpose: str, now: float) -> bool:
+    def redeem(self, challenge: bytes, purpose: str, now: float) -> bool:
         """Whether an answer is awaited for this purpose; it is not any more."""
         waiting = self._waiting.pop(challenge, None)
         if waiting is None or waiting.purpose != purpose:

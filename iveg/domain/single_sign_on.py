@@ -69,20 +69,20 @@ class ClaimReading:
             claims: What is told; of it nothing but strings and numbers counts.
         """
         person = person_id(issuer, subject)
-        told = next(values_at(claims, self.name_claim), "")
+        claimed = next(values_at(claims, self.name_claim), "")
         return ProvenIdentity(
             person,
-            name_of(told, person),
+            name_of(claimed, person),
             highest_role(values_at(claims, self.role_claim), self.roles),
             _time_of(claims.get("auth_time")),
         )
 
 
-def _time_of(told: object) -> float | None:
+def _time_of(claim: object) -> float | None:
     """A moment (Unix s); None where none is told that may be one."""
-    if not isinstance(told, int | float) or isinstance(told, bool):
+    if not isinstance(claim, int | float) or isinstance(claim, bool):
         return None
-    return float(told) if 0.0 <= told < 1e12 else None
+    return float(claim) if 0.0 <= claim < 1e12 else None
 
 
 def person_id(issuer: str, subject: str) -> str:
@@ -91,9 +91,9 @@ def person_id(issuer: str, subject: str) -> str:
     return f"sso-{digest[:32]}"
 
 
-def name_of(told: str, person: str) -> str:
+def name_of(claim: str, person: str) -> str:
     """A name that somebody may have, close to what is told; else part of the id."""
-    kept = unicodedata.normalize("NFC", told[: 4 * MOST_NAME])
+    kept = unicodedata.normalize("NFC", claim[: 4 * MOST_NAME])
     kept = "".join(one for one in kept if is_name(f"x{one}x")).strip()[:MOST_NAME]
     return kept if is_name(kept := kept.strip()) else person[:12]
 

@@ -33,6 +33,7 @@ class AuditTrail:
         at: Instant,
     ) -> None:
         """Write one act down; returns at once."""
-        told, audit_id = details or {}, self._new_id()
-        act = act_of(actor, action, subject, told, audit_id=audit_id, at=at.wall)
+        act = act_of(
+            actor, action, subject, details or {}, audit_id=self._new_id(), at=at.wall
+        )
         self._sink.enqueue(act)

@@ -127,7 +127,7 @@ class Backfill:
         self._reject(robot_id, "late_flood", "")
         return False
 
-    def take(self, batch: Batch, arrived: Instant) -> None:
+    def record(self, batch: Batch, arrived: Instant) -> None:
         """Write a batch into the history."""
         sent = batch.origin.mono or 0.0
         for one in batch.kept:
@@ -136,9 +136,9 @@ class Backfill:
                 reason = "late_too_old" if age_s > 0.0 else "late_from_the_future"
                 self._reject(batch.robot_id, reason, f"{age_s:.1f} s old")
                 continue
-            self._take_one(one, arrived.later(-age_s))
+            self._record_one(one, arrived.later(-age_s))
 
-    def _take_one(self, one: Observation, at: Instant) -> None:
+    def _record_one(self, one: Observation, at: Instant) -> None:
         robot, origin = self._robots[one.robot_id], one.origin
         if not self._silences.covers(one.robot_id, at.mono):
             self.counters["backfill.heard_live"] += 1

@@ -247,8 +247,8 @@ class EventLog:
         """
         state = "EXPIRED" if heir is None else "REPLACED"
         self._sink.enqueue(replace(row, state=state, reason="restarted"))
-        told = "followed no more" if heir is None else f"asserted again under {heir}"
-        self._audit(row, state, f"server restarted; {told}", at)
+        fate = "followed no more" if heir is None else f"asserted again under {heir}"
+        self._audit(row, state, f"server restarted; {fate}", at)
 
     async def flushed(self) -> None:
         """Return when every command and audit row so far is durable.

@@ -108,9 +108,9 @@ def _obstacle(seen: Obstacle | None, at: float) -> dict[str, object] | None:
 
 
 def _looks(looks: Looks) -> dict[str, object]:
-    told = asdict(looks) | {"probability": round(looks.probability, 4)}
-    del told["confirmed"]
-    return told
+    document = asdict(looks) | {"probability": round(looks.probability, 4)}
+    del document["confirmed"]
+    return document
 
 
 def write_link(link: Link) -> dict[str, object]:

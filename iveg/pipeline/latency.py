@@ -30,7 +30,7 @@ class LatencyMonitor:
         self.watch = watch
         self._sink = sink
         self._event_log = event_log
-        self._told: dict[str, float] = {}
+        self._logged_at: dict[str, float] = {}
 
     def tick(self, now: Instant) -> None:
         """Let time pass."""
@@ -45,8 +45,8 @@ class LatencyMonitor:
         """Log a remark once, for as long as it lasts."""
         what = "behind" if remark.what == "growing" else remark.what
         about = f"{what}/{remark.hop}/{remark.slots.get('robot', '')}"
-        last = self._told.get(about, float("-inf"))
-        self._told[about] = now.mono
+        last = self._logged_at.get(about, float("-inf"))
+        self._logged_at[about] = now.mono
         if now.mono - last > _QUIET_S:
             robot = remark.slots.get("robot")
             event = LogEvent(

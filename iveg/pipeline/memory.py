@@ -58,12 +58,12 @@ class Memory:
 
     def write(self) -> bytes:
         """As it is now."""
-        told = {
+        states = {
             path: {name: getattr(self._wired[path], name) for name in names}
             for path, names in self._kept.items()
         }
         buffer = io.BytesIO()
-        _Writer(buffer, self._wired.values(), self._paths).dump(told)
+        _Writer(buffer, self._wired.values(), self._paths).dump(states)
         return buffer.getvalue()
 
     def read(self, data: bytes) -> None:
@@ -73,10 +73,10 @@ class Memory:
             UnreadableError: it is of another build, or nothing of the kind.
         """
         try:
-            told = _Reader(io.BytesIO(data), self._wired).load()
-            if told["world"]["robots"].keys() != self._robots:
+            states = _Reader(io.BytesIO(data), self._wired).load()
+            if states["world"]["robots"].keys() != self._robots:
                 raise LookupError("recorded with other robots")
-            for path, state in told.items():
+            for path, state in states.items():
                 for name in self._kept[path]:
                     setattr(self._wired[path], name, state[name])
         except Exception as error:

@@ -40,7 +40,7 @@ class PeerScans:
     ) -> None:
         self._world, self._scans, self._publish = world, scans, publish
         self._boot, self._seq = boot, 0
-        self._told: dict[str, tuple[float, LaserScan | UnreadScan]] = {}
+        self._handled: dict[str, tuple[float, LaserScan | UnreadScan]] = {}
 
     async def run(self, clock: Clock) -> None:
         """Until cancelled."""
@@ -61,7 +61,7 @@ class PeerScans:
             if asking - {robot.robot_id} and self._is_due(robot, now)
         ]
         if due:
-            self._tell(min(due, key=self._told_at), now)
+            self._tell(min(due, key=self._handled_at), now)
 
     def _is_due(self, robot: RobotState, now: Instant) -> bool:
         received = robot.scan_received
@@ -69,29 +69,29 @@ class PeerScans:
             return False
         if now.mono - received.mono > OLDEST_S / 2:
             return False
-        _, told = self._told.get(robot.robot_id, (0.0, None))
-        return robot.scan is not told and now.mono - self._told_at(robot) >= APART_S
+        _, last = self._handled.get(robot.robot_id, (0.0, None))
+        return robot.scan is not last and now.mono - self._handled_at(robot) >= APART_S
 
-    def _told_at(self, robot: RobotState) -> float:
-        return self._told.get(robot.robot_id, (float("-inf"), None))[0]
+    def _handled_at(self, robot: RobotState) -> float:
+        return self._handled.get(robot.robot_id, (float("-inf"), None))[0]
 
     def _tell(self, robot: RobotState, now: Instant) -> None:
         waiting, pose, received = robot.scan, robot.scan_pose, robot.scan_received
         if waiting is None or pose is None or received is None:
             return
-        self._told[robot.robot_id] = now.mono, waiting
+        self._handled[robot.robot_id] = now.mono, waiting
         scan = self._scans.newest(robot)
         if scan is None or not scan.ranges.size:
             return
         try:
-            told = peer_scan_of(scan, pose, max(0.0, now.mono - received.mono))
+            peer_scan = peer_scan_of(scan, pose, max(0.0, now.mono - received.mono))
         except Exception as error:
             # One robot's scan ends neither this part nor what others are told.
             self._scans.undrawable(robot.robot_id, error)
             return
         self._seq += 1
         origin = Origin(self._boot, self._seq, format_stamp(now.wall))
-        self._publish(replace(told, origin=origin))
+        self._publish(replace(peer_scan, origin=origin))
 
 
 def _asks(robot: RobotState, now: Instant) -> bool:

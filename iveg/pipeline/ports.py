@@ -61,7 +61,7 @@ class FleetPort(Protocol):
     def publish_feedback(self, feedback: Feedback) -> None:
         """Publish feedback to the fleet; the newest of each topic counts."""
 
-    def publish_peer_scan(self, told: PeerScan) -> None:
+    def publish_peer_scan(self, scan: PeerScan) -> None:
         """Publish a scan for peers, which may be lost."""
 
     async def set_desired_state(

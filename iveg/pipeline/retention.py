@@ -126,8 +126,8 @@ class HistoryUpkeep:
         self._rest = rest
         self._is_low = False
         self._purges_at: float | None = None
-        self._told_day: int | None = None
-        self._told: Counter[str] = Counter()
+        self._logged_day: int | None = None
+        self._logged: Counter[str] = Counter()
 
     async def run(self, clock: Clock) -> None:
         """Until cancelled."""
@@ -194,8 +194,8 @@ class HistoryUpkeep:
             done = "unplaced" if step.kind == "positions" else "deleted"
             self.counters[f"history_{done}"] += rows
             if rows:
-                told = {"rows": rows, "before": cutoffs[step.kind]}
-                self._trail.note(ITSELF, done, step.table, told, at=now)
+                details = {"rows": rows, "before": cutoffs[step.kind]}
+                self._trail.note(ITSELF, done, step.table, details, at=now)
 
     async def _batches(self, batch: Callable[[], Awaitable[PurgeBatch]]) -> int:
         rows = 0
@@ -218,10 +218,10 @@ class HistoryUpkeep:
     async def _tell(self, now: Instant) -> None:
         """A line a day, by which days are recorded also where nothing happens."""
         day = int(now.wall // DAY_S)
-        if day == self._told_day:
+        if day == self._logged_day:
             return
-        fresh = self.counters - self._told
-        self._told_day, self._told = day, Counter(self.counters)
+        fresh = self.counters - self._logged
+        self._logged_day, self._logged = day, Counter(self.counters)
         slots = {
             "deleted": fresh["history_deleted"],
             "unplaced": fresh["history_unplaced"],

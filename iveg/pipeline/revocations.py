@@ -79,9 +79,9 @@ class Revocations:
                 robot.revoked = Revocation(by, self._clock().wall, stood)
                 key = "log.robot_revoked" if stood else "log.robot_revoked_unconfirmed"
                 self._tell(key, robot_id, by)
-            told = await self._tell_broker(robot_id, admitted=False)
+            answer = await self._tell_broker(robot_id, admitted=False)
             await self._save()
-        return robot, told
+        return robot, answer
 
     async def allow(self, robot_id: str, by: str) -> tuple[RobotState, BrokerTold]:
         """Hear a robot again; it stays held until people release it.
@@ -100,8 +100,8 @@ class Revocations:
                 raise
             if before is not None:
                 self._tell("log.robot_allowed", robot_id, by)
-            told = await self._tell_broker(robot_id, admitted=True)
-        return robot, told
+            answer = await self._tell_broker(robot_id, admitted=True)
+        return robot, answer
 
     async def _stopped(self, robot_id: str, by: str) -> bool:
         """STOP it, standing or not: who stands may drive on; whether it stands."""
@@ -115,13 +115,13 @@ class Revocations:
 
     async def _tell_broker(self, robot_id: str, *, admitted: bool) -> BrokerTold:
         try:
-            told: BrokerTold = await self._access.change(robot_id, admitted=admitted)
+            answer: BrokerTold = await self._access.change(robot_id, admitted=admitted)
         except HopError as error:
             slots = {"robot": robot_id, "reason": str(error)[:200]}
             event = LogEvent("system", "log.broker_access_failed", slots, robot_id)
             self._event_log.log(event, self._clock())
             return "failed"
-        return told
+        return answer
 
     async def _save(self) -> None:
         words = {one.robot_id: one.revoked for one in self._world.robots.values()}

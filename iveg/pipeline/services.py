@@ -96,8 +96,6 @@ def build_services(
 def _revocations(
     parts: Pipeline, kept: KeptChoices, clock: Clock, pause: Pause
 ) -> Revocations:
-    store, access, told = kept.revocation_store, kept.broker_access, parts.event_log
+    store, access, log = kept.revocation_store, kept.broker_access, parts.event_log
     world, commander = parts.world, parts.commander
-    return Revocations(
-        world, commander, store, access, told, clock, kept.revoked, pause
-    )
+    return Revocations(world, commander, store, access, log, clock, kept.revoked, pause)

@@ -162,8 +162,8 @@ class _Running:
     ) -> tuple[Limits, Sequence[LimitChange]]:
         """What concerns robots of today."""
         live = {robot.robot_id for robot in self._world.live_robots()}
-        told = {name: one for name, one in limits.items() if name in live}
-        return told, [one for one in changes if one.crossing.robot_id in live]
+        of_live = {name: one for name, one in limits.items() if name in live}
+        return of_live, [one for one in changes if one.crossing.robot_id in live]
 
     def _new_id(self) -> str:
         return f"shadow-{next(self._ids)}"

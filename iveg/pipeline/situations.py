@@ -49,7 +49,7 @@ class Situations:
             alert=alert,
             alert_about=None if alert is None else self._whom(robot, alert, now),
             near=None if report is None else self._reported(robot, report, limit, now),
-            told_near=self._told(robot, limit, now),
+            told_near=self._limited(robot, limit, now),
             margin=margin,
             margin_near=self._person(
                 robot, None if margin is None else margin.person_id, now
@@ -94,7 +94,7 @@ class Situations:
         if report.reason not in HAZARDS:
             return None
         if report.reason == limit.reason and report.cause in (None, limit.cause):
-            return self._told(robot, limit, now)
+            return self._limited(robot, limit, now)
         known = self._evaluator.people.known.values()
         named = {report.decision_id, report.cause} - {None}
         found = next(
@@ -104,7 +104,9 @@ class Situations:
             return self._to_person(robot, found, now)
         return self._near(robot, report.cause, now) or Near(report.reason)
 
-    def _told(self, robot: RobotState, limit: SpeedLimit, now: Instant) -> Near | None:
+    def _limited(
+        self, robot: RobotState, limit: SpeedLimit, now: Instant
+    ) -> Near | None:
         """Whom our speed limit is for."""
         if limit.reason not in HAZARDS:
             return None

@@ -104,16 +104,16 @@ class Chronicle(Trace):
 
     def ticked(self, now: Instant) -> None:
         """Write down what there is."""
-        told = self._told(now)
+        document = self._document(now)
         if not self._touched and now.mono - self._hashed_at >= HASHES_S - 1e-3:
             self._hashed_at = now.mono
-            told["hash"] = digest(self.picture(now))
-        self._write("Steps", orjson.dumps(told), now)
+            document["hash"] = digest(self.picture(now))
+        self._write("Steps", orjson.dumps(document), now)
         least = _SOON_S if self._touched else KEYFRAMES_S
         if now.mono - self._kept_at >= least - 1e-3:
             self._keep(now)
 
-    def _told(self, now: Instant) -> dict[str, object]:
+    def _document(self, now: Instant) -> dict[str, object]:
         steps = [[*_apart(at, now), kind] for at, kind in self._steps]
         arrived = [
             [*_apart(Instant(mono, wall), now), int(thinned)]
@@ -128,7 +128,7 @@ class Chronicle(Trace):
         if self.remember is None:
             return
         by_hand, self._touched, self._kept_at = self._touched, False, now.mono
-        told = {
+        document = {
             "version": self._version,
             "mono": in_ns(now.mono),
             "wall": now.wall,
@@ -137,7 +137,7 @@ class Chronicle(Trace):
             "ids": self.ids.count,
             "memory": b64encode(self.remember()).decode(),
         }
-        self._write("Memory", orjson.dumps(told), now)
+        self._write("Memory", orjson.dumps(document), now)
 
 
 class CountedIds:

@@ -158,8 +158,8 @@ class FleetCostmap:
         self.refused[error.reason] += 1
         if (peer, error.reason) not in self._said and len(self._said) < _MOST_PEERS:
             self._said.add((peer, error.reason))
-            told = self._me, peer, error.reason, error.detail
-            _log.warning("%s: scan of %s not used: %s, %s", *told)
+            slots = self._me, peer, error.reason, error.detail
+            _log.warning("%s: scan of %s not used: %s, %s", *slots)
 
 
 def _is_open(area: Rectangle) -> bool:

@@ -65,9 +65,9 @@ def read_goal(payload: bytes) -> GoalOrder | CancelOrder | None:
         return CancelOrder(value.cancel.id)
     if value.set is None or value.cancel is not None:
         return None
-    told = value.set
-    goal = Goal(told.id, told.kind, told.x, told.y)
-    return GoalOrder(goal, told.ch, told.until)
+    order = value.set
+    goal = Goal(order.id, order.kind, order.x, order.y)
+    return GoalOrder(goal, order.ch, order.until)
 
 
 @dataclass(frozen=True, slots=True)

@@ -136,7 +136,7 @@ class Judgement:
         """Evaluate this moment."""
         self.watchdog.tick(now)
         slowed = self.cap.reason in ("person", "robot")
-        told = [*self._peer_feedback.caps(self._own(now), slowed, now)]
+        peer_caps = [*self._peer_feedback.caps(self._own(now), slowed, now)]
         raw = lowest(
             (
                 self.local,
@@ -144,11 +144,11 @@ class Judgement:
                 self._silence_cap(now),
                 self._obstacle_cap(now),
                 self._foreseen_cap(now),
-                *(one for one in told if one.waits),
+                *(one for one in peer_caps if one.waits),
             )
         )
         self._waited = self._waited.settle(raw, now)
-        ends_late = (one for one in told if not one.waits)
+        ends_late = (one for one in peer_caps if not one.waits)
         self.cap = lowest((self._waited.cap, *ends_late))
 
     def must_stand(self, now: float) -> bool:

@@ -197,5 +197,5 @@ class Keepsake:
 
 def _said(report: SafetyReport) -> tuple[object, ...]:
     """What makes a report news."""
-    told = report.speed_factor, report.reason, report.cause, report.decision_id
-    return *told, report.holds
+    limit = report.speed_factor, report.reason, report.cause, report.decision_id
+    return *limit, report.holds

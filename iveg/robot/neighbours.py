@@ -33,7 +33,7 @@ class Neighbour:
 
 
 @dataclass(frozen=True, slots=True)
-class _Told:
+class _Heard:
     """Newest feedback of a topic.
 
     Attributes:
@@ -55,16 +55,16 @@ class Neighbours:
 
     def __init__(self, robot_id: str) -> None:
         self._me = robot_id
-        self._told: dict[str, _Told] = {}
+        self._heard: dict[str, _Heard] = {}
 
     def note(self, peer: str, feedback: Feedback, now: float) -> None:
         """Store the content of ``/{peer}/mqtt_feedback``."""
-        before, stamp = self._told.get(peer), feedback.pose_stamp
+        before, stamp = self._heard.get(peer), feedback.pose_stamp
         is_old = before is not None and stamp and before.feedback.pose_stamp == stamp
         posed = before.posed if before is not None and is_old else now
-        self._told[peer] = _Told(feedback, now, posed)
-        while len(self._told) > _MOST:
-            del self._told[next(iter(self._told))]
+        self._heard[peer] = _Heard(feedback, now, posed)
+        while len(self._heard) > _MOST:
+            del self._heard[next(iter(self._heard))]
 
     def present(self, own: Pose2D | None, now: float) -> list[Neighbour]:
         """All but this robot; one reported on two topics is listed once.
@@ -72,13 +72,13 @@ class Neighbours:
         A peer whose pose stays the same message for ``ring_lasts_s`` is left out:
         nobody knows any more where it is, or that it is there at all.
         """
-        live = [one for one in self._told.values() if now - one.at <= SILENT_S]
+        live = [one for one in self._heard.values() if now - one.at <= SILENT_S]
         found: dict[object, Neighbour] = {}
-        for told in live:
-            feedback = told.feedback
+        for heard in live:
+            feedback = heard.feedback
             for one in self._people(feedback, own):
                 found[one.kind, round(one.x, 1), round(one.y, 1)] = one
-            peer = feedback.pose if now - told.posed <= LIMITS.ring_lasts_s else None
+            peer = feedback.pose if now - heard.posed <= LIMITS.ring_lasts_s else None
             if feedback.robot_id != self._me and peer is not None:
                 name = feedback.robot_id
                 found[name] = Neighbour("robot", name, peer.x, peer.y, PEER_M, 2.0)

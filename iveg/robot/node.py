@@ -365,8 +365,8 @@ class RobotNode:
 
     def _tell_goal(self, answers: list[GoalAnswer]) -> None:
         for answer in answers:
-            told = self._id, answer.id, answer.result, answer.why or ""
-            _log.info("%s: goal %s %s %s", *told)
+            slots = self._id, answer.id, answer.result, answer.why or ""
+            _log.info("%s: goal %s %s %s", *slots)
             own = self._own(self._read_clock())
             self._lane.answer(self._uplink.goal_answer(answer, own))
 

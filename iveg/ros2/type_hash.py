@@ -58,8 +58,8 @@ def user_data(message: type[Message], gate: str = "") -> bytes:
 def read_user_data(data: bytes) -> tuple[str, str]:
     """Type hash and gate in an endpoint's USER_DATA; empty where it has none."""
     words = data.decode("utf-8", "replace").strip("\0").split(";")
-    told = dict(word.split("=", 1) for word in words if "=" in word)
-    return told.get(_HASH, ""), told.get(_GATE, "")
+    values = dict(word.split("=", 1) for word in words if "=" in word)
+    return values.get(_HASH, ""), values.get(_GATE, "")
 
 
 def definition(message: type[Message]) -> str:

@@ -39,8 +39,8 @@ class FakeFleet:
     def publish_feedback(self, feedback: Feedback) -> None:
         self.told.append(feedback)
 
-    def publish_peer_scan(self, told: PeerScan) -> None:
-        self.scans.append(told)
+    def publish_peer_scan(self, scan: PeerScan) -> None:
+        self.scans.append(scan)
 
     async def stop(self, robot_id: str, hold_id: str, by: str) -> None:  # noqa: ARG002 - the port
         self.stops.append((robot_id, hold_id))

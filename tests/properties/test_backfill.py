@@ -80,7 +80,7 @@ class Played:
             ("AGI", "AGII"),
             desk.clock,
             parts.backfill.has_room,
-            parts.backfill.take,
+            parts.backfill.record,
             parts.ingest.reject,
         )
         read = reader.beside(lambda *_: None)

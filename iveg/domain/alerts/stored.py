@@ -39,7 +39,7 @@ def _write_occurrence(one: AlertOccurrence) -> Json:
         "acknowledged_at": wall_of(one.acknowledged),
         "acknowledged_by": one.acknowledged_by,
         "note": one.note or None,
-        "told": [write_delivery(told) for told in one.deliveries],
+        "told": [write_delivery(delivery) for delivery in one.deliveries],
     }
 
 

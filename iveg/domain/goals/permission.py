@@ -50,10 +50,10 @@ def _why_not(robot: RobotState, stop_state: str, now: Instant) -> str | None:
 
 def _own_clock(robot: RobotState, report: SafetyReport) -> float | None:
     """The newest moment of the robot's own clock that it told (s), in this boot."""
-    told = [report.origin, *([robot.odometry.origin] if robot.odometry else [])]
+    origins = [report.origin, *([robot.odometry.origin] if robot.odometry else [])]
     moments = [
         one.mono
-        for one in told
+        for one in origins
         if one.mono is not None and one.boot == report.origin.boot
     ]
     return max(moments, default=None)

@@ -69,7 +69,7 @@ class ClockOffset:
         self._since = -_INF
         self._suspects: list[Bounds] = []
 
-    def take(
+    def time_message(
         self, stamp_s: float, at: Instant, composed_at: float | None
     ) -> float | Exclusion:
         """Take one message; returns its transit (s), or the reason for none.
@@ -116,10 +116,10 @@ class ClockOffset:
             and low > max(0.0, known.low) + _SAME_S
         )
 
-    def _suspect(self, told: Bounds, now: float) -> Exclusion:
-        if self._suspects and abs(told.low - self._suspects[0].low) > _SAME_S:
+    def _suspect(self, bounds: Bounds, now: float) -> Exclusion:
+        if self._suspects and abs(bounds.low - self._suspects[0].low) > _SAME_S:
             self._suspects.clear()
-        self._suspects.append(told)
+        self._suspects.append(bounds)
         if len(self._suspects) >= AGREE:
             agreed = _ANYTHING
             for one in self._suspects:
@@ -135,15 +135,15 @@ class ClockOffset:
         is_due = at.mono - self._since >= _WINDOW_S
         return is_due or low > newer.low or high < newer.high
 
-    def _note(self, told: Bounds, now: float) -> None:
+    def _note(self, bounds: Bounds, now: float) -> None:
         if now - self._since >= _WINDOW_S:
-            self._older, self._newer, self._since = self._newer, told, now
+            self._older, self._newer, self._since = self._newer, bounds, now
         else:
-            self._newer = self._newer.within(told)
+            self._newer = self._newer.within(bounds)
         both = self._older.within(self._newer)
         if both.low > both.high:
             # Slewed by a few milliseconds: the newest message is right.
-            self._older, self._newer = _ANYTHING, told
+            self._older, self._newer = _ANYTHING, bounds
         self._settle()
 
     def _settle(self) -> None:

@@ -202,7 +202,7 @@ class Stream:
         if origin.stamp_s == self._stamps.get(hop):
             return self._exclude(hop, "repeated_stamp")
         self._stamps[hop] = origin.stamp_s
-        took = self.clock.take(origin.stamp_s, at, composed_at)
+        took = self.clock.time_message(origin.stamp_s, at, composed_at)
         if isinstance(took, str):
             return self._exclude(hop, took)
         self.segments[hop].add(took, at.mono)

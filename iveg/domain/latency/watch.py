@@ -169,8 +169,8 @@ class LatencyWatch:
             stream, hop, series = following
             minute = series.end_slice(self._slices)
             if minute is not None and minute.count:
-                told = stream.robot_id, stream.data, hop, minute
-                self.ended.append((now.wall - 60.0, told))
+                measured = stream.robot_id, stream.data, hop, minute
+                self.ended.append((now.wall - 60.0, measured))
 
     # --- streams ----------------------------------------------------------------------
 

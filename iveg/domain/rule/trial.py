@@ -63,7 +63,7 @@ class _Sums:
     def meet(self, changes: Iterable[LimitChange]) -> None:
         self.encounters.update(one.crossing.zone.reason for one in changes if one.began)
 
-    def told(self) -> Doings:
+    def doings(self) -> Doings:
         seconds = {why: round(s, 3) for why, s in self.slowed_s.items()}
         return Doings(seconds, dict(self.encounters))
 
@@ -137,18 +137,18 @@ class Account:
                 self._differ(robot_id, limit, candidate[0][robot_id], now.wall)
 
     def _differ(
-        self, robot_id: str, told: SpeedLimit, would: SpeedLimit, wall: float
+        self, robot_id: str, in_force: SpeedLimit, would: SpeedLimit, wall: float
     ) -> None:
         before = self._open.get(robot_id)
         kind: Literal["slows", "frees"] | None = None
-        if _slows(told) != _slows(would):
+        if _slows(in_force) != _slows(would):
             kind = "slows" if _slows(would) else "frees"
         if before is not None and before.kind != kind:
             self._ended.append(replace(before, ended=wall))
             del self._open[robot_id]
         if kind is not None and robot_id not in self._open:
-            by = would if kind == "slows" else told
-            decision_id = None if kind == "slows" else told.decision_id
+            by = would if kind == "slows" else in_force
+            decision_id = None if kind == "slows" else in_force.decision_id
             self._open[robot_id] = Difference(
                 robot_id, kind, by.reason, by.cause, decision_id, wall
             )
@@ -159,18 +159,18 @@ class Account:
         differences = (*self._ended, *self._open.values())
         return replace(
             self._trial,
-            so_far=None if self._against is None else self._told(self._against),
+            so_far=None if self._against is None else self._comparison(self._against),
             differences=differences[-MOST_KEPT:],
         )
 
-    def _told(self, against: int) -> Comparison:
+    def _comparison(self, against: int) -> Comparison:
         return Comparison(
             self._since,
             self._until,
             against,
             round(self._compared_s, 3),
-            self._in_force.told(),
-            self._candidate.told(),
+            self._in_force.doings(),
+            self._candidate.doings(),
             self._counts["slows"],
             self._counts["frees"],
         )

@@ -96,7 +96,7 @@ def poses_of(rows: Iterable[PoseRow]) -> Poses:
 def sightings_of(rows: Sequence[SeenRow]) -> Sightings:
     """Rows in order of time, joined to chains."""
     chains = _Chains()
-    found = [chains.take(row) for row in rows]
+    found = [chains.join(row) for row in rows]
     numbers = np.array(
         [
             (*row[1:5], max(row[4], one.belief), one.number, one.subject)
@@ -142,7 +142,7 @@ class _Chains:
         self._newest: dict[tuple[str, str], dict[int, _Chain]] = {}
         self._count = 0
 
-    def take(self, row: SeenRow) -> _Chain:
+    def join(self, row: SeenRow) -> _Chain:
         """The chain of a detection, with it as its newest."""
         robot, at, x, y, probability, class_, person = row
         of = self._newest.setdefault((robot, class_), {})

@@ -35,15 +35,15 @@ async def list_entities(broker: ContextBroker, call: NgsiCall) -> Response:
     wanted, view = _Wanted.read(call), call.view()
     tenant = broker.tenant(call.scope.service)
     found = tenant.entities.all(call.scope.path)
-    told = await _ask_providers(broker, call, "", view.names)
+    provided = await _ask_providers(broker, call, "", view.names)
     known = {(one.id, one.type) for one in found}
-    strange = [key for key in told if key not in known]
+    strange = [key for key in provided if key not in known]
     ghosts = [_ghost(call.scope, *key) for key in strange]
     if order := call.query.get("orderBy"):
         found.sort(key=lambda one: one.id, reverse=order.startswith("!"))
     chosen = [one for one in (*found, *ghosts) if wanted.fits(one)]
     shown = [
-        write_entity(one, view, told.get((one.id, one.type), {})) for one in chosen
+        write_entity(one, view, provided.get((one.id, one.type), {})) for one in chosen
     ]
     return call.page(shown, len(chosen))
 
@@ -100,8 +100,8 @@ async def create_entity(broker: ContextBroker, call: NgsiCall) -> Response:
 
 async def get_entity(broker: ContextBroker, call: NgsiCall) -> Response:
     """``GET /v2/entities/{id}``."""
-    entity, told = await _whole(broker, call)
-    return Response(200, write_entity(entity, call.view(), told))
+    entity, provided = await _whole(broker, call)
+    return Response(200, write_entity(entity, call.view(), provided))
 
 
 async def _whole(
@@ -111,17 +111,17 @@ async def _whole(
     entity_id, view = call.parts[1], call.view()
     tenant = broker.tenant(call.scope.service)
     entity = broker.known(call.scope, entity_id, call.kind)
-    told = await _ask_providers(broker, call, entity_id, view.names)
+    provided = await _ask_providers(broker, call, entity_id, view.names)
     if entity is not None:
-        return entity, told.get((entity.id, entity.type), {})
+        return entity, provided.get((entity.id, entity.type), {})
     # With its type in the request, Orion answers that it does not know the entity.
     bare = (
         () if call.kind else bare_entities(tenant.registrations, call.scope, view.names)
     )
-    known = [*told, *(key for key in bare if key[0] == entity_id)]
+    known = [*provided, *(key for key in bare if key[0] == entity_id)]
     if not known:
         raise not_found()
-    return _ghost(call.scope, *known[0]), told.get(known[0], {})
+    return _ghost(call.scope, *known[0]), provided.get(known[0], {})
 
 
 async def _ask_providers(

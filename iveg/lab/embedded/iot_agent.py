@@ -222,9 +222,9 @@ class IotAgent:
             FiwareError: 404, no device has this entity.
         """
         device = self.registry.device_for(tenancy, name, kind)
-        told = {
+        commands = {
             command: {"type": "command", "value": ""}
             for command in device.commands_by_name
             if not names or command in names
         }
-        return {"type": kind, "id": name, **told}
+        return {"type": kind, "id": name, **commands}

@@ -120,11 +120,11 @@ class IotaApi:
         names = raw.get("attrs", [])
         if not isinstance(names, list) or not all(isinstance(n, str) for n in names):
             raise wrong_syntax()
-        told = [
+        answers = [
             await self.agent.query(tenancy, *_entity_key(entity), names)
             for entity in _listed(request, "entities")
         ]
-        return _json(told)
+        return _json(answers)
 
 
 _ROUTES: Routes[_Route] = Routes(

@@ -91,11 +91,11 @@ async def foreign(
         ]
         if attrs and entities and under(scope.path, registration.path):
             asked.append(_forward_query(registration, entities, attrs, scope))
-    told: dict[tuple[str, str], dict[str, Attribute]] = {}
+    merged: dict[tuple[str, str], dict[str, Attribute]] = {}
     for answer in await asyncio.gather(*asked):
         for key, attributes in answer.items():
-            told[key] = {**attributes, **told.get(key, {})}
-    return told
+            merged[key] = {**attributes, **merged.get(key, {})}
+    return merged
 
 
 def bare_entities(
@@ -160,17 +160,17 @@ async def _forward_query(
     if status != 200:
         return {}
     try:
-        told = orjson.loads(answer)
+        document = orjson.loads(answer)
     except orjson.JSONDecodeError:
         return {}
     return {
-        (one["id"], one["type"]): _read_told(one, scope.now)
-        for one in (told if isinstance(told, list) else ())
+        (one["id"], one["type"]): _read_attributes(one, scope.now)
+        for one in (document if isinstance(document, list) else ())
         if isinstance(one, dict) and {"id", "type"} <= one.keys()
     }
 
 
-def _read_told(one: Mapping[str, object], now: float) -> dict[str, Attribute]:
+def _read_attributes(one: Mapping[str, object], now: float) -> dict[str, Attribute]:
     return {
         name: Attribute(
             raw.get("type") or default_type(raw.get("value")),

@@ -19,13 +19,13 @@ _TAKEN: Final = 50
 _SAME_MOMENT_S: Final = 0.1
 
 
-def belief_of(own: InflatedGrid, told: InflatedGrid) -> Belief:
+def belief_of(own: InflatedGrid, with_peers: InflatedGrid) -> Belief:
     """Belief of the robot's own scan and of the costmap with peer reports."""
 
     def held(x: float, y: float) -> Held:
         if _is_taken(own, x, y):
             return "own"
-        return "told" if _is_taken(told, x, y) else "nobody"
+        return "told" if _is_taken(with_peers, x, y) else "nobody"
 
     return held
 
@@ -35,8 +35,8 @@ def belief_in(answer: Json) -> Belief:
     width, height, origin = answer["width"], answer["height"], answer["origin"]
     grid = Grid(answer["resolution"], origin["x"], origin["y"], width, height)
     cells = np.asarray(answer["data"], np.int8).reshape(height, width)
-    told = InflatedGrid(grid, cells)
-    return lambda x, y: "told" if _is_taken(told, x, y) else "nobody"
+    costmap = InflatedGrid(grid, cells)
+    return lambda x, y: "told" if _is_taken(costmap, x, y) else "nobody"
 
 
 @dataclass(frozen=True, slots=True)

@@ -99,11 +99,11 @@ def _changed(
     if found is None:
         return
     was, now, apart = found
-    told: str = verdict(_towards(apart, measure.better or 1.0))
+    judged: str = verdict(_towards(apart, measure.better or 1.0))
     if not measure.better:
-        told = {"better": "more", "worse": "fewer"}.get(told, told)
+        judged = {"better": "more", "worse": "fewer"}.get(judged, judged)
     yield _line(
-        f"{measure.name}{half}", was, now, apart, told if may_tell else _OTHER_LOAD
+        f"{measure.name}{half}", was, now, apart, judged if may_tell else _OTHER_LOAD
     )
 
 
@@ -114,10 +114,10 @@ def _towards(apart: Interval, better: float) -> Interval:
 
 
 def _line(
-    what: str, was: float, now: float, apart: Interval, told: str, form: str = ".3f"
+    what: str, was: float, now: float, apart: Interval, judged: str, form: str = ".3f"
 ) -> str:
     between = f"{apart.low:{form}} to {apart.high:{form}}"
-    return f"{what:<36}{was:>12{form}}{now:>12{form}}   {between}: {told}"
+    return f"{what:<36}{was:>12{form}}{now:>12{form}}   {between}: {judged}"
 
 
 def _latencies(before: Result, after: Result) -> Iterator[str]:
@@ -135,8 +135,8 @@ def _latencies(before: Result, after: Result) -> Iterator[str]:
             if name == "P95":
                 pair = one.quantile(0.95), other.quantile(0.95)
             old, new = (1000.0 * (value or 0.0) for value in pair)
-            told = verdict(_towards(apart, -1.0)) if same_load else _OTHER_LOAD
-            yield _line(f"{' '.join(cell)} {name} ms", old, new, apart, told, ".2f")
+            judged = verdict(_towards(apart, -1.0)) if same_load else _OTHER_LOAD
+            yield _line(f"{' '.join(cell)} {name} ms", old, new, apart, judged, ".2f")
 
 
 def _loads(result: Result) -> list[float]:

@@ -48,12 +48,12 @@ def counts_of(times: Iterable[MessageTimes]) -> dict[Data, dict[str, int]]:
     counts = {data: dict.fromkeys(COUNTS, 0) for data in DATA}
     came = []
     for one in times:
-        told = counts[one.data]
-        told["sent"] += 1
+        count = counts[one.data]
+        count["sent"] += 1
         if one.orion is None:
-            told["lost"] += 1
+            count["lost"] += 1
         else:
-            told["orion_first"] += one.orion < one.broker
+            count["orion_first"] += one.orion < one.broker
             came.append((one.orion, one))
     newest: dict[tuple[str, Data, str], int] = {}
     for _, one in sorted(came, key=lambda each: each[0]):

@@ -19,15 +19,17 @@ _SAME_M: Final = 1.0
 """Who is farther from where iVeg has somebody is somebody else (m)."""
 
 
-def moments_of(truth: Iterable[Row], told: Sequence[Row] = ()) -> Iterator[NearMoment]:
+def moments_of(
+    truth: Iterable[Row], encounters: Sequence[Row] = ()
+) -> Iterator[NearMoment]:
     """Every robot at each of its pictures, in the order of time.
 
     Args:
         truth: Rows of the truth.
-        told: What iVeg told of encounters with people: ``robot``, ``at``, ``people``
+        encounters: With people, as iVeg told them: ``robot``, ``at``, ``people``
             (each the place ``x``, ``y`` where iVeg has somebody), at the same times.
     """
-    encounters = {(one["robot"], one["at"]): one["people"] for one in told}
+    people_at = {(one["robot"], one["at"]): one["people"] for one in encounters}
     newest: dict[str, Row] = {}
     for at, same in groupby(sorted(truth, key=itemgetter("at")), itemgetter("at")):
         rows, before = list(same), dict(newest)
@@ -35,7 +37,7 @@ def moments_of(truth: Iterable[Row], told: Sequence[Row] = ()) -> Iterator[NearM
         young = (row for row in newest.values() if at - row["at"] <= _STILL_S)
         in_view = {one["key"] for row in young for one in row["visible"]}
         for row in rows:
-            places = encounters.get((row["robot"], at), ())
+            places = people_at.get((row["robot"], at), ())
             last_at = before.get(row["robot"], row)["at"]
             yield NearMoment(
                 row["robot"],

@@ -85,11 +85,11 @@ async def _measure(
 ) -> None:
     """A slice every few seconds, the last one at the end."""
     slices = max(1, math.floor(seconds / _SLICE_S))
-    start = before = await _told(api)
+    start = before = await _read_latency(api)
     watched.edges.append(clock.wall())
     for _ in range(slices):
         await asyncio.sleep(seconds / slices)
-        now = await _told(api)
+        now = await _read_latency(api)
         watched.edges.append(clock.wall())
         both = before is not None and now is not None
         watched.slices.append(
@@ -100,7 +100,7 @@ async def _measure(
         watched.read = _read_between(start["streams"], before["streams"])
 
 
-async def _told(api: httpx.AsyncClient) -> Any:
+async def _read_latency(api: httpx.AsyncClient) -> Any:
     """Response of the latency API since iVeg's start; None: none."""
     path = "/latency?window=24h&figures=false&bins=true"
     try:
@@ -142,7 +142,7 @@ def _hear(frame: bytes, watched: ObservedRun) -> int:
         if part["topic"].startswith("detections/"):
             picture = picture_of(part["data"])
             if picture is not None:
-                watched.told.append(picture)
+                watched.reported.append(picture)
     return int(head["frame"])
 
 
@@ -150,8 +150,8 @@ async def _believe(api: httpx.AsyncClient, robot_id: str, watched: ObservedRun) 
     while True:
         with contextlib.suppress(httpx.HTTPError):
             answer = await api.get(f"/costmap?robot={robot_id}")
-            if answer.status_code == 200 and watched.told:
+            if answer.status_code == 200 and watched.reported:
                 # Clock of the detection frames, with which it is compared.
-                newest = watched.told[-1].at
+                newest = watched.reported[-1].at
                 watched.beliefs.append((newest, belief_in(answer.json())))
         await asyncio.sleep(_MAP_EVERY_S)

@@ -75,8 +75,8 @@ def outcome_of(
     step: PlannedRun, counted: Outcome, stack: Outcome | None, load: Sequence[float]
 ) -> Outcome:
     """One run as stored; ``load`` of the machine before and after its last half."""
-    told = {"counted": counted, "stack": stack}
-    return {**asdict(step), **told, "load": [round(one, 1) for one in load]}
+    halves = {"counted": counted, "stack": stack}
+    return {**asdict(step), **halves, "load": [round(one, 1) for one in load]}
 
 
 def result_of(
@@ -182,14 +182,14 @@ def _protection(outcomes: Sequence[Outcome]) -> Iterator[dict[str, object]]:
 
 def scored(classes: Sequence[str], runs: Sequence[Outcome]) -> dict[str, object]:
     """Counts, rates with their intervals and AP of some classes over all runs."""
-    told = [
+    tallies = [
         Tally(**one["classes"][name])
         for one in runs
         for name in classes
         if name in one["classes"]
     ]
-    of = score(told)
-    sure = [one for each in told for one in each.found]
+    of = score(tallies)
+    sure = [one for each in tallies for one in each.found]
     precision = thinned(of.tp, of.tp + of.fp, of.claims)
     recall = thinned(of.tp, of.tp + of.fn, of.looks)
     return {
@@ -198,8 +198,8 @@ def scored(classes: Sequence[str], runs: Sequence[Outcome]) -> dict[str, object]
         "precision": None if precision is None else asdict(precision),
         "recall": None if recall is None else asdict(recall),
         "place": {
-            "map": _off([off for each in told for off in each.off_map]),
-            "robot": _off([off for each in told for off in each.off_robot]),
+            "map": _off([off for each in tallies for off in each.off_map]),
+            "robot": _off([off for each in tallies for off in each.off_robot]),
         },
     }
 
@@ -219,12 +219,12 @@ def _rows(
     for data in DATA:
         yield {
             "data": data,
-            "hops": {hop: _told(found[data, hop]) for hop in HOPS},
+            "hops": {hop: _figures(found[data, hop]) for hop in HOPS},
             "messages": _sum(one["messages"].get(data, {}) for one in stack),
         }
 
 
-def _told(of: Sketch) -> dict[str, object]:
+def _figures(of: Sketch) -> dict[str, object]:
     def ms(seconds: float | None) -> float | None:
         return None if seconds is None else round(1000.0 * seconds, 2)
 

@@ -79,11 +79,11 @@ def disagreements() -> Iterator[Disagreement]:
 
 
 def _rates(place: Place, name: str, row: PaperScore) -> Iterator[Disagreement]:
-    told = (
+    rates = (
         ("precision %", row.precision, row.tp + row.fp),
         ("recall %", row.recall, row.tp + row.fn),
     )
-    for what, printed, of in told:
+    for what, printed, of in rates:
         follows = round(100.0 * row.tp / of, 2)
         if abs(follows - printed) > _ROUNDING:
             yield Disagreement(place, name, what, printed, follows)
@@ -91,14 +91,14 @@ def _rates(place: Place, name: str, row: PaperScore) -> Iterator[Disagreement]:
 
 def _totals(place: Place, rows: list[PaperScore]) -> Iterator[Disagreement]:
     total, means = GLOBAL[place], MEANS[place]
-    told = (
+    totals = (
         ("total", "TP", total.tp, sum(row.tp for row in rows)),
         ("total", "FP", total.fp, sum(row.fp for row in rows)),
         ("total", "FN", total.fn, sum(row.fn for row in rows)),
         ("mean", "precision %", means[0], fmean(row.precision for row in rows)),
         ("mean", "recall %", means[1], fmean(row.recall for row in rows)),
     )
-    for name, what, printed, follows in told:
+    for name, what, printed, follows in totals:
         if abs(follows - printed) > _ROUNDING:
             yield Disagreement(place, name, what, printed, round(follows, 2))
 

@@ -151,11 +151,11 @@ class Protection:
 
 
 def _entered(entries: list[Entry]) -> Json:
-    told = sum((one.foretold_s or 0.0) >= AHEAD_S - _ROUNDING_S for one in entries)
+    foretold = sum((one.foretold_s or 0.0) >= AHEAD_S - _ROUNDING_S for one in entries)
     slow = sum(one.speed_share <= SLOW_SHARE for one in entries)
     return {
         "count": len(entries),
-        "foretold": share(told, len(entries)),
+        "foretold": share(foretold, len(entries)),
         "slow": share(slow, len(entries)),
     }
 

@@ -34,28 +34,28 @@ def write_raw(
     """Write the raw data of one run into a directory of its own."""
     _write_half(directory / "virtual", virtual)
     kept = ("family", "number", "seed", "profile", "rule", "fails", "load")
-    told: dict[str, object] = {one: outcome[one] for one in kept}
-    told["configuration"] = configuration
-    told["completed"] = {"virtual": virtual.completed}
-    told["failures"] = virtual.failures
+    document: dict[str, object] = {one: outcome[one] for one in kept}
+    document["configuration"] = configuration
+    document["completed"] = {"virtual": virtual.completed}
+    document["failures"] = virtual.failures
     if real is not None:
         _write_half(directory / "real", real)
         _write_rows(directory / "real" / "messages.ndjson", real.times)
         _write_rows(directory / "real" / "hops.ndjson", _decided(real))
-        told |= {
+        document |= {
             "completed": {"virtual": virtual.completed, "real": real.completed},
             "measured": {"began": real.edges[0], "ended": real.edges[-1]},
             "read": real.read,
             "settled": real.settled,
             "stops": real.stops,
         }
-    write_json(directory / "run.json", told)
+    write_json(directory / "run.json", document)
 
 
 def _write_half(place: Path, half: RunRecording) -> None:
     place.mkdir(parents=True, exist_ok=True)
     _write_rows(place / "truth.ndjson", half.truth)
-    _write_rows(place / "told.ndjson", half.told)
+    _write_rows(place / "told.ndjson", half.reported)
     _write_rows(place / "encounters.ndjson", half.foretold)
     _write_rows(place / "costmap.ndjson", half.asked)
     _write_rows(place / "decisions.ndjson", half.decisions)

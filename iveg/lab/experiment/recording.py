@@ -23,7 +23,7 @@ class RunRecording:
 
     Attributes:
         truth: The emulator's rows, one a picture (``emulator.truth.true_picture``).
-        told: Detection frames as iVeg told them.
+        reported: Detection frames as iVeg told them.
         foretold: Encounters with people as iVeg told them at each picture
             (``moments.moments_of``); the virtual half alone has them.
         beliefs: Content of a robot's costmap at some moments (s, by the clock of the
@@ -34,7 +34,7 @@ class RunRecording:
     """
 
     truth: list[Row] = field(default_factory=list)
-    told: list[Picture] = field(default_factory=list)
+    reported: list[Picture] = field(default_factory=list)
     foretold: list[Row] = field(default_factory=list)
     beliefs: list[tuple[float, Belief]] = field(default_factory=list)
     decisions: list[Row] = field(default_factory=list)
@@ -54,7 +54,7 @@ class RunRecording:
     @property
     def pairs(self) -> list[Pair]:
         """True and told pictures of one moment."""
-        return list(paired(self.views, self.told))
+        return list(paired(self.views, self.reported))
 
     @property
     def asked(self) -> list[InjectionQuestion]:
@@ -89,17 +89,17 @@ def picture_of_truth(row: Row) -> Picture:
     return Picture(row["robot"], row["at"], seen)
 
 
-def picture_of(told: Row, at: float | None = None) -> Picture | None:
+def picture_of(frame: Row, at: float | None = None) -> Picture | None:
     """One detection frame of the live topic; None without a readable stamp.
 
     Args:
-        told: The frame.
+        frame: As iVeg told it.
         at: When it was taken, where that is known without its stamp (s).
     """
-    at = parse_stamp(told["stamp"] or "") if at is None else at
+    at = parse_stamp(frame["stamp"] or "") if at is None else at
     if at is None:
         return None
-    return Picture(told["robot_id"], at, _seen_in(told["items"]))
+    return Picture(frame["robot_id"], at, _seen_in(frame["items"]))
 
 
 def _seen_in(items: Sequence[Row]) -> tuple[SeenObject, ...]:

@@ -184,9 +184,9 @@ def _figures(result: Result, language: Language) -> Iterator[str]:
             _name(trace, say)
         axes = figure["layout"]["meta"]
         axes.update({axis: say(what) for axis, what in axes.items()})
-        told = orjson.dumps(figure).decode().replace("</", "<\\/")
+        text = orjson.dumps(figure).decode().replace("</", "<\\/")
         yield f'<div class="figure" id="{name}-{language}"></div>'
-        yield f'<script type="application/json">{told}</script>'
+        yield f'<script type="application/json">{text}</script>'
 
 
 def _name(trace: dict[str, Any], say: Say) -> None:

@@ -90,12 +90,12 @@ def change(
 
 def _precision(classes: Sequence[str]) -> Number:
     def number(runs: Sequence[Run]) -> float | None:
-        told = [
+        tallies = [
             run["classes"][c] for run in runs for c in classes if c in run["classes"]
         ]
-        found = [sure for one in told for sure in one["found"]]
-        ghosts = [sure for one in told for sure in one["ghosts"]]
-        missed = sum(one["missed"] for one in told)
+        found = [sure for one in tallies for sure in one["found"]]
+        ghosts = [sure for one in tallies for sure in one["ghosts"]]
+        missed = sum(one["missed"] for one in tallies)
         return average_precision(found, ghosts, len(found) + missed)
 
     return number

@@ -129,9 +129,9 @@ class _Count:
 def tally(pairs: Iterable[Pair]) -> dict[str, Tally]:
     """Count each class."""
     counts: dict[str, _Count] = defaultdict(_Count)
-    for real, told in pairs:
+    for real, reported in pairs:
         robot_id, look = real.robot_id, int(real.at // _LOOK_S)
-        matched, wrong = match(real.seen, told.seen)
+        matched, wrong = match(real.seen, reported.seen)
         for target in real.seen:
             one, place = counts[target.class_id], (robot_id, target.key, look)
             one.looks.add(place)
@@ -147,22 +147,22 @@ def tally(pairs: Iterable[Pair]) -> dict[str, Tally]:
     return {name: counts[name].tally() for name in sorted(counts)}
 
 
-def paired(truth: Iterable[Picture], told: Iterable[Picture]) -> Iterator[Pair]:
+def paired(truth: Iterable[Picture], reported: Iterable[Picture]) -> Iterator[Pair]:
     """Reported frames with the ground truth of the same moment, where known."""
     views = _by_robot(truth)
-    for picture in told:
+    for picture in reported:
         real = _nearest(views.get(picture.robot_id, ()), picture.at)
         if real is not None:
             yield real, picture
 
 
 def match(
-    real: Sequence[SeenObject], told: Sequence[SeenObject]
+    real: Sequence[SeenObject], reported: Sequence[SeenObject]
 ) -> tuple[dict[str, SeenObject], list[SeenObject]]:
     """Detection of each target, most confident first, and unmatched detections."""
     matched: dict[str, SeenObject] = {}
     wrong: list[SeenObject] = []
-    for one in sorted(told, key=lambda seen: -seen.confidence):
+    for one in sorted(reported, key=lambda seen: -seen.confidence):
         free = [
             target
             for target in real
@@ -176,19 +176,19 @@ def match(
     return matched, wrong
 
 
-def overlap(real: SeenObject, told: SeenObject) -> float:
+def overlap(real: SeenObject, reported: SeenObject) -> float:
     """Intersection over union of two squares of the target's size at these centres."""
     size = SIZE_M.get(real.class_id, _ROBOT_SIZE_M)
-    dx, dy = _between(real, told)
+    dx, dy = _between(real, reported)
     shared = max(0.0, size - abs(dx)) * max(0.0, size - abs(dy))
     return shared / (2 * size * size - shared)
 
 
-def _between(real: SeenObject, told: SeenObject) -> tuple[float, float]:
+def _between(real: SeenObject, reported: SeenObject) -> tuple[float, float]:
     """From a target to a detection (m): in the robot's frame, where both are known."""
-    if real.local is None or told.local is None:
-        return told.x - real.x, told.y - real.y
-    return told.local[0] - real.local[0], told.local[1] - real.local[1]
+    if real.local is None or reported.local is None:
+        return reported.x - real.x, reported.y - real.y
+    return reported.local[0] - real.local[0], reported.local[1] - real.local[1]
 
 
 def score(tallies: Iterable[Tally]) -> Score:

@@ -76,8 +76,8 @@ def _bins(durations: Sequence[float]) -> Bins:
 
 def _less(after: Bins, before: Bins) -> Bins:
     known = dict(zip(before["edges_ms"], before["counts"], strict=True))
-    told = zip(after["edges_ms"], after["counts"], strict=True)
-    more = [(edge, count - known.get(edge, 0)) for edge, count in told]
+    bins = zip(after["edges_ms"], after["counts"], strict=True)
+    more = [(edge, count - known.get(edge, 0)) for edge, count in bins]
     kept = [(edge, count) for edge, count in more if count > 0]
     total = after["total_ms"] - before["total_ms"]
     return {

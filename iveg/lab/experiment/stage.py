@@ -263,7 +263,7 @@ class Stage:
                 robot.listen(feedback.robot_id, payload, self.now)
         scans = self._scans[self._scans_delivered :]
         self._scans_delivered += len(scans)
-        for told in scans:
-            topic = names.PEER_SCAN_TOPIC.format(robot_id=told.robot_id)
+        for scan in scans:
+            topic = names.PEER_SCAN_TOPIC.format(robot_id=scan.robot_id)
             for robot in self.robots.values():
-                robot.listen_to_scan(topic, codec.write_peer_scan(told))
+                robot.listen_to_scan(topic, codec.write_peer_scan(scan))

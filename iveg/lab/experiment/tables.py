@@ -53,10 +53,10 @@ def _printed(name: str, place: Place, row: PaperScore) -> Sequence[object]:
     return name, f"paper, {place}", row.tp, row.fp, row.fn, *rates, ap
 
 
-def _counts(name: str, source: str, told: Json) -> Sequence[object]:
-    ap = "–" if told["ap"] is None else f"{told['ap']:.2f}"
-    rates = (_interval(told["precision"]), _interval(told["recall"]))
-    return name, source, told["tp"], told["fp"], told["fn"], *rates, ap
+def _counts(name: str, source: str, score: Json) -> Sequence[object]:
+    ap = "–" if score["ap"] is None else f"{score['ap']:.2f}"
+    rates = (_interval(score["precision"]), _interval(score["recall"]))
+    return name, source, score["tp"], score["fp"], score["fn"], *rates, ap
 
 
 def _means(result: Result) -> Sequence[object]:
@@ -80,13 +80,13 @@ def place(result: Result) -> Rows:
     """Distance of each correct detection from its target (m)."""
     for source, half in (("here", result), ("here, real time", result["stack"])):
         for class_id in CLASSES:
-            told = half["detection"][class_id]
+            score = half["detection"][class_id]
             cells = [
                 _metres(off, name)
-                for off in (told["place"]["map"], told["place"]["robot"])
+                for off in (score["place"]["map"], score["place"]["robot"])
                 for name in ("mean_m", "p95_m")
             ]
-            yield class_id, source, told["tp"], *cells
+            yield class_id, source, score["tp"], *cells
 
 
 def _metres(off: Mapping[str, float] | None, name: str) -> str:
@@ -115,9 +115,9 @@ def claims(result: Result) -> Rows:
     field = result["field"]
     tested = f"{field['completed']} of {field['runs']}"
     yield "runs completed of the field test with failures", tested, *shares
-    told = result["global"]["confidence"]
+    confidence = result["global"]["confidence"]
     sure = [f"{CONFIDENCE[place]:.0%}" for place in PRINTED]
-    yield "mean confidence", "–" if told is None else f"{told:.0%}", *sure
+    yield "mean confidence", "–" if confidence is None else f"{confidence:.0%}", *sure
     yield "…of these at or above the rule's threshold", _confident(result), "", ""
     sent, lost, reordered = (
         sum(row["messages"].get(name, 0) for row in result["latency"]["rows"])
@@ -216,10 +216,10 @@ def entries(result: Result) -> Rows:
     """How rings around people were entered."""
     for one in result["protection"]:
         for kind, name in _ENTERED.items():
-            told = one["entries"][kind]
-            rates = percent(told["foretold"]), percent(told["slow"])
+            entered = one["entries"][kind]
+            rates = percent(entered["foretold"]), percent(entered["slow"])
             chosen = one["where"], one["profile"], one["rule"]
-            yield *chosen, name, told["count"], *rates
+            yield *chosen, name, entered["count"], *rates
 
 
 STOPS: Final = ("robot", "robot's answer", "standing")
@@ -243,8 +243,8 @@ def latency(result: Result) -> Rows:
     for one in result["latency"]["rows"]:
         data: Data = one["data"]
         up, on, total, decided = (
-            (told["count"], ms(told["mean_ms"]), ms(told["p95_ms"]))
-            for told in (one["hops"][hop] for hop in HOPS)
+            (hop["count"], ms(hop["mean_ms"]), ms(hop["p95_ms"]))
+            for hop in (one["hops"][name] for name in HOPS)
         )
         yield data, "here", *up, *on, *total, _first(one["messages"]), *decided
         for place, printed in PAPER.items():
@@ -294,10 +294,10 @@ def field_tests(result: Result) -> Rows:
             yield one["number"], one["profile"], one["seed"], done, why
 
 
-def _interval(told: Mapping[str, float] | None) -> str:
-    if told is None:
+def _interval(rate: Mapping[str, float] | None) -> str:
+    if rate is None:
         return "–"
-    share, low, high = (100.0 * told[name] for name in ("share", "low", "high"))
+    share, low, high = (100.0 * rate[name] for name in ("share", "low", "high"))
     return f"{share:.1f} % [{low:.1f}, {high:.1f}]"
 
 

@@ -106,7 +106,7 @@ class VirtualRun:
         self._result.decisions = [asdict(one) for one in self._iveg.decisions.values()]
         result = self._result
         result.failures = [*self._failed()]
-        result.completed = bool(result.told) and not result.failures
+        result.completed = bool(result.reported) and not result.failures
         return result
 
     def _failed(self) -> Iterator[str]:
@@ -143,18 +143,20 @@ class VirtualRun:
         looks, self._looks = self._looks, []
         for row in looks:
             frame = self._views.frame(row["robot"], self._iveg.now)
-            told = {} if frame is None else frame.model_dump(mode="json")
-            picture = picture_of(told, row["at"]) if told else None
+            document = {} if frame is None else frame.model_dump(mode="json")
+            picture = picture_of(document, row["at"]) if document else None
             self._result.truth.append(row)
             self._result.foretold.append(foretold_row(self._iveg, row))
-            self._result.told.append(picture or Picture(row["robot"], row["at"], ()))
+            self._result.reported.append(
+                picture or Picture(row["robot"], row["at"], ())
+            )
 
     def _believe(self) -> None:
         """Look into the watched robot's own costmap, beside what its laser found."""
         now = self._iveg.now
-        own, told = self._mapper.of(WATCHED, (), now), self._watched.believe(now)
-        if own is not None and told is not None:
-            self._result.beliefs.append((now.mono, belief_of(own, told)))
+        own, with_peers = self._mapper.of(WATCHED, (), now), self._watched.believe(now)
+        if own is not None and with_peers is not None:
+            self._result.beliefs.append((now.mono, belief_of(own, with_peers)))
 
     def _touches(self) -> int:
         people = self._world.discs()

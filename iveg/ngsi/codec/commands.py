@@ -37,8 +37,8 @@ def write_goal(order: GoalOrder | CancelOrder) -> dict[str, object]:
     if isinstance(order, CancelOrder):
         return {"cancel": {"id": order.goal_id}}
     goal = order.goal
-    told = {"id": goal.goal_id, "kind": goal.kind, "x": goal.x, "y": goal.y}
-    return {"set": {**told, "ch": order.challenge, "until": order.until_s}}
+    fields = {"id": goal.goal_id, "kind": goal.kind, "x": goal.x, "y": goal.y}
+    return {"set": {**fields, "ch": order.challenge, "until": order.until_s}}
 
 
 def write_command(value: Mapping[str, object], name: str = names.COMMAND) -> bytes:

@@ -64,10 +64,10 @@ def _speed_limits(value: payloads.FeedbackValue) -> dict[str, SpeedLimit]:
 
 def _backlog(value: object) -> float | None:
     """Seconds; what cannot be read is no news, and never costs the rest."""
-    told = value.get("fiware_s") if isinstance(value, dict) else None
-    if isinstance(told, bool) or not isinstance(told, int | float) or told < 0:
+    seconds = value.get("fiware_s") if isinstance(value, dict) else None
+    if isinstance(seconds, bool) or not isinstance(seconds, int | float) or seconds < 0:
         return None
-    return min(float(told), LONGEST_BACKLOG_S)
+    return min(float(seconds), LONGEST_BACKLOG_S)
 
 
 def _alert(value: payloads.AlertValue) -> FeedbackAlert:

@@ -15,21 +15,21 @@ LARGEST = 1024
 """Size of a message at most (bytes)."""
 
 
-def write_peer_scan(told: PeerScan) -> bytes:
+def write_peer_scan(scan: PeerScan) -> bytes:
     """The bytes of ``/{robot}/iveg/peer_scan``."""
-    centimetres = told.ranges.astype(np.float64).round(2).tolist()
+    centimetres = scan.ranges.astype(np.float64).round(2).tolist()
     return orjson.dumps(
         {
-            "boot": told.origin.boot,
-            "seq": told.origin.seq,
-            "stamp": told.origin.stamp,
-            "robot_id": told.robot_id,
-            "robot_pose": {**_pose(told.pose), "frame_id": "map"},
-            "age_s": round(told.age_s, 3),
-            "mount": _pose(told.mount),
-            "range_max": round(told.range_max, 3),
+            "boot": scan.origin.boot,
+            "seq": scan.origin.seq,
+            "stamp": scan.origin.stamp,
+            "robot_id": scan.robot_id,
+            "robot_pose": {**_pose(scan.pose), "frame_id": "map"},
+            "age_s": round(scan.age_s, 3),
+            "mount": _pose(scan.mount),
+            "range_max": round(scan.range_max, 3),
             "ranges": [None if one == np.inf else one for one in centimetres],
-            "places": told.places.tolist(),
+            "places": scan.places.tolist(),
         }
     )
 

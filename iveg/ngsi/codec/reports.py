@@ -163,8 +163,8 @@ def write_navigation(value: Navigation) -> bytes:
 
 def write_sensed(value: Observation) -> bytes:
     """The bytes of a small sensor's topic, ``/{apikey}/{robot}_{name}/attrs``."""
-    told = {**value_of(value), **write_origin(value.origin)}
-    return _measure(value.origin, {kind(value).name: told})
+    fields = {**value_of(value), **write_origin(value.origin)}
+    return _measure(value.origin, {kind(value).name: fields})
 
 
 def write_answer(value: CommandAnswer) -> bytes:
@@ -189,8 +189,8 @@ def write_answer(value: CommandAnswer) -> bytes:
 
 def write_goal_answer(value: GoalAnswer) -> bytes:
     """The bytes of ``/{apikey}/{robot}/cmdexe`` that tell of a goal."""
-    told = {"id": value.id, "r": value.result, "why": value.why}
-    return orjson.dumps({names.GOAL: told | write_origin(value.origin)})
+    fields = {"id": value.id, "r": value.result, "why": value.why}
+    return orjson.dumps({names.GOAL: fields | write_origin(value.origin)})
 
 
 def _mark(origin: Origin) -> dict[str, str]:

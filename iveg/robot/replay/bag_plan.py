@@ -79,7 +79,7 @@ class BagPlan:
         self._choose("odometry", (m.Odometry,), options.odometry, "--odom-topic")
         self._choose("scan", (m.LaserScan,), options.scan, "--scan-topic")
         for one in self._of(m.TFMessage):
-            self._take(one, "tf_static" if one.name.endswith("tf_static") else "tf")
+            self._use(one, "tf_static" if one.name.endswith("tf_static") else "tf")
         if not file.is_ros1:
             self._choose_detector(options)
 
@@ -130,7 +130,7 @@ class BagPlan:
             raise self._file.unusable(reason)
         others = [one for one in found if one not in chosen]
         self._whys |= dict.fromkeys(others, f"{option} names another")
-        return self._take(chosen[0], role) if chosen else None
+        return self._use(chosen[0], role) if chosen else None
 
     def _named(
         self, forms: Sequence[type[Message]], wanted: str | None, option: str
@@ -150,7 +150,7 @@ class BagPlan:
         names = ", ".join(sorted({one.name for one in self._of(*forms)})) or "none"
         return f"{' or '.join(one.ROS for one in forms)}: {names}"
 
-    def _take(self, topic: BagTopic, role: str) -> Use | None:
+    def _use(self, topic: BagTopic, role: str) -> Use | None:
         """Read a topic, unless its type has other fields under the same name."""
         form = next(one for one in _FORMS if topic.type == one.ROS)
         if topic.type_hash not in ("", type_hash(form)):
@@ -190,7 +190,7 @@ class BagPlan:
         info = [one for one in cameras if one.name == beside] or cameras
         if len(info) != 1:
             return False
-        taken = self._take(depth[0], "depth"), self._take(info[0], "camera_info")
+        taken = self._use(depth[0], "depth"), self._use(info[0], "camera_info")
         return None not in taken
 
     def _why(self, topic: BagTopic) -> str:

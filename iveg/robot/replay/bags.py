@@ -165,5 +165,5 @@ class Bag:
             _log.info("%s, %s: %d used", self._file.path, topic, count)
         for (topic, why), count in sorted(this.losses.items()):
             level = logging.INFO if this.used[topic] else logging.WARNING
-            told = self._file.path, topic, count, why
-            _log.log(level, "%s, %s: %d not used: %s", *told)
+            slots = self._file.path, topic, count, why
+            _log.log(level, "%s, %s: %d not used: %s", *slots)

@@ -68,8 +68,8 @@ class OwnRecording:
             }
         if len(robots) == 1:
             return robots.pop()
-        told = ", ".join(sorted(robots)) or "no robot"
-        raise self._unusable(f"holds {told}: name one as {self._path.name}#ROBOT.")
+        held = ", ".join(sorted(robots)) or "no robot"
+        raise self._unusable(f"holds {held}: name one as {self._path.name}#ROBOT.")
 
     def _unusable(self, reason: str) -> DataFileError:
         return DataFileError(str(self._path), "", reason)

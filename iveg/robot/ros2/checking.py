@@ -130,8 +130,8 @@ def _row(
     remark = ""
     if deaf:
         remark = "QoS mismatch"
-        told, key = _mismatch(asked, deaf[0].qos)
-        missing.append(f"{name}: {told}; qos.{topic}.{key} = false.")
+        mismatch, key = _mismatch(asked, deaf[0].qos)
+        missing.append(f"{name}: {mismatch}; qos.{topic}.{key} = false.")
     elif fitting and one.unreadable:
         remark = "unreadable"
         missing.append(f"{name}: {one.unreadable} messages of another layout.")
@@ -162,9 +162,9 @@ def _foreign(topic: str, name: str, writer: Endpoint) -> list[str]:
     """A type that is not read, or one of the same name with other fields."""
     there, form = writer.type_hash, TOPICS[topic].form(writer.type)
     if form is None:
-        told = f" ({there})" if there else ""
+        suffix = f" ({there})" if there else ""
         known = " or ".join(one.ROS for one in TOPICS[topic].forms)
-        return [f"{name} is {writer.type}{told}, not {known}."]
+        return [f"{name} is {writer.type}{suffix}, not {known}."]
     if there in ("", type_hash(form)):
         return []
     return [

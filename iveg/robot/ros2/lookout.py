@@ -64,8 +64,8 @@ class Lookout:
         for topic, name in sensed_topics(self._names).items():
             kinds = {one.type for one in others if one.writes and one.topic == name}
             if kinds and not any(map(TOPICS[topic].form, kinds)):
-                told = f"{name}: {min(kinds).replace('/msg/', '/')}"
-                self._input_faults.note("wrong_type", told, now)
+                about = f"{name}: {min(kinds).replace('/msg/', '/')}"
+                self._input_faults.note("wrong_type", about, now)
 
 
 def deafness(reader: Endpoint, message: type[Message], offered: Qos) -> str:

@@ -184,7 +184,7 @@ class Passkeys(Rereading):
         if not webauthn.has_passkeys():
             raise PasskeyRefusedError
         challenge = await self._ceremonies.run(webauthn.challenge_in, credential)
-        if not self._challenges.take(challenge, purpose, self._clock().mono):
+        if not self._challenges.redeem(challenge, purpose, self._clock().mono):
             raise PasskeyRefusedError
 
     async def _refreshed(self) -> None:

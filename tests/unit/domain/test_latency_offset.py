@@ -34,7 +34,7 @@ class Talker:
             stamp = round(START.wall + self.now + self.ahead_s, 3)
             heard = (self.now - self.down_s) // 0.1 * 0.1
             composed = START.mono + heard if self.acknowledgements else None
-            yield clock.take(stamp, at(self.now + self.up_s), composed)
+            yield clock.time_message(stamp, at(self.now + self.up_s), composed)
 
 
 def said(talker: Talker, clock: ClockOffset, seconds: float) -> list[float | str]:
@@ -91,7 +91,7 @@ def test_one_stamp_that_is_wrong_is_no_jump() -> None:
     clock, talker = ClockOffset(), Talker()
     said(talker, clock, 5.0)
 
-    wrong = clock.take(START.wall + 999.0, at(5.0), START.mono + 4.95)
+    wrong = clock.time_message(START.wall + 999.0, at(5.0), START.mono + 4.95)
     right = said(talker, clock, 1.0)
 
     assert wrong == "clock_jump"
@@ -158,6 +158,6 @@ def test_no_stamp_whatever_it_says_gives_a_number_below_zero() -> None:
         now += 0.03
         stamp = START.wall + now + chance.choice([0, 0, 0, chance.gauss(0, 1), 3600])
         composed = chance.choice([None, START.mono + now - chance.random()])
-        found.append(clock.take(stamp, at(now), composed))
+        found.append(clock.time_message(stamp, at(now), composed))
 
     assert min(numbers(found)) >= 0.0

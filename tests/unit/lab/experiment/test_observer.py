@@ -20,9 +20,9 @@ async def test_pictures_and_beliefs_are_heard_while_a_scenario_runs() -> None:
             await asyncio.sleep(0.1)
         watched = await hearing
 
-    assert {one.robot_id for one in watched.told} == {"AGI"}
-    assert len(watched.told) >= 3
-    [seen] = watched.told[-1].seen
+    assert {one.robot_id for one in watched.reported} == {"AGI"}
+    assert len(watched.reported) >= 3
+    [seen] = watched.reported[-1].seen
     assert (seen.class_id, seen.x) == ("farmer", 3.0)
     assert watched.beliefs[-1][1](3.0, 0.0) == "nobody"
     assert len(watched.slices) == 1
@@ -33,4 +33,4 @@ async def test_pictures_and_beliefs_are_heard_while_a_scenario_runs() -> None:
 async def test_a_server_that_is_not_there_leaves_nothing_and_ends_in_time() -> None:
     watched = await watch("http://127.0.0.1:9", API_TOKEN, 0.3, "AGII")
 
-    assert (watched.told, watched.beliefs) == ([], [])
+    assert (watched.reported, watched.beliefs) == ([], [])

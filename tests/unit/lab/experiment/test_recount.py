@@ -53,7 +53,7 @@ async def run(directory: Path, step: PlannedRun) -> Any:
     decided: Bins = {"edges_ms": [4.0, 40.0], "counts": [70, 9], "total_ms": 512.3}
     real = ObservedRun(
         told.truth,
-        told.told[7:],
+        told.reported[7:],
         beliefs=told.beliefs,
         decisions=told.decisions,
         completed=step.number == 1,
