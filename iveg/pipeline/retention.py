@@ -220,6 +220,8 @@ class HistoryUpkeep:
         day = int(now.wall // DAY_S)
         if day == self._logged_day:
             return
+        # Where the database fails here the day is logged an hour later, whole.
+        end = await self._history.audit_end()
         fresh = self.counters - self._logged
         self._logged_day, self._logged = day, Counter(self.counters)
         slots = {
@@ -227,7 +229,6 @@ class HistoryUpkeep:
             "unplaced": fresh["history_unplaced"],
         }
         self._event_log.log(LogEvent("system", "log.history_kept", slots), now)
-        end = await self._history.audit_end()
         sealed: dict[str, Slot] = {"rows": end.seq, "hash": end.hash}
         self._event_log.log(LogEvent("system", "log.audit_day", sealed), now)
         _log.info("audit: row %d, hash %s", end.seq, end.hash)

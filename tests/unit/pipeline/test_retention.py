@@ -35,7 +35,7 @@ class FakeHistory:
         due: Rows that a step has left to change; a batch takes ten.
         done: Batches, with the moment before which rows went.
         busy: How many more looks find rows that wait.
-        away: Whether the database does not answer.
+        away: Whether the database does not answer; ``audit_away``: of the audit.
         freed: Batches of room that was given back.
         recordings: Recordings of inputs.
         prepared: Moments at which tables of days were asked for (Unix s).
@@ -48,7 +48,7 @@ class FakeHistory:
         self.space = ROOMY
         self.inside: int | None = 0
         self.busy = self.freed = 0
-        self.away = False
+        self.away = self.audit_away = False
         self.recordings = 0
         self.oldest: float | None = None
         self.prepared: list[float] = []
@@ -67,6 +67,8 @@ class FakeHistory:
         return self.oldest
 
     async def audit_end(self) -> ChainEnd:
+        if self.audit_away:
+            raise HopError("database", "away")
         return ChainEnd(7, "ab" * 32)
 
     async def prepare_days(self, now: float) -> None:
@@ -120,6 +122,11 @@ class Upkeep:
         """What the log says of it."""
         kept = (one for one in self.desk.sink.records if isinstance(one, LogRecord))
         return [dict(one.slots) for one in kept if one.key == "log.history_kept"]
+
+    def keys(self) -> list[str]:
+        """The keys of all lines of the log, in order."""
+        kept = (one for one in self.desk.sink.records if isinstance(one, LogRecord))
+        return [one.key for one in kept]
 
     def alerts(self) -> list[BookedAlert]:
         """What is raised after the loop's next turn."""
@@ -213,6 +220,20 @@ async def test_a_line_a_day_says_what_went() -> None:
 
     assert upkeep.lines()[0] == {"deleted": 7, "unplaced": 0}
     assert upkeep.lines()[1:] == [{"deleted": 0, "unplaced": 0}] * 2
+
+
+async def test_a_day_whose_audit_cannot_be_asked_for_is_logged_an_hour_later() -> None:
+    upkeep = await settled()
+    upkeep.history.audit_away = True
+    with pytest.raises(HopError):
+        await upkeep.look(SETTLES_S)
+    early = upkeep.lines()
+
+    upkeep.history.audit_away = False
+    await upkeep.look(SETTLES_S + PURGE_S)
+
+    assert early == []
+    assert upkeep.keys() == ["log.history_kept", "log.audit_day"]
 
 
 async def test_a_low_disk_is_a_p2_until_it_is_well_again() -> None:
