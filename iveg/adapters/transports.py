@@ -27,10 +27,10 @@ class MqttTransport:
         topic = names.FEEDBACK_TOPIC.format(robot_id=feedback.robot_id)
         self._link.enqueue(topic, self._writer.write(feedback), qos=1)
 
-    def publish_peer_scan(self, told: PeerScan) -> None:
+    def publish_peer_scan(self, scan: PeerScan) -> None:
         """Offer a scan at QoS 0; a newer one overtakes what has not left yet."""
-        topic = names.PEER_SCAN_TOPIC.format(robot_id=told.robot_id)
-        self._link.enqueue(topic, codec.write_peer_scan(told))
+        topic = names.PEER_SCAN_TOPIC.format(robot_id=scan.robot_id)
+        self._link.enqueue(topic, codec.write_peer_scan(scan))
 
     async def stop(self, robot_id: str, hold_id: str, by: str) -> None:
         """Publish a STOP, never retained; returns when the broker has it."""
