@@ -91,9 +91,9 @@ class VirtualPipeline:
         """Keep the feedback."""
         self.feedback.append(feedback)
 
-    def publish_peer_scan(self, told: PeerScan) -> None:
+    def publish_peer_scan(self, scan: PeerScan) -> None:
         """Keep the scan for peers."""
-        self.peer_scans.append(told)
+        self.peer_scans.append(scan)
 
     def enqueue(self, record: Record) -> None:
         """Keep a decision; ignore other records."""
