@@ -118,38 +118,38 @@ class Admission:
         self._store.change(off, "account_disabled", self._by)
         return off
 
-    def vouched(self, known: Mapping[str, Account], told: Account) -> Account:
+    def vouched(self, known: Mapping[str, Account], user: Account) -> Account:
         """Let somebody in whom a provider vouches for, under the name that they had.
 
         Another role ends the sessions of the one before.
 
         Args:
             known: All accounts, by id.
-            told: As the provider says.
+            user: As the provider says.
 
         Raises:
             SignOnError: they are shut out here, or there are too many accounts.
         """
-        account = known.get(told.account_id)
+        account = known.get(user.account_id)
         if account is None:
-            return self._vouched_first(known, told)
+            return self._vouched_first(known, user)
         if not account.is_open(self._now):
             raise SignOnError("disabled", account.account_id)
-        if account.role == told.role:
+        if account.role == user.role:
             return account
-        changed = replace(account, role=told.role, since=self._now)
+        changed = replace(account, role=user.role, since=self._now)
         self._store.change(changed, "account_role", self._by)
         return changed
 
-    def _vouched_first(self, known: Mapping[str, Account], told: Account) -> Account:
+    def _vouched_first(self, known: Mapping[str, Account], user: Account) -> Account:
         if len(known) >= MOST_ACCOUNTS:
             raise SignOnError("busy", f"{MOST_ACCOUNTS} accounts are there already")
         try:
-            self._store.add(told, self._by)
+            self._store.add(user, self._by)
         except NameTakenError:
-            told = replace(told, name=another_name(told.name, told.account_id))
-            self._store.add(told, self._by)
-        return told
+            user = replace(user, name=another_name(user.name, user.account_id))
+            self._store.add(user, self._by)
+        return user
 
     def _invited(self, account: Account, waits_s: float) -> tuple[str, Account]:
         invitation = secrets.token_urlsafe(32)

@@ -20,7 +20,7 @@ class BackfillReader:
         robots: Of the fleet.
         clock: Reads both clocks.
         has_room: Whether a robot may send a batch now.
-        take: Where batches go.
+        accept: Where batches go.
         reject: Where the unreadable is counted.
         recorded: Told of each batch that is read.
     """
@@ -30,11 +30,11 @@ class BackfillReader:
         robots: Iterable[str],
         clock: Callable[[], Instant],
         has_room: Callable[[str, Instant], bool],
-        take: Callable[[Batch, Instant], None],
+        accept: Callable[[Batch, Instant], None],
         reject: Callable[[str, str, str], None],
         recorded: Recorded = lambda *_: None,
     ) -> None:
-        self._clock, self._has_room, self._take = clock, has_room, take
+        self._clock, self._has_room, self._accept = clock, has_room, accept
         self._reject, self._recorded = reject, recorded
         self._robots = {
             names.BACKFILL_TOPIC.format(robot_id=one): one for one in robots
@@ -72,4 +72,4 @@ class BackfillReader:
         self._recorded(topic, payload, at)
         for problem in problems:
             self._reject(problem.source, problem.reason, problem.detail)
-        self._take(batch, at)
+        self._accept(batch, at)

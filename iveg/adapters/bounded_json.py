@@ -37,9 +37,9 @@ class JsonAnswer:
     @property
     def refusal(self) -> str:
         """Status and OAuth error code; a description may hold anything."""
-        told = self.body.get("error")
-        known = isinstance(told, str) and told.isascii() and told.isprintable()
-        return f"{self.status} {str(told)[:40]}" if known else str(self.status)
+        code = self.body.get("error")
+        known = isinstance(code, str) and code.isascii() and code.isprintable()
+        return f"{self.status} {str(code)[:40]}" if known else str(self.status)
 
 
 class BoundedJson:
@@ -119,11 +119,11 @@ class BoundedJson:
 
     def _object(self, status: int, body: bytes) -> Json:
         try:
-            told = orjson.loads(body)
+            document = orjson.loads(body)
         except ValueError:
-            told = None
-        if isinstance(told, dict):
-            return told
+            document = None
+        if isinstance(document, dict):
+            return document
         if 200 <= status < 300:
             raise HopError(self._hop, "answered something that is no JSON object")
         return {}

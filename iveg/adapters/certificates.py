@@ -111,14 +111,14 @@ class CertificateAuthority:
         """Whether it is ours, for these hosts, and good for a while."""
         known = x509.load_pem_x509_certificate(file.read_bytes())
         kind = x509.SubjectAlternativeName
-        told = [one.value for one in known.extensions if isinstance(one.value, kind)]
+        named = [one.value for one in known.extensions if isinstance(one.value, kind)]
         wanted = [_reached_at(hosts)] if hosts else []
         left = known.not_valid_after_utc - self.now
         try:
             known.verify_directly_issued_by(self.certificate)
         except (InvalidSignature, ValueError):
             return False
-        return told == wanted and left > timedelta(days=RENEW_DAYS)
+        return named == wanted and left > timedelta(days=RENEW_DAYS)
 
 
 def write_secret(file: Path, body: bytes) -> None:

@@ -178,7 +178,7 @@ class ConnectionTable:
         self._by_address: dict[str, dict[Connection, None]] = {}
         """Connections of each address; the one that was quiet longest comes first."""
         self._known: OrderedDict[str, float] = OrderedDict()
-        self._told: OrderedDict[tuple[str, str], None] = OrderedDict()
+        self._logged: OrderedDict[tuple[str, str], None] = OrderedDict()
 
     def __len__(self) -> int:
         return sum(map(len, self._by_address.values()))
@@ -245,11 +245,11 @@ class ConnectionTable:
     def refused(self, address: str, reason: str) -> None:
         """Count a refusal; the first of an address and reason is logged."""
         self.counters[f"connections.{reason}"] += 1
-        if reason == "late" or (address, reason) in self._told:
+        if reason == "late" or (address, reason) in self._logged:
             return
-        self._told[address, reason] = None
-        if len(self._told) > _MOST_ADDRESSES:
-            self._told.popitem(last=False)
+        self._logged[address, reason] = None
+        if len(self._logged) > _MOST_ADDRESSES:
+            self._logged.popitem(last=False)
         _log.warning("connections of %s: %s", address or "?", _SENTENCES[reason])
 
     def _put(self, connection: Connection) -> None:

@@ -148,8 +148,8 @@ class Dds(AbstractContextManager["Dds"]):
 
     def reader(self, name: str, message: type[Message], qos: Qos) -> "DdsReader":
         """Subscribe to a topic by its full ROS name."""
-        told = self._told(message, qos)
-        reader = DataReader(self._participant, self._topic(name, message), told)
+        policies = self._policies(message, qos)
+        reader = DataReader(self._participant, self._topic(name, message), policies)
         made = DdsReader(reader)
         self._own.append(made)
         return made
@@ -157,12 +157,12 @@ class Dds(AbstractContextManager["Dds"]):
     def writer(self, name: str, message: type[Message], qos: Qos) -> "DdsWriter":
         """Publish on a topic by its full ROS name."""
         topic = self._topic(name, message)
-        told = self._told(message, qos)
-        made = DdsWriter(DataWriter(self._participant, topic, told), topic)
+        policies = self._policies(message, qos)
+        made = DdsWriter(DataWriter(self._participant, topic, policies), topic)
         self._own.append(made)
         return made
 
-    def _told(self, message: type[Message], qos: Qos) -> DdsQos:
+    def _policies(self, message: type[Message], qos: Qos) -> DdsQos:
         data = Policy.Userdata(user_data(message, self._gate))
         return DdsQos(data, base=write_qos(qos))
 
@@ -392,8 +392,8 @@ def _read_qos(qos: DdsQos) -> Qos:
 
 
 def _read_user_data(qos: DdsQos) -> tuple[str, str]:
-    told = qos[Policy.Userdata]
-    return read_user_data(b"" if told is None else bytes(told.data))
+    policy = qos[Policy.Userdata]
+    return read_user_data(b"" if policy is None else bytes(policy.data))
 
 
 class _Watch:
@@ -416,7 +416,7 @@ class _Watch:
         # Nobody lets go of it: to wait for it is the cheapest rest.
         self._rest = threading.Lock()
         self._rest.acquire()
-        self._told = False
+        self._is_announced = False
         self._thread = threading.Thread(target=self._wait, name="dds", daemon=True)
         self._thread.start()
 
@@ -429,8 +429,8 @@ class _Watch:
         while not self._ended.is_set():
             if not self._waitset.wait(duration(milliseconds=_WAIT_MS)):
                 continue
-            if not self._told:
-                self._told = True
+            if not self._is_announced:
+                self._is_announced = True
                 try:
                     self._loop.call_soon_threadsafe(self._tell)
                 except RuntimeError:  # the loop has closed
@@ -440,6 +440,6 @@ class _Watch:
 
     def _tell(self) -> None:
         # First, so that a sample which on_data just misses is announced again.
-        self._told = False
+        self._is_announced = False
         if not self._ended.is_set():
             self._on_data()

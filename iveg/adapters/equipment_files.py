@@ -126,8 +126,8 @@ class _Tile(Table):
 
     @model_validator(mode="after")
     def _limits_rise(self) -> Self:
-        told = list(self._limits().values())
-        if told != sorted(set(told)):
+        limits = list(self._limits().values())
+        if limits != sorted(set(limits)):
             raise ValueError("low_low, low, high and high_high must rise")
         return self
 

@@ -174,10 +174,10 @@ class FiwareHttp:
         Raises:
             HopError: it is anything else.
         """
-        told = self.read(response)
-        if not isinstance(told, dict):
+        document = self.read(response)
+        if not isinstance(document, dict):
             raise self._meaningless()
-        return told
+        return document
 
     def read_list(self, response: httpx.Response, part: str = "") -> list[Document]:
         """The list of objects in an answer, or in one part of it.
@@ -185,10 +185,10 @@ class FiwareHttp:
         Raises:
             HopError: it is anything else.
         """
-        told = self.read_object(response).get(part) if part else self.read(response)
-        if not isinstance(told, list) or not all(isinstance(one, dict) for one in told):
+        rows = self.read_object(response).get(part) if part else self.read(response)
+        if not isinstance(rows, list) or not all(isinstance(one, dict) for one in rows):
             raise self._meaningless()
-        return told
+        return rows
 
     async def read_all(
         self, path: str, query: Mapping[str, str] = _COUNTED, part: str = ""
@@ -207,10 +207,10 @@ class FiwareHttp:
         for _ in range(_MOST_PAGES):
             page = {**query, "limit": str(PAGE_SIZE), "offset": str(len(found))}
             response = await self.ask("GET", path, query=page)
-            told = self.read_list(response, part)
-            found += told
+            rows = self.read_list(response, part)
+            found += rows
             total = self._total(response, of_agent=bool(part))
-            if not told or len(found) >= total:
+            if not rows or len(found) >= total:
                 break
         return found
 
@@ -231,12 +231,12 @@ def _complaint(method: str, path: str, response: httpx.Response) -> str:
     """The reason of a refusal, short; each neighbour uses another word."""
     said = ""
     try:
-        told = orjson.loads(response.content)
+        body = orjson.loads(response.content)
     except ValueError:
-        told = None
-    if isinstance(told, dict):
+        body = None
+    if isinstance(body, dict):
         # ``detail`` is a PEP proxy's.
         words = ("description", "message", "detail")
-        said = next((str(told[one]) for one in words if told.get(one)), "")[:160]
+        said = next((str(body[one]) for one in words if body.get(one)), "")[:160]
     refused = f"{response.status_code} to {method} {path}"
     return f"{refused}: {said}" if said else refused

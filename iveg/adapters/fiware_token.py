@@ -185,8 +185,8 @@ class FiwareToken:
             return
         if self._error is None:
             _log.warning("no bearer for Orion and the agent: %s", error)
-        told = error if isinstance(error, HopError) else HopError(HOP, repr(error))
-        self._error, self._again_at = told, self._mono() + self._pause_s
+        failure = error if isinstance(error, HopError) else HopError(HOP, repr(error))
+        self._error, self._again_at = failure, self._mono() + self._pause_s
         self._pause_s = min(LONGEST_PAUSE_S, 2 * self._pause_s)
 
     async def _fetch(self) -> HeldToken:
@@ -214,9 +214,9 @@ def _is_token(text: str) -> bool:
 
 
 def _life_of(answer: TokenAnswer) -> float:
-    told = answer.body.get("expires_in")
-    if isinstance(told, str) and told.isdigit():
-        told = int(told[:9])
-    if not isinstance(told, int | float) or isinstance(told, bool) or not told > 0:
+    life = answer.body.get("expires_in")
+    if isinstance(life, str) and life.isdigit():
+        life = int(life[:9])
+    if not isinstance(life, int | float) or isinstance(life, bool) or not life > 0:
         return _UNTOLD_S
-    return min(float(told), _MOST_S)
+    return min(float(life), _MOST_S)

@@ -163,9 +163,9 @@ async def redeem(
     return answer.body
 
 
-def text_of(told: Mapping[str, object], name: str) -> str:
+def text_of(answer: Mapping[str, object], name: str) -> str:
     """A text that an answer must hold. Raises SignOnError."""
-    value = told.get(name)
+    value = answer.get(name)
     if not isinstance(value, str) or not value:
         raise SignOnError("untrusted", f"no {name} was told")
     return value

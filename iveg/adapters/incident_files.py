@@ -69,8 +69,8 @@ def write_pack(
                 found.append((name, _add(pack, name, stream)))
         files = chained(found)
         end = files[-1].chain if files else ""
-        told = {"format": _FORMAT, **facts, "files": [asdict(one) for one in files]}
-        text = orjson.dumps({**told, "chain": end}, option=orjson.OPT_INDENT_2)
+        manifest = {"format": _FORMAT, **facts, "files": [asdict(one) for one in files]}
+        text = orjson.dumps({**manifest, "chain": end}, option=orjson.OPT_INDENT_2)
         _add(pack, MANIFEST, BytesIO(text))
     return end
 
@@ -111,10 +111,10 @@ def _manifest(path: Path, pack: zipfile.ZipFile) -> tuple[tuple[PackedFile, ...]
     reason = "is no incident pack: it has no manifest of this format."
     try:
         with pack.open(MANIFEST) as stream:
-            told = orjson.loads(stream.read(_LARGEST_MANIFEST))
-        if told["format"] != _FORMAT:
+            manifest = orjson.loads(stream.read(_LARGEST_MANIFEST))
+        if manifest["format"] != _FORMAT:
             raise DataFileError(str(path), MANIFEST, reason)
-        return _PACKED.validate_python(told["files"]), str(told["chain"])
+        return _PACKED.validate_python(manifest["files"]), str(manifest["chain"])
     except (KeyError, TypeError, ValueError, ValidationError) as error:
         raise DataFileError(str(path), MANIFEST, reason) from error
 

@@ -32,8 +32,7 @@ class IotAgentClient(FiwareHttp):
             HopError: the agent does not answer.
         """
         response = await self.ask("GET", "/iot/about", timeout_s=PROBE_TIMEOUT_S)
-        told = self.read_object(response)
-        return str(told.get("version", "unknown"))
+        return str(self.read_object(response).get("version", "unknown"))
 
     async def read_groups(self) -> list[Document]:
         """The groups of our tenant.
@@ -150,8 +149,8 @@ async def _ensure_group(
         (one for one in await agent.read_groups() if one.get("apikey") == apikey), {}
     )
     # The agent never shows the address of its broker, so it is always sent again.
-    told = ("entity_type", "cbroker", "autoprovision")
-    await agent.change_group(apikey, {name: wanted[name] for name in told})
+    sent = ("entity_type", "cbroker", "autoprovision")
+    await agent.change_group(apikey, {name: wanted[name] for name in sent})
     if known.get("entity_type") == names.ROBOT_TYPE:
         return []
     return [f"Corrected the entity type of the group of API key {apikey}."]

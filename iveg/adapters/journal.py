@@ -172,13 +172,13 @@ class _Memory:
     def read_line(self, entry: Json, by: str, *, stopped: bool) -> None:
         """Read one line more."""
         # A line of the earlier version does not say what a release has named.
-        told = entry.get("named")
-        hold_id = None if told is None else entry["hold_id"]
+        named = entry.get("named")
+        hold_id = None if named is None else entry["hold_id"]
         self._by, self._at = by, entry.get("at", 0.0)
-        if told:
-            self._asked, self._challenge = tuple(told), entry["ch"]
-            fresh = tuple(one for one in self._named if one not in told)
-            self._named = (*fresh, *told)[-_NAMED_KEPT:]
+        if named:
+            self._asked, self._challenge = tuple(named), entry["ch"]
+            fresh = tuple(one for one in self._named if one not in named)
+            self._named = (*fresh, *named)[-_NAMED_KEPT:]
         if not stopped:
             self.wanted, self._asked, self._challenge = None, (), None
             return

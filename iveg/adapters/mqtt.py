@@ -187,7 +187,7 @@ class MqttLink:
             timeout=_ANSWERED_WITHIN_S,
             tls_context=address.context(),
             socket_options=NODELAY,
-            take=self._take,
+            on_arrived=self._hand_over,
             apart_s=self._apart_s,
         ) as client:
             self._early.clear()
@@ -233,7 +233,7 @@ class MqttLink:
             return False
         return True
 
-    def _take(self, arrived: Arrived) -> None:
+    def _hand_over(self, arrived: Arrived) -> None:
         """A mistake of ours in here must end ``run``, and not the connection alone."""
         try:
             for topic, count in arrived.passed_over.items():

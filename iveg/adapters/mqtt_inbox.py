@@ -65,7 +65,7 @@ class Arrived:
     others: bytes = b""
 
 
-Take = Callable[[Arrived], None]
+OnArrived = Callable[[Arrived], None]
 
 
 class InboxClient(aiomqtt.Client):
@@ -75,15 +75,15 @@ class InboxClient(aiomqtt.Client):
     reading one of them: what comes within ``apart_s`` is read together.
 
     Args:
-        take: Told what has come.  It speaks MQTT 3.1.1.
+        on_arrived: Told what has come.  It speaks MQTT 3.1.1.
         apart_s: Least time between two readings (s); 0: whenever something comes.
     """
 
     def __init__(
-        self, *args: Any, take: Take, apart_s: float = 0.0, **kwargs: Any
+        self, *args: Any, on_arrived: OnArrived, apart_s: float = 0.0, **kwargs: Any
     ) -> None:
         super().__init__(*args, protocol=aiomqtt.ProtocolVersion.V311, **kwargs)
-        self._take = take
+        self._on_arrived = on_arrived
         self._apart_s = apart_s
         # Who waits for the end hears why; where nobody does, nobody is missing it.
         self._disconnected.add_done_callback(_retrieve)
@@ -99,7 +99,7 @@ class InboxClient(aiomqtt.Client):
 
     def _on_socket_open(self, client: paho.Client, userdata: object, sock: Any) -> None:
         # Paho reads from this; it has no public way to say which socket.
-        line = client._sock = ReadAhead(sock, self._take)
+        line = client._sock = ReadAhead(sock, self._on_arrived)
         super()._on_socket_open(client, userdata, line)
         # In place of the reader that has just been asked for, from the same thread.
         self._loop.call_soon_threadsafe(self._listen, line)
@@ -144,9 +144,9 @@ class ReadAhead:
     One only, so that a flood from the broker leaves the loop its other work.
     """
 
-    def __init__(self, inner: socket.socket, take: Take) -> None:
+    def __init__(self, inner: socket.socket, on_arrived: OnArrived) -> None:
         self._inner = inner
-        self._tell = take
+        self._tell = on_arrived
         self._begun = b""
         """Of a packet that is not whole yet."""
         self._held = memoryview(b"")

@@ -13,7 +13,7 @@ from typing import Any
 
 import aiomqtt
 
-from iveg.adapters.mqtt_inbox import Arrived, InboxClient, Take
+from iveg.adapters.mqtt_inbox import Arrived, InboxClient, OnArrived
 from iveg.adapters.mqtt_packets import puback_packet, publish_packet
 
 _UNTOLD = 0
@@ -37,12 +37,12 @@ class OutboxClient(InboxClient):
     """A client with a short way out, which waits only for a full socket.
 
     Args:
-        take: Told what has come; messages at QoS 1 are acknowledged afterwards.
+        on_arrived: Told what has come; messages at QoS 1 are acknowledged afterwards.
     """
 
-    def __init__(self, *args: object, take: Take, **kwargs: Any) -> None:
-        super().__init__(*args, take=self._take_in, **kwargs)
-        self._hand_over = take
+    def __init__(self, *args: object, on_arrived: OnArrived, **kwargs: Any) -> None:
+        super().__init__(*args, on_arrived=self._take_in, **kwargs)
+        self._hand_over = on_arrived
         self._awaited: dict[int, _Batch] = {}
         self._number = 0
         self._sending = False

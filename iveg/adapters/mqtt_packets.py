@@ -28,11 +28,11 @@ def publish_packet(
 ) -> bytes:
     """A PUBLISH (section 3.3): at QoS 1 if it has a packet identifier, else at 0."""
     name = topic.encode()
-    told = b"" if packet_id is None else packet_id.to_bytes(2)
-    kind = PUBLISH | (QOS_1 if told else 0) | (RETAINED if retain else 0)
-    size = 2 + len(name) + len(told) + len(payload)
+    number = b"" if packet_id is None else packet_id.to_bytes(2)
+    kind = PUBLISH | (QOS_1 if number else 0) | (RETAINED if retain else 0)
+    size = 2 + len(name) + len(number) + len(payload)
     head = bytes((kind,)), remaining_length(size), len(name).to_bytes(2)
-    return b"".join((*head, name, told, payload))
+    return b"".join((*head, name, number, payload))
 
 
 def puback_packet(packet_id: bytes) -> bytes:

@@ -81,10 +81,10 @@ class OpenIdProvider:
         """Exchange the code, and verify what comes for it."""
         about = await self._discover()
         url = about["token_endpoint"]
-        told = await redeem(self._http, self.client, url, attempt, code)
-        token = text_of(told, "id_token")
-        claims = await self._verified(token, attempt.nonce, told.get("access_token"))
-        user = await self._user_info(about, told, claims)
+        answer = await redeem(self._http, self.client, url, attempt, code)
+        token = text_of(answer, "id_token")
+        claims = await self._verified(token, attempt.nonce, answer.get("access_token"))
+        user = await self._user_info(about, answer, claims)
         # What is signed comes last, and wins.
         return Vouched(text_of(claims, "sub"), {**user, **claims}, token)
 
@@ -183,16 +183,16 @@ def _checked(about: Json, issuer: str) -> Json:
         raise HopError(HOP, "says that it is another issuer")
     needed = ("authorization_endpoint", "token_endpoint", "jwks_uri")
     for name in (*needed, "userinfo_endpoint", "end_session_endpoint"):
-        told = about.get(name)
-        if told is None and name not in needed:
+        address = about.get(name)
+        if address is None and name not in needed:
             continue
-        if not isinstance(told, str) or not is_safe_address(told):
+        if not isinstance(address, str) or not is_safe_address(address):
             raise HopError(HOP, f"its {name} cannot be used")
     return about
 
 
-def _keys_of(told: Json) -> list[_Key]:
-    keys = told.get("keys")
+def _keys_of(key_set: Json) -> list[_Key]:
+    keys = key_set.get("keys")
     if not isinstance(keys, list) or len(keys) > _MOST_KEYS:
         raise HopError(HOP, "its keys cannot be used")
     return [one for one in keys if isinstance(one, dict) and _is_usable(one)]

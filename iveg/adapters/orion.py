@@ -45,8 +45,8 @@ class OrionClient(FiwareHttp):
         Raises:
             HopError: Orion does not answer.
         """
-        told = self.read(await self.ask("GET", "/version"))
-        about = told.get("orion", {}) if isinstance(told, dict) else {}
+        answer = self.read(await self.ask("GET", "/version"))
+        about = answer.get("orion", {}) if isinstance(answer, dict) else {}
         return str(about.get("version", "unknown"))
 
     async def update_command(
@@ -132,12 +132,12 @@ class OrionClient(FiwareHttp):
             },
             timeout_s=PROBE_TIMEOUT_S,
         )
-        told = self.read_object(response)
+        entity = self.read_object(response)
         try:
-            left = datetime.fromisoformat(told["probe"]["value"]["stamp"])
+            left = datetime.fromisoformat(entity["probe"]["value"]["stamp"])
         except (KeyError, TypeError, ValueError) as error:
             raise HopError("orion", "has no probe of iVeg's") from error
-        came = _date_modified(told, "probe")
+        came = _date_modified(entity, "probe")
         if came is None:
             raise HopError("orion", "does not tell when the probe came")
         return left.timestamp(), came
@@ -219,8 +219,8 @@ class OrionClient(FiwareHttp):
         response = await self.ask(
             "GET", path, query=query, timeout_s=timeout_s, also=(404,)
         )
-        told = self.read_object(response)
-        return None if response.status_code == 404 else told
+        entity = self.read_object(response)
+        return None if response.status_code == 404 else entity
 
     # --- subscriptions and registrations ------------------------------------------
 

@@ -122,10 +122,10 @@ class _Sink(io.RawIOBase):
         return self._size
 
     def write(self, piece: Buffer) -> int:
-        told = bytes(piece)
-        self._pieces.append(told)
-        self._size += len(told)
-        return len(told)
+        content = bytes(piece)
+        self._pieces.append(content)
+        self._size += len(content)
+        return len(content)
 
     def drain(self) -> bytes:
         """What came since the last time."""

@@ -111,10 +111,10 @@ def _with_settings(
 ) -> list[DetectionRule]:
     """The versions, and one more where the settings are others than last time."""
     last = versions[-1]
-    told = [
+    earlier = [
         (rule.threshold, rule.radius_m) for rule in versions if rule.author == _SETTINGS
     ]
-    if told[-1:] == [(settings.threshold, settings.radius_m)]:
+    if earlier[-1:] == [(settings.threshold, settings.radius_m)]:
         return versions
     changed = replace(
         last,
@@ -174,9 +174,9 @@ class StoredRule(BaseModel):
 
 def _first(error: ValidationError) -> str:
     """The first complaint, in a few words."""
-    told = error.errors(include_url=False)[0]
-    place = ".".join(str(part) for part in told["loc"])
-    return f"{place}: {told['msg']}" if place else told["msg"]
+    complaint = error.errors(include_url=False)[0]
+    place = ".".join(str(part) for part in complaint["loc"])
+    return f"{place}: {complaint['msg']}" if place else complaint["msg"]
 
 
 def rule_fields(rule: DetectionRule) -> dict[str, object]:

@@ -94,8 +94,8 @@ def challenge_in(credential: Credential) -> bytes:
         from webauthn import base64url_to_bytes
         from webauthn.helpers import parse_client_data_json
 
-        told = base64url_to_bytes(credential["response"]["clientDataJSON"])
-        challenge: bytes = parse_client_data_json(told).challenge
+        client_data = base64url_to_bytes(credential["response"]["clientDataJSON"])
+        challenge: bytes = parse_client_data_json(client_data).challenge
     except Exception as error:
         raise PasskeyRefusedError from error
     return challenge

@@ -65,9 +65,9 @@ _NOT_HASHED = topics.LOG, topics.HEALTH, topics.MAP
 def picture(views: StateReader, now: Instant) -> bytes:
     """The world as it is hashed: what a page is shown, but of the server itself."""
     rows = (row for row in topics.TOPICS if row not in _NOT_HASHED)
-    told = write_json({row.member: row.read(views, now) for row in rows if row.read})
+    body = write_json({row.member: row.read(views, now) for row in rows if row.read})
     # Some parts keep things in sets, which are in no order.
-    return orjson.dumps(orjson.loads(told), option=orjson.OPT_SORT_KEYS)
+    return orjson.dumps(orjson.loads(body), option=orjson.OPT_SORT_KEYS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -235,16 +235,16 @@ class Past:
         self._take_over(orjson.loads(found.message.payload))
         self._place, self._at_ns = found.behind, found.message.log_time
 
-    def _take_over(self, told: dict[str, Any]) -> None:
-        version = told.get("version")
+    def _take_over(self, record: dict[str, Any]) -> None:
+        version = record.get("version")
         if version != __version__:
             raise UnreadableError("other_version", f"recorded by iVeg {version}")
         self._waiting.messages.clear()
         # The one before would wait for the moments that it has heard to come again.
         self._reader = self._new_reader()
-        self._memory.read(b64decode(told["memory"]))
-        self._ids.seed, self._ids.count = bytes.fromhex(told["seed"]), told["ids"]
-        self._pass_to(Instant(told["mono"] / _NS, told["wall"]))
+        self._memory.read(b64decode(record["memory"]))
+        self._ids.seed, self._ids.count = bytes.fromhex(record["seed"]), record["ids"]
+        self._pass_to(Instant(record["mono"] / _NS, record["wall"]))
         self.agreement.newest = None
 
     def _play(self, at: int) -> None:
@@ -253,23 +253,23 @@ class Past:
             message = found.message
             if message.topic in (STEPS, MEMORY) and message.log_time > at:
                 return
-            self._take(found, compares=at - message.log_time < _COMPARED_NS)
+            self._play_message(found, compares=at - message.log_time < _COMPARED_NS)
             self._place = found.behind
             if message.topic == STEPS:
                 self._at_ns = message.log_time
 
-    def _take(self, found: Found, *, compares: bool) -> None:
+    def _play_message(self, found: Found, *, compares: bool) -> None:
         topic, log_time, payload = found.message
         if topic == STEPS:
-            told = orjson.loads(payload)
-            self._repeat(told)
-            if compares and "hash" in told:
+            tick = orjson.loads(payload)
+            self._repeat(tick)
+            if compares and "hash" in tick:
                 now = digest(picture(self.views, self.now))
-                self.agreement.note(told["hash"] == now)
+                self.agreement.note(tick["hash"] == now)
         elif topic == MEMORY:
-            told = orjson.loads(payload)
-            if told["by_hand"] or self.agreement.newest is False:
-                self._take_over(told)
+            memory = orjson.loads(payload)
+            if memory["by_hand"] or self.agreement.newest is False:
+                self._take_over(memory)
         elif topic == NOTIFICATIONS.topic or topic in self._heard:
             mono = in_ns(found.file.instant(log_time).mono)
             self._waiting.messages.append((mono, topic, payload))
@@ -282,14 +282,14 @@ class Past:
 
     # --- what the loop did --------------------------------------------------------
 
-    def _repeat(self, told: dict[str, Any]) -> None:
+    def _repeat(self, tick: dict[str, Any]) -> None:
         """The steps of one tick."""
-        tick_mono, tick_wall = told["mono"], told["wall"]
+        tick_mono, tick_wall = tick["mono"], tick["wall"]
         arrived = {
             tick_mono + mono: (tick_wall + wall / WALL_UNITS, bool(thinned))
-            for mono, wall, thinned in told["arrived"]
+            for mono, wall, thinned in tick["arrived"]
         }
-        for mono, wall, kind in told["steps"]:
+        for mono, wall, kind in tick["steps"]:
             moment = Instant((tick_mono + mono) / _NS, tick_wall + wall / WALL_UNITS)
             if kind == LOOK:
                 self._pass_to(moment)
@@ -305,7 +305,7 @@ class Past:
                 self.parts.ingest.drain(), moment, judges=kind == JUDGED
             )
         # A press that joined a STOP has drawn one, and was no input.
-        self._ids.count = told["ids"]
+        self._ids.count = tick["ids"]
 
     def _hear(self, at: Instant, topic: str, payload: bytes) -> None:
         self._heard_at = at

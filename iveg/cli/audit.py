@@ -32,7 +32,7 @@ def run_audit(options: argparse.Namespace, settings: Settings, data: Path) -> in
         return 0
     found = read_history(url, lambda connection: list(faults(connection)))
     for fault in found[:_MOST_TOLD]:
-        print(_told(fault))
+        print(_sentence(fault))
     if found:
         print(f"{len(found)} fault(s): the audit is not as it was written.")
         return 1
@@ -42,5 +42,5 @@ def run_audit(options: argparse.Namespace, settings: Settings, data: Path) -> in
     return 0
 
 
-def _told(fault: AuditFault) -> str:
+def _sentence(fault: AuditFault) -> str:
     return f"Row {fault.seq} {_SAYS[fault.what]}."

@@ -44,7 +44,7 @@ def run_db(options: argparse.Namespace, settings: Settings, data: Path) -> int:
         return 0
     check_database(url)
     if options.action == "stats":
-        print(*_told(read_history(url, read_stats)), sep="\n")
+        print(*_lines(read_history(url, read_stats)), sep="\n")
     elif options.action == "purge":
         asyncio.run(_purge(url, settings.retention, dry_run=options.dry_run))
     else:
@@ -101,7 +101,7 @@ def read_history(url: str, question: Callable[[Connection], _T]) -> _T:
         engine.dispose()
 
 
-def _told(stats: HistoryStats) -> Iterable[str]:
+def _lines(stats: HistoryStats) -> Iterable[str]:
     rows = [_HEAD, *(_row(one) for one in stats.tables), _total(stats)]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for first, *others in rows:

@@ -162,13 +162,13 @@ class Examination:
                     (Check.PAGE, look_at_page),
                 ):
                     tasks.create_task(self._try(check, step), name=check.name)
-            told = await self._ask_iveg()
-            if told is None or told.lag_s < self._patience_s:
+            lag = await self._ask_iveg()
+            if lag is None or lag.lag_s < self._patience_s:
                 await self._use_the_agent()
             else:
-                self.lag = told
+                self.lag = lag
                 self.findings[Check.MEASURE] = Finding(
-                    Check.MEASURE, told.lag_s, "nothing was added to it"
+                    Check.MEASURE, lag.lag_s, "nothing was added to it"
                 )
             await self._try(Check.NOTIFICATION, self._be_notified)
             await self._try(Check.DIRECT, self._command_straight)

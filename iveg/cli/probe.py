@@ -122,10 +122,10 @@ class Probe:
         """
         for one in await self._orion.read_subscriptions():
             if one.get("id") == subscription_id:
-                told = one.get("notification", {})
-                if told.get("lastFailureReason"):
-                    return str(told["lastFailureReason"])
-                if told.get("lastSuccess"):
+                notification = one.get("notification", {})
+                if notification.get("lastFailureReason"):
+                    return str(notification["lastFailureReason"])
+                if notification.get("lastSuccess"):
                     return "Orion believes that it did; somebody else answers there"
         return ""
 

@@ -59,7 +59,7 @@ def _act(options: argparse.Namespace, settings: Settings, rows: AccountRows) -> 
     now = clock.wall()
     admission = Admission(rows, CONSOLE, now)
     if options.action == "list":
-        return "\n".join(_told(rows.read().values()))
+        return "\n".join(_lines(rows.read().values()))
     if options.action == "add":
         made = (options.name, options.role, _end(options, now))
         return _invited(settings, admission.add(*made)[0])
@@ -113,7 +113,7 @@ def _invited(settings: Settings, invitation: str) -> str:
     return f"Their link, which works once and for 3 days:\n{link}"
 
 
-def _told(accounts: Iterable[Account]) -> Iterable[str]:
+def _lines(accounts: Iterable[Account]) -> Iterable[str]:
     now = clock.wall()
     for one in sorted(accounts, key=lambda account: name_key(account.name)):
         yield f"{one.name}  {one.role}  {_state(one, now)}"

@@ -55,7 +55,7 @@ class Occurrence(Model):
             acknowledged_at=stamp(one.get("acknowledged_at")),
             acknowledged_by=one.get("acknowledged_by"),
             note=one.get("note") or None,
-            told=[Told.of_record(told) for told in one.get("told", ())],
+            told=[Told.of_record(row) for row in one.get("told", ())],
         )
 
 

@@ -77,7 +77,7 @@ class Column:
 
     name: str
     type: ColumnType
-    told: Meaning
+    meaning: Meaning
     read: Callable[[Record], object]
 
 
@@ -208,8 +208,8 @@ def _columns(name: str, kind: type[Record]) -> Iterator[Column]:
     for column, read in readers_of(kind):
         hint = hints.get(column, float | None)
         shown = column.rstrip("_")
-        told = MEANINGS_APART.get((name, shown)) or MEANINGS[shown]
-        yield Column(shown, _type_of(shown, hint), told, read)
+        meaning = MEANINGS_APART.get((name, shown)) or MEANINGS[shown]
+        yield Column(shown, _type_of(shown, hint), meaning, read)
 
 
 def readers_of(kind: type[Any]) -> Iterator[tuple[str, Callable[[Any], object]]]:
@@ -255,7 +255,9 @@ class DictionaryColumn(Model):
 def dictionary_columns() -> list[DictionaryColumn]:
     """All columns of all lists."""
     return [
-        DictionaryColumn(list=name, column=one.name, type=one.type, **asdict(one.told))
+        DictionaryColumn(
+            list=name, column=one.name, type=one.type, **asdict(one.meaning)
+        )
         for name in LISTS
         for one in columns_of(name)
     ]
@@ -272,9 +274,9 @@ def describe() -> str:
             "|---|---|---|---|---|---|---|",
         ]
         for one in columns_of(name):
-            told = one.told
-            cells = (f"`{one.name}`", one.type, told.unit, told.frame, told.clock)
-            lines.append(f"| {' | '.join((*cells, told.means, told.joins))} |")
+            meant = one.meaning
+            cells = (f"`{one.name}`", one.type, meant.unit, meant.frame, meant.clock)
+            lines.append(f"| {' | '.join((*cells, meant.means, meant.joins))} |")
         lines.append("")
     return "\n".join(lines)
 

@@ -85,14 +85,14 @@ class Messages(Model):
         counts: Mapping[str, int],
     ) -> "Messages":
         """As it stands."""
-        told = {
+        sent = {
             channel: [Told.of(one) for one in last.get(channel, ())]
             for channel in messages.CHANNELS
         }
         return cls(
-            push=_push(contacts.push, public_key, told["push"]),
-            email=_email(contacts.email, told["email"]),
-            webhook=_webhook(contacts.webhook, told["webhook"]),
+            push=_push(contacts.push, public_key, sent["push"]),
+            email=_email(contacts.email, sent["email"]),
+            webhook=_webhook(contacts.webhook, sent["webhook"]),
             counts={
                 name.removeprefix("messages."): n for name, n in sorted(counts.items())
             },

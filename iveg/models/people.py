@@ -158,10 +158,10 @@ class DetectionRow(KeptDetection):
     @classmethod
     def of_row(cls, record: DetectionRecord) -> "DetectionRow":
         """One detection as it is remembered."""
-        told = dict(KeptDetection.of_record(record))
+        kept = dict(KeptDetection.of_record(record))
         at = format_stamp(record.at)
         x, y, z = record.x, record.y, record.z
-        return cls(**told, at=at, x=x, y=y, z=z, late=record.late)
+        return cls(**kept, at=at, x=x, y=y, z=z, late=record.late)
 
 
 class Detection(KeptDetection):

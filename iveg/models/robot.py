@@ -205,9 +205,9 @@ class RobotAccess(Model):
     broker: BrokerTold = Field(description="What came of asking the broker.")
 
     @classmethod
-    def of(cls, robot: RobotState, told: BrokerTold) -> "RobotAccess":
+    def of(cls, robot: RobotState, broker: BrokerTold) -> "RobotAccess":
         """Of one robot."""
-        return cls(robot_id=robot.robot_id, revoked=Revoked.of(robot), broker=told)
+        return cls(robot_id=robot.robot_id, revoked=Revoked.of(robot), broker=broker)
 
 
 class SensorReading(Model):

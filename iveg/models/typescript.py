@@ -118,8 +118,8 @@ def _members(schema: _Schema) -> Iterator[str]:
 
 
 def _comment(schema: _Schema, indent: str) -> str:
-    told = schema.get("description", "").split("\n\n")[0].replace("\n", " ")
-    return f"{indent}/** {told} */\n" if told else ""
+    text = schema.get("description", "").split("\n\n")[0].replace("\n", " ")
+    return f"{indent}/** {text} */\n" if text else ""
 
 
 def _type(schema: _Schema) -> str:

@@ -96,8 +96,8 @@ class Face:
         commander = self.pipeline.commander
         targets = commander.machines if robot_id is None else [robot_id]
         await commander.stop(targets, who.name, self.clock(), press)
-        told = {"press_id": press.press_id, "socket": True}
-        self.trail.note(who, "stop", robot_id or "", told, at=self.clock())
+        details = {"press_id": press.press_id, "socket": True}
+        self.trail.note(who, "stop", robot_id or "", details, at=self.clock())
 
 
 def live_routers(face: Face) -> Iterator[APIRouter]:

@@ -73,8 +73,8 @@ class NotificationHttp(HttpToolsProtocol):
             response = problem.response()
             status, body = response.status_code, bytes(response.body)
             headers = [*headers, *response.raw_headers]
-        told = [STATUS_LINE[status]]
+        parts = [STATUS_LINE[status]]
         for name, value in headers:
-            told += (name, b": ", value, b"\r\n")
-        told += (b"\r\n", body)
-        self.transport.write(b"".join(told))
+            parts += (name, b": ", value, b"\r\n")
+        parts += (b"\r\n", body)
+        self.transport.write(b"".join(parts))

@@ -160,8 +160,8 @@ class NotificationEndpoint:
         self._recorded(body, at, reading.observations)
         for problem in reading.problems:
             self._ingest.reject(problem.source, problem.reason, problem.detail)
-        for told in reading.equipment:
-            self._measured(told, at)
+        for entity in reading.equipment:
+            self._measured(entity, at)
         thinned = self._is_thinned(subscription_id)
         for observation in reading.observations:
             self._ingest.enqueue(Received(observation, at, FIWARE.id, thinned=thinned))

@@ -193,11 +193,11 @@ def problem_of(error: Exception) -> Problem:
 
 def _refused_pin(error: PinRefusedError) -> Problem:
     wait_s = math.ceil(error.wait_s)
-    told = {"blocked_s": wait_s}
+    members = {"blocked_s": wait_s}
     if error.left is None:
         wait = {"Retry-After": str(wait_s)}
-        return Problem(429, str(error), "pin-blocked", told, wait)
-    return Problem(403, str(error), "pin-wrong", {**told, "left": error.left})
+        return Problem(429, str(error), "pin-blocked", members, wait)
+    return Problem(403, str(error), "pin-wrong", {**members, "left": error.left})
 
 
 _REFUSED: Mapping[type[IvegError], str] = {

@@ -64,9 +64,9 @@ def declared_actions(app: FastAPI) -> dict[tuple[str, str], Action]:
 
 
 def _tell_refusals(operation: dict[str, Any], method: str, action: Action) -> None:
-    told = operation["responses"]
-    told |= {str(one): _refusal(one) for one in _refused(operation, method, action)}
-    operation["responses"] = dict(sorted(told.items()))
+    answers = operation["responses"]
+    answers |= {str(one): _refusal(one) for one in _refused(operation, method, action)}
+    operation["responses"] = dict(sorted(answers.items()))
 
 
 def _refused(

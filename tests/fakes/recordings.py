@@ -40,7 +40,7 @@ class WriterInPlace:
         """Write what waits; ``now`` is monotonic (s)."""
         for piece in recorder.take_waiting():
             for came in self._unpacking.feed(piece):
-                self.writer.take(came)
+                self.writer.write_input(came)
         self.writer.keep_house(now)
 
 

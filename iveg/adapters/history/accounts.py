@@ -34,8 +34,8 @@ class AccountRows:
         Raises:
             NameTakenError: somebody is called so already.
         """
-        told = {"role": account.role, "ends_at": account.ends_at}
-        add_row(self._connection, accounts, account, by, "account_added", told)
+        details = {"role": account.role, "ends_at": account.ends_at}
+        add_row(self._connection, accounts, account, by, "account_added", details)
 
     def change(self, account: Account, action: str, by: Actor) -> None:
         """Put a new state of an account in the place of the one before."""

@@ -23,8 +23,8 @@ class ApiTokenStore(NamedRows[ApiToken]):
         Raises:
             NameTakenError: a program is called so already.
         """
-        told = {"scope": token.scope, "ends_at": token.ends_at}
-        self._add(token, by, "token_added", told)
+        details = {"scope": token.scope, "ends_at": token.ends_at}
+        self._add(token, by, "token_added", details)
 
     def revoke(self, name: str, by: Actor) -> None:
         """Delete a token.

@@ -61,19 +61,21 @@ class KeyedRows(Generic[R]):
 class NamedRows(KeyedRows[R]):
     """Adds rows, too, of which no two share a ``name_key``."""
 
-    def _add(self, row: R, by: Actor, action: str, told: Json) -> None:
+    def _add(self, row: R, by: Actor, action: str, details: Json) -> None:
         """Keep a new row.
 
         Raises:
             NameTakenError: one is called so already.
         """
         self._store.run(
-            lambda connection: add_row(connection, self._table, row, by, action, told)
+            lambda connection: add_row(
+                connection, self._table, row, by, action, details
+            )
         )
 
 
 def add_row(
-    connection: Connection, table: Table, row: R, by: Actor, action: str, told: Json
+    connection: Connection, table: Table, row: R, by: Actor, action: str, details: Json
 ) -> None:
     """Keep a new row, with that of the audit.
 
@@ -86,13 +88,13 @@ def add_row(
             connection.execute(insert(table).values(**values))
     except IntegrityError as error:
         raise NameTakenError(row.name) from error
-    note_change(connection, by, action, row.name, told)
+    note_change(connection, by, action, row.name, details)
 
 
 def note_change(
-    connection: Connection, by: Actor, action: str, name: str, told: Json
+    connection: Connection, by: Actor, action: str, name: str, details: Json
 ) -> None:
     """Write a change of somebody's rights into the audit, in the same transaction."""
     now = clock.wall()
-    act = act_of(by, action, name, told, audit_id=new_id(), at=now)
+    act = act_of(by, action, name, details, audit_id=new_id(), at=now)
     write_audit(connection, [act], now)

@@ -31,8 +31,8 @@ class PasskeyStore(KeyedRows[Passkey]):
             if connection.execute(known).first() is not None:
                 return False
             connection.execute(insert(passkeys).values(**asdict(passkey)))
-            told = {"rp_id": passkey.rp_id}
-            note_change(connection, by, "passkey_added", passkey.name, told)
+            details = {"rp_id": passkey.rp_id}
+            note_change(connection, by, "passkey_added", passkey.name, details)
             return True
 
         if not self._store.run(work):

@@ -37,9 +37,9 @@ def _poses(connection: Connection, robot: str, since: float, until: float) -> Po
         .order_by(c.at)
     )
     # A day has a million: rows of the library would double the time.
-    told = str(wanted.compile(connection, compile_kwargs={"literal_binds": True}))
+    sql = str(wanted.compile(connection, compile_kwargs={"literal_binds": True}))
     cursor = connection.connection.cursor()
-    cursor.execute(told)
+    cursor.execute(sql)
     return poses_of(cursor.fetchall())
 
 

@@ -177,9 +177,9 @@ def measurement_series(
     found: dict[tuple[str, str], list[tuple[float, float]]] = {}
     for entity_id, attribute, at, value in connection.execute(wanted):
         found.setdefault((entity_id, attribute), []).append((at, value))
-    told_s = slice_s if is_sliced else 0.0
+    width_s = slice_s if is_sliced else 0.0
     return {
-        key: MeasurementSeries(*zip(*points, strict=True), slice_s=told_s)
+        key: MeasurementSeries(*zip(*points, strict=True), slice_s=width_s)
         for key, points in found.items()
     }
 
@@ -263,8 +263,8 @@ def command_latencies(
 
 
 def _latency(record: CommandRecord) -> CommandLatency:
-    told = record.pressed_at
-    asked = record.requested_at if told is None else told
+    pressed = record.pressed_at
+    asked = record.requested_at if pressed is None else pressed
     return CommandLatency(
         record.command_id,
         record.robot_id,
@@ -272,7 +272,7 @@ def _latency(record: CommandRecord) -> CommandLatency:
         {one: _ms(asked, at) for one, at in record.answer_at.items()},
         {one: _ms(asked, at) for one, at in record.sent_at.items()},
         record.standstill_ms,
-        None if told is None else _ms(told, record.requested_at),
+        None if pressed is None else _ms(pressed, record.requested_at),
     )
 
 

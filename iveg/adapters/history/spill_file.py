@@ -188,24 +188,23 @@ def _write_line(row: Waiting) -> bytes:
 def _read_line(line: bytes) -> Waiting | None:
     try:
         value = orjson.loads(line)
-        told = value["record"]
-        record = _KINDS[value["kind"]](**_as_now(told))
+        record = _KINDS[value["kind"]](**_as_now(value["record"]))
         return Waiting(record, int(value["revision"]), 0.0)
     except (ValueError, TypeError, KeyError):
         return None
 
 
-def _as_now(told: dict[str, Any]) -> dict[str, Any]:
+def _as_now(members: dict[str, Any]) -> dict[str, Any]:
     """A record as this version has it, of a line that the version before wrote."""
-    for name in _ONCE_TEXT & told.keys():
-        if isinstance(told[name], str):
-            told[name] = orjson.loads(told[name])
-    for before in _ONCE_NAMED.keys() & told.keys():
-        value = told.pop(before)
-        told[_ONCE_NAMED[before]] = _ONCE_VALUED.get(value, value)
+    for name in _ONCE_TEXT & members.keys():
+        if isinstance(members[name], str):
+            members[name] = orjson.loads(members[name])
+    for before in _ONCE_NAMED.keys() & members.keys():
+        value = members.pop(before)
+        members[_ONCE_NAMED[before]] = _ONCE_VALUED.get(value, value)
     for what in ("sent", "answer"):
         for transport in ("direct", "fiware"):
-            at = told.pop(f"{what}_{transport}_at", None)
+            at = members.pop(f"{what}_{transport}_at", None)
             if at is not None:
-                told.setdefault(f"{what}_at", {})[transport] = at
-    return told
+                members.setdefault(f"{what}_at", {})[transport] = at
+    return members

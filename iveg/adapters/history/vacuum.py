@@ -47,8 +47,8 @@ def vacuum(
 def _vacuum_file(file: Path, space: DiskSpace) -> None:
     needed = file.stat().st_size
     if space.free < needed:
-        told = f"{needed // 10**6} MB are needed beside it while it is written anew"
-        raise HopError("database", told)
+        reason = f"{needed // 10**6} MB are needed beside it while it is written anew"
+        raise HopError("database", reason)
     connection = sqlite3.connect(file, timeout=0.5, isolation_level=None)
     try:
         # Before its first read: so it is refused while anybody has the file open.

@@ -113,10 +113,10 @@ class ChunkedRecording:
             return False
         stream.seek(begins)
         summary = stream.read(ends - begins)
-        told = zlib.crc32(
+        computed = zlib.crc32(
             _FOOTER.pack(*footer)[: -len(_MAGIC) - 4], zlib.crc32(summary)
         )
-        if crc != told:
+        if crc != computed:
             return False
         head = _RECORD.size
         for opcode, body, size in _records(summary):
@@ -226,8 +226,8 @@ class ChunkedRecording:
                 self._learn(data[body : body + size])
 
     def _learn(self, channel: bytes) -> None:
-        told = Channel.read(ReadDataStream(io.BytesIO(channel)))
-        self._topics[told.id] = told.topic
+        record = Channel.read(ReadDataStream(io.BytesIO(channel)))
+        self._topics[record.id] = record.topic
 
     def _unusable(self, reason: str) -> DataFileError:
         return DataFileError(str(self.path), "", reason)

@@ -47,7 +47,7 @@ class Drawing:
         self._found: list[Observation] = []
         self._due: dict[_Stream, float] = {}
         self._reader = DirectReader(
-            apikey, robots, lambda: self._at, self._take, lambda *_: None
+            apikey, robots, lambda: self._at, self._draw_received, lambda *_: None
         )
 
     def messages(self, came: Incoming) -> Iterator[tuple[Channel, bytes]]:
@@ -56,7 +56,7 @@ class Drawing:
         with contextlib.suppress(UnreadableError):
             self._read(came)
         for one in self._found:
-            for channel, value in foxglove.told(one, came.at.wall):
+            for channel, value in foxglove.messages_of(one, came.at.wall):
                 yield channel, orjson.dumps(value)
 
     def _read(self, came: Incoming) -> None:
@@ -70,7 +70,7 @@ class Drawing:
             if stream is None or self._is_due(stream):
                 self._reader.read(came.name, came.payload)
 
-    def _take(self, received: Received) -> None:
+    def _draw_received(self, received: Received) -> None:
         self._draw(received.observation)
 
     def _draw(self, observation: Observation) -> None:

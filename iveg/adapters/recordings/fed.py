@@ -34,7 +34,7 @@ def run_fed(serve: Serve, refusal: type[Exception]) -> None:
             sys.exit(1)
 
 
-def answer(answers: BinaryIO, told: Mapping[str, object]) -> None:
+def answer(answers: BinaryIO, message: Mapping[str, object]) -> None:
     """Tell the feeder; where nobody is left to be told, the source ends, too."""
     with contextlib.suppress(BrokenPipeError):
-        answers.write(orjson.dumps(told) + b"\n")
+        answers.write(orjson.dumps(message) + b"\n")

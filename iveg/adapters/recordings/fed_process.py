@@ -100,17 +100,17 @@ class FedProcess:
         """
         refused = ""
         while line := await self._answers.readline():
-            told = orjson.loads(line)
-            refused = told.pop("refused", "")
-            if told:
-                self.heard(told)
+            answer = orjson.loads(line)
+            refused = answer.pop("refused", "")
+            if answer:
+                self.heard(answer)
         code = await self._process.wait()
         self.ended()
         if refused:
             raise HopError(self.REFUSER, refused)
         raise HopError(self.NAME, f"its process has ended: {code}")
 
-    def heard(self, told: dict[str, int]) -> None:
+    def heard(self, counts: dict[str, int]) -> None:
         """It said something."""
 
     def ended(self) -> None:

@@ -93,7 +93,7 @@ def _scene_channel(robot_id: str) -> Channel:
     return Channel(f"/{robot_id}/detections", "foxglove.SceneUpdate", _SCENE)
 
 
-def told(observation: Observation, wall: float) -> Iterator[Told]:
+def messages_of(observation: Observation, wall: float) -> Iterator[Told]:
     """What viewers draw of an observation that came at ``wall`` (Unix s)."""
     at, robot_id = _time(wall), observation.robot_id
     base = f"{robot_id}/{_BASE}"
@@ -108,8 +108,8 @@ def told(observation: Observation, wall: float) -> Iterator[Told]:
 
 
 def _pose(robot_id: str, at: Mapping[str, int], pose: Pose2D) -> Told:
-    told = {"timestamp": at, "frame_id": _MAP, "pose": _as_pose(pose)}
-    return _pose_channel(robot_id), told
+    message = {"timestamp": at, "frame_id": _MAP, "pose": _as_pose(pose)}
+    return _pose_channel(robot_id), message
 
 
 def _transform(base: str, at: Mapping[str, int], pose: Pose2D) -> Told:

@@ -61,9 +61,9 @@ class Incoming(NamedTuple):
 
 def pack(sort: Sort, at: Instant, name: str = "", payload: bytes = b"") -> bytes:
     """An input as bytes."""
-    told = name.encode()
-    head = _HEAD.pack(sort, at.mono, at.wall, len(told), len(payload))
-    return b"".join((head, told, payload))
+    encoded = name.encode()
+    head = _HEAD.pack(sort, at.mono, at.wall, len(encoded), len(payload))
+    return b"".join((head, encoded, payload))
 
 
 class Unpacking:
@@ -88,10 +88,10 @@ def _unpack(whole: bytes, begins: int) -> tuple[Incoming, int] | None:
     if named > len(whole):
         return None
     sort, mono, wall, name_size, size = _HEAD.unpack_from(whole, begins)
-    told = named + name_size
-    ends = told + size
+    payload_at = named + name_size
+    ends = payload_at + size
     if ends > len(whole):
         return None
-    name = whole[named:told].decode()
+    name = whole[named:payload_at].decode()
     at = Instant(mono, wall)
-    return Incoming(Sort(sort), at, name, whole[told:ends]), ends
+    return Incoming(Sort(sort), at, name, whole[payload_at:ends]), ends

@@ -118,9 +118,9 @@ class DoorProcess(FedProcess):
         super().__init__(process)
         self._looked_on = looked_on
 
-    def heard(self, told: dict[str, int]) -> None:
+    def heard(self, counts: dict[str, int]) -> None:
         """Somebody came to look on, or left."""
-        self._looked_on(told["subscriptions"])
+        self._looked_on(counts["subscriptions"])
 
 
 async def _start(setup: bytes, looked_on: Callable[[int], None]) -> DoorProcess:

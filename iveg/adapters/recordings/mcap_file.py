@@ -52,8 +52,8 @@ class McapFile:
             self._stream, CHUNK_BYTES, CompressionType.ZSTD, enable_data_crcs=False
         )
         self._writer.start(PROFILE, f"iveg {__version__}")
-        told = {"wall": repr(start.wall), "mono": repr(start.mono)}
-        self._writer.add_metadata(PROFILE, {"version": __version__, **told})
+        began = {"wall": repr(start.wall), "mono": repr(start.mono)}
+        self._writer.add_metadata(PROFILE, {"version": __version__, **began})
         self._channels: dict[str, int] = {}
         self._schemas: dict[str, int] = {}
         self._newest_ns = self._start_ns

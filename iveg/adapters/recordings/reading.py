@@ -102,8 +102,8 @@ class Reading:
         try:
             for record in self._records:
                 if isinstance(record, Metadata) and record.name == PROFILE:
-                    told = record.metadata
-                    return Instant(float(told["mono"]), float(told["wall"]))
+                    began = record.metadata
+                    return Instant(float(began["mono"]), float(began["wall"]))
                 if not isinstance(record, Header) or record.profile != PROFILE:
                     break
         except _BROKEN as error:

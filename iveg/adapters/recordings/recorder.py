@@ -116,8 +116,8 @@ class InputRecorder:
         if self._live is not None:
             self._live.notification(body, at)
         if self._is_on:
-            told = _NUMBERS.sub(b"[]", body) if _are_twins(observed) else body
-            self._queue(pack(Sort.NOTIFICATION, at, "", told))
+            kept = _NUMBERS.sub(b"[]", body) if _are_twins(observed) else body
+            self._queue(pack(Sort.NOTIFICATION, at, "", kept))
 
     def row(self, record: Record) -> None:
         """A row of the history; telemetry is here already, as it came."""

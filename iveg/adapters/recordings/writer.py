@@ -56,9 +56,9 @@ class WriterSetup:
     @classmethod
     def of_line(cls, line: bytes) -> "WriterSetup":
         """What ``line`` was told."""
-        told = orjson.loads(line)
-        limits = RecordingLimits(**told["limits"])
-        return cls(Path(told["folder"]), limits, told["apikey"], told["robots"])
+        setup = orjson.loads(line)
+        limits = RecordingLimits(**setup["limits"])
+        return cls(Path(setup["folder"]), limits, setup["apikey"], setup["robots"])
 
 
 class RecordingWriter:
@@ -90,7 +90,7 @@ class RecordingWriter:
         self._settled_at = self._pruned_at = float("-inf")
         self._is_held = False
 
-    def take(self, came: Incoming) -> None:
+    def write_input(self, came: Incoming) -> None:
         """Write an input, and what viewers draw of it."""
         if came.sort is Sort.ROW and came.name in KEPT_ANEW:
             self._anew[came.name] = came
@@ -170,7 +170,7 @@ def serve(source: BinaryIO, answers: BinaryIO) -> None:
     unpacking = Unpacking()
     while piece := os.read(source.fileno(), _PIECE):
         for came in unpacking.feed(piece):
-            writer.take(came)
+            writer.write_input(came)
         if writer.keep_house(clock.mono()):
             _say(answers, writer)
     writer.finish()

@@ -38,10 +38,10 @@ class WriterProcess(FedProcess):
         self._handed += len(inputs)
         await super().feed(inputs)
 
-    def heard(self, told: dict[str, int]) -> None:
+    def heard(self, counts: dict[str, int]) -> None:
         """What became of inputs since it began."""
-        fresh = Counter(told) - self._answered
-        self._answered = Counter(told)
+        fresh = Counter(counts) - self._answered
+        self._answered = Counter(counts)
         for what, count in fresh.items():
             self._counters[f"recordings_{what}"] += count
 

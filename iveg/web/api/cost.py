@@ -112,25 +112,25 @@ def _cost_of(
         places_since=stamp(rows.places_since),
         telemetry_since=stamp(rows.telemetry_since),
         events_since=stamp(rows.events_since),
-        **_told(rows, greenhouse, known),
+        **_figures(rows, greenhouse, known),
         cell_m=cost.CELL_M,
         map=GreenhouseMap.of(greenhouse),
     )
 
 
-def _told(
+def _figures(
     rows: CostRows, greenhouse: Greenhouse, known: Collection[str]
 ) -> dict[str, Any]:
     """What can be told of the range; null, not zero, where it is kept no longer."""
     changes = cost.SpeedChanges(rows.changes)
-    told: dict[str, Any] = dict.fromkeys(_TOLD)
+    figures: dict[str, Any] = dict.fromkeys(_TOLD)
     if "telemetry" in known:
-        told |= _driven(rows, changes, greenhouse)
+        figures |= _driven(rows, changes, greenhouse)
     if "telemetry" in known and "places" in known:
-        told |= _near(rows, changes, greenhouse)
+        figures |= _near(rows, changes, greenhouse)
     if "events" in known:
-        told |= _events(rows)
-    return told
+        figures |= _events(rows)
+    return figures
 
 
 def _driven(

@@ -73,7 +73,7 @@ def _json(costmap: InflatedGrid | None, age_s: float | None) -> bytes:
         return write_json(_NOTHING)
     grid = costmap.grid
     # Cells by the hundred thousand go as they are: the model names them, no more.
-    told = {
+    members = {
         "resolution": round(grid.resolution, 6),
         "width": grid.width,
         "height": grid.height,
@@ -81,7 +81,7 @@ def _json(costmap: InflatedGrid | None, age_s: float | None) -> bytes:
         "data": costmap.data.reshape(-1),
         "age_s": None if age_s is None else round(age_s, 1),
     }
-    return orjson.dumps(told, option=orjson.OPT_SERIALIZE_NUMPY)
+    return orjson.dumps(members, option=orjson.OPT_SERIALIZE_NUMPY)
 
 
 def _shades(costmap: InflatedGrid | None) -> NDArray[np.uint8]:

@@ -27,14 +27,14 @@ def router(monitor: CoverageMonitor, clock: Clock) -> APIRouter:
         """
         now = clock()
         share = monitor.coverage.share(now)
-        told = Coverage(
+        body = Coverage(
             at=format_stamp(now.wall),
             cameras=monitor.cameras(now),
             within_s=RECENT_S,
             share=None if share is None else round(share, 4),
             lanes=_lanes(monitor, now),
         )
-        return Json(told)
+        return Json(body)
 
     return routes
 

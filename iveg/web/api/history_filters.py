@@ -45,9 +45,9 @@ def mend_plus(value: object) -> object:
 
 
 def _in_utc(moment: datetime) -> datetime:
-    told = moment if moment.tzinfo else moment.replace(tzinfo=UTC)
-    as_kept(told.date())
-    return told
+    zoned = moment if moment.tzinfo else moment.replace(tzinfo=UTC)
+    as_kept(zoned.date())
+    return zoned
 
 
 def as_kept(day: date) -> date:

@@ -78,12 +78,12 @@ def router(watch: LatencyWatch, clock: Clock, worker: Apart) -> APIRouter:
         if form == "csv":
             return Response(_csv(await asyncio.to_thread(merge, parts)), 200, _CSV)
         streams = [one for one in watch.streams if asked.robot in (None, one.robot_id)]
-        told = _told(watch, streams, asked, clock())
+        members = _members(watch, streams, asked, clock())
         sampled = _sampled(streams)
         # A day of twenty robots is merged in a thread, as sending all of it to the
         # worker costs more; the figures of the sums are drawn there.
         sketches = await asyncio.to_thread(merge, parts)
-        body = await worker.run(_finished, sketches, told, sampled, asked)
+        body = await worker.run(_finished, sketches, members, sampled, asked)
         return Response(body, media_type="application/json")
 
     return routes
@@ -95,7 +95,7 @@ _CSV = {
 }
 
 
-def _told(
+def _members(
     watch: LatencyWatch, streams: list[Stream], asked: Asked, now: Instant
 ) -> dict[str, object]:
     """Values read from the streams, in the loop's thread."""
@@ -125,7 +125,7 @@ def _told(
 
 def _finished(
     sketches: Mapping[Cell, Sketch],
-    told: dict[str, Any],
+    members: dict[str, Any],
     sampled: Mapping[Data, list[Segment]],
     asked: Asked,
 ) -> bytes:
@@ -135,10 +135,10 @@ def _finished(
         figures = {
             "bars": bars_figure(sketches),
             "cdf": cdf_figure(sketches),
-            "trace": trace_figure(told["trace"]),
+            "trace": trace_figure(members["trace"]),
         }
     answer = LatencyTable(
-        **told,
+        **members,
         direct=any(sketches[data, "uplink"].count for data in DATA),
         rows=[
             _row(data, sketches, sampled[data], with_bins=asked.bins) for data in DATA
@@ -255,8 +255,8 @@ def _csv(sketches: Mapping[Cell, Sketch]) -> bytes:
     names = list(SegmentSpread.model_fields)
     rows = [["data", "hop", *names]]
     for (data, hop), sketch in sketches.items():
-        told = vars(_spread(sketch))
-        rows.append([data, hop, *(cell(name, told[name]) for name in names)])
+        spread = vars(_spread(sketch))
+        rows.append([data, hop, *(cell(name, spread[name]) for name in names)])
     return csv_lines(rows)
 
 

@@ -221,10 +221,10 @@ class Desk:
             raise HTTPException(429, "One test at a time.", headers)
         async with self._testing:
             self._tested_at = now
-            told = await self.messenger.test(channel)
-        if not told:
+            deliveries = await self.messenger.test(channel)
+        if not deliveries:
             raise HTTPException(409, "Nobody is to be told by this channel.")
-        return Json(MessageTest(told=[Told.of(one) for one in told]))
+        return Json(MessageTest(told=[Told.of(one) for one in deliveries]))
 
 
 _Operator = Annotated[Principal, Depends(require("release"))]

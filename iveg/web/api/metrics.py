@@ -76,10 +76,10 @@ def router(
 
 
 def _family(
-    name: str, kind: str, told: str, samples: Iterable[tuple[str, float | None]]
+    name: str, kind: str, text: str, samples: Iterable[tuple[str, float | None]]
 ) -> Iterator[str]:
     """One family; samples that nobody knows are left out."""
-    yield f"# HELP iveg_{name} {told}"
+    yield f"# HELP iveg_{name} {text}"
     yield f"# TYPE iveg_{name} {kind}"
     for labels, value in samples:
         if value is not None:
@@ -161,14 +161,14 @@ def _streams(watch: LatencyWatch) -> Iterator[str]:
         for one in streams
         for hop, order in (("uplink", one.up), ("fiware", one.fiware))
     ]
-    for name, told in (
+    for name, text in (
         ("passed", "Messages that passed the hop."),
         ("missing", "Messages that were lost at the hop."),
         ("reordered", "Messages that arrived after a later one."),
         ("repeated", "Messages that arrived twice."),
     ):
         samples = ((labels, getattr(order, name)) for labels, order in orders)
-        yield from _family(f"messages_{name}_total", "counter", told, samples)
+        yield from _family(f"messages_{name}_total", "counter", text, samples)
     excluded = (
         (_labels(robot=one.robot_id, data=one.data, hop=hop, reason=why), count)
         for one in streams
@@ -212,7 +212,7 @@ def _clocks(watch: LatencyWatch) -> Iterator[str]:
 
 
 def _queues(queues: Queues) -> Iterator[str]:
-    for name, kind, told, label, counts in (
+    for name, kind, text, label, counts in (
         ("queue_depth", "gauge", "Items in the queue.", "queue", queues.depths),
         (
             "dropped_total",
@@ -224,7 +224,7 @@ def _queues(queues: Queues) -> Iterator[str]:
         ("retries_total", "counter", "Repeated operations.", "what", queues.retries),
     ):
         samples = ((_labels(**{label: key}), count) for key, count in counts.items())
-        yield from _family(name, kind, told, samples)
+        yield from _family(name, kind, text, samples)
 
 
 def _turns(longest_s: float) -> Iterator[str]:
@@ -250,7 +250,7 @@ def _safety(safety: Safety) -> Iterator[str]:
             (_labels(quantile="0.99"), _seconds(latency.p99_ms)),
         ],
     )
-    for name, told, value in (
+    for name, text, value in (
         (
             "alerts_not_echoed",
             "Alerts without an answer within one second, last five minutes.",
@@ -277,7 +277,7 @@ def _safety(safety: Safety) -> Iterator[str]:
             None if worst is None else worst.margin_m,
         ),
     ):
-        yield from _family(name, "gauge", told, [("", value)])
+        yield from _family(name, "gauge", text, [("", value)])
 
 
 def _protection(counters: Mapping[str, int]) -> Iterator[str]:

@@ -47,7 +47,7 @@ def router(past: Past, clock: Clock) -> APIRouter:
         wall = at.timestamp()
         if wall > clock().wall:
             raise HTTPException(422, "That moment is still to come.")
-        told = await past.world(viewer, wall)
-        return Response(told, media_type="application/json")
+        body = await past.world(viewer, wall)
+        return Response(body, media_type="application/json")
 
     return routes

@@ -47,7 +47,7 @@ def _add(routes: APIRouter, path: str, action: Action, *, everybodys: bool) -> N
         """Those that are not over; the newest sign of life first."""
         seen = _seen(request, who, everybodys=everybodys)
         seen.sort(key=lambda one: one[0].seen, reverse=True)
-        return Json(Listing(items=[_told(*one, who) for one in seen]))
+        return Json(Listing(items=[_open_session(*one, who) for one in seen]))
 
     @routes.delete(f"{path}/{{session_id}}", response_model=OpenSession)
     async def end(request: Request, session_id: str, who: visitor) -> Response:
@@ -56,7 +56,7 @@ def _add(routes: APIRouter, path: str, action: Action, *, everybodys: bool) -> N
         for session, role in _seen(request, who, everybodys=everybodys):
             if session.session_id == session_id:
                 _sessions(request).end([session])
-                return Json(_told(session, role, who))
+                return Json(_open_session(session, role, who))
         raise UnknownNameError("session", session_id)
 
     @routes.delete(path, response_model=SessionsEnded)
@@ -87,7 +87,7 @@ def _is_own(session: Session, who: Principal) -> bool:
     return who.session is not None and session.digest == who.session.hex()
 
 
-def _told(session: Session, role: Role, who: Principal) -> OpenSession:
+def _open_session(session: Session, role: Role, who: Principal) -> OpenSession:
     kind: SessionKind = "link" if session.method == _BY_LINK else "account"
     return OpenSession(
         session_id=session.session_id,

@@ -75,7 +75,7 @@ def router(
             kept = None
         if followed is None and kept is None:
             raise HTTPException(404, "There is no such command.")
-        return Json(_told(followed, kept))
+        return Json(_joined(followed, kept))
 
     @routes.get("/drills", response_model=Listing[Drill])
     async def drills(robot: str | None = None) -> Response:
@@ -94,7 +94,7 @@ async def _kept(queries: Queries, command_id: str) -> Command | None:
     return Command.of_record(found, await queries.command_events(command_id))
 
 
-def _told(followed: Command | None, kept: Command | None) -> Command | None:
+def _joined(followed: Command | None, kept: Command | None) -> Command | None:
     """What goes on, beside what only the history tells: how it ended, and its steps."""
     if followed is None or kept is None:
         return followed or kept

@@ -43,7 +43,7 @@ class TelemetryFeed:
         self._read_outs: dict[str, float] = {}
         self._pictures: dict[str, float] = {}
         """Changed topics, and when each may be sent (monotonic, s)."""
-        self._told: dict[str, tuple[int, float]] = {}
+        self._sent: dict[str, tuple[int, float]] = {}
         self._is_full = False
         self._waits_for_news = True
 
@@ -85,13 +85,13 @@ class TelemetryFeed:
         self._is_full = frame.is_full
         if frame.is_empty:
             return None
-        told = frame.write(self.window.next_number)
+        data = frame.write(self.window.next_number)
         self._painting.sent(self.window.next_number, now.mono)
         # What had to come first is not late.
         late_s = 0.0 if self._waits_for_news else now.mono - self.window.opens_at
         self.window.sent(frame.heavy, now.mono, late_s)
         self._waits_for_news = False
-        return told
+        return data
 
     def _absorb(self) -> None:
         for topic in self._subscriber.drain_telemetry():
@@ -115,8 +115,8 @@ class TelemetryFeed:
         next_after: Callable[[float], float],
     ) -> None:
         if topic not in waiting:
-            told = self._told.get(topic)
-            waiting[topic] = -_INF if told is None else next_after(told[1])
+            sent = self._sent.get(topic)
+            waiting[topic] = -_INF if sent is None else next_after(sent[1])
 
     def _due_at(self) -> float:
         """Earliest time of a waiting part; parts without room wait for credit."""
@@ -132,7 +132,7 @@ class TelemetryFeed:
             move = self._encoder.move(topics.find(topic)[1], now)
             if move is not None and move.version != self._version(topic):
                 frame.moves.append(move.head)
-                self._told[topic] = move.version, now.mono
+                self._sent[topic] = move.version, now.mono
                 self._painting.adds(topic, now.mono)
         self._moved.clear()
 
@@ -146,12 +146,12 @@ class TelemetryFeed:
                 del waiting[topic]
             elif frame.add(part):
                 del waiting[topic]
-                self._told[topic] = part.version, now.mono
+                self._sent[topic] = part.version, now.mono
                 self._painting.adds(topic, now.mono)
 
     def _version(self, topic: str) -> int:
-        told = self._told.get(topic)
-        return -1 if told is None else told[0]
+        sent = self._sent.get(topic)
+        return -1 if sent is None else sent[0]
 
     def _part(self, topic: str, since: int, now: Instant) -> Part | None:
         row, key = topics.find(topic)
@@ -203,20 +203,20 @@ class _Frame:
         return write_frame(head, (scan.body for scan in self._scans))
 
 
-def _next_picture(told_at: float) -> float:
+def _next_picture(sent_at: float) -> float:
     """When a scan or a detection frame may be sent again (monotonic, s)."""
-    return told_at + PICTURE_S
+    return sent_at + PICTURE_S
 
 
-def _next_beat(told_at: float) -> float:
+def _next_beat(sent_at: float) -> float:
     """When a read-out may be sent again (monotonic, s).
 
     Read-outs of a kind go together, at the same moments to all browsers: what takes
     all robots and people is worked out once for all of them.
     """
-    return (math.floor(told_at / READ_OUT_S + 1e-6) + 1) * READ_OUT_S
+    return (math.floor(sent_at / READ_OUT_S + 1e-6) + 1) * READ_OUT_S
 
 
-def _next_state(told_at: float) -> float:
+def _next_state(sent_at: float) -> float:
     """The same of the state of a robot."""
-    return _next_beat(told_at - STATES_AFTER_S) + STATES_AFTER_S
+    return _next_beat(sent_at - STATES_AFTER_S) + STATES_AFTER_S

@@ -134,7 +134,7 @@ class CreditWindow:
         return True
 
 
-def _bounded(told: object, most: float) -> float | None:
+def _bounded(value: object, most: float) -> float | None:
     """A time that a page has sent; None where it is none, or longer than possible."""
-    number = read_number(told)
+    number = read_number(value)
     return number if number is not None and 0.0 <= number <= most else None

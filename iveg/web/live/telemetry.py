@@ -76,9 +76,9 @@ class TelemetryEncoder:
         place = round(pose.x, 3), round(pose.y, 3), round(pose.yaw, 4)
         speed = round(twist.linear_x, 3), round(twist.angular_z, 3)
         age_s = rounded(robot.age_s(now))
-        told = [robot_id, now.mono, age_s, *place, *speed, odometry.origin.stamp]
+        head = [robot_id, now.mono, age_s, *place, *speed, odometry.origin.stamp]
         version = self._hub.versions[topics.ROBOT.of(robot_id)]
-        part = Part(version, orjson.dumps(told))
+        part = Part(version, orjson.dumps(head))
         self._moves[robot_id] = odometry, part
         return part
 
@@ -87,16 +87,16 @@ class TelemetryEncoder:
         topic = topics.ROBOT.of(robot_id)
         state = self._states.setdefault(robot_id, _RobotState())
         if state.version != self._hub.versions[topic]:
-            told = self._views.robot(robot_id, now, self._margins_at(now))
-            state.update(told, self._hub.versions[topic], now.mono)
+            robot = self._views.robot(robot_id, now, self._margins_at(now))
+            state.update(robot, self._hub.versions[topic], now.mono)
         return state.changes(topic, since)
 
     def people(self, since: int, now: Instant) -> Part | None:
         """The list of people, and changes since a version; None without a change."""
         version = self._hub.versions[topics.PEOPLE.name]
         if self._people.version != version:
-            told = self._views.people(now, self._margins_at(now))
-            self._people.update(told, version, now.mono)
+            people = self._views.people(now, self._margins_at(now))
+            self._people.update(people, version, now.mono)
         return self._people.changes(since)
 
     def part(self, topic: str, now: Instant) -> Part | None:
@@ -127,8 +127,8 @@ class TelemetryEncoder:
         data = self._views.frame(robot_id, now)
         if data is None:
             return None
-        told = {"topic": topic, "at": now.mono, "data": data}
-        return Part(version, write_json(told))
+        head = {"topic": topic, "at": now.mono, "data": data}
+        return Part(version, write_json(head))
 
     def _scan(
         self, topic: str, robot_id: str, version: int, now: Instant
@@ -138,7 +138,7 @@ class TelemetryEncoder:
         if scan is None or robot.scan_pose is None:
             return None
         sensor = robot.scan_pose.compose(scan.mount)
-        told = {
+        head = {
             "topic": topic,
             "at": now.mono,
             "robot_id": robot_id,
@@ -152,7 +152,7 @@ class TelemetryEncoder:
             "unit_m": UNIT_M,
             "count": scan.ranges.size,
         }
-        return Part(version, orjson.dumps(told), write_ranges(scan))
+        return Part(version, orjson.dumps(head), write_ranges(scan))
 
 
 class _RobotState:
@@ -164,10 +164,10 @@ class _RobotState:
         self._values: dict[str, object] = {}
         self._members: dict[str, tuple[int, bytes]] = {}
 
-    def update(self, told: Robot, version: int, at: float) -> None:
+    def update(self, robot: Robot, version: int, at: float) -> None:
         """Compare with the members of the last update."""
         self.version, self._at = version, at
-        for name, value in told.__dict__.items():
+        for name, value in robot.__dict__.items():
             if name in _MOVES or self._values.get(name, self) == value:
                 continue
             self._values[name] = value
@@ -198,15 +198,15 @@ class _People:
         self._values: dict[str, object] = {}
         self._texts: dict[str, tuple[int, bytes]] = {}
 
-    def update(self, told: Sequence[Person], version: int, at: float) -> None:
+    def update(self, people: Sequence[Person], version: int, at: float) -> None:
         """Compare with the people of the last update."""
         self.version, self._at = version, at
-        ids = [person.person_id for person in told]
+        ids = [person.person_id for person in people]
         if ids != self._ids:
             self._ids, self._changed = ids, version
         self._values = {name: self._values.get(name) for name in ids}
         self._texts = {name: self._texts[name] for name in ids if name in self._texts}
-        for person in told:
+        for person in people:
             value = _without_ages(person)
             if self._values[person.person_id] == value:
                 continue
@@ -230,11 +230,11 @@ class _People:
 
 
 def _without_ages(person: Person) -> dict[str, object]:
-    told, margin = dict(person.__dict__), person.margin
-    del told["age_s"]
+    members, margin = dict(person.__dict__), person.margin
+    del members["age_s"]
     if margin is not None:
-        told["margin"] = {**margin.__dict__, "age_s": None}
-    return told
+        members["margin"] = {**margin.__dict__, "age_s": None}
+    return members
 
 
 def write_frame(head: bytes, bodies: Iterable[bytes]) -> bytes:

@@ -75,8 +75,8 @@ def _lines(rows: Iterable[Record], sentences: Sentences) -> Iterator[Line]:
                 text = f"{row.priority} · {sentences.say(row.key, row.slots)}"
                 yield Line(row.last_raised_at, "alert", row.robot_id or "", text)
             case DecisionRecord():
-                told = sentence_of(row)
-                text = sentences.say(told.key, told.slots)
+                sentence = sentence_of(row)
+                text = sentences.say(sentence.key, sentence.slots)
                 yield Line(row.started_at, "decision", row.robot_id, text)
             case CommandRecord():
                 kind = sentences.say(f"history.kind.{row.kind}", {})

@@ -37,7 +37,7 @@ class Attempts:
         self._rows = Allowance(REFUSED_ROWS, clock().mono)
         self.refused = 0
         """Wrong proofs so far."""
-        self._told_at: float | None = None
+        self._logged_at: float | None = None
 
     async def weigh(
         self,
@@ -83,22 +83,22 @@ class Attempts:
             detail = "Too many wrong sign-ins came from your address; wait a minute."
             return Problem(429, detail, headers=headers)
         self._failed.failed(address, now)
-        if self._rows.take(now):
+        if self._rows.admit(now):
             self.note(STRANGER, "sign_in_refused", address)
         self._tell_refused(now, wrong)
         return Problem(401, "This link does not sign in here, or not any more.")
 
-    def note(self, actor: Actor, action: str, address: str, **told: object) -> None:
+    def note(self, actor: Actor, action: str, address: str, **facts: object) -> None:
         """Write a sign-in, or one that was refused, into the audit."""
         if self._trail is not None:
-            details = {"address": address, **told}
+            details = {"address": address, **facts}
             self._trail.note(actor, action, details=details, at=self._clock())
 
     def _tell_refused(self, now: float, wrong: str) -> None:
         """Count a refused sign-in; log it once a minute, against floods of the log."""
         self.refused += 1
-        if self._told_at is None or now - self._told_at >= 60.0:
-            self._told_at = now
+        if self._logged_at is None or now - self._logged_at >= 60.0:
+            self._logged_at = now
             _log.warning("sign-in refused: %s (%d so far)", wrong, self.refused)
 
     def succeeded(self, address: str) -> None:

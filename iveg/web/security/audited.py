@@ -200,8 +200,8 @@ class _Exchange:
         """A part of the answer."""
         if message["type"] == "http.response.start":
             self.status = message["status"]
-            told = Headers(raw=message["headers"]).get("content-type", "")
-            self.is_file = told.partition(";")[0] in _FILES
+            media_type = Headers(raw=message["headers"]).get("content-type", "")
+            self.is_file = media_type.partition(";")[0] in _FILES
         elif not self.reads:
             _keep(self.answer, message)
 

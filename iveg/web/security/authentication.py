@@ -213,7 +213,7 @@ class Authenticator:
         return self.admit(request, cookie, response)
 
     def admit(
-        self, request: Request, cookie: str, response: Response, **told: object
+        self, request: Request, cookie: str, response: Response, **facts: object
     ) -> Response:
         """Give a browser its session; the rest goes into the audit."""
         address = "" if request.client is None else request.client.host
@@ -221,7 +221,7 @@ class Authenticator:
         secure = request.url.scheme == "https"
         who = self.sessions.find(cookie)
         if who is not None:
-            self.attempts.note(who, "sign_in", address, **told)
+            self.attempts.note(who, "sign_in", address, **facts)
         response.set_cookie(
             session_cookie(secure=secure),
             cookie,

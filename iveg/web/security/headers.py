@@ -145,18 +145,18 @@ class ReadableBodies:
 def _brings_json(scope: Scope) -> bool:
     if scope["method"] in _BODILESS or scope["path"].endswith("/stop"):
         return False
-    told = Headers(scope=scope).get("content-type", "")
-    return told.partition(";")[0].strip().lower() == "application/json"
+    media_type = Headers(scope=scope).get("content-type", "")
+    return media_type.partition(";")[0].strip().lower() == "application/json"
 
 
 def _once(body: bytes, receive: Receive) -> Receive:
-    told = False
+    is_given = False
 
     async def receive_again() -> Message:
-        nonlocal told
-        if told:
+        nonlocal is_given
+        if is_given:
             return await receive()
-        told = True
+        is_given = True
         return {"type": "http.request", "body": body, "more_body": False}
 
     return receive_again

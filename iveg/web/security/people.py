@@ -146,15 +146,15 @@ class People(Rereading):
         fits = await self._passwords.fits(password, found.password if found else "")
         return found if found and fits and found.is_open(now) else None
 
-    async def vouched(self, told: Account) -> Account:
+    async def vouched(self, user: Account) -> Account:
         """The account of somebody whom the provider vouches for; made where needed.
 
         Raises:
             SignOnError: they are shut out here.
             HopError: the database is away.
         """
-        by = NamedActor(told.account_id, told.name, told.role, "sso")
-        return await self.change(by, lambda one, known: one.vouched(known, told))
+        by = NamedActor(user.account_id, user.name, user.role, "sso")
+        return await self.change(by, lambda one, known: one.vouched(known, user))
 
     async def proven(self, account: Account, password: str) -> Account | None:
         """The same account where the password is its own. Raises BusyError."""

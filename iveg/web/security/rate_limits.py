@@ -84,7 +84,7 @@ class Allowance:
         self._left = per_s
         self._at = now
 
-    def take(self, now: float) -> bool:
+    def admit(self, now: float) -> bool:
         """Whether one more may pass (``now`` monotonic, s)."""
         self._left = min(self._per_s, self._left + (now - self._at) * self._per_s)
         self._at = now
@@ -196,7 +196,7 @@ class SocketLimits:
                     return message
                 kind = _kind_of(message)
                 of = socket.painting if kind == "painted" else socket.allowance
-                if kind == "stop" or of.take(now):
+                if kind == "stop" or of.admit(now):
                     return message
 
         return receive_limited

@@ -30,7 +30,7 @@ class SignInGate:
             scope["type"] == "http"
             and scope["method"] == "POST"
             and scope["path"] == _SIGN_IN
-            and not self._allowance.take(self._clock().mono)
+            and not self._allowance.admit(self._clock().mono)
         ):
             detail = "Too many sign in at once; try again in a moment."
             headers = {"Retry-After": "2", "Connection": "close"}

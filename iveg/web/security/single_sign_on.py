@@ -149,7 +149,7 @@ class SingleSignOn:
             raise SignOnError("busy", "too many wrong answers from there")
         state = request.query_params.get("state", "")
         cookie = request.cookies.get(_cookie(request), "")
-        waiting = self._waiting.take(state, cookie, now)
+        waiting = self._waiting.pop(state, cookie, now)
         if waiting is None:
             self._wrong.failed(client, now.mono)
             raise SignOnError("outdated", "no sign-in of this browser waits for it")
@@ -175,11 +175,11 @@ class SingleSignOn:
             _check_renewed(waiting, identity)
         if identity.role is None:
             raise SignOnError("no_role", "none of the claim's values gives one")
-        told = Account(
+        user = Account(
             identity.person, identity.name, identity.role, provider=self._issuer
         )
         try:
-            account = await self._people.vouched(told)
+            account = await self._people.vouched(user)
         except HopError as error:
             raise SignOnError("unreachable", str(error)) from error
         sessions, now = self._authenticator.sessions, self._clock().wall
@@ -243,16 +243,16 @@ class SingleSignOn:
 
     def _refused(self, request: Request, error: SignOnError, who: Actor) -> None:
         now = self._clock()
-        if not self._rows.take(now.mono):
+        if not self._rows.admit(now.mono):
             return
         _log.warning("sign-in by the provider refused: %s", error)
-        told = {
+        details = {
             "address": _client(request),
             "by": "sso",
             "why": error.failure,
             "detail": error.detail,
         }
-        self._trail.note(who, "sign_in_refused", details=told, at=now)
+        self._trail.note(who, "sign_in_refused", details=details, at=now)
 
 
 def _check_renewed(waiting: WaitingSignOn, identity: ProvenIdentity) -> None:

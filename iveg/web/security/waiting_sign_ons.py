@@ -53,7 +53,7 @@ class WaitingSignOns:
             self._waiting.popitem(last=False)
         self._waiting[one.attempt.state] = one
 
-    def take(self, state: str, browser: str, now: Instant) -> WaitingSignOn | None:
+    def pop(self, state: str, browser: str, now: Instant) -> WaitingSignOn | None:
         """The sign-in that an answer belongs to, once; None: to none any more."""
         one = self._waiting.pop(state, None)
         if one is None or one.browser != browser or not browser:

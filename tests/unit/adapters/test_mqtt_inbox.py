@@ -167,7 +167,7 @@ async def test_what_comes_during_a_rest_is_read_together_after_it() -> None:
     here, there = socket.socketpair()
     with here, there:
         here.setblocking(False)
-        client = InboxClient("nowhere", take=note, apart_s=REST_S)
+        client = InboxClient("nowhere", on_arrived=note, apart_s=REST_S)
         line = client._client._sock = ReadAhead(here, note)
         client._listen(line)
         async with asyncio.timeout(20.0):
@@ -275,7 +275,7 @@ MOVED = "docs/decisions/0005-past-the-mqtt-library.md: a private part has moved:
 
 
 async def test_the_private_parts_of_the_libraries_are_those_that_are_known() -> None:
-    client = InboxClient("nowhere", take=lambda _: None)
+    client = InboxClient("nowhere", on_arrived=lambda _: None)
     opened = list(inspect.signature(aiomqtt.Client._on_socket_open).parameters)
     queued = list(inspect.signature(paho.Client._packet_queue).parameters)
 

@@ -39,13 +39,15 @@ def data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 
 def test_each_column_of_each_list_is_told_and_none_besides() -> None:
-    told = {
-        (name, one.name): one.told.means for name in LISTS for one in columns_of(name)
+    meanings = {
+        (name, one.name): one.meaning.means
+        for name in LISTS
+        for one in columns_of(name)
     }
-    assert all(told.values())
-    names = {column for _, column in told}
+    assert all(meanings.values())
+    names = {column for _, column in meanings}
     assert names == set(dictionary.MEANINGS)
-    assert set(dictionary.MEANINGS_APART) <= set(told)
+    assert set(dictionary.MEANINGS_APART) <= set(meanings)
     for name, kind in LISTS.items():
         head = exports.csv_head(kind).decode().strip().split(",")
         assert head == [one.name for one in columns_of(name)]
