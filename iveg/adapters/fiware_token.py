@@ -215,7 +215,7 @@ def _is_token(text: str) -> bool:
 
 def _life_of(answer: TokenAnswer) -> float:
     life = answer.body.get("expires_in")
-    if isinstance(life, str) and life.isdigit():
+    if isinstance(life, str) and life.isdecimal():
         life = int(life[:9])
     if not isinstance(life, int | float) or isinstance(life, bool) or not life > 0:
         return _UNTOLD_S

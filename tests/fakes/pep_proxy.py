@@ -30,7 +30,7 @@ class FakePepProxy:
     Attributes:
         behind: Address of what stands behind.
         mono: The clock by which tokens end (s).
-        life_s: Of each token (s).
+        life_s: Of each token (s); ``says`` is what it tells of that, if not the same.
         header: Which it reads; Wilma prefers ``Authorization``.
         vice: What goes wrong; empty: nothing.
         given: Tokens so far, newest last; ``forms`` as they were asked for.
@@ -40,6 +40,7 @@ class FakePepProxy:
     behind: str
     mono: Callable[[], float]
     life_s: float = 3600.0
+    says: object = None
     header: str = "Authorization"
     vice: str = ""
     given: dict[str, float] = field(default_factory=dict)
@@ -82,7 +83,8 @@ class FakePepProxy:
         text = f"token-{next(self._numbers)}"
         self.given[text] = self.mono() + self.life_s
         told = {"access_token": text, "token_type": "bearer"}
-        return JSONResponse({**told, "expires_in": self.life_s})
+        life = self.life_s if self.says is None else self.says
+        return JSONResponse({**told, "expires_in": life})
 
     async def _pass(self, request: Request) -> Response:
         said = request.headers.get(self.header.lower(), "")

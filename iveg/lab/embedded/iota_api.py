@@ -196,7 +196,7 @@ def _page(
     request: Request, name: str, listed: Sequence[Group] | Sequence[AgentDevice]
 ) -> Response:
     limit, offset = request.query.get("limit", "20"), request.query.get("offset", "0")
-    if not (limit.isdigit() and offset.isdigit()):
+    if not (limit.isdecimal() and offset.isdecimal()):
         raise wrong_syntax()
     shown = [one.show() for one in listed[int(offset) : int(offset) + int(limit)]]
     return _json({"count": len(listed), name: shown})

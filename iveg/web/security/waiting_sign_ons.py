@@ -55,7 +55,9 @@ class WaitingSignOns:
 
     def pop(self, state: str, browser: str, now: Instant) -> WaitingSignOn | None:
         """The sign-in that an answer belongs to, once; None: to none any more."""
-        one = self._waiting.pop(state, None)
+        one = self._waiting.get(state)
         if one is None or one.browser != browser or not browser:
+            # Another browser's answer: the sign-in goes on to wait for its own.
             return None
+        del self._waiting[state]
         return one if now.mono - one.began.mono < WAITS_S else None

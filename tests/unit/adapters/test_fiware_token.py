@@ -117,6 +117,17 @@ async def test_a_token_is_renewed_beside_at_four_fifths_of_its_life(
     assert len(place.pep.forms) == 2
 
 
+@pytest.mark.parametrize("says", ["3600", "²", "soon", True, {}, -1, None])
+async def test_whatever_is_said_of_its_life_a_token_is_used(
+    place: Place, says: object
+) -> None:
+    place.pep.says = says
+
+    await place.orion.version()
+
+    assert place.pep.seen == [("token-1", 200)]
+
+
 async def test_a_token_that_is_over_is_never_sent(place: Place) -> None:
     place.pep.life_s = 2.0
     await place.orion.version()
