@@ -57,6 +57,12 @@ class Ahead:
         )
         return next(iter(found.get("AGI", {}).values()), None)
 
+    def told(self) -> Encounter | None:
+        """What people are told, which need not slow."""
+        scene, foresight = self.scene, Foresight()
+        foresight.look(scene.world, scene.people, DetectionRule(), at(scene.now))
+        return next(iter(foresight.told.get("AGI", {}).values()), None)
+
     def must(self) -> Encounter:
         found = self.foretold()
         assert found is not None
@@ -138,6 +144,42 @@ def test_who_was_not_seen_for_a_second_has_a_ring_and_no_forecast() -> None:
     ahead = Ahead(Pose2D(0, 0, 0), Twist2D(0.8, 0.0)).see((3.6, 0.0))
     ahead.scene.now = 1.2
     assert ahead.see().foretold() is None
+    assert ahead.told() is None, "nor is it told of a glimpse"
+
+
+@pytest.mark.parametrize("missed_s", [0.9, 1.5, 2.0])
+def test_in_a_ring_that_grows_the_encounter_is_told_and_slows_no_more(
+    missed_s: float,
+) -> None:
+    ahead = Ahead(Pose2D(0, 0, 0), Twist2D(0.4, 0.0)).walk(2.7, 0.0, 0.0, 0.0)
+    ahead.scene.now += missed_s
+    assert ahead.see().foretold() is None
+    told = ahead.told()
+    assert told is not None
+    assert told.in_s == pytest.approx(0.7 / 0.4, abs=MS_10)
+    assert told.zone.radius_m == 2.0
+
+
+def test_who_may_have_gone_is_not_told_of() -> None:
+    ahead = Ahead(Pose2D(0, 0, 0), Twist2D(0.4, 0.0)).walk(2.7, 0.0, 0.0, 0.0)
+    ahead.scene.now += 2.1
+    assert ahead.see().told() is None
+
+
+def test_in_the_ring_itself_there_is_nothing_to_tell() -> None:
+    ahead = Ahead(Pose2D(0, 0, 0), Twist2D(0.4, 0.0)).walk(1.9, 0.0, 0.0, 0.0)
+    for missed_s in (0.0, 0.9, 0.6):
+        ahead.scene.now += missed_s
+        assert ahead.see().told() is None
+
+
+def test_what_slows_is_told_as_it_slows() -> None:
+    """A ring that has grown is reached sooner than the one that it began as."""
+    ahead = Ahead(Pose2D(0, 0, 0), Twist2D(0.8, 0.0)).walk(4.0, 0.0, 0.0, 0.0)
+    ahead.scene.now += 0.8
+    told = ahead.see().told()
+    assert told == ahead.must()
+    assert told.in_s < 2.0 / 0.8
 
 
 def test_its_own_plan_counts_before_the_arc_of_its_twist() -> None:
