@@ -3,8 +3,8 @@
     python -m benchmarks.unforetold --seeds 11,12 --seconds 300
 
 The demo's greenhouse on the virtual clock, as in ``benchmarks.protection``, detector of
-the field; entries around somebody who has been in view for two seconds.  Of the looks
-in the 1.5 s before iVeg began to tell of the encounter, the cause that most have counts:
+the field; entries around somebody who has been in view for two seconds.  The cause is
+that of most looks in the 1.5 s before iVeg began to tell of the encounter:
 
 *unknown*, *remembered*: nobody, or nobody seen within the last two seconds, within a
 metre of the person; *elsewhere*: somebody farther away; *inside*: the robot was in a
@@ -198,8 +198,11 @@ def main() -> None:
     print_table(f"{title}, seeds {asked.seeds}", ("cause", "entries"), rows)
     if asked.each:
         each = [
-            [str(one.seed), f"{one.at:.2f}", one.robot, one.person]
-            + ["–" if one.foretold_s is None else f"{one.foretold_s:.2f}", one.cause]
+            [
+                *(str(one.seed), f"{one.at:.2f}", one.robot, one.person),
+                "–" if one.foretold_s is None else f"{one.foretold_s:.2f}",
+                one.cause,
+            ]
             for one in late
         ]
         head = ("seed", "at (s)", "robot", "person", "told before (s)", "cause")

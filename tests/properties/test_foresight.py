@@ -9,7 +9,7 @@ from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import CLEAR, Feedback, FeedbackAlert
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import Origin
-from iveg.domain.rule import foresight
+from iveg.domain.rule import foresight as rule_foresight
 from iveg.robot.judgement import Judgement, Limits
 from tests.unit.domain.scene import Scene, person
 from tests.unit.robot.rig import person as alert
@@ -108,7 +108,9 @@ def test_what_is_told_beside_what_slows_changes_no_limit(
             scene.drive("AGI", x, linear=speed)
             scene.drive("AGII", 3.0, 1.0, linear=-speed)
             scene.look("AGI", *(person(*spot) for spot in people))
-            with patch.object(foresight, "_MISSED_S", 2.0 if scene is more else 0.0):
+            with patch.object(
+                rule_foresight, "_MISSED_S", 2.0 if scene is more else 0.0
+            ):
                 limits.append(scene.judge())
         assert limits[0] == limits[1]
         slows = more.speed_limits.foretold.get("AGI", {})

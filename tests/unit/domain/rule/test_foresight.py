@@ -57,10 +57,11 @@ class Ahead:
         )
         return next(iter(found.get("AGI", {}).values()), None)
 
-    def told(self) -> Encounter | None:
+    def told(self, **speeds_before: float) -> Encounter | None:
         """What people are told, which need not slow."""
         scene, foresight = self.scene, Foresight()
-        foresight.look(scene.world, scene.people, DetectionRule(), at(scene.now))
+        now = at(scene.now)
+        foresight.look(scene.world, scene.people, scene.rule, now, speeds_before)
         return next(iter(foresight.told.get("AGI", {}).values()), None)
 
     def must(self) -> Encounter:
@@ -171,6 +172,22 @@ def test_in_the_ring_itself_there_is_nothing_to_tell() -> None:
     for missed_s in (0.0, 0.9, 0.6):
         ahead.scene.now += missed_s
         assert ahead.see().told() is None
+
+
+def test_of_a_slow_robot_it_is_told_whom_it_meets_soon_once_it_is_let_go() -> None:
+    ahead = Ahead(Pose2D(0, 0, 0), Twist2D(0.4, 0.0)).see((3.5, 0.0))
+    assert ahead.foretold() is None, "3.75 s ahead"
+    assert ahead.told() is None, "it is not slow for anything"
+    told = ahead.told(AGI=0.8)
+    assert told is not None
+    assert told.in_s == pytest.approx(1.5 / 0.8, abs=MS_10)
+    further = Ahead(Pose2D(0, 0, 0), Twist2D(0.4, 0.0)).see((3.7, 0.0))
+    assert further.told(AGI=0.8) is None, "2.1 s ahead"
+
+
+def test_what_it_meets_as_it_drives_is_told_by_that_speed() -> None:
+    ahead = Ahead(Pose2D(0, 0, 0), Twist2D(0.4, 0.0)).see((3.0, 0.0))
+    assert ahead.told(AGI=0.8) == ahead.must()
 
 
 def test_what_slows_is_told_as_it_slows() -> None:
