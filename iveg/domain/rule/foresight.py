@@ -17,6 +17,7 @@ from types import MappingProxyType
 import numpy as np
 
 from iveg.domain.detection_rule import DetectionRule
+from iveg.domain.feedback import HALF_SPEED
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
 from iveg.domain.robot_state import RobotState
@@ -36,6 +37,8 @@ from iveg.domain.world import World
 
 _CAME_TRUE = ((0.5, 1.0, 1.5, 2.0, 2.5, 3.0), (0.98, 0.93, 0.92, 0.88, 0.83, 0.78))
 """Measured (``benchmarks.foresight``; docs/experiment.md, "Foresight")."""
+_ALIKE = 1.05
+"""By so much faster makes no other forecast."""
 _MISSED_S = 2.0
 """So long a detector may miss somebody who is there (s)."""
 
@@ -87,7 +90,7 @@ class Foresight:
 
     def __init__(self) -> None:
         self._foretold: Foretold = {}
-        self.told: Foretold = {}
+        self.told: dict[str, _Ahead] = {}
         self.if_released: Foretold = {}
         self._at = -math.inf
 
@@ -119,10 +122,14 @@ class Foresight:
             }
             self._foretold = {name: slows for name, (slows, _) in ahead.items()}
             self.if_released = {name: slows for name, (slows, _) in again.items()}
-            self.told = {
-                name: {**_soon(again[name][1]), **told} if name in again else told
-                for name, (_, told) in ahead.items()
-            }
+            self.told = {name: {**told} for name, (_, told) in ahead.items()}
+            for one in drive:
+                name, free = one.robot_id, _if_free(one)
+                if free is None:
+                    continue
+                known = name in again and free <= _ALIKE * speeds_before[name]
+                met = again[name] if known else look.first(path_of(one, now, free))
+                self.told[name] = {**_soon(met[1]), **self.told[name]}
         return self._foretold
 
 
@@ -208,6 +215,18 @@ class _Look:
             if zone.radius_m <= ring_m and zone.cause not in beside:
                 _note(told, encounter)
         return slows, told | slows
+
+
+def _if_free(robot: RobotState) -> float | None:
+    """How fast a slow robot drives once it is let go (m/s); None: it is not slow.
+
+    It reports which share of its speed it allows itself.
+    """
+    report, odometry = robot.safety, robot.odometry
+    if report is None or odometry is None or report.speed_factor > HALF_SPEED:
+        return None
+    speed = abs(odometry.twist.linear_x) / max(report.speed_factor, HALF_SPEED)
+    return min(speed, robot.profile.max_speed)
 
 
 def _soon(again: _Ahead) -> _Ahead:

@@ -57,11 +57,10 @@ class Ahead:
         )
         return next(iter(found.get("AGI", {}).values()), None)
 
-    def told(self, **speeds_before: float) -> Encounter | None:
+    def told(self) -> Encounter | None:
         """What people are told, which need not slow."""
         scene, foresight = self.scene, Foresight()
-        now = at(scene.now)
-        foresight.look(scene.world, scene.people, scene.rule, now, speeds_before)
+        foresight.look(scene.world, scene.people, scene.rule, at(scene.now))
         return next(iter(foresight.told.get("AGI", {}).values()), None)
 
     def must(self) -> Encounter:
@@ -178,16 +177,13 @@ def test_of_a_slow_robot_it_is_told_whom_it_meets_soon_once_it_is_let_go() -> No
     ahead = Ahead(Pose2D(0, 0, 0), Twist2D(0.4, 0.0)).see((3.5, 0.0))
     assert ahead.foretold() is None, "3.75 s ahead"
     assert ahead.told() is None, "it is not slow for anything"
-    told = ahead.told(AGI=0.8)
+    ahead.scene.report("AGI", factor=0.5)
+    assert ahead.foretold() is None
+    told = ahead.told()
     assert told is not None
     assert told.in_s == pytest.approx(1.5 / 0.8, abs=MS_10)
-    further = Ahead(Pose2D(0, 0, 0), Twist2D(0.4, 0.0)).see((3.7, 0.0))
-    assert further.told(AGI=0.8) is None, "2.1 s ahead"
-
-
-def test_what_it_meets_as_it_drives_is_told_by_that_speed() -> None:
-    ahead = Ahead(Pose2D(0, 0, 0), Twist2D(0.4, 0.0)).see((3.0, 0.0))
-    assert ahead.told(AGI=0.8) == ahead.must()
+    assert ahead.see((3.7, 0.0)).told() is None, "2.1 s ahead"
+    assert ahead.see((3.0, 0.0)).told() == ahead.must(), "2.5 s ahead as it drives"
 
 
 def test_what_slows_is_told_as_it_slows() -> None:
