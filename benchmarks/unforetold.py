@@ -153,7 +153,7 @@ def _lacked(step: int, places: list[Places], look: Look, of: tuple[str, str]) ->
             return "remembered"
         return "elsewhere" if any(far <= _NEAR_M for far, *_ in away) else "unknown"
     if any(
-        far <= _SAME_M and age <= 1.0 and math.dist((z.x, z.y), here) <= z.radius_m
+        far <= _SAME_M and age <= _YOUNG_S and math.dist((z.x, z.y), here) <= z.radius_m
         for far, z, age in away
     ):
         return "inside"
