@@ -97,7 +97,7 @@ def _past_routers(dss: Dss, pages: routes.Pages) -> Iterator[APIRouter]:
             dss.stores.inputs,
             worker,
             lambda: dss.services.rules.versions,
-            dss.settings.told(),
+            dss.settings.without_secrets(),
             dss.pipeline.event_log.log,
             clock,
             __version__,

@@ -449,7 +449,7 @@ class Settings:
         own = f"http://{self.host}:{self.port}/ngsi/notifications"
         return self.notify_url or own
 
-    def told(self) -> dict[str, str]:
+    def without_secrets(self) -> dict[str, str]:
         """All of them by variable; of secrets and logins nothing."""
         values = self.to_environment()
         shown = {name: _without_login(text) for name, text in values.items()}

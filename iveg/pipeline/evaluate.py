@@ -128,7 +128,7 @@ class Evaluator:
 
     def foretold(self, robot_id: str, now: Instant) -> Sequence[Encounter]:
         """Rings that a robot will reach, the soonest first; forecasts grow old, too."""
-        ahead = self._speed_limits.foretold.get(robot_id, {}).values()
+        ahead = self._speed_limits.encounters_shown(robot_id).values()
         young = (one for one in ahead if now.mono - one.at <= LIMITS.silence_s)
         return sorted(young, key=lambda one: one.in_s)
 

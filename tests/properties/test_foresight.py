@@ -1,5 +1,7 @@
 """Foresight only adds (docs/safety.md, "Foresight")."""
 
+from unittest.mock import patch
+
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -7,6 +9,7 @@ from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import CLEAR, Feedback, FeedbackAlert
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import Origin
+from iveg.domain.rule import foresight as rule_foresight
 from iveg.robot.judgement import Judgement, Limits
 from tests.unit.domain.scene import Scene, person
 from tests.unit.robot.rig import person as alert
@@ -83,6 +86,35 @@ def test_nothing_beyond_the_horizon_of_the_rule_is_foretold(
             scene.judge()
         kept, every = (_in_s(scene) for scene in (near, far))
         assert kept == {who: s for who, s in every.items() if s <= horizon_s}
+
+
+@given(st.lists(_STEP, min_size=1, max_size=15))
+def test_what_is_told_beside_what_slows_changes_no_limit(
+    run: list[
+        tuple[
+            float,
+            float,
+            list[tuple[float, float]],
+            tuple[tuple[float, float], ...] | None,
+        ]
+    ],
+) -> None:
+    more, less, x = Scene(), Scene(), 0.0
+    for after_s, speed, people, _ in run:
+        x += min(speed, 1.0) * after_s
+        limits = []
+        for scene in (more, less):
+            scene.now = round(scene.now + after_s, 6)
+            scene.drive("AGI", x, linear=speed)
+            scene.drive("AGII", 3.0, 1.0, linear=-speed)
+            scene.look("AGI", *(person(*spot) for spot in people))
+            with patch.object(
+                rule_foresight, "_MISSED_S", 2.0 if scene is more else 0.0
+            ):
+                limits.append(scene.judge())
+        assert limits[0] == limits[1]
+        slows = more.speed_limits.foretold.get("AGI", {})
+        assert slows.items() <= more.speed_limits.encounters_shown("AGI").items()
 
 
 def _in_s(scene: Scene) -> dict[str, float]:

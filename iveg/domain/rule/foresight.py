@@ -4,22 +4,26 @@ The paper asks for a "preemptive velocity reduction" if a robot's own path meets
 safety zone of a person.  The path is the robot's own plan where it tells one, else the
 arc of its twist; people and peers go on as they were seen to go, so nobody is slowed
 for what a person could do at worst.  What is foretold only adds: the ring itself counts
-as before (docs/safety.md, "Foresight").
+as before (docs/safety.md, "Foresight").  More is told than slows: a robot that is slow
+already, for a ring that grows while somebody is out of sight or for something else,
+still has the encounter before it.
 """
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
 
 from iveg.domain.detection_rule import DetectionRule
+from iveg.domain.feedback import HALF_SPEED
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
 from iveg.domain.robot_state import RobotState
 from iveg.domain.rule.paths import (
     EVERY_S,
+    HOLDS_S,
     MOVES_M_S,
     PLAN_LASTS_S,
     Circles,
@@ -33,6 +37,10 @@ from iveg.domain.world import World
 
 _CAME_TRUE = ((0.5, 1.0, 1.5, 2.0, 2.5, 3.0), (0.98, 0.93, 0.92, 0.88, 0.83, 0.78))
 """Measured (``benchmarks.foresight``; docs/experiment.md, "Foresight")."""
+_ALIKE = 1.05
+"""By so much faster makes no other forecast."""
+_MISSED_S = 2.0
+"""So long a detector may miss somebody who is there (s)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,18 +74,23 @@ def probability(in_s: float) -> float:
 
 Foretold = Mapping[str, Mapping[str, Encounter]]
 """Robot → cause → the first encounter with one of its rings."""
+_Ahead = Mapping[str, Encounter]
+"""The same of one robot."""
 
 
 class Foresight:
     """Keeps what was foretold last.
 
     Attributes:
+        shown: For people to see: what slows, who is out of sight for a moment, and whom
+            a robot that is slow would meet as soon as it is let go.
         if_released: What would be foretold of slowed robots at the speed that they had
             before: who would have to slow again at once is better not let go.
     """
 
     def __init__(self) -> None:
         self._foretold: Foretold = {}
+        self.shown: dict[str, _Ahead] = {}
         self.if_released: Foretold = {}
         self._at = -math.inf
 
@@ -99,20 +112,24 @@ class Foresight:
         """
         if self.is_due(now):
             self._at = now.mono
-            zones = [z for z in zones_of(world, people, rule, now) if _is_seen(z, now)]
-            circles = Circles([_circle(zone, world, now) for zone in zones])
-            drive = [one for one in world.live_robots() if zones and _drives(one)]
-            self._foretold = {
-                one.robot_id: _first(path_of(one, now), zones, circles, rule, now)
-                for one in drive
-            }
-            self.if_released = {
-                one.robot_id: _first(
-                    path_of(one, now, speed), zones, circles, rule, now
-                )
+            look = _Look.at(world, people, rule, now)
+            drive = [one for one in world.live_robots() if look.zones and _drives(one)]
+            ahead = {one.robot_id: look.first(path_of(one, now)) for one in drive}
+            again = {
+                one.robot_id: look.first(path_of(one, now, speed))
                 for one in drive
                 if (speed := speeds_before.get(one.robot_id)) is not None
             }
+            self._foretold = {name: slows for name, (slows, _) in ahead.items()}
+            self.if_released = {name: slows for name, (slows, _) in again.items()}
+            self.shown = {name: {**shown} for name, (_, shown) in ahead.items()}
+            for one in drive:
+                name, free = one.robot_id, _if_free(one)
+                if free is None:
+                    continue
+                known = name in again and free <= _ALIKE * speeds_before[name]
+                met = again[name] if known else look.first(path_of(one, now, free))
+                self.shown[name] = {**_soon(met[1]), **self.shown[name]}
         return self._foretold
 
 
@@ -145,26 +162,92 @@ def _circle(zone: Zone, world: World, now: Instant) -> tuple[float, ...]:
     return zone.x, zone.y, sighting.vx, sighting.vy, age, radius
 
 
-def _first(
-    path: Path,
-    zones: Sequence[Zone],
-    circles: Circles,
-    rule: DetectionRule,
-    now: Instant,
-) -> Mapping[str, Encounter]:
-    """A path's first encounter with each cause in whose rings it does not begin."""
-    inside, meetings = circles.met_by(path)
-    with_it = {zones[one].cause for one in inside}
-    found: dict[str, Encounter] = {}
-    for met in (one for one in meetings if rule.foresees(one.in_s)):
-        zone = zones[met.circle]
-        if zone.cause in with_it or zone.recording is not None:
-            continue
-        earlier = found.get(zone.cause)
-        if earlier is None or met.in_s < earlier.in_s:
+@dataclass(frozen=True, slots=True)
+class _Look:
+    """One look ahead of the fleet.
+
+    Attributes:
+        zones: The rings that slow whoever will reach them, then those that are told of.
+        slow: How many of them slow.
+    """
+
+    zones: Sequence[Zone]
+    slow: int
+    circles: Circles
+    rule: DetectionRule
+    now: Instant
+
+    @classmethod
+    def at(
+        cls, world: World, people: People, rule: DetectionRule, now: Instant
+    ) -> "_Look":
+        """The rings of everybody of whom it is known how they go on."""
+        every = list(zones_of(world, people, rule, now))
+        slow = [zone for zone in every if _is_seen(zone, now)]
+        missed = [
+            replace(zone, radius_m=rule.radius_m)
+            for zone in every
+            if zone.radius_m > rule.radius_m and _is_missed(zone, people, now)
+        ]
+        circles = Circles([_circle(zone, world, now) for zone in (*slow, *missed)])
+        return cls([*slow, *missed], len(slow), circles, rule, now)
+
+    def first(self, path: Path) -> tuple[_Ahead, _Ahead]:
+        """A path's first encounter with each cause in whose rings it does not begin.
+
+        Returns:
+            Those that slow, and those to tell: these, and with rings that have not
+            grown.
+        """
+        inside, meetings = self.circles.met_by(path)
+        begins_in, ring_m = [self.zones[one] for one in inside], self.rule.radius_m
+        within = {self.zones[one].cause for one in inside if one < self.slow}
+        beside = {zone.cause for zone in begins_in if zone.radius_m <= ring_m}
+        slows, shown = dict[str, Encounter](), dict[str, Encounter]()
+        for met in (one for one in meetings if self.rule.foresees(one.in_s)):
+            zone = self.zones[met.circle]
+            if zone.recording is not None:
+                continue
             places = met.x, met.y, met.centre_x, met.centre_y
-            found[zone.cause] = Encounter(zone, met.in_s, now.mono, *places)
-    return found
+            encounter = Encounter(zone, met.in_s, self.now.mono, *places)
+            if met.circle < self.slow and zone.cause not in within:
+                _note(slows, encounter)
+            if zone.radius_m <= ring_m and zone.cause not in beside:
+                _note(shown, encounter)
+        return slows, shown | slows
+
+
+def _if_free(robot: RobotState) -> float | None:
+    """How fast a slow robot drives once it is let go (m/s); None: it is not slow.
+
+    It reports which share of its speed it allows itself.
+    """
+    report, odometry = robot.safety, robot.odometry
+    if report is None or odometry is None or report.speed_factor > HALF_SPEED:
+        return None
+    speed = abs(odometry.twist.linear_x) / max(report.speed_factor, HALF_SPEED)
+    return min(speed, robot.profile.max_speed)
+
+
+def _soon(again: _Ahead) -> _Ahead:
+    """Whom a robot would be slow for if it were let go."""
+    return {cause: one for cause, one in again.items() if one.in_s <= HOLDS_S}
+
+
+def _is_missed(zone: Zone, people: People, now: Instant) -> bool:
+    """Whether somebody may still go on as they did, and only be missed."""
+    sighting, person = zone.sighting, people.known.get(zone.cause)
+    if sighting is None or person is None or sighting.reach_m:
+        return False
+    age_s, is_known = sighting.age_s(now), person.is_well_known and not sighting.laser
+    return age_s <= (_MISSED_S if is_known else LIMITS.seen_s)
+
+
+def _note(found: dict[str, Encounter], encounter: Encounter) -> None:
+    """Keep the first encounter with each cause."""
+    earlier = found.get(encounter.zone.cause)
+    if earlier is None or encounter.in_s < earlier.in_s:
+        found[encounter.zone.cause] = encounter
 
 
 def path_of(robot: RobotState, now: Instant, at_least: float = 0.0) -> Path:

@@ -41,7 +41,7 @@ def gives_way_to(
 
 def _rank(robot: RobotState, now: Instant) -> int | None:
     """The rank of a task that was told lately; None: unknown."""
-    told, navigation = robot.navigation_received, robot.navigation
-    if navigation is None or told is None or now.mono - told.mono > PLAN_LASTS_S:
+    heard, navigation = robot.navigation_received, robot.navigation
+    if navigation is None or heard is None or now.mono - heard.mono > PLAN_LASTS_S:
         return None
     return RANKS.get(navigation.task.strip().lower())

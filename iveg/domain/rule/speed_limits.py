@@ -79,7 +79,7 @@ class SpeedLimits:
     Attributes:
         missing: What the claim "clear" lacks for each robot, since the last judgement.
         limited_since: When each limited robot was first limited (monotonic, s).
-        foretold: Encounters ahead, since the last judgement.
+        foretold: Encounters ahead that slow, since the last judgement.
 
     Args:
         seen: What robots' lasers see near them that nobody explains.
@@ -113,6 +113,11 @@ class SpeedLimits:
     def crossings(self) -> Iterable[Crossing]:
         """Every crossing that has begun and not ended."""
         return [one for mine in self._open.values() for one in mine.values()]
+
+    def encounters_shown(self, robot_id: str) -> Mapping[str, Encounter]:
+        """Encounters ahead of a robot, those among it that slow no robot."""
+        slows = self.foretold.get(robot_id, _NOBODY)
+        return {**self._foresight.shown.get(robot_id, _NOBODY), **slows}
 
     def evaluate(
         self,

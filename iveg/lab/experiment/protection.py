@@ -12,7 +12,7 @@ stepped into view since, which leaves nobody the time to slow before, or who is 
 camera's view.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from statistics import quantiles
 from typing import Final, Literal
@@ -90,6 +90,11 @@ class Entry:
     foretold_s: float | None
     known: Known
 
+    @property
+    def is_foretold(self) -> bool:
+        """Whether iVeg told of it long enough before."""
+        return (self.foretold_s or 0.0) >= AHEAD_S - _ROUNDING_S
+
 
 def _nothing() -> dict[str, float]:
     return dict.fromkeys(SIGHTS, 0.0)
@@ -151,7 +156,7 @@ class Protection:
 
 
 def _entered(entries: list[Entry]) -> Json:
-    foretold = sum((one.foretold_s or 0.0) >= AHEAD_S - _ROUNDING_S for one in entries)
+    foretold = sum(one.is_foretold for one in entries)
     slow = sum(one.speed_share <= SLOW_SHARE for one in entries)
     return {
         "count": len(entries),
@@ -186,6 +191,19 @@ def protection_of(moments: Iterable[NearMoment]) -> Protection:
     delays = [one.delay_s for one in score.encounters]
     score.sums.delays_s = [None if s is None else round(s, 3) for s in delays]
     return score.sums
+
+
+def entries_of(
+    moments: Iterable[NearMoment],
+) -> Iterator[tuple[NearMoment, NearPerson, Entry]]:
+    """Each entry of one run, as ``protection_of`` counts it, with whose it is."""
+    score = _Score()
+    for moment in moments:
+        for person in moment.people:
+            known = len(score.sums.entries)
+            score.note_entry(moment, person)
+            for entry in score.sums.entries[known:]:
+                yield moment, person, entry
 
 
 @dataclass(slots=True)
@@ -231,7 +249,7 @@ class _Score:
     def add(self, moment: NearMoment) -> None:
         """Count one moment of one robot."""
         for person in moment.people:
-            self._note_entry(moment, person)
+            self.note_entry(moment, person)
         if moment.speed < MOVES_M_S:
             return
         slowed = moment.factor <= HALF_SPEED
@@ -245,7 +263,8 @@ class _Score:
             if person.distance_m <= NEAR_M:
                 self._add_near(moment, person, slowed=slowed)
 
-    def _note_entry(self, moment: NearMoment, person: NearPerson) -> None:
+    def note_entry(self, moment: NearMoment, person: NearPerson) -> None:
+        """Count an entry, if this is one."""
         pair = self._pairs.setdefault((moment.robot_id, person.name), _Pair())
         if person.sight != "in_view":
             pair.seen_since = None

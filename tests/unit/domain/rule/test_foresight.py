@@ -57,6 +57,12 @@ class Ahead:
         )
         return next(iter(found.get("AGI", {}).values()), None)
 
+    def shown(self) -> Encounter | None:
+        """What people are told, which need not slow."""
+        scene, foresight = self.scene, Foresight()
+        foresight.look(scene.world, scene.people, scene.rule, at(scene.now))
+        return next(iter(foresight.shown.get("AGI", {}).values()), None)
+
     def must(self) -> Encounter:
         found = self.foretold()
         assert found is not None
@@ -138,6 +144,55 @@ def test_who_was_not_seen_for_a_second_has_a_ring_and_no_forecast() -> None:
     ahead = Ahead(Pose2D(0, 0, 0), Twist2D(0.8, 0.0)).see((3.6, 0.0))
     ahead.scene.now = 1.2
     assert ahead.see().foretold() is None
+    assert ahead.shown() is None, "nor is it told of a glimpse"
+
+
+@pytest.mark.parametrize("missed_s", [0.9, 1.5, 2.0])
+def test_in_a_ring_that_grows_the_encounter_is_told_and_slows_no_more(
+    missed_s: float,
+) -> None:
+    ahead = Ahead(Pose2D(0, 0, 0), Twist2D(0.4, 0.0)).walk(2.7, 0.0, 0.0, 0.0)
+    ahead.scene.now += missed_s
+    assert ahead.see().foretold() is None
+    shown = ahead.shown()
+    assert shown is not None
+    assert shown.in_s == pytest.approx(0.7 / 0.4, abs=MS_10)
+    assert shown.zone.radius_m == 2.0
+
+
+def test_who_may_have_gone_is_not_told_of() -> None:
+    ahead = Ahead(Pose2D(0, 0, 0), Twist2D(0.4, 0.0)).walk(2.7, 0.0, 0.0, 0.0)
+    ahead.scene.now += 2.1
+    assert ahead.see().shown() is None
+
+
+def test_in_the_ring_itself_there_is_nothing_to_tell() -> None:
+    ahead = Ahead(Pose2D(0, 0, 0), Twist2D(0.4, 0.0)).walk(1.9, 0.0, 0.0, 0.0)
+    for missed_s in (0.0, 0.9, 0.6):
+        ahead.scene.now += missed_s
+        assert ahead.see().shown() is None
+
+
+def test_of_a_slow_robot_it_is_told_whom_it_meets_soon_once_it_is_let_go() -> None:
+    ahead = Ahead(Pose2D(0, 0, 0), Twist2D(0.4, 0.0)).see((3.5, 0.0))
+    assert ahead.foretold() is None, "3.75 s ahead"
+    assert ahead.shown() is None, "it is not slow for anything"
+    ahead.scene.report("AGI", factor=0.5)
+    assert ahead.foretold() is None
+    shown = ahead.shown()
+    assert shown is not None
+    assert shown.in_s == pytest.approx(1.5 / 0.8, abs=MS_10)
+    assert ahead.see((3.7, 0.0)).shown() is None, "2.1 s ahead"
+    assert ahead.see((3.0, 0.0)).shown() == ahead.must(), "2.5 s ahead as it drives"
+
+
+def test_what_slows_is_told_as_it_slows() -> None:
+    """A ring that has grown is reached sooner than the one that it began as."""
+    ahead = Ahead(Pose2D(0, 0, 0), Twist2D(0.8, 0.0)).walk(4.0, 0.0, 0.0, 0.0)
+    ahead.scene.now += 0.8
+    shown = ahead.see().shown()
+    assert shown == ahead.must()
+    assert shown.in_s < 2.0 / 0.8
 
 
 def test_its_own_plan_counts_before_the_arc_of_its_twist() -> None:

@@ -76,7 +76,7 @@ class Desk:
             self.recorder,
             FakeWorker(),
             lambda: [DetectionRule()],
-            Settings.from_environment(settings).told(),
+            Settings.from_environment(settings).without_secrets(),
             lambda event, _: self.lines.append(event),
             FakeClock(),
             "1.0",
