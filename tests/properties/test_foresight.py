@@ -2,7 +2,7 @@
 
 from unittest.mock import patch
 
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from iveg.domain.detection_rule import DetectionRule
@@ -125,7 +125,20 @@ def _in_s(scene: Scene) -> dict[str, float]:
 _TASK = st.sampled_from((None, "waiting", "scouting", "hauling", "sowing"))
 
 
+_SLOW, _FAST = (0.1, -1.0, [], None), (0.4, 40.0, [], None)
+
+
 @given(st.lists(st.tuples(_STEP, _TASK, _TASK), max_size=15))
+@example(
+    [
+        ((0.1, 1.0, [], None), None, None),
+        (_SLOW, "waiting", "scouting"),
+        *[(_SLOW, None, None)] * 4,
+        ((0.1, 40.0, [], None), None, None),
+        (_FAST, None, None),
+        ((10.0, -1.0, [], None), None, None),
+    ]
+)
 def test_no_robot_is_ever_faster_for_a_task(
     run: list[
         tuple[

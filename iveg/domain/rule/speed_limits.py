@@ -94,6 +94,8 @@ class SpeedLimits:
         self.limited_since: dict[str, float] = {}
         self._zones = ZoneFinder()
         self._foresight = Foresight()
+        self._fastest: dict[str, float] = {}
+        """Of slow robots, before and since (m/s)."""
         self.foretold: Foretold = {}
         self._rule: DetectionRule | None = None
         self._judged: dict[str, tuple[object, ...]] = {}
@@ -106,6 +108,7 @@ class SpeedLimits:
         other = SpeedLimits(self._greenhouse, self._seen)
         other._open = {name: {**mine} for name, mine in self._open.items()}
         other._foresight = copy(self._foresight)
+        other._fastest = {**self._fastest}
         other.limited_since = {**self.limited_since}
         return other
 
@@ -208,16 +211,18 @@ class SpeedLimits:
         if not rule.foresight:
             self._foresight = Foresight()
             return {}
-        before = self._speeds_before() if self._foresight.is_due(now) else {}
-        return self._foresight.look(world, people, rule, now, before)
-
-    def _speeds_before(self) -> Mapping[str, float]:
-        """Of the robots that are slow now (m/s)."""
-        return {
-            robot_id: max(one.speed_before for one in mine.values())
-            for robot_id, mine in self._open.items()
-            if mine
-        }
+        if self._foresight.is_due(now):
+            self._fastest = {
+                robot_id: max(
+                    self._fastest.get(robot_id, 0.0),
+                    # Who is slow early for a task may not have been fast yet.
+                    world.robots[robot_id].fastest_lately(),
+                    *(one.speed_before for one in mine.values()),
+                )
+                for robot_id, mine in self._open.items()
+                if mine
+            }
+        return self._foresight.look(world, people, rule, now, self._fastest)
 
     def _foreseen(
         self,
