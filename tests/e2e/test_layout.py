@@ -227,6 +227,21 @@ def test_13_19_a_card_is_as_high_whatever_it_says(fleet: Fleet) -> None:
         assert len(heights) == 1, size
 
 
+@pytest.mark.parametrize("fleet", [2, 6], indirect=True)
+def test_a_card_shows_no_half_line_and_what_to_do_whole(fleet: Fleet) -> None:
+    first = frozen()["snapshot"]["robots"][0]
+    cut = {}
+    for name, (known, *_) in STAGED.items():
+        fleet.tell({**first, "situation": staged.told(known), "age_s": known.age_s})
+        for size in (*SIZES, (1280, 900)):
+            found = evaluate(fleet.at(size), CUT_LINES)
+            if found:
+                cut[name, size] = found
+    fleet.tell(first)
+
+    assert cut == {}
+
+
 @pytest.mark.parametrize("fleet", [2], indirect=True)
 def test_two_cards_are_whole_on_a_desktop_and_have_no_second_stop(fleet: Fleet) -> None:
     page = fleet.at((1440, 900))
@@ -309,6 +324,28 @@ WITHIN_REACH = """() => {
   return [...near];
 }"""
 """STOPs of cards that a finger finds within 24 px of that of all, when scrolled."""
+CUT_LINES = """() => {
+  const card = document.querySelector('.card[data-robot="AGI"]');
+  const mode = card.querySelector('.card__mode');
+  const words = document.createTreeWalker(mode, NodeFilter.SHOW_TEXT);
+  const found = [];
+  while (words.nextNode()) {
+    const node = words.currentNode;
+    const isTodo = Boolean(node.parentElement.closest('.card__todo'));
+    const range = document.createRange();
+    range.selectNodeContents(node);
+    const bottoms = [node.parentElement.closest('.card__said'), mode]
+      .filter((of) => of && getComputedStyle(of).overflow === 'hidden')
+      .map((of) => of.getBoundingClientRect().bottom);
+    for (const line of node.data.trim() ? range.getClientRects() : []) {
+      const seen = Math.min(line.bottom, ...bottoms) - line.top;
+      const isWhole = seen > line.height - 3;
+      if (!isWhole && (seen > 2 || isTodo)) found.push(`${node.data}: ${seen} px`);
+    }
+  }
+  return found;
+}"""
+"""Lines of a card that are seen in part, and lines of what to do that are not seen."""
 LETTERS = """() => {
   const words = document.createTreeWalker(
     document.querySelector('#robots'), NodeFilter.SHOW_TEXT);

@@ -127,7 +127,7 @@ export class RobotCard {
   /** @param {Robot | undefined} robot */
   #drawMode(robot) {
     const { i18n } = this.#app;
-    const { why, causes, faults } = this.#parts;
+    const { why, todo, causes, faults } = this.#parts;
     const situation = situationOf(robot);
     const phrases = phrasesOf(situation, i18n);
     setAttribute(this.#card, "data-level", situation.level);
@@ -135,7 +135,9 @@ export class RobotCard {
     const mark = markOf(situation);
     if (mark) setAttribute(causes, "data-cause", mark);
     else causes.removeAttribute("data-cause");
-    setText(why, [phrases.why, phrases.todo].filter(Boolean).join(" — "));
+    setText(why, phrases.why);
+    setText(todo, phrases.todo);
+    this.#card.toggleAttribute("data-todo", phrases.todo !== "");
     const said = robot ? faultsSaid(robot, i18n).join(" · ") : "";
     setText(faults, said);
   }
