@@ -329,6 +329,11 @@ CUT_LINES = """() => {
   const mode = card.querySelector('.card__mode');
   const words = document.createTreeWalker(mode, NodeFilter.SHOW_TEXT);
   const found = [];
+  const said = card.querySelector('.card__said');
+  const lines = parseInt(getComputedStyle(said).webkitLineClamp);
+  const high = lines * parseFloat(getComputedStyle(said).lineHeight);
+  if (said.scrollHeight > said.clientHeight + 1 && said.clientHeight < high - 1)
+    found.push(`without an ellipsis: ${said.textContent}`);
   while (words.nextNode()) {
     const node = words.currentNode;
     const isTodo = Boolean(node.parentElement.closest('.card__todo'));
@@ -345,7 +350,8 @@ CUT_LINES = """() => {
   }
   return found;
 }"""
-"""Lines of a card that are seen in part, and lines of what to do that are not seen."""
+"""Lines of a card that are seen in part or cut without an ellipsis, and lines of what to
+do that are not seen."""
 LETTERS = """() => {
   const words = document.createTreeWalker(
     document.querySelector('#robots'), NodeFilter.SHOW_TEXT);
@@ -436,6 +442,23 @@ def test_the_tab_of_the_log_leads_to_it_from_another_page(
         assert box is not None
         assert header is not None
         assert abs(box["y"] - header["height"]) <= 2
+
+
+@pytest.mark.parametrize("name", ["commands", "alerts", "decisions", "audit"])
+def test_no_column_of_a_list_is_cut(browser: Browser, past: Site, name: str) -> None:
+    for language in ("es", "en"):
+        with frozen_page(browser, past, (1024, 768), language=language) as page:
+            page.goto(f"{past.url}/{name}")
+            settle(page, ".table--list tbody tr")
+            for wide, high in (*SIZES, (767, 900)):
+                page.set_viewport_size({"width": wide, "height": high})
+                assert evaluate(page, CUT_LISTS) == [], (language, wide)
+
+
+CUT_LISTS = """() => [...document.querySelectorAll('.scroll-x:has(.table--list)')]
+  .filter((it) => it.checkVisibility() && it.scrollWidth > it.clientWidth)
+  .map((it) => `${it.id}: ${it.scrollWidth - it.clientWidth} px`)"""
+"""Lists that are wider than their place."""
 
 
 def test_the_screen_of_a_wall_looks_and_stops_and_frees_nothing(
