@@ -147,8 +147,8 @@ STAGED = {
     "late": (
         facts(link="LATE", age_s=1.8),
         "doubt",
-        ("última noticia hace 1,8 s", "trátelo como en marcha"),
-        ("last news 1.8 s ago", "treat it as moving"),
+        ("última noticia hace\xa01,8\xa0s", "trátelo como en marcha"),
+        ("last news 1.8\xa0s ago", "treat it as moving"),
     ),
     "contradicts itself": (
         facts(doubts=("jumped",)),

@@ -141,6 +141,17 @@ async def test_robots_stand_as_people_count_over_pages(
     assert (found, cursor) == ([*wanted], None)
 
 
+async def test_charts_have_robots_as_people_count(
+    queries: Queries, database_url: str
+) -> None:
+    rows = [odometry_record(at=NOON, robot_id=r) for r in ("R10", "R2", "AGI")]
+    remember(database_url, *rows)
+
+    found = await queries.speed_series(NOON, NOON + 60)
+
+    assert [one.robot_id for one in found] == ["AGI", "R2", "R10"]
+
+
 async def test_a_full_last_page_is_the_end(queries: Queries, database_url: str) -> None:
     remember(database_url, log_record(id=1), log_record(id=2))
 
