@@ -444,18 +444,18 @@ def test_the_tab_of_the_log_leads_to_it_from_another_page(
         assert abs(box["y"] - header["height"]) <= 2
 
 
-@pytest.mark.parametrize("name", ["commands", "alerts", "decisions", "audit"])
+@pytest.mark.parametrize("name", ["commands", "alerts", "decisions", "audit", "fleet"])
 def test_no_column_of_a_list_is_cut(browser: Browser, past: Site, name: str) -> None:
     for language in ("es", "en"):
         with frozen_page(browser, past, (1024, 768), language=language) as page:
             page.goto(f"{past.url}/{name}")
-            settle(page, ".table--list tbody tr")
+            settle(page, ":is(.table--list, #machines) tbody tr")
             for wide, high in (*SIZES, (767, 900)):
                 page.set_viewport_size({"width": wide, "height": high})
                 assert evaluate(page, CUT_LISTS) == [], (language, wide)
 
 
-CUT_LISTS = """() => [...document.querySelectorAll('.scroll-x:has(.table--list)')]
+CUT_LISTS = """() => [...document.querySelectorAll('.scroll-x:has(.table--list, #machines)')]
   .filter((it) => it.checkVisibility() && it.scrollWidth > it.clientWidth)
   .map((it) => `${it.id}: ${it.scrollWidth - it.clientWidth} px`)"""
 """Lists that are wider than their place."""

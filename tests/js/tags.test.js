@@ -60,9 +60,10 @@ function covered({ paint, robots }) {
 test("no robot's name or age stands on another's, however small the map", () => {
   const lost = { link: "LOST", ageS: 4 };
   const held = { situation: { level: "locked", state: "standing", slots: {} } };
-  equal([{}, lost, { link: "LATE", ageS: 1.1 }, held].map(frame).map(covered), [
-    0, 0, 0, 0,
-  ]);
+  equal(
+    [{}, lost, { link: "LATE", ageS: 1.1 }, held].map(frame).map(covered),
+    [0, 0, 0, 0],
+  );
 });
 
 test("an age stands beside the name where there is room", () => {

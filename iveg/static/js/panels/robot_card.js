@@ -118,7 +118,8 @@ export class RobotCard {
     setAttribute(this.#card, "data-link", link);
     setAttribute(this.#card, "data-mode", robot?.mode ?? "UNKNOWN");
     setAttribute(menu, "aria-label", i18n.t("release.open", { robot: this.#robotId }));
-    setText(this.#fields.link, i18n.t(`robot.link.${link}`));
+    const isThen = link === "LIVE" && document.body.hasAttribute("data-past");
+    setText(this.#fields.link, i18n.t(`robot.link.${isThen ? "THEN" : link}`));
     setAttribute(shape, "data-slot", String(slotOf(this.#robotId)));
     setAttribute(shape, "data-drive", robot?.profile?.drive ?? "differential");
     setHidden(replay, !robot?.replay);
