@@ -350,8 +350,8 @@ CUT_LINES = """() => {
   }
   return found;
 }"""
-"""Lines of a card that are seen in part or cut without an ellipsis, and what to do that is
-not seen."""
+"""Lines of a card that are seen in part or cut without an ellipsis, and what to do that
+is not seen."""
 LETTERS = """() => {
   const words = document.createTreeWalker(
     document.querySelector('#robots'), NodeFilter.SHOW_TEXT);
