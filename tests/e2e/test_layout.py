@@ -465,7 +465,10 @@ CUT_LISTS = """() => [...document.querySelectorAll('.scroll-x')]
 def test_the_screen_of_a_wall_looks_and_stops_and_frees_nothing(
     browser: Browser, past: Site
 ) -> None:
-    with frozen_page(browser, past, (1440, 900), language="en") as page:
+    told = snapshot(6)
+    with frozen_page(
+        browser, past, (1440, 900), language="en", tell=lambda: told
+    ) as page:
         page.goto(past.url)
         settle(page, "#map-fit:enabled")
         page.locator(".user").click()
@@ -480,6 +483,7 @@ def test_the_screen_of_a_wall_looks_and_stops_and_frees_nothing(
         assert gone.count() > 0
         assert [one for one in gone.all() if one.is_visible()] == []
         expect(page.locator("body")).to_have_css("cursor", "none")
+        assert evaluate(page, TAGS_ON_WORDS) == []
         expect(strip_stop(page, "fleet")).to_be_in_viewport(ratio=1)
         assert evaluate(page, COVERED_STOPS) == []
         answers = {
@@ -491,6 +495,14 @@ def test_the_screen_of_a_wall_looks_and_stops_and_frees_nothing(
             "robots/AGI/release": 403,
             "alerts/x/acknowledge": 403,
         }
+
+
+TAGS_ON_WORDS = """() => [...document.querySelectorAll('.card')].filter((card) => {
+  const bottom = (part) => card.querySelector(part).getBoundingClientRect().bottom;
+  const mode = card.querySelector('.card__mode').getBoundingClientRect();
+  return bottom('.link') > mode.top + 1;
+}).map((card) => card.dataset.robot)"""
+"""Cards on which the age covers what is said."""
 
 
 def _posted(page: Page, path: str) -> object:
