@@ -28,8 +28,8 @@ const NAME = { size: 13, weight: 700 };
 const WORDS_PX = 28;
 
 /**
- * Where the labels of each robot stand: above it, else below, else farther away, where no
- * other label is and no other robot's name will be.  Where there is no room for all of
+ * Where the labels of each robot stand: above it, else below, else farther away, else
+ * beside it, where no other label is and no other robot's name will be.  Where there is no room for all of
  * it, its name stands alone; the card has the rest.  At an edge of the map it moves aside.
  *
  * @param {Paint} paint
@@ -46,14 +46,12 @@ export function placesOfTags(paint, robots) {
 function placeOf(paint, robot, names) {
   const tags = tagsOf(paint, robot);
   for (const told of tags.length ? [tags, []] : [tags]) {
-    const { rects, heights, aside } = rectsOf(paint, robot, told);
+    const { rects, places } = rectsOf(paint, robot, told);
     const clear = rects.filter((rect) => !names.some((name) => overlap(rect, name)));
     const found = claim(paint, clear);
-    if (found !== null)
-      return { y: heights[rects.indexOf(clear[found])], aside, tags: told };
+    if (found !== null) return { ...places[rects.indexOf(clear[found])], tags: told };
   }
-  const { heights, aside } = rectsOf(paint, robot, []);
-  return { y: heights[0], aside, tags: [] };
+  return { ...rectsOf(paint, robot, []).places[0], tags: [] };
 }
 
 /**
@@ -64,8 +62,8 @@ function placeOf(paint, robot, names) {
 function rectsOf(paint, robot, tags) {
   const { view } = paint;
   const isHeld = isSeenHeld(robot);
-  const near = bodySize(robot, view.scale)[0] / 2 + 20;
-  const heights = [-near, near, -near - WORDS_PX, near + WORDS_PX];
+  const [length] = bodySize(robot, view.scale);
+  const near = length / 2 + 20;
   const half = widthOf(paint, robot.id, NAME) / 2;
   const widths = tags.map(([text]) => widthOfPill(paint, text));
   const x = screenX(view, robot.pose.x);
@@ -75,13 +73,19 @@ function rectsOf(paint, robot, tags) {
   const up = isHeld ? PADLOCK_PX : tags.length ? PILL_PX : NAME_PX;
   const isInView = x >= 0 && x <= view.width;
   const aside = isInView ? Math.max(-left, Math.min(0, view.width - right)) : 0;
-  const rects = heights.map((dy) => ({
-    left: left + aside,
-    right: right + aside,
-    top: y + dy - up,
-    bottom: y + dy + up,
+  const heights = [-near, near, -near - WORDS_PX, near + WORDS_PX];
+  const places = heights.map((dy) => ({ y: dy, aside }));
+  const [east, west] = [x - left, x - right].map(
+    (px) => px + (px < 0 ? -length : length),
+  );
+  if (isInView) places.push({ y: 0, aside: east }, { y: 0, aside: west });
+  const rects = places.map((place) => ({
+    left: left + place.aside,
+    right: right + place.aside,
+    top: y + place.y - up,
+    bottom: y + place.y + up,
   }));
-  return { rects, heights, aside };
+  return { rects, places };
 }
 
 /** @param {Paint} paint @param {SceneRobot} robot @param {Place} place */
