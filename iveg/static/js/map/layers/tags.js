@@ -75,10 +75,9 @@ function rectsOf(paint, robot, tags) {
   const aside = isInView ? Math.max(-left, Math.min(0, view.width - right)) : 0;
   const heights = [-near, near, -near - WORDS_PX, near + WORDS_PX];
   const places = heights.map((dy) => ({ y: dy, aside }));
-  const [east, west] = [x - left, x - right].map(
-    (px) => px + (px < 0 ? -length : length),
-  );
-  if (isInView) places.push({ y: 0, aside: east }, { y: 0, aside: west });
+  const [east, west] = [x - left + length, x - right - length];
+  if (right + east <= view.width) places.push({ y: 0, aside: east });
+  if (left + west >= 0) places.push({ y: 0, aside: west });
   const rects = places.map((place) => ({
     left: left + place.aside,
     right: right + place.aside,
