@@ -54,7 +54,7 @@ STAGED = {
         facts(link="LOST", age_s=4.0, alert=p1("alert.moving_robot_lost")),
         "danger",
         ("sin contacto hace 4 s", "aléjese"),
-        ("no contact for 4 s while moving", "keep away; it should stop by itself"),
+        ("no contact for 4 s while moving", "keep away, it should stop"),
     ),
     "STOP not confirmed": (
         facts(alert=p1("alert.stop_unconfirmed"), stop="UNCONFIRMED"),
@@ -141,14 +141,14 @@ STAGED = {
     "stopping": (
         facts(stop="SENT"),
         "caution",
-        ("parada enviada", "trátelo como en movimiento"),
+        ("parada enviada", "trátelo como en marcha"),
         ("STOP sent, not confirmed yet", "treat it as moving"),
     ),
     "late": (
         facts(link="LATE", age_s=1.8),
         "doubt",
-        ("última noticia hace 1,8 s", "trátelo como en movimiento"),
-        ("last news 1.8 s ago", "treat it as moving"),
+        ("última noticia hace\xa01,8\xa0s", "trátelo como en marcha"),
+        ("last news 1.8\xa0s ago", "treat it as moving"),
     ),
     "contradicts itself": (
         facts(doubts=("jumped",)),
@@ -165,8 +165,8 @@ STAGED = {
     "stopped from a page": (
         facts(stop="STANDING", stands=True, report=LOCKED),
         "locked",
-        ("bloqueado por la parada", "rearme cuando la vía esté libre"),
-        ("locked by STOP", "release it when the way is free"),
+        ("bloqueado por la parada", "rearme con la vía libre"),
+        ("locked by STOP", "release it once it is clear"),
     ),
     "all clear": (
         facts(),

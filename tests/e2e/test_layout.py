@@ -227,6 +227,21 @@ def test_13_19_a_card_is_as_high_whatever_it_says(fleet: Fleet) -> None:
         assert len(heights) == 1, size
 
 
+@pytest.mark.parametrize("fleet", [2, 6], indirect=True)
+def test_a_card_shows_no_half_line_and_what_to_do_whole(fleet: Fleet) -> None:
+    first = frozen()["snapshot"]["robots"][0]
+    cut = {}
+    for name, (known, *_) in STAGED.items():
+        fleet.tell({**first, "situation": staged.told(known), "age_s": known.age_s})
+        for size in (*SIZES, (1280, 900)):
+            found = evaluate(fleet.at(size), CUT_LINES)
+            if found:
+                cut[name, size] = found
+    fleet.tell(first)
+
+    assert cut == {}
+
+
 @pytest.mark.parametrize("fleet", [2], indirect=True)
 def test_two_cards_are_whole_on_a_desktop_and_have_no_second_stop(fleet: Fleet) -> None:
     page = fleet.at((1440, 900))
@@ -309,6 +324,34 @@ WITHIN_REACH = """() => {
   return [...near];
 }"""
 """STOPs of cards that a finger finds within 24 px of that of all, when scrolled."""
+CUT_LINES = """() => {
+  const card = document.querySelector('.card[data-robot="AGI"]');
+  const mode = card.querySelector('.card__mode');
+  const words = document.createTreeWalker(mode, NodeFilter.SHOW_TEXT);
+  const found = [];
+  const said = card.querySelector('.card__said');
+  const lines = parseInt(getComputedStyle(said).webkitLineClamp);
+  const high = lines * parseFloat(getComputedStyle(said).lineHeight);
+  if (said.scrollHeight > said.clientHeight + 1 && said.clientHeight < high - 1)
+    found.push(`without an ellipsis: ${said.textContent}`);
+  while (words.nextNode()) {
+    const node = words.currentNode;
+    const isTodo = Boolean(node.parentElement.closest('.card__todo'));
+    const range = document.createRange();
+    range.selectNodeContents(node);
+    const bottoms = [node.parentElement.closest('.card__said'), mode]
+      .filter((of) => of && getComputedStyle(of).overflow === 'hidden')
+      .map((of) => of.getBoundingClientRect().bottom);
+    for (const line of node.data.trim() ? range.getClientRects() : []) {
+      const seen = Math.min(line.bottom, ...bottoms) - line.top;
+      const isWhole = seen > line.height - 3;
+      if (!isWhole && (seen > 2 || isTodo)) found.push(`${node.data}: ${seen} px`);
+    }
+  }
+  return found;
+}"""
+"""Lines of a card that are seen in part or cut without an ellipsis, and what to do that
+is not seen."""
 LETTERS = """() => {
   const words = document.createTreeWalker(
     document.querySelector('#robots'), NodeFilter.SHOW_TEXT);
@@ -401,10 +444,31 @@ def test_the_tab_of_the_log_leads_to_it_from_another_page(
         assert abs(box["y"] - header["height"]) <= 2
 
 
+@pytest.mark.parametrize("name", ["commands", "alerts", "decisions", "audit", "fleet"])
+def test_no_column_of_a_list_is_cut(browser: Browser, past: Site, name: str) -> None:
+    for language in ("es", "en"):
+        with frozen_page(browser, past, (1024, 768), language=language) as page:
+            page.goto(f"{past.url}/{name}")
+            settle(page, ":is(.table--list, #machines) tbody tr")
+            for wide, high in (*SIZES, (767, 900)):
+                page.set_viewport_size({"width": wide, "height": high})
+                assert evaluate(page, CUT_LISTS) == [], (language, wide)
+
+
+CUT_LISTS = """() => [...document.querySelectorAll('.scroll-x')]
+  .filter((it) => it.querySelector('.table--list, #machines'))
+  .filter((it) => it.checkVisibility() && it.scrollWidth > it.clientWidth)
+  .map((it) => `${it.id}: ${it.scrollWidth - it.clientWidth} px`)"""
+"""Lists that are wider than their place."""
+
+
 def test_the_screen_of_a_wall_looks_and_stops_and_frees_nothing(
     browser: Browser, past: Site
 ) -> None:
-    with frozen_page(browser, past, (1440, 900), language="en") as page:
+    told = snapshot(6)
+    with frozen_page(
+        browser, past, (1440, 900), language="en", tell=lambda: told
+    ) as page:
         page.goto(past.url)
         settle(page, "#map-fit:enabled")
         page.locator(".user").click()
@@ -419,6 +483,7 @@ def test_the_screen_of_a_wall_looks_and_stops_and_frees_nothing(
         assert gone.count() > 0
         assert [one for one in gone.all() if one.is_visible()] == []
         expect(page.locator("body")).to_have_css("cursor", "none")
+        assert evaluate(page, TAGS_ON_WORDS) == []
         expect(strip_stop(page, "fleet")).to_be_in_viewport(ratio=1)
         assert evaluate(page, COVERED_STOPS) == []
         answers = {
@@ -430,6 +495,14 @@ def test_the_screen_of_a_wall_looks_and_stops_and_frees_nothing(
             "robots/AGI/release": 403,
             "alerts/x/acknowledge": 403,
         }
+
+
+TAGS_ON_WORDS = """() => [...document.querySelectorAll('.card')].filter((card) => {
+  const bottom = (part) => card.querySelector(part).getBoundingClientRect().bottom;
+  const mode = card.querySelector('.card__mode').getBoundingClientRect();
+  return bottom('.link') > mode.top + 1;
+}).map((card) => card.dataset.robot)"""
+"""Cards on which the age covers what is said."""
 
 
 def _posted(page: Page, path: str) -> object:

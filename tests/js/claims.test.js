@@ -26,6 +26,12 @@ test("13.19: words give way to an aisle's name, to figures and to robots", () =>
   equal([at(30, 100), at(300, 330), at(450, 500)], [true, true, true]);
 });
 
+test("a robot beside somebody keeps its place, too", () => {
+  const paint = frame();
+  paint.scene.robots[0].pose = { x: 10.5, y: 10, yaw: 0 };
+  equal(mayStand(paint, "R1", 327, 300, 11), false);
+});
+
 test("28.7: an aisle's name gives way to a robot, and stays where it went", () => {
   const paint = frame();
   const [robot] = paint.scene.robots;

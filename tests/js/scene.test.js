@@ -1,7 +1,7 @@
 import { LIMITS } from "../../iveg/static/js/core/limits.js";
 import { Store } from "../../iveg/static/js/core/store.js";
 import { borderTowards } from "../../iveg/static/js/map/layers/encounters.js";
-import { isSeenHeld } from "../../iveg/static/js/map/layers/robot.js";
+import { isSeenHeld } from "../../iveg/static/js/map/layers/tags.js";
 import { marked, readPerson, readScene } from "../../iveg/static/js/map/scene.js";
 import { command, detection, person, robot, situation, snapshot } from "./builders.js";
 import { equal, near, test } from "./harness.js";

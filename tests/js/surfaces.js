@@ -12,7 +12,7 @@ import {
   sentenceOf,
   situationOf,
 } from "../../iveg/static/js/core/situation.js";
-import { isSeenHeld, tagsOf } from "../../iveg/static/js/map/layers/robot.js";
+import { isSeenHeld, tagsOf } from "../../iveg/static/js/map/layers/tags.js";
 import { statusOf } from "../../iveg/static/js/pages/fleet.js";
 import { heardOf, judgeDataPath } from "../../iveg/static/js/pages/health_sentence.js";
 import { readingOf } from "../../iveg/static/js/panels/gauge.js";

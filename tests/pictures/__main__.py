@@ -39,7 +39,7 @@ PAGES = {
     "decisions": "/decisions",
     "decision": "/decisions/D1",
     "history": "/history",
-    "day": "/day",
+    "day": "/day?day=2026-11-21",
     "compare": "/compare",
     "fleet": "/fleet",
     "command": "/commands/C1",
@@ -77,6 +77,10 @@ READY = {
         for name in ("users", "tokens", "sessions", "audit")
     },
     "climate": "#trend-co2 .main-svg",
+    "settings": "#rule-form:visible",
+    "decisions": "#decisions-rows tbody tr",
+    "fleet": "#machines tbody tr",
+    "compare": "#compare-page table tbody tr",
 }
 """What a page is about; of the others their frame will do."""
 _LOST_MS = 4000

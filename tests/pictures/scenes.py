@@ -29,7 +29,7 @@ _NOT_SLOWING = _is(
     "danger", "not_slowing", "press_stop", why="person_in", slots=_IN_AISLE
 )
 _LOST = _is("danger", "lost_moving", "keep_away", slots={"age": 4.2})
-_LATE = _is("doubt", "late", "as_moving", cause="link", slots={"age": 0.9})
+_LATE = _is("doubt", "late", "as_moving", cause="link", slots={"age": 1.4})
 _STANDING = _is("locked", "standing", "release", cause="stop")
 _STILL_MOVING = _is("danger", "still_moving", "red_button")
 
@@ -74,7 +74,7 @@ def _danger(seen: Told) -> None:
 
 def _lost(seen: Told) -> None:
     """One is late; of a fleet the last one was lost while it moved."""
-    seen["robots"][0].update(situation=_LATE, age_s=0.9, link="LATE")
+    seen["robots"][0].update(situation=_LATE, age_s=1.4, link="LATE")
     last = seen["robots"][-1]
     last.update(situation=_LOST, age_s=4.2, link="LOST")
     slots = {"robot": last["robot_id"], "age": 4.2}

@@ -6,6 +6,7 @@ new rows nor deep pages make the next one wrong or slow.
 
 import base64
 import binascii
+import string
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, Generic, TypeVar
@@ -201,7 +202,7 @@ def read_page(connection: Connection, of: ListOf[R], asked: Filter) -> Page[R]:
     if len(rows) <= limit:
         return Page(items, None)
     last = rows[limit - 1]
-    value = None if group is None else last[of.sorts[_name(asked.sort)]] or ""
+    value = None if not group else last[of.sorts[_name(asked.sort)]] or ""
     return Page(items, Cursor(last[of.at], last[of.key], value))
 
 
@@ -209,26 +210,34 @@ def _name(sort: str) -> str:
     return sort.removeprefix("-")
 
 
-def _group(of: ListOf[R], sort: str) -> ColumnElement[str] | None:
-    """What a list is sorted by before its time; None: by that alone."""
+def _group(of: ListOf[R], sort: str) -> tuple[ColumnElement[Any], ...]:
+    """What a list is sorted by before its time; empty: by that alone."""
     if _name(sort) == BY_TIME:
-        return None
-    return func.coalesce(of.sorts[_name(sort)], "")
+        return ()
+    return _as_counted(func.coalesce(of.sorts[_name(sort)], ""))
+
+
+def _as_counted(name: ColumnElement[str]) -> tuple[ColumnElement[Any], ...]:
+    """What sorts names that may end in a number as people count: R2 before R10.
+
+    Of the names that differ by that number alone, the shorter has the smaller.
+    """
+    return func.rtrim(name, string.digits), func.length(name), name
 
 
 def _order(
-    of: ListOf[R], group: ColumnElement[str] | None, sort: str
+    of: ListOf[R], group: tuple[ColumnElement[Any], ...], sort: str
 ) -> Iterator[ColumnElement[Any]]:
     falls = sort.startswith("-")
-    if group is not None:
-        yield group.desc() if falls else group.asc()
-        falls = True
+    for column in group:
+        yield column.desc() if falls else column.asc()
+    falls = falls or bool(group)
     for column in (of.at, of.key):
         yield column.desc() if falls else column.asc()
 
 
 def _after(
-    of: ListOf[R], group: ColumnElement[str] | None, asked: Filter
+    of: ListOf[R], group: tuple[ColumnElement[Any], ...], asked: Filter
 ) -> Iterator[ColumnElement[bool]]:
     """What comes after the cursor."""
     if (cursor := asked.cursor) is None:
@@ -236,11 +245,13 @@ def _after(
     falls = asked.sort.startswith("-")
     place = tuple_(of.at, of.key)
     last = tuple_(literal(cursor.at), literal(cursor.key))
-    if group is None:
+    if not group:
         yield place < last if falls else place > last
     else:
-        beyond = group < cursor.group if falls else group > cursor.group
-        yield or_(beyond, and_(group == cursor.group, place < last))
+        here = tuple_(*group)
+        there = tuple_(*_as_counted(literal(cursor.group)))
+        beyond = here < there if falls else here > there
+        yield or_(beyond, and_(here == there, place < last))
 
 
 def conditions(of: ListOf[R], asked: Filter) -> Iterator[ColumnElement[bool]]:

@@ -26,6 +26,7 @@ from iveg.adapters.history.tables import (
     odometry,
 )
 from iveg.domain.day import DaySighting, Pose
+from iveg.domain.fleet import as_counted
 from iveg.domain.records import ByTransport, CommandRecord
 
 MOST_POINTS = 2000
@@ -134,8 +135,8 @@ def speed_series(
     robot: str | None = None,
     most: int = MOST_POINTS,
 ) -> tuple[SpeedSeries, ...]:
-    """One series for each robot with data in ``since <= at < until``."""
-    robots = _robots(connection) if robot is None else [robot]
+    """One series for each robot with data in ``since <= at < until``: R2 before R10."""
+    robots = [robot] if robot else sorted(_robots(connection), key=as_counted)
     found = (_one(connection, one, since, until, most) for one in robots)
     return tuple(series for series in found if series.at)
 

@@ -242,7 +242,7 @@ def _too_close(facts: RobotFacts) -> Iterator[Situation]:
     if margin.band == "inside":
         close = Situation("caution", "close", "margin")
         close = _because(close, facts.margin_near)
-        slots = {**close.slots, "short": round(-margin.margin_m, 1)}
+        slots = {**close.slots, "short": max(0.1, round(-margin.margin_m, 1))}
         yield replace(close, cause="margin", slots=slots)
     elif margin.band == "unknown":
         yield Situation("doubt", "unseen", "margin", about=margin.person_id)

@@ -123,6 +123,35 @@ async def test_28_9_a_sorted_list_keeps_its_order_over_pages_and_new_rows(
     assert (ids, cursor) == (found, None)
 
 
+@pytest.mark.parametrize("sort", ["robot", "-robot"])
+async def test_robots_stand_as_people_count_over_pages(
+    queries: Queries, database_url: str, sort: str
+) -> None:
+    counted = ("7", "70", "AGI", "AGII", "R1", "R1", "R2", "R10", "R100", "R10-9")
+    lines = [log_record(id=n, at=NOON, robot_id=r) for n, r in enumerate(counted)]
+    remember(database_url, *lines)
+
+    found, cursor = [], None
+    for _ in range(4):
+        page = await queries.log(Filter(limit=3, sort=sort, cursor=cursor))
+        found += [one.robot_id for one in page.items]
+        cursor = page.next
+
+    wanted = counted if sort == "robot" else counted[::-1]
+    assert (found, cursor) == ([*wanted], None)
+
+
+async def test_charts_have_robots_as_people_count(
+    queries: Queries, database_url: str
+) -> None:
+    rows = [odometry_record(at=NOON, robot_id=r) for r in ("R10", "R2", "AGI")]
+    remember(database_url, *rows)
+
+    found = await queries.speed_series(NOON, NOON + 60)
+
+    assert [one.robot_id for one in found] == ["AGI", "R2", "R10"]
+
+
 async def test_a_full_last_page_is_the_end(queries: Queries, database_url: str) -> None:
     remember(database_url, log_record(id=1), log_record(id=2))
 

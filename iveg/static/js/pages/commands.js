@@ -91,16 +91,17 @@ function createDrills(store, i18n) {
  */
 function cellsOf(command, transports, i18n, opened) {
   const took = tookOf(command, transports);
-  const number = (/** @type {number | null} */ value) =>
-    make("td", "number", value === null ? "—" : i18n.number(value, 0));
+  const number = (/** @type {number | null} */ value, kind = "number") =>
+    make("td", kind, value === null ? "—" : i18n.number(value, 0));
+  const extra = (/** @type {number | null} */ value) => number(value, "number extra");
   return [
     make("td", "time", dayAndTime(zeroOf(command.times))),
     make("td", "", command.robot_id),
     orderOf(command, i18n),
     endOf(command, i18n, opened),
     make("td", "", i18n.t("rows.by", { by: command.requested_by })),
-    number(took.accepted),
-    ...transports.flatMap((_, i) => [number(took.sent[i]), number(took.answer[i])]),
+    extra(took.accepted),
+    ...transports.flatMap((_, i) => [extra(took.sent[i]), number(took.answer[i])]),
     number(took.standing),
     number(command.tries),
   ];

@@ -104,7 +104,8 @@ function createBar() {
       setAttribute(value, "d", line(0, share));
       setAttribute(limit, "transform", `translate(${along(allowed)} 1)`);
       setAttribute(limit, "visibility", shown(reading.factor));
-      setText(text, `${reading.speedSaid} · ${reading.limitSaid}`);
+      const said = [reading.speedSaid, reading.limitSaid].filter(Boolean);
+      setText(text, said.join(" · "));
     },
   };
 }

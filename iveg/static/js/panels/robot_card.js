@@ -118,7 +118,8 @@ export class RobotCard {
     setAttribute(this.#card, "data-link", link);
     setAttribute(this.#card, "data-mode", robot?.mode ?? "UNKNOWN");
     setAttribute(menu, "aria-label", i18n.t("release.open", { robot: this.#robotId }));
-    setText(this.#fields.link, i18n.t(`robot.link.${link}`));
+    const isThen = link === "LIVE" && document.body.hasAttribute("data-past");
+    setText(this.#fields.link, i18n.t(`robot.link.${isThen ? "THEN" : link}`));
     setAttribute(shape, "data-slot", String(slotOf(this.#robotId)));
     setAttribute(shape, "data-drive", robot?.profile?.drive ?? "differential");
     setHidden(replay, !robot?.replay);
@@ -127,7 +128,7 @@ export class RobotCard {
   /** @param {Robot | undefined} robot */
   #drawMode(robot) {
     const { i18n } = this.#app;
-    const { why, causes, faults } = this.#parts;
+    const { why, todo, causes, faults } = this.#parts;
     const situation = situationOf(robot);
     const phrases = phrasesOf(situation, i18n);
     setAttribute(this.#card, "data-level", situation.level);
@@ -135,7 +136,9 @@ export class RobotCard {
     const mark = markOf(situation);
     if (mark) setAttribute(causes, "data-cause", mark);
     else causes.removeAttribute("data-cause");
-    setText(why, [phrases.why, phrases.todo].filter(Boolean).join(" — "));
+    setText(why, phrases.why);
+    setText(todo, phrases.todo);
+    this.#card.toggleAttribute("data-todo", phrases.todo !== "");
     const said = robot ? faultsSaid(robot, i18n).join(" · ") : "";
     setText(faults, said);
   }

@@ -197,7 +197,7 @@ function makeBar() {
  * @param {string} language
  */
 function whenSaid(atS, language) {
-  return new Intl.DateTimeFormat(language, {
+  return new Intl.DateTimeFormat(language === "en" ? "en-GB" : language, {
     timeZone: TIME_ZONE,
     hourCycle: "h23",
     day: "numeric",

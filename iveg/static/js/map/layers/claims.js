@@ -29,7 +29,7 @@ export function claim(paint, wished) {
   if (!places) return 0;
   if (!settled.has(places)) {
     settled.add(places);
-    for (const rect of standing(paint)) places.claim([rect]);
+    for (const rect of standing(paint)) places.take(rect);
   }
   const seen = wished.filter(({ top, bottom }) => top >= 0 && bottom <= view.height);
   const found = places.claim(seen);

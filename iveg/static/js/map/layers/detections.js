@@ -35,7 +35,7 @@ function drawDetection(paint, detection) {
   ctx.strokeRect(-length / 2, -width / 2, length, width);
   ctx.restore();
   if (detection.named || view.scale < WORDS_FROM_SCALE) return;
-  const text = `${detection.item.class_id} ${labels.percent(detection.probability)}`;
+  const text = `${labels.seen(detection.item.class_id)} ${labels.percent(detection.probability)}`;
   const [x, y] = [screenX(view, detection.x), screenY(view, detection.y)];
   if (!mayStand(paint, text, x, y - width / 2 - 9, 11)) return;
   ctx.globalAlpha = detection.confident ? 1 : 0.75;

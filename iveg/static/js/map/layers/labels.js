@@ -8,7 +8,7 @@
 import { laneName } from "../../core/lanes.js";
 
 /**
- * @param {Translate} [t] of the keys `lane.…`, `task.…`, `map.encounter`, `map.ghost`,
+ * @param {Translate} [t] of the keys `class.…`, `lane.…`, `task.…`, `map.encounter`, `map.ghost`,
  *   `map.last_seen`, `map.replay`; without it numbers stand alone
  * @param {string} [locale] BCP 47; the page's by default
  */
@@ -39,6 +39,12 @@ export function createLabels(t = untranslated, locale = document.documentElement
       const key = `task.${task}`;
       const said = t(key);
       return said === key || said === task.toUpperCase() ? task : said;
+    },
+    /** What a detector says that it sees. @param {string} classId */
+    seen: (classId) => {
+      const key = `class.${classId}`;
+      const said = t(key);
+      return said === key || said === classId.toUpperCase() ? classId : said;
     },
     /** A number of other equipment. @param {import("../../core/protocol.js").Tile} tile */
     tile: ({ value, state, unit, decimals }) => {

@@ -16,6 +16,10 @@ export function createPlaces() {
   const isFree = (rect) => !taken.some((other) => overlap(rect, other));
 
   return {
+    /** What is there in any case. @param {Rect} rect */
+    take(rect) {
+      taken.push(rect);
+    },
     /**
      * Takes the first place that is free.
      *
@@ -31,8 +35,8 @@ export function createPlaces() {
   };
 }
 
-/** @param {Rect} one @param {Rect} other */
-function overlap(one, other) {
+/** Whether there is no gap between them. @param {Rect} one @param {Rect} other */
+export function overlap(one, other) {
   return (
     one.left < other.right + GAP_PX &&
     other.left < one.right + GAP_PX &&

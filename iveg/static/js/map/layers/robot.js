@@ -7,11 +7,10 @@
  */
 
 import { isSilent } from "../../core/clock.js";
-import { LIMITS } from "../../core/limits.js";
 import { isStriped } from "../../core/slots.js";
 import { screenX, screenY } from "../viewport.js";
-import { claim } from "./claims.js";
-import { circle, isolated, label, pill, widthOf, widthOfPill } from "./paint.js";
+import { circle, isolated } from "./paint.js";
+import { drawTag, placesOfTags } from "./tags.js";
 
 /**
  * @typedef {import("./paint.js").Paint} Paint
@@ -21,17 +20,13 @@ import { circle, isolated, label, pill, widthOf, widthOfPill } from "./paint.js"
 
 /** A body is never drawn shorter than this (px), however small the scale. */
 const SHORTEST_PX = 20;
-const PADLOCK_PX = 12;
-/** The letters of a name. */
-const NAME = { size: 13, weight: 700 };
-/** From one line of text to the next. */
-const WORDS_PX = 28;
 
 /** @param {Paint} paint */
 export function draw(paint) {
-  for (const robot of paint.scene.robots) {
-    isolated(paint.ctx, () => drawRobot(paint, robot));
-  }
+  const places = placesOfTags(paint, paint.scene.robots);
+  paint.scene.robots.forEach((robot, n) => {
+    isolated(paint.ctx, () => drawRobot(paint, robot, places[n]));
+  });
 }
 
 /**
@@ -46,8 +41,9 @@ export function bodySize(robot, scale) {
   return [length, (length * robot.width) / robot.length];
 }
 
-/** @param {Paint} paint @param {SceneRobot} robot */
-function drawRobot(paint, robot) {
+/** @param {Paint} paint @param {SceneRobot} robot
+ * @param {import("./tags.js").Place} place of its name and tags */
+function drawRobot(paint, robot, place) {
   const { ctx, view } = paint;
   const [length, width] = bodySize(robot, view.scale);
   ctx.translate(screenX(view, robot.pose.x), screenY(view, robot.pose.y));
@@ -57,7 +53,7 @@ function drawRobot(paint, robot) {
   ctx.rotate(-robot.pose.yaw);
   drawBody(paint, robot, length, width);
   ctx.restore();
-  drawTag(paint, robot, length);
+  drawTag(paint, robot, place);
 }
 
 /**
@@ -226,132 +222,4 @@ function drawHeading(ctx, length, width, hue, ink) {
   ctx.lineTo(length / 2 + 5, 5);
   ctx.closePath();
   ctx.fill();
-}
-
-/**
- * Whether a padlock is true: the robot is locked, and was heard a moment ago.
- *
- * @param {Pick<SceneRobot, "situation" | "ageS">} robot
- */
-export const isSeenHeld = ({ situation, ageS }) =>
-  situation.level === "locked" && ageS <= LIMITS.report_stale_s;
-
-/**
- * A dark octagon with a padlock: held, and not by accident.
- *
- * @param {Paint} paint
- * @param {number} x (px)
- * @param {number} y (px)
- */
-function drawPadlock({ ctx, theme }, x, y) {
-  ctx.save();
-  ctx.translate(x, y);
-  ctx.beginPath();
-  for (let i = 0; i < 8; i += 1) {
-    const angle = (Math.PI / 4) * (i + 0.5);
-    ctx.lineTo(PADLOCK_PX * Math.cos(angle), PADLOCK_PX * Math.sin(angle));
-  }
-  ctx.closePath();
-  ctx.strokeStyle = theme.bg;
-  ctx.lineWidth = 2;
-  ctx.stroke();
-  ctx.fillStyle = theme.text;
-  ctx.fill();
-  ctx.strokeStyle = theme.bg;
-  ctx.lineWidth = 1.8;
-  ctx.beginPath();
-  ctx.arc(0, -1.5, 3, Math.PI, 2 * Math.PI);
-  ctx.stroke();
-  ctx.fillStyle = theme.bg;
-  ctx.fillRect(-4.5, -1.5, 9, 7);
-  ctx.restore();
-}
-
-/**
- * Name above, and beside it age, half speed and recording.
- *
- * @param {Paint} paint
- * @param {SceneRobot} robot
- * @param {number} length
- */
-function drawTag(paint, robot, length) {
-  const { theme } = paint;
-  const { y, tags, aside } = placeOfTag(paint, robot, length);
-  const isLost = isSilent(robot.link);
-  label(paint, robot.id, aside, y, {
-    ...NAME,
-    colour: isLost ? theme.muted : theme.text,
-  });
-  const half = widthOf(paint, robot.id, NAME) / 2 + 6;
-  if (isSeenHeld(robot)) drawPadlock(paint, aside - half - PADLOCK_PX, y);
-  let x = aside + half;
-  for (const [text, fill, ink] of tags) {
-    x += pill(paint, text, x, y, fill, ink) + 4;
-  }
-}
-
-/**
- * Above the robot, else below, else farther away: where no other label is.  Where there is
- * no room for all of it, its name stands alone; the card has the rest.  At an edge of the
- * map it moves aside.
- *
- * @param {Paint} paint
- * @param {SceneRobot} robot
- * @param {number} length
- * @returns {{y: number, aside: number, tags: Tag[]}} middle of the labels and of the
- *   name, from the robot's (px)
- */
-function placeOfTag(paint, robot, length) {
-  const near = length / 2 + 20;
-  const heights = [-near, near, -near - WORDS_PX, near + WORDS_PX];
-  const tags = tagsOf(paint, robot);
-  for (const told of tags.length ? [tags, []] : [tags]) {
-    const { rects, aside } = rectsOf(paint, robot, heights, told);
-    const found = claim(paint, rects);
-    if (found !== null) return { y: heights[found], aside, tags: told };
-  }
-  return { y: heights[0], aside: 0, tags };
-}
-
-/**
- * @param {Paint} paint @param {SceneRobot} robot
- * @param {number[]} heights @param {Tag[]} tags
- */
-function rectsOf(paint, robot, heights, tags) {
-  const { view } = paint;
-  const half = widthOf(paint, robot.id, NAME) / 2;
-  const widths = tags.map(([text]) => widthOfPill(paint, text));
-  const x = screenX(view, robot.pose.x);
-  const y = screenY(view, robot.pose.y);
-  const left = x - half - (isSeenHeld(robot) ? 2 * PADLOCK_PX + 6 : 0);
-  const right = x + half + widths.reduce((sum, width) => sum + width + 4, 6);
-  const isInView = x >= 0 && x <= view.width;
-  const aside = isInView ? Math.max(-left, Math.min(0, view.width - right)) : 0;
-  const rects = heights.map((dy) => ({
-    left: left + aside,
-    right: right + aside,
-    top: y + dy - PADLOCK_PX,
-    bottom: y + dy + PADLOCK_PX,
-  }));
-  return { rects, aside };
-}
-
-/**
- * @typedef {[text: string, ground: string, ink: string]} Tag
- * @param {Pick<Paint, "theme" | "labels">} paint
- * @param {SceneRobot} robot
- * @returns {Tag[]}
- */
-export function tagsOf({ theme, labels }, robot) {
-  const { alert, bg, muted, onAlert2, text } = theme;
-  /** @type {Tag[]} */
-  const tags = [];
-  if (robot.link === "LATE") tags.push([labels.age(robot.ageS), alert[1], onAlert2]);
-  if (isSilent(robot.link)) tags.push([labels.ago(robot.ageS), muted, bg]);
-  const { state, slots } = robot.situation;
-  if ((state === "half" || state === "slow") && typeof slots.factor === "number") {
-    tags.push([labels.percent(slots.factor), text, bg]);
-  }
-  if (robot.replay) tags.push([labels.replay(), muted, bg]);
-  return tags;
 }
