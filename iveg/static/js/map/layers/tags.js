@@ -29,8 +29,9 @@ const WORDS_PX = 28;
 
 /**
  * Where the labels of each robot stand: above it, else below, else farther away, else
- * beside it, where no other label is and no other robot's name will be.  Where there is no room for all of
- * it, its name stands alone; the card has the rest.  At an edge of the map it moves aside.
+ * beside it, where no other label is and no other robot's name will be.  Where there is
+ * no room for all of it, its name stands alone; the card has the rest.  At an edge of the
+ * map it moves aside.
  *
  * @param {Paint} paint
  * @param {readonly SceneRobot[]} robots
