@@ -125,17 +125,17 @@ def _in_s(scene: Scene) -> dict[str, float]:
 _TASK = st.sampled_from((None, "waiting", "scouting", "hauling", "sowing"))
 
 
-_SLOW, _FAST = (0.1, -1.0, [], None), (0.4, 40.0, [], None)
+_BACK: tuple[float, float, list[tuple[float, float]], object] = (0.1, -1.0, [], None)
 
 
 @given(st.lists(st.tuples(_STEP, _TASK, _TASK), max_size=15))
 @example(
     [
         ((0.1, 1.0, [], None), None, None),
-        (_SLOW, "waiting", "scouting"),
-        *[(_SLOW, None, None)] * 4,
+        (_BACK, "waiting", "scouting"),
+        *[(_BACK, None, None)] * 4,
         ((0.1, 40.0, [], None), None, None),
-        (_FAST, None, None),
+        ((0.4, 40.0, [], None), None, None),
         ((10.0, -1.0, [], None), None, None),
     ]
 )
