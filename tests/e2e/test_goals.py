@@ -17,12 +17,6 @@ PLACE = {"x": 10.0, "y": 6.0}
 OUTSIDE = {"x": -1.5, "y": 10.0}
 
 
-@pytest.fixture(scope="module")
-def scenario() -> str:
-    """AGI waits near the place, and nobody is on its way."""
-    return "nlos"
-
-
 def tap_map(page: Page, place: dict[str, float]) -> None:
     """Tap a place of ``map`` (m), wherever the picture has it now."""
     page.locator("#map-fit").click()
