@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 PROGRAMS = ("serve", "fiware", "emulator", "robot")
-_PARTS = (
+PARTS = (
     *("iveg.cli.robot", "iveg.cli.serve", "iveg.lab.pages"),
     *("iveg.lab.commands.emulator", "iveg.lab.commands.fiware"),
     *("anyio._backends._asyncio", "httpcore", "numpy.ma"),
@@ -112,7 +112,7 @@ def main() -> None:
     """Fork what is asked for, and say of each how it ended."""
     import iveg.__main__ as program
 
-    for part in _PARTS:
+    for part in PARTS:
         import_module(part)
     # A process that is spawned begins with the main module, as it does in earnest.
     sys.modules["__main__"] = program

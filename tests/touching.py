@@ -1,5 +1,6 @@
 """Whether emulated robots overlap each other or what stands still."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -26,14 +27,29 @@ def _separates(edge: Floats, first: Floats, second: Floats) -> bool:
     return bool(one.max() < other.min() or other.max() < one.min())
 
 
+def _near(corners: Floats, boxes: Floats) -> Floats:
+    """Those boxes that the upright box about some corners overlaps: most are far away.
+
+    Args:
+        corners: Shape (k, 2).
+        boxes: Shape (n, 4): xmin, ymin, xmax, ymax.
+    """
+    least, most = corners.min(axis=0), corners.max(axis=0)
+    near = ((boxes[:, :2] <= most) & (boxes[:, 2:] >= least)).all(axis=1)
+    found: Floats = boxes[near]
+    return found
+
+
 def touches(scenery: Scenery, body: Body) -> bool:
     """Whether a robot overlaps anything, or the wall."""
     corners = body.corners()
     if not all(scenery.bounds.contains(x, y) for x, y in corners):
         return True
-    boxes = [_box_corners(*sides) for sides in scenery.rectangles]
     posts = any(body.gap_to(x, y)[0] < radius for x, y, radius in scenery.posts)
-    return posts or any(overlap(corners, box) for box in boxes)
+    return posts or any(
+        overlap(corners, _box_corners(*sides))
+        for sides in _near(corners, scenery.rectangles)
+    )
 
 
 def bodies_touch(bodies: Sequence[Body]) -> bool:
@@ -42,4 +58,10 @@ def bodies_touch(bodies: Sequence[Body]) -> bool:
         overlap(one.corners(), other.corners())
         for index, one in enumerate(bodies)
         for other in bodies[:index]
+        if one.pose.distance_to(other.pose.x, other.pose.y) <= _reach(one, other)
     )
+
+
+def _reach(one: Body, other: Body) -> float:
+    """Farther apart (m) no corners meet."""
+    return sum(math.hypot(body.length, body.width) / 2 for body in (one, other))

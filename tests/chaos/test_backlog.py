@@ -185,9 +185,9 @@ def test_f50_poses_that_are_seconds_old_are_never_called_live(
     fiware_only.person.let_go("AGI", PATIENCE_S)
 
     with Auditor(fiware_only.place) as auditor:
-        fiware_only.backlog.pace = Pace(late_s=12.0)
+        fiware_only.backlog.pace = Pace(late_s=6.0)
         until(lambda: robot.speed == 0.0, PATIENCE_S, "the robot stands by itself")
-        until(lambda: auditor.oldest_s > 12.0, PATIENCE_S, "a pose of 12 s is shown")
+        until(lambda: auditor.oldest_s > 6.0, PATIENCE_S, "a pose of 6 s is shown")
         known = auditor.looks
         until(lambda: auditor.looks > known + 20, PATIENCE_S, "it is looked at")
 

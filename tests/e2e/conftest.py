@@ -106,10 +106,12 @@ def opened(
 
 
 @contextmanager
-def live_page(browser: Browser, stack: Site, *robots: str) -> Iterator[Page]:
-    """The live page in Spanish on a desktop for several tests, these robots LIVE."""
+def live_page(
+    browser: Browser, stack: Site, *robots: str, route: str = "/"
+) -> Iterator[Page]:
+    """A page in Spanish on a desktop for several tests, these robots LIVE on it."""
     complaints: list[str] = []
-    with opened(browser, stack, complaints) as page:
+    with opened(browser, stack, complaints, route=route) as page:
         for robot in robots:
             page.wait_for_selector(f'[data-robot="{robot}"][data-link="LIVE"]')
         yield page

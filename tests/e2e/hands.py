@@ -15,9 +15,14 @@ _OWN = {"X-IVEG": "1", "Sec-Fetch-Site": "same-origin"}
 
 
 def open_menu(page: Page, robot: str) -> None:
-    """Open the menu of a robot's card."""
-    press_open(page, card(page, robot).locator(".card__menu"))
-    card(page, robot).locator("dialog[open]").wait_for()
+    """Open the menu of a robot's card; that of a card that moves is closed again."""
+    panel = card(page, robot).locator("dialog[open]")
+
+    def is_open() -> bool:
+        press_open(page, card(page, robot).locator(".card__menu"))
+        return panel.is_visible()
+
+    until(is_open, 60.0, f"the menu of {robot} opens")
 
 
 def press_open(page: Page, opener: Locator) -> None:
@@ -28,9 +33,11 @@ def press_open(page: Page, opener: Locator) -> None:
     """
 
     def is_open() -> bool:
-        opener.click()
+        # One that opened late lies over its button.
+        if page.locator("dialog[open]").count() == 0:
+            opener.click()
         with suppress(sync_api.TimeoutError):
-            page.wait_for_selector("dialog[open]", timeout=5000)
+            page.wait_for_selector("dialog[open]", timeout=1000)
             return True
         return False
 

@@ -13,7 +13,7 @@ from tests.processes import Site, until
 
 pytestmark = pytest.mark.e2e
 
-PLACE = {"x": 10.0, "y": 7.5}
+PLACE = {"x": 10.0, "y": 6.0}
 OUTSIDE = {"x": -1.5, "y": 10.0}
 
 

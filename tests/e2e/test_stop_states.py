@@ -10,9 +10,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 import pytest
-from playwright.sync_api import Locator, Page, expect
+from playwright.sync_api import Browser, Locator, Page, expect
 
-from tests.e2e.conftest import OpenPage
+from tests.e2e.conftest import OpenPage, live_page
 from tests.e2e.hands import ask, begin_hold, let_go, look, open_menu
 from tests.e2e.puppet import CRUISE, Puppet, described, puppet
 from tests.e2e.reading import card, evaluate, strip_stop
@@ -57,10 +57,11 @@ def strings(stack: Site) -> Iterator[Puppet]:
         yield robot
 
 
-@pytest.fixture
-def page(open_page: OpenPage) -> Page:
+@pytest.fixture(scope="module")
+def page(browser: Browser, stack: Site) -> Iterator[Page]:
     """A page with no map on it: every page has the STOP controls, and this is light."""
-    return _listening(open_page(route="/about"))
+    with live_page(browser, stack, route="/about") as found:
+        yield _listening(found)
 
 
 @pytest.fixture

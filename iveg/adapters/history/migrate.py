@@ -7,6 +7,7 @@ start calls ``upgrade``: nothing to do costs a few milliseconds.
 import logging
 import sqlite3
 from datetime import UTC, datetime
+from functools import cache
 from pathlib import Path
 
 from alembic import command
@@ -71,8 +72,14 @@ def migrations_directory() -> Path:
 def revisions(connection: Connection) -> tuple[str | None, list[str]]:
     """The revision of a database, and all that this version knows, newest first."""
     found = MigrationContext.configure(connection).get_current_revision()
-    steps = ScriptDirectory.from_config(alembic_config(connection))
-    return found, [step.revision for step in steps.walk_revisions()]
+    return found, list(_known(migrations_directory()))
+
+
+@cache
+def _known(directory: Path) -> tuple[str, ...]:
+    """All revisions, newest first; to load them takes longer than most else here."""
+    steps = ScriptDirectory(str(directory))
+    return tuple(step.revision for step in steps.walk_revisions())
 
 
 def reason_of(error: Exception) -> str:
@@ -85,8 +92,9 @@ def _upgrade(connection: Connection, where: str) -> None:
     if connection.dialect.name == "postgresql":
         lock = text("SELECT pg_advisory_xact_lock(:key)")
         connection.execute(lock, {"key": _ONE_AT_A_TIME})
-    config = alembic_config(connection)
     found, known = revisions(connection)
+    if found == known[0]:
+        return
     if found is not None and found not in known:
         raise DataFileError(
             where,
@@ -95,7 +103,7 @@ def _upgrade(connection: Connection, where: str) -> None:
             "version, or name another database in IVEG_DATABASE_URL",
         )
     try:
-        command.upgrade(config, "head")
+        command.upgrade(alembic_config(connection), "head")
     except (DatabaseError, CommandError) as error:
         raise DataFileError(
             where,
