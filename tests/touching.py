@@ -35,9 +35,8 @@ def _near(corners: Floats, boxes: Floats) -> Floats:
         boxes: Shape (n, 4): xmin, ymin, xmax, ymax.
     """
     least, most = corners.min(axis=0), corners.max(axis=0)
-    near = ((boxes[:, :2] <= most) & (boxes[:, 2:] >= least)).all(axis=1)
-    found: Floats = boxes[near]
-    return found
+    found = ((boxes[:, :2] <= most) & (boxes[:, 2:] >= least)).all(axis=1)
+    return boxes[found]
 
 
 def touches(scenery: Scenery, body: Body) -> bool:

@@ -19,7 +19,6 @@ from tests.e2e.reading import (
     OVERFLOW,
     SMALLEST_STOP,
     evaluate,
-    strip_stop,
 )
 from tests.processes import Site
 from tests.staged import STAGED

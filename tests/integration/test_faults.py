@@ -229,10 +229,9 @@ def stack(running: Stack) -> Iterator[Stack]:
 
 
 # --- one part is broken, the rest goes on -------------------------------------------
-# What it may answer beside: ``unit/adapters/test_provisioner``.
 
 
-@pytest.mark.parametrize("mood", ["shut", "hanging"])
+@pytest.mark.parametrize("mood", ["shut", "hanging", "error", "malformed", "odd"])
 def test_f6_an_orion_that_fails_in_any_way_is_named_once_and_forgiven(
     stack: Stack, mood: Mood
 ) -> None:
@@ -246,7 +245,7 @@ def test_f6_an_orion_that_fails_in_any_way_is_named_once_and_forgiven(
     assert stack.said("orion: not as it should be", since) == 1
 
 
-@pytest.mark.parametrize("mood", ["shut", "odd"])
+@pytest.mark.parametrize("mood", ["shut", "error", "odd"])
 def test_f3_an_agent_that_fails_in_any_way_is_named_once_and_forgiven(
     stack: Stack, mood: Mood
 ) -> None:

@@ -25,7 +25,6 @@ from iveg.ngsi import codec, names
 from iveg.pipeline.health_monitor import HealthMonitor
 from iveg.pipeline.ingest import Ingest
 from tests.builders import odometry
-from tests.integration.gate import Mood, gate
 from tests.ports import free_ports
 
 SERVICE = ("agroconnect", "/greenhouse")
@@ -231,43 +230,6 @@ async def test_f6_an_orion_that_is_down_is_told_once_and_shown(
     told = [line for line in _warnings(caplog) if line.startswith("orion: ")]
     assert len(told) == 1
     assert "cannot be reached" in site.health_monitor.orion_error
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("mood", ["error", "malformed", "odd"])
-async def test_f6_an_orion_that_answers_nonsense_is_told_once_and_forgiven(
-    fiware: Running, caplog: pytest.LogCaptureFixture, mood: Mood
-) -> None:
-    with gate(fiware.orion_port) as door:
-        behind = Site(fiware, orion_url=f"http://127.0.0.1:{door.port}")
-        async with behind.running() as site:
-            await until(lambda: site.provisioner.subscription_ids)
-            door.be(mood)
-            await until(lambda: site.health_monitor.orion_error)
-            door.be("open")
-            await until(lambda: not site.health_monitor.orion_error)
-
-    told = [line for line in _warnings(caplog) if line.startswith("orion: not as")]
-    assert len(told) == 1
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("mood", ["error", "odd"])
-async def test_f3_an_agent_that_answers_nonsense_is_told_once_and_forgiven(
-    fiware: Running, caplog: pytest.LogCaptureFixture, mood: Mood
-) -> None:
-    with gate(fiware.iota_port) as door:
-        behind = Site(fiware, agent_url=f"http://127.0.0.1:{door.port}")
-        async with behind.running() as site:
-            await until(lambda: site.provisioner.subscription_ids)
-            door.be(mood)
-            await until(lambda: site.health_monitor.agent_error)
-            assert site.health_monitor.orion_error == ""
-            door.be("open")
-            await until(lambda: not site.health_monitor.agent_error)
-
-    told = [line for line in _warnings(caplog) if line.startswith("iot_agent: not as")]
-    assert len(told) == 1
 
 
 @pytest.mark.slow
