@@ -54,7 +54,7 @@ _REAL = {"browser", "postgresql", "postgresql_url", "database_url", "empty_url"}
 """Fixtures that start programs."""
 
 
-class Spread(LoadScopeScheduling):
+class Spread(LoadScopeScheduling):  # type: ignore[misc]
     """A module, or a folder that shares a stack, stays together in one worker.
 
     Three workers that start programs leave a quarter of two processors idle: each

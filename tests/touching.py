@@ -35,8 +35,9 @@ def _near(corners: Floats, boxes: Floats) -> Floats:
         boxes: Shape (n, 4): xmin, ymin, xmax, ymax.
     """
     least, most = corners.min(axis=0), corners.max(axis=0)
-    found = ((boxes[:, :2] <= most) & (boxes[:, 2:] >= least)).all(axis=1)
-    return boxes[found]
+    near = ((boxes[:, :2] <= most) & (boxes[:, 2:] >= least)).all(axis=1)
+    found: Floats = boxes[near]
+    return found
 
 
 def touches(scenery: Scenery, body: Body) -> bool:

@@ -4,7 +4,7 @@ from contextlib import suppress
 from typing import Any
 
 from playwright import sync_api
-from playwright.sync_api import APIResponse, BrowserContext, Locator, Page
+from playwright.sync_api import APIResponse, BrowserContext, Locator, Page, expect
 
 from tests.e2e.reading import card
 from tests.processes import Site, until
@@ -57,6 +57,23 @@ def begin_hold(page: Page, button: Locator) -> None:
         return button.get_attribute("data-holding") is not None
 
     until(is_held, 30.0, "a button is held")
+
+
+def hold(page: Page, button: Locator, done: Locator) -> None:
+    """Hold a button until its fill is full, again where it gave way, until ``done`` may
+    be pressed."""
+
+    def is_done() -> bool:
+        if button.is_enabled():
+            begin_hold(page, button)
+            expect(button).not_to_have_attribute("data-holding", "")
+            page.mouse.up()
+        with suppress(AssertionError):
+            expect(done).to_be_enabled(timeout=2000)
+            return True
+        return False
+
+    until(is_done, 60.0, "what is held is done")
 
 
 def ask(

@@ -19,6 +19,7 @@ from tests.e2e.reading import (
     OVERFLOW,
     SMALLEST_STOP,
     evaluate,
+    strip_stop,
 )
 from tests.processes import Site
 from tests.staged import STAGED

@@ -36,7 +36,7 @@ def _write(file: Path) -> None:
 
 
 if __name__ == "__main__":
-    # What only defines functions passes none of them, and takes long where each is noted.
+    # What only defines functions passes none, and takes long where each is noted.
     import_module(next(it for it in PARTS if it.endswith(f".{sys.argv[1]}")))
     atexit.register(_write, Path.cwd() / f"passed-{sys.argv[1]}.json")
     threading.setprofile(_note)

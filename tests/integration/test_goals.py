@@ -52,8 +52,13 @@ def test_a_goal_is_driven_to_and_a_stop_deletes_the_next(driving: Site) -> None:
             keys = (str(one["key"]) for one in reversed(lines))
             return [key for key in keys if key.startswith("log.goal")]
 
-        given = page.post("/api/v1/robots/AGI/goal", json=THERE)
-        assert given.status_code == 202, given.text
+        def is_given() -> bool:
+            """Again where a busy machine left its report old, as a person would."""
+            answer = page.post("/api/v1/robots/AGI/goal", json=THERE)
+            assert answer.status_code == 202 or answer.json()["why"] == "no_report"
+            return answer.status_code == 202
+
+        until(is_given, SOON_S, "the goal is given")
         there = until(lambda: goal_is("REACHED"), SOON_S, "AGI is at its goal")
         away = (
             (there["pose"]["x"] - 10.0) ** 2 + (there["pose"]["y"] - 7.5) ** 2

@@ -110,10 +110,12 @@ function queryOf({ window, robot }) {
 }
 
 /** @param {Latency} told @param {import("../core/i18n.js").I18n} i18n */
-function drawRemarks({ remarks, figures }, i18n) {
+function drawRemarks({ remarks, rows }, i18n) {
   const said = remarks.map(({ key, slots }) => i18n.t(key, slots));
   // Of what was not measured nobody knows whether it is behind.
-  const isMeasured = figures.cdf.data.length > 0;
+  const isMeasured = rows.some(({ hops }) =>
+    Object.values(hops).some(({ count }) => count),
+  );
   if (!said.length) said.push(i18n.t(isMeasured ? "hops.well" : "hops.nothing"));
   fill(need("#hops-remarks"), said);
 }
