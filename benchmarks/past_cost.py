@@ -8,7 +8,7 @@ number of files and the size of one are those of a day; seconds are asked for wh
 file holds what was recorded then.  Half of them are in the file that is being written.
 
 *ready*: by a new viewer, for whom a process stands ready.  *none ready*: by another at
-once.  *next*: by the same, anywhere.  *page*: from the address to the robots' places.
+once.  *next*: by the same, anywhere.  *page*: from the address to the cards of robots.
 CPU is of the viewer's process: it differs less with what else the machine does.
 """
 
@@ -39,9 +39,7 @@ EVERY_S = 11.0
 _HOUR_S, _NS = 3600.0, 10**9
 _EDGE_S = 8.0
 """At both ends of a file something may be missing, such as the first memory."""
-_WHOLE = "() => [...document.querySelectorAll('.card [data-field=x]')]" + (
-    ".filter((one) => one.textContent.trim() !== '—').length > 0 && performance.now()"
-)
+_WHOLE = """() => document.querySelector('.card[data-mode]') && performance.now()"""
 
 
 class Asked:
@@ -156,6 +154,7 @@ def _report(there: Site, browser: Browser, day: _Day, count: int, pid: int) -> N
             for name in ("ready", "none ready"):
                 _ask(api, told[name], next(moments), f"{name[0]}-{number}", pid)
             _ask(api, told["next"], next(moments), f"r-{number}", pid)
+    _print(told)
     context = browser.new_context()
     page = context.new_page()
     page.goto(there.sign_in_link)
@@ -165,9 +164,12 @@ def _report(there: Site, browser: Browser, day: _Day, count: int, pid: int) -> N
         found = page.wait_for_function(_WHOLE, timeout=60_000)
         told["page"].took_s.append(found.json_value() / 1000.0)
     context.close()
-    print_table(
-        f"First picture; {machine()}", HEAD, [a.row(n) for n, a in told.items()]
-    )
+    _print(told)
+
+
+def _print(told: dict[str, Asked]) -> None:
+    rows = [asked.row(name) for name, asked in told.items()]
+    print_table(f"First picture; {machine()}", HEAD, rows)
 
 
 def _ask(api: httpx.Client, to: Asked, wall: float, viewer: str, pid: int) -> None:
