@@ -7,10 +7,10 @@ DEV := $(VENV)/.dev
 BENCH := $(VENV)/.bench
 # Apart from iVeg's own libraries: what judges them is none of them.
 AUDIT := $(VENV)/audit
-# Three start programs and mostly wait for them; the fourth computes (tests/conftest.py).
-WORKERS ?= 4
+# A module of tests and what it starts stay together; most of its time is waiting.
+WORKERS ?= 3
 # A worker that dies ends the run: loadscope would wait for it for ever.
-SIDE_BY_SIDE = --dist loadscope --no-loadscope-reorder --max-worker-restart 0
+SIDE_BY_SIDE = -n $(WORKERS) --dist loadscope --no-loadscope-reorder --max-worker-restart 0
 # What a site installs (run.lock), the image, the demo and all that a test can ask for.
 LOCK = $(BIN)/uv pip compile --quiet --universal --generate-hashes --no-emit-index-url --no-header pyproject.toml
 ALL := bags foxglove parquet passkeys postgresql ros2 sso
@@ -25,14 +25,14 @@ export PYTHONDONTWRITEBYTECODE :=
 
 demo: $(RUN) ; @exec $(BIN)/python -m iveg demo
 demo-ros2: $(DEV) ; @exec $(BIN)/python -m iveg demo --ros2
-test: test-needs $(DEV) ; $(BIN)/python -m pytest -n $(WORKERS) $(SIDE_BY_SIDE)
-quick: $(DEV) ; IVEG_HYPOTHESIS=quick IVEG_STOP_EXAMPLES=20 $(BIN)/python -m pytest -n 3 $(SIDE_BY_SIDE) -m "not real and not slow"
+test: test-needs $(DEV) ; $(BIN)/python -m pytest $(SIDE_BY_SIDE)
+quick: $(DEV) ; IVEG_HYPOTHESIS=quick IVEG_STOP_EXAMPLES=20 $(BIN)/python -m pytest $(SIDE_BY_SIDE) -m "not real and not slow"
 setup: $(DEV)
 format: $(DEV) ; $(BIN)/ruff format . && $(BIN)/ruff check --fix .
 check: check-needs $(DEV) node_modules ; $(BIN)/ruff format --check . && $(BIN)/ruff check . && $(BIN)/mypy && $(BIN)/lint-imports && npm run --silent check
 bench: test-needs $(BENCH) ; $(BIN)/python -m benchmarks
 deep: $(DEV) ; IVEG_HYPOTHESIS=thorough IVEG_STOP_EXAMPLES=20000 IVEG_LIAR_STEPS=100000 IVEG_PAST_SECONDS=3600 IVEG_OPENAPI_EXAMPLES=1000 $(BIN)/python -m pytest $(FOR_HOURS) -o timeout=3600 tests/properties tests/liar tests/unit/app/test_past.py
-chaos: test-needs $(DEV) ; IVEG_CHAOS_DISK=on IVEG_CHAOS_RECORDER_KILLS=$(or $(KILLS),50) IVEG_CHAOS_SEED=$(or $(SEED),1) IVEG_CHAOS_KILLS=$(or $(KILLS),200) IVEG_CHAOS_TIMES=$(or $(TIMES),20) $(BIN)/python -m pytest $(FOR_HOURS) tests/chaos/test_kills.py tests/chaos/test_backlog.py tests/chaos/test_network.py tests/chaos/test_ros2_kills.py tests/chaos/test_recording_kills.py tests/chaos/test_disk_full.py
+chaos: test-needs $(DEV) ; IVEG_CHAOS_DISK=on IVEG_CHAOS_RECORDER_KILLS=$(or $(KILLS),50) IVEG_CHAOS_SEED=$(or $(SEED),1) IVEG_CHAOS_KILLS=$(or $(KILLS),200) IVEG_CHAOS_TIMES=$(or $(TIMES),20) $(BIN)/python -m pytest $(FOR_HOURS) tests/chaos/test_kills.py tests/chaos/test_backlog.py tests/chaos/test_ros2_kills.py tests/chaos/test_recording_kills.py tests/chaos/test_disk_full.py
 pictures: $(DEV) ; $(BIN)/python -m tests.pictures
 mutants: $(DEV) ; $(BIN)/python -m tests.mutants
 experiment: $(RUN) ; @exec $(BIN)/python -m iveg experiment run --$(or $(SIZE),quick)

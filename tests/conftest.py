@@ -9,7 +9,6 @@ import pytest
 from hypothesis import settings
 from playwright.sync_api import expect
 from xdist.scheduler import LoadScopeScheduling
-from xdist.workermanage import WorkerController
 
 from iveg.cli.running import tune_garbage_collection
 
@@ -47,39 +46,24 @@ _WAITING = (
 _FIRST = [name for pair in zip(_BUSY, _WAITING, strict=True) for name in pair]
 """So browsers run beside modules that wait for processes, and no worker ends with a
 long module alone."""
-_PROGRAMS = ("e2e/", "tests/chaos/", "tests/e2e/", "tests/integration/")
-"""Scopes that start programs; the first is that of a folder in ``_TOGETHER``."""
 _MEEK = 5
 _REAL = {"browser", "postgresql", "postgresql_url", "database_url", "empty_url"}
 """Fixtures that start programs."""
 
 
-class Spread(LoadScopeScheduling):  # type: ignore[misc]
-    """A module, or a folder that shares a stack, stays together in one worker.
-
-    Three workers that start programs leave a quarter of two processors idle: each
-    fourth one computes meanwhile, and so starts no more programs at a time.
-    """
-
-    def _split_scope(self, nodeid: str) -> str:
-        module = nodeid.split("::")[0]
-        folder = module.removeprefix("tests/").rpartition("/")[0]
-        if folder in _TOGETHER:
-            return folder
-        return str(super()._split_scope(nodeid))
-
-    def _assign_work_unit(self, node: WorkerController) -> None:
-        if int(node.gateway.id.removeprefix("gw")) % 4 == 3:
-            computing = (it for it in self.workqueue if not it.startswith(_PROGRAMS))
-            chosen = next(computing, next(iter(self.workqueue)))
-            self.workqueue.move_to_end(chosen, last=False)
-        super()._assign_work_unit(node)
-
-
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> LoadScopeScheduling:
-    """Who gets which tests."""
-    return Spread(config, log)
+    """A module, or a folder that shares a stack, stays together in one worker."""
+    scheduler = LoadScopeScheduling(config, log)
+    module_of = scheduler._split_scope
+    scheduler._split_scope = lambda nodeid: _shared(nodeid) or module_of(nodeid)
+    return scheduler
+
+
+def _shared(nodeid: str) -> str | None:
+    module = nodeid.split("::")[0]
+    folder = module.removeprefix("tests/").rpartition("/")[0]
+    return folder if folder in _TOGETHER else None
 
 
 def pytest_collection() -> None:

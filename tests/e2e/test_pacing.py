@@ -94,7 +94,7 @@ def test_nothing_older_than_its_successor_is_painted_and_the_window_holds(
         pages[0].wait_for_timeout(1000 * SECONDS)
         for page in pages:
             page.wait_for_function(
-                ALL_PAINTED, arg=[len(ROBOTS), FRAMES], timeout=60_000
+                ALL_PAINTED, arg=[len(ROBOTS), FRAMES], timeout=150_000
             )
         seen = [evaluate(page, "() => window.seen") for page in pages]
 

@@ -135,7 +135,7 @@ def _drove_at(page: Page, stack: Site) -> str | None:
 
         robots = until(world, 60.0, "the past answers")["robots"]
     # The page goes no nearer to now, as the newest is not recorded yet.
-    time.sleep(max(0.0, moment + 4.0 - time.time()))
+    page.wait_for_timeout(1000 * max(0.0, moment + 4.0 - time.time()))
     (agi,) = (one for one in robots if one["robot_id"] == "AGI")
     return at if agi["mode"] in ("RUNNING", "SLOW") else None
 
