@@ -32,7 +32,7 @@ format: $(DEV) ; $(BIN)/ruff format . && $(BIN)/ruff check --fix .
 check: check-needs $(DEV) node_modules ; $(BIN)/ruff format --check . && $(BIN)/ruff check . && $(BIN)/mypy && $(BIN)/lint-imports && npm run --silent check
 bench: test-needs $(BENCH) ; $(BIN)/python -m benchmarks
 deep: $(DEV) ; IVEG_HYPOTHESIS=thorough IVEG_STOP_EXAMPLES=20000 IVEG_LIAR_STEPS=100000 IVEG_PAST_SECONDS=3600 IVEG_OPENAPI_EXAMPLES=1000 $(BIN)/python -m pytest $(FOR_HOURS) -o timeout=3600 tests/properties tests/liar tests/unit/app/test_past.py
-chaos: test-needs $(DEV) ; IVEG_CHAOS_DISK=on IVEG_CHAOS_RECORDER_KILLS=$(or $(KILLS),50) IVEG_CHAOS_SEED=$(or $(SEED),1) IVEG_CHAOS_KILLS=$(or $(KILLS),200) IVEG_CHAOS_TIMES=$(or $(TIMES),20) $(BIN)/python -m pytest $(FOR_HOURS) tests/chaos/test_kills.py tests/chaos/test_backlog.py tests/chaos/test_ros2_kills.py tests/chaos/test_recording_kills.py tests/chaos/test_disk_full.py
+chaos: test-needs $(DEV) ; IVEG_CHAOS_DISK=on IVEG_CHAOS_RECORDER_KILLS=$(or $(KILLS),50) IVEG_CHAOS_SEED=$(or $(SEED),1) IVEG_CHAOS_KILLS=$(or $(KILLS),200) IVEG_CHAOS_TIMES=$(or $(TIMES),20) $(BIN)/python -m pytest $(FOR_HOURS) tests/chaos/test_kills.py tests/chaos/test_backlog.py tests/chaos/test_network.py tests/chaos/test_ros2_kills.py tests/chaos/test_recording_kills.py tests/chaos/test_disk_full.py
 pictures: $(DEV) ; $(BIN)/python -m tests.pictures
 mutants: $(DEV) ; $(BIN)/python -m tests.mutants
 experiment: $(RUN) ; @exec $(BIN)/python -m iveg experiment run --$(or $(SIZE),quick)
