@@ -27,6 +27,12 @@ _ODD_PATHS = (
     ((2.0, 0.0),) * 50,
     _LONG,
 )
+_Step = tuple[
+    float,
+    float,
+    list[tuple[float, float]],
+    tuple[tuple[float, float], ...] | None,
+]
 _STEP = st.tuples(
     st.sampled_from((0.1, 0.4, 1.2, 10.0)),
     st.sampled_from((-1.0, 0.0, 0.4, 1.0, 40.0)),
@@ -37,14 +43,7 @@ _STEP = st.tuples(
 
 @given(st.lists(_STEP, max_size=15))
 def test_no_robot_is_ever_faster_for_it(
-    run: list[
-        tuple[
-            float,
-            float,
-            list[tuple[float, float]],
-            tuple[tuple[float, float], ...] | None,
-        ]
-    ],
+    run: list[_Step],
 ) -> None:
     scenes = [Scene(rule=DetectionRule(foresight=one)) for one in (False, True)]
     x = 0.0
@@ -68,14 +67,7 @@ def test_no_robot_is_ever_faster_for_it(
 @given(st.sampled_from((0.5, 1.0, 2.0)), st.lists(_STEP, min_size=1, max_size=15))
 def test_nothing_beyond_the_horizon_of_the_rule_is_foretold(
     horizon_s: float,
-    run: list[
-        tuple[
-            float,
-            float,
-            list[tuple[float, float]],
-            tuple[tuple[float, float], ...] | None,
-        ]
-    ],
+    run: list[_Step],
 ) -> None:
     far, near = Scene(), Scene(rule=DetectionRule(foresight_s=horizon_s))
     for after_s, speed, people, _ in run:
@@ -90,14 +82,7 @@ def test_nothing_beyond_the_horizon_of_the_rule_is_foretold(
 
 @given(st.lists(_STEP, min_size=1, max_size=15))
 def test_what_is_told_beside_what_slows_changes_no_limit(
-    run: list[
-        tuple[
-            float,
-            float,
-            list[tuple[float, float]],
-            tuple[tuple[float, float], ...] | None,
-        ]
-    ],
+    run: list[_Step],
 ) -> None:
     more, less, x = Scene(), Scene(), 0.0
     for after_s, speed, people, _ in run:
@@ -125,7 +110,7 @@ def _in_s(scene: Scene) -> dict[str, float]:
 _TASK = st.sampled_from((None, "waiting", "scouting", "hauling", "sowing"))
 
 
-_BACK: tuple[float, float, list[tuple[float, float]], object] = (0.1, -1.0, [], None)
+_BACK: _Step = (0.1, -1.0, [], None)
 
 
 @given(st.lists(st.tuples(_STEP, _TASK, _TASK), max_size=15))
@@ -142,7 +127,7 @@ _BACK: tuple[float, float, list[tuple[float, float]], object] = (0.1, -1.0, [], 
 def test_no_robot_is_ever_faster_for_a_task(
     run: list[
         tuple[
-            tuple[float, float, list[tuple[float, float]], object],
+            _Step,
             str | None,
             str | None,
         ]

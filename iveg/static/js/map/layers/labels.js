@@ -24,6 +24,15 @@ export function createLabels(t = untranslated, locale = document.documentElement
     maximumFractionDigits: 2,
   });
   const percents = new Intl.NumberFormat(language, { style: "percent" });
+
+  /** A word of a robot's; one that iVeg does not know, as it was sent.
+   * @param {string} kind @param {string} word */
+  function translated(kind, word) {
+    const key = `${kind}.${word}`;
+    const said = t(key);
+    return said === key || said === word.toUpperCase() ? word : said;
+  }
+
   return {
     /** @param {string} lane */
     lane: (lane) => laneName(lane, t),
@@ -33,19 +42,10 @@ export function createLabels(t = untranslated, locale = document.documentElement
     distance: (m) => `${tenths.format(m)} m`,
     /** A length that a person measured. @param {number} m */
     measured: (m) => `${hundredths.format(m)} m`,
-    /** A task in the reader's language; a task that iVeg does not know, as it was sent.
-     * @param {string} task */
-    task: (task) => {
-      const key = `task.${task}`;
-      const said = t(key);
-      return said === key || said === task.toUpperCase() ? task : said;
-    },
+    /** @param {string} task */
+    task: (task) => translated("task", task),
     /** What a detector says that it sees. @param {string} classId */
-    seen: (classId) => {
-      const key = `class.${classId}`;
-      const said = t(key);
-      return said === key || said === classId.toUpperCase() ? classId : said;
-    },
+    seen: (classId) => translated("class", classId),
     /** A number of other equipment. @param {import("../../core/protocol.js").Tile} tile */
     tile: ({ value, state, unit, decimals }) => {
       if (value === null || state === "silent" || state === "unreadable") return "—";

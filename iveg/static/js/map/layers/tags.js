@@ -38,21 +38,28 @@ const WORDS_PX = 28;
  * @returns {Place[]}
  */
 export function placesOfTags(paint, robots) {
-  const names = robots.map((robot) => rectsOf(paint, robot, []).rects[0]);
-  return robots.map((robot, n) => placeOf(paint, robot, names.slice(n + 1)));
+  const alone = robots.map((robot) => wishesOf(paint, robot, []));
+  const names = alone.map(({ rects }) => rects[0]);
+  return robots.map((robot, n) => {
+    const tags = tagsOf(paint, robot);
+    const whole = tags.length ? [wishesOf(paint, robot, tags)] : [];
+    return placeOf(paint, [...whole, alone[n]], names.slice(n + 1));
+  });
 }
 
-/** @param {Paint} paint @param {SceneRobot} robot @param {Rect[]} names of others
- * @returns {Place} */
-function placeOf(paint, robot, names) {
-  const tags = tagsOf(paint, robot);
-  for (const told of tags.length ? [tags, []] : [tags]) {
-    const { rects, places } = rectsOf(paint, robot, told);
+/**
+ * @param {Paint} paint
+ * @param {ReturnType<typeof wishesOf>[]} wishes with all tags, and at last without any
+ * @param {Rect[]} names of others
+ * @returns {Place}
+ */
+function placeOf(paint, wishes, names) {
+  for (const { rects, places } of wishes) {
     const clear = rects.filter((rect) => !names.some((name) => overlap(rect, name)));
     const found = claim(paint, clear);
-    if (found !== null) return { ...places[rects.indexOf(clear[found])], tags: told };
+    if (found !== null) return places[rects.indexOf(clear[found])];
   }
-  return { ...rectsOf(paint, robot, []).places[0], tags: [] };
+  return wishes[wishes.length - 1].places[0];
 }
 
 /**
@@ -60,7 +67,7 @@ function placeOf(paint, robot, names) {
  *
  * @param {Paint} paint @param {SceneRobot} robot @param {Tag[]} tags
  */
-function rectsOf(paint, robot, tags) {
+function wishesOf(paint, robot, tags) {
   const { view } = paint;
   const isHeld = isSeenHeld(robot);
   const [length] = bodySize(robot, view.scale);
@@ -75,10 +82,10 @@ function rectsOf(paint, robot, tags) {
   const isInView = x >= 0 && x <= view.width;
   const aside = isInView ? Math.max(-left, Math.min(0, view.width - right)) : 0;
   const heights = [-near, near, -near - WORDS_PX, near + WORDS_PX];
-  const places = heights.map((dy) => ({ y: dy, aside }));
+  const places = heights.map((dy) => ({ y: dy, aside, tags }));
   const [east, west] = [x - left + length, x - right - length];
-  if (right + east <= view.width) places.push({ y: 0, aside: east });
-  if (left + west >= 0) places.push({ y: 0, aside: west });
+  if (right + east <= view.width) places.push({ y: 0, aside: east, tags });
+  if (left + west >= 0) places.push({ y: 0, aside: west, tags });
   const rects = places.map((place) => ({
     left: left + place.aside,
     right: right + place.aside,
