@@ -66,6 +66,7 @@ class Evaluator:
 
     Attributes:
         rule: The version in force; a new one counts from the next judgement on.
+        laser_sight: What lasers find empty; a memory finds only parts that have names.
         aged: Comfort, called with each tick and with who was seen to walk by lasers.
         judged: The same with each judgement: the rule, limits, changes, and when.
     """
@@ -103,8 +104,10 @@ class Evaluator:
         self._obstacles = obstacles or Obstacles(world, people, Plan.of(greenhouse))
         self._speed_limits = SpeedLimits(greenhouse, self._obstacles.seen)
         self.tracking = DetectionTracking(world, self.people, event_log, new_id)
-        swept = LaserSight(Plan.of(greenhouse), newest_scan).swept
-        self._staleness = Staleness(world, self.people, greenhouse, event_log, swept)
+        self.laser_sight = sight = LaserSight(Plan.of(greenhouse), newest_scan)
+        self._staleness = Staleness(
+            world, self.people, greenhouse, event_log, sight.swept
+        )
         self._feedback_publisher = FeedbackPublisher(
             world, self.people, self.tracking.other, fleet, boot, backlog
         )

@@ -10,6 +10,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import orjson
 import pytest
 
@@ -25,6 +26,7 @@ from iveg.app.viewers import IDLE_S, MOST_VIEWERS, Viewers, picture_of
 from iveg.domain.errors import HopError, NotRecordedError, UnreadableError
 from iveg.domain.observations import Instant, Received
 from iveg.domain.records import Record
+from iveg.domain.robot_state import RobotState
 from iveg.domain.transports import DIRECT, FIWARE
 from iveg.lab.emulator.camera import DETECTORS
 from iveg.lab.emulator.layout import lay_out
@@ -33,7 +35,7 @@ from iveg.lab.emulator.scenarios import scenario_named
 from iveg.lab.emulator.world import SimulatedWorld
 from iveg.lab.experiment.stage import STEP_S, Stage
 from iveg.ngsi import codec
-from iveg.pipeline.build import Choices, Ports, build
+from iveg.pipeline.build import Choices, Pipeline, Ports, build
 from iveg.pipeline.memory import Memory
 from iveg.pipeline.trace import Chronicle, CountedIds
 from iveg.web.views import Views
@@ -319,6 +321,34 @@ async def test_of_another_version_there_is_one_clear_problem(
 async def test_of_another_fleet_there_is_one_clear_problem(folder: Path) -> None:
     with pytest.raises(UnreadableError, match="other robots"):
         Past(site_of(folder, robots=("AGI", "X1"))).move(START.wall + 9)
+
+
+def _place(robot: RobotState) -> tuple[float, float]:
+    assert robot.odometry is not None
+    return robot.odometry.pose.x, robot.odometry.pose.y
+
+
+async def test_after_a_memory_a_laser_clears_the_same_places(tmp_path: Path) -> None:
+    """Its scan is no second one that is equal: that would be a frozen laser."""
+    live = Live(tmp_path / "live")
+    memory = Memory(live.parts)
+    await live.run(10)
+    await live.close()
+    around = np.indices((9, 9)).reshape(2, -1).T - 4.0
+    ages = np.full(len(around), 2.0)
+
+    def cleared(parts: Pipeline) -> list[list[int]]:
+        sight, now = parts.evaluator.laser_sight, live.clock()
+        return [
+            sight.swept(one, np.add(around, _place(one)), ages, now).tolist()
+            for one in parts.world.robots.values()
+        ]
+
+    before = cleared(live.parts)
+    past = Past(site_of(tmp_path)).parts
+    Memory(past).read(memory.write())
+    assert any(before)
+    assert cleared(past) == before
 
 
 def test_a_memory_from_elsewhere_runs_nothing(folder: Path) -> None:
