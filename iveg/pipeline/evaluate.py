@@ -198,14 +198,16 @@ class Evaluator:
 
     def settle(self) -> None:
         """Judge the fleet once for everything that was taken since the last time."""
-        at, self._unjudged = self._unjudged, None
-        if at is None:
-            return
-        self._judge(at)
+        if self._unjudged is not None:
+            self._settle(self._unjudged)
+
+    def _settle(self, now: Instant) -> None:
+        self._unjudged = None
+        self._judge(now)
         for robot_id, odometry in self._moved.items():
             robot, speed_limit = self.world.robot(robot_id), self.speed_limits[robot_id]
             self._event_log.odometry(
-                odometry, robot, speed_limit.speed_factor, robot.link(at), at
+                odometry, robot, speed_limit.speed_factor, robot.link(now), now
             )
         self._moved.clear()
 
@@ -300,8 +302,7 @@ class Evaluator:
         walkers = list(self._obstacles.walkers())
         self.tracking.witness(walkers)
         self.aged(walkers, now)
-        self.settle()
-        self._judge(now)
+        self._settle(now)
         if now.mono - self._feedback_publisher.published_at >= HEARTBEAT_S - 1e-3:
             self.publish(now)
         aged = self.decisions.age(self._heard_s, self.people.known)

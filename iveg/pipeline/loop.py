@@ -133,20 +133,26 @@ class RuleLoop:
                 continue
             if self._evaluator.world.may_act(received):
                 self._act(received)
-        if judges:
+        ticks = now.mono - self._ticked >= TICK_S - 1e-3
+        if ticks:
+            self._tick(now)
+        elif judges:
             self._evaluator.settle()
         if self._taken and not self._evaluator.is_unjudged:
             self._decided(self._taken, self._clock())
             self._taken.clear()
-        if now.mono - self._ticked >= TICK_S - 1e-3:
-            self._ticked = now.mono
-            self._commander.tick(now)
-            commanded = self._commander.conditions(now)
-            supervised = self._supervision.conditions(now)
-            self._evaluator.tick(now, chain(commanded, supervised))
+        if ticks:
             self._watch_chain(now)
             for tick in self._ticks:
                 tick(now)
+
+    def _tick(self, now: Instant) -> None:
+        """Let time pass for what is vital; the fleet is judged with it."""
+        self._ticked = now.mono
+        self._commander.tick(now)
+        commanded = self._commander.conditions(now)
+        supervised = self._supervision.conditions(now)
+        self._evaluator.tick(now, chain(commanded, supervised))
 
     def _act(self, received: Received) -> None:
         """Hand an observation to whoever follows an order."""
