@@ -188,12 +188,13 @@ def _live(desk: WebDesk) -> dict[str, Any]:
 
 
 def _paced(desk: WebDesk) -> Any:
-    """The first frame of telemetry."""
+    """A frame of telemetry that has everything."""
     subscriber = Subscriber()
     for topic in _PACED:
         subscriber.changed(topic)
     painting = Painting(desk.latency.watch)
     feed = TelemetryFeed(desk.encoder.telemetry, subscriber, painting)
+    feed.write_ahead(desk.clock())
     return _read(feed.next_frame(desk.clock()))
 
 

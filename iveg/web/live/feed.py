@@ -46,6 +46,8 @@ class TelemetryFeed:
         self._sent: dict[str, tuple[int, float]] = {}
         self._is_full = False
         self._waits_for_news = True
+        self._ready: _Frame | None = None
+        """Begun for the next frame."""
 
     def painted(self, number: object, now: float, report: dict[str, object]) -> None:
         """The page has painted a frame: there may be credit for another.
@@ -77,11 +79,13 @@ class TelemetryFeed:
             return None
         self._absorb()
         self._encoder.begin()
-        frame = _Frame(self.window.room)
+        frame = self._begun()
         self._add_moves(frame, now)
         # People and states before pictures, where there is no room for all.
-        self._add_due(frame, self._read_outs, now)
-        self._add_due(frame, self._pictures, now)
+        if self._ready is None:
+            if not frame.moves:
+                self._add_due(frame, self._read_outs, now)
+            self._add_due(frame, self._pictures, now)
         self._is_full = frame.is_full
         if frame.is_empty:
             return None
@@ -92,6 +96,34 @@ class TelemetryFeed:
         self.window.sent(frame.heavy, now.mono, late_s)
         self._waits_for_news = False
         return data
+
+    def write_ahead(self, now: Instant) -> None:
+        """Write the read-outs that are due, for the next frame.
+
+        They take long to write, and poses must not wait for that.
+        """
+        if self._ready is not None or self.window.opens_at == _INF:
+            return
+        self._absorb()
+        self._encoder.begin()
+        ready = _Frame(BYTES)
+        self._add_due(ready, self._read_outs, now)
+        self._ready = None if ready.is_empty else ready
+
+    def _begun(self) -> "_Frame":
+        """The frame that was written ahead, once there is room for it; else a new one.
+
+        Where it waits, so does all that is heavy.
+        """
+        room, ready = self.window.room, self._ready
+        if ready is None:
+            return _Frame(room)
+        if ready.heavy <= room or room == BYTES:
+            self._ready = None
+            return ready
+        waits = _Frame(0)
+        waits.is_full = True
+        return waits
 
     def _absorb(self) -> None:
         for topic in self._subscriber.drain_telemetry():
@@ -124,6 +156,8 @@ class TelemetryFeed:
             return -_INF
         if self._is_full:
             return _INF
+        if self._ready is not None:
+            return -_INF
         parts = min(self._read_outs.values(), default=_INF)
         return min(parts, min(self._pictures.values(), default=_INF))
 

@@ -179,8 +179,9 @@ class Line:
             self._sending_since = None
             await self._subscriber.news(feed.wait_s(self._clock().mono))
             self._sending_since = loop.time()
-            await self._send_news()
             await self._send_frame(feed)
+            await self._send_news()
+            feed.write_ahead(self._clock())
         await self.close_slow()
 
     @property
