@@ -14,9 +14,12 @@ def format_stamp(wall: float) -> str:
     return f"{_second(whole + carried)}.{micros // 1000:03d}Z"
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=4096)
 def _second(wall: int) -> str:
-    """Without its end, which alone differs among stamps of a second."""
+    """Without its end, which alone differs among stamps of a second.
+
+    Kept are the seconds of all people and alerts that are shown again and again.
+    """
     return datetime.fromtimestamp(wall, UTC).isoformat().removesuffix("+00:00")
 
 

@@ -1,10 +1,11 @@
-"""The state of the pipeline as models: built on request, never kept."""
+"""The state of the pipeline as models: built on request; only alerts are kept."""
 
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable
 
 from iveg.domain import margins as margins_
 from iveg.domain.acknowledgements import acknowledgements_of
+from iveg.domain.alerts.alert_book import BookedAlert
 from iveg.domain.margins import LeastMargins
 from iveg.domain.observations import Instant
 from iveg.domain.records import LogRecord
@@ -72,6 +73,8 @@ class Views:
         self._health_monitor = parts.health_monitor
         self._equipment = parts.equipment.equipment
         self._counters = counters or parts.counters
+        self._alerts: dict[str, tuple[BookedAlert, Alert]] = {}
+        """Made for the last list, and of what: in a flood few of many have changed."""
 
     # --- robots -------------------------------------------------------------------
 
@@ -270,7 +273,13 @@ class Views:
         """All alerts that people should see now, gravest first."""
         waiting = self._evaluator.alerts.waiting
         waiting.sort(key=lambda one: (one.priority, -one.last.raised.wall))
-        return [Alert.of(one) for one in waiting]
+        before, self._alerts = self._alerts, {}
+        for one in waiting:
+            kept = before.get(one.alert_id)
+            if kept is None or kept[0] is not one:
+                kept = one, Alert.of(one)
+            self._alerts[one.alert_id] = kept
+        return [alert for _, alert in self._alerts.values()]
 
     def flood(self) -> Flood:
         """How fast alerts come."""

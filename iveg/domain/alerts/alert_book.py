@@ -104,7 +104,9 @@ class AlertBook:
         for number, (key, condition) in enumerate(wrong.items()):
             before = self._alerts.get(key)
             if before is not None and _goes_on(before, condition):
-                self._alerts[key] = replace(before, condition=condition)
+                # What has not changed stays the very same for whoever draws it.
+                if condition != before.condition:
+                    self._alerts[key] = replace(before, condition=condition)
                 continue
             self._alerts[key] = _raise(before, condition, now, f"{new_id}-{number}")
             changed.append(self._alerts[key])

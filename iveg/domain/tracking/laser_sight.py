@@ -12,6 +12,7 @@ Nothing unexplained may stand so near that the person may have walked there.
 
 import math
 from collections.abc import Callable
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,7 @@ from iveg.domain.witness import PLAN_M, Plan
 ScanOf = Callable[[RobotState], LaserScan | None]
 """Reads a robot's newest scan; None where there is none that can be read."""
 _Floats = NDArray[np.float64]
+_Bearing = TypeVar("_Bearing", float, NDArray[np.float64])
 _NONE = np.empty(0, np.intp)
 _FRESH_S = 0.5
 _NEAREST_M, _FARTHEST_M = 0.5, 12.0
@@ -89,8 +91,8 @@ def swept_by(
     sensor = pose.compose(scan.mount)
     passed = [
         index
-        for index, (x, y) in enumerate(spots.tolist())
-        if _passes(scan, sensor, x, y)
+        for index in _perhaps_passed(scan, sensor, spots).tolist()
+        if _passes(scan, sensor, *spots[index].tolist())
     ]
     if not passed:
         return _NONE
@@ -102,6 +104,20 @@ def swept_by(
     apart = np.hypot(*(strange[:, None] - spots[passed]).transpose(2, 0, 1))
     empty: NDArray[np.intp] = np.array(passed)[np.all(apart > walked, axis=0)]
     return empty
+
+
+def _perhaps_passed(
+    scan: LaserScan, sensor: Pose2D, spots: _Floats
+) -> NDArray[np.intp]:
+    """The spots behind which the beam to their middle ends; few are looked at whole."""
+    if not scan.angle_increment:
+        return _NONE
+    dx, dy = spots[:, 0] - sensor.x, spots[:, 1] - sensor.y
+    away = np.hypot(dx, dy)
+    beams = np.rint(_beams(scan, np.arctan2(dy, dx) - sensor.yaw)).astype(np.intp)
+    hits = scan.ranges[beams % scan.ranges.size]
+    passes = (hits >= away + _BEHIND_M) & (hits <= scan.range_max)
+    return np.flatnonzero(passes & (away <= _FARTHEST_M))
 
 
 def _passes(scan: LaserScan, sensor: Pose2D, x: float, y: float) -> bool:
@@ -127,7 +143,7 @@ def _passes(scan: LaserScan, sensor: Pose2D, x: float, y: float) -> bool:
     return bool(passes.all())
 
 
-def _beams(scan: LaserScan, bearing: float) -> float:
+def _beams(scan: LaserScan, bearing: _Bearing) -> _Bearing:
     """Which beam goes at a bearing in the sensor's frame, counted from the first."""
     turn = math.tau / abs(scan.angle_increment)
     return ((bearing - scan.angle_min) / scan.angle_increment) % turn
