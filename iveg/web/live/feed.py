@@ -74,17 +74,14 @@ class TelemetryFeed:
         return None if wake_at == _INF else max(0.0, wake_at - now)
 
     def next_frame(self, now: Instant) -> bytes | None:
-        """A frame of the newest of everything that is due; None: not now."""
+        """A frame of what has moved, is written ahead or is a picture; None: not now."""
         if self.window.opens_at > now.mono:
             return None
         self._absorb()
-        self._encoder.begin()
         frame = self._begun()
         self._add_moves(frame, now)
         # People and states before pictures, where there is no room for all.
         if self._ready is None:
-            if not frame.moves:
-                self._add_due(frame, self._read_outs, now)
             self._add_due(frame, self._pictures, now)
         self._is_full = frame.is_full
         if frame.is_empty:

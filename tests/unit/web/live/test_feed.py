@@ -38,6 +38,7 @@ class Page:
         """The next frame, if there may be one now; then as a browser's line does."""
         frame = self.feed.next_frame(self.desk.clock())
         self.feed.write_ahead(self.desk.clock())
+        frame = frame or self.feed.next_frame(self.desk.clock())
         if frame is None:
             return None
         (length,) = struct.unpack_from("<I", frame)
@@ -383,11 +384,10 @@ def test_of_people_those_are_told_of_whom_there_is_more_to_say_than_an_age(
     desk.drive("AGII", 50.0)
     desk.look("AGI", detection("farmer", 5.0))
     desk.look("AGII", detection("farmer", 55.0))
-    page.read()
-    page.paint()
+    page.read_all()
     desk.clock.now += 0.3
     desk.look("AGII", detection("farmer", 55.1))
-    page.read()
+    page.read_all()
 
     told = [one for one in page.told("parts") if one["topic"] == "people"]
     ids = [[one["person_id"] for one in each["data"]["changed"]] for each in told]
