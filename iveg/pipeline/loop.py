@@ -123,16 +123,7 @@ class RuleLoop:
         """
         self._stepped(now, judges)
         for received in arrived:
-            fresh = self._apply(received)
-            if fresh:
-                self._taken.append(received)
-            if isinstance(received.observation, HeartbeatProbe):
-                self._health_monitor.received(received.observation.origin, received.at)
-            # The second transport's answer is no news, but its time is kept.
-            if not fresh and not isinstance(received.observation, _ANSWERS):
-                continue
-            if self._evaluator.world.may_act(received):
-                self._act(received)
+            self._hear(received)
         ticks = now.mono - self._ticked >= TICK_S - 1e-3
         if ticks:
             self._tick(now)
@@ -145,6 +136,18 @@ class RuleLoop:
             self._watch_chain(now)
             for tick in self._ticks:
                 tick(now)
+
+    def _hear(self, received: Received) -> None:
+        fresh = self._apply(received)
+        if fresh:
+            self._taken.append(received)
+        if isinstance(received.observation, HeartbeatProbe):
+            self._health_monitor.received(received.observation.origin, received.at)
+        # The second transport's answer is no news, but its time is kept.
+        if not fresh and not isinstance(received.observation, _ANSWERS):
+            return
+        if self._evaluator.world.may_act(received):
+            self._act(received)
 
     def _tick(self, now: Instant) -> None:
         """Let time pass for what is vital; the fleet is judged with it."""

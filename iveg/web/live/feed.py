@@ -74,7 +74,7 @@ class TelemetryFeed:
         return None if wake_at == _INF else max(0.0, wake_at - now)
 
     def next_frame(self, now: Instant) -> bytes | None:
-        """A frame of what has moved, is written ahead or is a picture; None: not now."""
+        """A frame of what moved, was written ahead or is a picture; None: not now."""
         if self.window.opens_at > now.mono:
             return None
         self._absorb()
