@@ -137,7 +137,7 @@ class Dss:
             self.stores.inputs.counters,
         ]
         site = PastSite.of(settings, self.stores.inputs.folder)
-        self.past = Viewers(site, clock.now, has_spare=settings.recordings)
+        self.past = Viewers(site, clock.now, has_spares=settings.recordings)
         self.what_ifs = WhatIfs.of(settings, self.stores.queries.url, fleet)
         self.worker = Worker(partial(self.pipeline.supervision.failed, "worker"))
         self._attach_reader()

@@ -1,8 +1,8 @@
 """Who looks at the past: for each a process of its own, so that the loop feels nothing.
 
 A process begins with the first question, keeps its world for the next, and ends when
-nobody has asked for a while.  Where there are recordings one is always ready for who
-comes next, because its imports alone take a second.
+nobody has asked for a while.  Where there are recordings some are always ready for who
+comes next, because their imports alone take a second.
 """
 
 import asyncio
@@ -27,6 +27,8 @@ from iveg.pipeline.ports import Clock
 
 MOST_VIEWERS: Final = 3
 """Processes at once; each holds a world of its own."""
+MOST_READY: Final = 2
+"""Processes for who comes next and after; fewer, but one, where that many look on."""
 IDLE_S: Final = 60.0
 _IN_USE_S: Final = 10.0
 _LIMIT_S: Final = 60.0
@@ -107,7 +109,7 @@ class Viewers:
     Args:
         site: What worlds are made with.
         clock: Tells who has not asked for long.
-        has_spare: Whether a process is kept ready for the next viewer.
+        has_spares: Whether processes are kept ready for the next viewers.
         work: Answers; tests pass another.
     """
 
@@ -116,13 +118,13 @@ class Viewers:
         site: Site,
         clock: Clock,
         *,
-        has_spare: bool = False,
+        has_spares: bool = False,
         work: Callable[[Site, float], Shown] = world_at,
     ) -> None:
-        self._site, self._clock, self._has_spare = site, clock, has_spare
+        self._site, self._clock, self._has_spares = site, clock, has_spares
         self._work = work
         self._viewers: dict[str, Viewer] = {}
-        self._spare: Worker | None = None
+        self._spares: list[Worker] = []
         self._looked_at = float("-inf")
 
     @property
@@ -151,7 +153,7 @@ class Viewers:
         viewer = self._viewers.get(name)
         if viewer is None:
             self._make_room(now)
-            worker, self._spare = self._spare or _worker(), None
+            worker = self._spares.pop(0) if self._spares else _worker()
             viewer = self._viewers[name] = Viewer(now, worker)
         viewer.asked_at = now
         return viewer
@@ -165,23 +167,25 @@ class Viewers:
         self._end(oldest)
 
     async def run(self) -> None:
-        """End what nobody asks any more, and keep one ready, until cancelled."""
+        """End what nobody asks any more, and keep some ready, until cancelled."""
         while True:
             self.tick(self._clock())
             await self.keep_ready()
             await asyncio.sleep(_CHECK_S)
 
     async def keep_ready(self) -> None:
-        """Have a process for the next viewer, where one is wanted."""
-        now = self._clock().mono
-        is_ready = self._spare is not None and now - self._looked_at < _LOOKED_S
-        if not self._has_spare or is_ready:
+        """Have processes for the next viewers, where they are wanted."""
+        if not self._has_spares:
             return
-        self._looked_at = now
-        spare = self._spare = self._spare or _worker()
-        # Who comes meanwhile has this one, and waits in its line.
-        with contextlib.suppress(HopError):
-            await spare.run(make_ready, self._site)
+        now, wanted = self._clock().mono, min(MOST_READY, MOST_VIEWERS - self.count)
+        new = [_worker() for _ in range(max(1, wanted) - len(self._spares))]
+        self._spares += new
+        if now - self._looked_at >= _LOOKED_S:
+            self._looked_at, new = now, list(self._spares)
+        for spare in new:
+            # Who comes meanwhile has this one, and waits in its line.
+            with contextlib.suppress(HopError):
+                await spare.run(make_ready, self._site)
 
     def tick(self, now: Instant) -> None:
         """End what nobody asks any more."""
@@ -196,5 +200,5 @@ class Viewers:
         """End all."""
         for name in list(self._viewers):
             self._end(name)
-        if self._spare is not None:
-            self._spare.close()
+        for spare in self._spares:
+            spare.close()
