@@ -4,18 +4,19 @@ import contextlib
 import os
 from pathlib import Path
 
-_LESS_URGENT = 10
+LESS_URGENT = 10
+"""Of a process whose work may be late."""
 _FIRST_TO_GO = "1000"
 
 
-def give_way() -> None:
+def give_way(less_urgent: int = LESS_URGENT) -> None:
     """Let this process run where others leave room.
 
-    Its priority is lower, and on Linux it is a batch: one that wakes takes no other's
-    place on a processor (sched(7), ``SCHED_BATCH``).  Where memory runs out the kernel
+    Its priority is so much lower (nice), and on Linux it is a batch: one that wakes
+    takes no other's place on a processor (sched(7), ``SCHED_BATCH``).  Where memory runs out the kernel
     ends it, and not the server (proc_pid_oom_score_adj(5)).
     """
-    os.nice(_LESS_URGENT)
+    os.nice(less_urgent)
     if hasattr(os, "SCHED_BATCH"):
         # Some containers allow no change; being late is all that is lost.
         with contextlib.suppress(OSError):

@@ -8,20 +8,22 @@ from typing import BinaryIO
 
 import orjson
 
-from iveg.adapters.urgency import give_way
+from iveg.adapters.urgency import LESS_URGENT, give_way
 
 Serve = Callable[[BinaryIO, BinaryIO], None]
 """Takes inputs from the first until it ends, and answers on the second."""
 
 
-def run_fed(serve: Serve, refusal: type[Exception]) -> None:
+def run_fed(
+    serve: Serve, refusal: type[Exception], less_urgent: int = LESS_URGENT
+) -> None:
     """Serve on standard input and output; a refusal is said once, and ends it.
 
     Signals are the feeder's to heed; its end is this process's.
     """
     for one in (signal.SIGINT, signal.SIGTERM):
         signal.signal(one, signal.SIG_IGN)
-    give_way()
+    give_way(less_urgent)
     with (
         open(0, "rb", buffering=0) as source,
         open(1, "wb", buffering=0) as answers,

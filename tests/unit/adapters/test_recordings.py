@@ -409,6 +409,10 @@ async def test_a_process_that_hangs_and_is_killed_delays_nobody_and_another_goes
     running.hear(1)
     await running.until(lambda: recorder.counters["recordings_written"] == 1)
     assert recorder.pid is not None
+    # It takes no other's place on a processor, and has its share of a crowded one.
+    assert os.sched_getscheduler(recorder.pid) == os.SCHED_BATCH
+    mine = os.getpriority(os.PRIO_PROCESS, 0)
+    assert os.getpriority(os.PRIO_PROCESS, recorder.pid) == mine
     os.kill(recorder.pid, signal.SIGSTOP)
     fits = MOST_BYTES // 10**6
     for _ in range(fits + 8):
