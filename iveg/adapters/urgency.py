@@ -13,8 +13,8 @@ def give_way(less_urgent: int = LESS_URGENT) -> None:
     """Let this process run where others leave room.
 
     Its priority is so much lower (nice), and on Linux it is a batch: one that wakes
-    takes no other's place on a processor (sched(7), ``SCHED_BATCH``).  Where memory runs out the kernel
-    ends it, and not the server (proc_pid_oom_score_adj(5)).
+    takes no other's place on a processor (sched(7), ``SCHED_BATCH``).  Where memory
+    runs out the kernel ends it, and not the server (proc_pid_oom_score_adj(5)).
     """
     os.nice(less_urgent)
     if hasattr(os, "SCHED_BATCH"):
