@@ -116,8 +116,7 @@ def _perhaps_passed(
     away = np.hypot(dx, dy)
     beams = np.rint(_beams(scan, np.arctan2(dy, dx) - sensor.yaw)).astype(np.intp)
     hits = scan.ranges[beams % scan.ranges.size]
-    passes = (hits >= away + _BEHIND_M) & (hits <= scan.range_max)
-    return np.flatnonzero(passes & (away <= _FARTHEST_M))
+    return np.flatnonzero((hits >= away + _BEHIND_M) & (away <= _FARTHEST_M))
 
 
 def _passes(scan: LaserScan, sensor: Pose2D, x: float, y: float) -> bool:

@@ -211,7 +211,7 @@ async def record(folder: Path, seconds: float) -> None:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Recordings, of which the last by name is the longer; only to be read."""
+    """Recordings of some hours of the clock; only to be read."""
     found = tmp_path_factory.mktemp("recordings")
     asyncio.run(record(found, SECONDS))
     return found
@@ -219,8 +219,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def copied(folder: Path, tmp_path: Path) -> Path:
-    """The same file, to be spoiled."""
-    return Path(shutil.copy(max(folder.iterdir()), tmp_path))
+    """The file in which they begin, to be spoiled."""
+    longest = max(folder.iterdir(), key=lambda one: one.stat().st_size)
+    return Path(shutil.copy(longest, tmp_path))
 
 
 def moment(past: Past) -> bytes:
