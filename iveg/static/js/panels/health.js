@@ -67,12 +67,11 @@ export function createHealthPanel({ store, i18n, line }) {
 
   /** @param {Record<string, number>} counters */
   function drawCounters(counters) {
-    const rows = Object.entries(counters).map(([name, value]) => {
-      const row = make("div");
-      row.append(make("dt", "", name), make("dd", "", i18n.number(value, 0)));
-      return row;
+    fill(need("#counters"), Object.entries(counters), makeCounter, (row, counter) => {
+      const [name, value] = counter;
+      setText(row.children[0], name);
+      setText(row.children[1], i18n.number(value, 0));
     });
-    need("#counters").replaceChildren(...rows);
   }
 
   store.subscribe("health", draw);
@@ -80,6 +79,12 @@ export function createHealthPanel({ store, i18n, line }) {
   i18n.onChange(draw);
   setInterval(onBeat, TICK_MS, draw);
   draw();
+}
+
+function makeCounter() {
+  const row = make("div");
+  row.append(make("dt"), make("dd"));
+  return row;
 }
 
 function makeItem() {
