@@ -38,7 +38,6 @@ export function createAlertsPanel({ store, i18n }, tone) {
     const active = i18n.t("header.alerts_count", { count: open });
     setAttribute(button, "title", rate ? `${active} · ${rate}` : active);
     button.toggleAttribute("data-flood", Boolean(flood?.since));
-    writeFlood(need("#alerts-flood"), flood, i18n);
     setHidden(need("#alerts-empty"), alerts.length > 0 || !isKnown(store));
     drawList();
   }
@@ -46,6 +45,7 @@ export function createAlertsPanel({ store, i18n }, tone) {
   /** A closed list is written when it is opened: nobody reads it before. */
   function drawList() {
     if (panel && !panel.hasAttribute("open")) return;
+    writeFlood(need("#alerts-flood"), store.get("flood"), i18n);
     list.draw(store.get("alerts") ?? []);
   }
 
