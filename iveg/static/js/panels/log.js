@@ -15,6 +15,8 @@ import { rowsOf } from "./log_rows.js";
 
 /** Entries in the list; the store keeps more, history keeps all. */
 const SHOWN = 200;
+/** What each item says. @type {WeakMap<Element, Row>} */
+const told = new WeakMap();
 
 /**
  * @param {App} app
@@ -28,8 +30,6 @@ export function createLogPanel(app, decision) {
   const chosen = createChosen();
   /** @type {Entry[]} told since the last beat, oldest first */
   let fresh = [];
-  /** @type {WeakMap<Element, Row>} what each item says */
-  const told = new WeakMap();
   /** @type {Set<string>} */
   const robots = new Set(store.robots().keys());
   const chips = createLogChips({
@@ -101,10 +101,8 @@ export function createLogPanel(app, decision) {
 
   /** @param {Element} item @param {Row} row */
   function writeLasted(item, row) {
-    const { lastedS } = row;
     told.set(item, row);
-    const said = lastedS === null ? "" : i18n.t("log.lasted", { seconds: lastedS });
-    setText(needPart("lasted", item), said);
+    setText(needPart("lasted", item), lastedSaid(row, i18n));
   }
 
   /** The rows that the filter admits, newest first. @param {readonly Entry[]} entries */
@@ -173,6 +171,10 @@ export function createLogPanel(app, decision) {
   });
   rebuild();
 }
+
+/** @param {Row} row @param {import("../core/i18n.js").I18n} i18n */
+const lastedSaid = ({ lastedS: seconds }, i18n) =>
+  seconds === null ? "" : i18n.t("log.lasted", { seconds });
 
 /**
  * The text of an entry; for a slow-down far from any person, the reason: a grown ring.
