@@ -1,4 +1,5 @@
 import { createGround } from "../../iveg/static/js/map/layers/ground.js";
+import { createPlaces } from "../../iveg/static/js/map/layers/places.js";
 import { createScanLayer } from "../../iveg/static/js/map/layers/scan.js";
 import { createStaticImage } from "../../iveg/static/js/map/layers/static.js";
 import { equal, test } from "./harness.js";
@@ -11,6 +12,7 @@ const VIEW = { width: 100, height: 80, scale: 10, x: 0, y: 0 };
 function sceneOf(scans, nowMs = 0) {
   return {
     ...{ nowMs, robots: [], map: null, coverage: null, costmap: null, tiles: [] },
+    ...{ people: [], detections: [] },
     scans: scans.map((points, i) => ({
       ...{ robotId: `R${i}`, slot: i + 1, strength: 1 },
       points: new Float32Array(points),
@@ -113,9 +115,9 @@ function countedGround() {
     () => [],
     () => told.steps,
   );
-  /** @param {number[][]} scans @param {number} nowMs */
-  function update(scans, nowMs, view = VIEW) {
-    const scene = sceneOf(scans, nowMs);
+  /** @param {number[][]} scans @param {number} nowMs @param {object} [known] */
+  function update(scans, nowMs, view = VIEW, known = {}) {
+    const scene = { ...sceneOf(scans, nowMs), ...known };
     const paint = { view, theme: null, labels: null, scene };
     return ground.update(/** @type {any} */ (paint), 1, () => true);
   }
@@ -135,6 +137,64 @@ test("what lies under the robots is drawn at once for another view", () => {
   const { told, update } = countedGround();
   update([[1, 2]], 1000);
   equal([update([[1, 2]], 1016, { ...VIEW, x: 1 }), told.redrawn], [0, 2]);
+});
+
+/** A robot at a place, with nothing to do. @param {number} x */
+const robotAt = (x) => {
+  const [pose, path, encounters] = [{ x, y: 0, yaw: 0 }, nothing, nothing];
+  return { id: "AGI", link: "LIVE", pose, goal: null, path, task: null, encounters };
+};
+/** @type {never[]} */
+const nothing = [];
+
+test("detections, people and plans are drawn anew with the scans, when they change", () => {
+  const { told, update } = countedGround();
+  const item = { class_id: "farmer" };
+  const person = { x: 1, y: 2, stage: "seen", observers: nothing, acting: nothing };
+  const robots = [robotAt(1)];
+  let nowMs = 1100;
+  /** @param {object} known */
+  const drawnFor = (known) => {
+    // Trails fade by their own clock, four times a second.
+    nowMs += 1000;
+    told.redrawn = 0;
+    update([], nowMs - 70, VIEW, { robots });
+    told.redrawn = 0;
+    update([], nowMs, VIEW, { robots, ...known });
+    return told.redrawn;
+  };
+  equal([drawnFor({}), drawnFor({ robots: [robotAt(1.01)] })], [0, 0]);
+  equal([drawnFor({ detections: [{ item }] }), drawnFor({ people: [person] })], [1, 1]);
+  equal(drawnFor({ robots: [{ ...robotAt(1), encounters: [{}] }] }), 1);
+  equal(drawnFor({ robots: [{ ...robotAt(1), link: "LOST" }] }), 1);
+});
+
+test("a link to somebody follows its robot, as often as scans are drawn", () => {
+  const { told, update } = countedGround();
+  const people = [{ x: 1, y: 2, stage: "seen", observers: ["AGI"], acting: nothing }];
+  const drawnAt = (/** @type {number} */ x, /** @type {number} */ nowMs) =>
+    update([], nowMs, VIEW, { people, robots: [robotAt(x)] });
+  equal([drawnAt(1, 1000), drawnAt(1.01, 1016)], [0, 50]);
+  equal([drawnAt(1.02, 1066), told.redrawn], [0, 2]);
+});
+
+test("words under the robots keep their places until they are drawn again", () => {
+  const rect = { left: 10, right: 40, top: 20, bottom: 30 };
+  const still = { image: () => new OffscreenCanvas(100, 80) };
+  const words = (/** @type {Paint} */ paint) => void paint.places?.claim([rect]);
+  const ground = createGround(
+    still,
+    [["intent", words]],
+    () => [],
+    () => 0,
+  );
+  const free = [1000, 1016].map((nowMs) => {
+    const places = createPlaces();
+    const paint = { view: VIEW, theme: null, labels: null, scene: sceneOf([], nowMs) };
+    ground.update(/** @type {any} */ ({ ...paint, places }), 1, () => true);
+    return places.claim([rect]);
+  });
+  equal(free, [null, null]);
 });
 
 test("the static image is drawn for what is known, and once a second for its age", () => {

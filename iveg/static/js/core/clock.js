@@ -92,8 +92,9 @@ export function aboutAge(robot, said, i18n) {
 export function createServerClock(fallbackOriginS = performance.timeOrigin / 1000) {
   /** @type {{roundTrip: number, origin: number, zeroMs: number | null}[]} */
   let samples = [];
-  const best = () =>
-    samples.reduce((a, b) => (b.roundTrip < a.roundTrip ? b : a), samples[0]);
+  /** Asked for each of hundreds of values a second. */
+  let shortest = samples[0];
+  const best = () => shortest;
   return {
     note(sentMs, receivedMs, serverS, at) {
       const middle = (sentMs + receivedMs) / 2;
@@ -103,6 +104,7 @@ export function createServerClock(fallbackOriginS = performance.timeOrigin / 100
         zeroMs: at === undefined ? null : middle - 1000 * at,
       };
       samples = [...samples.slice(-7), sample];
+      shortest = samples.reduce((a, b) => (b.roundTrip < a.roundTrip ? b : a));
     },
     serverNow: (nowMs) =>
       (samples.length ? best().origin : fallbackOriginS) + nowMs / 1000,

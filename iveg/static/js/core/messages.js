@@ -18,13 +18,14 @@ const LOCALES = { es: "es-ES", en: "en-GB" };
 /** Greenhouses live by the clock on their wall; data stay in UTC. */
 export const TIME_ZONE = "Europe/Madrid";
 const NOTHING = "—";
+/** Keys whose templates are kept in pieces; a value may be part of a key. */
+const PIECES_KEPT = 1000;
 const PERCENT = { style: /** @type {const} */ ("percent"), maximumFractionDigits: 0 };
 
 /** @type {Record<string, (value: any, messages: Messages, slots: Slots) => string>} */
 const FORMATS = {
   // Rounded down: a share below a threshold is never written as the threshold.
-  percent: (value, messages) =>
-    messages.formatted(Math.floor(value * 100 + 1e-6) / 100, PERCENT),
+  percent: (value, messages) => messages.percent(Math.floor(value * 100 + 1e-6) / 100),
   span: spanOf,
   time: (value, messages) => messages.time(value),
   class: (value, messages) => messages.named("class", value),
@@ -52,8 +53,11 @@ export class Messages {
   #blocks;
   #locale;
   #clock;
-  /** @type {Map<string, Intl.NumberFormat>} */
+  #percents;
+  /** @type {Map<number | null, Intl.NumberFormat>} by decimals; null: as they come */
   #numbers = new Map();
+  /** @type {Map<string, string[]>} templates of keys, in pieces */
+  #pieces = new Map();
 
   /** @param {Language} language @param {Blocks} blocks */
   constructor(language, blocks) {
@@ -61,6 +65,7 @@ export class Messages {
     this.#blocks = blocks;
     this.#locale = LOCALES[language];
     this.#clock = clockOf(this.#locale);
+    this.#percents = new Intl.NumberFormat(this.#locale, PERCENT);
   }
 
   /**
@@ -70,14 +75,30 @@ export class Messages {
    * @param {Slots} [slots]
    */
   say = (key, slots = {}) => {
-    const template = this.find(key);
-    if (template === null) return key;
-    return template
-      .replace(/\{(\w+)(?::(\w+))?\}/g, (_, name, form) =>
-        this.#write(slots[name], form, slots),
-      )
-      .trim();
+    const pieces = this.#pieces.get(key) ?? this.#cut(key);
+    if (pieces === null) return key;
+    let said = pieces[0];
+    for (let i = 1; i < pieces.length; i += 3) {
+      said += this.#write(slots[pieces[i]], pieces[i + 1], slots) + pieces[i + 2];
+    }
+    return said.trim();
   };
+
+  /**
+   * A template as text, name, format, text, name, format … text: a page says the same
+   * few hundred sentences thousands of times a minute.
+   *
+   * @param {string} key
+   * @returns {string[] | null} null: unknown
+   */
+  #cut(key) {
+    const template = this.find(key);
+    if (template === null) return null;
+    const pieces = template.split(/\{(\w+)(?::(\w+))?\}/);
+    if (this.#pieces.size >= PIECES_KEPT) this.#pieces.clear();
+    this.#pieces.set(key, pieces);
+    return pieces;
+  }
 
   /** @param {string} key @returns {string | null} */
   find(key) {
@@ -96,13 +117,9 @@ export class Messages {
     return this.find(`${block}.${value}`) ?? String(value);
   }
 
-  /** @param {number} value @param {Intl.NumberFormatOptions} options */
-  formatted(value, options) {
-    const name = JSON.stringify(options);
-    const known = this.#numbers.get(name);
-    const format = known ?? new Intl.NumberFormat(this.#locale, options);
-    this.#numbers.set(name, format);
-    return format.format(value);
+  /** @param {number} share 0–1 */
+  percent(share) {
+    return this.#percents.format(share);
   }
 
   /** @param {number} value @param {number} decimals */
@@ -110,11 +127,16 @@ export class Messages {
     if (!Number.isFinite(value)) return NOTHING;
     // "-0,0" of a robot at rest says nothing that "0,0" does not.
     const rounded = Math.abs(value) < 0.5 * 10 ** -decimals ? 0 : value;
-    return this.formatted(rounded, {
-      minimumFractionDigits: decimals,
-      maximumFractionDigits: decimals,
-      useGrouping: false,
-    });
+    return this.#format(decimals).format(rounded);
+  }
+
+  /** A format costs a hundred times what its use does. @param {number | null} decimals */
+  #format(decimals) {
+    const known = this.#numbers.get(decimals);
+    if (known) return known;
+    const format = new Intl.NumberFormat(this.#locale, optionsOf(decimals));
+    this.#numbers.set(decimals, format);
+    return format;
   }
 
   /** @param {string | number | Date} at ISO-8601, Unix seconds or a date */
@@ -128,7 +150,7 @@ export class Messages {
     if (value === null || value === undefined || value === "") return NOTHING;
     if (form && form in FORMATS) return FORMATS[form](value, this, slots);
     if (typeof value !== "number") return String(value);
-    return form ? this.number(value, Number(form)) : this.formatted(value, {});
+    return form ? this.number(value, Number(form)) : this.#format(null).format(value);
   }
 }
 
@@ -159,7 +181,17 @@ function spanOf(seconds) {
     : `${Math.floor(minutes / 60)} h ${minutes % 60} min`;
 }
 
-/** A format costs a hundred times what its use does. @param {string} locale */
+/** @param {number | null} decimals @returns {Intl.NumberFormatOptions} */
+const optionsOf = (decimals) =>
+  decimals === null
+    ? {}
+    : {
+        minimumFractionDigits: decimals,
+        maximumFractionDigits: decimals,
+        useGrouping: false,
+      };
+
+/** @param {string} locale */
 function clockOf(locale) {
   return new Intl.DateTimeFormat(locale, {
     timeZone: TIME_ZONE,

@@ -71,7 +71,8 @@ function createPaintHook(tell) {
     /** @type {WhenDrawn} */
     drawn(hasScans) {
       for (const [name, painted] of arrived) {
-        if (painted.kind === "lidar" && !hasScans) continue;
+        // Detections are drawn with the scans.
+        if (painted.kind !== "odom" && !hasScans) continue;
         arrived.delete(name);
         told.set(name, painted.stamp);
         tell(painted);

@@ -9,6 +9,8 @@ export class ProtocolError extends Error {
   }
 }
 
+const text = new TextDecoder();
+
 /**
  * The JSON that a binary frame begins with, and where its body starts.
  *
@@ -25,14 +27,14 @@ export function readHead(bytes) {
   const start = 4 + length;
   if (start > bytes.byteLength) throw new ProtocolError("head longer than the frame");
   if (length % 4) throw new ProtocolError("head not padded to four bytes");
-  const head = parse(new TextDecoder().decode(new Uint8Array(bytes, 4, length)));
+  const head = parse(text.decode(new Uint8Array(bytes, 4, length)));
   return { head, start };
 }
 
-/** @param {string} text */
-export function parse(text) {
+/** @param {string} json */
+export function parse(json) {
   try {
-    return JSON.parse(text);
+    return JSON.parse(json);
   } catch {
     throw new ProtocolError("not JSON");
   }

@@ -11,6 +11,7 @@
  *   `off` the layers that are not drawn, `trailS` how much of the trails (s)
  */
 
+import { createAbove } from "./layers/above.js";
 import { createCostmapLayer } from "./layers/costmap.js";
 import * as coverage from "./layers/coverage.js";
 import * as detections from "./layers/detections.js";
@@ -53,9 +54,10 @@ export const LAYERS = [
 
 /** Of the greenhouse and what is known of it: they never move. */
 const STILL = ["grid", "greenhouse", "coverage", "costmap"];
-/** Under the machines. */
-const GROUND = ["trail", "scan"];
-const OVER_GROUND = LAYERS.slice(LAYERS.indexOf("scan") + 1);
+/** Robots, and what hides no robot: in each picture. */
+const OVER_GROUND = LAYERS.slice(LAYERS.indexOf("robot"));
+/** Between them. */
+const GROUND = LAYERS.slice(STILL.length, -OVER_GROUND.length);
 
 /** More than any layer nests its drawing states. */
 const DEEPEST_SAVE = 8;
@@ -86,7 +88,7 @@ export function createPicture(canvas, trails) {
     equipment: equipment.draw,
     detections: detections.draw,
     robot: robot.draw,
-    people: people.draw,
+    people: createAbove(people.draw),
     scalebar: scalebar.draw,
   };
   const ground = createGround(

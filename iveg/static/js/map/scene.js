@@ -62,6 +62,11 @@ const ONE_MARK_M = 1;
 /** Body of a robot without a description (m). */
 const PLAIN = { drive: "differential", length: 1, width: 0.6 };
 const BOX_WITHOUT_SIZE_M = 0.5;
+/** Of robots without any: the same ones in each frame, so that nothing seems to change.
+ * @type {[number, number][]} */
+const NO_PATH = [];
+/** @type {import("../core/protocol.js").Encounter[]} */
+const NO_ENCOUNTERS = [];
 
 /**
  * @param {Store} store
@@ -126,9 +131,9 @@ function readRobot(robot, pose, store, nowMs) {
     width,
     task: robot.navigation?.task ?? null,
     goal: robot.navigation?.goal ?? null,
-    path: robot.navigation?.path ?? [],
+    path: robot.navigation?.path ?? NO_PATH,
     unsureM: Math.max(unsureOfStop(robot, store, nowMs), unheard(robot, ageS)),
-    encounters: link === "LIVE" ? (robot.encounters ?? []) : [],
+    encounters: (link === "LIVE" ? robot.encounters : null) ?? NO_ENCOUNTERS,
   };
 }
 

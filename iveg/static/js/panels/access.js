@@ -4,7 +4,7 @@
 
 import { sendApi } from "../core/api.js";
 import { dayAndTime } from "../pages/history/local_time.js";
-import { need, needPart, setHidden, setText } from "./dom.js";
+import { need, needPart, setDisabled, setHidden, setText } from "./dom.js";
 
 /** @typedef {import("../main.js").App} App */
 /** @typedef {import("../core/i18n.js").I18n} I18n */
@@ -33,7 +33,7 @@ export function createAccess({ i18n }, card, robotId) {
     }
     const isAdmin = document.body.dataset.role === "admin";
     setHidden(needPart("access", card), !isAdmin && !isRevoked);
-    button.disabled = isBusy || !isAdmin;
+    setDisabled(button, isBusy || !isAdmin);
     const key = isRevoked ? "access.allow" : "access.revoke";
     setText(needPart("access-label", card), i18n.t(key, { robot: robotId }));
     setText(needPart("access-state", card), accessSaid(robot, i18n));

@@ -5,15 +5,11 @@
  * come.  The server groups repetitions and keeps person, time and note.
  */
 
-import { onBeat } from "../core/beat.js";
-import { byUrgency, createAlertList } from "./alert_list.js";
+import { createAlertList } from "./alert_list.js";
 import { floodSaid, writeFlood } from "./alert_members.js";
 import { need, setAttribute, setHidden, setText } from "./dom.js";
 
 /** @typedef {import("../core/protocol.js").Alert} Alert */
-
-/** How often a closed list is rewritten (ms). */
-const CLOSED_MS = 1000;
 
 /**
  * @param {import("../main.js").App} app
@@ -23,18 +19,15 @@ export function createAlertsPanel({ store, i18n }, tone) {
   const list = createAlertList(need("#alerts"), i18n);
   const button = need("#alerts-button");
   const panel = document.querySelector("#alerts-panel");
-  let drawnAtMs = Number.NEGATIVE_INFINITY;
-  /** @type {ReturnType<typeof setTimeout> | undefined} */
-  let later;
   /** @type {Map<string, number> | null} occurrences told before; null before the first */
   let known = null;
 
   function draw() {
     /** @type {Alert[]} */
     const alerts = store.get("alerts") ?? [];
-    const open = [...alerts].sort(byUrgency);
+    const open = alerts.length;
     const isUnknown = earlierUnknown(store);
-    setText(need("#alerts-count"), isUnknown ? `${open.length}?` : String(open.length));
+    setText(need("#alerts-count"), isUnknown ? `${open}?` : String(open));
     setHidden(need("#alerts-earlier"), !isUnknown);
     // A past and unseen alert may be graver than the active ones.
     const [worst] = alerts.map(({ priority }) => priority).sort();
@@ -42,24 +35,17 @@ export function createAlertsPanel({ store, i18n }, tone) {
     /** @type {import("../core/protocol.js").Flood | null | undefined} */
     const flood = store.get("flood");
     const rate = floodSaid(flood, i18n);
-    const active = i18n.t("header.alerts_count", { count: open.length });
+    const active = i18n.t("header.alerts_count", { count: open });
     setAttribute(button, "title", rate ? `${active} · ${rate}` : active);
     button.toggleAttribute("data-flood", Boolean(flood?.since));
-    writeFlood(need("#alerts-flood"), flood, i18n);
     setHidden(need("#alerts-empty"), alerts.length > 0 || !isKnown(store));
     drawList();
   }
 
-  /** A closed list is not rewritten with each change: nobody reads it. */
+  /** A closed list is written when it is opened: nobody reads it before. */
   function drawList() {
-    clearTimeout(later);
-    const isClosed = panel !== null && !panel.hasAttribute("open");
-    const waitMs = isClosed ? drawnAtMs + CLOSED_MS - performance.now() : 0;
-    if (waitMs > 0) {
-      later = setTimeout(onBeat, waitMs, drawList);
-      return;
-    }
-    drawnAtMs = performance.now();
+    if (panel && !panel.hasAttribute("open")) return;
+    writeFlood(need("#alerts-flood"), store.get("flood"), i18n);
     list.draw(store.get("alerts") ?? []);
   }
 

@@ -5,7 +5,7 @@
 
 import { sendApi } from "../core/api.js";
 import { dayAndTime } from "../pages/history/local_time.js";
-import { need, needPart, setHidden, setText } from "./dom.js";
+import { need, needPart, setDisabled, setHidden, setText } from "./dom.js";
 
 /** @typedef {import("../main.js").App} App */
 /** @typedef {import("../core/i18n.js").I18n} I18n */
@@ -35,7 +35,7 @@ export function createDetector({ i18n }, card, robotId) {
     const isAsked = isOut || robot?.detector?.required === true;
     const may = OPERATORS.has(document.body.dataset.role ?? "");
     setHidden(button, !isAsked);
-    button.disabled = isBusy || !may;
+    setDisabled(button, isBusy || !may);
     const key = isOut ? "detector.put_back" : "detector.take_out";
     setText(needPart("detector-label", card), i18n.t(key, { robot: robotId }));
     setText(needPart("detector-state", card), detectorSaid(robot, i18n));

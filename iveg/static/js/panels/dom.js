@@ -34,16 +34,28 @@ export function makeSvg(tag, attributes = {}) {
 /**
  * Writes only a different text: most values of most frames are unchanged.
  *
+ * A text in place of another keeps its node: a node that comes or goes has the styles of
+ * all that depend on what an element has (`:has`) worked out anew.
+ *
  * @param {Element} element
  * @param {string} text
  */
 export function setText(element, text) {
-  if (element.textContent !== text) element.textContent = text;
+  const { firstChild: node } = element;
+  if (text && node instanceof Text && node.data && !node.nextSibling) {
+    if (node.data !== text) node.data = text;
+  } else if (element.textContent !== text) element.textContent = text;
 }
 
 /** @param {Element} element @param {string} name @param {string} value */
 export function setAttribute(element, name, value) {
   if (element.getAttribute(name) !== value) element.setAttribute(name, value);
+}
+
+/** @param {HTMLButtonElement} button @param {boolean} disabled */
+export function setDisabled(button, disabled) {
+  // An attribute that is written is a change, also where it was there before.
+  if (button.disabled !== disabled) button.disabled = disabled;
 }
 
 /** @param {HTMLElement} element @param {boolean} hidden */

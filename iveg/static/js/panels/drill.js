@@ -7,7 +7,7 @@
 
 import { readApi, sendApi } from "../core/api.js";
 import { dayAndTime } from "../pages/history/local_time.js";
-import { need, needPart, setHidden, setText } from "./dom.js";
+import { need, needPart, setDisabled, setHidden, setText } from "./dom.js";
 import { whyNotAtAll } from "./release.js";
 import { since } from "./stop_view.js";
 
@@ -49,7 +49,7 @@ export function createDrill({ store, i18n, line }, card, robotId) {
       return;
     }
     const why = isBusy ? "busy" : whyNotDrill(facts);
-    button.disabled = why !== "ok";
+    setDisabled(button, why !== "ok");
     setText(needPart("drill-why", card), i18n.t(`drill.why.${why}`));
     setText(needPart("drill-label", card), i18n.t("drill.button", { robot: robotId }));
     const command = facts.command?.drill ? facts.command : undefined;

@@ -7,7 +7,7 @@
 
 import { sendApi } from "../core/api.js";
 import { laneName } from "../core/lanes.js";
-import { all, make, needPart, setHidden, setText } from "./dom.js";
+import { all, make, needPart, setDisabled, setHidden, setText } from "./dom.js";
 import { whyNotAtAll } from "./release.js";
 
 /** @typedef {import("../main.js").App} App */
@@ -55,7 +55,7 @@ export function createGoal({ i18n, store, dialogs }, card, robotId) {
       const isCancel = button.dataset.goal === "cancel";
       const may = isCancel ? mayCancel(facts) && !isBusy : why === "ok";
       const lacksAisle = button.dataset.goal === "aisle" && !aisle.value;
-      button.disabled = !may || lacksAisle;
+      setDisabled(button, !may || lacksAisle);
       setHidden(button, isCancel && !OPEN.has(facts.robot?.goal?.state ?? ""));
     }
   }

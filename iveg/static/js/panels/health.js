@@ -14,6 +14,7 @@ const TICK_MS = 1000;
 /** @param {import("../main.js").App} app */
 export function createHealthPanel({ store, i18n, line }) {
   const chip = need("#health-chip");
+  const panel = need("#health-panel");
 
   function draw() {
     /** @type {import("../core/protocol.js").Health | undefined} */
@@ -25,6 +26,14 @@ export function createHealthPanel({ store, i18n, line }) {
       need("#health-latency"),
       isOpen && ms !== null ? i18n.t("health.latency", { ms }) : "",
     );
+    drawList();
+  }
+
+  /** A closed list is written when it is opened: nobody reads it before. */
+  function drawList() {
+    if (!panel.hasAttribute("open")) return;
+    /** @type {import("../core/protocol.js").Health | undefined} */
+    const health = store.get("health") ?? undefined;
     const waitedS = health ? ageOf({ age_s: 0, receivedAtMs: health.receivedAtMs }) : 0;
     drawHops(health?.hops ?? [], waitedS);
     drawCounters(health?.counters ?? {});
@@ -67,19 +76,25 @@ export function createHealthPanel({ store, i18n, line }) {
 
   /** @param {Record<string, number>} counters */
   function drawCounters(counters) {
-    const rows = Object.entries(counters).map(([name, value]) => {
-      const row = make("div");
-      row.append(make("dt", "", name), make("dd", "", i18n.number(value, 0)));
-      return row;
+    fill(need("#counters"), Object.entries(counters), makeCounter, (row, counter) => {
+      const [name, value] = counter;
+      setText(row.children[0], name);
+      setText(row.children[1], i18n.number(value, 0));
     });
-    need("#counters").replaceChildren(...rows);
   }
 
   store.subscribe("health", draw);
   store.subscribe("connection", draw);
+  document.addEventListener("iveg:panel", drawList);
   i18n.onChange(draw);
   setInterval(onBeat, TICK_MS, draw);
   draw();
+}
+
+function makeCounter() {
+  const row = make("div");
+  row.append(make("dt"), make("dd"));
+  return row;
 }
 
 function makeItem() {

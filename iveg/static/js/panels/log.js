@@ -11,9 +11,12 @@ import { rowsOf } from "./log_rows.js";
 
 /** @typedef {import("../main.js").App} App */
 /** @typedef {import("../core/protocol.js").Entry} Entry */
+/** @typedef {import("./log_rows.js").Row} Row */
 
 /** Entries in the list; the store keeps more, history keeps all. */
 const SHOWN = 200;
+/** What each item says. @type {WeakMap<Element, Row>} */
+const told = new WeakMap();
 
 /**
  * @param {App} app
@@ -40,7 +43,7 @@ export function createLogPanel(app, decision) {
   const isStill = () => list.scrollTop > 0;
   const each = createLogEach({ isStill, onChange: rebuild });
 
-  /** @param {import("./log_rows.js").Row} row */
+  /** @param {Row} row */
   function makeItem(row) {
     const { entry } = row;
     const item = make("li");
@@ -83,23 +86,23 @@ export function createLogPanel(app, decision) {
     if (each.isOn()) return;
     const shown = newestOf(store.log());
     if (!shown.length) return;
-    const rows = new Map(shown.map((row) => [String(row.entry.id), row]));
-    const newest = Number(list.firstElementChild?.getAttribute("data-id") ?? -1);
+    const rows = new Map(shown.map((row) => [row.entry.id, row]));
+    const newest = told.get(list.firstElementChild ?? list)?.entry.id ?? -1;
     // Rows that stay are not touched: one of them may have the focus.
-    for (const item of /** @type {HTMLElement[]} */ ([...list.children])) {
-      const row = rows.get(String(item.dataset.id));
-      if (row) writeLasted(item, row);
-      else item.remove();
+    for (const item of [...list.children]) {
+      const row = rows.get(told.get(item)?.entry.id ?? -1);
+      if (!row) item.remove();
+      else if (row.lastedS !== told.get(item)?.lastedS) writeLasted(item, row);
     }
     list.prepend(...shown.filter(({ entry }) => entry.id > newest).map(makeItem));
     setHidden(empty, true);
     setHidden(clear, true);
   }
 
-  /** @param {HTMLElement} item @param {import("./log_rows.js").Row} row */
-  function writeLasted(item, { lastedS }) {
-    const said = lastedS === null ? "" : i18n.t("log.lasted", { seconds: lastedS });
-    setText(needPart("lasted", item), said);
+  /** @param {Element} item @param {Row} row */
+  function writeLasted(item, row) {
+    told.set(item, row);
+    setText(needPart("lasted", item), lastedSaid(row, i18n));
   }
 
   /** The rows that the filter admits, newest first. @param {readonly Entry[]} entries */
@@ -168,6 +171,10 @@ export function createLogPanel(app, decision) {
   });
   rebuild();
 }
+
+/** @param {Row} row @param {import("../core/i18n.js").I18n} i18n */
+const lastedSaid = ({ lastedS: seconds }, i18n) =>
+  seconds === null ? "" : i18n.t("log.lasted", { seconds });
 
 /**
  * The text of an entry; for a slow-down far from any person, the reason: a grown ring.

@@ -10,7 +10,15 @@
 import { sendApi } from "../core/api.js";
 import { ageOf } from "../core/clock.js";
 import { LIMITS } from "../core/limits.js";
-import { fill, make, need, needPart, setAttribute, setText } from "./dom.js";
+import {
+  fill,
+  make,
+  need,
+  needPart,
+  setAttribute,
+  setDisabled,
+  setText,
+} from "./dom.js";
 import { askProof, asksForProof } from "./proof.js";
 
 /** @typedef {import("../main.js").App} App */
@@ -49,8 +57,8 @@ export function createRelease(app, card, robotId) {
     const facts = factsOf(robot);
     const mayRelease = whyNotRelease(facts);
     const mayResume = whyNotResume(facts);
-    releaseButton.disabled = isBusy || mayRelease !== "ok";
-    resumeButton.disabled = isBusy || mayResume !== "ok";
+    setDisabled(releaseButton, isBusy || mayRelease !== "ok");
+    setDisabled(resumeButton, isBusy || mayResume !== "ok");
     const named = { robot: robotId };
     setAttribute(releaseButton, "aria-label", i18n.t("release.button", named));
     setAttribute(resumeButton, "aria-label", i18n.t("release.resume", named));

@@ -217,12 +217,27 @@ export class StopPanel {
     const said = i18n.t(view.key, view.slots);
     for (const control of this.#controlsOf(id)) {
       setAttribute(control, "data-state", view.state);
-      setText(need(".stop__label", control), said);
-      const who = need(".stop__who", control);
+      const { label, who } = partsOf(control);
+      setText(label, said);
       setText(who, id === "fleet" ? i18n.t("stop.fleet_name") : id);
       setHidden(who, view.state === "ready" || view.state === "late");
     }
   }
+}
+
+/** @type {WeakMap<HTMLElement, {label: HTMLElement, who: HTMLElement}>} */
+const parts = new WeakMap();
+
+/** Asked for five times a second of each control. @param {HTMLElement} control */
+function partsOf(control) {
+  const known = parts.get(control);
+  if (known) return known;
+  const found = {
+    label: need(".stop__label", control),
+    who: need(".stop__who", control),
+  };
+  parts.set(control, found);
+  return found;
 }
 
 /** @param {Pending | null} press @returns {press is Pending} */

@@ -13,7 +13,7 @@ export function labelTables({ i18n }) {
   };
   for (const table of tables) {
     const observer = new MutationObserver(() => labelCells(table));
-    observer.observe(table, { childList: true, subtree: true });
+    observer.observe(table, { childList: true, characterData: true, subtree: true });
   }
   i18n.onChange(label);
   label();

@@ -15,15 +15,21 @@ import { laneName } from "../../core/lanes.js";
 export function createLabels(t = untranslated, locale = document.documentElement.lang) {
   const language = locale || "es";
   const plain = new Intl.NumberFormat(language, { maximumFractionDigits: 1 });
-  const tenths = new Intl.NumberFormat(language, {
-    minimumFractionDigits: 1,
-    maximumFractionDigits: 1,
-  });
-  const hundredths = new Intl.NumberFormat(language, {
-    minimumFractionDigits: 2,
-    maximumFractionDigits: 2,
-  });
   const percents = new Intl.NumberFormat(language, { style: "percent" });
+  /** @type {Map<number, Intl.NumberFormat>} by decimals: making one costs a hundred uses */
+  const fixed = new Map();
+
+  /** @param {number} value @param {number} decimals */
+  function digits(value, decimals) {
+    const known = fixed.get(decimals);
+    const options = {
+      minimumFractionDigits: decimals,
+      maximumFractionDigits: decimals,
+    };
+    const format = known ?? new Intl.NumberFormat(language, options);
+    if (!known) fixed.set(decimals, format);
+    return format.format(value);
+  }
 
   /** A word of a robot's; one that iVeg does not know, as it was sent.
    * @param {string} kind @param {string} word */
@@ -39,9 +45,9 @@ export function createLabels(t = untranslated, locale = document.documentElement
     /** A length of the scale bar. @param {number} m */
     metres: (m) => `${plain.format(m)} m`,
     /** A measured distance. @param {number} m */
-    distance: (m) => `${tenths.format(m)} m`,
+    distance: (m) => `${digits(m, 1)} m`,
     /** A length that a person measured. @param {number} m */
-    measured: (m) => `${hundredths.format(m)} m`,
+    measured: (m) => `${digits(m, 2)} m`,
     /** @param {string} task */
     task: (task) => translated("task", task),
     /** What a detector says that it sees. @param {string} classId */
@@ -49,16 +55,13 @@ export function createLabels(t = untranslated, locale = document.documentElement
     /** A number of other equipment. @param {import("../../core/protocol.js").Tile} tile */
     tile: ({ value, state, unit, decimals }) => {
       if (value === null || state === "silent" || state === "unreadable") return "—";
-      const said = value.toLocaleString(language, {
-        minimumFractionDigits: decimals,
-        maximumFractionDigits: decimals,
-      });
+      const said = digits(value, decimals);
       return unit === "1" ? said : `${said} ${unit}`;
     },
     /** @param {number} share 0–1 */
     percent: (share) => percents.format(share),
     /** An age short enough for a tag; tenths while they matter. @param {number} s */
-    age: (s) => `${s < 10 ? tenths.format(s) : plain.format(Math.round(s))} s`,
+    age: (s) => `${s < 10 ? digits(s, 1) : plain.format(Math.round(s))} s`,
     /** @param {number} s Infinity: nobody knows */
     ago: (s) => (Number.isFinite(s) ? t("map.ghost", { age: Math.round(s) }) : "? s"),
     /** @param {number} s */

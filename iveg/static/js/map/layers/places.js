@@ -11,6 +11,8 @@ const GAP_PX = 2;
 export function createPlaces() {
   /** @type {Rect[]} */
   const taken = [];
+  /** @type {Rect[]} */
+  const labels = [];
 
   /** @param {Rect} rect */
   const isFree = (rect) => !taken.some((other) => overlap(rect, other));
@@ -30,8 +32,16 @@ export function createPlaces() {
       const found = wished.findIndex(isFree);
       if (found < 0) return null;
       taken.push(wished[found]);
+      labels.push(wished[found]);
       return found;
     },
+    /** Labels that were claimed before and stay. @param {readonly Rect[]} rects */
+    keep(rects) {
+      taken.push(...rects);
+      labels.push(...rects);
+    },
+    /** The labels so far. */
+    labels: () => labels,
   };
 }
 

@@ -1,6 +1,9 @@
 /** The scale bar: the length of a metre on this screen. */
 
 import { isolated, label } from "./paint.js";
+import { drawSign } from "./sprites.js";
+
+/** @typedef {import("./paint.js").Paint} Paint */
 
 const LONGEST_PX = 130;
 const MARGIN_PX = 16;
@@ -24,24 +27,32 @@ export function coverOf({ height }) {
   return { left: 0, top: height - MARGIN_PX - TALL_PX, right, bottom: height };
 }
 
-/** @param {import("./paint.js").Paint} paint */
+/** @param {Paint} paint */
 export function draw(paint) {
-  const { ctx, view, theme, labels } = paint;
+  const { view, labels, sprites } = paint;
   const metres = barLength(view.scale);
   const length = metres * view.scale;
-  const y = view.height - MARGIN_PX;
+  const said = labels.metres(metres);
+  const place = { x: MARGIN_PX + length / 2, y: view.height - MARGIN_PX };
+  const sign = { name: `scale ${length} ${said}`, reach: length / 2 + 3, ...place };
+  drawSign(paint, sprites, sign, (there) => drawBar(there, length / 2, said));
+}
+
+/** @param {Paint} paint @param {number} half its length (px) @param {string} said */
+function drawBar(paint, half, said) {
+  const { ctx, theme } = paint;
   isolated(ctx, () => {
     ctx.beginPath();
-    ctx.moveTo(MARGIN_PX, y - 6);
-    ctx.lineTo(MARGIN_PX, y);
-    ctx.lineTo(MARGIN_PX + length, y);
-    ctx.lineTo(MARGIN_PX + length, y - 6);
+    ctx.moveTo(-half, -6);
+    ctx.lineTo(-half, 0);
+    ctx.lineTo(half, 0);
+    ctx.lineTo(half, -6);
     ctx.strokeStyle = theme.bg;
     ctx.lineWidth = 5;
     ctx.stroke();
     ctx.strokeStyle = theme.text;
     ctx.lineWidth = 2;
     ctx.stroke();
-    label(paint, labels.metres(metres), MARGIN_PX + length / 2, y - 13);
+    label(paint, said, 0, -13);
   });
 }
