@@ -260,6 +260,35 @@ def test_a_card_shows_no_half_line_and_what_to_do_whole(fleet: Fleet) -> None:
     assert cut == {}
 
 
+LONG = (
+    "half speed",
+    "half speed for a memory",
+    "too close to where somebody was",
+    "something that only a laser sees",
+    "a camera is silent",
+)
+"""Situations of which there is most to say."""
+
+
+@pytest.mark.parametrize("fleet", [6], indirect=True)
+def test_a_small_card_of_a_desktop_says_whole_what_it_is_because_of(
+    fleet: Fleet,
+) -> None:
+    first = frozen()["snapshot"]["robots"][0]
+    cut = set()
+    for size in ((1200, 800), (1440, 900)):
+        fleet.at(size)
+        for name in LONG:
+            known = STAGED[name][0]
+            fleet.tell({**first, "situation": staged.told(known), "age_s": known.age_s})
+            fleet.page.clock.run_for(1500)
+            if evaluate(fleet.page, CUT_SAID):
+                cut.add((name, size))
+    fleet.tell(first)
+
+    assert cut == set()
+
+
 @pytest.mark.parametrize("fleet", [2], indirect=True)
 def test_two_cards_are_whole_on_a_desktop_and_have_no_second_stop(fleet: Fleet) -> None:
     page = fleet.at((1440, 900))
@@ -370,6 +399,10 @@ CUT_LINES = """() => {
 }"""
 """Lines of a card that are seen in part or cut without an ellipsis, and what to do that
 is not seen."""
+CUT_SAID = """() => {
+  const said = document.querySelector('.card[data-robot="AGI"] .card__said');
+  return said.scrollHeight > said.clientHeight + 1;
+}"""
 LETTERS = """() => {
   const words = document.createTreeWalker(
     document.querySelector('#robots'), NodeFilter.SHOW_TEXT);
