@@ -237,7 +237,7 @@ def said_of_many(page: Page, name: str, language: str, count: int) -> str:
     """The status line of ten robots, so many of them in a staged situation."""
     known = STAGED[name][0]
     clear = staged.facts()
-    fleet = [
+    fleet: list[dict[str, Any]] = [
         {
             "robot_id": robot,
             "age_s": one.age_s,
@@ -279,7 +279,7 @@ def test_one_sentence_tells_all_robots_that_stand_alike(
 
 def test_of_several_alike_most_are_told_and_in_danger_the_first(page: Page) -> None:
     def line(*names: str) -> str:
-        fleet = [
+        fleet: list[dict[str, Any]] = [
             {
                 "robot_id": robot,
                 "age_s": STAGED[name][0].age_s,
