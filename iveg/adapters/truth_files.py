@@ -17,7 +17,7 @@ import orjson
 from iveg.domain.errors import DataFileError
 from iveg.domain.what_if.truth import Nearest, nearest_of
 
-_HEAD = re.compile(rb'\{"robot":"([^"]*)","at":([-+.\deE]+)')
+_HEAD = re.compile(rb'\{"robot":"([^"]*)","at":(-?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?)')
 _EVERY_S = 0.15
 """Looks of one robot nearer in time than this are passed over."""
 _SLACK_S = 5.0
@@ -28,11 +28,12 @@ def read_nearest(path: Path, since: float, until: float) -> Mapping[str, Nearest
     """How near the nearest person was to each robot in a range (Unix s).
 
     Raises:
-        DataFileError: the file cannot be read.
+        DataFileError: the file cannot be read, or has no line of the truth.
     """
     rows: dict[str, list[tuple[float, float]]] = defaultdict(list)
     try:
         with path.open("rb") as file:
+            _check(path, file)
             for robot, at, line in _lines(file, since - _SLACK_S):
                 if at >= until + _SLACK_S:
                     break
@@ -43,6 +44,13 @@ def read_nearest(path: Path, since: float, until: float) -> Mapping[str, Nearest
     except OSError as error:
         raise DataFileError(str(path), "", f"cannot be read: {error}.") from error
     return {robot: nearest_of(of) for robot, of in rows.items() if of}
+
+
+def _check(path: Path, file: IO[bytes]) -> None:
+    """A file that begins as none of these is not read as one without people."""
+    begun = file.read(1 << 16).splitlines()
+    if begun and not any(_HEAD.match(line) for line in begun):
+        raise DataFileError(str(path), "", "cannot be read: no line of the truth.")
 
 
 def _lines(file: IO[bytes], since: float) -> Iterator[tuple[str, float, bytes]]:

@@ -129,16 +129,31 @@ def test_13_19_a_low_screen_is_mostly_map(fleet: Fleet) -> None:
         assert box["height"] >= high, size
 
 
-@pytest.mark.parametrize("fleet", [2], indirect=True)
+@pytest.mark.parametrize("fleet", [2, 6, 10], indirect=True)
 def test_a_tablet_shows_the_strip_of_time_above_the_stops(fleet: Fleet) -> None:
-    page = fleet.at((768, 1024))
-    strip = page.locator(".timebar").bounding_box()
-    stops = page.locator("#stops").bounding_box()
-    assert strip is not None
-    assert stops is not None
     border_px = 1
-    assert strip["y"] + strip["height"] <= stops["y"] + border_px
+    for size in ((768, 1024), (820, 1180), (1024, 1366), (1024, 768), (1180, 820)):
+        page = fleet.at(size)
+        strip = page.locator(".timebar").bounding_box()
+        stops = page.locator("#stops").bounding_box()
+        assert strip is not None
+        assert stops is not None
+        assert strip["y"] + strip["height"] <= stops["y"] + border_px, size
+        assert evaluate(page, UNREACHABLE, ".timebar") == [], size
 
+
+UNREACHABLE = """([within]) => [...document.querySelectorAll(
+  `${within} :is(a, button, svg[tabindex], time)`)]
+  .filter((one) => one.checkVisibility())
+  .flatMap((one) => {
+    const {left, right, top, bottom} = one.getBoundingClientRect();
+    const corners = [[left, top], [right, top], [left, bottom], [right, bottom]];
+    return corners.map(([x, y]) => [one, x < right ? x + 2 : x - 2,
+      y < bottom ? y + 2 : y - 2]);
+  })
+  .filter(([one, x, y]) => !one.contains(document.elementFromPoint(x, y)))
+  .map(([one, x, y]) => `${one.id || one.className} at ${x}, ${y}`)"""
+"""Corners of what can be pressed or read where something else lies over it."""
 
 SAID = """() => {
   const said = document.querySelector('#status-said');
@@ -243,6 +258,35 @@ def test_a_card_shows_no_half_line_and_what_to_do_whole(fleet: Fleet) -> None:
     fleet.tell(first)
 
     assert cut == {}
+
+
+LONG = (
+    "half speed",
+    "half speed for a memory",
+    "too close to where somebody was",
+    "something that only a laser sees",
+    "a camera is silent",
+)
+"""Situations of which there is most to say."""
+
+
+@pytest.mark.parametrize("fleet", [6], indirect=True)
+def test_a_small_card_of_a_desktop_says_whole_what_it_is_because_of(
+    fleet: Fleet,
+) -> None:
+    first = frozen()["snapshot"]["robots"][0]
+    cut = set()
+    for size in ((1200, 800), (1440, 900)):
+        fleet.at(size)
+        for name in LONG:
+            known = STAGED[name][0]
+            fleet.tell({**first, "situation": staged.told(known), "age_s": known.age_s})
+            fleet.page.clock.run_for(1500)
+            if evaluate(fleet.page, CUT_SAID):
+                cut.add((name, size))
+    fleet.tell(first)
+
+    assert cut == set()
 
 
 @pytest.mark.parametrize("fleet", [2], indirect=True)
@@ -355,6 +399,10 @@ CUT_LINES = """() => {
 }"""
 """Lines of a card that are seen in part or cut without an ellipsis, and what to do that
 is not seen."""
+CUT_SAID = """() => {
+  const said = document.querySelector('.card[data-robot="AGI"] .card__said');
+  return said.scrollHeight > said.clientHeight + 1;
+}"""
 LETTERS = """() => {
   const words = document.createTreeWalker(
     document.querySelector('#robots'), NodeFilter.SHOW_TEXT);

@@ -1,5 +1,6 @@
 import { Store } from "../../iveg/static/js/core/store.js";
 import { createRuleForm } from "../../iveg/static/js/pages/rule.js";
+import { stateSaid } from "../../iveg/static/js/pages/what_if.js";
 import { questionOf } from "../../iveg/static/js/pages/yesterday.js";
 import { make } from "../../iveg/static/js/panels/dom.js";
 import { equal, test } from "./harness.js";
@@ -87,4 +88,13 @@ test("yesterday is asked about with what was typed, midnight to midnight in Madr
     vary: "foresight_s",
   });
   equal(questionOf(rule, { foresight: false }, now).foresight_s, 0);
+});
+
+test("a question that failed says which part could not be read", () => {
+  const said = (/** @type {string | null} */ why) =>
+    stateSaid(/** @type {any} */ ({ state: "failed", progress: 0.5, why }), i18n);
+  equal(["truth", "no_data", "database", "worker", null].map(said), [
+    ...["whatif.truth_unreadable", "whatif.no_data", "whatif.no_history"],
+    ...["whatif.failed", "whatif.failed"],
+  ]);
 });

@@ -1,6 +1,6 @@
+import { fleetSaid } from "../../iveg/static/js/core/fleet_said.js";
 import { createI18n } from "../../iveg/static/js/core/i18n.js";
 import {
-  fleetSaid,
   markOf,
   sentenceOf,
   situationOf,
@@ -85,13 +85,17 @@ test("a sentence has what, why and what to do", () => {
 /** @param {import("./builders.js").Robot[]} fleet */
 const said = (fleet) => fleetSaid(fleet, EN, NOW_MS);
 
-test("the worst of the fleet is said, of several as bad the first", () => {
+test("the worst of the fleet is said, of several alike together", () => {
   const fleet = [heard(0, CLEAR, "A"), heard(0, NEAR, "B"), heard(0, NEAR, "C")];
+  equal(said(fleet.slice(0, 2)).said, "B: at half speed: person in aisle 3 at 1.4 m");
   equal(said(fleet), {
     level: "caution",
-    said: "B: at half speed: person in aisle 3 at 1.4 m",
+    said: "B, C: at half speed: person in aisle 3",
     robotId: "B",
   });
+  const other = { ...NEAR, slots: { ...NEAR.slots, lane: "4" } };
+  const apart = [heard(0, NEAR, "B"), heard(0, other, "C"), heard(0, CLEAR, "A")];
+  equal(said(apart).said, "B, C: at half speed: person near");
   const two = [heard(0, NOT_SLOWING, "A"), heard(0, NOT_SLOWING, "B")];
   equal(said(two).said.endsWith("(+1 in danger)"), true);
 });

@@ -369,7 +369,7 @@ test("whoever reads the occurrences keeps reading while more come", () => {
     occurrence("2026-11-20T12:07:00Z"),
   ];
   draw([alert({ count: 2, members })]);
-  const details = /** @type {HTMLDetailsElement} */ (list.querySelector("details"));
+  const details = /** @type {HTMLDetailsElement} */ (list.querySelector(".members"));
   details.open = true;
   draw([
     alert({ count: 3, members: [...members, occurrence("2026-11-20T12:09:00Z")] }),
@@ -403,7 +403,34 @@ test("13.23 an alert says who was told outside the page, and who could not be", 
 test("what happened once has nothing to open", () => {
   const list = document.createElement("ul");
   createAlertList(list, i18n).draw([alert()]);
-  equal(list.querySelector("details")?.hidden, true);
+  equal(/** @type {any} */ (list.querySelector(".members")).hidden, true);
+});
+
+test("a row has what and since when; what is behind it opens of the gravest alone", () => {
+  document.body.dataset.role = "operator";
+  const list = document.createElement("ul");
+  const { draw } = createAlertList(list, i18n);
+  const seen = { acknowledged_at: "2026-11-20T12:00:00Z", acknowledged_by: "ana" };
+  const alerts = [
+    ...["a", "b", "c"].map((alert_id) => alert({ alert_id })),
+    alert({ alert_id: "d", ...seen }),
+    alert({ alert_id: "e", priority: "P2" }),
+  ];
+  const rows = () => [...list.querySelectorAll("li > details")];
+  draw(alerts);
+  equal(
+    rows().map((row) => row.hasAttribute("open")),
+    [true, true, false, false, false],
+  );
+  const [first] = rows();
+  const parts = [
+    ...(first.querySelector("summary")?.querySelectorAll("b, small") ?? []),
+  ];
+  equal(parts.length, 2);
+  equal(first.querySelector("summary form, summary a"), null);
+  rows()[4].setAttribute("open", "");
+  draw(alerts.map((one) => ({ ...one, count: 2 })));
+  equal(rows()[4].hasAttribute("open"), true);
 });
 
 test("a flood is told apart from a rate that a person can bear", () => {

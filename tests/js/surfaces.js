@@ -5,9 +5,9 @@
  */
 
 import { linkOfRobot } from "../../iveg/static/js/core/clock.js";
+import { fleetSaid } from "../../iveg/static/js/core/fleet_said.js";
 import { createI18n } from "../../iveg/static/js/core/i18n.js";
 import {
-  fleetSaid,
   phrasesOf,
   sentenceOf,
   situationOf,

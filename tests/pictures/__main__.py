@@ -16,48 +16,20 @@ from playwright.sync_api import (
     Browser,
     Error,
     Page,
-    StorageState,
     WebSocketRoute,
 )
 
 from tests.browsers import running_browser
 from tests.e2e.frozen import Frozen, frozen_page, past_site, settle
 from tests.e2e.reading import COVERED_STOPS, OVERFLOW, RUN_OVER, evaluate
+from tests.pictures.pages import PAGES, READY, TABLETS, act, prepare
 from tests.pictures.pairs import Case, covering
-from tests.pictures.people import signed_in_admin
+from tests.pictures.people import Sessions, signed_in
 from tests.pictures.scenes import IDS, SITUATIONS, fleet
 from tests.pictures.sheet import Picture, sheet_of
 from tests.processes import Site
 
 AT_LEAST = 200
-PAGES = {
-    "live": "/",
-    "live-robots": "/?#robots",
-    "live-log": "/?#log-panel",
-    "alerts": "/alerts",
-    "commands": "/commands",
-    "decisions": "/decisions",
-    "decision": "/decisions/D1",
-    "history": "/history",
-    "day": "/day?day=2026-11-21",
-    "compare": "/compare",
-    "fleet": "/fleet",
-    "command": "/commands/C1",
-    "experiments": "/experiments",
-    "what-if": "/what-if",
-    "account": "/account",
-    "users": "/users",
-    "tokens": "/tokens",
-    "sessions": "/sessions",
-    "audit": "/audit",
-    "climate": "/climate",
-    "latency": "/latency",
-    "settings": "/settings",
-    "docs": "/docs",
-    "about": "/about",
-    "missing": "/no-such-page",
-    "offline": "/static/offline.html",
-}
 FACTORS = {
     "robots": ("1", "2", "10"),
     "page": tuple(PAGES),
@@ -66,23 +38,6 @@ FACTORS = {
     "theme": ("light", "dark", "sunlight"),
     "situation": tuple(SITUATIONS),
 }
-READY = {
-    **dict.fromkeys(("live", "live-robots", "live-log"), "#map-fit:enabled"),
-    "alerts": "#past-rows tbody tr",
-    "commands": "#orders-rows tbody tr",
-    "decision": ".chain li",
-    "history": "#chart-stops .main-svg",
-    **{
-        name: f"#{name}-rows tbody tr"
-        for name in ("users", "tokens", "sessions", "audit")
-    },
-    "climate": "#trend-co2 .main-svg",
-    "settings": "#rule-form:visible",
-    "decisions": "#decisions-rows tbody tr",
-    "fleet": "#machines tbody tr",
-    "compare": "#compare-page table tbody tr",
-}
-"""What a page is about; of the others their frame will do."""
 _LOST_MS = 4000
 """How long the server has been away on pictures without it."""
 _REST_MS = 1600
@@ -97,9 +52,9 @@ def main(folder: Path) -> None:
     with running_browser() as browser:
         for robots, some in groupby(cases, key=lambda case: case["robots"]):
             with _site(int(robots)) as past:
-                admin = signed_in_admin(browser, past)
+                who = signed_in(browser, past)
                 for case in some:
-                    taken = _take(browser, past, admin, case, folder, len(pictures))
+                    taken = _take(browser, past, who, case, folder, len(pictures))
                     pictures.append(taken)
                     print(pictures[-1].said, flush=True)
     sheet_of(pictures).save(folder / "sheet.png", optimize=True)
@@ -119,7 +74,7 @@ def _site(robots: int) -> Iterator[Site]:
 def _take(
     browser: Browser,
     past: Site,
-    admin: StorageState,
+    who: Sessions,
     case: Case,
     folder: Path,
     n: int,
@@ -134,15 +89,18 @@ def _take(
         browser, past, (wide, high), *look, tell=lambda: told, lines=lines
     ) as page:
         page.on("pageerror", lambda error: errors.append(str(error)))
+        session = who.tablet if case["page"] in TABLETS else who.admin
         page.context.add_cookies(
             [
                 {"name": one["name"], "value": one["value"], "url": past.url}
-                for one in admin["cookies"]
+                for one in session["cookies"]
             ]
         )
         try:
+            prepare(page, case["page"], told, past.url)
             page.goto(past.url + PAGES[case["page"]])
             settle(page, READY.get(case["page"], "body"))
+            act(page, case["page"])
         except (AssertionError, Error) as error:
             # One page that is late, or broken, is no reason to take no more pictures.
             errors.append(str(error).splitlines()[0])

@@ -197,3 +197,109 @@ def test_the_status_line_alone_names_robot_danger_and_action(
     assert (
         f"{'pulse' if language == 'es' else 'press'} {calls}" in said["status"]
     ) == (name == "does not slow")
+
+
+TOGETHER = {
+    "lost while moving": (
+        "Los 10 robots: sin contacto hace hasta 4 s, en marcha — aléjese, "
+        "deberían pararse",
+        "All 10 robots: no contact for up to 4 s while moving — keep away, "
+        "they should stop",
+    ),
+    "half speed": (
+        "Los 10 robots: a media velocidad: persona en el pasillo 3",
+        "All 10 robots: at half speed: person in aisle 3",
+    ),
+    "late": (
+        "Los 10 robots: última noticia hace hasta 1,8\xa0s — trátelos como en marcha",
+        "All 10 robots: last news up to 1.8\xa0s ago — treat them as moving",
+    ),
+    "contradicts itself": (
+        "Los 10 robots: sus datos se contradicen — revíselos",
+        "All 10 robots: their data contradict themselves — check them",
+    ),
+    "red button": (
+        "Los 10 robots: bloqueados: seta roja del robot — desbloquéelos en cada robot",
+        "All 10 robots: locked: red button on the robot — unlock each at the robot",
+    ),
+    "stopped from a page": (
+        "Los 10 robots: bloqueados por la parada, quietos — rearme con la vía libre",
+        "All 10 robots: locked by STOP, standing still — release them once it is clear",
+    ),
+}
+"""What is said of ten robots in the same situation."""
+ALONE = {"does not slow", "too close to stop", "too close to where somebody was"}
+"""Situations of which each is told by itself: where somebody is comes first."""
+_NAMES = ("AGI", "AGII", *(f"R{n}" for n in range(3, 11)))
+
+
+def said_of_many(page: Page, name: str, language: str, count: int) -> str:
+    """The status line of ten robots, so many of them in a staged situation."""
+    known = STAGED[name][0]
+    clear = staged.facts()
+    fleet: list[dict[str, Any]] = [
+        {
+            "robot_id": robot,
+            "age_s": one.age_s,
+            "situation": staged.told(one),
+            "holds": [],
+            "margin": None,
+            "twist": None,
+        }
+        for robot, one in zip(
+            _NAMES, [known] * count + [clear] * (10 - count), strict=True
+        )
+    ]
+    said: str = page.evaluate(SAY, [fleet, 0.0, language])["status"]
+    return said
+
+
+@pytest.mark.parametrize("language", ["es", "en"])
+@pytest.mark.parametrize("name", STAGED)
+def test_one_sentence_tells_all_robots_that_stand_alike(
+    page: Page, name: str, language: str
+) -> None:
+    for count in (2, 5, 10):
+        said = said_of_many(page, name, language, count)
+
+        assert len(said) <= 86, said
+        level = STAGED[name][1]
+        if level == "working":
+            continue
+        alone, named = f"AGI: {said.partition(': ')[2]}", "AGI, AGII: "
+        if name in ALONE:
+            assert said == alone
+        elif count == 2:
+            assert said.startswith(named)
+        else:
+            assert re.match(rf"(All |Los )?{count} robots( \(AGI, AGII…\))?: ", said)
+    if name in TOGETHER:
+        assert said == TOGETHER[name][language == "en"]
+
+
+def test_of_several_alike_most_are_told_and_in_danger_the_first(page: Page) -> None:
+    def line(*names: str) -> str:
+        fleet: list[dict[str, Any]] = [
+            {
+                "robot_id": robot,
+                "age_s": STAGED[name][0].age_s,
+                "situation": staged.told(STAGED[name][0]),
+                "holds": [],
+                "margin": None,
+                "twist": None,
+            }
+            for robot, name in zip(_NAMES, names, strict=False)
+        ]
+        said: str = page.evaluate(SAY, [fleet, 0.0, "en"])["status"]
+        return said
+
+    stopped = "stopped from a page"
+    said = line("red button", stopped, stopped, stopped)
+    assert said.startswith("AGII, R3, R4: locked by STOP")
+    lost = "lost while moving"
+    said = line("does not slow", lost, lost, "all clear")
+    assert said.startswith("AGI: does not slow down: person in aisle 3")
+    assert said.endswith("(+2 in danger)")
+    said = line(lost, lost, "does not slow")
+    assert said.startswith("AGI, AGII: no contact for up to")
+    assert said.endswith("(+1 in danger)")

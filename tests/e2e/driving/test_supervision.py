@@ -296,13 +296,13 @@ def test_markup_in_a_note_is_text_on_every_page(
     with _frozen(stack, "emulator"):
         # One that is over goes with its note as soon as it was seen.
         over = page.locator("small", has_text="terminada")
-        form = page.locator("#active-alerts li", has_not=over).locator("form:visible")
-        form.first.wait_for(timeout=30_000)
+        row = page.locator("#active-alerts > li:not(:has(form[hidden]))", has_not=over)
+        row.first.wait_for(timeout=30_000)
         # It is not the first any more once further alerts have come before it.
-        form.first.evaluate("form => { form.id = 'noted'; }")
+        row.first.evaluate("row => { row.id = 'noted'; row.firstChild.open = true; }")
 
         page.locator("#noted input").fill(PROBE)
-        page.locator("#noted button").click()
+        page.locator("#noted form:not(.notes__form) button").click()
 
         page.locator("#active-alerts", has_text=PROBE).wait_for()
     noted = page.locator("#past-rows td", has_text="operador")

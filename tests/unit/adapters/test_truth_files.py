@@ -53,3 +53,24 @@ def test_nobody_is_infinitely_far_and_no_row_is_nothing(tmp_path: Path) -> None:
 def test_a_file_that_is_away_is_one_error(tmp_path: Path) -> None:
     with pytest.raises(DataFileError, match="cannot be read"):
         read_nearest(tmp_path / "none", 0.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [b"\x89PNG\r\n\x1a\n", b"pose,people\n1,2\n", b'{"robot":"AGI","at":-.-}'],
+)
+def test_a_file_of_something_else_is_not_a_truth_without_people(
+    tmp_path: Path, content: bytes
+) -> None:
+    file = tmp_path / "truth.ndjson"
+    file.write_bytes(content)
+
+    with pytest.raises(DataFileError, match="no line of the truth"):
+        read_nearest(file, 0.0, 1.0)
+
+
+def test_a_file_that_was_just_begun_is_empty_and_no_error(tmp_path: Path) -> None:
+    file = tmp_path / "truth.ndjson"
+    file.write_bytes(b"")
+
+    assert read_nearest(file, 0.0, 1.0) == {}

@@ -191,6 +191,22 @@ async def test_a_file_of_the_truth_that_is_away_fails_the_question(
     assert (job.state, job.why, job.answer) == ("failed", "truth", None)
 
 
+async def test_a_file_of_something_else_fails_the_question(
+    url: str, tmp_path: Path
+) -> None:
+    """Through the process, whose answer has the part that failed."""
+    file = tmp_path / "truth.png"
+    file.write_bytes(b"\x89PNG")
+    worker = Worker()
+    what_ifs = WhatIfs(
+        url, fleet_of("AGI", "AGII"), FakeIds(), FakeClock(), file, [worker]
+    )
+    job = await answered(what_ifs, what_ifs.ask(question(), "ana"))
+    worker.close()
+
+    assert (job.state, job.why, job.answer) == ("failed", "truth", None)
+
+
 async def test_a_process_that_dies_fails_its_question_alone(url: str) -> None:
     def happens(piece: int) -> None:
         if piece == 1:

@@ -1,5 +1,5 @@
 /**
- * The situation of a robot, and of the fleet, as this page may say it now: pure functions.
+ * The situation of a robot as this page may say it now: pure functions.
  *
  * The server finds it (`iveg/domain/situation/judge.py`); here it only grows old.  A robot that
  * this page has not heard of lately is never told as clear, whatever was true before.
@@ -9,7 +9,6 @@
  * @typedef {import("./protocol.js").Robot} Robot
  * @typedef {import("./i18n.js").I18n} I18n
  * @typedef {{said: string, why: string, todo: string}} Said
- * @typedef {{level: Level, said: string, robotId: string | null}} FleetSaid
  */
 
 import { ageOf, isSilent, linkOfRobot } from "./clock.js";
@@ -124,60 +123,3 @@ export const capitalised = (said) => said.slice(0, 1).toUpperCase() + said.slice
 
 /** From bad to good, for sorting. @param {Situation} situation */
 export const rankOf = ({ level }) => LEVELS.indexOf(level);
-
-/**
- * The worst of the fleet in one sentence; of several as bad, the first of the fleet.
- *
- * @param {Iterable<Robot>} robots
- * @param {I18n} i18n
- * @param {number} [nowMs] `performance.now()` (ms)
- * @returns {FleetSaid}
- */
-export function fleetSaid(robots, i18n, nowMs = performance.now()) {
-  const fleet = [...robots].map((robot) => ({
-    robot: robot.robot_id,
-    situation: situationOf(robot, nowMs),
-  }));
-  const [worst] = [...fleet].sort((a, b) => rankOf(a.situation) - rankOf(b.situation));
-  if (!worst) return { level: "away", said: i18n.t("robot.none"), robotId: null };
-  const { robot, situation } = worst;
-  const { level } = situation;
-  if (level !== "working" && level !== "away") {
-    const bad = fleet.filter((one) => one.situation.level === "danger").length;
-    const slots = { robot, said: sentenceOf(situation, i18n), more: bad - 1 };
-    const said = i18n.t(`situation.of_robot${bad > 1 ? "_more" : ""}`, slots);
-    return { level, said, robotId: robot };
-  }
-  return quietSaid(fleet, i18n);
-}
-
-/**
- * A fleet of which nothing bad is known: all clear only if every robot says so.
- *
- * @param {{robot: string, situation: Situation}[]} fleet
- * @param {I18n} i18n
- * @returns {FleetSaid}
- */
-function quietSaid(fleet, i18n) {
-  const named = (/** @type {(one: Situation) => boolean} */ belongs) =>
-    fleet.filter(({ situation }) => belongs(situation)).map(({ robot }) => robot);
-  const away = named(({ level }) => level === "away");
-  const clear = named(({ state }) => state === "clear");
-  const others = named(({ level, state }) => level === "working" && state !== "clear");
-  const [robot] = clear;
-  const count = clear.length;
-  const slots = { robot, count, away: away.join(", "), others: others.join(", ") };
-  if (away.length) {
-    const key = away.length === fleet.length ? "none_heard" : "some_away";
-    const said = i18n.t(`situation.fleet.${key}`, slots);
-    return { level: "away", said, robotId: null };
-  }
-  const key = others.length
-    ? `${count ? "some" : "none"}_clear`
-    : `clear_${count === 1 ? "one" : "many"}`;
-  return {
-    level: "working",
-    said: i18n.t(`situation.fleet.${key}`, slots),
-    robotId: null,
-  };
-}

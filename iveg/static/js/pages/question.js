@@ -32,6 +32,16 @@ export function endQuestion({ id }) {
   return sendApi("DELETE", `what-if/${id}`, {});
 }
 
+/** What a failed question says of whom. @type {Record<string, string>} */
+const FAILURES = {
+  no_data: "whatif.no_data",
+  truth: "whatif.truth_unreadable",
+  database: "whatif.no_history",
+};
+
+/** The text of a failure. @param {string | null} why */
+export const failureKey = (why) => FAILURES[why ?? ""] ?? "whatif.failed";
+
 /**
  * Why a question was not taken, as a key of the texts; null: for what it says.
  *

@@ -12,7 +12,7 @@ import { make, need, setHidden, setText } from "../panels/dom.js";
 import { onThemeChange } from "../panels/theme.js";
 import { drawFigure } from "./history/charts.js";
 import { personShare } from "./lowering.js";
-import { endQuestion, isGoing, lookAgain, refusalKey } from "./question.js";
+import { endQuestion, failureKey, isGoing, lookAgain, refusalKey } from "./question.js";
 import { startTrial } from "./trial.js";
 
 const HOUR_MS = 3_600_000;
@@ -175,10 +175,10 @@ function input(name) {
 }
 
 /** @param {WhatIf} asked @param {import("../core/i18n.js").I18n} i18n */
-function stateSaid({ state, progress, why }, i18n) {
+export function stateSaid({ state, progress, why }, i18n) {
   if (state !== "failed")
     return i18n.t(`whatif.state.${state}`, { percent: Math.round(progress * 100) });
-  return i18n.t(why === "no_data" ? "whatif.no_data" : "whatif.failed");
+  return i18n.t(failureKey(why));
 }
 
 /**

@@ -10,7 +10,7 @@
 import { sendApi } from "../core/api.js";
 import { momentOf, wallText } from "./history/local_time.js";
 import { personShare } from "./lowering.js";
-import { endQuestion, isGoing, lookAgain, refusalKey } from "./question.js";
+import { endQuestion, failureKey, isGoing, lookAgain, refusalKey } from "./question.js";
 
 const DAY_MS = 86_400_000;
 
@@ -59,6 +59,7 @@ export function questionOf(before, change, now) {
 function answerSaid({ state, why, answer }) {
   if (state === "failed" && why === "no_data")
     return { key: "preview.no_data", slots: {} };
+  if (state === "failed" && why === "truth") return { key: failureKey(why), slots: {} };
   if (state !== "done" || !answer) return null;
   const minutes = (/** @type {Record<string, number>} */ of) =>
     Object.values(of).reduce((sum, s) => sum + s, 0) / 60;

@@ -1,6 +1,8 @@
 /**
  * A list of alerts that can be acknowledged: shape, colour and text show the urgency.
  *
+ * A row says what and since when; the rest of it opens by a tap, of the gravest at once.
+ *
  * The bell's panel and the Alerts page show the same list; a note that is being written
  * keeps its focus while alerts come and go around it.
  */
@@ -15,6 +17,8 @@ import { makePastLink } from "./past_link.js";
 
 /** Roles that may acknowledge (safety: the table of roles). */
 const ACKNOWLEDGERS = new Set(["operator", "admin"]);
+/** So many P1s are open from the start: with more nobody would see what there is. */
+const OPEN = 2;
 /** How long no row moves under a finger that has acknowledged. */
 const STILL_MS = 3000;
 
@@ -52,7 +56,7 @@ export function createAlertList(list, i18n, send = acknowledge, stillMs = STILL_
       if (!shown.some(({ alert_id }) => alert_id === id)) drop(id);
     }
     shown.forEach((alert, i) => {
-      const item = itemOf(alert);
+      const item = itemOf(alert, i);
       // Moving an element takes the focus out of the note that is being written.
       if (list.children[i] !== item) list.insertBefore(item, list.children[i] ?? null);
       drawItem(item, alert);
@@ -91,8 +95,8 @@ export function createAlertList(list, i18n, send = acknowledge, stillMs = STILL_
     failures.delete(id);
   }
 
-  /** @param {Alert} alert */
-  function itemOf(alert) {
+  /** @param {Alert} alert @param {number} place in the list */
+  function itemOf(alert, place) {
     const known = items.get(alert.alert_id);
     if (known) return known;
     const item = makeItem(async (note) => {
@@ -102,10 +106,12 @@ export function createAlertList(list, i18n, send = acknowledge, stillMs = STILL_
       else failures.set(alert.alert_id, status);
       draw(shown);
     });
+    const isLoud = alert.priority === "P1" && alert.acknowledged_at === null;
+    need("details", item).toggleAttribute("open", isLoud && place < OPEN);
     const past = createMembers(i18n);
-    need("small", item).after(past.element);
+    need(".alert__more", item).prepend(past.element);
     const written = createNotes(pinOf(alert), i18n, readNotes);
-    need("p", item).after(written.element);
+    need(".alert-links", item).after(written.element);
     notes.set(alert.alert_id, written);
     members.set(alert.alert_id, past);
     items.set(alert.alert_id, item);
@@ -122,8 +128,7 @@ export function createAlertList(list, i18n, send = acknowledge, stillMs = STILL_
     drawn.set(alert.alert_id, source);
     setAttribute(item, "data-priority", alert.priority);
     setAttribute(item, "data-alert", alert.key);
-    const priority = i18n.t(`alert.priority.${alert.priority}`);
-    setText(need("b", item), `${priority}: ${sentenceOf(alert, i18n)}`);
+    setText(need("b", item), sentenceOf(alert, i18n));
     setText(need("small", item), factsOf(alert, i18n));
     need(".past-link", item).replaceWith(makePastLink(alert.raised_at, i18n));
     const pack = /** @type {HTMLAnchorElement} */ (need(".incident-link", item));
@@ -157,17 +162,21 @@ export function sentenceOf({ key, slots }, i18n) {
 
 /** @param {Alert} alert @param {import("../core/i18n.js").I18n} i18n */
 function factsOf(alert, i18n) {
-  const { count, raised_at, last_raised_at } = alert;
+  const { priority, count, raised_at, last_raised_at } = alert;
+  const how = i18n.t(`alert.priority.${priority}`);
   const since = i18n.t("alert.since", { at: raised_at });
   const times = i18n.t("alert.times", { count, at: last_raised_at });
-  const began = count > 1 ? [since, times] : [since];
+  const began = count > 1 ? [how, since, times] : [how, since];
   return [...began, ...endOf(alert, i18n)].join(" · ");
 }
 
 /** @param {(note: string) => void} onAcknowledge */
 function makeItem(onAcknowledge) {
   const item = make("li");
-  const body = make("div");
+  const row = make("details");
+  const head = make("summary", "alert__head");
+  const said = make("span", "alert__said");
+  const more = make("div", "alert__more");
   const form = make("form");
   const input = make("input");
   const submit = make("button", "button");
@@ -182,8 +191,11 @@ function makeItem(onAcknowledge) {
   pack.download = "";
   const links = make("span", "alert-links");
   links.append(make("a", "past-link"), pack);
-  body.append(make("b"), make("small"), links, form, make("p"));
-  item.append(make("span", "shape"), body);
+  said.append(make("b"), make("small"));
+  head.append(make("span", "shape"), said);
+  more.append(form, make("p"), links);
+  row.append(head, more);
+  item.append(row);
   return item;
 }
 

@@ -7,8 +7,9 @@
  */
 
 import { onBeat } from "../core/beat.js";
+import { fleetSaid } from "../core/fleet_said.js";
 import { addressOf } from "../core/showing.js";
-import { fleetSaid, LEVELS } from "../core/situation.js";
+import { LEVELS } from "../core/situation.js";
 import { need, setAttribute, setText } from "./dom.js";
 
 /** @typedef {import("../core/situation.js").Level} Level */

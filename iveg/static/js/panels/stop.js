@@ -62,6 +62,8 @@ export class StopPanel {
     setInterval(onBeat, TICK_MS, drawAll);
     this.#presser.goOn();
     this.#drawAll();
+    // From here on `early.js` hears nothing, and what it has heard goes on here.
+    document.body.toggleAttribute("data-loaded", true);
   }
 
   /** The newest STOP of a robot. @param {string} robotId */
@@ -79,6 +81,7 @@ export class StopPanel {
     const id = String(control.dataset.stop);
     this.#controls.set(id, [...(this.#controls.get(id) ?? []), control]);
     for (const part of all("[data-i18n]", control)) part.removeAttribute("data-i18n");
+    control.removeAttribute("aria-busy");
     onPress(control, () => this.#press(id === "fleet" ? null : id));
   }
 

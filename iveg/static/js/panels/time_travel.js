@@ -59,11 +59,11 @@ export function createTimeTravel(app, askedS) {
   function refuse(status, body) {
     isPlaying = false;
     isTransient = status === 0 || status >= 500;
-    const key = status === 404 ? "gap" : status === 400 ? "other" : "failed";
-    problem = i18n.t(`past.problem.${key}`, {
-      before: body?.before ? i18n.time(body.before) : "—",
-      after: body?.after ? i18n.time(body.after) : "—",
-    });
+    const { before, after } = body ?? {};
+    const near = [before, after].filter(Boolean).map((at) => i18n.time(at));
+    const gap = near.length ? `gap_${before && after ? "both" : "one"}` : "gap";
+    const key = status === 404 ? gap : status === 400 ? "other" : "failed";
+    problem = i18n.t(`past.problem.${key}`, { before: near[0], after: near.at(-1) });
   }
 
   /** @param {1 | -1} way */

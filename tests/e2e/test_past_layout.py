@@ -1,0 +1,58 @@
+"""Where things stand while a moment of the past is shown, with ten robots."""
+
+from collections.abc import Iterator
+
+import pytest
+from playwright.sync_api import Browser, Page
+
+from tests.e2e.frozen import frozen_page, past_site, settle
+from tests.e2e.reading import COVERED_STOPS, OVERFLOW, evaluate
+from tests.pictures.pages import PAGES, prepare
+from tests.pictures.scenes import IDS, fleet
+from tests.processes import Site
+
+pytestmark = pytest.mark.e2e
+
+SIZES = ((390, 844), (768, 1024), (1440, 900))
+
+
+@pytest.fixture(scope="module")
+def past(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
+    """A server that has no robots."""
+    names = ",".join(IDS)
+    with past_site(tmp_path_factory.mktemp("then"), IVEG_ROBOTS=names) as place:
+        yield place
+
+
+@pytest.fixture(scope="module")
+def page(browser: Browser, past: Site) -> Iterator[Page]:
+    """The page of a moment at which a robot was slow."""
+    told = fleet(10, "slow")
+    with frozen_page(browser, past, SIZES[0], tell=lambda: told) as found:
+        prepare(found, "past", told, past.url)
+        found.goto(past.url + PAGES["past"])
+        settle(found, "#map-fit:enabled")
+        yield found
+
+
+@pytest.mark.parametrize(("wide", "high"), SIZES)
+def test_the_bar_of_the_past_covers_no_stop_and_no_tool_of_the_map(
+    page: Page, wide: int, high: int
+) -> None:
+    page.set_viewport_size({"width": wide, "height": high})
+    page.clock.run_for(500)
+
+    assert evaluate(page, COVERED_STOPS) == []
+    page.evaluate("() => scrollTo(0, 0)")
+    assert evaluate(page, UNDER_BAR) == []
+    assert evaluate(page, OVERFLOW) == 0
+
+
+UNDER_BAR = """() => {
+  const bar = document.querySelector('#past').getBoundingClientRect();
+  return [...document.querySelectorAll('.map-tools button')]
+    .filter((one) => one.getBoundingClientRect().bottom > bar.top
+      && one.getBoundingClientRect().right > bar.left)
+    .map((one) => one.id);
+}"""
+"""Tools of the map that the bar of the past lies over."""
