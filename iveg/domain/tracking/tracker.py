@@ -15,7 +15,7 @@ one.  Two that were ever seen apart at once never do.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 from iveg.domain.limits import LIMITS
@@ -88,8 +88,17 @@ class Tracker:
         """Drop a sighting whose place was seen to be empty."""
         person = self.known[person_id]
         left = tuple(earlier for earlier in person.sightings if earlier != sighting)
-        self.known[person_id] = person.seen_as(person.newest, left)
-        return self.known[person_id]
+        person = self.known[person_id] = person.seen_as(person.newest, left)
+        return person
+
+    def confirm(self, person_id: str, sighting: Sighting, until: float) -> None:
+        """Whom only a laser sees may be somebody who is remembered so long."""
+        known = replace(sighting, known_until=max(until, sighting.known_until))
+        newest, *kept = (
+            known if one is sighting else one
+            for one in (self.known[person_id].newest, *self.known[person_id].sightings)
+        )
+        self.known[person_id] = self.known[person_id].seen_as(newest, tuple(kept))
 
     def forget(self, now: Instant) -> list[TrackedPerson]:
         """Drop persons whose mark has had its time; returns them."""
