@@ -30,8 +30,8 @@ _NEAR_M, _RANGE_SHARE = 1.0, 0.75
 _FRESH_LOOK_S = 0.5
 _PERSON_M = 0.6
 """About the centre of a person's box: half of a person, and the error of the box."""
-_BODY_M = 0.25
-"""Half of a person, who keeps so far from what stands there."""
+_BODY_M = 0.3
+"""Half of a person, whose middle keeps so far from what stands there."""
 _YOUNG_S = 0.5
 """An older sighting says too little of where somebody is to explain a return."""
 
@@ -153,19 +153,34 @@ def beside(
     """Where somebody may stand whose box lies in something that the plan draws.
 
     Boxes are off by 0.4 m; deeper in it the place is left as it is, where nobody looks.
-    Nobody sees through crop, so they are on the observer's side of it; over crates one
-    sees, so it is each side that is near.
     """
+    most = LIMITS.uncertainty_m + _BODY_M
+    places = list(_besides(greenhouse, x, y, seen_from))
+    is_near = all(math.dist(one, (x, y)) <= most + 1e-9 for one in places)
+    return places if places and is_near else [(x, y)]
+
+
+def _besides(
+    greenhouse: Greenhouse, x: float, y: float, seen_from: Pose2D
+) -> Iterator[_Place]:
+    """Places beside: nobody stands in a wall, and nobody sees through crop.
+
+    So they are on the observer's side of that; over crates one sees, so it is each side
+    that is near.
+    """
+    walls = greenhouse.bounds
+    x = min(max(x, walls.xmin + _BODY_M), walls.xmax - _BODY_M)
+    y = min(max(y, walls.ymin + _BODY_M), walls.ymax - _BODY_M)
     for row in greenhouse.rows:
         if row.contains(x, y):
-            sides = _sides(row, x, y, seen_from)
-            return [place for _, place in sorted(sides)[:1]] or [(x, y)]
+            yield from [place for _, place in sorted(_sides(row, x, y, seen_from))[:1]]
+            return
     for one in greenhouse.obstacles:
         if one.area.contains(x, y):
-            sides = _sides(one.area, x, y, None)
-            near = [place for _, place in sides if greenhouse.bounds.contains(*place)]
-            return near or [(x, y)]
-    return [(x, y)]
+            sides = (place for _, place in _sides(one.area, x, y, None))
+            yield from (place for place in sides if walls.contains(*place))
+            return
+    yield x, y
 
 
 def _sides(
