@@ -164,8 +164,8 @@ def main() -> None:
     head = ("cause", "seconds", "of driving")
     print_table(f"Needless slowness, seeds {asked.seeds}", head, rows)
     if asked.each:
-        head = ("at", "robot", "for", "age of the ring", "radius", "cause")
-        print_table("Each", head, [_told(one) for one in spells])
+        each = ("at", "robot", "for", "age of the ring", "radius", "cause")
+        print_table("Each", each, [_told(one) for one in spells])
 
 
 def _told(spell: Spell) -> list[str]:

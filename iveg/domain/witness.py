@@ -223,9 +223,9 @@ class Witness:
         x, y = scan.points(Pose2D(0.0, 0.0, 0.0)).astype(np.float64).T
         gap = self._outline.gap_to(x, y)
         near = (gap > 0.0) & (gap <= self._reach_m)
-        for one in followed:
-            ahead, aside = pose.inverse(one.x, one.y)
-            theirs = np.hypot(x - ahead, y - aside) <= _about(one, now)
+        for who in followed:
+            ahead, aside = pose.inverse(who.x, who.y)
+            theirs = np.hypot(x - ahead, y - aside) <= _about(who, now)
             near |= theirs & (gap > 0.0) & (gap <= self._follow_m)
         away = np.hypot(x, y)[near]
         farthest = float(away.max(initial=0.0))

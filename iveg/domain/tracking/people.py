@@ -294,11 +294,10 @@ class People:
 
         Who counts by looks has a ring, which may end one of looks, but none of a box.
         """
-        spot, is_guess = (sighting.x, sighting.y), sighting.possible or sighting.laser
-        is_guess = is_guess and not self.things.known
+        is_guess = (sighting.possible or sighting.laser) and not self.things.known
         return any(
             one.class_ == person.class_
-            and math.dist(one.position[:2], spot) <= _SUSPECT_M
+            and math.dist(one.position[:2], (sighting.x, sighting.y)) <= _SUSPECT_M
             and not (is_guess and one.person)
             for one in self._faint.get(observer, ())
         )

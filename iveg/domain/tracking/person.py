@@ -116,6 +116,10 @@ class Sighting:
                 extent = extent.joined(earlier.extent)
         return replace(self, extent=extent)
 
+    def remembered(self, until: float) -> "Sighting":
+        """The same, which is remembered at least so long (monotonic, s)."""
+        return replace(self, known_until=max(until, self.known_until))
+
     def _going_on(self, before: "Sighting") -> tuple[float, float]:
         """The velocity of the chain (m/s), smoothed over 0.4 s, of a walker at most."""
         after_s = self.at.mono - before.at.mono

@@ -15,7 +15,7 @@ one.  Two that were ever seen apart at once never do.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 
 from iveg.domain.limits import LIMITS
@@ -93,12 +93,10 @@ class Tracker:
 
     def confirm(self, person_id: str, sighting: Sighting, until: float) -> None:
         """Whom only a laser sees may be somebody who is remembered so long."""
-        known = replace(sighting, known_until=max(until, sighting.known_until))
-        newest, *kept = (
-            known if one is sighting else one
-            for one in (self.known[person_id].newest, *self.known[person_id].sightings)
-        )
-        self.known[person_id] = self.known[person_id].seen_as(newest, tuple(kept))
+        person, known = self.known[person_id], sighting.remembered(until)
+        every = person.newest, *person.sightings
+        newest, *kept = (known if one is sighting else one for one in every)
+        self.known[person_id] = person.seen_as(newest, tuple(kept))
 
     def forget(self, now: Instant) -> list[TrackedPerson]:
         """Drop persons whose mark has had its time; returns them."""
