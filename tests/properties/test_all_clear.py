@@ -45,10 +45,10 @@ class Hall(Scene):
         return self.newest if robot.robot_id == "AGI" else None
 
     def step(self, people: list[tuple[float, float]], x: float, speed: float) -> None:
-        """A tenth of a second later; the camera sees who is ahead within 5 m."""
+        """A tenth of a second later; the camera sees everybody who is ahead."""
         self.now = round(self.now + _TICK_S, 6)
         self.drive("AGI", x, linear=speed)
-        ahead = [one for one in people if _is_in_view(*one, x)]
+        ahead = [one for one in people if self.is_in_view(*one, x)]
         self.look("AGI", *(person(*one, probability=0.85) for one in ahead))
         discs = [Disc(*one, 0.25) for one in people]
         pose = Pose2D(x, 0.0, 0.0)
@@ -58,9 +58,12 @@ class Hall(Scene):
         self.scan("AGI", said)
         self.newest = said
 
-
-def _is_in_view(x: float, y: float, from_x: float) -> bool:
-    return abs(math.atan2(y, x - from_x)) < 0.7 and math.dist((x, y), (from_x, 0)) < 5.0
+    def is_in_view(self, x: float, y: float, from_x: float) -> bool:
+        """Whether AGI's camera sees a place from where AGI stands."""
+        profile = self.world.robot("AGI").profile
+        camera = Pose2D(from_x, 0.0, 0.0).compose(profile.camera)
+        bearing = math.atan2(y - camera.y, x - camera.x) - camera.yaw
+        return abs(math.remainder(bearing, math.tau)) <= profile.camera_fov / 2
 
 
 def _goes(
@@ -108,7 +111,7 @@ def test_whom_a_laser_sees_is_remembered_as_long_as_the_one_whom_a_camera_saw() 
     for _ in range(60):
         place = _goes(place, stops, 0.6)
         hall.step([place], -2.0, 0.0)
-        seen = hall.now if _is_in_view(*place, -2.0) else seen
+        seen = hall.now if hall.is_in_view(*place, -2.0) else seen
         if hall.sweep() and ended is None:
             ended = hall.now
     rings = [one for somebody in hall.everyone for one in somebody.sightings]
