@@ -35,6 +35,10 @@ _PEER_M = 1.0
 """About a peer's ``base_link``: half of its body, and how far it went since it told."""
 _APART_M = 0.3
 """Returns of one body are not farther apart."""
+_FOLLOWED_M = 0.6
+"""About the middle of who is followed: where a scan may have them by noise."""
+_ONE_M = 0.7
+"""Two people beside each other are larger."""
 _ROUNDING_M = 0.01
 _LEAST_RETURNS = 2
 _BESIDE_M = 0.2
@@ -149,18 +153,25 @@ class Witness:
         outline: The robot's body.
         plan: None: nobody drew the place.
         ahead_s: It looks farther by how far the robot drives in this time (s).
+        follow_m: So far from itself it goes on seeing who walked beside it (m).
     """
 
     def __init__(
-        self, outline: Outline, plan: Plan | None, ahead_s: float = 0.0
+        self,
+        outline: Outline,
+        plan: Plan | None,
+        ahead_s: float = 0.0,
+        follow_m: float = 0.0,
     ) -> None:
         self._outline = outline
         self._plan = plan
         self._ahead_s = ahead_s
+        self._follow_m = follow_m
         self._known: tuple[Obstacle, ...] = ()
         self.walkers: tuple[Obstacle, ...] = ()
         """Of the last scan, those who walk, or walked just now."""
         self._looked_at = -math.inf
+        self._reach_m = LIMITS.ring_default_m
 
     def look(
         self,
@@ -174,7 +185,11 @@ class Witness:
         if now - self._looked_at < _EVERY_S:
             return
         self._looked_at = now
-        bodies = _bodies(self._unexplained(scan, pose, twist, known))
+        self._reach_m = LIMITS.ring_default_m + self._ahead_s * abs(twist.linear_x)
+        followed = [one for one in self._known if self._is_followed(one, now)]
+        bodies = _bodies(self._unexplained(scan, pose, twist, known, followed, now))
+        if followed:
+            bodies = self._told_apart(bodies, pose, followed, now)
         if self._plan is None or not self._plan.is_drawn:
             bodies = [one for one in bodies if self._is_ahead(one, pose, twist)]
         earlier = [one for one in self._known if now - one.at <= GONE_S]
@@ -196,13 +211,22 @@ class Witness:
         return min(self.present(now), key=lambda one: one.since, default=None)
 
     def _unexplained(
-        self, scan: LaserScan, pose: Pose2D, twist: Twist2D, known: Iterable[KnownBody]
+        self,
+        scan: LaserScan,
+        pose: Pose2D,
+        twist: Twist2D,
+        known: Iterable[KnownBody],
+        followed: Iterable[Obstacle],
+        now: float,
     ) -> _Floats:
         """Returns near the robot that nothing explains; shape (n, 2), in ``map``."""
         x, y = scan.points(Pose2D(0.0, 0.0, 0.0)).astype(np.float64).T
         gap = self._outline.gap_to(x, y)
-        reach = LIMITS.ring_default_m + self._ahead_s * abs(twist.linear_x)
-        near = (gap > 0.0) & (gap <= reach)
+        near = (gap > 0.0) & (gap <= self._reach_m)
+        for who in followed:
+            ahead, aside = pose.inverse(who.x, who.y)
+            theirs = np.hypot(x - ahead, y - aside) <= _about(who, now)
+            near |= theirs & (gap > 0.0) & (gap <= self._follow_m)
         away = np.hypot(x, y)[near]
         farthest = float(away.max(initial=0.0))
         x, y = _moved(x[near], y[near], pose)
@@ -215,6 +239,36 @@ class Witness:
             if pose.distance_to(one.x, one.y) <= farthest + one.radius + _ROUNDING_M:
                 left &= np.hypot(x - one.x, y - one.y) > one.radius
         return np.column_stack((x[left], y[left]))
+
+    def _is_followed(self, one: Obstacle, now: float) -> bool:
+        """Whether it goes on seeing who walked beside the robot."""
+        is_new = self._follow_m > 0.0 and now - one.at <= GONE_S
+        return is_new and one.is_somebody
+
+    def _told_apart(
+        self,
+        bodies: Sequence[_Floats],
+        pose: Pose2D,
+        followed: Sequence[Obstacle],
+        now: float,
+    ) -> Sequence[_Floats]:
+        """Bodies; beyond reach only where it is plain who each is.
+
+        Where two may be who is followed, neither is, and whoever was is remembered.
+        """
+        kept = [one for one in bodies if self._gap_to(one, pose) <= self._reach_m]
+        for who in followed:
+            may_be = [
+                one
+                for one in bodies
+                if math.dist(one.mean(0), (who.x, who.y)) <= _about(who, now)
+            ]
+            if len(may_be) == 1 and np.hypot(*np.ptp(may_be[0], axis=0)) <= _ONE_M:
+                kept += [one for one in may_be if not any(one is x for x in kept)]
+        return kept
+
+    def _gap_to(self, body: _Floats, pose: Pose2D) -> float:
+        return float(self._outline.gap_to(*_seen_from(pose, body)).min())
 
     def _is_ahead(self, body: _Floats, pose: Pose2D, twist: Twist2D) -> bool:
         """Whether a part of a body lies where the robot is driving."""
@@ -232,7 +286,7 @@ class Witness:
         x, y = (float(one) for one in body.mean(0))
         size = float(np.hypot(*np.ptp(body, axis=0)))
         ahead, aside = _seen_from(pose, body)
-        gap = float(self._outline.gap_to(ahead, aside).min())
+        gap = self._gap_to(body, pose)
         beside = float(ahead.mean()), float(aside.mean())
         near = min(
             earlier, key=lambda one: math.hypot(one.x - x, one.y - y), default=None
@@ -243,6 +297,11 @@ class Witness:
                 earlier.remove(near)
                 return near.seen_at(x, y, beside, size, gap, now)
         return Obstacle(x, y, x, y, size, gap, now, now, beside)
+
+
+def _about(one: Obstacle, now: float) -> float:
+    """How far who is followed may be from where they were seen last (m)."""
+    return _FOLLOWED_M + LIMITS.walking_m_s * (now - one.at)
 
 
 def _moved(x: _Floats, y: _Floats, frame: Pose2D) -> tuple[_Floats, _Floats]:

@@ -24,6 +24,7 @@ from iveg.domain.rule.foresight import Encounter, Foretold, path_of
 from iveg.domain.rule.paths import HORIZON_S, MOVES_M_S, Circles
 from iveg.domain.rule.zones import Zone
 from iveg.domain.tracking.people import People
+from iveg.domain.tracking.sight import seen_sightings
 from iveg.domain.witness import (
     GONE_S,
     PLAN_M,
@@ -36,13 +37,11 @@ from iveg.domain.world import World
 
 CAUSE = "obstacle"
 """Stands for the id of a cause: a laser knows no names."""
-_PERSON_M = 0.6
-"""About the centre of a person's box: half of a person, and the error of the box."""
 _CHECKED_S, _FAULTY_S = 1.0, 5.0
 _LEAST_RETURNS, _STRANGE = 0.05, 0.5
 """Shares of the beams that come back at least, and of those that the plan explains."""
-_YOUNG_S = 0.5
-"""An older sighting says too little of where somebody is to explain a return."""
+_FOLLOW_M = 8.0
+"""Beyond, too few beams meet somebody."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +128,7 @@ class Obstacles:
             return
         outline = Outline(profile.length, profile.width)
         witness = self._witnesses.setdefault(
-            robot.robot_id, Witness(outline, self._plan, HORIZON_S)
+            robot.robot_id, Witness(outline, self._plan, HORIZON_S, _FOLLOW_M)
         )
         known = (*self._peers(robot, now), *self._sighted(now))
         witness.look(scan, pose, odometry.twist, known, now.mono)
@@ -185,15 +184,9 @@ class Obstacles:
 
     def _sighted(self, now: Instant) -> Iterator[KnownBody]:
         """Where cameras see people, who have rings of their own."""
-        for person in self._people.known.values():
-            if person.age_s(now) > _YOUNG_S or person.newest.recording is not None:
-                continue
-            if self._people.things.explain(person, now) is not None:
-                continue
-            for one in person.sightings:
-                age = one.age_s(now)
-                if age <= _YOUNG_S and not one.reach_m and not one.laser:
-                    yield KnownBody(one.x, one.y, _PERSON_M + LIMITS.walking_m_s * age)
+        for sighting, body in seen_sightings(self._people, now):
+            if not sighting.laser:
+                yield body
 
 
 def _first(robot: RobotState, witness: Witness, now: Instant) -> SeenObstacle | None:

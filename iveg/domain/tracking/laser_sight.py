@@ -7,11 +7,12 @@ A sweep proves nothing where it may be wrong itself.  Beams that do not come bac
 nothing (a covered laser sees "nothing" everywhere), and a laser that repeats itself is
 frozen.  Most of the returns must be explained by the plan of the greenhouse: a laser
 that is turned on its mount, or of a robot at a wrong pose, draws walls where none are.
-Nothing unexplained may stand so near that the person may have walked there.
+Nothing unexplained may stand so near that the person may have walked there, but who has
+a ring there by now.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from typing import TypeVar
 
 import numpy as np
@@ -21,7 +22,7 @@ from iveg.domain.geometry import Pose2D
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant, LaserScan
 from iveg.domain.robot_state import RobotState
-from iveg.domain.witness import PLAN_M, Plan
+from iveg.domain.witness import PLAN_M, KnownBody, Plan
 
 ScanOf = Callable[[RobotState], LaserScan | None]
 """Reads a robot's newest scan; None where there is none that can be read."""
@@ -54,7 +55,12 @@ class LaserSight:
         """By robot the newest scan that was asked for, and whether it is frozen."""
 
     def swept(
-        self, robot: RobotState, spots: _Floats, ages: _Floats, now: Instant
+        self,
+        robot: RobotState,
+        spots: _Floats,
+        ages: _Floats,
+        bodies: Sequence[KnownBody],
+        now: Instant,
     ) -> NDArray[np.intp]:
         """``sight.Swept``; none by a scan that is old or makes no sense."""
         pose = robot.scan_pose
@@ -65,7 +71,7 @@ class LaserSight:
         scan = self._newest(robot)
         if scan is None or self._is_frozen(scan):
             return _NONE
-        return swept_by(scan, pose, spots, ages, self._plan)
+        return swept_by(scan, pose, spots, ages, self._plan, bodies)
 
     def _is_frozen(self, scan: LaserScan) -> bool:
         """Whether a scan repeats the one before to the bit: no laser is so exact."""
@@ -77,7 +83,12 @@ class LaserSight:
 
 
 def swept_by(
-    scan: LaserScan, pose: Pose2D, spots: _Floats, ages: _Floats, plan: Plan
+    scan: LaserScan,
+    pose: Pose2D,
+    spots: _Floats,
+    ages: _Floats,
+    plan: Plan,
+    bodies: Iterable[KnownBody] = (),
 ) -> NDArray[np.intp]:
     """The spots that a scan shows to be empty.
 
@@ -87,6 +98,7 @@ def swept_by(
         spots: Shape (n, 2), in ``map`` (m).
         ages: Shape (n,): how long ago somebody stood there (s).
         plan: What stands in the greenhouse.
+        bodies: Who is seen by now and has a ring: whoever walked there is one of them.
     """
     sensor = pose.compose(scan.mount)
     passed = [
@@ -100,6 +112,9 @@ def swept_by(
     strange = points[plan.distance_to(points[:, 0], points[:, 1]) > PLAN_M]
     if len(strange) > (1.0 - _EXPLAINED) * len(points):
         return _NONE
+    for one in bodies:
+        away = np.hypot(strange[:, 0] - one.x, strange[:, 1] - one.y)
+        strange = strange[away > one.radius]
     walked = np.minimum(_WALKED_MOST_M, _BESIDE_M + LIMITS.walking_m_s * ages[passed])
     apart = np.hypot(*(strange[:, None] - spots[passed]).transpose(2, 0, 1))
     empty: NDArray[np.intp] = np.array(passed)[np.all(apart > walked, axis=0)]

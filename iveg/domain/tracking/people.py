@@ -141,10 +141,11 @@ class People:
             self._doubt(_match_peer(one, observer, world, at), pose, observer)
             for one in placed
         ]
+        placed = self._assign(placed, observer, at, new_id)
         self._faint[frame.robot_id] = [
             one for one in placed if one.kind == "faint" or one.possible
         ]
-        return self._assign(placed, observer, at, new_id)
+        return placed
 
     def _place(
         self,
@@ -282,14 +283,22 @@ class People:
         """Drop a sighting whose place was seen to be empty."""
         return self._tracker.drop(person_id, sighting)
 
+    def confirm(self, person_id: str, sighting: Sighting, until: float) -> None:
+        """Whom only a laser sees may be somebody who is remembered so long."""
+        self._tracker.confirm(person_id, sighting, until)
+
     def is_suspected(
         self, person: TrackedPerson, sighting: Sighting, observer: str
     ) -> bool:
-        """Whether a robot's newest frame has such a faint detection near a sighting."""
-        spot = sighting.x, sighting.y
+        """Whether a robot's newest frame has such a faint detection near a sighting.
+
+        Who counts by looks has a ring, which may end one of looks, but none of a box.
+        """
+        is_guess = (sighting.possible or sighting.laser) and not self.things.known
         return any(
             one.class_ == person.class_
-            and math.dist(one.position[:2], spot) <= _SUSPECT_M
+            and math.dist(one.position[:2], (sighting.x, sighting.y)) <= _SUSPECT_M
+            and not (is_guess and one.person)
             for one in self._faint.get(observer, ())
         )
 

@@ -47,6 +47,8 @@ class Sighting:
         laser: Only the observer's laser saw it: it moves like somebody who walks.
         extent: Of its chain, and of all that this was ever taken to continue; None
             before it is part of a chain.
+        known_until: Of a laser: who is seen may be somebody whom a camera saw, and who
+            is remembered so long (monotonic, s).
     """
 
     observer: str
@@ -65,11 +67,14 @@ class Sighting:
     possible: bool = False
     laser: bool = False
     extent: Extent | None = None
+    known_until: float = -math.inf
 
     @property
     def lasts_s(self) -> float:
         """Age up to which it has a ring (s)."""
-        return LASER_LASTS_S if self.laser else LIMITS.ring_lasts_s
+        if not self.laser:
+            return LIMITS.ring_lasts_s
+        return max(LASER_LASTS_S, self.known_until - self.at.mono)
 
     def age_s(self, now: Instant) -> float:
         """Seconds since the sighting."""
@@ -100,6 +105,7 @@ class Sighting:
             self.possible,
             self.laser,
             extent if before is None else extent.joined(before.extent),
+            self.known_until if before is None else before.known_until,
         )
 
     def in_track(self, person: "TrackedPerson") -> "Sighting":
@@ -109,6 +115,10 @@ class Sighting:
             for earlier in (person.newest, *person.sightings):
                 extent = extent.joined(earlier.extent)
         return replace(self, extent=extent)
+
+    def remembered(self, until: float) -> "Sighting":
+        """The same, which is remembered at least so long (monotonic, s)."""
+        return replace(self, known_until=max(until, self.known_until))
 
     def _going_on(self, before: "Sighting") -> tuple[float, float]:
         """The velocity of the chain (m/s), smoothed over 0.4 s, of a walker at most."""

@@ -88,8 +88,15 @@ class Tracker:
         """Drop a sighting whose place was seen to be empty."""
         person = self.known[person_id]
         left = tuple(earlier for earlier in person.sightings if earlier != sighting)
-        self.known[person_id] = person.seen_as(person.newest, left)
-        return self.known[person_id]
+        person = self.known[person_id] = person.seen_as(person.newest, left)
+        return person
+
+    def confirm(self, person_id: str, sighting: Sighting, until: float) -> None:
+        """Whom only a laser sees may be somebody who is remembered so long."""
+        person, known = self.known[person_id], sighting.remembered(until)
+        every = person.newest, *person.sightings
+        newest, *kept = (known if one is sighting else one for one in every)
+        self.known[person_id] = person.seen_as(newest, tuple(kept))
 
     def forget(self, now: Instant) -> list[TrackedPerson]:
         """Drop persons whose mark has had its time; returns them."""

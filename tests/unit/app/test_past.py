@@ -347,7 +347,7 @@ async def test_after_a_memory_a_laser_clears_the_same_places(tmp_path: Path) -> 
     def cleared(parts: Pipeline) -> list[list[int]]:
         sight, now = parts.evaluator.laser_sight, live.clock()
         return [
-            sight.swept(one, np.add(around, _place(one)), ages, now).tolist()
+            sight.swept(one, np.add(around, _place(one)), ages, (), now).tolist()
             for one in parts.world.robots.values()
         ]
 

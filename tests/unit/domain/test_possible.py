@@ -132,6 +132,18 @@ def test_where_a_weak_box_stands_no_sure_ring_is_cleared() -> None:
     assert {one.possible for one in somebody.sightings} == {False, True}
 
 
+def test_where_a_weak_box_stands_that_has_a_ring_an_old_weak_one_is_cleared() -> None:
+    scene = Scene(rule=ON)
+    looked(scene, 0.7, 0.7, 0.7)
+    scene.now += 1.5
+    for _ in range(30):
+        looked(scene, 0.7, every_s=0.1, x=5.9)
+        scene.sweep()
+
+    rings = [one for somebody in scene.everyone for one in somebody.sightings]
+    assert [one.x for one in rings] == [5.9]
+
+
 def test_a_possible_person_slows_like_any_other() -> None:
     scene = Scene(rule=ON)
     looked(scene, 0.7, 0.7, 0.7, x=1.5)

@@ -204,6 +204,32 @@ def test_who_stops_before_the_laser_is_still_somebody_for_ten_seconds(
     assert aisle.judge()["AGI"].reason == "person", "its ring lasts a little longer"
 
 
+def test_who_walked_beside_a_robot_is_seen_on_as_it_drives_away(aisle: Aisle) -> None:
+    x, y = walk(aisle, 8)
+    for step in range(40):
+        x -= 0.08
+        aisle.step((x, y), x=0.08 * step, linear=0.8)
+        (one,) = aisle.everyone
+        assert one.age_s(at(aisle.now)) < 0.2
+        assert one.newest.x == pytest.approx(x, abs=0.3)
+    assert 0.08 * 39 - x > 5.0, "beyond what it looks at for anybody else"
+
+
+def test_where_two_may_be_who_walked_neither_is_and_who_did_is_remembered(
+    aisle: Aisle,
+) -> None:
+    x, y = walk(aisle, 8)
+    for step in range(40):
+        aisle.step((x - 0.08 * step, y), x=0.08 * step, linear=0.8)
+    x -= 0.08 * 39
+    before = aisle.everyone
+    for step in range(40, 50):
+        two = (x, y), (x, y - 0.8)
+        aisle.step(*two, x=0.08 * step, linear=0.8)
+    (one,) = before
+    assert aisle.people.known[one.person_id].age_s(at(aisle.now)) > 0.8
+
+
 def test_whom_a_camera_then_confirms_keeps_the_name_and_has_no_second_one(
     aisle: Aisle,
 ) -> None:

@@ -12,7 +12,7 @@ from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import LaserScan, Origin
 from iveg.domain.tracking.laser_sight import LaserSight, swept_by
-from iveg.domain.witness import Plan
+from iveg.domain.witness import KnownBody, Plan
 from iveg.lab.emulator.greenhouse import Disc, Scenery
 from iveg.lab.emulator.lidar import LaserModel, sweep
 from tests.builders import at
@@ -97,6 +97,14 @@ def test_who_cannot_have_come_from_the_spot_does_not_keep_it() -> None:
     assert not is_swept(scan_of((0.9, 0.5)), age_s=6.0)
 
 
+def test_who_has_a_ring_by_now_keeps_no_second_one_where_they_were() -> None:
+    scan, spots, ages = scan_of((0.9, 0.5)), np.array([SPOT]), np.array([6.0])
+    assert not swept_by(scan, HERE, spots, ages, PLAN).size
+    there, elsewhere = KnownBody(0.9, 0.5, 0.6), KnownBody(0.9, -0.5, 0.6)
+    assert swept_by(scan, HERE, spots, ages, PLAN, [there]).size == 1
+    assert not swept_by(scan, HERE, spots, ages, PLAN, [elsewhere]).size
+
+
 def test_who_leans_into_a_row_is_not_taken_for_the_row() -> None:
     """The plan explains all of them, but no beam passes."""
     assert not is_swept(scan_of((-3.0, 1.95)), (-3.0, 1.95))
@@ -168,7 +176,7 @@ def sweeps(scene: Scene, sight: LaserSight | None = None) -> bool:
     sight = sight or LaserSight(PLAN, lambda _: scan_of())
     robot = scene.world.robot("AGI")
     spots, ages = np.array([SPOT]), np.array([1.5])
-    return sight.swept(robot, spots, ages, at(scene.now)).size == 1
+    return sight.swept(robot, spots, ages, (), at(scene.now)).size == 1
 
 
 def test_the_newest_scan_of_a_live_robot_counts() -> None:
