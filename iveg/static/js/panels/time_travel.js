@@ -10,7 +10,7 @@
 import { readApi } from "../core/api.js";
 import { TIME_ZONE } from "../core/messages.js";
 import { BEFORE_S, nextEvent, pastAddress } from "../core/moments.js";
-import { PastLine, waitSaid } from "../core/past_line.js";
+import { PastLine, problemOf, waitSaid } from "../core/past_line.js";
 import { PastStore } from "../core/past_store.js";
 import { need, setAttribute, setHidden, setText } from "./dom.js";
 import { createNotes } from "./notes.js";
@@ -59,8 +59,7 @@ export function createTimeTravel(app, askedS) {
   function refuse(status, body) {
     isPlaying = false;
     isTransient = status === 0 || status >= 500;
-    const key = status === 404 ? "gap" : status === 400 ? "other" : "failed";
-    problem = i18n.t(`past.problem.${key}`, {
+    problem = i18n.t(`past.problem.${problemOf(status, body)}`, {
       before: body?.before ? i18n.time(body.before) : "—",
       after: body?.after ? i18n.time(body.after) : "—",
     });
