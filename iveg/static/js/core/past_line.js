@@ -77,7 +77,7 @@ export function waitSaid(waitedMs, isShown) {
 }
 
 /**
- * Why there is no picture, as a key below `past.problem`.
+ * Why there is no picture, as the last part of the key of its text.
  *
  * @param {number} status @param {any} body
  */
