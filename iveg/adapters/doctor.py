@@ -140,7 +140,9 @@ def check_database(database_url: str) -> None:
     """
     file = sqlite_file(database_url)
     if file is not None and not file.is_file():
-        raise HopError("database", "there is none; `iveg db upgrade` makes it")
+        raise HopError(
+            "database", f"there is none at {file}; `iveg db upgrade` makes it"
+        )
     engine = reading_engine(database_url)
     try:
         with engine.connect() as connection:

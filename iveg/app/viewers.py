@@ -17,6 +17,7 @@ from iveg.domain.errors import (
     DataFileError,
     HopError,
     NotRecordedError,
+    TooManyLookError,
     UnreadableError,
 )
 from iveg.domain.observations import Instant
@@ -138,7 +139,8 @@ class Viewers:
         Raises:
             NotRecordedError: nothing was recorded there.
             UnreadableError: another version or fleet recorded it.
-            HopError: too many look at once, or the process ended.
+            TooManyLookError: as many look at once as may.
+            HopError: the process ended.
         """
         shown = await self.viewer(viewer).worker.run(self._work, self._site, wall)
         if shown.missing is not None:
@@ -148,7 +150,7 @@ class Viewers:
         return shown.world
 
     def viewer(self, name: str) -> "Viewer":
-        """A viewer by name, old or new.  Raises HopError: there are too many."""
+        """A viewer by name, old or new.  Raises TooManyLookError."""
         now = self._clock().mono
         viewer = self._viewers.get(name)
         if viewer is None:
@@ -163,7 +165,7 @@ class Viewers:
             return
         oldest = min(self._viewers, key=lambda one: self._viewers[one].asked_at)
         if now - self._viewers[oldest].asked_at < _IN_USE_S:
-            raise HopError("past", "too many look at the past at once")
+            raise TooManyLookError
         self._end(oldest)
 
     async def run(self) -> None:

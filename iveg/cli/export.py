@@ -3,6 +3,7 @@
 import argparse
 import asyncio
 import contextlib
+import os
 import sys
 from collections.abc import AsyncIterator, Callable, Sequence
 from pathlib import Path
@@ -60,8 +61,12 @@ def _moment(option: str, text: str | None) -> float | None:
 def _write(options: argparse.Namespace, queries: Queries, asked: Filter) -> None:
     (one,) = (one for one in lists_of(queries) if one.path == options.list)
     if options.out is None:
-        asyncio.run(_export(one, asked, options.format, sys.stdout.buffer.write))
+        asyncio.run(_export(one, asked, options.format, _to_output))
+        _flush_output()
         return
+    if options.out.exists() and not options.out.is_file():
+        # Whatever writes to it would find a file in its place.
+        raise HopError("disk", f"{options.out} is there and no file")
     part = options.out.with_name(options.out.name + ".part")
     try:
         with part.open("wb") as file:
@@ -72,6 +77,26 @@ def _write(options: argparse.Namespace, queries: Queries, asked: Filter) -> None
     finally:
         with contextlib.suppress(OSError):
             part.unlink(missing_ok=True)
+
+
+def _to_output(piece: bytes) -> None:
+    try:
+        sys.stdout.buffer.write(piece)
+    except OSError as error:
+        raise _output_gone(error) from error
+
+
+def _flush_output() -> None:
+    try:
+        sys.stdout.buffer.flush()
+    except OSError as error:
+        raise _output_gone(error) from error
+
+
+def _output_gone(error: OSError) -> HopError:
+    # What is left in the buffer would fail once more when the program ends.
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return HopError("output", error.strerror or str(error))
 
 
 async def _export(

@@ -12,8 +12,13 @@ from iveg.domain.observations import FeedbackRef
 
 _APART_S = 0.05
 """Moments closer than this share the earlier one, so that ages come out older."""
-_KEPT = 18_000
-"""Moments that are remembered at least: fifteen minutes of them, at that distance."""
+_LATELY_S = 60.0
+_LONG_AGO_APART_S = 1.0
+"""The same of what left iVeg longer ago than ``_LATELY_S``: whether an age is sixty
+seconds or sixty-one changes nothing, and each memory of a recording holds them all."""
+_KEPT_S = 900.0
+_MOST = 4_000
+"""Moments at which those of long ago are thinned out: 2,100 of them stay at most."""
 
 
 class FeedbackLedger:
@@ -32,8 +37,19 @@ class FeedbackLedger:
             return
         self._firsts.append(first)
         self._moments.append(now)
-        if len(self._moments) > 2 * _KEPT:
-            del self._firsts[:_KEPT], self._moments[:_KEPT]
+        if len(self._moments) > _MOST:
+            self._thin_out(now)
+
+    def _thin_out(self, now: float) -> None:
+        kept: list[tuple[int, float]] = []
+        for first, moment in zip(self._firsts, self._moments, strict=True):
+            is_near = bool(kept) and moment - kept[-1][1] < _LONG_AGO_APART_S
+            is_spare = now - moment > _LATELY_S and is_near
+            # The earliest stays, so that ages come out older.
+            if now - moment <= _KEPT_S and not is_spare:
+                kept.append((first, moment))
+        self._firsts = [first for first, _ in kept]
+        self._moments = [moment for _, moment in kept]
 
     def is_unsent(self, heard: FeedbackRef | None) -> bool:
         """Whether a robot names feedback of this boot that was never sent."""

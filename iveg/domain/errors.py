@@ -250,5 +250,12 @@ class HopError(IvegError):
         self.detail = detail
 
 
+class TooManyLookError(HopError):
+    """As many look at the past at once as there are processes for."""
+
+    def __init__(self) -> None:
+        super().__init__("past", "too many look at the past at once")
+
+
 class NoAnswerError(HopError):
     """A neighbour took the question and did not answer in time: late, or hung."""

@@ -38,6 +38,7 @@ from iveg.domain.errors import (
     NotRecordedError,
     OutdatedError,
     ProvidedAccountError,
+    TooManyLookError,
     TrialRefusedError,
     UnknownNameError,
     UnknownRobotError,
@@ -179,16 +180,22 @@ def problem_of(error: Exception) -> Problem:
             ends = {"before": stamp(error.before), "after": stamp(error.after)}
             return Problem(404, str(error), "not-recorded", ends)
         case HopError():
-            # Addresses and drivers' words stay inside.
-            return Problem(
-                503, f"{error.hop} did not answer.", "hop", {"hop": error.hop}
-            )
+            return _broken_hop(error)
     for kind, status, code in _PLAIN:
         if isinstance(error, kind):
             headers = _HEADERS.get(kind, {})
             return Problem(status, str(error), code, headers=headers)
     # The server logs the traceback: Starlette raises it again after this answer.
     return Problem(500, "Something failed inside iVeg; its log says what.")
+
+
+def _broken_hop(error: HopError) -> Problem:
+    extra = {"hop": error.hop}
+    if isinstance(error, TooManyLookError):
+        said = "Too many look at the past at once."
+        return Problem(503, said, "hop", {**extra, "why": "viewers"})
+    # Addresses and drivers' words stay inside.
+    return Problem(503, f"{error.hop} did not answer.", "hop", extra)
 
 
 def _refused_pin(error: PinRefusedError) -> Problem:

@@ -1,4 +1,9 @@
-import { PastLine, SLOW_MS, waitSaid } from "../../iveg/static/js/core/past_line.js";
+import {
+  PastLine,
+  problemOf,
+  SLOW_MS,
+  waitSaid,
+} from "../../iveg/static/js/core/past_line.js";
 import { equal, test } from "./harness.js";
 
 function wired() {
@@ -55,6 +60,22 @@ test("a question that takes long can be asked anew, and its answer comes once", 
     asked.map(({ atS }) => atS),
     [10, 10],
   );
+});
+
+test("why there is no picture is told apart", () => {
+  const ends = { before: "2026-11-26T11:40:20.512Z", after: null };
+  const told = [
+    problemOf(404, ends),
+    problemOf(404, { ...ends, after: null }),
+    problemOf(404, { before: null, after: null }),
+    problemOf(422, {}),
+    problemOf(400, {}),
+    problemOf(503, { why: "viewers" }),
+    problemOf(503, {}),
+    problemOf(0, null),
+  ];
+  const gaps = ["gap_both", "gap_one", "never", "never"];
+  equal(told, [...gaps, "other", "full", "failed", "failed"]);
 });
 
 test("the page says at once that it opens the past, and when that is slow", () => {

@@ -68,7 +68,9 @@ class OwnRecording:
             }
         if len(robots) == 1:
             return robots.pop()
-        held = ", ".join(sorted(robots)) or "no robot"
+        if not robots:
+            raise self._unusable("holds nothing of a robot that this iVeg can read.")
+        held = ", ".join(sorted(robots))
         raise self._unusable(f"holds {held}: name one as {self._path.name}#ROBOT.")
 
     def _unusable(self, reason: str) -> DataFileError:

@@ -64,6 +64,11 @@ def _opened(
     own = Path(f"{stem}.mcap") if robot_id else path
     if own.suffix == ".mcap" and is_own(own):
         return OwnRecording(own, robot_id or None).entries
+    if robot_id and own.is_file():
+        reason = (
+            "is no recording of iVeg's that can be read, so # names no robot in it."
+        )
+        raise DataFileError(str(own), "", reason)
     if path.is_dir() or path.suffix in _BAGS:
         opened = Bag(path, bag, mount, needs_odometry=not fixed)
         for line in (f"{path}:", *opened.plan.table()):

@@ -95,6 +95,11 @@ def router(sources: Sources) -> APIRouter:
     ) -> FileResponse:
         """Everything about some minutes as a ZIP, at most an hour."""
         since, until, said = await _range(asked, sources)
+        now = sources.clock().wall
+        if since > now:
+            raise HTTPException(422, "That range is still to come.")
+        # What is still to come is in no pack, so its end does not claim it.
+        until = min(until, now)
         folder = Path(await asyncio.to_thread(tempfile.mkdtemp, prefix="iveg-pack-"))
         clear = BackgroundTask(shutil.rmtree, folder, ignore_errors=True)
         try:

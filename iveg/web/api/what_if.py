@@ -7,6 +7,7 @@ from typing import Annotated, Final, Literal, Protocol, Self
 from fastapi import APIRouter, Depends, HTTPException, Response
 from orjson import Fragment
 from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic_core import PydanticCustomError
 
 from iveg.domain.detection_rule import FORESIGHT_MOST_S, DetectionRule
 from iveg.domain.limits import LIMITS
@@ -59,9 +60,9 @@ class Asked(BaseModel):
     @model_validator(mode="after")
     def _in_order(self) -> Self:
         if self.since >= self.until:
-            raise ValueError("since is not before until")
+            raise PydanticCustomError("order", "since is not before until")
         if (self.until - self.since).total_seconds() > LONGEST_S:
-            raise ValueError("longer than seven days")
+            raise PydanticCustomError("length", "longer than seven days")
         return self
 
     def question(self, rule: DetectionRule) -> Question:

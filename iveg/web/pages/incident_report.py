@@ -48,14 +48,20 @@ def write_report(
     lines = sorted(_lines(rows, sentences), key=lambda one: one.at)
     html = _template().render(
         language=language,
-        say=lambda key: sentences.say(key, {}),
+        say=lambda key, **slots: sentences.say(key, slots),
         since=format_stamp(since),
         until=format_stamp(until),
+        local_since=_local(since),
+        local_until=_local(until),
         day=f"{in_madrid(since):%Y-%m-%d}",
         about=said,
         lines=lines,
     )
     return html.encode()
+
+
+def _local(at: float) -> str:
+    return f"{in_madrid(at):%Y-%m-%d %H:%M:%S}"
 
 
 def _lines(rows: Iterable[Record], sentences: Sentences) -> Iterator[Line]:

@@ -55,6 +55,20 @@ def test_a_question_is_answered_by_a_curve_with_the_rule_in_force_marked(
     expect(page.locator("#whatif-truth-section")).to_be_hidden()
 
 
+def test_what_is_wrong_in_a_folded_field_is_shown(open_page: OpenPage) -> None:
+    page = open_page(route="/what-if")
+    radius_of(page)
+    field = page.locator("#whatif-release_beyond_m")
+    expect(field).to_be_hidden()
+    field.evaluate("field => { field.value = '99'; }")
+
+    page.locator("#whatif-ask").click()
+
+    expect(field).to_be_visible()
+    expect(field).to_be_focused()
+    expect(page.locator("#whatif-progress")).to_be_hidden()
+
+
 def test_a_question_tells_its_progress_and_is_ended(open_page: OpenPage) -> None:
     page = open_page(route="/what-if")
     expect(page.locator("#whatif-radius_m")).not_to_have_value("")

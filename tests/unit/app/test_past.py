@@ -29,7 +29,7 @@ from iveg.app.viewers import (
     Viewers,
     picture_of,
 )
-from iveg.domain.errors import HopError, NotRecordedError, UnreadableError
+from iveg.domain.errors import NotRecordedError, TooManyLookError, UnreadableError
 from iveg.domain.observations import Instant, Received
 from iveg.domain.records import Record
 from iveg.domain.robot_state import RobotState
@@ -418,7 +418,7 @@ async def test_one_viewer_too_many_is_refused_while_the_others_look() -> None:
     for name in range(MOST_VIEWERS):
         viewers.viewer(str(name))
 
-    with pytest.raises(HopError):
+    with pytest.raises(TooManyLookError):
         viewers.viewer("one more")
     clock.now += 11.0
     viewers.viewer("one more")

@@ -152,10 +152,11 @@ def test_the_database_is_made_where_data_lives(
 
 @pytest.mark.parametrize("action", ["stats", "purge", "vacuum"])
 def test_a_database_that_is_not_there_is_one_sentence(
-    capsys: pytest.CaptureFixture[str], action: str
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, action: str
 ) -> None:
     assert run(["db", action]) == 1
-    assert "there is none; `iveg db upgrade` makes it" in capsys.readouterr().err
+    said = f"there is none at {tmp_path / 'iveg' / 'iveg.sqlite'}; `iveg db upgrade`"
+    assert said in capsys.readouterr().err
 
 
 @pytest.fixture

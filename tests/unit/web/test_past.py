@@ -1,6 +1,6 @@
 """The past over HTTP: what is asked of it, and its problems."""
 
-from iveg.domain.errors import NotRecordedError, UnreadableError
+from iveg.domain.errors import NotRecordedError, TooManyLookError, UnreadableError
 from tests.unit.web.desk import WebDesk
 
 PATH = "/api/v1/world"
@@ -24,6 +24,8 @@ async def test_what_cannot_be_shown_is_one_clear_problem() -> None:
         gap = await browser.get(f"{PATH}?at=2023-11-14T22:13:00Z")
         desk.past.fails = UnreadableError("other_version", "recorded by iVeg 2")
         newer = await browser.get(f"{PATH}?at=2023-11-14T22:13:00Z")
+        desk.past.fails = TooManyLookError()
+        full = await browser.get(f"{PATH}?at=2023-11-14T22:13:00Z")
         nameless = await browser.get(f"{PATH}?at=2023-11-14T22:13:00Z&viewer=a/b")
 
     assert (future.status_code, nameless.status_code) == (422, 422)
@@ -33,3 +35,5 @@ async def test_what_cannot_be_shown_is_one_clear_problem() -> None:
     assert gap.json()["after"] is None
     assert newer.status_code == 400
     assert newer.json()["reason"] == "other_version"
+    assert full.status_code == 503
+    assert (full.json()["type"], full.json()["why"]) == ("urn:iveg:hop", "viewers")

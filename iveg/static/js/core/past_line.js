@@ -76,6 +76,19 @@ export function waitSaid(waitedMs, isShown) {
   return isShown && waitedMs < SOON_MS ? "" : "opening";
 }
 
+/**
+ * Why there is no picture, as the last part of the key of its text.
+ *
+ * @param {number} status @param {any} body
+ */
+export function problemOf(status, body) {
+  if (status === 422) return "never";
+  if (status === 404 && body?.before && body.after) return "gap_both";
+  if (status === 404) return body?.before || body?.after ? "gap_one" : "never";
+  if (status === 400) return "other";
+  return body?.why === "viewers" ? "full" : "failed";
+}
+
 /** @param {number} atS @param {AbortSignal} signal */
 function askWorld(atS, signal) {
   const at = new Date(1000 * atS).toISOString();

@@ -135,12 +135,19 @@ export function start({ store, i18n }) {
   need("#whatif-form").addEventListener("submit", (event) =>
     ask(/** @type {SubmitEvent} */ (event)),
   );
+  // A browser cannot point to what is folded away: it would do nothing, silently.
+  need("#whatif-form").addEventListener("invalid", unfold, true);
   need("#whatif-cancel").addEventListener("click", cancel);
   store.subscribe("rule", fill);
   i18n.onChange(draw);
   onThemeChange(draw);
   fill();
   startTrial(store, i18n, typed);
+}
+
+/** @param {Event} event */
+function unfold({ target }) {
+  /** @type {Element} */ (target).closest("details")?.setAttribute("open", "");
 }
 
 /** What the form says, as the API takes it. */

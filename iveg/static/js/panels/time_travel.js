@@ -10,7 +10,7 @@
 import { readApi } from "../core/api.js";
 import { TIME_ZONE } from "../core/messages.js";
 import { BEFORE_S, nextEvent, pastAddress } from "../core/moments.js";
-import { PastLine, waitSaid } from "../core/past_line.js";
+import { PastLine, problemOf, waitSaid } from "../core/past_line.js";
 import { PastStore } from "../core/past_store.js";
 import { need, setAttribute, setHidden, setText } from "./dom.js";
 import { createNotes } from "./notes.js";
@@ -59,11 +59,12 @@ export function createTimeTravel(app, askedS) {
   function refuse(status, body) {
     isPlaying = false;
     isTransient = status === 0 || status >= 500;
-    const { before, after } = body ?? {};
-    const near = [before, after].filter(Boolean).map((at) => i18n.time(at));
-    const gap = near.length ? `gap_${before && after ? "both" : "one"}` : "gap";
-    const key = status === 404 ? gap : status === 400 ? "other" : "failed";
-    problem = i18n.t(`past.problem.${key}`, { before: near[0], after: near.at(-1) });
+    const ends = [body?.before, body?.after].filter(Boolean);
+    const near = ends.map((at) => i18n.time(at));
+    problem = i18n.t(`past.problem.${problemOf(status, body)}`, {
+      before: near[0],
+      after: near.at(-1),
+    });
   }
 
   /** @param {1 | -1} way */

@@ -87,6 +87,20 @@ def test_of_several_robots_one_is_named(path: Path) -> None:
         entries(path.with_name(path.name + "#D1"))
 
 
+def test_what_this_iveg_cannot_read_is_told_as_that(path: Path) -> None:
+    file = McapFile(path, START)
+    file.add(ODOM, at(0.0), b'{"in_a_newer_format": 1}')
+    file.finish()
+    with pytest.raises(DataFileError, match="nothing of a robot that this iVeg can"):
+        entries(path)
+
+    magic = bytearray(path.read_bytes())
+    magic[5] = ord("9")
+    path.write_bytes(magic)
+    with pytest.raises(DataFileError, match="no recording of iVeg's that can be read"):
+        entries(path.with_name(path.name + "#AGI"))
+
+
 def test_one_that_breaks_off_says_so_after_what_can_be_read(path: Path) -> None:
     file = McapFile(path, START)
     file.add(ODOM, at(0.0), pose(1.0, 1))

@@ -1,5 +1,7 @@
 """Exports: the data dictionary, and Parquet from the door and from the command line."""
 
+import os
+import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -97,6 +99,30 @@ def test_what_cannot_be_exported_is_one_sentence(
     assert main(["export", "odometry", *words]) != 0
     (sentence,) = capsys.readouterr().err.splitlines()
     assert says in sentence
+
+
+def test_a_device_is_not_replaced_by_a_file(
+    data: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pipe = data / "pipe"
+    os.mkfifo(pipe)
+    assert main(["export", "odometry", "--out", str(pipe)]) == 1
+    assert "is there and no file" in capsys.readouterr().err
+    assert pipe.is_fifo()
+    assert [*data.glob("*.part")] == []
+
+
+def test_a_reader_that_leaves_early_is_one_sentence(data: Path) -> None:
+    command = [sys.executable, "-m", "iveg", "export", "odometry"]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        process.stdout.close()
+        assert process.stderr is not None
+        (sentence,) = process.stderr.read().splitlines()
+    assert process.returncode == 1
+    assert sentence == "iveg: output: Broken pipe"
 
 
 def test_without_its_library_the_command_says_what_to_install(

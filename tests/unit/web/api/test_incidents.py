@@ -23,6 +23,7 @@ from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.events import LogEvent
 from iveg.domain.observations import Instant
 from iveg.domain.records import Record
+from iveg.domain.stamps import format_stamp
 from iveg.pipeline.record import Waiting
 from iveg.settings import Settings
 from iveg.web import problems
@@ -66,6 +67,8 @@ class Desk:
         self.recorder = InputRecorder(setup, FakeClock())
         self.in_place = WriterInPlace(setup)
         self.lines: list[LogEvent] = []
+        now = FakeClock()
+        now.now = 3600.0
         settings = {"IVEG_API_TOKEN": SECRET, "IVEG_MQTT_URL": "mqtt://ana:pw@host:1"}
         self.app = FastAPI()
         self.app.dependency_overrides[require("release")] = lambda: Principal(
@@ -78,7 +81,7 @@ class Desk:
             lambda: [DetectionRule()],
             Settings.from_environment(settings).without_secrets(),
             lambda event, _: self.lines.append(event),
-            FakeClock(),
+            now,
             "1.0",
             browser,
         )
@@ -179,6 +182,29 @@ async def test_a_range_has_its_very_ends_and_an_hour_at_most(desk: Desk) -> None
     assert (await ask(desk, command="none")).status_code == 404
     assert (await ask(desk, alert="none")).status_code == 404
     assert (await ask(desk, since=until, until=since)).status_code == 422
+
+
+async def test_a_pack_does_not_claim_what_is_still_to_come(desk: Desk) -> None:
+    now = desk.sources.clock().wall
+    until = format_stamp(now + 30.0)
+    answer = await ask(desk, since=format_stamp(now - 60.0), until=until)
+    with zipfile.ZipFile(io.BytesIO(answer.content)) as whole:
+        told = orjson.loads(whole.read("manifest.json"))
+        assert told["until"] == format_stamp(now)
+        assert until.encode() not in whole.read("report.en.html")
+
+    later = await ask(desk, since=format_stamp(now + 10.0), until=until)
+    assert later.status_code == 422
+    assert "still to come" in later.json()["detail"]
+
+
+async def test_the_page_of_a_pack_names_the_zone_of_its_times(desk: Desk) -> None:
+    since, until = "2023-11-14T22:13:30Z", "2023-11-14T22:14:00Z"
+    answer = await ask(desk, since=since, until=until)
+    with zipfile.ZipFile(io.BytesIO(answer.content)) as whole:
+        page = whole.read("report.en.html").decode()
+    assert "2023-11-14 23:13:30 – 2023-11-14 23:14:00" in page
+    assert "Europe/Madrid" in page
 
 
 async def test_a_pack_of_a_time_without_rows_says_so(desk: Desk) -> None:

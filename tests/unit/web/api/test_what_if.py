@@ -102,6 +102,23 @@ async def test_nonsense_is_refused_with_its_reason(
     assert asked.newest() == []
 
 
+@pytest.mark.parametrize(
+    ("since", "until", "says"),
+    [
+        (HOUR["until"], HOUR["since"], "since is not before until"),
+        (HOUR["since"], HOUR["since"], "since is not before until"),
+        ("2023-10-14T20:00:00Z", HOUR["until"], "longer than seven days"),
+    ],
+)
+async def test_a_range_that_cannot_be_asked_about_says_why(
+    browser: httpx.AsyncClient, since: str, until: str, says: str
+) -> None:
+    told = await browser.post(PATH, json={"since": since, "until": until})
+
+    assert told.status_code == 422
+    assert told.json()["errors"] == [{"where": "body", "what": says}]
+
+
 async def test_one_at_a_time_that_can_be_watched_and_ended(
     browser: httpx.AsyncClient,
 ) -> None:
