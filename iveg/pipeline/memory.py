@@ -7,6 +7,7 @@ is seen once, when nothing has come in yet.
 
 import io
 import pickle
+import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from enum import Enum
 from typing import Any, Final
@@ -27,6 +28,9 @@ _LEFT_OUT = (
 )
 """Parts that no picture of the world needs."""
 _TASKS = "_tasks"
+_QUICK: Final = 1
+"""The level that takes least time, as this is the loop's."""
+_MOST_BYTES: Final = 1 << 26
 _PLAIN: Final = {
     "builtins": {"bool", "dict", "float", "frozenset", "int", "list", "set", "str"},
     "collections": {"deque", "defaultdict", "Counter", "OrderedDict"},
@@ -66,7 +70,7 @@ class Memory:
         buffer = io.BytesIO()
         writer = _Writer(buffer, self._wired.values(), self._paths, self._scans.as_read)
         writer.dump(states)
-        return buffer.getvalue()
+        return zlib.compress(buffer.getvalue(), _QUICK)
 
     def read(self, data: bytes) -> None:
         """Take over what :meth:`write` gave.
@@ -75,7 +79,7 @@ class Memory:
             UnreadableError: it is of another build, or nothing of the kind.
         """
         try:
-            states = _Reader(io.BytesIO(data), self._wired).load()
+            states = _Reader(io.BytesIO(_unpacked(data)), self._wired).load()
             if states["world"]["robots"].keys() != self._robots:
                 raise LookupError("recorded with other robots")
             for path, state in states.items():
@@ -137,6 +141,15 @@ def _is_wire(value: object) -> bool:
 def _is_data(value: object) -> bool:
     module = type(value).__module__
     return module.startswith((*_OURS, "builtins", "collections", "numpy"))
+
+
+def _unpacked(data: bytes) -> bytes:
+    """What was written, as far as any memory can be large."""
+    unpacking = zlib.decompressobj()
+    whole = unpacking.decompress(data, _MOST_BYTES)
+    if not unpacking.eof:
+        raise LookupError("cut off, or too large")
+    return whole
 
 
 class _Writer(pickle.Pickler):

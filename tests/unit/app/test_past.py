@@ -6,6 +6,7 @@ import os
 import pickle
 import re
 import shutil
+import zlib
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -366,7 +367,7 @@ def test_a_memory_from_elsewhere_runs_nothing(folder: Path) -> None:
     memory = Memory(Past(site_of(folder)).parts)
 
     with pytest.raises(UnreadableError, match="system"):
-        memory.read(pickle.dumps(Evil()))
+        memory.read(zlib.compress(pickle.dumps(Evil())))
 
 
 def test_a_memory_makes_nothing_that_a_module_of_ours_imports(tmp_path: Path) -> None:
@@ -376,8 +377,22 @@ def test_a_memory_makes_nothing_that_a_module_of_ours_imports(tmp_path: Path) ->
     through = b"\x80\x04\x8c\x15iveg.pipeline.command\x8c\x13logging.FileHandler\x93("
 
     with pytest.raises(UnreadableError, match="FileHandler"):
-        memory.read(through + path + b"tR.")
+        memory.read(zlib.compress(through + path + b"tR."))
     assert not written.exists()
+
+
+@pytest.mark.parametrize(
+    "data",
+    [b"", b"nothing", zlib.compress(b"N" * 1000)[:-9], zlib.compress(bytes(1 << 27))],
+    ids=["empty", "foreign", "cut off", "too large"],
+)
+def test_a_memory_that_is_no_memory_is_one_clear_problem(
+    tmp_path: Path, data: bytes
+) -> None:
+    memory = Memory(Past(site_of(tmp_path)).parts)
+
+    with pytest.raises(UnreadableError, match="memory"):
+        memory.read(data)
 
 
 async def test_a_viewer_is_a_process_of_its_own_that_ends_when_idle(
