@@ -95,7 +95,7 @@ def _past_routers(dss: Dss, pages: routes.Pages) -> Iterator[APIRouter]:
         incidents.Sources(
             queries,
             dss.stores.inputs,
-            worker,
+            dss.packer,
             lambda: dss.services.rules.versions,
             dss.settings.without_secrets(),
             dss.pipeline.event_log.log,

@@ -20,8 +20,8 @@ from iveg.domain.errors import HopError
 
 MOST_WAITING = 16
 """Questions that wait or are worked on; one more is refused."""
-LIMIT_S = 60.0
-"""Time that one may take."""
+LIMIT_S, PACK_LIMIT_S = 60.0, 240.0
+"""Time that one may take; a pack has its pages printed by a browser."""
 _NAME = "worker"
 _P = ParamSpec("_P")
 _T = TypeVar("_T")

@@ -27,7 +27,7 @@ from iveg.adapters.recordings.recorder import PART as RECORDINGS
 from iveg.adapters.recordings.recorder import RecordedSink
 from iveg.adapters.transports import MqttTransport, OrionTransport
 from iveg.adapters.webauthn import has_passkeys
-from iveg.adapters.worker import Worker
+from iveg.adapters.worker import PACK_LIMIT_S, Worker
 from iveg.app.counts import count_all, read_queues
 from iveg.app.door import open_door
 from iveg.app.laboratory import find_laboratory
@@ -139,7 +139,8 @@ class Dss:
         site = PastSite.of(settings, self.stores.inputs.folder)
         self.past = Viewers(site, clock.now, has_spares=settings.recordings)
         self.what_ifs = WhatIfs.of(settings, self.stores.queries.url, fleet)
-        self.worker = Worker(partial(self.pipeline.supervision.failed, "worker"))
+        failed = partial(self.pipeline.supervision.failed, "worker")
+        self.worker, self.packer = Worker(failed), Worker(failed, PACK_LIMIT_S)
         self._attach_reader()
         self.provisioner = self._provisioner()
         self.face = self._face()
@@ -288,7 +289,7 @@ class Dss:
             parts = self.pipeline.commander, self.pipeline.goals, self.outside
             for part in (*parts, self.past):
                 await part.close()
-            for one in (self.worker, self.what_ifs, self.door):
+            for one in (self.worker, self.packer, self.what_ifs, self.door):
                 one.close()
 
     async def _live(self) -> None:

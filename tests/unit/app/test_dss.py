@@ -1,5 +1,7 @@
 """Which parts share the fate of the process, and what happens when one ends."""
 
+import asyncio
+import signal
 from pathlib import Path
 
 import pytest
@@ -37,3 +39,14 @@ async def test_mqtt_and_the_rule_loop_alone_share_the_fate_of_the_process(
         "shadow-rule",
         "what-if",
     }
+
+
+async def test_no_chart_waits_for_an_incident_pack(dss: Dss) -> None:
+    packing = asyncio.create_task(dss.packer.run(signal.pause))
+    try:
+        assert await dss.worker.run(abs, -1) == 1
+        assert not packing.done()
+    finally:
+        dss.worker.close()
+        dss.packer.close()
+        await asyncio.gather(packing, return_exceptions=True)

@@ -112,7 +112,7 @@ def whole_server(folder: Path) -> Iterator[WholeServer]:
     parts = {one.name: getattr(real, one.name) for one in fields(real)}
     parts["stores"] = replace(real.stores, recorder=recorder)
     dss = _Dss(chosen, fleet, _Outside(**parts))
-    dss.worker = FakeWorker()  # type: ignore[assignment]
+    dss.worker = dss.packer = FakeWorker()  # type: ignore[assignment]
     past = FakePast()
     past.fails = NotRecordedError(0.0, None, None)
     dss.face = replace(dss.face, worker=FakeWorker(), past=past)
