@@ -1,9 +1,11 @@
-"""Where things stand while a moment of the past is shown, with ten robots."""
+"""A moment of the past, with ten robots: where things stand, and how fast it plays."""
 
 from collections.abc import Iterator
+from datetime import datetime
+from urllib.parse import parse_qs, urlsplit
 
 import pytest
-from playwright.sync_api import Browser, Page
+from playwright.sync_api import Browser, Page, Route
 
 from tests.e2e.frozen import frozen_page, past_site, settle
 from tests.e2e.reading import COVERED_STOPS, OVERFLOW, evaluate
@@ -46,6 +48,29 @@ def test_the_bar_of_the_past_covers_no_stop_and_no_tool_of_the_map(
     page.evaluate("() => scrollTo(0, 0)")
     assert evaluate(page, UNDER_BAR) == []
     assert evaluate(page, OVERFLOW) == 0
+
+
+def test_what_plays_keeps_its_rate_where_pictures_take_half_a_second(
+    page: Page,
+) -> None:
+    waiting: list[Route] = []
+    page.route("**/api/v1/world*", lambda route: waiting.append(route))
+    began = _moment_of(page.url)
+    page.locator("#past [data-part=play]").click()
+    for _ in range(20):
+        page.clock.run_for(500)
+        page.wait_for_timeout(20)
+        for route in waiting:
+            route.fallback()
+        waiting.clear()
+        page.wait_for_timeout(20)
+
+    assert 8.5 <= _moment_of(page.url) - began <= 10.5
+
+
+def _moment_of(address: str) -> float:
+    (said,) = parse_qs(urlsplit(address).query)["t"]
+    return datetime.fromisoformat(said).timestamp()
 
 
 UNDER_BAR = """() => {

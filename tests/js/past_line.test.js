@@ -65,8 +65,8 @@ test("a question that takes long can be asked anew, and its answer comes once", 
 test("why there is no picture is told apart", () => {
   const ends = { before: "2026-11-26T11:40:20.512Z", after: null };
   const told = [
+    problemOf(404, { ...ends, after: ends.before }),
     problemOf(404, ends),
-    problemOf(404, { ...ends, after: null }),
     problemOf(404, { before: null, after: null }),
     problemOf(422, {}),
     problemOf(400, {}),

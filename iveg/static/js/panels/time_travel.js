@@ -20,6 +20,8 @@ const WINDOW_S = 600;
 /** What is newer may not be on the disk yet (s). */
 const NEWEST_S = 4;
 const FAR_S = 900;
+/** A picture may be awaited so long before playing falls behind its rate (s). */
+const LONGEST_STEP_S = 2;
 const LIVE = "/";
 
 /**
@@ -78,14 +80,17 @@ export function createTimeTravel(app, askedS) {
 
   function tick() {
     const nowMs = performance.now();
-    const passedS = (nowMs - playedAtMs) / 1000;
-    playedAtMs = nowMs;
     // A slow server is waited for: what plays is what is shown.
     const isWaiting = question.waitedMs !== null;
-    if (isPlaying && !isWaiting) seek(targetS + passedS * Number(rate.value));
+    if (isPlaying && !isWaiting) seek(targetS + playedS(nowMs) * Number(rate.value));
     else world.freshen();
+    if (!isPlaying || !isWaiting) playedAtMs = nowMs;
     drawState();
   }
+
+  /** Time since the last picture that was asked for, but not that of a stall (s).
+   * @param {number} nowMs */
+  const playedS = (nowMs) => Math.min((nowMs - playedAtMs) / 1000, LONGEST_STEP_S);
 
   function again() {
     problem = "";
