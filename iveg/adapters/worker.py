@@ -72,6 +72,11 @@ class Worker:
         finally:
             self._waiting -= 1
 
+    @property
+    def is_busy(self) -> bool:
+        """Whether somebody waits for an answer."""
+        return self._waiting > 0
+
     def interrupt(self) -> None:
         """End the process, whatever it does; the next question has another."""
         # Whoever waits for it sees its line closed.

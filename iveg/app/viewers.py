@@ -154,19 +154,27 @@ class Viewers:
         now = self._clock().mono
         viewer = self._viewers.get(name)
         if viewer is None:
-            self._make_room(now)
-            worker = self._spares.pop(0) if self._spares else _worker()
+            worker = self._freed(now) or self._ready()
             viewer = self._viewers[name] = Viewer(now, worker)
         viewer.asked_at = now
         return viewer
 
-    def _make_room(self, now: float) -> None:
+    def _ready(self) -> Worker:
+        return self._spares.pop(0) if self._spares else _worker()
+
+    def _freed(self, now: float) -> Worker | None:
+        """The process of who has not asked for longest, if there must be no more."""
         if len(self._viewers) < MOST_VIEWERS:
-            return
+            return None
         oldest = min(self._viewers, key=lambda one: self._viewers[one].asked_at)
         if now - self._viewers[oldest].asked_at < _IN_USE_S:
             raise TooManyLookError
-        self._end(oldest)
+        worker = self._viewers[oldest].worker
+        if worker.is_busy:
+            self._end(oldest)
+            return None
+        del self._viewers[oldest]
+        return worker
 
     async def run(self) -> None:
         """End what nobody asks any more, and keep some ready, until cancelled."""

@@ -430,14 +430,15 @@ async def test_a_viewer_is_a_process_of_its_own_that_ends_when_idle(
 async def test_one_viewer_too_many_is_refused_while_the_others_look() -> None:
     clock = FakeClock()
     viewers = Viewers(site_of(Path("nowhere")), clock)
-    for name in range(MOST_VIEWERS):
-        viewers.viewer(str(name))
+    first, *_ = [viewers.viewer(str(name)) for name in range(MOST_VIEWERS)]
 
     with pytest.raises(TooManyLookError):
         viewers.viewer("one more")
     clock.now += 11.0
-    viewers.viewer("one more")
+    one_more = viewers.viewer("one more")
     assert viewers.count == MOST_VIEWERS
+    # Who has not asked for longest leaves a process that has everything ready.
+    assert one_more.worker is first.worker
 
 
 def test_counted_ids_are_ulids_and_none_comes_twice() -> None:
