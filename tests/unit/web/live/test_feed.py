@@ -117,15 +117,20 @@ def test_however_much_has_changed_a_frame_tells_of_each_robot_once() -> None:
     assert {move[3] for move in page.told("moves")} == {4.0}
 
 
-def test_heavy_parts_on_their_way_are_bounded_and_go_on_in_turn() -> None:
+def _page_of_many_scans() -> Page:
+    """A page whose first frame is full of a fleet's scans."""
     desk = WebDesk(MANY)
     page = Page(desk)
     for robot_id in MANY:
         desk.drive(robot_id)
         desk.hear(_wide_scan(desk, robot_id))
-
     page.read()
-    desk.clock.now += 1.0
+    return page
+
+
+def test_heavy_parts_on_their_way_are_bounded_and_go_on_in_turn() -> None:
+    page = _page_of_many_scans()
+    page.desk.clock.now += 1.0
     page.read()
     unpainted = sum(map(len, page.bodies))
     page.paint()
@@ -165,12 +170,8 @@ def test_robots_are_told_before_what_takes_long_to_write(
 
 
 def test_what_was_written_ahead_waits_for_room_and_scans_wait_behind_it() -> None:
-    desk = WebDesk(MANY)
-    page = Page(desk)
-    for robot_id in MANY:
-        desk.drive(robot_id)
-        desk.hear(_wide_scan(desk, robot_id))
-    page.read()
+    page = _page_of_many_scans()
+    desk = page.desk
     desk.clock.now += 0.05
     desk.drive(MANY[0], 1.0)
 
