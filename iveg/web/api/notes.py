@@ -20,7 +20,7 @@ from iveg.ngsi.payloads import legible
 from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.api.history_filters import Moment, Span, seconds
-from iveg.web.pages.local_time import in_madrid
+from iveg.web.pages.local_time import local_stamp
 from iveg.web.refusals import refusals
 from iveg.web.security.authentication import Principal, require
 
@@ -83,7 +83,7 @@ def router(
         slots: dict[str, Slot] = {
             "by": who.name,
             "text": body.text,
-            "pinned": f"{in_madrid(pinned_at):%Y-%m-%d %H:%M:%S}",
+            "pinned": local_stamp(pinned_at),
             "pinned_at": pinned_at,
         }
         if body.x is not None:

@@ -16,7 +16,7 @@ from iveg.domain.records import (
 )
 from iveg.domain.stamps import format_stamp
 from iveg.models.decision import sentence_of
-from iveg.web.pages.local_time import in_madrid
+from iveg.web.pages.local_time import in_madrid, local_stamp
 from iveg.web.pages.sentences import Sentences
 from iveg.web.pages.translations import read_translations
 
@@ -51,17 +51,13 @@ def write_report(
         say=lambda key, **slots: sentences.say(key, slots),
         since=format_stamp(since),
         until=format_stamp(until),
-        local_since=_local(since),
-        local_until=_local(until),
+        local_since=local_stamp(since),
+        local_until=local_stamp(until),
         day=f"{in_madrid(since):%Y-%m-%d}",
         about=said,
         lines=lines,
     )
     return html.encode()
-
-
-def _local(at: float) -> str:
-    return f"{in_madrid(at):%Y-%m-%d %H:%M:%S}"
 
 
 def _lines(rows: Iterable[Record], sentences: Sentences) -> Iterator[Line]:

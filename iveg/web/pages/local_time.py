@@ -15,6 +15,11 @@ def in_madrid(at: float) -> datetime:
     return moment + (2 * _HOUR if _is_summer(moment) else _HOUR)
 
 
+def local_stamp(at: float) -> str:
+    """A moment (Unix s) on the wall clock, to the second."""
+    return f"{in_madrid(at):%Y-%m-%d %H:%M:%S}"
+
+
 def start_of(day: date) -> float:
     """When a day begins there (Unix s); clocks never change at midnight."""
     midnight = datetime(day.year, day.month, day.day)  # noqa: DTZ001 - a wall clock

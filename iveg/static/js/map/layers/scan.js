@@ -7,7 +7,7 @@ const NEAR_SCALE = 40;
 const OPACITY = 0.85;
 
 /**
- * @typedef {{left: number, top: number, right: number, bottom: number}} Box (device px)
+ * @typedef {import("../viewport.js").Rect} Box (device px)
  */
 
 /**
