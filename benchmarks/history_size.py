@@ -23,6 +23,8 @@ from sqlalchemy.engine.interfaces import DBAPICursor
 
 from benchmarks.process import machine, percentile, print_table
 from iveg.adapters.history import lists
+from iveg.adapters.history.ages import lost_of
+from iveg.adapters.history.cost import cost_rows
 from iveg.adapters.history.day_partitions import (
     PARTITIONED,
     days_of,
@@ -33,6 +35,13 @@ from iveg.adapters.history.engine import writing_engine
 from iveg.adapters.history.lists import Filter
 from iveg.adapters.history.migrate import upgrade
 from iveg.adapters.history.queries import Queries
+from iveg.adapters.history.series import (
+    command_latencies,
+    confidence_counts,
+    people_seen,
+    poses_of,
+    speed_series,
+)
 from iveg.domain.retention import DAY_S
 from tests.fakes.postgresql import programs, running_postgresql
 
@@ -93,38 +102,59 @@ async def _charts(queries: Queries, asked: Filter, since: float) -> object:
     return await asyncio.gather(*(one(queries, asked, since) for one in charts))
 
 
+async def _evening(queries: Queries, _: Filter, since: float) -> object:
+    """What the evening sheet asks for most."""
+    await queries.ask(poses_of, since, since + DAY_S)
+    return await queries.ask(people_seen, since, since + DAY_S)
+
+
 QUESTIONS: Mapping[str, Question] = {
-    "odometry": lambda q, f, _: q.odometry(f),
-    "odometry, 1000 in the middle": lambda q, f, at: q.odometry(
-        replace(f, limit=1000, cursor=lists.Cursor(at + DAY_S / 2, 0))
+    "odometry": lambda q, f, _: q.page(lists.ODOMETRY, f),
+    "odometry, 1000 in the middle": lambda q, f, at: q.page(
+        lists.ODOMETRY,
+        replace(f, limit=1000, cursor=lists.Cursor(at + DAY_S / 2, 0)),
     ),
-    "odometry, oldest first": lambda q, f, _: q.odometry(replace(f, sort="at")),
-    "odometry, newest of all days": lambda q, f, _: q.odometry(Filter(robot=f.robot)),
-    "detections": lambda q, f, _: q.detections(f),
-    "detections of a class": lambda q, f, _: q.detections(replace(f, class_="robot")),
-    "detections of no class": lambda q, f, _: q.detections(replace(f, class_="bird")),
-    "detections, 90 % at least": lambda q, f, _: q.detections(
-        replace(f, min_probability=0.9)
+    "odometry, oldest first": lambda q, f, _: q.page(
+        lists.ODOMETRY, replace(f, sort="at")
     ),
-    "tracks of a person": lambda q, f, _: q.tracks(replace(f, person="P64")),
-    "decisions": lambda q, f, _: q.decisions(f),
-    "log": lambda q, f, _: q.log(f),
-    "log of no class": lambda q, f, _: q.log(replace(f, class_="bird")),
-    "log by kind": lambda q, f, _: q.log(replace(f, sort="kind")),
-    "commands": lambda q, f, _: q.commands(f),
-    "alerts": lambda q, f, _: q.alerts(f),
-    "* speed": lambda q, f, at: q.speed_series(at, at + DAY_S, f.robot),
-    "* confidence": lambda q, f, at: q.confidence_counts(at, at + DAY_S, f.robot),
-    "* STOPs": lambda q, f, at: q.command_latencies(at, at + DAY_S, f.robot),
+    "odometry, newest of all days": lambda q, f, _: q.page(
+        lists.ODOMETRY, Filter(robot=f.robot)
+    ),
+    "detections": lambda q, f, _: q.page(lists.DETECTIONS, f),
+    "detections of a class": lambda q, f, _: q.page(
+        lists.DETECTIONS, replace(f, class_="robot")
+    ),
+    "detections of no class": lambda q, f, _: q.page(
+        lists.DETECTIONS, replace(f, class_="bird")
+    ),
+    "detections, 90 % at least": lambda q, f, _: q.page(
+        lists.DETECTIONS, replace(f, min_probability=0.9)
+    ),
+    "tracks of a person": lambda q, f, _: q.page(
+        lists.TRACKS, replace(f, person="P64")
+    ),
+    "decisions": lambda q, f, _: q.page(lists.DECISIONS, f),
+    "log": lambda q, f, _: q.page(lists.LOG, f),
+    "log of no class": lambda q, f, _: q.page(lists.LOG, replace(f, class_="bird")),
+    "log by kind": lambda q, f, _: q.page(lists.LOG, replace(f, sort="kind")),
+    "commands": lambda q, f, _: q.page(lists.COMMANDS, f),
+    "alerts": lambda q, f, _: q.page(lists.ALERTS, f),
+    "* speed": lambda q, f, at: q.ask(speed_series, at, at + DAY_S, f.robot),
+    "* confidence": lambda q, f, at: q.ask(confidence_counts, at, at + DAY_S, f.robot),
+    "* STOPs": lambda q, f, at: q.ask(command_latencies, at, at + DAY_S, f.robot),
     "the three charts at once": _charts,
-    "what is lost of the day": lambda q, _, at: q.lost_of_day(at, at + DAY_S),
+    "what is lost of the day": lambda q, _, at: q.ask(lost_of, at, at + DAY_S),
 }
 FLEET: Mapping[str, Question] = {
-    "speed of all robots": lambda q, _, at: q.speed_series(at, at + DAY_S),
-    "confidence of all robots": lambda q, _, at: q.confidence_counts(at, at + DAY_S),
-    "odometry of all robots": lambda q, f, _: q.odometry(replace(f, robot=None)),
-    "cost": lambda q, f, at: q.cost_rows(at, at + DAY_S, {str(f.robot): 0.5}),
-    "evening sheet": lambda q, _, at: q.day_series(at, at + DAY_S),
+    "speed of all robots": lambda q, _, at: q.ask(speed_series, at, at + DAY_S),
+    "confidence of all robots": lambda q, _, at: q.ask(
+        confidence_counts, at, at + DAY_S
+    ),
+    "odometry of all robots": lambda q, f, _: q.page(
+        lists.ODOMETRY, replace(f, robot=None)
+    ),
+    "cost": lambda q, f, at: q.ask(cost_rows, at, at + DAY_S, {str(f.robot): 0.5}),
+    "evening sheet": _evening,
 }
 """Of all robots' day: told beside, without a goal."""
 

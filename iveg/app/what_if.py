@@ -13,6 +13,7 @@ from typing import Final
 
 from iveg.adapters import clock
 from iveg.adapters.history.queries import Queries
+from iveg.adapters.history.rule_inputs import rule_inputs
 from iveg.adapters.ids import new_id
 from iveg.adapters.truth_files import read_nearest
 from iveg.adapters.worker import Worker
@@ -66,7 +67,7 @@ async def _judge_part(
 ) -> Answer:
     queries = Queries(url)
     try:
-        found = await queries.rule_inputs(braking, since - _LEAD_S, until)
+        found = await queries.ask(rule_inputs, braking, since - _LEAD_S, until)
     finally:
         queries.close()
     inputs = Inputs(found.poses, sightings_of(found.seen), braking)

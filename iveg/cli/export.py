@@ -20,7 +20,7 @@ from iveg.domain.records import Record
 from iveg.domain.stamps import parse_stamp
 from iveg.settings import Settings
 from iveg.web.api import exports
-from iveg.web.api.history import HistoryList, lists_of, pages_of
+from iveg.web.api.history import HistoryList, lists_of
 
 _Pages = AsyncIterator[Sequence[Record]]
 _MOMENT = "a moment as ISO-8601, in UTC unless it says otherwise"
@@ -61,7 +61,7 @@ def _moment(option: str, text: str | None) -> float | None:
 def _write(options: argparse.Namespace, queries: Queries, asked: Filter) -> None:
     (one,) = (one for one in lists_of(queries) if one.path == options.list)
     if options.out is None:
-        asyncio.run(_export(one, asked, options.format, _to_output))
+        asyncio.run(_export(queries, one, asked, options.format, _to_output))
         _flush_output()
         return
     if options.out.exists() and not options.out.is_file():
@@ -70,7 +70,7 @@ def _write(options: argparse.Namespace, queries: Queries, asked: Filter) -> None
     part = options.out.with_name(options.out.name + ".part")
     try:
         with part.open("wb") as file:
-            asyncio.run(_export(one, asked, options.format, file.write))
+            asyncio.run(_export(queries, one, asked, options.format, file.write))
         part.replace(options.out)
     except OSError as error:
         raise HopError("disk", error.strerror or str(error)) from error
@@ -100,12 +100,14 @@ def _output_gone(error: OSError) -> HopError:
 
 
 async def _export(
+    queries: Queries,
     one: HistoryList[Any],
     asked: Filter,
     form: str,
     write: Callable[[bytes], object],
 ) -> None:
-    pages = pages_of(one, await one.ask(asked), asked, whole=True)
+    first = await queries.page(one.of, asked)
+    pages = queries.pages(one.of, first, asked)
     writers = {"csv": _csv, "ndjson": _ndjson, "parquet": _parquet}
     async for piece in writers[form](one, pages):
         write(piece)

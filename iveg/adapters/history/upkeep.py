@@ -6,6 +6,8 @@ from pathlib import Path
 
 from iveg.adapters import clock
 from iveg.adapters.disk import disk_space
+from iveg.adapters.history import ages
+from iveg.adapters.history.audit import chain_end
 from iveg.adapters.history.day_partitions import prepare_days
 from iveg.adapters.history.engine import sqlite_file
 from iveg.adapters.history.purge import (
@@ -51,9 +53,9 @@ class RecordedHistory:
         self._stopwatch = stopwatch
         self._read_space = read_space
         self._is_file = sqlite_file(queries.url) is not None
-        self.recorded_days = queries.recorded_days
-        self.oldest_telemetry = queries.oldest_telemetry
-        self.audit_end = queries.audit_end
+        self.recorded_days = lambda most: queries.ask(ages.recorded_days, most)
+        self.oldest_telemetry = lambda: queries.ask(ages.oldest_telemetry)
+        self.audit_end = lambda: queries.ask(chain_end)
         self.drop_recording = drop_recording
 
     @property

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 from fastapi import APIRouter, Depends, Query, Request, Response
 from pydantic import AfterValidator, BeforeValidator
 
-from iveg.adapters.history.cost import CostRows
+from iveg.adapters.history.cost import CostRows, cost_rows
 from iveg.adapters.history.queries import Queries
 from iveg.domain import cost
 from iveg.domain.greenhouse import Greenhouse
@@ -89,7 +89,7 @@ def read_cost(
     async def read() -> CostRows:
         queries = Queries(url)
         try:
-            return await queries.cost_rows(since, until, braking)
+            return await queries.ask(cost_rows, since, until, braking)
         finally:
             queries.close()
 

@@ -6,8 +6,10 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Query, Request, Response
 
-from iveg.adapters.history.lists import MOST_ROWS, Filter
+from iveg.adapters.history.ages import lost_of
+from iveg.adapters.history.lists import COMMANDS, DECISIONS, MOST_ROWS, Filter
 from iveg.adapters.history.queries import Queries
+from iveg.adapters.history.series import people_seen, poses_of
 from iveg.domain.alerts.alert_book import MOST_KEPT
 from iveg.domain.day import (
     Passing,
@@ -92,7 +94,8 @@ class _Reading:
         """The day."""
         since, end = start_of(day), start_of(day + _DAY)
         until = max(since, min(end, now))
-        poses, seen = await self._queries.day_series(since, until)
+        poses = await self._queries.ask(poses_of, since, until)
+        seen = await self._queries.ask(people_seen, since, until)
         worked = worked_minutes(poses, self._greenhouse)
         decisions = await self._decisions(since, until)
         slowed = slowed_minutes(decisions, self._greenhouse, until)
@@ -129,7 +132,7 @@ class _Reading:
             stops=[Command.of_record(one) for one in await self._stops(since, until)],
             drills_due=due_drills(last, self._drill_days, by),
             unseen=len(await self._queries.unseen_alerts(MOST_KEPT)),
-            lost=list(await self._queries.lost_of_day(since, until)),
+            lost=list(await self._queries.ask(lost_of, since, until)),
             map=GreenhouseMap.of(self._greenhouse),
         )
 
@@ -137,7 +140,7 @@ class _Reading:
         asked = Filter(since=since, until=until, limit=MOST_ROWS)
         found: list[DecisionRecord] = []
         for _ in range(_MOST_PAGES):
-            page = await self._queries.decisions(asked)
+            page = await self._queries.page(DECISIONS, asked)
             found += page.items
             if page.next is None:
                 break
@@ -146,7 +149,7 @@ class _Reading:
 
     async def _stops(self, since: float, until: float) -> list[CommandRecord]:
         asked = Filter(since=since, until=until, limit=MOST_ROWS)
-        page = await self._queries.commands(asked)
+        page = await self._queries.page(COMMANDS, asked)
         return [one for one in reversed(page.items) if one.kind == "stop"]
 
 

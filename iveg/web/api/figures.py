@@ -7,6 +7,7 @@ from typing import Annotated
 from fastapi import APIRouter, HTTPException, Query, Response
 from orjson import Fragment
 
+from iveg.adapters.history import series
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.series import (
     ClimateSeries,
@@ -50,9 +51,9 @@ def add_routes(
     async def draw(asked: Annotated[Range, Query()]) -> Response:
         since, until = range_of(asked, read_clock().wall)
         found = await asyncio.gather(
-            queries.speed_series(since, until, asked.robot),
-            queries.confidence_counts(since, until, asked.robot),
-            queries.command_latencies(since, until, asked.robot),
+            queries.ask(series.speed_series, since, until, asked.robot),
+            queries.ask(series.confidence_counts, since, until, asked.robot),
+            queries.ask(series.command_latencies, since, until, asked.robot),
         )
         body = await worker.run(_draw_charts, *found, threshold(), fleet)
         return Response(body, media_type=MEDIA_TYPES["json"])
@@ -83,8 +84,8 @@ def _add_spans(
     )
     async def climate(asked: Annotated[Span, Query()]) -> Response:
         since, until = range_of(asked, read_clock().wall, _DAY_S)
-        series = await queries.climate_series(since, until)
-        body = await worker.run(_draw_climate, series, since, until)
+        found = await queries.ask(series.climate_series, since, until)
+        body = await worker.run(_draw_climate, found, since, until)
         return Response(body, media_type=MEDIA_TYPES["json"])
 
     @routes.get(
@@ -97,8 +98,8 @@ def _add_spans(
     )
     async def equipment(asked: Annotated[Span, Query()]) -> Response:
         since, until = range_of(asked, read_clock().wall, _DAY_S)
-        series = await queries.measurement_series(since, until)
-        body = await worker.run(_draw_equipment, series, since, until)
+        found = await queries.ask(series.measurement_series, since, until)
+        body = await worker.run(_draw_equipment, found, since, until)
         return Response(body, media_type=MEDIA_TYPES["json"])
 
 

@@ -68,7 +68,6 @@ class HistoryList(Generic[R]):
 
     path: str
     of: ListOf[R]
-    ask: Callable[[Filter], Awaitable[Page[R]]]
     model: Callable[..., Model]
     listing: type[Listing[Any]]
     says: str
@@ -81,6 +80,46 @@ class HistoryList(Generic[R]):
         if self.beside is None:
             return [(one,) for one in records]
         return list(zip(records, await self.beside(records), strict=True))
+
+
+_MEASURED: tuple[HistoryList[Any], ...] = (
+    HistoryList(
+        "detections",
+        lists.DETECTIONS,
+        DetectionRow.of_row,
+        Listing[DetectionRow],
+        "What robots saw, by when it reached iVeg",
+    ),
+    HistoryList(
+        "tracks",
+        lists.TRACKS,
+        DetectionRow.of_row,
+        Listing[DetectionRow],
+        "Where people were: their detections, by when each reached iVeg",
+    ),
+    HistoryList(
+        "odometry",
+        lists.ODOMETRY,
+        OdometryRow.of_record,
+        Listing[OdometryRow],
+        "Poses and speeds of robots with their speed limits, twice a second",
+    ),
+    HistoryList(
+        "readings",
+        lists.READINGS,
+        Reading.of_record,
+        Listing[Reading],
+        "What small sensors of robots said; `class` asks for a kind, as `battery`",
+    ),
+    HistoryList(
+        "measurements",
+        lists.MEASUREMENTS,
+        Measurement.of_record,
+        Listing[Measurement],
+        "Numbers of other equipment; `class` asks for an entity or an attribute",
+    ),
+)
+"""What was measured; each column of the CSV is a key of the JSON."""
 
 
 def router(
@@ -110,7 +149,7 @@ def router(
         responses=refusals(503),
     )
     for one in lists_of(queries, flood):
-        _add_list(routes, one, worker)
+        _add_list(routes, queries, one, worker)
 
     @routes.get(
         "/api/v1/decisions/{decision_id}",
@@ -120,7 +159,7 @@ def router(
     async def decision(
         decision_id: Annotated[str, Path(pattern=r"^[ -~]{1,64}$")],
     ) -> Response:
-        found = present(decision_id) or await queries.decision(decision_id)
+        found = present(decision_id) or await queries.one(lists.DECISIONS, decision_id)
         if found is None:
             raise HTTPException(404, "There is no such decision.")
         return Json(Decision.of_record(found))
@@ -150,7 +189,6 @@ def lists_of(
         HistoryList(
             "decisions",
             lists.DECISIONS,
-            queries.decisions,
             Decision.of_record,
             Listing[Decision],
             "Why robots were slowed, by when it began",
@@ -158,7 +196,6 @@ def lists_of(
         HistoryList(
             "commands",
             lists.COMMANDS,
-            queries.commands,
             Command.of_record,
             Listing[Command],
             "Every STOP, release and resume, by when it was asked",
@@ -167,7 +204,6 @@ def lists_of(
         HistoryList(
             "alerts",
             lists.ALERTS,
-            queries.alerts,
             Alert.of_record,
             AlertListing,
             "Every alert, by when it was last raised, and how fast they come",
@@ -176,7 +212,6 @@ def lists_of(
         HistoryList(
             "log",
             lists.LOG,
-            queries.log,
             LogEntry.of_record,
             Listing[LogEntry],
             "The action and inference log",
@@ -184,63 +219,18 @@ def lists_of(
         HistoryList(
             "audit",
             lists.AUDIT,
-            queries.audit,
             AuditEntry.of_record,
             Listing[AuditEntry],
             "Who did what; `robot` asks for a subject, `class` for an action or name",
             needs="release",
         ),
-        *_measured(queries),
+        *_MEASURED,
     )
 
 
-def _measured(queries: Queries) -> tuple[HistoryList[Any], ...]:
-    """Lists of what was measured; each column of the CSV is a key of the JSON."""
-    return (
-        HistoryList(
-            "detections",
-            lists.DETECTIONS,
-            queries.detections,
-            DetectionRow.of_row,
-            Listing[DetectionRow],
-            "What robots saw, by when it reached iVeg",
-        ),
-        HistoryList(
-            "tracks",
-            lists.TRACKS,
-            queries.tracks,
-            DetectionRow.of_row,
-            Listing[DetectionRow],
-            "Where people were: their detections, by when each reached iVeg",
-        ),
-        HistoryList(
-            "odometry",
-            lists.ODOMETRY,
-            queries.odometry,
-            OdometryRow.of_record,
-            Listing[OdometryRow],
-            "Poses and speeds of robots with their speed limits, twice a second",
-        ),
-        HistoryList(
-            "readings",
-            lists.READINGS,
-            queries.readings,
-            Reading.of_record,
-            Listing[Reading],
-            "What small sensors of robots said; `class` asks for a kind, as `battery`",
-        ),
-        HistoryList(
-            "measurements",
-            lists.MEASUREMENTS,
-            queries.measurements,
-            Measurement.of_record,
-            Listing[Measurement],
-            "Numbers of other equipment; `class` asks for an entity or an attribute",
-        ),
-    )
-
-
-def _add_list(routes: APIRouter, one: HistoryList[R], worker: Apart) -> None:
+def _add_list(
+    routes: APIRouter, queries: Queries, one: HistoryList[R], worker: Apart
+) -> None:
     @routes.get(
         f"/api/v1/{one.path}",
         name=one.path,
@@ -255,8 +245,8 @@ def _add_list(routes: APIRouter, one: HistoryList[R], worker: Apart) -> None:
         form = filters.format or exports.form_of(request.headers)
         asked = filter_of(filters, one.of)
         if form == "json":
-            return await _listing(await one.ask(asked), one, worker)
-        return await _file(one, filters, asked, form, worker)
+            return await _listing(await queries.page(one.of, asked), one, worker)
+        return await _file(queries, one, filters, asked, form, worker)
 
 
 async def _listing(page: Page[R], one: HistoryList[R], worker: Apart) -> Response:
@@ -274,7 +264,12 @@ def _write_items(model: Callable[..., Model], rows: Sequence[tuple[Any, ...]]) -
 
 
 async def _file(
-    one: HistoryList[R], filters: Filters, asked: Filter, form: FileForm, worker: Apart
+    queries: Queries,
+    one: HistoryList[R],
+    filters: Filters,
+    asked: Filter,
+    form: FileForm,
+    worker: Apart,
 ) -> Response:
     """A whole list as a file; with a limit, that many rows of it."""
     if form == "parquet":
@@ -282,8 +277,10 @@ async def _file(
     if filters.limit is None:
         asked = replace(asked, limit=lists.MOST_ROWS)
     # The first page is read before the answer begins, so that a refusal can be told.
-    first = await one.ask(asked)
-    pages = pages_of(one, first, asked, whole=filters.limit is None)
+    first = await queries.page(one.of, asked)
+    if filters.limit is not None:
+        first = replace(first, next=None)
+    pages = queries.pages(one.of, first, asked)
     if form == "parquet":
         body = _parquet(one.path, pages, worker)
     elif form == "csv":
@@ -344,13 +341,3 @@ def _day(asked: Filter) -> str:
     """The first day that was asked for, for the name of the file."""
     at = clock.wall() if asked.since is None else asked.since
     return f"-{in_madrid(at):%Y-%m-%d}"
-
-
-async def pages_of(
-    one: HistoryList[R], page: Page[R], asked: Filter, *, whole: bool
-) -> AsyncIterator[Sequence[R]]:
-    """The first page and, where the whole list is wanted, all after it."""
-    yield page.items
-    while whole and page.next is not None:
-        page = await one.ask(replace(asked, cursor=page.next))
-        yield page.items

@@ -8,8 +8,8 @@ rule and the settings without secrets, under a manifest that one changed byte br
 import asyncio
 import shutil
 import tempfile
-from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any, Protocol
 
@@ -19,7 +19,8 @@ from fastapi.responses import FileResponse
 from pydantic import Field
 from starlette.background import BackgroundTask
 
-from iveg.adapters.history.lists import MOST_ROWS, Filter, Page
+from iveg.adapters.history import lists
+from iveg.adapters.history.lists import MOST_ROWS, Filter, ListOf, R
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.incident_files import write_pack
 from iveg.adapters.pdf import print_pdf
@@ -119,20 +120,19 @@ def router(sources: Sources) -> APIRouter:
 
 async def _range(asked: About, sources: Sources) -> tuple[float, float, str]:
     """Since, until (Unix s), and what it is about."""
-    queries = sources.queries
-    rows: dict[str, tuple[Callable[[str], Awaitable[Record | None]], str, str]] = {
-        "decision": (queries.decision, "started_at", "ended_at"),
-        "command": (queries.command, "requested_at", "standing_at"),
-        "alert": (queries.alert, "last_raised_at", "cleared_at"),
+    rows: dict[str, tuple[ListOf[Any], str]] = {
+        "decision": (lists.DECISIONS, "ended_at"),
+        "command": (lists.COMMANDS, "standing_at"),
+        "alert": (lists.ALERTS, "cleared_at"),
     }
-    for kind, (find, begins, ends) in rows.items():
+    for kind, (of, ends) in rows.items():
         wanted = getattr(asked, kind)
         if wanted is None:
             continue
-        found = await find(wanted)
+        found = await sources.queries.one(of, wanted)
         if found is None:
             raise HTTPException(404, f"There is no such {kind}.")
-        began = getattr(found, begins)
+        began = getattr(found, of.at.name)
         return *_around(began, getattr(found, ends) or began), f"{kind} {wanted}"
     if asked.since is None or asked.until is None:
         raise HTTPException(
@@ -176,38 +176,28 @@ async def _rows(
     queries: Queries, since: float, until: float
 ) -> dict[str, list[Record]]:
     """Rows of the history by list, oldest first."""
-    lists: dict[str, Callable[[Filter], Awaitable[Page[Any]]]] = {
-        "decisions": queries.decisions,
-        "commands": queries.commands,
-        "alerts": queries.alerts,
-        "log": queries.log,
-        "detections": queries.detections,
-        "odometry": queries.odometry,
+    parts: dict[str, ListOf[Any]] = {
+        "decisions": lists.DECISIONS,
+        "commands": lists.COMMANDS,
+        "alerts": lists.ALERTS,
+        "log": lists.LOG,
+        "detections": lists.DETECTIONS,
+        "odometry": lists.ODOMETRY,
     }
-    found = {}
-    for name, ask in lists.items():
-        asked = Filter(since=since, until=until, limit=MOST_ROWS)
-        page = await ask(asked)
-        rows = [*page.items]
-        while page.next is not None:
-            page = await ask(replace(asked, cursor=page.next))
-            rows += page.items
-        found[name] = rows[::-1]
-    found["notes"] = await _notes(queries, since, until)
+    asked = Filter(since=since, until=until, limit=MOST_ROWS)
+    found = {name: await _all(queries, of, asked) for name, of in parts.items()}
+    # A note is about a moment, whenever it was written after it.
+    later = await _all(queries, lists.NOTES, Filter(since=since, limit=MOST_ROWS))
+    found["notes"] = [
+        one for one in later if since <= one.slots.get("pinned_at", one.at) < until
+    ]
     return found
 
 
-async def _notes(queries: Queries, since: float, until: float) -> list[Record]:
-    """Notes about these moments, whenever they were written."""
-    asked = Filter(since=since, limit=MOST_ROWS)
-    page = await queries.notes(asked)
-    rows = [*page.items]
-    while page.next is not None:
-        page = await queries.notes(replace(asked, cursor=page.next))
-        rows += page.items
-    return [
-        one for one in rows[::-1] if since <= one.slots.get("pinned_at", one.at) < until
-    ]
+async def _all(queries: Queries, of: ListOf[R], asked: Filter) -> list[R]:
+    """A whole list, oldest first."""
+    pages = queries.pages(of, await queries.page(of, asked), asked)
+    return [one async for page in pages for one in page][::-1]
 
 
 def _reports(

@@ -68,7 +68,7 @@ def router(
         """Notes by when they were written, newest first."""
         since, until = seconds(asked.since), seconds(asked.until)
         wanted = lists.Filter(since=since, until=until, limit=lists.MOST_ROWS)
-        page = await queries.notes(wanted)
+        page = await queries.page(lists.NOTES, wanted)
         return Json(Listing(items=[Note.of_record(one) for one in page.items]))
 
     @routes.post("/notes", status_code=201)

@@ -9,8 +9,9 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, HTTPException, Path, Query, Response
 
+from iveg.adapters.history.lists import COMMANDS
 from iveg.adapters.history.queries import Queries
-from iveg.adapters.history.series import CommandLatency
+from iveg.adapters.history.series import CommandLatency, command_latencies
 from iveg.domain.errors import HopError
 from iveg.domain.fleet import as_counted
 from iveg.domain.observations import Instant
@@ -53,7 +54,7 @@ def router(
     async def latency(asked: Annotated[Range, Query()]) -> Response:
         """P50, P95 and longest of each step, per robot; 15 minutes unless told."""
         since, until = range_of(asked, clock().wall)
-        found = await queries.command_latencies(since, until, asked.robot)
+        found = await queries.ask(command_latencies, since, until, asked.robot)
         body = Latency(
             since=format_stamp(since),
             until=format_stamp(until),
@@ -88,7 +89,7 @@ def router(
 
 
 async def _kept(queries: Queries, command_id: str) -> Command | None:
-    found = await queries.command(command_id)
+    found = await queries.one(COMMANDS, command_id)
     if found is None:
         return None
     return Command.of_record(found, await queries.command_events(command_id))

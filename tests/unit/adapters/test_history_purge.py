@@ -11,6 +11,8 @@ import pytest
 from alembic import command
 from sqlalchemy import Engine, text
 
+from iveg.adapters.history import lists
+from iveg.adapters.history.ages import recorded_days
 from iveg.adapters.history.engine import writing_engine
 from iveg.adapters.history.lists import Filter
 from iveg.adapters.history.migrate import alembic_config, upgrade
@@ -25,6 +27,7 @@ from iveg.adapters.history.purge import (
 )
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.recorder import Recorder
+from iveg.adapters.history.series import people_seen, speed_series
 from iveg.adapters.history.store import Store
 from iveg.adapters.history.table_mappings import TABLE_MAPPINGS
 from iveg.adapters.history.upkeep import RecordedHistory
@@ -161,16 +164,16 @@ async def test_places_go_and_all_else_of_the_rows_stays(
     engine: Engine, database_url: str, queries: Queries
 ) -> None:
     write(database_url, everything(OLD - 1.0, "M"))
-    [decided] = (await queries.decisions(Filter())).items
-    [seen] = (await queries.detections(Filter())).items
-    [told] = (await queries.log(Filter())).items
+    [decided] = (await queries.page(lists.DECISIONS, Filter())).items
+    [seen] = (await queries.page(lists.DETECTIONS, Filter())).items
+    [told] = (await queries.page(lists.LOG, Filter())).items
 
     for step in PURGE_STEPS[:3]:
         run(engine, step, OLD)
 
-    [decision] = (await queries.decisions(Filter())).items
-    [detection] = (await queries.detections(Filter())).items
-    [line] = (await queries.log(Filter())).items
+    [decision] = (await queries.page(lists.DECISIONS, Filter())).items
+    [detection] = (await queries.page(lists.DETECTIONS, Filter())).items
+    [line] = (await queries.page(lists.LOG, Filter())).items
     assert (decision.x, decision.y, decision.z) == (None, None, None)
     assert decision.rule_parameters == {"radius_m": 2.0}
     assert (decision.distance_m, decision.links) == (decided.distance_m, decided.links)
@@ -181,7 +184,7 @@ async def test_places_go_and_all_else_of_the_rows_stays(
     )
     assert line.slots == {"robot": "AGI", "confidence": 0.9}
     assert (line.key, line.at) == (told.key, told.at)
-    assert (await queries.day_series(0.0, NOON))[1] == ()
+    assert await queries.ask(people_seen, 0.0, NOON) == ()
 
 
 async def test_what_goes_on_and_drills_are_kept_whatever_their_age(
@@ -274,7 +277,7 @@ async def test_a_purge_beside_recording_loses_no_row_and_keeps_its_batches_small
     with contextlib.suppress(asyncio.CancelledError):
         await writing
     await recorder.close()
-    (found,) = await queries.speed_series(0.0, NOON * 2)
+    (found,) = await queries.ask(speed_series, 0.0, NOON * 2)
     assert batches > 3000 / CHUNK
     assert beside > 0
     assert recorder.counters["history_written"] == recorded
@@ -345,8 +348,8 @@ def test_days_of_the_log_are_found_newest_first(
     at = [0.5, 0.9, 1.5, 7.2, 7.9, 4000.1]
     write(database_url, [log_record(id=n, at=day * DAY_S) for n, day in enumerate(at)])
 
-    assert asyncio.run(queries.recorded_days(3)) == (4000, 7, 1)
-    assert asyncio.run(queries.recorded_days(99)) == (4000, 7, 1, 0)
+    assert asyncio.run(queries.ask(recorded_days, 3)) == (4000, 7, 1)
+    assert asyncio.run(queries.ask(recorded_days, 99)) == (4000, 7, 1, 0)
 
 
 def test_the_way_back_to_the_version_before_and_forth_again_keeps_what_has_a_place(

@@ -7,6 +7,12 @@ import pytest
 from iveg.adapters.history import lists
 from iveg.adapters.history.lists import Cursor, Filter, read_cursor, write_cursor
 from iveg.adapters.history.queries import Queries
+from iveg.adapters.history.series import (
+    climate_series,
+    command_latencies,
+    confidence_counts,
+    speed_series,
+)
 from iveg.adapters.history.store import Store
 from iveg.domain.errors import HopError, UnreadableError
 from iveg.domain.records import DetectionRecord, Record
@@ -41,10 +47,10 @@ def queries(database_url: str) -> Iterator[Queries]:
 
 async def detections(queries: Queries, asked: Filter) -> list[DetectionRecord]:
     """Every page, one after the other."""
-    page = await queries.detections(asked)
+    page = await queries.page(lists.DETECTIONS, asked)
     found = list(page.items)
     while page.next is not None:
-        page = await queries.detections(replace(asked, cursor=page.next))
+        page = await queries.page(lists.DETECTIONS, replace(asked, cursor=page.next))
         found += page.items
     return found
 
@@ -61,11 +67,13 @@ async def test_what_was_stored_comes_back_as_it_was(
         log_record(),
     )
 
-    assert (await queries.alerts(Filter())).items == (alert_record(),)
-    assert (await queries.commands(Filter())).items == (command_record(),)
-    assert (await queries.decisions(Filter())).items == (decision_record(),)
-    assert (await queries.detections(Filter())).items == (detection_record(),)
-    assert (await queries.log(Filter())).items == (log_record(),)
+    assert (await queries.page(lists.ALERTS, Filter())).items == (alert_record(),)
+    assert (await queries.page(lists.COMMANDS, Filter())).items == (command_record(),)
+    assert (await queries.page(lists.DECISIONS, Filter())).items == (decision_record(),)
+    assert (await queries.page(lists.DETECTIONS, Filter())).items == (
+        detection_record(),
+    )
+    assert (await queries.page(lists.LOG, Filter())).items == (log_record(),)
 
 
 async def test_pages_hold_every_row_once_though_times_are_equal_and_rows_arrive(
@@ -74,7 +82,7 @@ async def test_pages_hold_every_row_once_though_times_are_equal_and_rows_arrive(
     rows = [detection_record(at=NOON + n // 4, x=float(n)) for n in range(25)]
     remember(database_url, *rows)
 
-    first = await queries.detections(Filter(limit=7))
+    first = await queries.page(lists.DETECTIONS, Filter(limit=7))
     remember(database_url, detection_record(at=NOON + 99.0, x=99.0))
     rest = await detections(queries, Filter(limit=7, cursor=first.next))
 
@@ -88,8 +96,8 @@ async def test_pages_of_text_ids_stay_in_step_too(
 ) -> None:
     remember(database_url, *(decision_record(decision_id=f"D{n}") for n in range(5)))
 
-    first = await queries.decisions(Filter(limit=3))
-    second = await queries.decisions(Filter(limit=3, cursor=first.next))
+    first = await queries.page(lists.DECISIONS, Filter(limit=3))
+    second = await queries.page(lists.DECISIONS, Filter(limit=3, cursor=first.next))
 
     found = [row.decision_id for row in (*first.items, *second.items)]
     assert found == ["D4", "D3", "D2", "D1", "D0"]
@@ -115,7 +123,7 @@ async def test_28_9_a_sorted_list_keeps_its_order_over_pages_and_new_rows(
 
     ids, cursor = "", None
     for _ in range(5):
-        page = await queries.log(Filter(limit=1, sort=sort, cursor=cursor))
+        page = await queries.page(lists.LOG, Filter(limit=1, sort=sort, cursor=cursor))
         ids, cursor = ids + "".join(str(one.id) for one in page.items), page.next
         if sort == "-at" and len(ids) == 1:
             remember(database_url, log_record(id=9, at=NOON + 1))
@@ -133,7 +141,7 @@ async def test_robots_stand_as_people_count_over_pages(
 
     found, cursor = [], None
     for _ in range(4):
-        page = await queries.log(Filter(limit=3, sort=sort, cursor=cursor))
+        page = await queries.page(lists.LOG, Filter(limit=3, sort=sort, cursor=cursor))
         found += [one.robot_id for one in page.items]
         cursor = page.next
 
@@ -147,7 +155,7 @@ async def test_charts_have_robots_as_people_count(
     rows = [odometry_record(at=NOON, robot_id=r) for r in ("R10", "R2", "AGI")]
     remember(database_url, *rows)
 
-    found = await queries.speed_series(NOON, NOON + 60)
+    found = await queries.ask(speed_series, NOON, NOON + 60)
 
     assert [one.robot_id for one in found] == ["AGI", "R2", "R10"]
 
@@ -155,7 +163,7 @@ async def test_charts_have_robots_as_people_count(
 async def test_a_full_last_page_is_the_end(queries: Queries, database_url: str) -> None:
     remember(database_url, log_record(id=1), log_record(id=2))
 
-    assert (await queries.log(Filter(limit=2))).next is None
+    assert (await queries.page(lists.LOG, Filter(limit=2))).next is None
 
 
 async def test_since_is_inclusive_and_until_is_not(
@@ -200,7 +208,9 @@ async def test_a_filter_that_a_row_has_no_field_for_asks_nothing(
 ) -> None:
     remember(database_url, command_record())
 
-    page = await queries.commands(Filter(class_="person", min_probability=0.9))
+    page = await queries.page(
+        lists.COMMANDS, Filter(class_="person", min_probability=0.9)
+    )
 
     assert len(page.items) == 1
 
@@ -236,8 +246,8 @@ async def test_one_decision_is_found_by_its_id(
 ) -> None:
     remember(database_url, decision_record())
 
-    assert await queries.decision("D1") == decision_record()
-    assert await queries.decision("D2") is None
+    assert await queries.one(lists.DECISIONS, "D1") == decision_record()
+    assert await queries.one(lists.DECISIONS, "D2") is None
 
 
 async def test_open_commands_are_those_that_say_that_they_still_go_on(
@@ -299,14 +309,14 @@ async def test_a_short_series_is_answered_row_by_row(
         odometry_record(at=NOON + 60),
     )
 
-    agi, agii = await queries.speed_series(NOON, NOON + 60)
+    agi, agii = await queries.ask(speed_series, NOON, NOON + 60)
 
     assert (agi.robot_id, agi.at, agi.linear) == ("AGI", (NOON, NOON + 1), (0.4, 0.2))
     assert (agi.limit, agi.slice_s) == ((1.0, 0.5), 0.0)
     assert (agi.margin, agii.margin) == ((None, -0.4), (None,))
     assert agii.applied == (None,)
-    assert await queries.speed_series(NOON, NOON + 60, "AGII") == (agii,)
-    assert await queries.speed_series(NOON, NOON + 60, "AGIII") == ()
+    assert await queries.ask(speed_series, NOON, NOON + 60, "AGII") == (agii,)
+    assert await queries.ask(speed_series, NOON, NOON + 60, "AGIII") == ()
 
 
 async def test_a_long_series_is_thinned_and_keeps_a_short_slow_down(
@@ -319,7 +329,7 @@ async def test_a_long_series_is_thinned_and_keeps_a_short_slow_down(
     rows[2499] = replace(rows[2499], margin_m=0.1)
     remember(database_url, *rows)
 
-    [series] = await queries.speed_series(NOON, NOON + 2500)
+    [series] = await queries.ask(speed_series, NOON, NOON + 2500)
 
     assert 1000 < len(series.at) <= 2000
     assert list(series.at) == sorted(series.at)
@@ -335,7 +345,7 @@ async def test_many_rows_of_one_moment_are_one_point(
 ) -> None:
     remember(database_url, *(odometry_record() for _ in range(2001)))
 
-    [series] = await queries.speed_series(NOON, NOON + 1)
+    [series] = await queries.ask(speed_series, NOON, NOON + 1)
 
     assert series.at == (NOON,)
 
@@ -350,12 +360,12 @@ async def test_the_air_comes_back_reading_by_reading(
         climate_record(at=NOON + 120),
     )
 
-    found = await queries.climate_series(NOON, NOON + 120)
+    found = await queries.ask(climate_series, NOON, NOON + 120)
 
     assert (found.at, found.temperature) == ((NOON, NOON + 60), (21.5, None))
     assert (found.relative_humidity, found.co2) == ((0.7, 0.7), (430.0, 430.0))
     assert found.slice_s == 0.0
-    assert (await queries.climate_series(0.0, 1.0)).at == ()
+    assert (await queries.ask(climate_series, 0.0, 1.0)).at == ()
 
 
 async def test_a_day_of_the_air_is_means_of_five_minutes(
@@ -364,7 +374,7 @@ async def test_a_day_of_the_air_is_means_of_five_minutes(
     rows = [climate_record(at=NOON + 60 * n, co2=400 + n % 5) for n in range(1440)]
     remember(database_url, *rows)
 
-    found = await queries.climate_series(NOON, NOON + 86_400)
+    found = await queries.ask(climate_series, NOON, NOON + 86_400)
 
     assert (len(found.at), found.slice_s) == (288, 300.0)
     assert set(found.co2) == {402.0}
@@ -381,8 +391,8 @@ async def test_detections_are_counted_by_class_and_confidence(
         detection_record(at=NOON + 99, probability=0.5),
     )
 
-    found = await queries.confidence_counts(NOON, NOON + 1)
-    of_agii = await queries.confidence_counts(NOON, NOON + 1, "AGII")
+    found = await queries.ask(confidence_counts, NOON, NOON + 1)
+    of_agii = await queries.ask(confidence_counts, NOON, NOON + 1, "AGII")
 
     assert [(c.class_id, c.least, c.count) for c in found] == [
         ("AGII", 0.8, 1),
@@ -409,20 +419,20 @@ async def test_how_long_stops_took_is_counted_from_the_press(
         command_record(command_id="C3", kind="release"),
     )
 
-    first, second = await queries.command_latencies(NOON, NOON + 2)
+    first, second = await queries.ask(command_latencies, NOON, NOON + 2)
 
     assert (first.command_id, first.sent_ms) == ("C1", {"direct": 125.0})
     assert first.answer_ms == {"direct": 250.0, "fiware": 500.0}
     assert first.standstill_ms == 1500.0
     assert (second.command_id, second.answer_ms) == ("C2", {})
-    assert await queries.command_latencies(NOON, NOON + 2, "AGII") == ()
+    assert await queries.ask(command_latencies, NOON, NOON + 2, "AGII") == ()
 
 
 async def test_a_database_that_does_not_answer_is_a_hop() -> None:
     queries = Queries("postgresql://somebody:secret@127.0.0.1:1/history")
 
     with pytest.raises(HopError, match="database") as caught:
-        await queries.log(Filter())
+        await queries.page(lists.LOG, Filter())
 
     queries.close()
     assert "secret" not in str(caught.value)
