@@ -24,6 +24,12 @@ class Model(BaseModel):
     )
 
 
+class Body(BaseModel):
+    """Base of what a request brings: each value of its own kind, and nothing else."""
+
+    model_config = ConfigDict(strict=True, extra="forbid")
+
+
 M = TypeVar("M", bound=Model)
 
 

@@ -3,36 +3,32 @@
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, HTTPException, Request, Response
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from iveg.adapters.passwords import LEAST, MOST
 from iveg.domain.accounts import Language
-from iveg.models.base import stamp
+from iveg.models.base import Body, stamp
 from iveg.models.signing_in import OwnAccount
 from iveg.web.api.answers import Json
 from iveg.web.api.sessions import refuse_walls
 from iveg.web.cookies import keep_language
 from iveg.web.problems import Problem
 from iveg.web.refusals import refusals
-from iveg.web.security.authentication import Authenticator, Principal, require
+from iveg.web.security.authentication import Principal, authenticator_of, require
 from iveg.web.security.people import People
 
 _Reader = Annotated[Principal, Depends(require("read"))]
 
 
-class PasswordBody(BaseModel):
+class PasswordBody(Body):
     """The password that was, and the one that is to be."""
-
-    model_config = ConfigDict(strict=True, extra="forbid")
 
     old: str = Field(max_length=MOST)
     new: str = Field(min_length=LEAST, max_length=MOST)
 
 
-class LanguageBody(BaseModel):
+class LanguageBody(Body):
     """The language that is to be."""
-
-    model_config = ConfigDict(strict=True, extra="forbid")
 
     language: Language
 
@@ -61,8 +57,8 @@ def router(people: People) -> APIRouter:
     @routes.put("/password", status_code=204)
     async def change(request: Request, body: PasswordBody, who: _Reader) -> Response:
         """Change the password; every session ends but this one, which begins anew."""
-        authenticator: Authenticator = request.app.state.authenticator
-        done = await authenticator.change_password(request, who, body.old, body.new)
+        change = authenticator_of(request).change_password
+        done = await change(request, who, body.old, body.new)
         if not isinstance(done, Problem):
             return done
         if done.status != 401:

@@ -3,8 +3,8 @@
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, Response
-from pydantic import BaseModel, ConfigDict
 
+from iveg.models.base import Body
 from iveg.models.robot import Detector
 from iveg.pipeline.detectors import Detectors
 from iveg.pipeline.ports import Clock
@@ -13,10 +13,8 @@ from iveg.web.refusals import refusals
 from iveg.web.security.authentication import Principal, require
 
 
-class ServiceRequest(BaseModel):
+class ServiceRequest(Body):
     """Whether the detector is to be waited for."""
-
-    model_config = ConfigDict(strict=True, extra="forbid")
 
     in_service: bool
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Depends, HTTPException, Response
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, Field
 
 from iveg.adapters import web_push
 from iveg.adapters.outbound import is_public_target
@@ -25,6 +25,7 @@ from iveg.domain.messages import (
     OutboundMessage,
 )
 from iveg.models.alert import Told
+from iveg.models.base import Body
 from iveg.models.messages import Messages, MessageTest
 from iveg.ngsi.payloads import clean_text
 from iveg.pipeline.messenger import Messenger
@@ -55,18 +56,14 @@ _Address = Annotated[str, Field(pattern=_ADDRESS)]
 _Secret = Annotated[str, Field(max_length=256)]
 
 
-class _Body(BaseModel):
-    model_config = ConfigDict(strict=True, extra="forbid")
-
-
-class RecipientBody(_Body):
+class RecipientBody(Body):
     """Somebody with an address."""
 
     who: _Who
     address: _Address
 
 
-class EmailBody(_Body):
+class EmailBody(Body):
     """The whole of it; `password` null keeps the one that is there.
 
     It has to be typed anew where server, port or user are others: nobody reads it by
@@ -112,7 +109,7 @@ class EmailBody(_Body):
         return now != (before.server, before.port, before.security, before.user)
 
 
-class WebhookBody(_Body):
+class WebhookBody(Body):
     """The whole of it; `url` null keeps the one that is there."""
 
     on: bool
@@ -126,21 +123,21 @@ class WebhookBody(_Body):
         return messages.Webhook(self.on, self.who, url, self.least)
 
 
-class PushBody(_Body):
+class PushBody(Body):
     """`contact`: where push services find whoever runs this server; empty: nowhere."""
 
     on: bool
     contact: _Address | Literal[""] = ""
 
 
-class KeysBody(_Body):
+class KeysBody(Body):
     """As `PushSubscription.toJSON` writes them."""
 
     p256dh: Annotated[str, Field(max_length=128)]
     auth: Annotated[str, Field(min_length=20, max_length=32)]
 
 
-class DeviceBody(_Body):
+class DeviceBody(Body):
     """A browser that asks to be told."""
 
     who: _Who

@@ -3,19 +3,18 @@
 from typing import Annotated, Any, Final
 
 from fastapi import APIRouter, Depends, HTTPException, Request, Response
-from pydantic import BaseModel, ConfigDict
 
 from iveg.domain.accounts import Account
 from iveg.domain.errors import UnknownNameError
 from iveg.domain.passkeys import MOST_PASSKEYS, Passkey
-from iveg.models.base import Listing
+from iveg.models.base import Body, Listing
 from iveg.models.signing_in import PasskeyOfPerson
 from iveg.web.api.answers import Json
 from iveg.web.api.users import Name
 from iveg.web.problems import Problem
 from iveg.web.refusals import refusals
 from iveg.web.security.answer import AnswerOfDevice
-from iveg.web.security.authentication import Authenticator, Principal, require
+from iveg.web.security.authentication import Principal, authenticator_of, require
 from iveg.web.security.passkeys import SIGN_IN, Passkeys, site_of
 from iveg.web.security.people import People
 
@@ -25,10 +24,8 @@ _REFUSED: Final = Problem(
 _Reader = Annotated[Principal, Depends(require("read"))]
 
 
-class PasskeyBody(BaseModel):
+class PasskeyBody(Body):
     """What a device made, and what the person calls it."""
-
-    model_config = ConfigDict(strict=True, extra="forbid")
 
     name: Name
     passkey: AnswerOfDevice
@@ -97,9 +94,3 @@ def account_of(people: People, who: Principal) -> Account:
     if found is None:
         raise UnknownNameError("account", who.name)
     return found
-
-
-def authenticator_of(request: Request) -> Authenticator:
-    """What lets people in here."""
-    authenticator: Authenticator = request.app.state.authenticator
-    return authenticator

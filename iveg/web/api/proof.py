@@ -4,19 +4,20 @@ from collections.abc import Awaitable, Callable
 from typing import Annotated, Any, Final
 
 from fastapi import APIRouter, Depends, Request, Response
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from iveg.adapters.passwords import MOST
 from iveg.domain.accounts import Account
 from iveg.domain.errors import UnknownNameError
 from iveg.domain.pins import MOST_DIGITS
+from iveg.models.base import Body
 from iveg.models.signing_in import Proof
 from iveg.web.api.answers import Json
-from iveg.web.api.passkeys import account_of, authenticator_of
+from iveg.web.api.passkeys import account_of
 from iveg.web.problems import Problem
 from iveg.web.refusals import refusals
 from iveg.web.security.answer import AnswerOfDevice
-from iveg.web.security.authentication import Principal, require
+from iveg.web.security.authentication import Principal, authenticator_of, require
 from iveg.web.security.passkeys import Passkeys, site_of
 from iveg.web.security.people import People
 from iveg.web.security.tablets import Pins
@@ -26,23 +27,19 @@ _PURPOSE: Final = "prove "
 _Reader = Annotated[Principal, Depends(require("read"))]
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(strict=True, extra="forbid")
-
-
-class ByPassword(_Strict):
+class ByPassword(Body):
     """The password of the account."""
 
     password: Annotated[str, Field(max_length=MOST)]
 
 
-class ByPasskey(_Strict):
+class ByPasskey(Body):
     """What a device answered to the challenge of `GET /account/proof/options`."""
 
     passkey: AnswerOfDevice
 
 
-class ByPin(_Strict):
+class ByPin(Body):
     """What unlocks a shared tablet as this person."""
 
     pin: Annotated[str, Field(max_length=MOST_DIGITS)]

@@ -3,7 +3,7 @@
 from typing import Annotated, Literal, TypeVar
 
 from fastapi import APIRouter, Depends, Response
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import Field, field_validator
 
 from iveg.domain.detection_rule import (
     FORESIGHT_LEAST_S,
@@ -13,7 +13,7 @@ from iveg.domain.detection_rule import (
 )
 from iveg.domain.errors import VersionMissingError
 from iveg.domain.limits import LIMITS
-from iveg.models.base import Listing
+from iveg.models.base import Body, Listing
 from iveg.models.rule import Rule as RuleModel
 from iveg.models.rule import Trial as TrialModel
 from iveg.ngsi.payloads import clean_text
@@ -31,14 +31,12 @@ _HORIZON = Field(ge=FORESIGHT_LEAST_S, le=FORESIGHT_MOST_S, allow_inf_nan=False)
 _MOST_ALIASES = 200
 
 
-class RuleChange(BaseModel):
+class RuleChange(Body):
     """The parameters to change; others stay as they are.
 
     A detector's word must stand for `person` or `robot`; both names always stand for
     themselves.
     """
-
-    model_config = ConfigDict(strict=True, extra="forbid")
 
     version: int | None = None
     """The version that the person saw: 428 without, 409 when it is in force no more."""
@@ -92,10 +90,8 @@ def _new(wanted: T | None, old: T) -> T:
     return old if wanted is None else wanted
 
 
-class Promotion(BaseModel):
+class Promotion(Body):
     """The version in force that the person saw beside the trial."""
-
-    model_config = ConfigDict(strict=True, extra="forbid")
 
     version: int
 

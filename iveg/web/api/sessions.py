@@ -13,7 +13,12 @@ from iveg.domain.stamps import format_stamp
 from iveg.models.base import Listing
 from iveg.models.signing_in import OpenSession, SessionKind, SessionsEnded
 from iveg.web.api.answers import Json
-from iveg.web.security.authentication import Action, Principal, require
+from iveg.web.security.authentication import (
+    Action,
+    Principal,
+    authenticator_of,
+    require,
+)
 from iveg.web.security.roles import Role
 from iveg.web.security.sessions import Sessions
 
@@ -70,8 +75,7 @@ def _add(routes: APIRouter, path: str, action: Action, *, everybodys: bool) -> N
 
 
 def _sessions(request: Request) -> Sessions:
-    sessions: Sessions = request.app.state.authenticator.sessions
-    return sessions
+    return authenticator_of(request).sessions
 
 
 def _seen(

@@ -4,15 +4,21 @@ from math import ceil
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, HTTPException, Request, Response
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, Field
 
 from iveg.domain.pins import MOST_DIGITS, is_pin
+from iveg.models.base import Body
 from iveg.models.signing_in import Tablet, TabletPerson
 from iveg.web.api.answers import Json
-from iveg.web.api.passkeys import account_of, authenticator_of
+from iveg.web.api.passkeys import account_of
 from iveg.web.api.users import Name
 from iveg.web.refusals import refusals
-from iveg.web.security.authentication import Authenticator, Principal, require
+from iveg.web.security.authentication import (
+    Authenticator,
+    Principal,
+    authenticator_of,
+    require,
+)
 from iveg.web.security.people import People
 from iveg.web.security.tablets import Pins
 
@@ -26,24 +32,20 @@ def _chosen(text: str) -> str:
     return text
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(strict=True, extra="forbid")
-
-
-class TabletBody(_Strict):
+class TabletBody(Body):
     """What the tablet is called, in all that it does while it is locked."""
 
     name: Name
 
 
-class UnlockBody(_Strict):
+class UnlockBody(Body):
     """Whose PIN it is, and the PIN."""
 
     person_id: Annotated[str, Field(max_length=64)]
     pin: Annotated[str, Field(max_length=MOST_DIGITS)]
 
 
-class PinBody(_Strict):
+class PinBody(Body):
     """A PIN of 4 to 8 digits, neither one digit again and again nor a run."""
 
     pin: Annotated[str, Field(max_length=MOST_DIGITS), AfterValidator(_chosen)]

@@ -4,9 +4,9 @@ from datetime import timedelta
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, Response
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
-from iveg.models.base import Listing
+from iveg.models.base import Body, Listing
 from iveg.models.thing import Thing
 from iveg.pipeline.ports import Clock
 from iveg.pipeline.things import ThingMarks
@@ -18,10 +18,8 @@ from iveg.web.security.authentication import Principal, require
 Marking = Annotated[Principal, Depends(require("release"))]
 
 
-class MarkRequest(BaseModel):
+class MarkRequest(Body):
     """Which track is no person."""
-
-    model_config = ConfigDict(strict=True, extra="forbid")
 
     person_id: Annotated[str, Field(min_length=1, max_length=64)]
 

@@ -6,12 +6,11 @@ A token leaves by the one answer that made it.
 from typing import Annotated, Final
 
 from fastapi import APIRouter, Depends, HTTPException, Response
-from pydantic import BaseModel, ConfigDict
 
 from iveg.adapters.admission import admit_program
 from iveg.domain.accounts import ApiToken, TokenScope, name_key
 from iveg.domain.errors import UnknownNameError
-from iveg.models.base import Listing
+from iveg.models.base import Body, Listing
 from iveg.models.signing_in import NewToken, ProgramToken
 from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json
@@ -24,10 +23,8 @@ MOST_TOKENS: Final = 200
 _Admin = Annotated[Principal, Depends(require("admin"))]
 
 
-class TokenBody(BaseModel):
+class TokenBody(Body):
     """A program that is to come; `days` until its token ends by itself."""
-
-    model_config = ConfigDict(strict=True, extra="forbid")
 
     name: Name
     scope: TokenScope

@@ -7,13 +7,13 @@ from collections.abc import Callable, Mapping
 from typing import Annotated, TypeVar
 
 from fastapi import APIRouter, Depends, HTTPException, Request, Response
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, Field
 
 from iveg.adapters.admission import MOST_ACCOUNTS, Admission
 from iveg.domain.accounts import MOST_NAME, Account, PersonRole, is_name, name_key
 from iveg.domain.errors import NotAllowedError, UnknownNameError
 from iveg.domain.retention import DAY_S
-from iveg.models.base import Listing
+from iveg.models.base import Body, Listing
 from iveg.models.signing_in import Invitation, UserAccount
 from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json
@@ -44,11 +44,7 @@ Days = Annotated[int, Field(ge=1, le=3650)]
 Name = Annotated[str, Field(max_length=MOST_NAME), AfterValidator(named)]
 
 
-class _Body(BaseModel):
-    model_config = ConfigDict(strict=True, extra="forbid")
-
-
-class UserBody(_Body):
+class UserBody(Body):
     """Somebody new; `days` until the account ends by itself."""
 
     name: Name
@@ -56,7 +52,7 @@ class UserBody(_Body):
     days: Days | None = None
 
 
-class RoleBody(_Body):
+class RoleBody(Body):
     """The role that is to be."""
 
     role: PersonRole

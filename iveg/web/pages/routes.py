@@ -15,12 +15,13 @@ from fastapi import APIRouter, Depends, Path, Request, Response
 from fastapi.responses import HTMLResponse, JSONResponse
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup, escape
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from iveg.adapters.passwords import LEAST, MOST
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.limits import LIMITS
 from iveg.domain.stamps import format_stamp
+from iveg.models.base import Body
 from iveg.web import cookies
 from iveg.web.pages.contexts import (
     THEMES,
@@ -49,8 +50,8 @@ from iveg.web.problems import Problem
 from iveg.web.security.answer import AnswerOfDevice
 from iveg.web.security.authentication import (
     Action,
-    Authenticator,
     Principal,
+    authenticator_of,
     require,
 )
 from iveg.web.security.single_sign_on import SingleSignOn
@@ -73,31 +74,27 @@ _SCRIPTED: Final = {
 _Reader = Annotated[Principal, Depends(require("read"))]
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(strict=True, extra="forbid")
-
-
-class _ByLink(_Strict):
+class _ByLink(Body):
     """The token behind the ``#`` of the link."""
 
     token: str = Field(max_length=256)
 
 
-class _ByPassword(_Strict):
+class _ByPassword(Body):
     """Who somebody says that they are, and the proof."""
 
     name: str = Field(max_length=256)
     password: str = Field(max_length=MOST)
 
 
-class _ByInvitation(_Strict):
+class _ByInvitation(Body):
     """An invitation, and the password that is to be."""
 
     invitation: str = Field(max_length=256)
     password: str = Field(min_length=LEAST, max_length=MOST)
 
 
-class _ByPasskey(_Strict):
+class _ByPasskey(Body):
     """What a device answered to the challenge of ``GET /signin/passkey``."""
 
     passkey: AnswerOfDevice
@@ -157,7 +154,8 @@ class Pages:
             return self.sign_in(request, 401)
         known = problem.status if problem.status in _EXPLAINED else "other"
         # Somebody signed in keeps the STOP controls, whatever page went wrong.
-        frame = self.frame(request, "error", _authenticator(request).identify(request))
+        who = authenticator_of(request).identify(request)
+        frame = self.frame(request, "error", who)
         page = ErrorPage(frame, problem.status, f"error.{known}")
         response = self.draw(page, problem.status)
         response.headers.update(problem.headers)
@@ -267,7 +265,7 @@ def _add_signing(routes: APIRouter, pages: Pages, sign_on: SingleSignOn | None) 
     @routes.post("/wall", status_code=204)
     async def wall(request: Request, visitor: _Reader) -> None:
         # A screen on a wall is everybody's: it looks and stops, and frees nothing.
-        _authenticator(request).sessions.lower(visitor)
+        authenticator_of(request).sessions.lower(visitor)
 
 
 def add_scripted(
@@ -283,7 +281,7 @@ def add_scripted(
 
 
 async def _enter(request: Request, body: _SignIn) -> Response | Problem:
-    authenticator = _authenticator(request)
+    authenticator = authenticator_of(request)
     match body:
         case _ByLink():
             return authenticator.sign_in(request, body.token)
@@ -297,7 +295,7 @@ async def _enter(request: Request, body: _SignIn) -> Response | Problem:
 
 async def _leave(request: Request, sign_on: SingleSignOn | None) -> Response:
     """End a session, here before anywhere else."""
-    authenticator = _authenticator(request)
+    authenticator = authenticator_of(request)
     who = authenticator.identify(request)
     gone = authenticator.sign_out(request)
     if sign_on is None or who is None:
@@ -307,11 +305,6 @@ async def _leave(request: Request, sign_on: SingleSignOn | None) -> Response:
         return gone
     cookie = gone.headers["set-cookie"]
     return JSONResponse({"next": onward}, headers={"Set-Cookie": cookie})
-
-
-def _authenticator(request: Request) -> Authenticator:
-    authenticator: Authenticator = request.app.state.authenticator
-    return authenticator
 
 
 def _look(request: Request) -> Appearance:

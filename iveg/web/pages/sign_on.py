@@ -7,7 +7,7 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 from iveg.domain.errors import SignOnError
 from iveg.web.pages.contexts import EnteredPage
 from iveg.web.pages.routes import Pages
-from iveg.web.security.authentication import Authenticator, require
+from iveg.web.security.authentication import authenticator_of, require
 from iveg.web.security.single_sign_on import CALLBACK, SingleSignOn
 
 _STATUS: Final = {"unreachable": 503, "busy": 429, "outdated": 400}
@@ -38,8 +38,7 @@ def router(pages: Pages, sign_on: SingleSignOn) -> APIRouter:
         response = pages.draw(page)
         # A redirect would still be the provider's, and leave the Strict cookie behind.
         response.headers["Refresh"] = f"0; url={to}"
-        authenticator: Authenticator = request.app.state.authenticator
-        return authenticator.admit(request, token, response)
+        return authenticator_of(request).admit(request, token, response)
 
     return routes
 

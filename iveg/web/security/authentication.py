@@ -323,11 +323,16 @@ class Authenticator:
 # --- what a route asks for ----------------------------------------------------------
 
 
+def authenticator_of(connection: HTTPConnection) -> Authenticator:
+    """What lets people in here; it is put at ``app.state.authenticator``."""
+    authenticator: Authenticator = connection.app.state.authenticator
+    return authenticator
+
+
 class Requirement:
     """A FastAPI dependency that lets a role in; made by ``require``.
 
-    It serves HTTP and WebSocket routes alike and finds its ``Authenticator`` at
-    ``app.state.authenticator``.
+    It serves HTTP and WebSocket routes alike.
     """
 
     def __init__(self, action: Action, *, proven: bool = False) -> None:
@@ -336,7 +341,7 @@ class Requirement:
 
     async def __call__(self, connection: HTTPConnection) -> Principal:
         """The authorised principal, or the error that refuses the request."""
-        authenticator: Authenticator = connection.app.state.authenticator
+        authenticator = authenticator_of(connection)
         if self.action == "open":
             return authenticator.identify(connection) or NOBODY
         if isinstance(connection, WebSocket):
