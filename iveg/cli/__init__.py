@@ -4,6 +4,7 @@ import logging
 import os
 import sys
 from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
 
 from iveg.app.laboratory import find_laboratory
@@ -20,14 +21,13 @@ from iveg.cli.arguments import (
     add_user,
     parser,
 )
-from iveg.cli.running import run_until_stopped
 from iveg.domain.errors import (
     DataFileError,
     IvegError,
     MissingExtraError,
     SettingsError,
 )
-from iveg.settings import Settings, default_data_directory, describe
+from iveg.settings import Settings, default_data_directory
 
 UNUSABLE = 2
 """Exit code for a setting or a file that cannot be used."""
@@ -48,7 +48,8 @@ def main(arguments: Sequence[str]) -> int:
         data = settings.data_directory or default_data_directory(
             os.environ, Path.home()
         )
-        code: int = options.run(CommandCall(options, settings, os.environ, Path(data)))
+        call = CommandCall(options, settings, os.environ, Path(data))
+        code: int = import_module(options.module).run(call)
     except (SettingsError, DataFileError, MissingExtraError) as error:
         print(f"iveg: {error}", file=sys.stderr)
         return UNUSABLE
@@ -64,88 +65,22 @@ def _commands() -> Sequence[CommandWord]:
     return COMMANDS if laboratory is None else (*COMMANDS, *laboratory.COMMANDS)
 
 
-# Each command imports what it needs when it runs: a robot starts without the libraries
-# of page and history.
-
-
-def _serve(call: CommandCall) -> int:
-    from iveg.cli.serve import serve
-
-    call.data.mkdir(parents=True, exist_ok=True)
-    work = serve(call.settings, call.data, demo=call.options.demo)
-    return run_until_stopped(work, until_eof=call.options.until_eof)
-
-
-def _replay(call: CommandCall) -> int:
-    from iveg.cli.replay import replay
-
-    work = replay(call.options, call.settings)
-    return run_until_stopped(work, until_eof=call.options.until_eof)
-
-
-def _robot(call: CommandCall) -> int:
-    from iveg.cli.robot import run_robot
-
-    return run_robot(call.options, call.settings, call.data, call.environment)
-
-
-def _provision(call: CommandCall) -> int:
-    from iveg.cli.provision import provision_fleet
-
-    return provision_fleet(call.settings)
-
-
-def _doctor(call: CommandCall) -> int:
-    from iveg.cli.doctor import run_doctor
-
-    return run_doctor(call.settings, call.data)
-
-
-def _settings(_: CommandCall) -> int:
-    print(describe(), end="")
-    return 0
-
-
-def _db(call: CommandCall) -> int:
-    from iveg.cli.database import run_db
-
-    return run_db(call.options, call.settings, call.data)
-
-
-def _incident(call: CommandCall) -> int:
-    from iveg.cli.incident import run_incident
-
-    return run_incident(call.options)
-
-
-def _export(call: CommandCall) -> int:
-    from iveg.cli.export import run_export
-
-    return run_export(call.options, call.settings, call.data)
-
-
-def _audit(call: CommandCall) -> int:
-    from iveg.cli.audit import run_audit
-
-    return run_audit(call.options, call.settings, call.data)
-
-
-def _user(call: CommandCall) -> int:
-    from iveg.cli.user import run_user
-
-    return run_user(call.options, call.settings, call.data)
-
-
 COMMANDS = (
-    CommandWord("serve", "the DSS and its page", _serve, add_serve),
-    CommandWord("replay", "recorded logs as robots", _replay, add_replay),
-    CommandWord("robot", "a ROS 2 robot joins", _robot, add_robot),
-    CommandWord("provision", "make devices and subscriptions", _provision),
-    CommandWord("doctor", "try every hop once and say what is broken", _doctor),
-    CommandWord("settings", "print docs/settings.md", _settings),
-    CommandWord("db", "the history's database", _db, add_db),
-    CommandWord("export", "a list of the history as a file", _export, add_export),
-    CommandWord("incident", "verify an incident pack", _incident, add_incident),
-    CommandWord("user", "who may sign in", _user, add_user),
-    CommandWord("audit", "whether the audit is whole", _audit, add_audit),
+    CommandWord("serve", "the DSS and its page", "iveg.cli.serve", add_serve),
+    CommandWord("replay", "recorded logs as robots", "iveg.cli.replay", add_replay),
+    CommandWord("robot", "a ROS 2 robot joins", "iveg.cli.robot", add_robot),
+    CommandWord("provision", "make devices and subscriptions", "iveg.cli.provision"),
+    CommandWord(
+        "doctor", "try every hop once and say what is broken", "iveg.cli.doctor"
+    ),
+    CommandWord("settings", "print docs/settings.md", "iveg.cli.settings"),
+    CommandWord("db", "the history's database", "iveg.cli.database", add_db),
+    CommandWord(
+        "export", "a list of the history as a file", "iveg.cli.export", add_export
+    ),
+    CommandWord(
+        "incident", "verify an incident pack", "iveg.cli.incident", add_incident
+    ),
+    CommandWord("user", "who may sign in", "iveg.cli.user", add_user),
+    CommandWord("audit", "whether the audit is whole", "iveg.cli.audit", add_audit),
 )

@@ -38,13 +38,14 @@ class CommandWord:
 
     Attributes:
         help: Its line in ``iveg --help``.
-        run: Executes a call; returns the exit code.
+        module: Its ``run`` executes a call and returns the exit code.  It is imported
+            then: a robot starts without the libraries of page and history.
         add_arguments: Adds its arguments to its parser.
     """
 
     name: str
     help: str
-    run: Callable[[CommandCall], int]
+    module: str
     add_arguments: AddArguments = lambda _: None
 
 
@@ -61,7 +62,7 @@ def parser(commands: Iterable[CommandWord]) -> argparse.ArgumentParser:
     for one in commands:
         word = words.add_parser(one.name, help=one.help)
         one.add_arguments(word)
-        word.set_defaults(run=one.run)
+        word.set_defaults(module=one.module)
     return parser
 
 

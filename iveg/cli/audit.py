@@ -1,14 +1,11 @@
 """``iveg audit``: whether the audit is whole, and its newest hash."""
 
-import argparse
-from pathlib import Path
-
 from iveg.adapters.doctor import check_database
 from iveg.adapters.history.audit import chain_end, faults, sealed_end
 from iveg.adapters.history.engine import history_url
+from iveg.cli.arguments import CommandCall
 from iveg.cli.database import read_history
 from iveg.domain.audit import AuditFault
-from iveg.settings import Settings
 
 _MOST_TOLD = 20
 _SAYS = {
@@ -18,16 +15,16 @@ _SAYS = {
 }
 
 
-def run_audit(options: argparse.Namespace, settings: Settings, data: Path) -> int:
+def run(call: CommandCall) -> int:
     """One question to the audit; returns the exit code.
 
     Raises:
         IvegError: the database cannot be read.
     """
-    url = history_url(settings.database_url, data)
+    url = history_url(call.settings.database_url, call.data)
     check_database(url)
     end = read_history(url, chain_end)
-    if options.action == "end":
+    if call.options.action == "end":
         print(end.seq, end.hash)
         return 0
     found = read_history(url, lambda connection: list(faults(connection)))

@@ -1,10 +1,8 @@
 """``iveg db``: the schema, size and upkeep of the history's database."""
 
-import argparse
 import asyncio
 from collections.abc import Callable, Iterable
 from functools import partial
-from pathlib import Path
 from typing import TypeVar
 
 from sqlalchemy import Connection
@@ -19,10 +17,10 @@ from iveg.adapters.history.purge import count_due, purge_batch
 from iveg.adapters.history.stats import HistoryStats, TableStats, read_stats
 from iveg.adapters.history.store import Store
 from iveg.adapters.history.vacuum import vacuum
+from iveg.cli.arguments import CommandCall
 from iveg.domain.errors import HopError
 from iveg.domain.retention import PURGE_STEPS, Cutoffs, PurgeStep, Retention
 from iveg.domain.stamps import format_stamp
-from iveg.settings import Settings
 
 _T = TypeVar("_T")
 _PAUSE_S = 0.02
@@ -30,15 +28,16 @@ _PAUSE_S = 0.02
 _HEAD = ("table", "rows", "MB", "oldest", "newest", "bytes a robot-hour")
 
 
-def run_db(options: argparse.Namespace, settings: Settings, data: Path) -> int:
+def run(call: CommandCall) -> int:
     """One action on the database; returns the exit code.
 
     Raises:
         IvegError: it cannot be done.
     """
-    url = history_url(settings.database_url, data)
+    options, settings = call.options, call.settings
+    url = history_url(settings.database_url, call.data)
     if options.action == "upgrade":
-        data.mkdir(parents=True, exist_ok=True)
+        call.data.mkdir(parents=True, exist_ok=True)
         upgrade(url)
         print("The database is up to date.")
         return 0

@@ -35,6 +35,7 @@ from iveg.adapters.fiware_http import FiwareHttp
 from iveg.adapters.history.engine import describe, history_url
 from iveg.adapters.post_listener import post_listener
 from iveg.app.fiware import open_fiware
+from iveg.cli.arguments import CommandCall
 from iveg.cli.diagnosis import (
     Finding,
     Lag,
@@ -65,9 +66,9 @@ _FRESH_S = 10.0
 _ANYWHERE = {"0.0.0.0": "127.0.0.1", "::": "::1"}  # noqa: S104 - read, not bound
 
 
-def run_doctor(settings: Settings, data: Path) -> int:
+def run(call: CommandCall) -> int:
     """Examine, print the table, remove the probe; returns the exit code."""
-    examination = Examination(settings, data)
+    examination = Examination(call.settings, call.data)
     run_until_stopped(examination.run())
     rows = judge(examination.findings, examination.stack)
     print(table(rows))

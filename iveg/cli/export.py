@@ -6,7 +6,6 @@ import contextlib
 import os
 import sys
 from collections.abc import AsyncIterator, Callable, Sequence
-from pathlib import Path
 from typing import Any
 
 from iveg.adapters.doctor import check_database
@@ -15,10 +14,10 @@ from iveg.adapters.history.engine import history_url
 from iveg.adapters.history.lists import MOST_ROWS, Filter
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.parquet import ParquetTable
+from iveg.cli.arguments import CommandCall
 from iveg.domain.errors import HopError, SettingsError
 from iveg.domain.records import Record
 from iveg.domain.stamps import parse_stamp
-from iveg.settings import Settings
 from iveg.web.api import exports
 from iveg.web.api.history import HistoryList, lists_of
 
@@ -26,15 +25,16 @@ _Pages = AsyncIterator[Sequence[Record]]
 _MOMENT = "a moment as ISO-8601, in UTC unless it says otherwise"
 
 
-def run_export(options: argparse.Namespace, settings: Settings, data: Path) -> int:
+def run(call: CommandCall) -> int:
     """Write the file; returns the exit code.
 
     Raises:
         IvegError: it cannot be done.  Then there is no file.
     """
+    options = call.options
     if options.format == "parquet":
         require_extra("parquet", "iveg export --format parquet")
-    url = history_url(settings.database_url, data)
+    url = history_url(call.settings.database_url, call.data)
     since = _moment("--since", options.since)
     until = _moment("--until", options.until)
     if since is not None and until is not None and since > until:

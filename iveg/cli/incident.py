@@ -1,17 +1,16 @@
 """``iveg incident``: looks whether an incident pack is as it was made."""
 
-import argparse
-
 from iveg.adapters.incident_files import verify_pack
+from iveg.cli.arguments import CommandCall
 
 
-def run_incident(options: argparse.Namespace) -> int:
+def run(call: CommandCall) -> int:
     """Verify a pack; returns the exit code.
 
     Raises:
         DataFileError: it is no pack.
     """
-    end, wrong = verify_pack(options.file)
+    end, wrong = verify_pack(call.options.file)
     for sentence in wrong:
         print(sentence)
     if not wrong:

@@ -6,11 +6,12 @@ from iveg.adapters.equipment_files import load_equipment
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.iot_agent import provision
 from iveg.app.fiware import open_fiware
-from iveg.settings import Settings
+from iveg.cli.arguments import CommandCall
 
 
-def provision_fleet(settings: Settings) -> int:
+def run(call: CommandCall) -> int:
     """Create or repair the fleet's devices, and print the repairs."""
+    settings = call.settings
 
     async def work() -> None:
         orion, agent = open_fiware(settings)

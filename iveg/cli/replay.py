@@ -6,14 +6,21 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from iveg.adapters.fleet_files import load_fleet
+from iveg.cli.arguments import CommandCall
 from iveg.cli.live_robots import live_robot
 from iveg.cli.nodes import broker_of, node_settings
-from iveg.cli.running import LOOPBACK
+from iveg.cli.running import LOOPBACK, run_until_stopped
 from iveg.domain.errors import DataFileError
 from iveg.domain.fleet import FleetDescription
 from iveg.robot.replay.bags import BagOptions
 from iveg.robot.replay.replay import ReplaySettings, run_replay
 from iveg.settings import Settings
+
+
+def run(call: CommandCall) -> int:
+    """Run ``iveg replay``; returns the exit code."""
+    work = replay(call.options, call.settings)
+    return run_until_stopped(work, until_eof=call.options.until_eof)
 
 
 async def replay(options: argparse.Namespace, settings: Settings) -> None:

@@ -13,6 +13,7 @@ from iveg.adapters.extras import require_extra
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.adapters.mqtt import MqttLink
+from iveg.cli.arguments import CommandCall
 from iveg.cli.nodes import broker_of, node_settings
 from iveg.cli.running import (
     LOOPBACK,
@@ -58,18 +59,14 @@ _CHECK_S = 3.0
 _DOMAINS = "a whole number from 0 to 232"
 
 
-def run_robot(
-    options: argparse.Namespace,
-    settings: Settings,
-    data: Path,
-    environment: Mapping[str, str],
-) -> int:
+def run(call: CommandCall) -> int:
     """Run ``iveg robot``; returns the exit code."""
+    options, settings = call.options, call.settings
     if not names.is_robot_id(options.id):
         allowed = "1 to 64 letters, digits and hyphens, and no name of iVeg's own"
         raise SettingsError("--id", options.id, allowed)
-    config, classes = load_config(options, environment)
-    network = network_of(config, environment, "iveg robot")
+    config, classes = load_config(options, call.environment)
+    network = network_of(config, call.environment, "iveg robot")
     if options.action == "check":
         return asyncio.run(_check(options.id, config, network, settings))
     if options.attended and broker_of(settings).host not in LOOPBACK:
@@ -78,8 +75,8 @@ def run_robot(
         )
     from iveg.adapters.lease import lease
 
-    with lease(data / "robots" / f"{options.id}.lease", options.id):
-        work = _ride(options, settings, data, config, classes, network)
+    with lease(call.data / "robots" / f"{options.id}.lease", options.id):
+        work = _ride(options, settings, call.data, config, classes, network)
         return run_until_stopped(work, until_eof=options.until_eof)
 
 

@@ -20,10 +20,12 @@ from iveg.adapters.history.engine import history_url
 from iveg.adapters.history.migrate import upgrade
 from iveg.app.dss import Dss, open_dss
 from iveg.asgi import create_app
+from iveg.cli.arguments import CommandCall
 from iveg.cli.running import (
     page_address,
     print_sign_in_link,
     report_ready,
+    run_until_stopped,
     tune_garbage_collection,
 )
 from iveg.cli.user import invitation_link, set_up
@@ -52,6 +54,13 @@ class _Server(uvicorn.Server):
     @contextlib.contextmanager
     def capture_signals(self) -> Iterator[None]:
         yield
+
+
+def run(call: CommandCall) -> int:
+    """Run ``iveg serve``; returns the exit code."""
+    call.data.mkdir(parents=True, exist_ok=True)
+    work = serve(call.settings, call.data, demo=call.options.demo)
+    return run_until_stopped(work, until_eof=call.options.until_eof)
 
 
 async def serve(

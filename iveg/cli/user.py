@@ -2,7 +2,6 @@
 
 import argparse
 from collections.abc import Iterable
-from pathlib import Path
 
 from iveg.adapters import clock
 from iveg.adapters.admission import Admission, admit_program, has_admin
@@ -10,6 +9,7 @@ from iveg.adapters.doctor import check_database
 from iveg.adapters.history.accounts import AccountRows, AccountStore
 from iveg.adapters.history.api_tokens import ApiTokenStore
 from iveg.adapters.history.engine import history_url
+from iveg.cli.arguments import CommandCall
 from iveg.cli.running import page_address
 from iveg.domain.accounts import (
     Account,
@@ -27,13 +27,14 @@ SET_UP_S = 1800.0
 FIRST_ADMIN = "admin"
 
 
-def run_user(options: argparse.Namespace, settings: Settings, data: Path) -> int:
+def run(call: CommandCall) -> int:
     """One action on accounts; returns the exit code.
 
     Raises:
         IvegError: it cannot be done.
     """
-    url = history_url(settings.database_url, data)
+    options, settings = call.options, call.settings
+    url = history_url(settings.database_url, call.data)
     check_database(url)
     store, tokens = AccountStore(url), ApiTokenStore(url)
     try:

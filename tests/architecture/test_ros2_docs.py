@@ -46,7 +46,7 @@ def test_every_type_is_in_the_contract(message: str) -> None:
 
 def test_every_word_of_the_command_line_is_in_the_contract() -> None:
     usage = vars(parser(cli.COMMANDS).parse_args(["robot", "--id", "AGI"]))
-    names = usage.keys() - {"action", "command", "run", "verbose"}
+    names = usage.keys() - {"action", "command", "module", "verbose"}
     words = {f"--{name.replace('_', '-')}" for name in names}
 
     assert {word for word in words if word not in COMMANDS} == set()

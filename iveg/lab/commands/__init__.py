@@ -6,34 +6,7 @@ FIWARE and robots start without the libraries of page and history.
 import argparse
 from pathlib import Path
 
-from iveg.cli.arguments import CommandCall, CommandWord, add_end, add_network
-from iveg.cli.running import run_until_stopped
-
-
-def _demo(call: CommandCall) -> int:
-    from iveg.lab.commands.demo import demo
-
-    return demo(call)
-
-
-def _fiware(call: CommandCall) -> int:
-    from iveg.lab.commands.fiware import fiware
-
-    work = fiware(call.settings)
-    return run_until_stopped(work, until_eof=call.options.until_eof)
-
-
-def _emulator(call: CommandCall) -> int:
-    from iveg.lab.commands.emulator import emulator
-
-    work = emulator(call.options, call.settings)
-    return run_until_stopped(work, until_eof=call.options.until_eof)
-
-
-def _experiment(call: CommandCall) -> int:
-    from iveg.lab.commands.experiment import experiment
-
-    return experiment(call)
+from iveg.cli.arguments import CommandWord, add_end, add_network
 
 
 def _add_demo(demo: argparse.ArgumentParser) -> None:
@@ -155,8 +128,22 @@ def _rate(text: str) -> float:
 
 
 COMMANDS = (
-    CommandWord("demo", "everything on one machine", _demo, _add_demo),
-    CommandWord("fiware", "MQTT broker, Orion and IoT Agent", _fiware, add_end),
-    CommandWord("emulator", "simulated robots", _emulator, _add_emulator),
-    CommandWord("experiment", "the paper's evaluation", _experiment, _add_experiment),
+    CommandWord(
+        "demo", "everything on one machine", "iveg.lab.commands.demo", _add_demo
+    ),
+    CommandWord(
+        "fiware",
+        "MQTT broker, Orion and IoT Agent",
+        "iveg.lab.commands.fiware",
+        add_end,
+    ),
+    CommandWord(
+        "emulator", "simulated robots", "iveg.lab.commands.emulator", _add_emulator
+    ),
+    CommandWord(
+        "experiment",
+        "the paper's evaluation",
+        "iveg.lab.commands.experiment",
+        _add_experiment,
+    ),
 )

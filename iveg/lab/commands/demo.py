@@ -31,7 +31,7 @@ _FIWARE = (
 """Setting of each address, its variable and its scheme's port."""
 
 
-def demo(call: CommandCall) -> int:
+def run(call: CommandCall) -> int:
     """Run the demo; returns the exit code."""
     settings, environment = call.settings, call.environment
     directory = call.data / "demo"

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 from iveg.adapters.equipment_files import DEMO
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
+from iveg.cli.arguments import CommandCall
 from iveg.cli.nodes import node_settings
-from iveg.cli.running import report_ready, tune_garbage_collection
+from iveg.cli.running import report_ready, run_until_stopped, tune_garbage_collection
 from iveg.domain.witness import Plan
 from iveg.lab.emulator.emulated_robot import FleetSettings
 from iveg.lab.emulator.fleet import run_emulator
@@ -22,6 +23,12 @@ from iveg.settings import Settings
 
 if TYPE_CHECKING:
     from iveg.adapters.dds import Dds
+
+
+def run(call: CommandCall) -> int:
+    """Run ``iveg emulator``; returns the exit code."""
+    work = emulator(call.options, call.settings)
+    return run_until_stopped(work, until_eof=call.options.until_eof)
 
 
 async def emulator(options: argparse.Namespace, settings: Settings) -> None:

@@ -54,7 +54,7 @@ _LIVE_WITHIN_S = 30.0
 T = TypeVar("T")
 
 
-def experiment(call: CommandCall) -> int:
+def run(call: CommandCall) -> int:
     """Run or compare; returns the exit code."""
     options, settings, environment = call.options, call.settings, call.environment
     if options.word == "compare":

@@ -3,9 +3,16 @@
 from urllib.parse import urlsplit
 
 from iveg.adapters.connections import raise_descriptor_limit
-from iveg.cli.running import report_ready, tune_garbage_collection
+from iveg.cli.arguments import CommandCall
+from iveg.cli.running import report_ready, run_until_stopped, tune_garbage_collection
 from iveg.lab.embedded.server import serve_fiware
 from iveg.settings import Settings
+
+
+def run(call: CommandCall) -> int:
+    """Run ``iveg fiware``; returns the exit code."""
+    work = fiware(call.settings)
+    return run_until_stopped(work, until_eof=call.options.until_eof)
 
 
 async def fiware(settings: Settings) -> None:

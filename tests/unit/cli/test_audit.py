@@ -8,7 +8,8 @@ import pytest
 from sqlalchemy import Connection, text
 
 from iveg.adapters.history.store import Store
-from iveg.cli.audit import run_audit
+from iveg.cli import audit
+from iveg.cli.arguments import CommandCall
 from iveg.pipeline.record import Waiting
 from iveg.settings import Settings
 from tests.fakes.records import audit_record
@@ -25,7 +26,7 @@ def settings(tmp_path: Path) -> Settings:
 
 
 def ask(action: str, settings: Settings, data: Path) -> int:
-    return run_audit(Namespace(action=action), settings, data)
+    return audit.run(CommandCall(Namespace(action=action), settings, {}, data))
 
 
 def test_a_whole_chain_is_told_with_its_end(

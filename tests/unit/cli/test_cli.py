@@ -3,19 +3,22 @@
 import io
 import socket
 from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_type_hints
 
 import pytest
 
 from iveg import __version__
 from iveg.adapters import clock
 from iveg.adapters.history.store import Store
-from iveg.cli import UNUSABLE, main
+from iveg.cli import COMMANDS, UNUSABLE, main
+from iveg.cli.arguments import CommandCall, CommandWord
 from iveg.cli.nodes import node_settings
 from iveg.cli.running import print_sign_in_link, sign_in_link
 from iveg.domain.errors import SettingsError
 from iveg.domain.records import Record
+from iveg.lab import commands as laboratory
 from iveg.lab.commands.demo import on_free_ports
 from iveg.pipeline.record import Waiting
 from iveg.settings import Settings, describe
@@ -43,6 +46,15 @@ def test_settings_prints_the_page_of_settings(
 ) -> None:
     assert run(["settings"]) == 0
     assert capsys.readouterr().out == describe()
+
+
+@pytest.mark.parametrize(
+    "word", [*COMMANDS, *laboratory.COMMANDS], ids=lambda word: word.name
+)
+def test_every_command_is_run_by_its_module(word: CommandWord) -> None:
+    hints = get_type_hints(import_module(word.module).run)
+
+    assert [*hints.values()] == [CommandCall, int]
 
 
 def test_version_prints_the_version(capsys: pytest.CaptureFixture[str]) -> None:

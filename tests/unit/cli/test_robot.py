@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from iveg.cli import COMMANDS, main
-from iveg.cli.arguments import parser
-from iveg.cli.robot import load_config, refuse_second_gate, run_robot
+from iveg.cli import COMMANDS, main, robot
+from iveg.cli.arguments import CommandCall, parser
+from iveg.cli.robot import load_config, refuse_second_gate
 from iveg.domain.errors import DataFileError, HopError, SettingsError
 from iveg.ros2 import messages as m
 from iveg.settings import Settings
@@ -26,7 +26,7 @@ def test_an_id_that_iveg_cannot_know_is_refused(robot_id: str, tmp_path: Path) -
     asked.id = robot_id
 
     with pytest.raises(SettingsError, match="--id"):
-        run_robot(asked, Settings(), tmp_path, {})
+        robot.run(CommandCall(asked, Settings(), {}, tmp_path))
 
 
 def test_importing_iveg_needs_no_dds(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -83,7 +83,7 @@ def test_nobody_lets_a_robot_go_over_a_broker_that_is_not_here(
     pytest.importorskip("cyclonedds")
 
     with pytest.raises(SettingsError, match="--attended"):
-        run_robot(options("--attended"), settings, tmp_path, {})
+        robot.run(CommandCall(options("--attended"), settings, {}, tmp_path))
 
 
 # --- one gate a robot ---------------------------------------------------------------

@@ -13,8 +13,10 @@ from iveg.adapters.admission import Admission
 from iveg.adapters.history.accounts import AccountRows, AccountStore
 from iveg.adapters.history.api_tokens import ApiTokenStore
 from iveg.adapters.history.audit import faults
+from iveg.cli import user
+from iveg.cli.arguments import CommandCall
 from iveg.cli.database import read_history
-from iveg.cli.user import run_user, set_up
+from iveg.cli.user import set_up
 from iveg.domain.accounts import Account, PersonRole, digest_of
 from iveg.domain.audit import CONSOLE
 from iveg.domain.errors import (
@@ -41,7 +43,7 @@ class Console:
     def call(self, action: str, name: str = "", **options: object) -> int:
         told = {"role": "operator", "days": None, **options}
         given = Namespace(action=action, name=name, **told)
-        return run_user(given, self.settings, self._data)
+        return user.run(CommandCall(given, self.settings, {}, self._data))
 
     def state(self, name: str) -> tuple[str, bool, bool]:
         one = next(one for one in self.store.read().values() if one.name == name)

@@ -16,9 +16,8 @@ from iveg.adapters.history.store import Store
 from iveg.adapters.incident_files import verify_pack
 from iveg.adapters.recordings.recorder import InputRecorder
 from iveg.adapters.recordings.writer import WriterSetup
-from iveg.cli import COMMANDS
-from iveg.cli.arguments import parser
-from iveg.cli.incident import run_incident
+from iveg.cli import COMMANDS, incident
+from iveg.cli.arguments import CommandCall, parser
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.events import LogEvent
 from iveg.domain.observations import Instant
@@ -162,7 +161,7 @@ async def test_a_decisions_pack_holds_its_minutes_and_is_whole(
     assert b"ana:pw" not in everything
 
     options = parser(COMMANDS).parse_args(["incident", "verify", str(pack)])
-    assert run_incident(options) == 0
+    assert incident.run(CommandCall(options, Settings(), {}, pack.parent)) == 0
     assert end in capsys.readouterr().out
 
 
