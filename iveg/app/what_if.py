@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Final
 
 from iveg.adapters import clock
-from iveg.adapters.history.queries import Queries
+from iveg.adapters.history.asking import ask_once
 from iveg.adapters.history.rule_inputs import rule_inputs
 from iveg.adapters.ids import new_id
 from iveg.adapters.truth_files import read_nearest
@@ -54,22 +54,7 @@ def judge_part(
     Raises:
         HopError: the database does not answer, or the file of the truth.
     """
-    return asyncio.run(_judge_part(url, braking, since, until, tried, truth))
-
-
-async def _judge_part(
-    url: str,
-    braking: Mapping[str, float],
-    since: float,
-    until: float,
-    tried: tuple[Parameters, ...],
-    truth: Path | None,
-) -> Answer:
-    queries = Queries(url)
-    try:
-        found = await queries.ask(rule_inputs, braking, since - _LEAD_S, until)
-    finally:
-        queries.close()
+    found = ask_once(url, rule_inputs, braking, since - _LEAD_S, until)
     inputs = Inputs(found.poses, sightings_of(found.seen), braking)
     nearest = {} if truth is None else _truth(truth, since, until)
     range_ = Range(inputs, since - _LEAD_S, until, nearest)

@@ -1,10 +1,10 @@
 """``iveg audit``: whether the audit is whole, and its newest hash."""
 
 from iveg.adapters.doctor import check_database
+from iveg.adapters.history.asking import ask_once
 from iveg.adapters.history.audit import chain_end, faults, sealed_end
 from iveg.adapters.history.engine import history_url
 from iveg.cli.arguments import CommandCall
-from iveg.cli.database import read_history
 from iveg.domain.audit import AuditFault
 
 _MOST_TOLD = 20
@@ -23,17 +23,17 @@ def run(call: CommandCall) -> int:
     """
     url = history_url(call.settings.database_url, call.data)
     check_database(url)
-    end = read_history(url, chain_end)
+    end = ask_once(url, chain_end)
     if call.options.action == "end":
         print(end.seq, end.hash)
         return 0
-    found = read_history(url, lambda connection: list(faults(connection)))
+    found = ask_once(url, lambda connection: list(faults(connection)))
     for fault in found[:_MOST_TOLD]:
         print(_sentence(fault))
     if found:
         print(f"{len(found)} fault(s): the audit is not as it was written.")
         return 1
-    gone = read_history(url, sealed_end).seq
+    gone = ask_once(url, sealed_end).seq
     print(f"Rows {gone + 1} to {end.seq} are as they were written.")
     print(f"The chain ends with {end.hash}.")
     return 0

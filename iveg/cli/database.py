@@ -1,28 +1,23 @@
 """``iveg db``: the schema, size and upkeep of the history's database."""
 
 import asyncio
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from functools import partial
-from typing import TypeVar
-
-from sqlalchemy import Connection
-from sqlalchemy.exc import SQLAlchemyError
 
 from iveg.adapters import clock
 from iveg.adapters.doctor import check_database
 from iveg.adapters.history.ages import recorded_days
-from iveg.adapters.history.engine import history_url, reading_engine
-from iveg.adapters.history.migrate import reason_of, upgrade
+from iveg.adapters.history.asking import ask_once
+from iveg.adapters.history.engine import history_url
+from iveg.adapters.history.migrate import upgrade
 from iveg.adapters.history.purge import count_due, purge_batch
 from iveg.adapters.history.stats import HistoryStats, TableStats, read_stats
 from iveg.adapters.history.store import Store
 from iveg.adapters.history.vacuum import vacuum
 from iveg.cli.arguments import CommandCall
-from iveg.domain.errors import HopError
 from iveg.domain.retention import PURGE_STEPS, Cutoffs, PurgeStep, Retention
 from iveg.domain.stamps import format_stamp
 
-_T = TypeVar("_T")
 _PAUSE_S = 0.02
 """Between two batches: a server that records comes in between."""
 _HEAD = ("table", "rows", "MB", "oldest", "newest", "bytes a robot-hour")
@@ -43,7 +38,7 @@ def run(call: CommandCall) -> int:
         return 0
     check_database(url)
     if options.action == "stats":
-        print(*_lines(read_history(url, read_stats)), sep="\n")
+        print(*_lines(ask_once(url, read_stats)), sep="\n")
     elif options.action == "purge":
         asyncio.run(_purge(url, settings.retention, dry_run=options.dry_run))
     else:
@@ -53,12 +48,12 @@ def run(call: CommandCall) -> int:
 
 
 async def _purge(url: str, retention: Retention, *, dry_run: bool) -> None:
-    recorded = read_history(url, partial(recorded_days, most=retention.longest))
+    recorded = ask_once(url, recorded_days, retention.longest)
     cutoffs = retention.cutoffs(clock.wall(), recorded)
     store = Store(url)
     for step, before in _steps(cutoffs):
         if dry_run:
-            rows = read_history(url, partial(count_due, step=step, before=before))
+            rows = ask_once(url, count_due, step, before)
         else:
             rows = await _remove(store, step, before)
         done = "places of" if step.kind == "positions" else "rows of"
@@ -82,22 +77,6 @@ async def _remove(store: Store, step: PurgeStep, before: float) -> int:
         if batch.is_last:
             return rows
         await asyncio.sleep(_PAUSE_S)
-
-
-def read_history(url: str, question: Callable[[Connection], _T]) -> _T:
-    """The answer of the history's database.
-
-    Raises:
-        HopError: it does not answer.
-    """
-    engine = reading_engine(url)
-    try:
-        with engine.connect() as connection:
-            return question(connection)
-    except SQLAlchemyError as error:
-        raise HopError("database", reason_of(error)) from error
-    finally:
-        engine.dispose()
 
 
 def _lines(stats: HistoryStats) -> Iterable[str]:

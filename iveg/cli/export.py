@@ -41,11 +41,8 @@ def run(call: CommandCall) -> int:
         raise SettingsError("--since", options.since, "a moment before --until")
     asked = Filter(since=since, until=until, robot=options.robot, limit=MOST_ROWS)
     check_database(url)
-    queries = Queries(url)
-    try:
+    with contextlib.closing(Queries(url)) as queries:
         _write(options, queries, asked)
-    finally:
-        queries.close()
     return 0
 
 

@@ -5,17 +5,17 @@ from dataclasses import asdict
 from typing import Generic, TypeVar
 
 from sqlalchemy import Connection, Table, insert, select
-from sqlalchemy.exc import IntegrityError, SQLAlchemyError
+from sqlalchemy.exc import IntegrityError
 
 from iveg.adapters import clock
+from iveg.adapters.history.asking import ask
 from iveg.adapters.history.audit import write_audit
 from iveg.adapters.history.engine import reading_engine
-from iveg.adapters.history.migrate import reason_of
 from iveg.adapters.history.store import Store
 from iveg.adapters.ids import new_id
 from iveg.domain.accounts import Account, ApiToken, name_key
 from iveg.domain.audit import Actor, act_of
-from iveg.domain.errors import HopError, NameTakenError
+from iveg.domain.errors import NameTakenError
 from iveg.domain.passkeys import Passkey
 from iveg.domain.records import Json
 
@@ -45,12 +45,11 @@ class KeyedRows(Generic[R]):
 
     def read(self) -> Mapping[str, R]:
         """All rows, by their key."""
-        try:
-            with self._reading.connect() as connection:
-                rows = connection.execute(select(*self._columns)).mappings()
-                return {row[self._key]: self._kind(**row) for row in rows}
-        except SQLAlchemyError as error:
-            raise HopError("database", reason_of(error)) from error
+        return ask(self._reading, self._rows)
+
+    def _rows(self, connection: Connection) -> Mapping[str, R]:
+        rows = connection.execute(select(*self._columns)).mappings()
+        return {row[self._key]: self._kind(**row) for row in rows}
 
     def close(self) -> None:
         """Let go of the connections."""

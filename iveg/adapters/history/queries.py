@@ -8,15 +8,14 @@ import asyncio
 from collections.abc import AsyncIterator, Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from typing import Any, Concatenate, ParamSpec, TypeVar
+from typing import Any, Concatenate
 
 from sqlalchemy import Connection, Select, func, select
-from sqlalchemy.exc import SQLAlchemyError
 
 from iveg.adapters.history import lists
+from iveg.adapters.history.asking import P, T, ask
 from iveg.adapters.history.engine import reading_engine
 from iveg.adapters.history.lists import Filter, ListOf, Page, R, record_of
-from iveg.adapters.history.migrate import reason_of
 from iveg.adapters.history.tables import (
     alerts,
     command_events,
@@ -25,7 +24,6 @@ from iveg.adapters.history.tables import (
     is_open_command,
     latency,
 )
-from iveg.domain.errors import HopError
 from iveg.domain.records import (
     AlertRecord,
     CommandEventRecord,
@@ -36,8 +34,6 @@ from iveg.domain.records import (
 )
 
 _THREADS = 4
-P = ParamSpec("P")
-T = TypeVar("T")
 
 
 class Queries:
@@ -62,11 +58,10 @@ class Queries:
     ) -> T:
         """What a question finds, as ``speed_series`` of ``series``."""
 
-        def asked(connection: Connection) -> T:
-            return question(connection, *args, **named)
+        def asked() -> T:
+            return ask(self._engine, question, *args, **named)
 
-        loop = asyncio.get_running_loop()
-        return await loop.run_in_executor(self._threads, self._answer, asked)
+        return await asyncio.get_running_loop().run_in_executor(self._threads, asked)
 
     async def page(self, of: ListOf[R], asked: Filter) -> Page[R]:
         """One page of a list."""
@@ -179,13 +174,6 @@ class Queries:
         """Let go of threads and connections."""
         self._threads.shutdown(wait=False, cancel_futures=True)
         self._engine.dispose()
-
-    def _answer(self, question: Callable[[Connection], T]) -> T:
-        try:
-            with self._engine.connect() as connection:
-                return question(connection)
-        except SQLAlchemyError as error:
-            raise HopError("database", reason_of(error)) from error
 
 
 def _records(

@@ -9,8 +9,8 @@ from typing import Annotated, Any, Literal
 from fastapi import APIRouter, Depends, Query, Request, Response
 from pydantic import AfterValidator, BeforeValidator
 
+from iveg.adapters.history.asking import ask_once
 from iveg.adapters.history.cost import CostRows, cost_rows
-from iveg.adapters.history.queries import Queries
 from iveg.domain import cost
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.stamps import format_stamp
@@ -85,15 +85,8 @@ def read_cost(
     until: float,
 ) -> Cost:
     """One range (Unix s); takes a third of a second for a day of ten robots."""
-
-    async def read() -> CostRows:
-        queries = Queries(url)
-        try:
-            return await queries.ask(cost_rows, since, until, braking)
-        finally:
-            queries.close()
-
-    return _cost_of(asyncio.run(read()), greenhouse, since, until)
+    rows = ask_once(url, cost_rows, since, until, braking)
+    return _cost_of(rows, greenhouse, since, until)
 
 
 def _cost_of(

@@ -1,6 +1,7 @@
 """The evening sheet over HTTP: as numbers, and as a page to print."""
 
 import asyncio
+from contextlib import closing
 from datetime import date, timedelta
 from typing import Annotated, Any
 
@@ -71,11 +72,8 @@ def read_day(
     """One day, as far as it has gone (``now`` in Unix s); takes seconds."""
 
     async def read() -> Day:
-        queries = Queries(url)
-        try:
+        with closing(Queries(url)) as queries:
             return await _Reading(queries, greenhouse, drill_days).read(day, now)
-        finally:
-            queries.close()
 
     return asyncio.run(read())
 

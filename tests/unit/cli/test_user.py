@@ -12,10 +12,10 @@ from iveg.adapters import clock
 from iveg.adapters.admission import Admission
 from iveg.adapters.history.accounts import AccountRows, AccountStore
 from iveg.adapters.history.api_tokens import ApiTokenStore
+from iveg.adapters.history.asking import ask_once
 from iveg.adapters.history.audit import faults
 from iveg.cli import user
 from iveg.cli.arguments import CommandCall
-from iveg.cli.database import read_history
 from iveg.cli.user import set_up
 from iveg.domain.accounts import Account, PersonRole, digest_of
 from iveg.domain.audit import CONSOLE
@@ -96,8 +96,8 @@ def test_a_password_is_changed_by_who_has_the_one_that_is_kept(
     (kept,) = console.store.read().values()
     assert (kept.language, kept.disabled) == ("en", True)
     url = console.settings.database_url
-    assert read_history(url, lambda one: list(faults(one))) == []
-    assert read_history(url, _actions).count("password_changed") == 1
+    assert ask_once(url, lambda one: list(faults(one))) == []
+    assert ask_once(url, _actions).count("password_changed") == 1
 
 
 def test_whom_a_provider_vouches_for_is_kept_by_id_and_shut_out_from_here(
@@ -147,7 +147,7 @@ def test_what_raises_within_a_change_leaves_the_accounts_and_the_audit_as_they_w
         console.store.together(break_off)
 
     assert console.store.read() == {ana.account_id: ana}
-    assert read_history(console.settings.database_url, _actions) == ["account_added"]
+    assert ask_once(console.settings.database_url, _actions) == ["account_added"]
 
 
 def test_reset_role_and_disable_end_sessions_and_are_in_the_audit(
@@ -162,8 +162,8 @@ def test_reset_role_and_disable_end_sessions_and_are_in_the_audit(
     assert account.since >= began
     assert console.state("Ana") == ("viewer", True, False)
     url = console.settings.database_url
-    assert read_history(url, lambda one: list(faults(one))) == []
-    assert read_history(url, _actions) == [
+    assert ask_once(url, lambda one: list(faults(one))) == []
+    assert ask_once(url, _actions) == [
         "account_added",
         "account_reset",
         "account_role",
@@ -246,7 +246,7 @@ def test_a_programs_token_is_printed_once_listed_and_revoked(
         console.call("revoke", "MES")
     tokens.close()
     url = console.settings.database_url
-    assert read_history(url, _actions) == ["token_added", "token_revoked"]
+    assert ask_once(url, _actions) == ["token_added", "token_revoked"]
 
 
 def _actions(connection: Connection) -> list[str]:
