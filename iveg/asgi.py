@@ -74,15 +74,20 @@ def _past_routers(dss: Dss, pages: routes.Pages) -> Iterator[APIRouter]:
     queries, face = dss.stores.queries, dss.face
     views, evaluator, clock = face.views, dss.pipeline.evaluator, face.clock
     yield stop_records.router(queries, clock, views.find_command)
-    greenhouse, worker = evaluator.greenhouse, dss.worker
-    days = day.Days(queries.url, greenhouse, dss.settings.drill_days, worker)
-    yield day.router(days, pages, clock)
+    url, greenhouse, worker = queries.url, evaluator.greenhouse, dss.worker
+    run, due = worker.run, dss.settings.drill_days
+    yield day.router(
+        lambda *asked: run(day.read_day, url, greenhouse, due, *asked), pages, clock
+    )
     braking = {
         robot_id: one.profile.assumed_braking
         for robot_id, one in dss.fleet.members.items()
     }
-    costs = cost.Costs(queries.url, greenhouse, braking, worker)
-    yield cost.router(costs, pages, clock)
+    yield cost.router(
+        lambda *asked: run(cost.read_cost, url, greenhouse, braking, *asked),
+        pages,
+        clock,
+    )
     yield history.router(
         queries,
         worker,

@@ -1,8 +1,7 @@
 """What a range cost and how near it was: as numbers, and two ranges side by side."""
 
 import asyncio
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from collections.abc import Awaitable, Callable, Collection, Mapping
 from datetime import UTC, date, datetime, timedelta
 from typing import Annotated, Any, Literal
 
@@ -19,7 +18,7 @@ from iveg.models.cost import AlertCount, Cost, Heat, NearMiss, TaskCost
 from iveg.models.day import Slowed
 from iveg.models.places import GreenhouseMap, Point
 from iveg.pipeline.ports import Clock
-from iveg.web.api.answers import Apart, Json
+from iveg.web.api.answers import Json
 from iveg.web.api.history_filters import Span, as_kept, mend_plus, range_of
 from iveg.web.pages.contexts import ComparePage
 from iveg.web.pages.local_time import in_madrid, moment_of, start_of
@@ -55,26 +54,8 @@ class _TwoSpans(Span):
     than_until: _Told | None = None
 
 
-@dataclass(frozen=True)
-class Costs:
-    """Has ranges read from the history, in the worker process.
-
-    Attributes:
-        url: The history's database.
-        greenhouse: Whose aisles count.
-        braking: What margins of each robot count on (m/s²).
-        worker: The process.
-    """
-
-    url: str
-    greenhouse: Greenhouse
-    braking: Mapping[str, float]
-    worker: Apart
-
-    async def read(self, since: float, until: float) -> Cost:
-        """One range (Unix s)."""
-        asked = self.url, self.greenhouse, self.braking, since, until
-        return await self.worker.run(read_cost, *asked)
+ReadCost = Callable[[float, float], Awaitable[Cost]]
+"""Has a range read from the history (Unix s)."""
 
 
 def read_cost(
@@ -84,7 +65,10 @@ def read_cost(
     since: float,
     until: float,
 ) -> Cost:
-    """One range (Unix s); takes a third of a second for a day of ten robots."""
+    """One range (Unix s); takes a third of a second for a day of ten robots.
+
+    Margins of each robot count on its ``braking`` (m/s²).
+    """
     rows = ask_once(url, cost_rows, since, until, braking)
     return _cost_of(rows, greenhouse, since, until)
 
@@ -203,7 +187,7 @@ def _task(one: cost.TaskCost) -> TaskCost:
     )
 
 
-def router(costs: Costs, pages: Pages, read_clock: Clock) -> APIRouter:
+def router(read: ReadCost, pages: Pages, read_clock: Clock) -> APIRouter:
     """One range as numbers, two as a page."""
     routes = APIRouter()
     who = Depends(require("read"))
@@ -217,7 +201,7 @@ def router(costs: Costs, pages: Pages, read_clock: Clock) -> APIRouter:
         description="The last 24 hours unless told; 31 days at most.",
     )
     async def numbers(asked: Annotated[Span, Query()]) -> Response:
-        return Json(await costs.read(*range_of(asked, read_clock().wall, _DAY_S)))
+        return Json(await read(*range_of(asked, read_clock().wall, _DAY_S)))
 
     @routes.get("/compare", response_model=None, include_in_schema=False)
     async def compare(
@@ -229,7 +213,7 @@ def router(costs: Costs, pages: Pages, read_clock: Clock) -> APIRouter:
         today = in_madrid(now).date()
         one = _range_or_day(asked.since, asked.until, today, now)
         than = _range_or_day(asked.than_since, asked.than_until, today - _DAY, now)
-        found = [await costs.read(*span) for span in (than, one)]
+        found = [await read(*span) for span in (than, one)]
         page = ComparePage(pages.frame(request, "compare", visitor), *found)
         return await asyncio.to_thread(pages.draw, page)
 

@@ -1,6 +1,7 @@
 """The evening sheet over HTTP: as numbers, and as a page to print."""
 
 import asyncio
+from collections.abc import Awaitable, Callable
 from contextlib import closing
 from datetime import date, timedelta
 from typing import Annotated, Any
@@ -29,7 +30,7 @@ from iveg.models.command import Command
 from iveg.models.day import Day, Encounters, Pass, Slowed, Worked
 from iveg.models.places import GreenhouseMap, Point
 from iveg.pipeline.ports import Clock
-from iveg.web.api.answers import Apart, Json
+from iveg.web.api.answers import Json
 from iveg.web.api.history_filters import HistoryDay
 from iveg.web.pages.contexts import DayPage
 from iveg.web.pages.local_time import in_madrid, start_of
@@ -40,115 +41,89 @@ from iveg.web.security.authentication import require
 _DAY = timedelta(days=1)
 _MOST_PAGES = 20
 """So many pages of rows are read; a day with more is told by those."""
-
-
-class Days:
-    """Has days read from the history, in the worker process: a day takes seconds.
-
-    Args:
-        url: The history's database.
-        greenhouse: Whose aisles count.
-        drill_days: A STOP drill is due after so many days; 0: never.
-        worker: The process.
-    """
-
-    def __init__(
-        self, url: str, greenhouse: Greenhouse, drill_days: float, worker: Apart
-    ) -> None:
-        self._url = url
-        self._greenhouse = greenhouse
-        self._drill_days = drill_days
-        self._worker = worker
-
-    async def read(self, day: date, now: float) -> Day:
-        """One day, as far as it has gone (``now`` in Unix s)."""
-        asked = self._url, self._greenhouse, self._drill_days, day, now
-        return await self._worker.run(read_day, *asked)
+ReadDay = Callable[[date, float], Awaitable[Day]]
+"""Has one day read from the history, as far as it has gone (Unix s)."""
 
 
 def read_day(
     url: str, greenhouse: Greenhouse, drill_days: float, day: date, now: float
 ) -> Day:
-    """One day, as far as it has gone (``now`` in Unix s); takes seconds."""
+    """One day of a history, as far as it has gone (``now`` in Unix s); takes seconds.
+
+    A STOP drill is due after ``drill_days``; 0: never.
+    """
 
     async def read() -> Day:
         with closing(Queries(url)) as queries:
-            return await _Reading(queries, greenhouse, drill_days).read(day, now)
+            return await _read(queries, greenhouse, drill_days, day, now)
 
     return asyncio.run(read())
 
 
-class _Reading:
-    """What a day needs of the history, and what follows from it."""
+async def _read(
+    queries: Queries, greenhouse: Greenhouse, drill_days: float, day: date, now: float
+) -> Day:
+    since, end = start_of(day), start_of(day + _DAY)
+    until = max(since, min(end, now))
+    poses = await queries.ask(poses_of, since, until)
+    seen = await queries.ask(people_seen, since, until)
+    worked = worked_minutes(poses, greenhouse)
+    decisions = await _decisions(queries, since, until)
+    slowed = slowed_minutes(decisions, greenhouse, until)
+    met = encounter_counts(decisions)
+    last = await queries.last_drills()
+    by = start_of(day + 2 * _DAY)
+    return Day(
+        day=day.isoformat(),
+        since=format_stamp(since),
+        until=format_stamp(until),
+        robots=sorted({pose.robot_id for pose in poses}, key=as_counted),
+        worked=[
+            Worked(lane=lane, robot_id=robot, minutes=round(minutes, 1))
+            for lane, robots in worked.items()
+            for robot, minutes in sorted(
+                robots.items(), key=lambda one: as_counted(one[0])
+            )
+        ],
+        slowed=[
+            Slowed(cause=cause, lane=lane, minutes=round(minutes, 1))
+            for (cause, lane), minutes in sorted(
+                slowed.items(), key=lambda one: -one[1]
+            )
+        ],
+        encounters=Encounters(
+            count=met.count,
+            slowed=met.slowed,
+            foretold=met.foretold,
+            foretold_s=rounded(met.foretold_s, 1),
+        ),
+        passes=[_pass(one) for one in closest_passes(poses, seen, greenhouse)],
+        stops=[Command.of_record(one) for one in await _stops(queries, since, until)],
+        drills_due=due_drills(last, drill_days, by),
+        unseen=len(await queries.unseen_alerts(MOST_KEPT)),
+        lost=list(await queries.ask(lost_of, since, until)),
+        map=GreenhouseMap.of(greenhouse),
+    )
 
-    def __init__(
-        self, queries: Queries, greenhouse: Greenhouse, drill_days: float
-    ) -> None:
-        self._queries = queries
-        self._greenhouse = greenhouse
-        self._drill_days = drill_days
 
-    async def read(self, day: date, now: float) -> Day:
-        """The day."""
-        since, end = start_of(day), start_of(day + _DAY)
-        until = max(since, min(end, now))
-        poses = await self._queries.ask(poses_of, since, until)
-        seen = await self._queries.ask(people_seen, since, until)
-        worked = worked_minutes(poses, self._greenhouse)
-        decisions = await self._decisions(since, until)
-        slowed = slowed_minutes(decisions, self._greenhouse, until)
-        met = encounter_counts(decisions)
-        last = await self._queries.last_drills()
-        by = start_of(day + 2 * _DAY)
-        return Day(
-            day=day.isoformat(),
-            since=format_stamp(since),
-            until=format_stamp(until),
-            robots=sorted({pose.robot_id for pose in poses}, key=as_counted),
-            worked=[
-                Worked(lane=lane, robot_id=robot, minutes=round(minutes, 1))
-                for lane, robots in worked.items()
-                for robot, minutes in sorted(
-                    robots.items(), key=lambda one: as_counted(one[0])
-                )
-            ],
-            slowed=[
-                Slowed(cause=cause, lane=lane, minutes=round(minutes, 1))
-                for (cause, lane), minutes in sorted(
-                    slowed.items(), key=lambda one: -one[1]
-                )
-            ],
-            encounters=Encounters(
-                count=met.count,
-                slowed=met.slowed,
-                foretold=met.foretold,
-                foretold_s=rounded(met.foretold_s, 1),
-            ),
-            passes=[
-                _pass(one) for one in closest_passes(poses, seen, self._greenhouse)
-            ],
-            stops=[Command.of_record(one) for one in await self._stops(since, until)],
-            drills_due=due_drills(last, self._drill_days, by),
-            unseen=len(await self._queries.unseen_alerts(MOST_KEPT)),
-            lost=list(await self._queries.ask(lost_of, since, until)),
-            map=GreenhouseMap.of(self._greenhouse),
-        )
+async def _decisions(
+    queries: Queries, since: float, until: float
+) -> list[DecisionRecord]:
+    asked = Filter(since=since, until=until, limit=MOST_ROWS)
+    found: list[DecisionRecord] = []
+    for _ in range(_MOST_PAGES):
+        page = await queries.page(DECISIONS, asked)
+        found += page.items
+        if page.next is None:
+            break
+        asked = Filter(since=since, until=until, limit=MOST_ROWS, cursor=page.next)
+    return found
 
-    async def _decisions(self, since: float, until: float) -> list[DecisionRecord]:
-        asked = Filter(since=since, until=until, limit=MOST_ROWS)
-        found: list[DecisionRecord] = []
-        for _ in range(_MOST_PAGES):
-            page = await self._queries.page(DECISIONS, asked)
-            found += page.items
-            if page.next is None:
-                break
-            asked = Filter(since=since, until=until, limit=MOST_ROWS, cursor=page.next)
-        return found
 
-    async def _stops(self, since: float, until: float) -> list[CommandRecord]:
-        asked = Filter(since=since, until=until, limit=MOST_ROWS)
-        page = await self._queries.page(COMMANDS, asked)
-        return [one for one in reversed(page.items) if one.kind == "stop"]
+async def _stops(queries: Queries, since: float, until: float) -> list[CommandRecord]:
+    asked = Filter(since=since, until=until, limit=MOST_ROWS)
+    page = await queries.page(COMMANDS, asked)
+    return [one for one in reversed(page.items) if one.kind == "stop"]
 
 
 def _pass(one: Passing) -> Pass:
@@ -163,7 +138,7 @@ def _pass(one: Passing) -> Pass:
     )
 
 
-def router(days: Days, pages: Pages, clock: Clock) -> APIRouter:
+def router(read: ReadDay, pages: Pages, clock: Clock) -> APIRouter:
     """The evening sheet."""
     routes = APIRouter()
     who = Depends(require("read"))
@@ -182,7 +157,7 @@ def router(days: Days, pages: Pages, clock: Clock) -> APIRouter:
     ) -> Response:
         """What the fleet did on one day, Europe/Madrid, and what is due next."""
         now = clock().wall
-        return Json(await days.read(day or in_madrid(now).date(), now))
+        return Json(await read(day or in_madrid(now).date(), now))
 
     @routes.get("/day", response_model=None, include_in_schema=False)
     async def sheet(
@@ -192,7 +167,7 @@ def router(days: Days, pages: Pages, clock: Clock) -> APIRouter:
     ) -> Response:
         now = clock().wall
         wanted = day or in_madrid(now).date()
-        found = await days.read(wanted, now)
+        found = await read(wanted, now)
         before, after = ((wanted + step).isoformat() for step in (-_DAY, _DAY))
         frame = pages.frame(request, "day", visitor)
         page = DayPage(frame, found, before, after)

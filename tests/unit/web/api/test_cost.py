@@ -1,6 +1,6 @@
 """Issue 25, 5: what two ranges cost and how near it was, from rows of the history."""
 
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Mapping
 from functools import partial
 from pathlib import Path
 
@@ -66,10 +66,16 @@ def url(tmp_path: Path) -> str:
     return f"sqlite:///{tmp_path / 'history.db'}"
 
 
+def _reading(url: str, braking: Mapping[str, float]) -> cost.ReadCost:
+    return lambda since, until: FakeWorker().run(
+        cost.read_cost, url, GREENHOUSE, braking, since, until
+    )
+
+
 @pytest.fixture
 async def browser(url: str) -> AsyncIterator[httpx.AsyncClient]:
-    costs = cost.Costs(url, GREENHOUSE, {"AGI": 1.0}, FakeWorker())
-    async with reader(url, RECORDS, partial(cost.router, costs)) as client:
+    read = _reading(url, {"AGI": 1.0})
+    async with reader(url, RECORDS, partial(cost.router, read)) as client:
         yield client
 
 
@@ -102,8 +108,7 @@ async def test_a_near_miss_is_where_people_were_and_leads_to_its_decision(
 async def test_robots_of_which_nothing_is_described_brake_as_the_worst(
     url: str,
 ) -> None:
-    costs = cost.Costs(url, GREENHOUSE, {}, FakeWorker())
-    async with reader(url, RECORDS, partial(cost.router, costs)) as client:
+    async with reader(url, RECORDS, partial(cost.router, _reading(url, {}))) as client:
         told = (await client.get("/api/v1/cost", params=_asked())).json()
 
     assert [one["distance_m"] for one in told["near"]] == [1.0]

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import AsyncIterator
+from datetime import date
 from functools import partial
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from iveg.adapters.history.engine import writing_engine
 from iveg.adapters.history.purge import purge_batch
 from iveg.domain.records import Record
 from iveg.domain.retention import DAY_S, PURGE_STEPS
+from iveg.models.day import Day
 from iveg.web.api import day
 from tests.fakes.records import (
     alert_record,
@@ -40,8 +42,10 @@ def url(tmp_path: Path) -> str:
 
 @pytest.fixture
 async def browser(url: str) -> AsyncIterator[httpx.AsyncClient]:
-    days = day.Days(url, GREENHOUSE, 30.0, FakeWorker())
-    async with reader(url, RECORDS, partial(day.router, days)) as client:
+    async def read(wanted: date, now: float) -> Day:
+        return await FakeWorker().run(day.read_day, url, GREENHOUSE, 30.0, wanted, now)
+
+    async with reader(url, RECORDS, partial(day.router, read)) as client:
         yield client
 
 
