@@ -48,14 +48,10 @@ class BoundedJson:
     Args:
         hop: Names the server in errors.
         timeout_s: For each exchange as a whole (s), however slowly it trickles.
-        most_bytes: Of a body.
     """
 
-    def __init__(
-        self, hop: str, timeout_s: float = TIMEOUT_S, most_bytes: int = MOST_BYTES
-    ) -> None:
-        self._hop = hop
-        self._timeout_s, self._most_bytes = timeout_s, most_bytes
+    def __init__(self, hop: str, timeout_s: float = TIMEOUT_S) -> None:
+        self._hop, self._timeout_s = hop, timeout_s
         # The server's address is an operator's choice and mostly a private one.
         self._names = OutboundHttp(lambda _: True, timeout_s=timeout_s)
         self._client = httpx.AsyncClient(
@@ -112,8 +108,8 @@ class BoundedJson:
         body = bytearray()
         async for part in answer.aiter_raw():
             body += part
-            if len(body) > self._most_bytes:
-                detail = f"answered more than {self._most_bytes} bytes"
+            if len(body) > MOST_BYTES:
+                detail = f"answered more than {MOST_BYTES} bytes"
                 raise HopError(self._hop, detail)
         return bytes(body)
 

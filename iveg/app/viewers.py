@@ -7,7 +7,6 @@ comes next, because their imports alone take a second.
 
 import asyncio
 import contextlib
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -111,19 +110,10 @@ class Viewers:
         site: What worlds are made with.
         clock: Tells who has not asked for long.
         has_spares: Whether processes are kept ready for the next viewers.
-        work: Answers; tests pass another.
     """
 
-    def __init__(
-        self,
-        site: Site,
-        clock: Clock,
-        *,
-        has_spares: bool = False,
-        work: Callable[[Site, float], Shown] = world_at,
-    ) -> None:
+    def __init__(self, site: Site, clock: Clock, *, has_spares: bool = False) -> None:
         self._site, self._clock, self._has_spares = site, clock, has_spares
-        self._work = work
         self._viewers: dict[str, Viewer] = {}
         self._spares: list[Worker] = []
         self._looked_at = float("-inf")
@@ -142,7 +132,7 @@ class Viewers:
             TooManyLookError: as many look at once as may.
             HopError: the process ended.
         """
-        shown = await self.viewer(viewer).worker.run(self._work, self._site, wall)
+        shown = await self.viewer(viewer).worker.run(world_at, self._site, wall)
         if shown.missing is not None:
             raise NotRecordedError(*shown.missing)
         if shown.unreadable is not None:

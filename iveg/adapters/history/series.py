@@ -133,39 +133,36 @@ def speed_series(
     since: float,
     until: float,
     robot: str | None = None,
-    most: int = MOST_POINTS,
 ) -> tuple[SpeedSeries, ...]:
     """One series for each robot with data in ``since <= at < until``: R2 before R10."""
     robots = [robot] if robot else sorted(_robots(connection), key=as_counted)
-    found = (_one(connection, one, since, until, most) for one in robots)
+    found = (_one(connection, one, since, until) for one in robots)
     return tuple(series for series in found if series.at)
 
 
-def climate_series(
-    connection: Connection, since: float, until: float, most: int = MOST_READINGS
-) -> ClimateSeries:
+def climate_series(connection: Connection, since: float, until: float) -> ClimateSeries:
     """The air in ``since <= at < until``."""
     c = climate.c
     asked = (c.at >= since, c.at < until)
     values = (c.temperature, c.relative_humidity, c.co2)
     count = connection.scalar(select(func.count()).where(*asked)) or 0
-    if count <= most:
+    if count <= MOST_READINGS:
         return ClimateSeries(*_columns(connection, (c.at, *values), asked))
-    slice_s = (until - since) / most
+    slice_s = (until - since) / MOST_READINGS
     place = whole(connection, (c.at - since) / slice_s)
     means = (func.min(c.at), *(func.avg(value) for value in values))
     return ClimateSeries(*_columns(connection, means, asked, place), slice_s=slice_s)
 
 
 def measurement_series(
-    connection: Connection, since: float, until: float, most: int = MOST_READINGS
+    connection: Connection, since: float, until: float
 ) -> dict[tuple[str, str], MeasurementSeries]:
     """Every attribute in ``since <= at < until``, by entity and attribute.
 
     A range with more than a reading in each slice is answered in slices.
     """
     c = measurements.c
-    slice_s = (until - since) / most
+    slice_s = (until - since) / MOST_READINGS
     is_sliced = slice_s > READING_PERIOD_S
     place = whole(connection, (c.at - since) / slice_s) if is_sliced else c.row_id
     names = (c.entity_id, c.attribute)
@@ -293,13 +290,11 @@ def _robots(connection: Connection) -> Iterator[str]:
         yield last
 
 
-def _one(
-    connection: Connection, robot: str, since: float, until: float, most: int
-) -> SpeedSeries:
+def _one(connection: Connection, robot: str, since: float, until: float) -> SpeedSeries:
     o = odometry.c
     asked = (o.robot_id == robot, o.at >= since, o.at < until)
     # Three looks at the index; to count all rows takes as long as to read them.
-    enough = select(o.at).where(*asked).limit(most + 1).subquery()
+    enough = select(o.at).where(*asked).limit(MOST_POINTS + 1).subquery()
     first, last, count = connection.execute(
         select(
             select(func.min(o.at)).where(*asked).scalar_subquery(),
@@ -307,11 +302,11 @@ def _one(
             select(func.count()).select_from(enough).scalar_subquery(),
         )
     ).one()
-    if count <= most:
+    if count <= MOST_POINTS:
         rows = (o.at, o.linear, o.limit_factor, o.applied_factor, o.margin_m, o.late)
         return SpeedSeries(robot, *_columns(connection, rows, asked))
     # One slice fewer than asked for: the last row may stand on the last edge.
-    slice_s = (last - first) / (most - 1) or 1.0
+    slice_s = (last - first) / (MOST_POINTS - 1) or 1.0
     place = whole(connection, (o.at - first) / slice_s)
     slices = (
         func.min(o.at),

@@ -210,9 +210,7 @@ def within_world(box: Box3D) -> Box3D:
     raise UnreadableError("absurd", "a box outside of the world")
 
 
-def read_path(
-    path: m.Path, place: RigidTransform, task: str = "navigating"
-) -> Navigation:
+def read_path(path: m.Path, place: RigidTransform) -> Navigation:
     """The path in ``map``; a long one is thinned to 1,024 points.
 
     Raises:
@@ -226,7 +224,7 @@ def read_path(
     if not (np.abs(points) <= _FARTHEST_M).all():
         raise UnreadableError("not_a_number", "a path")
     way = tuple((float(x), float(y)) for x, y, _ in place.of(points))
-    return Navigation("", UNKNOWN_ORIGIN, task, way[-1], way)
+    return Navigation("", UNKNOWN_ORIGIN, "navigating", way[-1], way)
 
 
 @lru_cache(1024)
