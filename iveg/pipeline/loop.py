@@ -110,21 +110,28 @@ class RuleLoop:
             if self._ingest.waiting:
                 taken_at = now.mono
             judges = now.mono - judged_at >= JUDGED_APART_S * robots - _WORTH_S
-            self.step(self._ingest.drain(), now, judges=judges)
+            judges |= self._ticks_at(now)
+            arrived = list(self._ingest.drain())
+            if arrived:
+                self.step(arrived, now, judges=False)
+                # What pages are shown goes to them before the fleet is judged.
+                await asyncio.sleep(0)
             if judges:
                 judged_at = now.mono
+                self.step((), self._clock())
 
     def step(
         self, arrived: Iterable[Received], now: Instant, *, judges: bool = True
     ) -> None:
-        """Take everything that arrived, then let time pass if it is due.
+        """Take everything that arrived.
 
-        ``judges``: the fleet now, too; else with the next step that does.
+        ``judges``: and judge the fleet, and let time pass if it is due; else the next
+        step that judges does.
         """
         self._stepped(now, judges)
         for received in arrived:
             self._hear(received)
-        ticks = now.mono - self._ticked >= TICK_S - 1e-3
+        ticks = judges and self._ticks_at(now)
         if ticks:
             self._tick(now)
         elif judges:
@@ -136,6 +143,9 @@ class RuleLoop:
             self._watch_chain(now)
             for tick in self._ticks:
                 tick(now)
+
+    def _ticks_at(self, now: Instant) -> bool:
+        return now.mono - self._ticked >= TICK_S - 1e-3
 
     def _hear(self, received: Received) -> None:
         fresh = self._apply(received)

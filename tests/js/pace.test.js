@@ -1,4 +1,4 @@
-import { createPace, createScreen, withWait } from "../../iveg/static/js/core/pace.js";
+import { createPace } from "../../iveg/static/js/core/pace.js";
 import { createPainting } from "../../iveg/static/js/core/painting.js";
 import { equal, test } from "./harness.js";
 
@@ -52,32 +52,25 @@ test("a page that is not painted says seldom, but says", async () => {
   equal(said, [1]);
 });
 
-test("the screen's next frame is known from when those began that were drawn", () => {
-  const screen = createScreen();
-  equal(screen.nextMs(107, 100), 0);
-  equal(Math.round(screen.nextMs(122, 116.7)), 11);
-  equal(Math.round(screen.nextMs(160, 150)), 7);
-});
-
-test("a picture that took longer than a frame of the screen waits for the one after", () => {
-  const screen = createScreen();
-  screen.nextMs(107, 100);
-  equal(Math.round(screen.nextMs(137, 116.7)), 13);
-});
-
-test("where seldom anything is drawn the screen is taken for a usual one", () => {
-  const screen = createScreen();
-  screen.nextMs(105, 100);
-  equal(Math.round(screen.nextMs(155, 150)), 12);
-});
-
-test("what nobody drew says nothing of the screen", () => {
-  equal(createScreen().nextMs(100), 0);
-});
-
-test("the next frame may wait as long as it still comes in time, the way there counted", () => {
-  const drawn = { at: 7, within: 0.001 };
-  equal(withWait(drawn, 12), { ...drawn, wait: 0.005 });
-  equal(withWait(drawn, 3), { ...drawn, wait: 0 });
-  equal(withWait({ at: 7, within: 0.15 }, 12), { at: 7, within: 0.15, wait: 0 });
+test("a page that nobody sees says that it draws nothing", () => {
+  /** @type {boolean[]} */
+  const drawn = [];
+  const hidden = Object.getOwnPropertyDescriptor(document, "hidden");
+  const pace = createPace(
+    (_, isDrawn) => drawn.push(isDrawn),
+    (fn) => fn(),
+  );
+  try {
+    for (const [frame, isHidden] of [false, true].entries()) {
+      Object.defineProperty(document, "hidden", {
+        value: isHidden,
+        configurable: true,
+      });
+      pace.took(frame + 1);
+    }
+  } finally {
+    if (hidden) Object.defineProperty(document, "hidden", hidden);
+    else Reflect.deleteProperty(document, "hidden");
+  }
+  equal(drawn, [true, false]);
 });

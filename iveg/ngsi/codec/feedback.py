@@ -1,6 +1,7 @@
 """The feedback that iVeg publishes for the fleet, both ways."""
 
 from collections.abc import Mapping
+from functools import lru_cache
 from operator import is_
 
 import orjson
@@ -167,23 +168,30 @@ def _write_speed_limit(speed_limit: SpeedLimit) -> dict[str, object]:
 
 
 def _write_alert(alert: FeedbackAlert) -> dict[str, object]:
-    position = alert.position
     return without_none(
         {
             "decision_id": alert.decision_id or None,
             "class": alert.class_,
             "class_id": alert.class_id,
             "conf": rounded(alert.confidence),
-            "position": None
-            if position is None
-            else dict(zip("xyz", map(rounded, position), strict=True)),
+            "position": _write_vector("xyz", alert.position),
             "radius_m": rounded(alert.radius_m),
             "stamp": alert.stamp,
             "observer": alert.observer,
-            "velocity": None
-            if alert.velocity is None
-            else dict(zip("xy", map(rounded, alert.velocity), strict=True)),
+            "velocity": _write_vector("xy", alert.velocity),
         }
+    )
+
+
+@lru_cache(maxsize=512)
+def _write_vector(
+    axes: str, vector: tuple[float, ...] | None
+) -> orjson.Fragment | None:
+    """Of a ring it stays the same for as long as nobody looks there anew."""
+    if vector is None:
+        return None
+    return orjson.Fragment(
+        orjson.dumps(dict(zip(axes, map(rounded, vector), strict=True)))
     )
 
 

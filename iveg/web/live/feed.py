@@ -12,7 +12,7 @@ from typing import Final
 from iveg.domain.observations import Instant
 from iveg.pipeline import topics
 from iveg.pipeline.publish import Subscriber
-from iveg.web.live.pacing import BYTES, FEW_ROBOTS, CreditWindow
+from iveg.web.live.pacing import BYTES, GAP_S, ROBOT_GAP_S, CreditWindow
 from iveg.web.live.painting import Painting
 from iveg.web.live.telemetry import Part, TelemetryEncoder, write_frame
 
@@ -45,7 +45,6 @@ class TelemetryFeed:
         """Changed topics, and when each may be sent (monotonic, s)."""
         self._sent: dict[str, tuple[int, float]] = {}
         self._is_full = False
-        self._waits_for_news = True
         self._ready: _Frame | None = None
         """Begun for the next frame."""
 
@@ -53,10 +52,10 @@ class TelemetryFeed:
         """The page has painted a frame: there may be credit for another.
 
         ``report``, all in its own words: ``at`` and ``within`` (s) are when; without
-        ``at`` it drew nothing; ``wait`` (s) is how long the next frame may wait.
+        ``at`` it drew nothing.
         """
-        wait, within = report.get("wait"), report.get("within")
-        if type(number) is int and self.window.painted(number, now, wait, within):
+        within = report.get("within")
+        if type(number) is int and self.window.painted(number, now, within):
             self._painting.painted(number, report.get("at"), within, now)
             self._is_full = False
             self._subscriber.wake()
@@ -70,7 +69,6 @@ class TelemetryFeed:
         opens_at = self.window.opens_at
         self._subscriber.wants_telemetry = opens_at <= now
         wake_at = opens_at if opens_at > now else self._due_at()
-        self._waits_for_news |= opens_at <= now < wake_at
         return None if wake_at == _INF else max(0.0, wake_at - now)
 
     def next_frame(self, now: Instant) -> bytes | None:
@@ -88,10 +86,7 @@ class TelemetryFeed:
             return None
         data = frame.write(self.window.next_number)
         self._painting.sent(self.window.next_number, now.mono)
-        # What had to come first is not late.
-        late_s = 0.0 if self._waits_for_news else now.mono - self.window.opens_at
-        self.window.sent(frame.heavy, now.mono, late_s)
-        self._waits_for_news = False
+        self.window.sent(frame.heavy, now.mono)
         return data
 
     def write_ahead(self, now: Instant) -> None:
@@ -135,7 +130,7 @@ class TelemetryFeed:
                 self._note(self._read_outs, topic, _next_beat)
             else:
                 self._note(self._pictures, topic, _next_picture)
-        self.window.gathers = len(self._robots) > FEW_ROBOTS
+        self.window.gap_s = max(GAP_S, ROBOT_GAP_S * len(self._robots))
 
     def _note(
         self,

@@ -4,11 +4,6 @@ Buffers of the kernel, of the server and of the browser are queues without a siz
 telemetry that waits in them shows the past.  So the page says which frame it has
 painted, and no more than a window of unpainted frames is ever sent: further changes
 wait in slots, where the newest wins.
-
-A page also says how long the next frame may wait to come just in time for its next
-picture: of many robots one frame a picture is nearly as fresh as many frames, and costs
-both sides a third.  Of few robots less than a frame a picture comes by itself, so it
-goes at once.
 """
 
 from collections import deque
@@ -25,21 +20,12 @@ BYTES: Final = 24_576
 """Of what is heavy in them (scans, detections, people): 0.2 s of a line of 1 Mbit/s."""
 GAP_S: Final = 0.004
 """Frames nearer to each other would cost more than the freshness that they bring."""
-SCREEN_FRAME_S: Final = 0.015
-"""Between frames of which none is painted yet: a little less than screens take, so
-that who is late for a picture is sent something newer before the next."""
-LONGEST_WAIT_S: Final = 0.1
-"""For which a page may ask: more would show the past, and counts as nothing."""
-LATEST_S: Final = 0.006
-"""So much earlier a frame is made at most, where this side is usually late."""
-
-FEW_ROBOTS: Final = 2
-"""So few bring less than a frame a picture by themselves."""
+ROBOT_GAP_S: Final = 0.0004
+"""The same for each robot of the fleet, where that is more: 8 ms with twenty."""
+SLOW_FRAME_S: Final = 0.03
+"""A page that draws for longer than this twice is slow."""
 
 _LEARNS: Final = 0.5
-_FORGETS: Final = 0.05
-"""How late this side is it learns by the worst: a picture that is missed costs more
-than the age of a frame that waits for it."""
 
 
 class _Sent(NamedTuple):
@@ -52,19 +38,16 @@ class CreditWindow:
     """The frames that one page has not painted yet; times are monotonic (s).
 
     Attributes:
-        gathers: Whether changes wait for each other, to go together in one frame a
-            picture.
+        gap_s: Least time between two frames.
     """
 
     def __init__(self) -> None:
-        self.gathers = True
+        self.gap_s = GAP_S
         self._sent: deque[_Sent] = deque()
         self._number = 0
         self._sent_at = float("-inf")
-        self._asked_at = float("-inf")
         self._round_trip_s = 0.0
         self._line_s: float | None = None
-        self._late_s = 0.0
 
     @property
     def next_number(self) -> int:
@@ -76,9 +59,7 @@ class CreditWindow:
         """When the next frame may go; ``inf``: not before one is painted."""
         if len(self._sent) >= FRAMES:
             return float("inf")
-        gap_s = self._apart_s if self._sent else GAP_S
-        free_at = self._sent_at + gap_s
-        return max(self._asked_at, free_at) if self.gathers else free_at
+        return self._sent_at + (self._apart_s if self._sent else self.gap_s)
 
     @property
     def _apart_s(self) -> float:
@@ -87,36 +68,27 @@ class CreditWindow:
         Many on a long line, so that it is used; two while a page draws that takes
         longer than screens do: more would only keep it from drawing.
         """
-        least_s = SCREEN_FRAME_S if self.gathers else GAP_S
         if self._line_s is None:
-            return max(least_s, self._round_trip_s / FRAMES)
+            return max(self.gap_s, self._round_trip_s / FRAMES)
         half_s = (self._round_trip_s - self._line_s) / 2
-        draws_s = half_s if half_s > SCREEN_FRAME_S else 0.0
-        return max(least_s, self._line_s / FRAMES, draws_s)
+        draws_s = half_s if half_s > SLOW_FRAME_S else 0.0
+        return max(self.gap_s, self._line_s / FRAMES, draws_s)
 
     @property
     def room(self) -> int:
         """Number of heavy bytes that may go with it."""
         return BYTES - sum(one.heavy for one in self._sent)
 
-    def sent(self, heavy: int, now: float, late_s: float = 0.0) -> None:
-        """One more frame is on its way, ``heavy`` bytes of it heavy.
-
-        ``late_s`` is how long it could have gone already: this side had other work.
-        """
-        behind_s = min(late_s, LATEST_S) - self._late_s
-        self._late_s += (_LEARNS if behind_s > 0.0 else _FORGETS) * behind_s
+    def sent(self, heavy: int, now: float) -> None:
+        """One more frame is on its way, ``heavy`` bytes of it heavy."""
         self._number += 1
         self._sent_at = now
         self._sent.append(_Sent(self._number, heavy, now))
 
-    def painted(
-        self, number: object, now: float, wait: object = None, within: object = None
-    ) -> bool:
+    def painted(self, number: object, now: float, within: object = None) -> bool:
         """The page has painted this frame and all before; whether that was news.
 
-        In its own words (s): ``wait`` is how long the next frame may wait, ``within``
-        half its shortest round trip.
+        ``within``, in its own words, is half its shortest round trip (s).
         """
         if type(number) is not int or number > self._number:
             return False
@@ -127,8 +99,6 @@ class CreditWindow:
         self._round_trip_s += _LEARNS * (away_s - self._round_trip_s)
         while self._sent and self._sent[0].number <= number:
             self._sent.popleft()
-        waits_s = _bounded(wait, LONGEST_WAIT_S) or 0.0
-        self._asked_at = now + max(0.0, waits_s - self._late_s)
         half_s = _bounded(within, self._round_trip_s / 2)
         self._line_s = None if half_s is None else 2 * half_s
         return True

@@ -43,6 +43,22 @@ def test_what_is_taken_is_shown_at_once_and_judged_with_the_next_judgement() -> 
     assert desk.evaluator.speed_limits["AGI"].speed_factor == 0.5
 
 
+async def test_pages_are_shown_what_came_before_the_fleet_is_judged() -> None:
+    desk = Desk()
+    browser = desk.hub.join()
+    desk.ingest.enqueue(Received(odometry(), desk.clock()))
+    running = asyncio.create_task(desk.loop.run())
+
+    async with asyncio.timeout(30):
+        await browser.news()
+    was_unjudged = desk.evaluator.is_unjudged
+    await settle()
+
+    assert (was_unjudged, desk.evaluator.is_unjudged) == (True, False)
+    running.cancel()
+    await asyncio.gather(running, return_exceptions=True)
+
+
 def test_time_passes_once_in_a_tick_however_much_arrives() -> None:
     desk = Desk()
     desk.drive("AGI")

@@ -4,8 +4,7 @@
  *
  * @typedef {import("./presses.js").Press} Press
  * @typedef {import("./clock.js").ServerClock} ServerClock
- * @typedef {import("./painting.js").WhenPainted} WhenPainted
- * @typedef {{draws: boolean, whenPainted: (fn: WhenPainted) => void}} Painting `draws`:
+ * @typedef {{draws: boolean, whenPainted: (fn: () => void) => void}} Painting `draws`:
  *   this page shows telemetry, so the moment when it paints is worth telling
  * @typedef {{
  *   apply: (topic: string, data: any, receivedAtMs: number) => void,
@@ -14,7 +13,7 @@
  * }} Receiver `confirm`: everything sent before that ping was read
  */
 
-import { createPace, withWait } from "./pace.js";
+import { createPace } from "./pace.js";
 import { readFrame, writePainted, writePing, writeStop } from "./protocol.js";
 
 /** Asks for telemetry as fast as this page paints, and no faster. */
@@ -42,7 +41,7 @@ export class LiveSocket {
     this.#receiver = receiver;
     this.#draws = draws;
     this.#pace = createPace(
-      (frame, nextMs) => this.#painted(frame, nextMs),
+      (frame, isDrawn) => this.#painted(frame, isDrawn),
       whenPainted,
     );
     this.#socket = new WebSocket(url, [SUBPROTOCOL]);
@@ -124,11 +123,11 @@ export class LiveSocket {
     return told === null ? this.heardAtMs : Math.min(this.heardAtMs, told);
   }
 
-  /** @param {number} frame @param {number | null} nextMs as for `createPace` */
-  #painted(frame, nextMs) {
+  /** @param {number} frame @param {boolean} isDrawn */
+  #painted(frame, isDrawn) {
     if (!this.isOpen) return;
-    const isDrawn = this.#draws && nextMs !== null;
-    const drawn = isDrawn ? this.#clock.serverOf(performance.now()) : null;
-    this.#socket.send(writePainted(frame, drawn && withWait(drawn, nextMs ?? 0)));
+    const isTimed = this.#draws && isDrawn;
+    const drawn = isTimed ? this.#clock.serverOf(performance.now()) : null;
+    this.#socket.send(writePainted(frame, drawn));
   }
 }

@@ -1,9 +1,7 @@
 /**
  * The moment when this page has painted the newest messages; the map knows it, if any.
  *
- * @typedef {(beganMs?: number) => void} WhenPainted `beganMs`: when the frame of the
- *   screen began (`performance.now()`), where something was drawn
- * @typedef {{afterDrawn: (fn: WhenPainted) => void}} Painter
+ * @typedef {{afterDrawn: (fn: () => void) => void}} Painter
  */
 
 import { onNextFrame } from "./hub.js";
@@ -22,7 +20,7 @@ export function createPainting() {
     /**
      * Calls `fn` once the present values have been painted, or a second later.
      *
-     * @param {WhenPainted} fn
+     * @param {() => void} fn
      */
     when(fn) {
       if (painter) once(painter, fn);
@@ -31,16 +29,15 @@ export function createPainting() {
   };
 }
 
-/** @param {Painter} painter @param {WhenPainted} fn */
+/** @param {Painter} painter @param {() => void} fn */
 function once(painter, fn) {
   let isDone = false;
-  /** @type {WhenPainted} */
-  const done = (beganMs) => {
+  const done = () => {
     if (isDone) return;
     isDone = true;
     clearTimeout(timer);
-    fn(beganMs);
+    fn();
   };
-  const timer = setTimeout(() => done(), HIDDEN_MS);
+  const timer = setTimeout(done, HIDDEN_MS);
   painter.afterDrawn(done);
 }

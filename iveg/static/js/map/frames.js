@@ -4,8 +4,7 @@
  * A message requests the next picture the moment it arrives; however many arrive before
  * it, that picture has the newest of each, so no queue can grow.
  *
- * @typedef {(hasScans: boolean, beganMs: number) => void} WhenDrawn whether the newest
- *   scans are in it, too; when that frame of the screen began (`performance.now()`)
+ * @typedef {(hasScans: boolean) => void} WhenDrawn whether the newest scans are in it, too
  */
 
 /**
@@ -17,15 +16,13 @@ export function createFrames(draw) {
   /** @type {Set<WhenDrawn>} */
   const watchers = new Set();
   let isAsked = false;
-  let beganMs = performance.now();
   /** @type {ReturnType<typeof setTimeout> | undefined} */
   let later;
 
   function ask() {
     if (isAsked) return;
     isAsked = true;
-    requestAnimationFrame((atMs) => {
-      beganMs = atMs;
+    requestAnimationFrame(() => {
       if (isAsked) drawNow();
     });
   }
@@ -35,7 +32,7 @@ export function createFrames(draw) {
     const missingMs = draw();
     if (missingMs === null) return;
     // Who asks again meanwhile asks for the next one.
-    for (const tell of [...watchers]) tell(missingMs === 0, beganMs);
+    for (const tell of [...watchers]) tell(missingMs === 0);
     clearTimeout(later);
     if (missingMs) later = setTimeout(ask, missingMs);
   }
@@ -55,16 +52,14 @@ export function createFrames(draw) {
       return () => void watchers.delete(fn);
     },
     /**
-     * Calls `fn` once the present values are on the canvas, with the beginning of that
-     * frame of the screen (`performance.now()`).
+     * Calls `fn` once the present values are on the canvas.
      *
-     * @param {(beganMs: number) => void} fn
+     * @param {() => void} fn
      */
     afterDrawn(fn) {
-      /** @type {WhenDrawn} */
-      const tell = (_, beganMs) => {
+      const tell = () => {
         watchers.delete(tell);
-        fn(beganMs);
+        fn();
       };
       watchers.add(tell);
       ask();

@@ -9,7 +9,7 @@ import orjson
 import pytest
 
 from iveg.web.live.feed import PICTURE_S, READ_OUT_S, TelemetryFeed
-from iveg.web.live.pacing import BYTES, FRAMES, GAP_S
+from iveg.web.live.pacing import BYTES, FRAMES, GAP_S, ROBOT_GAP_S
 from iveg.web.live.painting import Painting
 from iveg.web.live.telemetry import NO_RETURN, UNIT_M
 from tests.builders import detection, scan
@@ -55,7 +55,7 @@ class Page:
         """All that is known now, each frame painted at once."""
         while self.read() is not None:
             self.paint()
-            self.desk.clock.now += 1.01 * GAP_S
+            self.desk.clock.now += 1.01 * self.feed.window.gap_s
 
     def told(self, member: str) -> list[Any]:
         """All that frames told under a member."""
@@ -238,56 +238,25 @@ def test_states_of_robots_are_not_written_in_the_frame_of_the_list_of_people(
     assert not any("robots/AGI" in topics for topics in people)
 
 
-def test_of_many_robots_the_next_frame_comes_when_the_page_asked_for_it() -> None:
-    desk = WebDesk(MANY)
-    page = Page(desk)
-    for robot_id in MANY:
-        desk.drive(robot_id)
-    page.read()
-    desk.clock.now += 0.005
-    page.feed.painted(1, desk.clock().mono, {"wait": 0.007})
-    desk.drive(MANY[0], 1.0)
-
-    assert page.feed.wait_s(desk.clock().mono) == pytest.approx(0.007)
-    assert page.read() is None
-    desk.drive(MANY[0], 2.0)
-    desk.clock.now += 0.007 + 1e-6
-    page.read()
-    assert [move[3] for move in page.told("moves")] == [0.0] * len(MANY) + [2.0]
-
-
-def test_of_two_robots_each_change_goes_at_once(desk: WebDesk, page: Page) -> None:
-    desk.drive("AGI")
-    desk.drive("AGII")
-    page.read()
-    desk.clock.now += 0.005
-    page.feed.painted(1, desk.clock().mono, {"wait": 0.007})
-    desk.drive("AGI", 1.0)
-
-    assert page.feed.wait_s(desk.clock().mono) == 0.0
-    assert page.read() is not None
-
-
-@pytest.mark.parametrize("has_news", [True, False])
-def test_a_frame_that_had_to_wait_for_news_is_not_late(*, has_news: bool) -> None:
-    fleet = MANY[:3]
+@pytest.mark.parametrize(("robots", "gap_s"), [(2, GAP_S), (20, 20 * ROBOT_GAP_S)])
+def test_the_more_robots_the_more_of_them_share_a_frame(
+    robots: int, gap_s: float
+) -> None:
+    fleet = MANY[:robots]
     desk = WebDesk(fleet)
     page = Page(desk)
     for robot_id in fleet:
         desk.drive(robot_id)
-    page.read_all()
-    desk.clock.now += 1.0
-    if has_news:
-        desk.drive(fleet[0], 1.0)
-    page.feed.wait_s(desk.clock().mono)
-    desk.clock.now += 0.02
-    desk.drive(fleet[0], 2.0)
     page.read()
-    page.feed.painted(page.frames[-1]["frame"], desk.clock().mono, {"wait": 0.05})
+    page.paint()
+    desk.drive(fleet[0], 1.0)
 
-    wait_s = page.feed.wait_s(desk.clock().mono)
-    assert wait_s is not None
-    assert (wait_s < 0.049) == has_news
+    assert page.feed.wait_s(desk.clock().mono) == pytest.approx(gap_s)
+    assert page.read() is None
+    desk.drive(fleet[0], 2.0)
+    desk.clock.now += gap_s + 1e-6
+    page.read()
+    assert [move[3] for move in page.told("moves")] == [0.0] * robots + [2.0]
 
 
 def test_what_was_not_due_comes_when_it_is(desk: WebDesk, page: Page) -> None:
