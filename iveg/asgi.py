@@ -47,7 +47,7 @@ def create_app(dss: Dss) -> FastAPI:
     app = build_app(
         dss.face,
         pages,
-        [*live_routers(dss.face), *_past_routers(dss, pages)],
+        [*(make() for make in live_routers(dss.face)), *_past_routers(dss, pages)],
         title="iVeg",
         version=__version__,
         description="Supervise mixed robot fleets in greenhouses.",
