@@ -3,10 +3,10 @@
 import asyncio
 from collections.abc import Iterator
 from functools import cache
-from importlib.resources import files
+from pathlib import Path
 
 from fastapi import APIRouter, Depends, FastAPI
-from starlette.staticfiles import StaticFiles
+from starlette.routing import Mount
 
 from iveg import __version__
 from iveg.adapters.pdf import find_browser
@@ -33,6 +33,9 @@ from iveg.web.api.answers import Json
 from iveg.web.build import build_app, live_routers
 from iveg.web.pages import openapi, routes, service_worker, sign_on
 from iveg.web.security.authentication import require
+from iveg.web.static_files import KeptFiles
+
+_STATIC = Path(__file__).with_name("static")
 
 
 def create_app(dss: Dss) -> FastAPI:
@@ -44,7 +47,7 @@ def create_app(dss: Dss) -> FastAPI:
     app = build_app(
         dss.face,
         pages,
-        [*live_routers(dss.face), *_past_routers(dss, pages)],
+        [*(make() for make in live_routers(dss.face)), *_past_routers(dss, pages)],
         title="iVeg",
         version=__version__,
         description="Supervise mixed robot fleets in greenhouses.",
@@ -65,7 +68,8 @@ def create_app(dss: Dss) -> FastAPI:
         # Made once, in a thread: it takes most of a second.
         return Json(await asyncio.to_thread(app.openapi))
 
-    app.mount("/static", StaticFiles(directory=str(files("iveg") / "static")))
+    # First of all routes: a page has 200 files, and each would be compared with each.
+    app.router.routes.insert(0, Mount("/static", KeptFiles(_STATIC)))
     return app
 
 

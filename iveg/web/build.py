@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from fastapi import APIRouter, FastAPI
@@ -100,32 +101,34 @@ class Face:
         self.trail.note(who, "stop", robot_id or "", details, at=self.clock())
 
 
-def live_routers(face: Face) -> Iterator[APIRouter]:
-    """The routes of what there is now: all but history, experiments and pages."""
+def live_routers(face: Face) -> Iterator[Callable[[], APIRouter]]:
+    """What makes the routes of now: all but history, experiments and pages."""
     parts, beside, views, clock = face.pipeline, face.services, face.views, face.clock
     watch, evaluator = parts.latency.watch, parts.evaluator
     encoder = socket.Encoder(views, parts.hub, clock)
-    yield socket.router(parts.hub, encoder, face.snapshot, clock, face.stop, watch)
-    yield robots.router(views, clock)
-    yield equipment.router(views, clock)
-    yield costmap.router(beside.mapper, evaluator, clock)
-    yield coverage.router(beside.coverage, clock)
-    yield commands.router(parts.commander, clock)
-    yield goals.router(parts.goals, clock)
-    yield alerts.router(evaluator, clock)
-    yield rule.router(beside.rules, clock)
-    yield rule.trial_router(beside.trials, beside.rules, clock)
-    yield detections.router(evaluator.tracking.newest, face.worker)
-    yield detectors.router(beside.detectors, clock)
-    yield revocations.router(beside.revocations)
-    yield things.router(beside.things, clock)
-    yield messages.router(messages.Desk(beside.messenger, face.new_id, clock))
-    yield latency.router(watch, clock, face.worker)
-    yield recordings.router(face.recordings)
-    yield past.router(face.past, clock)
-    yield health.router(clock, views.health)
+    yield partial(
+        socket.router, parts.hub, encoder, face.snapshot, clock, face.stop, watch
+    )
+    yield partial(robots.router, views, clock)
+    yield partial(equipment.router, views, clock)
+    yield partial(costmap.router, beside.mapper, evaluator, clock)
+    yield partial(coverage.router, beside.coverage, clock)
+    yield partial(commands.router, parts.commander, clock)
+    yield partial(goals.router, parts.goals, clock)
+    yield partial(alerts.router, evaluator, clock)
+    yield partial(rule.router, beside.rules, clock)
+    yield partial(rule.trial_router, beside.trials, beside.rules, clock)
+    yield partial(detections.router, evaluator.tracking.newest, face.worker)
+    yield partial(detectors.router, beside.detectors, clock)
+    yield partial(revocations.router, beside.revocations)
+    yield partial(things.router, beside.things, clock)
+    yield partial(messages.router, messages.Desk(beside.messenger, face.new_id, clock))
+    yield partial(latency.router, watch, clock, face.worker)
+    yield partial(recordings.router, face.recordings)
+    yield partial(past.router, face.past, clock)
+    yield partial(health.router, clock, views.health)
     turns = parts.supervision.longest_turn_s
-    yield metrics.router(clock, views.health, watch, face.queues, turns)
+    yield partial(metrics.router, clock, views.health, watch, face.queues, turns)
 
 
 def build_app(

@@ -7,7 +7,7 @@ from typing import Any
 import httpx
 
 from tests.chaos.witness import Witness
-from tests.processes import Site, until
+from tests.processes import NO_TLS, Site, until
 
 _LIMIT_S = 10.0
 
@@ -93,5 +93,6 @@ class Person:
             headers=page,
             timeout=_LIMIT_S,
             trust_env=False,
+            verify=NO_TLS,
             follow_redirects=True,
         )

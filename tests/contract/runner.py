@@ -20,10 +20,12 @@ object allows more than is named.  ``${name}`` is filled in everywhere.
 import asyncio
 import re
 import secrets
+import ssl
 import time
 from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 import aiomqtt
@@ -186,6 +188,12 @@ class Player:
         assert self.listener.heard.empty(), self.listener.heard.get_nowait()
 
 
+@cache
+def _trusted() -> ssl.SSLContext:
+    """Read once for all cases; a real FIWARE may be behind TLS."""
+    return httpx.create_ssl_context()
+
+
 @asynccontextmanager
 async def playing(stack: Stack) -> AsyncIterator[Player]:
     """A player with its listener and connections, ready."""
@@ -196,7 +204,7 @@ async def playing(stack: Stack) -> AsyncIterator[Player]:
 
     async with (
         http_server(handle, stack.listener_host, 0) as port,
-        httpx.AsyncClient(timeout=PATIENCE_S) as http,
+        httpx.AsyncClient(timeout=PATIENCE_S, verify=_trusted()) as http,
         aiomqtt.Client(*stack.mqtt) as mqtt,
     ):
         players.append(Player(stack, http, mqtt, port))

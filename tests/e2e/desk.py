@@ -3,12 +3,11 @@
 import asyncio
 from collections.abc import Coroutine, Iterator
 from contextlib import contextmanager
-from importlib.resources import files
 from queue import Queue
 from typing import Any, Generic, TypeVar
 
-from starlette.staticfiles import StaticFiles
-
+from iveg.web.static_files import KeptFiles
+from tests.processes import ROOT
 from tests.threads import running
 from tests.unit.web.security.test_people import PeoplesDesk
 
@@ -39,7 +38,7 @@ def served(make: type[D]) -> Iterator[Served[D]]:
 
     async def serve() -> None:
         desk = make()
-        desk.app.mount("/static", StaticFiles(directory=str(files("iveg") / "static")))
+        desk.app.mount("/static", KeptFiles(ROOT / "iveg/static"))
         await desk.people.refresh()
         try:
             async with desk.serving() as address:

@@ -18,6 +18,8 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
+from tests.processes import NO_TLS
+
 CLIENT, SECRET = "iveg", "a-secret-of-the-client"
 USER, PASSWORD = "iveg@coop.test", "a-password-of-the-user"
 _METHODS = ["GET", "POST", "PUT", "PATCH", "DELETE"]
@@ -98,7 +100,7 @@ class FakePepProxy:
             for name, value in request.headers.items()
             if name not in ("host", "content-length", "connection")
         }
-        async with httpx.AsyncClient(base_url=self.behind) as client:
+        async with httpx.AsyncClient(base_url=self.behind, verify=NO_TLS) as client:
             answer = await client.request(
                 request.method,
                 request.url.path,

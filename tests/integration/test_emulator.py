@@ -34,6 +34,7 @@ from iveg.lab.emulator.world import SimulatedWorld
 from iveg.ngsi import codec
 from iveg.robot.node_settings import NodeSettings
 from tests.integration.emulator_cloud import Cloud, broker, running, until
+from tests.processes import NO_TLS
 
 TESTBED = load_greenhouse("mvsim-20x20")
 FLEET = ("AGI", "AGII")
@@ -63,7 +64,7 @@ class FaultPort:
         self.port = port
 
     async def post(self, order: object, *, method: str = "POST") -> httpx.Response:
-        async with httpx.AsyncClient() as client:
+        async with httpx.AsyncClient(verify=NO_TLS) as client:
             url = f"http://127.0.0.1:{self.port}/"
             return await client.request(method, url, content=json.dumps(order))
 

@@ -26,7 +26,7 @@ from tests.brokers import MOSQUITTO, PLAIN
 from tests.faulty_fiware import MODULE
 from tests.integration.gate import Gate, Mood, bridge, gate
 from tests.ports import free_ports
-from tests.processes import EMULATOR, Program, Site, site, until
+from tests.processes import EMULATOR, NO_TLS, Program, Site, site, until
 
 # The gate installs Mosquitto: without it there, these tests fail instead of hiding.
 pytestmark = [
@@ -77,11 +77,12 @@ class Stack:
 
     def tell_agent(self, **faults: object) -> None:
         url = f"{self.behind['IVEG_IOTA_URL']}/test/faults"
-        httpx.post(url, json=faults, trust_env=False).raise_for_status()
+        httpx.post(url, json=faults, trust_env=False, verify=NO_TLS).raise_for_status()
 
     def ask_orion(self, method: str, path: str, **more: Any) -> httpx.Response:
         url = self.behind["IVEG_ORION_URL"] + path
-        answer = httpx.request(method, url, headers=TENANT, trust_env=False, **more)
+        settings: dict[str, Any] = {"trust_env": False, "verify": NO_TLS, **more}
+        answer = httpx.request(method, url, headers=TENANT, **settings)
         return answer.raise_for_status()
 
     # --- what iVeg says ---------------------------------------------------------------
@@ -162,7 +163,7 @@ class Stack:
 def operator(place: Site) -> Iterator[httpx.Client]:
     """Somebody who came by the sign-in link."""
     with httpx.Client(
-        base_url=f"{place.url}/api/v1/", timeout=5.0, trust_env=False
+        base_url=f"{place.url}/api/v1/", timeout=5.0, trust_env=False, verify=NO_TLS
     ) as person:
         person.get(place.sign_in_link, follow_redirects=True).raise_for_status()
         person.headers["Origin"] = place.url

@@ -12,7 +12,7 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
 from iveg.web.security.headers import CONTENT_SECURITY_POLICY, MAX_BODY
-from tests.processes import Site
+from tests.processes import NO_TLS, Site
 
 pytestmark = pytest.mark.e2e
 
@@ -22,14 +22,14 @@ JSON = {"Content-Type": "application/json"}
 
 @pytest.fixture
 def stranger(stack: Site) -> Iterator[httpx.Client]:
-    with httpx.Client(base_url=stack.url, trust_env=False) as client:
+    with httpx.Client(base_url=stack.url, trust_env=False, verify=NO_TLS) as client:
         yield client
 
 
 @pytest.fixture
 def operator(stack: Site) -> Iterator[httpx.Client]:
     """A browser with a session, its page's script not involved."""
-    with httpx.Client(base_url=stack.url, trust_env=False) as client:
+    with httpx.Client(base_url=stack.url, trust_env=False, verify=NO_TLS) as client:
         client.get(stack.sign_in_link)
         yield client
 

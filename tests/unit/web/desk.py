@@ -34,6 +34,7 @@ from tests.fakes.revocations import FakeBrokerAccess, FakeRevocations
 from tests.fakes.rule_store import FakeRuleStore, FakeTrialStore
 from tests.fakes.worker import FakeWorker
 from tests.unit.pipeline.desk import FIELD, Desk
+from tests.unit.web.when_asked import RoutesWhenAsked
 
 HOST = "iveg.test"
 API_TOKEN = "a-token-for-programs"
@@ -103,7 +104,9 @@ class WebDesk(Desk):
         )
         self.table = ConnectionTable(lambda: self.clock().mono, ConnectionCaps())
         self.pages = _pages(self.face.site)
-        self.app = build_app(self.face, self.pages, live_routers(self.face))
+        self.app = build_app(self.face, self.pages, routers=())
+        makers = list(live_routers(self.face))
+        self.app.add_middleware(RoutesWhenAsked, face=self.app, makers=makers)
 
     def _kept_choices(self) -> KeptChoices:
         self.rule_store, self.contact_store = FakeRuleStore(), FakeContacts()
