@@ -118,7 +118,7 @@ def live_routers(face: Face) -> Iterator[APIRouter]:
     yield detections.router(evaluator.tracking.newest, face.worker)
     yield detectors.router(beside.detectors, clock)
     yield revocations.router(beside.revocations)
-    yield things.router(beside.things, clock)
+    yield things.router(beside.things, evaluator.obstacles.known_here, clock)
     yield messages.router(messages.Desk(beside.messenger, face.new_id, clock))
     yield latency.router(watch, clock, face.worker)
     yield recordings.router(face.recordings)
