@@ -10,6 +10,9 @@ view; *suspected*: a faint box, or for a box's ring any, is within a metre; *wat
 for less than a second.
 
     python -m benchmarks.needless --seeds 11 --seconds 60 --each
+    python -m benchmarks.needless --seeds 12 --after 600 --seconds 600 --plan-off 0.2
+
+What is beside the plan is learnt in ten minutes: ``--after`` begins to count then.
 """
 
 import argparse
@@ -57,15 +60,18 @@ def causes(
     seconds: float,
     errors: SiteErrors = EXACT,
     spells: list[Spell] | None = None,
+    after: float = 0.0,
 ) -> Counter[str]:
     """Seconds of needless slowness by cause; ``driving``: of all that they moved.
 
-    Each spell of it is appended to ``spells``.
+    Each spell of it is appended to ``spells``; the first seconds (``after``) count not.
     """
     stage, world, iveg = staged("field", seed, DetectionRule(), errors=errors)
     found, open_ = Counter[str](), dict[tuple[str, str], Spell]()
-    for _ in range(round(seconds / STEP_S)):
+    for number in range(round((after + seconds) / STEP_S)):
         stage.step()
+        if number < after / STEP_S:
+            continue
         for robot_id, rig in world.rigs.items():
             if abs(rig.vehicle.twist.linear_x) <= MOVES_M_S:
                 continue
@@ -148,6 +154,7 @@ def main() -> None:
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--seeds", default="11,12,13,14")
     options.add_argument("--seconds", type=float, default=300.0)
+    options.add_argument("--after", type=float, default=0.0)
     options.add_argument("--each", action="store_true")
     options.add_argument("--plan-off", type=float, default=0.0)
     options.add_argument("--pose-error", type=float, default=1.0)
@@ -155,7 +162,7 @@ def main() -> None:
     errors = SiteErrors(asked.plan_off, asked.pose_error)
     found, spells = Counter[str](), list[Spell]()
     for seed in asked.seeds.split(","):
-        found += causes(int(seed), asked.seconds, errors, spells)
+        found += causes(int(seed), asked.seconds, errors, spells, asked.after)
     driving = found.pop("driving", 0)
     rows = [
         [cause, f"{steps * STEP_S:.1f}", f"{100 * steps / max(1, driving):.1f} %"]

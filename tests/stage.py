@@ -104,7 +104,8 @@ class Stage:
 
     def mark(self, person_id: str) -> None:
         """An operator says that somebody is no person, for the rest of the day."""
-        marks = ThingMarks(self.desk.evaluator.people, self.desk.parts.event_log)
+        evaluator, event_log = self.desk.evaluator, self.desk.parts.event_log
+        marks = ThingMarks(evaluator.people, event_log, evaluator.obstacles.shown)
         marks.mark(person_id, "ana", self.now.wall + 3600.0, self.now)
 
     # --- what iVeg says ---------------------------------------------------------------

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from iveg.domain.geometry import Pose2D, Twist2D
+from iveg.domain.known import KnownPlace
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Origin
 
@@ -82,6 +83,7 @@ class Feedback:
         backlog_s: How far Orion is behind (s), at most ``LONGEST_BACKLOG_S``; None
             where nobody knows.
         foresight: Robots slow before they reach a ring, too: the rule asks for it.
+        known_here: Places near this robot where what stands still slows nobody.
     """
 
     robot_id: str
@@ -95,3 +97,4 @@ class Feedback:
     seen: Mapping[str, int] = field(default_factory=dict)
     backlog_s: float | None = None
     foresight: bool = False
+    known_here: tuple[KnownPlace, ...] = ()

@@ -20,9 +20,10 @@ from numpy.typing import NDArray
 from iveg.domain.fleet import CAUTIOUS
 from iveg.domain.geometry import Pose2D, Rectangle, Twist2D
 from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.known import KnownPlace, is_known
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import LaserScan
-from iveg.domain.obstacle import Obstacle
+from iveg.domain.obstacle import Body, Obstacle
 
 _Floats = NDArray[np.float64]
 GONE_S = 0.5
@@ -170,6 +171,9 @@ class Witness:
         self._known: tuple[Obstacle, ...] = ()
         self.walkers: tuple[Obstacle, ...] = ()
         """Of the last scan, those who walk, or walked just now."""
+        self.newest: tuple[Obstacle, ...] = ()
+        """Everything of the last scan that neither the plan nor somebody explains."""
+        self._places: tuple[KnownPlace, ...] = ()
         self._looked_at = -math.inf
         self._reach_m = LIMITS.ring_default_m
 
@@ -180,11 +184,16 @@ class Witness:
         twist: Twist2D,
         known: Iterable[KnownBody],
         now: float,
+        places: Iterable[KnownPlace] = (),
     ) -> None:
-        """Take a scan, made at ``pose`` in ``map`` (monotonic, s)."""
+        """Take a scan, made at ``pose`` in ``map`` (monotonic, s).
+
+        What never left one of the ``places`` and does not move slows nobody.
+        """
         if now - self._looked_at < _EVERY_S:
             return
         self._looked_at = now
+        self._places = tuple(places)
         self._reach_m = LIMITS.ring_default_m + self._ahead_s * abs(twist.linear_x)
         followed = [one for one in self._known if self._is_followed(one, now)]
         bodies = _bodies(self._unexplained(scan, pose, twist, known, followed, now))
@@ -195,6 +204,7 @@ class Witness:
         earlier = [one for one in self._known if now - one.at <= GONE_S]
         seen = [self._joined(body, earlier, pose, now) for body in bodies]
         self._known = (*seen, *earlier)
+        self.newest = tuple(seen)
         self.walkers = tuple(one for one in seen if one.is_somebody)
 
     @property
@@ -204,7 +214,8 @@ class Witness:
 
     def present(self, now: float) -> list[Obstacle]:
         """What counts and was there within the last half second."""
-        return [one for one in self._known if one.counts and now - one.at <= GONE_S]
+        counts = (one for one in self._known if one.counts and now - one.at <= GONE_S)
+        return [one for one in counts if not is_known(one, self._places)]
 
     def obstacle(self, now: float) -> Obstacle | None:
         """The oldest of them."""
@@ -283,11 +294,8 @@ class Witness:
 
         That one is taken out of ``earlier``.
         """
-        x, y = (float(one) for one in body.mean(0))
-        size = float(np.hypot(*np.ptp(body, axis=0)))
-        ahead, aside = _seen_from(pose, body)
-        gap = self._gap_to(body, pose)
-        beside = float(ahead.mean()), float(aside.mean())
+        found = self._measured(body, pose)
+        x, y = found.x, found.y
         near = min(
             earlier, key=lambda one: math.hypot(one.x - x, one.y - y), default=None
         )
@@ -295,8 +303,25 @@ class Witness:
             reach = _APART_M + LIMITS.walking_m_s * (now - near.at)
             if math.hypot(near.x - x, near.y - y) <= reach:
                 earlier.remove(near)
-                return near.seen_at(x, y, beside, size, gap, now)
-        return Obstacle(x, y, x, y, size, gap, now, now, beside)
+                return near.seen_again(found, now)
+        return Obstacle.new(found, now)
+
+    def _measured(self, body: _Floats, pose: Pose2D) -> Body:
+        x, y = (float(one) for one in body.mean(0))
+        (xmin, ymin), (xmax, ymax) = body.min(0).tolist(), body.max(0).tolist()
+        ahead, aside = _seen_from(pose, body)
+        plan, out_m = self._plan, math.inf
+        if plan is not None and plan.is_drawn:
+            out_m = float(plan.distance_to(body[:, 0], body[:, 1]).max())
+        return Body(
+            x,
+            y,
+            float(np.hypot(*np.ptp(body, axis=0))),
+            self._gap_to(body, pose),
+            (float(ahead.mean()), float(aside.mean())),
+            Rectangle(xmin, ymin, xmax, ymax),
+            out_m,
+        )
 
 
 def _about(one: Obstacle, now: float) -> float:

@@ -39,7 +39,7 @@ from iveg.models.signing_in import (
     Tablet,
 )
 from iveg.models.snapshot import PastWorld, Snapshot
-from iveg.models.thing import Thing
+from iveg.models.thing import KnownSpot, Thing
 from iveg.models.what_if import WhatIf
 
 TOLD: tuple[type[Model], ...] = (
@@ -69,6 +69,7 @@ TOLD: tuple[type[Model], ...] = (
     Tablet,
     OwnAccount,
     RobotAccess,
+    KnownSpot,
     Thing,
     Trial,
     WhatIf,

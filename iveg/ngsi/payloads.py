@@ -298,6 +298,16 @@ class FeedbackValue(OriginFields):
     seen: Annotated[dict[str, int], Field(max_length=MAX_ROBOTS)] = {}
     backlog: object = None
     foresight: bool = False
+    known_here: object = None
+
+
+class KnownPlaceValue(Wire):
+    """A place where what stands still slows nobody, inside the feedback."""
+
+    x: Metres
+    y: Metres
+    radius_m: Annotated[float, Field(gt=0, le=0.5)]
+    most_out_m: Annotated[float, Field(ge=0, le=0.5)] | None = None
 
 
 class MountValue(Wire):

@@ -101,15 +101,21 @@ class Evaluator:
         )
         self.protected_unseen = 0
         """How often a robot slowed for a person or peer out of its own sight."""
-        self._obstacles = obstacles or Obstacles(world, people, Plan.of(greenhouse))
-        self._speed_limits = SpeedLimits(greenhouse, self._obstacles.seen)
+        self.obstacles = obstacles or Obstacles(world, people, Plan.of(greenhouse))
+        self._speed_limits = SpeedLimits(greenhouse, self.obstacles.seen)
         self.tracking = DetectionTracking(world, self.people, event_log, new_id)
         self.laser_sight = sight = LaserSight(Plan.of(greenhouse), newest_scan)
         self._staleness = Staleness(
             world, self.people, greenhouse, event_log, sight.swept
         )
         self._feedback_publisher = FeedbackPublisher(
-            world, self.people, self.tracking.other, fleet, boot, backlog
+            world,
+            self.people,
+            self.tracking.other,
+            fleet,
+            boot,
+            backlog,
+            self.obstacles.known_here.near,
         )
         self._event_log = event_log
         self._new_id = new_id
@@ -299,7 +305,7 @@ class Evaluator:
         self._staleness.tick(now)
         self._log_returned_detectors(now)
         self.tracking.forget(now)
-        walkers = list(self._obstacles.walkers())
+        walkers = list(self.obstacles.walkers())
         self.tracking.witness(walkers)
         self.aged(walkers, now)
         self._settle(now)
@@ -322,7 +328,7 @@ class Evaluator:
             yield from conditions.of_decision(decision)
         for robot in self.world.live_robots():
             yield from conditions.of_robot(robot, now)
-            fault = self._obstacles.fault(robot.robot_id, now)
+            fault = self.obstacles.fault(robot.robot_id, now)
             yield from conditions.of_laser(robot.robot_id, fault)
             yield from conditions.of_detector(robot, now, started=self._started or now)
             yield from self._low.conditions(robot)
@@ -330,7 +336,7 @@ class Evaluator:
         yield from conditions.of_fleet(self.world.live_robots(), now)
         yield from conditions.of_overload(self.world.robots.values(), now)
         yield from conditions.of_rule(self.rule)
-        yield from conditions.of_things(self.people.things.known.values())
+        yield from conditions.of_things(self.people.things.all)
 
     def _heard_s(self, crossing: Crossing) -> float:
         robot = self.world.robot(crossing.robot_id)

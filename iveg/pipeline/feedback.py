@@ -4,6 +4,8 @@ from collections.abc import Callable, Iterable, Mapping
 
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import Feedback, FeedbackAlert, SpeedLimit
+from iveg.domain.geometry import Pose2D
+from iveg.domain.known import KnownPlace
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant, Origin
 from iveg.domain.robot_state import RobotState
@@ -16,6 +18,8 @@ USED_HZ, BURST = 30.0, 8.0
 """Greatest mean rate of feedback, and size of a burst (1/s, 1)."""
 MOST_ALERTS = 256
 """A robot refuses feedback with more."""
+KnownNear = Callable[[str, Pose2D, Instant], tuple[KnownPlace, ...]]
+"""Robot, its pose, now → what is known to stand near it."""
 
 
 class FeedbackPublisher:
@@ -28,6 +32,7 @@ class FeedbackPublisher:
         other: When each robot's newest confident object of another class came.
         boot: Random, new at each start: identity of our feedback.
         backlog: How far Orion is behind (s); None where nobody knows.
+        known: Places near a robot where something static is known to stand.
     """
 
     def __init__(
@@ -38,6 +43,7 @@ class FeedbackPublisher:
         fleet: FleetPort,
         boot: str,
         backlog: Callable[[Instant], float | None] = lambda _: None,
+        known: KnownNear = lambda *_: (),
     ) -> None:
         self.published_at = float("-inf")
         self._world = world
@@ -46,6 +52,7 @@ class FeedbackPublisher:
         self._fleet = fleet
         self._boot = boot
         self._backlog = backlog
+        self._known = known
         self._seq = 0
         self._left = BURST
 
@@ -106,6 +113,7 @@ class FeedbackPublisher:
             seen,
             self._backlog(now),
             rule.foresight,
+            () if odometry is None else self._known(robot.robot_id, odometry.pose, now),
         )
 
     def _alerts(self, rule: DetectionRule, now: Instant) -> Iterable[FeedbackAlert]:

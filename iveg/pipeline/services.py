@@ -84,7 +84,7 @@ def build_services(
     return Services(
         rules,
         Detectors(parts.world, kept.detector_store, event_log, kept.out_of_service),
-        ThingMarks(evaluator.people, event_log),
+        ThingMarks(evaluator.people, event_log, evaluator.obstacles.shown),
         messenger,
         Mapper(parts.world, greenhouse.bounds, parts.scans),
         CoverageMonitor(parts.world, greenhouse),

@@ -49,7 +49,7 @@ class Staleness:
         for person in empty:
             self._log_clear(person, now)
         for thing in people.things.end(now):
-            self._event_log.log(thing_line("log.thing_over", thing, thing.by), now)
+            self._event_log.log(thing_line("over", thing, thing.by), now)
             self._event_log.changed(topics.PEOPLE.name)
         for person in people.forget(now):
             self._stages.pop(person.person_id, None)

@@ -16,6 +16,7 @@ from iveg.domain.limits import LIMITS
 from iveg.domain.observations import LaserScan
 from iveg.domain.witness import KnownBody, Outline, Plan, Witness
 from iveg.robot.caps import FREE, AppliedCap, Cap, lowest
+from iveg.robot.known_here import KnownHere
 from iveg.robot.lookahead import Lookahead
 from iveg.robot.peer_feedback import PeerFeedback
 from iveg.robot.watchdog import Watchdog
@@ -81,6 +82,7 @@ class Judgement:
         self.cap = self._waited.cap
         """In force since the last ``settle``."""
         self.watchdog = Watchdog(boot_at, limits.slow_s)
+        self._known_here = KnownHere(robot_id)
         self.local = FREE
         """Cap requested by the robot's own software, independent of iVeg."""
 
@@ -120,13 +122,15 @@ class Judgement:
         """Note a message of ``/{topic}/mqtt_feedback``."""
         if self._peer_feedback.apply(topic, feedback, self._own(now), now):
             self.watchdog.heard(feedback.seen.get(self._id), now)
+            self._known_here.note(topic, feedback)
 
     def note_scan(self, scan: LaserScan, now: float) -> None:
         """Note what the laser sees; nothing of it without a young pose."""
         motion = self.motion(now)
         if motion is not None and motion.pose is not None:
             peers = map(KnownBody.of_peer, self._peer_feedback.peers(now))
-            self._witness.look(scan, motion.pose, motion.twist, peers, now)
+            known = self._known_here.places(self.watchdog.age(now))
+            self._witness.look(scan, motion.pose, motion.twist, peers, now, known)
 
     def note_path(self, path: Sequence[tuple[float, float]], now: float) -> None:
         """Note where the robot's own navigation will drive, in ``map`` (m)."""

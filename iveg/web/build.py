@@ -121,7 +121,7 @@ def live_routers(face: Face) -> Iterator[Callable[[], APIRouter]]:
     yield partial(detections.router, evaluator.tracking.newest, face.worker)
     yield partial(detectors.router, beside.detectors, clock)
     yield partial(revocations.router, beside.revocations)
-    yield partial(things.router, beside.things, clock)
+    yield partial(things.router, beside.things, evaluator.obstacles.known_here, clock)
     yield partial(messages.router, messages.Desk(beside.messenger, face.new_id, clock))
     yield partial(latency.router, watch, clock, face.worker)
     yield partial(recordings.router, face.recordings)

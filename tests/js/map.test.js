@@ -226,6 +226,8 @@ test("every layer shows, and its switch takes it off the picture", async () => {
   store.apply("costmap", grid);
   const aisle = { label: "", xmin: 1, ymin: 1, xmax: 3, ymax: 3, columns: 1, rows: 1 };
   store.apply("coverage", { cameras: 1, lanes: [{ ...aisle, ages_s: [null] }] });
+  const known = { x: 10, y: 8, radius_m: 0.5, since: "", thing_id: null };
+  store.apply("known-here", { items: [known] });
   const name = { es: "", en: "" };
   const place = { x: 5, y: 8 };
   const tile = { state: "ok", value: 2, unit: "bar", decimals: 1, name, place };

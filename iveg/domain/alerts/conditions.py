@@ -96,11 +96,13 @@ def of_detector(
 
 
 def of_things(things: Iterable[Thing]) -> Iterable[Condition]:
-    """Places where an operator said that nobody is."""
+    """Places where an operator said that nobody is, or what stands there."""
     for one in things:
         slots: dict[str, Slot] = {"x": round(one.x, 2), "y": round(one.y, 2)}
         slots["by"] = one.by
-        yield Condition("P3", "alert.thing_marked", one.thing_id, None, slots)
+        is_person = one.kind == "person"
+        key = "alert.thing_marked" if is_person else "alert.known_marked"
+        yield Condition("P3", key, one.thing_id, None, slots)
 
 
 def _is_unplaced(robot: RobotState, now: Instant, started: Instant) -> bool:

@@ -8,11 +8,15 @@ two metres of is an encounter like any other (docs/safety.md, "The laser").
 It only adds: nothing that it finds or misses lifts a limit (``tests/properties``).
 """
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
+from itertools import chain
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.geometry import Pose2D
@@ -21,8 +25,10 @@ from iveg.domain.observations import Instant, LaserScan
 from iveg.domain.obstacle import Obstacle
 from iveg.domain.robot_state import RobotState
 from iveg.domain.rule.foresight import Encounter, Foretold, path_of
+from iveg.domain.rule.known_here import Around, KnownHere, Somebody
 from iveg.domain.rule.paths import HORIZON_S, MOVES_M_S, Circles
 from iveg.domain.rule.zones import Zone
+from iveg.domain.tracking.laser_sight import passes_by
 from iveg.domain.tracking.people import People
 from iveg.domain.tracking.sight import seen_sightings
 from iveg.domain.witness import (
@@ -40,6 +46,10 @@ CAUSE = "obstacle"
 _CHECKED_S, _FAULTY_S = 1.0, 5.0
 _LEAST_RETURNS, _STRANGE = 0.05, 0.5
 """Shares of the beams that come back at least, and of those that the plan explains."""
+_EXPLAINED, _TURNS_RAD_S = 0.7, 0.5
+"""Share of the returns that the plan explains to a laser from which places are learnt,
+and how fast its robot turns at most."""
+_WATCHED_S, _SHOWN_S = 0.45, 10.0
 _FOLLOW_M = 8.0
 """Beyond, too few beams meet somebody."""
 
@@ -72,11 +82,16 @@ Fault = Literal["blind", "unfit"]
 
 @dataclass(frozen=True, slots=True)
 class _Fit:
-    """How a laser fits the plan; since when, and by which scan (monotonic, s)."""
+    """How a laser fits the plan; since when, and by which scan (monotonic, s).
+
+    Attributes:
+        explained: Share of the returns that the plan explains.
+    """
 
     fault: Fault | None
     since: float
     at: float
+    explained: float
 
 
 def fault_of(scan: LaserScan, pose: Pose2D, plan: Plan) -> Fault | None:
@@ -84,11 +99,21 @@ def fault_of(scan: LaserScan, pose: Pose2D, plan: Plan) -> Fault | None:
 
     A wrong mount or pose draws walls where none are; zeros, and a cover, draw none.
     """
+    return _fault(scan, explained_by(scan, pose, plan))
+
+
+def explained_by(scan: LaserScan, pose: Pose2D, plan: Plan) -> tuple[int, float]:
+    """How many beams of a scan come back; the share of them that a plan explains."""
     x, y = scan.points(pose).astype(np.float64).T
-    if len(x) < _LEAST_RETURNS * len(scan.ranges):
+    explained = np.count_nonzero(plan.distance_to(x, y) <= PLAN_M)
+    return len(x), explained / max(1, len(x))
+
+
+def _fault(scan: LaserScan, fit: tuple[int, float]) -> Fault | None:
+    returns, explained = fit
+    if returns < _LEAST_RETURNS * len(scan.ranges):
         return "blind"
-    strange = np.count_nonzero(plan.distance_to(x, y) > PLAN_M)
-    return "unfit" if strange > _STRANGE * len(x) else None
+    return "unfit" if 1.0 - explained > _STRANGE else None
 
 
 Walkers = tuple[str, Instant, Sequence[tuple[float, float]]]
@@ -118,8 +143,13 @@ class Obstacles:
         self._world, self._people, self._plan = world, people, plan
         self._witnesses: dict[str, Witness] = {}
         self._seen: dict[str, SeenObstacle | None] = {}
+        self._newest: dict[str, SeenObstacle] = {}
         self._walkers: dict[str, tuple[Instant, Sequence[Obstacle]]] = {}
         self._fits: dict[str, _Fit] = {}
+        self._ranges: dict[str, NDArray[np.float32]] = {}
+        self._watched_at = -math.inf
+        self._swept_at: dict[str, float] = {}
+        self.known_here = KnownHere(people.things)
 
     def look(self, robot: RobotState, scan: LaserScan, now: Instant) -> None:
         """Take a robot's scan, made where it was when that came."""
@@ -131,20 +161,69 @@ class Obstacles:
             robot.robot_id, Witness(outline, self._plan, HORIZON_S, _FOLLOW_M)
         )
         known = (*self._peers(robot, now), *self._sighted(now))
-        witness.look(scan, pose, odometry.twist, known, now.mono)
-        self._seen[robot.robot_id] = _first(robot, witness, now)
+        places = self.known_here.near(robot.robot_id, pose, now)
+        witness.look(scan, pose, odometry.twist, known, now.mono, places)
+        first = self._seen[robot.robot_id] = _first(robot, witness, now)
+        if first is not None:
+            self._newest[robot.robot_id] = first
         self._walkers[robot.robot_id] = now, witness.walkers
         if self._plan.is_drawn:
             self._check(scan, pose, now)
+        self._watch(witness.newest, now)
+        if self._is_believed(robot, scan, now):
+            self._learn(robot.robot_id, scan, pose, witness.newest, now)
+
+    def _watch(self, seen: Sequence[Obstacle], now: Instant) -> None:
+        """Look whether somebody is, or something moves, where something is known."""
+        moving = [one for one in seen if one.stirred]
+        if now.mono - self._watched_at < _WATCHED_S:
+            self.known_here.stir(moving, now)
+            return
+        self._watched_at = now.mono
+        people = [*_people_on(self._people)]
+        present = [(one.x, one.y) for one, _ in seen_sightings(self._people, now)]
+        self.known_here.watch(Around(people, present, moving), now)
+
+    def _learn(
+        self,
+        robot_id: str,
+        scan: LaserScan,
+        pose: Pose2D,
+        seen: Sequence[Obstacle],
+        now: Instant,
+    ) -> None:
+        """Learn what is beside the plan, and what is seen to be gone."""
+        if self._plan.is_drawn:
+            self.known_here.take(robot_id, seen, now)
+        if now.mono - self._swept_at.get(robot_id, -math.inf) >= _CHECKED_S:
+            self._swept_at[robot_id] = now.mono
+            passes = partial(passes_by, scan, pose.compose(scan.mount))
+            self.known_here.swept(robot_id, passes, pose, now)
+
+    def _is_believed(self, robot: RobotState, scan: LaserScan, now: Instant) -> bool:
+        """Whether what a laser shows may be learnt: it fits, turns slowly, goes on."""
+        odometry, fit = robot.odometry, self._fits.get(robot.robot_id)
+        before = self._ranges.get(robot.robot_id)
+        self._ranges[robot.robot_id] = scan.ranges
+        fits = fit is not None and fit.explained >= _EXPLAINED
+        return (
+            odometry is not None
+            and abs(odometry.twist.angular_z) <= _TURNS_RAD_S
+            and (fits or not self._plan.is_drawn)
+            and not robot.doubts.is_open(now)
+            and before is not None
+            and not np.array_equal(before, scan.ranges)
+        )
 
     def _check(self, scan: LaserScan, pose: Pose2D, now: Instant) -> None:
         """Compare a whole scan with the plan, once a second."""
         before = self._fits.get(scan.robot_id)
         if before is None or now.mono - before.at >= _CHECKED_S:
-            fault = fault_of(scan, pose, self._plan)
+            fit = explained_by(scan, pose, self._plan)
+            fault = _fault(scan, fit)
             goes_on = before is not None and before.fault == fault
             since = before.since if before is not None and goes_on else now.mono
-            self._fits[scan.robot_id] = _Fit(fault, since, now.mono)
+            self._fits[scan.robot_id] = _Fit(fault, since, now.mono, fit[1])
 
     def fault(self, robot_id: str, now: Instant) -> Fault | None:
         """What is wrong with a robot's laser, if it is so for some seconds."""
@@ -165,6 +244,13 @@ class Obstacles:
             for robot_id, one in self._seen.items()
             if one is not None and 0.0 <= now.mono - one.at <= GONE_S
         }
+
+    def shown(self, robot_id: str, now: Instant) -> Obstacle | None:
+        """What a robot was slowed for within some seconds, for whoever looks at it."""
+        one = self._newest.get(robot_id)
+        if one is None or now.mono - one.at > _SHOWN_S:
+            return None
+        return one.zone.obstacle
 
     def walkers(self) -> Iterator[Walkers]:
         """Who walks by the newest scan of each robot, since the last time of asking."""
@@ -187,6 +273,15 @@ class Obstacles:
         for sighting, body in seen_sightings(self._people, now):
             if not sighting.laser:
                 yield body
+
+
+def _people_on(people: People) -> Iterator[Somebody]:
+    """Everybody on the map and faint boxes; marks of operators take nobody away."""
+    for person in people.known.values():
+        newest = person.newest
+        yield Somebody(person.person_id, newest.at.mono, (newest.x, newest.y))
+    for one in chain.from_iterable(people.faint.values()):
+        yield Somebody(None, 0.0, (one.position[0], one.position[1]))
 
 
 def _first(robot: RobotState, witness: Witness, now: Instant) -> SeenObstacle | None:

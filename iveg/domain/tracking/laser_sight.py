@@ -104,7 +104,7 @@ def swept_by(
     passed = [
         index
         for index in _perhaps_passed(scan, sensor, spots).tolist()
-        if _passes(scan, sensor, *spots[index].tolist())
+        if passes_by(scan, sensor, *spots[index].tolist())
     ]
     if not passed:
         return _NONE
@@ -134,7 +134,7 @@ def _perhaps_passed(
     return np.flatnonzero((hits >= away + _BEHIND_M) & (away <= _FARTHEST_M))
 
 
-def _passes(scan: LaserScan, sensor: Pose2D, x: float, y: float) -> bool:
+def passes_by(scan: LaserScan, sensor: Pose2D, x: float, y: float) -> bool:
     """Whether all beams that a person at a spot would stop end behind it."""
     dx, dy = x - sensor.x, y - sensor.y
     away, step = math.hypot(dx, dy), abs(scan.angle_increment)

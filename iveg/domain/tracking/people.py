@@ -96,7 +96,7 @@ class People:
         self._suspicions = Suspicions()
         way = straight if greenhouse is None else Ways(greenhouse).between
         self._tracker = Tracker(numbers=TrackNumbers(era), way=way)
-        self._faint: dict[str, list[Placed]] = {}
+        self.faint: dict[str, list[Placed]] = {}
         self.things = Things()
         self.turned_away = 0
         """Detections of the last frame without room."""
@@ -142,7 +142,7 @@ class People:
             for one in placed
         ]
         placed = self._assign(placed, observer, at, new_id)
-        self._faint[frame.robot_id] = [
+        self.faint[frame.robot_id] = [
             one for one in placed if one.kind == "faint" or one.possible
         ]
         return placed
@@ -299,7 +299,7 @@ class People:
             one.class_ == person.class_
             and math.dist(one.position[:2], (sighting.x, sighting.y)) <= _SUSPECT_M
             and not (is_guess and one.person)
-            for one in self._faint.get(observer, ())
+            for one in self.faint.get(observer, ())
         )
 
     def forget(self, now: Instant) -> list[TrackedPerson]:

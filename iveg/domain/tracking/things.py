@@ -5,11 +5,17 @@ takes the rings of a track whose every sighting, and every sighting that these w
 taken to continue, is of a thing: inside the circle from the first on, never as fast as
 somebody who walks, and never as sure as 0.95.  So who walks in, who moves and who is
 surely seen is protected as without it (docs/safety.md, "Not a person here").
+
+The other word, "known here", is about what lasers see and no plan draws: a crate in an
+aisle.  It is a mark of the same kind, takes no ring, and ends where anything moves
+(docs/safety.md, "Known here").
 """
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Literal
 
+from iveg.domain.known import KnownPlace
 from iveg.domain.observations import Instant
 from iveg.domain.tracking.person import Sighting, TrackedPerson
 
@@ -19,6 +25,7 @@ MOVES_FROM_M_S = 0.8
 """Half of a walker's speed: a box that jumps by 0.2 m is noise."""
 MOST_THINGS = 32
 LONGEST_S = 86_400.0
+Kind = Literal["person", "obstacle"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +35,8 @@ class Thing:
     Attributes:
         x: Of its middle in ``map`` (m); ``y`` likewise.
         by: Who said so; ``since`` when, ``until`` when at the latest.
+        kind: ``person``: what is taken for one is none; ``obstacle``: what lasers see
+            is known.
     """
 
     thing_id: str
@@ -36,6 +45,12 @@ class Thing:
     by: str
     since: Instant
     until: Instant
+    kind: Kind = "person"
+
+    @property
+    def place(self) -> KnownPlace:
+        """The circle, for lasers."""
+        return KnownPlace(self.x, self.y, RADIUS_M)
 
     def is_over(self, now: Instant) -> bool:
         """Whether its time is up, by either clock."""
@@ -61,9 +76,33 @@ class Thing:
 
 @dataclass(slots=True)
 class Things:
-    """Every thing that operators have marked, by id, in the order of their words."""
+    """Every mark of operators, by id, in the order of their words.
+
+    Attributes:
+        known: What is no person.
+        obstacles: What is known to lasers.
+    """
 
     known: dict[str, Thing] = field(default_factory=dict)
+    obstacles: dict[str, Thing] = field(default_factory=dict)
+    _moved: set[str] = field(default_factory=set)
+
+    @property
+    def all(self) -> Sequence[Thing]:
+        """Both kinds."""
+        return [*self.known.values(), *self.obstacles.values()]
+
+    def add(self, thing: Thing) -> None:
+        """Take a word of an operator."""
+        self._of(thing.kind)[thing.thing_id] = thing
+
+    def pop(self, thing_id: str) -> Thing | None:
+        """Take a word back; None: there is none of this id."""
+        self._moved.discard(thing_id)
+        return self.known.pop(thing_id, self.obstacles.pop(thing_id, None))
+
+    def _of(self, kind: Kind) -> dict[str, Thing]:
+        return self.known if kind == "person" else self.obstacles
 
     def explain(self, person: TrackedPerson, now: Instant) -> Thing | None:
         """The thing that a track is; None: it is somebody."""
@@ -72,9 +111,25 @@ class Things:
                 return one
         return None
 
-    def end(self, now: Instant) -> Iterable[Thing]:
-        """Forget those whose time is up; returns them."""
-        over = [one for one in self.known.values() if one.is_over(now)]
+    def obstacles_at(self, now: Instant) -> Sequence[Thing]:
+        """What is known to lasers now."""
+        marks = self.obstacles.values()
+        return [
+            one
+            for one in marks
+            if one.thing_id not in self._moved and not one.is_over(now)
+        ]
+
+    def moved(self, thing_id: str) -> None:
+        """Note that somebody is there, that it moved or went: it is known no more."""
+        self._moved.add(thing_id)
+
+    def end(self, now: Instant) -> Sequence[Thing]:
+        """Forget those whose time is up, or that moved; returns them."""
+        over = [
+            one for one in self.all if one.is_over(now) or one.thing_id in self._moved
+        ]
         for one in over:
-            del self.known[one.thing_id]
+            self.pop(one.thing_id)
+        self._moved.clear()
         return over

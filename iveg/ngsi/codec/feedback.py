@@ -1,11 +1,13 @@
 """The feedback that iVeg publishes for the fleet, both ways."""
 
+import math
 from collections.abc import Mapping
 from functools import lru_cache
 from operator import is_
+from typing import Annotated
 
 import orjson
-from pydantic import ValidationError
+from pydantic import Field, TypeAdapter, ValidationError
 
 from iveg.domain.errors import UnreadableError
 from iveg.domain.feedback import (
@@ -16,9 +18,14 @@ from iveg.domain.feedback import (
     SpeedLimit,
 )
 from iveg.domain.geometry import Pose2D, Twist2D
+from iveg.domain.known import MOST_TOLD, KnownPlace
 from iveg.ngsi import payloads
 from iveg.ngsi.codec.fields import read_origin, rounded, without_none, write_origin
 from iveg.ngsi.codec.untrusted import first_complaint, load_json
+
+_PLACES: TypeAdapter[list[payloads.KnownPlaceValue]] = TypeAdapter(
+    Annotated[list[payloads.KnownPlaceValue], Field(max_length=MOST_TOLD)]
+)
 
 
 def read_feedback(payload: bytes) -> Feedback:
@@ -44,6 +51,7 @@ def read_feedback(payload: bytes) -> Feedback:
         value.seen,
         _backlog(value.backlog),
         value.foresight,
+        _known_here(value.known_here),
     )
 
 
@@ -69,6 +77,23 @@ def _backlog(value: object) -> float | None:
     if isinstance(seconds, bool) or not isinstance(seconds, int | float) or seconds < 0:
         return None
     return min(float(seconds), LONGEST_BACKLOG_S)
+
+
+def _known_here(value: object) -> tuple[KnownPlace, ...]:
+    """Known places; what cannot be read is none, and never costs the rest."""
+    try:
+        places = _PLACES.validate_python(value or [])
+    except ValidationError:
+        return ()
+    return tuple(
+        KnownPlace(
+            one.x,
+            one.y,
+            one.radius_m,
+            math.inf if one.most_out_m is None else one.most_out_m,
+        )
+        for one in places
+    )
 
 
 def _alert(value: payloads.AlertValue) -> FeedbackAlert:
@@ -121,6 +146,24 @@ def _write(feedback: Feedback, shared: Mapping[str, object]) -> bytes:
             **shared,
             **_write_backlog(feedback.backlog_s),
             **({"foresight": True} if feedback.foresight else {}),
+            **_write_known(feedback.known_here),
+        }
+    )
+
+
+def _write_known(places: tuple[KnownPlace, ...]) -> dict[str, object]:
+    if not places:
+        return {}
+    return {"known_here": [_write_place(one) for one in places]}
+
+
+def _write_place(place: KnownPlace) -> dict[str, object]:
+    return without_none(
+        {
+            "x": rounded(place.x),
+            "y": rounded(place.y),
+            "radius_m": place.radius_m,
+            "most_out_m": None if math.isinf(place.most_out_m) else place.most_out_m,
         }
     )
 

@@ -536,6 +536,17 @@ export type Invitation = {
 
 export type JsonValue = unknown;
 
+/** A place where what stands still slows nobody, in ``map``. */
+export type KnownSpot = {
+  x: number;
+  y: number;
+  radius_m: number;
+  /** When it became known. */
+  since: string;
+  /** The mark of an operator; null: lasers learnt it by themselves. */
+  thing_id: string | null;
+};
+
 /** A lane of the greenhouse. */
 export type Lane = {
   xmin: number;
@@ -1209,6 +1220,8 @@ export type TabletPerson = {
 /** One mark: who is born inside its circle and stays there slows nobody. */
 export type Thing = {
   thing_id: string;
+  /** ``person``: no person; ``obstacle``: known, whatever lasers see. */
+  kind: "person" | "obstacle";
   /** Of its middle in ``map``. */
   x: number;
   y: number;

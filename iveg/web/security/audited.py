@@ -111,7 +111,9 @@ AUDITED: Final[Mapping[tuple[str, str], Audited]] = {
     ("POST", f"{_API}/notes"): Audited(
         "note", asked=("text", "at", "x", "y", "robot_id", "decision_id")
     ),
-    ("POST", f"{_API}/things"): Audited("mark_thing", "", ("person_id",), ("id",)),
+    ("POST", f"{_API}/things"): Audited(
+        "mark_thing", "", ("person_id", "robot_id"), ("id",)
+    ),
     ("DELETE", f"{_API}/things/{{thing_id}}"): Audited("unmark_thing", "thing_id"),
     ("PUT", f"{_API}/messages/email"): Audited(
         "messages_email", asked=("on", "server", "port", "security", "least")

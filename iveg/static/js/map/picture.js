@@ -21,6 +21,7 @@ import * as greenhouse from "./layers/greenhouse.js";
 import * as grid from "./layers/grid.js";
 import { createGround } from "./layers/ground.js";
 import * as intent from "./layers/intent.js";
+import * as known from "./layers/known.js";
 import * as links from "./layers/links.js";
 import * as measure from "./layers/measure.js";
 import { matchPixels } from "./layers/paint.js";
@@ -40,6 +41,7 @@ export const LAYERS = [
   "greenhouse",
   "coverage",
   "costmap",
+  "known",
   "trail",
   "scan",
   "intent",
@@ -53,7 +55,7 @@ export const LAYERS = [
 ];
 
 /** Of the greenhouse and what is known of it: they never move. */
-const STILL = ["grid", "greenhouse", "coverage", "costmap"];
+const STILL = ["grid", "greenhouse", "coverage", "costmap", "known"];
 /** Robots, and what hides no robot: in each picture. */
 const OVER_GROUND = LAYERS.slice(LAYERS.indexOf("robot"));
 /** Between them. */
@@ -80,6 +82,7 @@ export function createPicture(canvas, trails) {
     greenhouse: greenhouse.draw,
     coverage: coverage.draw,
     costmap: createCostmapLayer(),
+    known: known.draw,
     trail: (paint) => trail.draw(paint, trails, chosen.trailS),
     scan: createScanLayer(),
     intent: intent.draw,

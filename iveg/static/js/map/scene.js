@@ -42,6 +42,7 @@
  *   robots: SceneRobot[], people: ScenePerson[], detections: SceneDetection[],
  *   scans: SceneScan[], costmap: import("../core/protocol.js").Costmap | null,
  *   coverage: import("../core/protocol.js").Coverage | null,
+ *   known: {items: import("../types.js").KnownSpot[]} | null,
  *   tiles: import("../core/protocol.js").Tile[],
  * }} Scene
  */
@@ -68,6 +69,20 @@ const NO_PATH = [];
 /** @type {import("../core/protocol.js").Encounter[]} */
 const NO_ENCOUNTERS = [];
 
+/** A scene without anything. */
+export const NOTHING = {
+  nowMs: 0,
+  map: null,
+  isVeiled: false,
+  robots: [],
+  people: [],
+  detections: [],
+  scans: [],
+  costmap: null,
+  coverage: null,
+  known: null,
+};
+
 /**
  * @param {Store} store
  * @param {number} nowMs `performance.now()` (ms)
@@ -86,6 +101,7 @@ export function readScene(store, nowMs) {
     scans: readScans(store, nowMs),
     costmap: store.get("costmap") ?? null,
     coverage: store.get("coverage") ?? null,
+    known: store.get("known-here") ?? null,
     tiles: readTiles(store),
   };
 }

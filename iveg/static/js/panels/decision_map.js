@@ -75,6 +75,7 @@ export function sceneOf({ position, places, rule, ...told }, map) {
     scans: [],
     costmap: null,
     coverage: null,
+    known: null,
     tiles: [],
   };
 }

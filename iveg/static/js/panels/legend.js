@@ -12,6 +12,7 @@ import * as equipment from "../map/layers/equipment.js";
 import * as greenhouse from "../map/layers/greenhouse.js";
 import * as grid from "../map/layers/grid.js";
 import * as intent from "../map/layers/intent.js";
+import * as known from "../map/layers/known.js";
 import { createLabels } from "../map/layers/labels.js";
 import * as links from "../map/layers/links.js";
 import * as people from "../map/layers/people.js";
@@ -20,6 +21,7 @@ import * as scalebar from "../map/layers/scalebar.js";
 import { createScanLayer } from "../map/layers/scan.js";
 import { readTheme } from "../map/layers/theme.js";
 import * as trail from "../map/layers/trail.js";
+import { NOTHING } from "../map/scene.js";
 import { make, need } from "./dom.js";
 
 /**
@@ -297,6 +299,7 @@ export const SIGNS = [
     draw: coverage.draw,
     scene: looked([0, 30, 120, null]),
   },
+  known.SIGN,
   {
     name: "aisle",
     layer: "greenhouse",
@@ -386,15 +389,3 @@ export function paintSign(
     ),
   );
 }
-
-const NOTHING = {
-  nowMs: 0,
-  map: null,
-  isVeiled: false,
-  robots: [],
-  people: [],
-  detections: [],
-  scans: [],
-  costmap: null,
-  coverage: null,
-};

@@ -6,7 +6,7 @@
 
 import { installPaintHook } from "../core/painthook.js";
 import { takeAsked } from "../core/showing.js";
-import { followCostmap, followCoverage } from "../map/costmap.js";
+import { followCostmap, followCoverage, followKnown } from "../map/costmap.js";
 import { hears } from "../map/layers/belief.js";
 import { createMap } from "../map/map.js";
 import { all, need, setAttribute, setHidden, setText } from "./dom.js";
@@ -131,11 +131,13 @@ export function createMapbox(app, decision) {
   for (const tool of all(".map-tools [disabled]")) tool.removeAttribute("disabled");
 }
 
-/** What only the present has: costmap and coverage.
+/** What only the present has: costmap, coverage and what is known to stand where.
  * @param {LiveMap} map @param {App["store"]} store */
 function followPresent(map, store) {
-  const isOn = () => map.layers().some(({ name, on }) => name === "costmap" && on);
-  followCostmap(store, isOn, map.believer);
+  const isOn = (/** @type {string} */ layer) => () =>
+    map.layers().some(({ name, on }) => name === layer && on);
+  followCostmap(store, isOn("costmap"), map.believer);
+  followKnown(store, isOn("known"));
   followCoverage(store);
 }
 

@@ -1,7 +1,8 @@
 /**
- * "Not a person here": an operator marks a thing that cameras take for a person, and
- * takes marks back, in the list of people.  A mark lowers protection, so it is asked
- * twice; the second press counts only for the person that the first one was for.
+ * "Not a person here" and "Known here": an operator marks a thing that cameras take for a
+ * person, or that a robot's laser sees and no plan draws, and takes marks back, in the
+ * list of people.  A mark lowers protection, so it is asked twice; the second press counts
+ * only for what the first one was for.
  */
 
 import { readApi, sendApi } from "../core/api.js";
@@ -10,45 +11,75 @@ import { fill, make, need, setHidden, setText } from "./dom.js";
 
 /**
  * @typedef {import("../core/protocol.js").Person} Person
+ * @typedef {import("../core/protocol.js").Robot} Robot
  * @typedef {import("../types.js").Thing} Thing
  */
 
+/** What is said of a mark, by its kind. */
+const WORDS = {
+  person: {
+    mark: "things.mark",
+    sure: "things.sure",
+    asked: "things.asked",
+    marked: "things.marked",
+    one: "things.one",
+  },
+  obstacle: {
+    mark: "things.known_mark",
+    sure: "things.known_sure",
+    asked: "things.known_asked",
+    marked: "things.known_marked",
+    one: "things.known_one",
+  },
+};
 const MARKERS = new Set(["operator", "admin"]);
 /** So long a first press waits for its second. */
 const ASKED_MS = 8000;
+/** So long after a robot was slow for it something may be marked; the server's, too. */
+const SHOWN_MS = 10000;
+
+/** @typedef {{person_id: string} | {robot_id: string}} What of which person, or robot */
 
 /** @param {import("../core/i18n.js").I18n} i18n */
 export function createThings(i18n) {
   const list = need("#things-list");
+  /** When each robot was slow for its laser. @type {Map<string, number>} */
+  const slowedMs = new Map();
   /** @type {Thing[]} */
   let things = [];
-  /** @type {{personId: string, untilMs: number} | null} */
+  /** @type {{id: string, untilMs: number} | null} */
   let asked = null;
 
-  /** Whether a person's button waits for its second press. @param {string} personId */
-  const isAsked = (personId) =>
-    asked?.personId === personId && performance.now() < asked.untilMs;
+  /** Whether a button waits for its second press. @param {string} id */
+  const isAsked = (id) => asked?.id === id && performance.now() < asked.untilMs;
 
   function makeItem() {
     const item = make("li");
     const button = make("button", "button");
     button.type = "button";
-    button.addEventListener("click", () => press(button));
+    button.addEventListener("click", () => {
+      const id = button.dataset.person ?? "";
+      press(button, id, { person_id: id }, WORDS.person);
+    });
     item.append(make("b"), make("small"), make("p"), button);
     return item;
   }
 
-  /** @param {HTMLButtonElement} button */
-  async function press(button) {
-    const personId = button.dataset.person ?? "";
-    if (!isAsked(personId)) {
-      asked = { personId, untilMs: performance.now() + ASKED_MS };
-      setText(button, i18n.t("things.sure"));
-      return say("things.asked");
+  /**
+   * @param {HTMLButtonElement} button
+   * @param {string} id of what it marks
+   * @param {What} what
+   * @param {typeof WORDS.person} words
+   */
+  async function press(button, id, what, words) {
+    if (!isAsked(id)) {
+      asked = { id, untilMs: performance.now() + ASKED_MS };
+      setText(button, i18n.t(words.sure));
+      return say(words.asked);
     }
     asked = null;
-    const { status, body } = await sendApi("POST", "things", { person_id: personId });
-    tell(status, body, "things.marked");
+    const { status, body } = await sendApi("POST", "things", what);
+    tell(status, body, words.marked);
     return renew();
   }
 
@@ -71,8 +102,8 @@ export function createThings(i18n) {
 
   /** Forgets a first press whose person is gone. @param {Person[]} people */
   function keep(people) {
-    if (asked && !people.some(({ person_id }) => person_id === asked?.personId))
-      asked = null;
+    const ids = [...people.map(({ person_id }) => person_id), ...slowedMs.keys()];
+    if (asked && !ids.includes(asked.id)) asked = null;
   }
 
   /** The button of a person's item. @param {Element} item @param {Person} person */
@@ -82,7 +113,45 @@ export function createThings(i18n) {
     const may = MARKERS.has(document.body.dataset.role ?? "");
     setHidden(button, !may || person.class !== "person" || thing_id !== null);
     button.dataset.person = person_id;
-    setText(button, i18n.t(isAsked(person_id) ? "things.sure" : "things.mark"));
+    setText(button, i18n.t(isAsked(person_id) ? WORDS.person.sure : WORDS.person.mark));
+  }
+
+  /** What robots are slow for by their lasers. @param {Robot[]} robots */
+  function drawSlowed(robots) {
+    const nowMs = performance.now();
+    for (const { robot_id, speed_limit } of robots) {
+      if (speed_limit.reason === "obstacle") slowedMs.set(robot_id, nowMs);
+    }
+    for (const [robot, atMs] of slowedMs) {
+      if (nowMs - atMs > SHOWN_MS) slowedMs.delete(robot);
+    }
+    const may = MARKERS.has(document.body.dataset.role ?? "");
+    fill(
+      need("#slowed-list"),
+      may ? [...slowedMs.keys()] : [],
+      makeSlowed,
+      writeSlowed,
+    );
+  }
+
+  function makeSlowed() {
+    const item = make("li");
+    const button = make("button", "button");
+    button.type = "button";
+    button.addEventListener("click", () => {
+      const id = button.dataset.robot ?? "";
+      press(button, id, { robot_id: id }, WORDS.obstacle);
+    });
+    item.append(make("p"), button);
+    return item;
+  }
+
+  /** @param {Element} item @param {string} robot */
+  function writeSlowed(item, robot) {
+    const button = /** @type {HTMLButtonElement} */ (need("button", item));
+    button.dataset.robot = robot;
+    setText(need("p", item), i18n.t("things.known_beside", { robot }));
+    setText(button, i18n.t(isAsked(robot) ? WORDS.obstacle.sure : WORDS.obstacle.mark));
   }
 
   async function renew() {
@@ -96,7 +165,7 @@ export function createThings(i18n) {
     setHidden(need("#things-title"), things.length === 0);
     fill(list, things, makeMark, (item, thing) => {
       const slots = { ...thing, until: dayAndTime(thing.until) };
-      setText(need("p", item), i18n.t("things.one", slots));
+      setText(need("p", item), i18n.t(WORDS[thing.kind].one, slots));
       const button = /** @type {HTMLButtonElement} */ (need("button", item));
       button.dataset.thing = thing.thing_id;
       setText(button, i18n.t("things.unmark"));
@@ -114,5 +183,5 @@ export function createThings(i18n) {
   }
 
   i18n.onChange(draw);
-  return { makeItem, write, keep, renew };
+  return { makeItem, write, keep, drawSlowed, renew };
 }
