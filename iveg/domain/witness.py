@@ -286,7 +286,7 @@ class Witness:
         x, y = (float(one) for one in body.mean(0))
         size = float(np.hypot(*np.ptp(body, axis=0)))
         ahead, aside = _seen_from(pose, body)
-        gap = self._gap_to(body, pose)
+        gap = float(self._outline.gap_to(ahead, aside).min())
         beside = float(ahead.mean()), float(aside.mean())
         near = min(
             earlier, key=lambda one: math.hypot(one.x - x, one.y - y), default=None
