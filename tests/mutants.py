@@ -231,8 +231,8 @@ MUTANTS = (
     ),
     Mutant(
         "clear: what is missing concerns its own robot alone",
-        "if observer is robot:\n        return True",
-        "if True:\n        return observer is robot",
+        "if self.observer is robot:\n            return True",
+        "if True:\n            return self.observer is robot",
         ("unit/domain/rule/test_premises.py",),
     ),
     Mutant(
@@ -364,7 +364,7 @@ MUTANTS = (
     ),
     Mutant(
         "rule: somebody without a place slows nobody",
-        "self.unplaced += _may_be_somebody(detection, rule)",
+        "self.unplaced += may_be_somebody(detection, rule)",
         "self.unplaced += 0",
         ("unit/pipeline/test_frames.py",),
     ),
@@ -412,8 +412,8 @@ MUTANTS = (
     ),
     Mutant(
         "clear: a laser whose walls are not the plan's finds a spot empty",
-        "if len(strange) > (1.0 - _EXPLAINED) * len(points):",
-        "if False:",
+        "is_fit = len(strange) <= (1.0 - _EXPLAINED) * len(points)",
+        "is_fit = True",
         ("unit/domain/tracking/test_laser_sight.py",),
     ),
     Mutant(

@@ -317,7 +317,7 @@ class Witness:
             x,
             y,
             float(np.hypot(*np.ptp(body, axis=0))),
-            self._gap_to(body, pose),
+            float(self._outline.gap_to(ahead, aside).min()),
             (float(ahead.mean()), float(aside.mean())),
             Rectangle(xmin, ymin, xmax, ymax),
             out_m,

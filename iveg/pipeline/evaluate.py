@@ -252,10 +252,11 @@ class Evaluator:
         for change in changes:
             self._crossed(change, now)
         before, self.speed_limits = self.speed_limits, speed_limits
+        # Mostly all are the very same, and this is asked at each judgement.
+        perhaps = () if speed_limits is before else speed_limits.items()
         changed = [
             robot_id
-            for robot_id, speed_limit in speed_limits.items()
-            # Of most it is the very same, and this is asked of all at each judgement.
+            for robot_id, speed_limit in perhaps
             if speed_limit is not (was := before[robot_id])
             and (speed_limit.speed_factor, speed_limit.reason, speed_limit.cause)
             != (was.speed_factor, was.reason, was.cause)

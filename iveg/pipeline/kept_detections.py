@@ -50,6 +50,8 @@ class KeptDetections:
         key, now = (frame.robot_id, subject), received.at.mono
         # Frames come at 10 or 30 Hz: half a frame early must not wait a whole one.
         is_due = now - self._kept_at.get(key, -1e9) >= 0.95 * KEPT_EVERY_S
+        if not is_due and one.person is None:
+            return
         look = _Look(one, frame, received, is_kept=is_due)
         if is_due:
             self._kept_at[key] = now

@@ -39,6 +39,8 @@ class Hall(Scene):
         self.newest: LaserScan | None = None
         swept = LaserSight(Plan.of(HALL), self._newest).swept
         self.all_clear = AllClear(swept)
+        self.confidences = 0.85, 0.85
+        """Of the camera, in turn with seconds."""
         self._rng = np.random.default_rng(1)
 
     def _newest(self, robot: RobotState) -> LaserScan | None:
@@ -49,7 +51,8 @@ class Hall(Scene):
         self.now = round(self.now + _TICK_S, 6)
         self.drive("AGI", x, linear=speed)
         ahead = [one for one in people if self.is_in_view(*one, x)]
-        self.look("AGI", *(person(*one, probability=0.85) for one in ahead))
+        sure = self.confidences[int(self.now) % 2]
+        self.look("AGI", *(person(*one, probability=sure) for one in ahead))
         discs = [Disc(*one, 0.25) for one in people]
         pose = Pose2D(x, 0.0, 0.0)
         ranges = sweep(pose, MODEL, Scenery.of(HALL), discs, [], self._rng)
@@ -84,13 +87,16 @@ def _goes(
     st.lists(_WALKS, min_size=1, max_size=2),
     st.floats(0.4, LIMITS.walking_m_s),
     st.sampled_from((0.0, 0.4)),
+    st.sampled_from(((0.85, 0.85), (0.85, 0.6), (0.6, 0.85))),
 )
 def test_no_all_clear_leaves_somebody_who_walks_without_a_ring_and_nobody_is_made_up(
     walks: list[tuple[tuple[float, float], list[tuple[float, float]]]],
     pace: float,
     speed: float,
+    confidences: tuple[float, float],
 ) -> None:
     hall, x = Hall(), -2.0
+    hall.confidences = confidences
     walks = [(place, [*stops]) for place, stops in walks]
     for _ in range(60):
         x += speed * _TICK_S

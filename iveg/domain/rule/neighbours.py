@@ -87,14 +87,22 @@ class Neighbours:
         return (
             0.0 <= now.mono - self.at <= _HOLDS_S
             and rule.radius_m == self.radius_m
-            and all(map(self._is_still_there, world.robots.values()))
-            and all(map(self._is_still_seen_there, people.known.values()))
+            and all(
+                self._is_still_there(robot)
+                for robot in world.robots.values()
+                # Its moment is known or estimated once, as it comes.
+                if self.checked.get(robot.robot_id) is not robot.odometry
+            )
+            and all(
+                self._is_still_seen_there(person)
+                for name, person in people.known.items()
+                if self.checked.get(name) is not person
+            )
         )
 
     def _is_still_there(self, robot: RobotState) -> bool:
-        # Its moment is known or estimated once, as it comes.
         odometry, name = robot.odometry, robot.robot_id
-        if odometry is None or self.checked.get(name) is odometry:
+        if odometry is None:
             return True
         place, now = self.places.get(name), _place_of(robot)
         if place is None or now is None or not _is_as_near(now, place):
@@ -103,8 +111,6 @@ class Neighbours:
         return True
 
     def _is_still_seen_there(self, person: TrackedPerson) -> bool:
-        if self.checked.get(person.person_id) is person:
-            return True
         before = self.persons.get(person.person_id)
         if before is None:
             return False

@@ -40,11 +40,11 @@ class Missing:
 def missing_premises(world: World, now: Instant) -> Mapping[str, tuple[Missing, ...]]:
     """What is missing for each robot, the reason for its limit first."""
     robots = world.robots.values()
-    # Of most nothing lacks, and this is asked of all at each judgement.
+    if all(_is_plainly_whole(one, now) for one in robots):
+        return dict.fromkeys(world.robots, ())
     gaps = [
-        (observer, premise)
+        _Gap.of(observer, premise)
         for observer in robots
-        if not _is_plainly_whole(observer, now)
         for premise in _gaps(observer, now)
     ]
     return {
@@ -60,15 +60,61 @@ def _is_pose_young(robot: RobotState, now: Instant) -> bool:
     return age is not None and age <= LIMITS.silence_s
 
 
-def _missing_of(
-    robot: RobotState, gaps: list[tuple[RobotState, Premise]], now: Instant
-) -> Iterator[Missing]:
+@dataclass(frozen=True, slots=True)
+class _Gap:
+    """What one robot leaves open, and whom that concerns.
+
+    Attributes:
+        theirs: Where the observer may be; its camera protects so far (``reach_m``).
+    """
+
+    observer: RobotState
+    missing: Missing
+    recording: str | None
+    theirs: tuple[Pose2D, ...]
+    reach_m: float
+
+    @classmethod
+    def of(cls, observer: RobotState, premise: Premise) -> "_Gap":
+        """What is the same for everybody whom it may concern."""
+        return cls(
+            observer,
+            _missing(premise, observer.robot_id),
+            observer.recording,
+            observer.possible_poses(),
+            observer.profile.camera_range + LIMITS.ring_most_m,
+        )
+
+    def concerns(
+        self, robot: RobotState, recording: str | None, ours: tuple[Pose2D, ...]
+    ) -> bool:
+        """Whether a robot is where the observer's camera would protect it.
+
+        ``ours``: where that may be.
+
+        A robot of unknown place may be anywhere.  What a recording lacks concerns
+        recordings of its own frame.
+        """
+        if self.observer is robot:
+            return True
+        if self.recording != recording:
+            return False
+        if not self.theirs or not ours:
+            return True
+        for one in self.theirs:
+            for two in ours:
+                if one.distance_to(two.x, two.y) <= self.reach_m:
+                    return True
+        return False
+
+
+def _missing_of(robot: RobotState, gaps: list[_Gap], now: Instant) -> Iterator[Missing]:
     if not _is_pose_young(robot, now):
         yield _missing("pose", robot.robot_id)
-    ours = robot.possible_poses()
-    for observer, premise in gaps:
-        if _concerns(observer, robot, ours):
-            yield _missing(premise, observer.robot_id)
+    ours, recording = robot.possible_poses(), robot.recording
+    for gap in gaps:
+        if gap.concerns(robot, recording, ours):
+            yield gap.missing
 
 
 @lru_cache(maxsize=1024)
@@ -77,12 +123,19 @@ def _missing(premise: Premise, robot_id: str) -> Missing:
     return Missing(premise, robot_id)
 
 
-def _is_plainly_whole(observer: RobotState, now: Instant) -> bool:
-    """Whether a robot was never doubted, and its newest frame is young and whole."""
-    detector, whole_at = observer.detector, observer.detector.whole_at
-    if whole_at is None or detector.flawed_at or observer.doubts.were_raised:
+def _is_plainly_whole(robot: RobotState, now: Instant) -> bool:
+    """Whether nothing of a robot lacks, plainly.
+
+    It was never doubted, and its pose and its newest frame are young, and that whole.
+    """
+    detector, pose_at = robot.detector, robot.pose_at
+    whole_at = detector.whole_at
+    if whole_at is None or pose_at is None:
         return False
-    return now.mono - whole_at <= LIMITS.silence_s
+    if detector.flawed_at or robot.doubts.were_raised:
+        return False
+    # Asked of all at each judgement.
+    return now.mono - min(whole_at, pose_at) <= LIMITS.silence_s
 
 
 def _gaps(observer: RobotState, now: Instant) -> Iterator[Premise]:
@@ -93,28 +146,3 @@ def _gaps(observer: RobotState, now: Instant) -> Iterator[Premise]:
     is_required = observer.description.has_detector and not observer.is_replay
     if detector.is_missing(now) if is_required else detector.is_flawed(now):
         yield "detector"
-
-
-def _concerns(
-    observer: RobotState, robot: RobotState, ours: tuple[Pose2D, ...]
-) -> bool:
-    """Whether a robot is where the observer's camera would protect it.
-
-    ``ours``: where that may be.
-
-    A robot of unknown place may be anywhere.  What a recording lacks concerns
-    recordings of its own frame.
-    """
-    if observer is robot:
-        return True
-    if observer.recording != robot.recording:
-        return False
-    reach = observer.profile.camera_range + LIMITS.ring_most_m
-    theirs = observer.possible_poses()
-    if not theirs or not ours:
-        return True
-    for one in theirs:
-        for two in ours:
-            if one.distance_to(two.x, two.y) <= reach:
-                return True
-    return False

@@ -10,7 +10,6 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from copy import copy
 from dataclasses import dataclass, replace
 from itertools import count
-from operator import is_
 from types import MappingProxyType
 
 from iveg.domain.detection_rule import DetectionRule
@@ -141,14 +140,15 @@ class SpeedLimits:
         again, changes = self._foresight.if_released, list[LimitChange]()
         # Should anything fail, everybody is judged anew.
         before, self._judged = self._judged, {}
-        anew, judged = set[str](), dict[str, tuple[object, ...]]()
+        anew, judged = list[str](), dict[str, tuple[object, ...]]()
         for name, robot in world.robots.items():
             if robot.odometry is None:
                 continue
             zones = near(robot)
             known = seen.get(name), ahead.get(name), again.get(name)
             rests_on = (*_premises_of(robot), *known, *zones)
-            if _are_same(rests_on, before.get(name)):
+            # Of most it is the very same, which is compared first.
+            if rests_on == before.get(name):
                 judged[name] = rests_on
                 continue
             mine = self._open.setdefault(name, {})
@@ -157,7 +157,7 @@ class SpeedLimits:
             met |= self._foreseen(robot, mine, world, now)
             crossed = list(self._cross(robot, mine, met, now, ids))
             changes += crossed
-            anew.add(name)
+            anew.append(name)
             if not crossed and self._is_settled(name, world):
                 judged[name] = rests_on
         missing, self.missing = self.missing, missing_premises(world, now)
@@ -183,15 +183,25 @@ class SpeedLimits:
     ) -> dict[str, SpeedLimit]:
         """The limit of every robot; notes since when it is limited.
 
+        While nothing changes they are the very same mapping, which nobody changes.
+
         Args:
             anew: Who was judged anew; the others keep their limits.
             missing: What was missing as those were made.
             now: This judgement.
         """
-        limits = {**self._limits}
-        for name, lacks in self.missing.items():
-            if name in limits and name not in anew and lacks == missing.get(name):
-                continue
+        before, names = self._limits, anew
+        if missing != self.missing or len(before) != len(missing):
+            known = before.keys() - anew
+            names = [
+                name
+                for name, lacks in self.missing.items()
+                if name not in known or lacks != missing.get(name)
+            ]
+        if not names:
+            return before
+        limits = {**before}
+        for name in names:
             limit = limits[name] = self._speed_limit(name)
             if limit.speed_factor > HALF_SPEED:
                 self.limited_since.pop(name, None)
@@ -354,11 +364,6 @@ _NOBODY: Mapping[str, Encounter] = MappingProxyType({})
 def _premises_of(robot: RobotState) -> tuple[object, ...]:
     """What of a robot itself its judgement rests on."""
     return robot.odometry, robot.description, robot.live_at, robot.map_frame
-
-
-def _are_same(one: tuple[object, ...], other: tuple[object, ...] | None) -> bool:
-    """Whether both hold the very same values, which are frozen."""
-    return other is not None and len(one) == len(other) and all(map(is_, one, other))
 
 
 def _beside(seen: SeenObstacle | None) -> Found:

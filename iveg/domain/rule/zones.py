@@ -110,15 +110,16 @@ def deepest(robot: RobotState, zones: Iterable[Zone], mine: Container[str]) -> F
     nearest: Found = {}
     if robot.odometry is None:
         return nearest
-    pose, robot_id = robot.odometry.pose, robot.robot_id
+    pose, robot_id, recording = robot.odometry.pose, robot.robot_id, robot.recording
+    x, y = pose.x, pose.y
     for zone in zones:
         cause, reach = zone.cause, zone.radius_m + NOT_FAR_M
-        dx, dy = zone.x - pose.x, zone.y - pose.y
+        dx, dy = zone.x - x, zone.y - y
         if dx * dx + dy * dy > reach * reach and cause not in mine:
             continue
-        if cause == robot_id or zone.recording not in (None, robot.recording):
+        if cause == robot_id or zone.recording not in (None, recording):
             continue
-        distance = pose.distance_to(zone.x, zone.y)
+        distance = math.hypot(dx, dy)
         depth = distance - zone.radius_m
         if cause not in nearest or depth < nearest[cause][0]:
             nearest[cause] = depth, distance, zone
@@ -218,14 +219,12 @@ class _Look:
     before: Mapping[str, _Made]
     made: dict[str, _Made]
 
-    def circles_of(self, cause: str) -> Sequence[Zone]:
+    def make(self, cause: str) -> _Made:
         """The circles of a cause; while they stay the same, the very same."""
-        made = self.made.get(cause)
-        if made is None:
-            made = self.made[cause] = self._make(cause)
-        return made.zones
+        made = self.made[cause] = self._made_of(cause)
+        return made
 
-    def _make(self, cause: str) -> _Made:
+    def _made_of(self, cause: str) -> _Made:
         before, now = self.before.get(cause), self.now
         person = self.people.known.get(cause)
         peer = self.world.robots.get(cause) if person is None else None
@@ -267,9 +266,12 @@ def _near(
     causes, mine = neighbours.causes.get(name, _NOBODY), inside.get(name, _NOBODY)
     if not (causes or mine):
         return ()
-    found: list[Zone] = []
-    for cause in (*causes, *[one for one in mine if one not in causes]):
-        found += look.circles_of(cause)
+    found, made = list[Zone](), look.made
+    is_within = mine.keys() <= causes.keys()
+    more = () if is_within else [one for one in mine if one not in causes]
+    # Asked of each robot at each judgement: nearly all are made already.
+    for cause in (*causes, *more) if more else causes:
+        found += (made.get(cause) or look.make(cause)).zones
     return found
 
 

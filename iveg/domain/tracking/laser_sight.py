@@ -53,6 +53,8 @@ class LaserSight:
         self._newest = newest
         self._scans: dict[str, tuple[LaserScan, bool]] = {}
         """By robot the newest scan that was asked for, and whether it is frozen."""
+        self._strange: dict[str, tuple[LaserScan, Pose2D, _Floats | None]] = {}
+        """By robot a scan, where it was made, and what the plan leaves of it."""
 
     def swept(
         self,
@@ -71,7 +73,19 @@ class LaserSight:
         scan = self._newest(robot)
         if scan is None or self._is_frozen(scan):
             return _NONE
-        return swept_by(scan, pose, spots, ages, self._plan, bodies)
+        passed = _passed(scan, pose, spots)
+        strange = self._strange_of(scan, pose) if passed else None
+        return (
+            _NONE if strange is None else _empty(passed, strange, spots, ages, bodies)
+        )
+
+    def _strange_of(self, scan: LaserScan, pose: Pose2D) -> _Floats | None:
+        """``_unexplained``, once for all rings and ticks that ask the same scan."""
+        before = self._strange.get(scan.robot_id)
+        if before is None or before[0] is not scan or before[1] != pose:
+            before = scan, pose, _unexplained(scan, pose, self._plan)
+            self._strange[scan.robot_id] = before
+        return before[2]
 
     def _is_frozen(self, scan: LaserScan) -> bool:
         """Whether a scan repeats the one before to the bit: no laser is so exact."""
@@ -100,18 +114,37 @@ def swept_by(
         plan: What stands in the greenhouse.
         bodies: Who is seen by now and has a ring: whoever walked there is one of them.
     """
+    passed = _passed(scan, pose, spots)
+    strange = _unexplained(scan, pose, plan) if passed else None
+    return _NONE if strange is None else _empty(passed, strange, spots, ages, bodies)
+
+
+def _passed(scan: LaserScan, pose: Pose2D, spots: _Floats) -> list[int]:
+    """The spots that a laser sees past."""
     sensor = pose.compose(scan.mount)
-    passed = [
+    return [
         index
         for index in _perhaps_passed(scan, sensor, spots).tolist()
         if passes_by(scan, sensor, *spots[index].tolist())
     ]
-    if not passed:
-        return _NONE
+
+
+def _unexplained(scan: LaserScan, pose: Pose2D, plan: Plan) -> _Floats | None:
+    """Returns that the plan does not explain, in ``map`` (m); None: of too many."""
     points = scan.points(pose).astype(np.float64)
     strange = points[plan.distance_to(points[:, 0], points[:, 1]) > PLAN_M]
-    if len(strange) > (1.0 - _EXPLAINED) * len(points):
-        return _NONE
+    is_fit = len(strange) <= (1.0 - _EXPLAINED) * len(points)
+    return strange if is_fit else None
+
+
+def _empty(
+    passed: list[int],
+    strange: _Floats,
+    spots: _Floats,
+    ages: _Floats,
+    bodies: Iterable[KnownBody],
+) -> NDArray[np.intp]:
+    """Those of the spots that are seen past where nobody may have walked from."""
     for one in bodies:
         away = np.hypot(strange[:, 0] - one.x, strange[:, 1] - one.y)
         strange = strange[away > one.radius]

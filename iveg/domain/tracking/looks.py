@@ -24,8 +24,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.limits import LIMITS
-from iveg.domain.observations import Instant
+from iveg.domain.observations import Detection, Instant
 from iveg.domain.tracking.calibration import PLAIN, Calibration
 
 FAINT_FROM = 0.50
@@ -41,6 +42,7 @@ SUREST = 4.0
 """Bound of the log-odds: no number of looks makes certain (0.982)."""
 _NEAR_M = 1.0
 _FARTHEST_M = _NEAR_M + LIMITS.walking_m_s * FORGOTTEN_S
+_ROUNDING_M = 0.01
 MOST_SUSPECTS = 64
 """Of each robot; the one not seen for longest gives way."""
 
@@ -133,11 +135,40 @@ class _Suspect:
         return min(SUREST, self.odds + self.look)
 
 
+@dataclass(frozen=True, slots=True)
+class _Suspected:
+    """Whom one robot suspects, and the area in ``map`` that they are in (m)."""
+
+    suspects: list[_Suspect]
+    xmin: float = math.inf
+    xmax: float = -math.inf
+    ymin: float = math.inf
+    ymax: float = -math.inf
+    newest_at: float = -math.inf
+
+    @classmethod
+    def of(cls, suspects: list[_Suspect]) -> "_Suspected":
+        """These, who stay where they are until the robot's next picture."""
+        if not suspects:
+            return cls(suspects)
+        xs, ys = [one.x for one in suspects], [one.y for one in suspects]
+        # The newest is the last.
+        newest_at = suspects[-1].seen_at
+        return cls(suspects, min(xs), max(xs), min(ys), max(ys), newest_at)
+
+    def may_have(self, one: FaintPerson, now: float) -> bool:
+        """Whether a detection may be one of them; few robots look at one place."""
+        most = _FARTHEST_M + _ROUNDING_M
+        return self.xmin - most <= one.x <= self.xmax + most and (
+            self.ymin - most <= one.y <= self.ymax + most or now < self.newest_at
+        )
+
+
 @dataclass(slots=True)
 class Suspicions:
     """Everybody whom robots suspect."""
 
-    _of: dict[tuple[str | None, str], list[_Suspect]] = field(default_factory=dict)
+    _of: dict[tuple[str | None, str], _Suspected] = field(default_factory=dict)
     """By recording (None: of today) and robot."""
 
     def look(
@@ -163,12 +194,13 @@ class Suspicions:
             None for who is too faint to be suspected and continues nobody.
         """
         now, own = at.mono, (recording, observer)
-        known = _kept(self._of.get(own, ()), now)
+        before = self._of.get(own)
+        known = [] if before is None else _kept(before.suspects, now)
         free = list(known)
         found = [_match(one, free, known, calibration, now) for one in seen]
         for suspect in free:
             suspect.miss(now)
-        self._of[own] = _kept(known, now)
+        self._of[own] = _Suspected.of(_kept(known, now))
         others = [
             theirs
             for key, theirs in self._of.items()
@@ -177,7 +209,7 @@ class Suspicions:
         return [
             None
             if suspect is None
-            else _judged(suspect, [_nearest(one, they, now) for they in others], least)
+            else _judged(suspect, _who_is(one, others, now), least)
             for one, suspect in zip(seen, found, strict=True)
         ]
 
@@ -203,14 +235,23 @@ def _match(
     return suspect
 
 
+def _who_is(
+    one: FaintPerson, others: Sequence[_Suspected], now: float
+) -> list[_Suspect | None]:
+    """Whom each of the other robots that look there takes a detection for."""
+    return [
+        _nearest(one, they.suspects, now) for they in others if they.may_have(one, now)
+    ]
+
+
 def _nearest(
     one: FaintPerson, suspects: Sequence[_Suspect], now: float
 ) -> _Suspect | None:
-    found, least = None, math.inf
+    found, least, x = None, math.inf, one.x
     for suspect in suspects:
-        # First what nearly all fail: every box asks every other robot's suspects.
+        # First what nearly all fail: every box asks other robots' suspects.
         if (
-            abs(suspect.x - one.x) <= _FARTHEST_M
+            -_FARTHEST_M <= suspect.x - x <= _FARTHEST_M
             # Of a late picture it may have gone farther.
             and (abs(suspect.y - one.y) <= _FARTHEST_M or now < suspect.seen_at)
             and not suspect.is_over(now)
@@ -244,3 +285,10 @@ def _judged(
 def _kept(known: Sequence[_Suspect], now: float) -> list[_Suspect]:
     going_on = [one for one in known if not one.is_over(now)]
     return sorted(going_on, key=lambda one: one.seen_at)[-MOST_SUSPECTS:]
+
+
+def may_be_somebody(detection: Detection, rule: DetectionRule) -> bool:
+    """Whether a detection would slow robots if its place were known."""
+    verdict = rule.judge(detection.class_id, detection.probability)
+    suspected = verdict.class_ == "person" and detection.probability >= FAINT_FROM
+    return verdict.kind == "alert" or (rule.possible_people and suspected)

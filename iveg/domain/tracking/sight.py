@@ -237,9 +237,11 @@ def seen_sightings(
 ) -> Iterator[tuple[Sighting, KnownBody]]:
     """Who is seen now and has a ring, and where that explains returns of lasers."""
     for person in people.known.values():
-        if person.age_s(now) > _YOUNG_S or person.newest.recording is not None:
+        # Asked for each scan that is looked at: most people were seen long ago.
+        newest = person.newest
+        if now.mono - newest.at.mono > _YOUNG_S or newest.recording is not None:
             continue
-        if people.things.explain(person, now) is not None:
+        if people.things.known and people.things.explain(person, now) is not None:
             continue
         for one in person.sightings:
             age = one.age_s(now)

@@ -344,10 +344,10 @@ class Tracker:
 
     def _lost_before(self, person: TrackedPerson) -> Iterator[TrackedPerson]:
         """Who may be this one: well known, and in no picture since it appeared."""
-        apart = self._together.get(person.person_id, set())
+        apart, began = self._together.get(person.person_id, set()), person.began.at.mono
         for other in self.known.values():
             if (
-                other.newest.at.mono < person.began.at.mono
+                other.newest.at.mono < began
                 and other.is_well_known
                 and other.class_ == person.class_
                 and other.newest.recording == person.newest.recording
@@ -356,22 +356,22 @@ class Tracker:
                 yield other
 
     def _twin_of(self, track: str, at: Instant) -> str | None:
-        person = self.known[track]
+        person, most = self.known[track], self.merge_m
         if person.newest.reach_m:
             return None
         apart, x, y = self._together.get(track, set()), person.newest.x, person.newest.y
         for other in self.known.values():
             if (
                 # First what nearly all fail: in a storm this is asked of everybody.
-                abs(other.newest.x - x) <= self.merge_m
-                and abs(other.newest.y - y) <= self.merge_m
+                -most <= (newest := other.newest).x - x <= most
+                and -most <= newest.y - y <= most
                 and other is not person
                 and other.class_ == person.class_
-                and other.newest.recording == person.newest.recording
+                and newest.recording == person.newest.recording
                 and other.person_id not in apart
                 and other.age_s(at) <= LIMITS.seen_s
-                and not other.newest.reach_m
-                and distance_between(other.newest, person.newest) <= self.merge_m
+                and not newest.reach_m
+                and distance_between(newest, person.newest) <= most
             ):
                 return other.person_id
         return None

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.greenhouse import Greenhouse
@@ -189,6 +190,27 @@ def test_a_laser_that_repeats_itself_to_the_bit_finds_nothing_empty() -> None:
     given = iter((one, one, other, other, noisy))
     scene, sight = scene_with_scan(), LaserSight(PLAN, lambda _: next(given))
     assert [sweeps(scene, sight) for _ in range(5)] == [True, True, False, False, True]
+
+
+def test_one_scan_is_compared_with_the_plan_once_for_all_who_ask_it() -> None:
+    asked = list[int]()
+
+    class Counted(Plan):
+        def distance_to(
+            self, x: NDArray[np.float64], y: NDArray[np.float64]
+        ) -> NDArray[np.float64]:
+            asked.append(len(x))
+            return Plan.distance_to(self, x, y)
+
+    plan = Counted(PLAN.bounds, PLAN.rectangles, PLAN.posts)
+    one, moved = scan_of(), replace(HERE, x=HERE.x + 0.01)
+    scene, sight = scene_with_scan(), LaserSight(plan, lambda _: one)
+    assert sweeps(scene, sight)
+    assert sweeps(scene, sight)
+    assert len(asked) == 1
+    scene.world.robot("AGI").scan_pose = moved
+    sweeps(scene, sight)
+    assert len(asked) == 2
 
 
 def test_an_old_scan_finds_nothing_empty() -> None:

@@ -2,8 +2,11 @@
 
 import math
 from collections.abc import Sequence
+from unittest.mock import patch
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from iveg.domain.tracking.calibration import Calibration
 from iveg.domain.tracking.looks import (
@@ -181,6 +184,41 @@ def test_a_weak_box_keeps_nobody_else(weak: float, moment: float, x: float) -> N
     robots.look([seen(0.85)], 0.8)
 
     assert not any(one.confirmed for one in robots.look([seen(weak, x)], moment))
+
+
+_PICTURES = st.lists(
+    st.tuples(
+        st.sampled_from(("AGI", "AGII", "AGIII")),
+        st.floats(-1.0, 0.5),
+        st.lists(
+            st.builds(
+                FaintPerson,
+                st.floats(-4.0, 4.0),
+                st.floats(-4.0, 4.0),
+                st.floats(0.3, 0.9),
+            ),
+            max_size=3,
+        ),
+    ),
+    max_size=12,
+)
+
+
+@given(_PICTURES)
+def test_robots_that_look_elsewhere_are_not_asked_and_would_have_said_nothing(
+    pictures: list[tuple[str, float, list[FaintPerson]]],
+) -> None:
+    def told() -> list[list[Looks | None]]:
+        suspicions, now, out = Suspicions(), 10.0, []
+        for robot, later, found in pictures:
+            # Pictures may be late.
+            now += later
+            out.append(suspicions.look(robot, found, at(now), 0.8))
+        return out
+
+    quick = told()
+    with patch("iveg.domain.tracking.looks._Suspected.may_have", return_value=True):
+        assert told() == quick
 
 
 def test_a_storm_keeps_the_newest() -> None:
