@@ -50,6 +50,13 @@ def contradictions(robot: Robot, *, alerted: bool) -> dict[str, bool]:
 
 @settings(max_examples=60, deadline=None)
 @given(days)
+@example(
+    [
+        ("look", "AGI", []),
+        ("healthy", 0.3, 0.0),
+        ("report", "AGI", 0.3, "hold", (), 0.0),
+    ]
+)
 def test_no_situation_contradicts_what_is_told_beside_it(
     day: list[tuple[Any, ...]],
 ) -> None:

@@ -13,6 +13,7 @@ from typing import get_args
 from iveg.domain.events import Condition, Slot
 from iveg.domain.feedback import FULL_SPEED, HALF_SPEED
 from iveg.domain.limits import LIMITS
+from iveg.domain.observations import SafetyReport
 from iveg.domain.rule.premises import Missing
 from iveg.domain.situation.facts import Action, Level, Near, RobotFacts, Situation
 from iveg.domain.stop.commands import State
@@ -149,12 +150,17 @@ def _held(facts: RobotFacts) -> Iterator[Situation]:
         return
     holds = report.holds
     if not holds:
-        if report.reason == "hold":
+        if _waits_for_resume(report):
             yield Situation("locked", "ready", "hold", action="resume")
         return
     first = min(holds, key=lambda one: list(_UNLOCKED).index(one.ack))
     action, source = _UNLOCKED[first.ack], f"held_{first.source}"
     yield Situation("locked", "held", "hold", source, first.id, action)
+
+
+def _waits_for_resume(report: SafetyReport) -> bool:
+    """Whether a robot that nothing holds stays where it is, and does not drive."""
+    return report.reason == "hold" and report.speed_factor <= 0.0
 
 
 # --- speed ----------------------------------------------------------------------------
@@ -163,7 +169,7 @@ def _held(facts: RobotFacts) -> Iterator[Situation]:
 def _limited(facts: RobotFacts) -> Iterator[Situation]:
     """Slow: by its own report, or because iVeg tells it and it does not say so yet."""
     report, limit, applied = facts.report, facts.limit, facts.applied
-    held = report is not None and (report.holds or report.reason == "hold")
+    held = report is not None and (report.holds or _waits_for_resume(report))
     if held or facts.stop != "RUNNING":
         return
     if limit.speed_factor < applied:
