@@ -506,6 +506,18 @@ def test_no_column_of_a_list_is_cut(browser: Browser, past: Site, name: str) -> 
                 assert evaluate(page, CUT_LISTS) == [], (language, wide)
 
 
+def test_a_robot_of_the_fleet_page_is_a_few_lines_on_a_phone(
+    browser: Browser, past: Site
+) -> None:
+    with frozen_page(browser, past, (390, 844)) as page:
+        page.goto(f"{past.url}/fleet")
+        settle(page, "#machines tbody tr")
+        high = page.locator("#machines tbody tr").evaluate_all(
+            "(rows) => rows.map((row) => row.offsetHeight)"
+        )
+    assert max(high) < 200
+
+
 CUT_LISTS = """() => [...document.querySelectorAll('.scroll-x')]
   .filter((it) => it.querySelector('.table--list, #machines'))
   .filter((it) => it.checkVisibility() && it.scrollWidth > it.clientWidth)
