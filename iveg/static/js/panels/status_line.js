@@ -21,8 +21,8 @@ const TICK_MS = 200;
 const BACK_SHOWN_MS = 3000;
 /** A first connection quicker than this is not worth a word (ms). */
 const PATIENCE_MS = 1500;
-/** More letters than this are smaller on a phone; than that, everywhere: long names of
- * robots, and a sentence of now over a map of then. */
+/** More letters than this, or more lines than fit, are smaller on a phone; than that,
+ * everywhere: long names of robots, and a sentence of now over a map of then. */
 const LONG = 64;
 const VERY_LONG = 86;
 /** What lasts less than this is not told (ms). */
@@ -55,12 +55,21 @@ export function createStatusLine({ store, i18n }) {
     setAttribute(place, "data-level", shown.level);
     const isPast = document.body.hasAttribute("data-past");
     const said = isPast ? i18n.t("past.now", { said: shown.said }) : shown.said;
-    place.toggleAttribute("data-long", said.length > LONG);
-    place.toggleAttribute("data-very-long", said.length > VERY_LONG);
-    setText(need("#status-said"), said);
+    fit(said);
     if (shown.robotId) setAttribute(place, "href", addressOf(shown.robotId));
     else place.removeAttribute("href");
     if (aloud) setText(need("#status-told"), aloud.said);
+  }
+
+  /** Writes a sentence whole; what fits is asked for new ones. @param {string} said */
+  function fit(said) {
+    const text = need("#status-said");
+    if (text.textContent === said) return;
+    setText(text, said);
+    place.toggleAttribute("data-very-long", said.length > VERY_LONG);
+    place.toggleAttribute("data-long", said.length > LONG);
+    if (text.offsetHeight > place.clientHeight)
+      place.toggleAttribute("data-long", true);
   }
 
   /** @param {ConnectionState} state */
