@@ -517,11 +517,12 @@ def test_a_phone_cuts_no_sentence_of_danger(
     robot.update(robot_id=name, situation=lost, age_s=4.2, link="LOST")
     told["snapshot"]["robots"] = [robot]
     with frozen_page(
-        browser, past, (390, 844), language=language, tell=lambda: told
+        browser, past, (844, 390), language=language, tell=lambda: told
     ) as page:
         page.goto(f"{past.url}/account")
         settle(page, "#status[data-level=danger]")
         page.clock.run_for(500)
+        page.set_viewport_size({"width": 390, "height": 844})
         found = evaluate(page, SAID)
         assert page.locator("#status-said").inner_text().startswith(name)
         assert found["whole"]

@@ -55,19 +55,26 @@ export function createStatusLine({ store, i18n }) {
     setAttribute(place, "data-level", shown.level);
     const isPast = document.body.hasAttribute("data-past");
     const said = isPast ? i18n.t("past.now", { said: shown.said }) : shown.said;
-    fit(said);
+    say(said);
     if (shown.robotId) setAttribute(place, "href", addressOf(shown.robotId));
     else place.removeAttribute("href");
     if (aloud) setText(need("#status-told"), aloud.said);
   }
 
-  /** Writes a sentence whole; what fits is asked for new ones. @param {string} said */
-  function fit(said) {
+  /** Writes a sentence whole. @param {string} said */
+  function say(said) {
     const text = need("#status-said");
     if (text.textContent === said) return;
     setText(text, said);
     place.toggleAttribute("data-very-long", said.length > VERY_LONG);
-    place.toggleAttribute("data-long", said.length > LONG);
+    fit();
+  }
+
+  /** Costs a layout, so it is asked of new sentences and of new windows only. */
+  function fit() {
+    const text = need("#status-said");
+    const isLong = (text.textContent ?? "").length > LONG;
+    place.toggleAttribute("data-long", isLong);
     if (text.offsetHeight > place.clientHeight)
       place.toggleAttribute("data-long", true);
   }
@@ -90,6 +97,7 @@ export function createStatusLine({ store, i18n }) {
   store.subscribe("connection", draw);
   store.subscribe("snapshot", draw);
   i18n.onChange(draw);
+  addEventListener("resize", fit);
   setInterval(onBeat, TICK_MS, draw);
   draw();
 }
