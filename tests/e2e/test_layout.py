@@ -506,6 +506,56 @@ def test_no_column_of_a_list_is_cut(browser: Browser, past: Site, name: str) -> 
                 assert evaluate(page, CUT_LISTS) == [], (language, wide)
 
 
+@pytest.mark.parametrize("language", ["es", "en"])
+@pytest.mark.parametrize("name", ["AGI", "Tractor"])
+def test_a_phone_cuts_no_sentence_of_danger(
+    browser: Browser, past: Site, language: str, name: str
+) -> None:
+    lost = staged.told(STAGED["lost while moving"][0])
+    told = frozen()
+    robot = told["snapshot"]["robots"][0]
+    robot.update(robot_id=name, situation=lost, age_s=4.2, link="LOST")
+    told["snapshot"]["robots"] = [robot]
+    with frozen_page(
+        browser, past, (844, 390), language=language, tell=lambda: told
+    ) as page:
+        page.goto(f"{past.url}/account")
+        settle(page, "#status[data-level=danger]")
+        page.clock.run_for(500)
+        page.set_viewport_size({"width": 390, "height": 844})
+        found = evaluate(page, SAID)
+        assert page.locator("#status-said").inner_text().startswith(name)
+        assert found["whole"]
+
+
+def test_a_robot_of_the_fleet_page_is_a_few_lines_on_a_phone(
+    browser: Browser, past: Site
+) -> None:
+    with frozen_page(browser, past, (390, 844)) as page:
+        page.goto(f"{past.url}/fleet")
+        settle(page, "#machines tbody tr")
+        high = page.locator("#machines tbody tr").evaluate_all(
+            "(rows) => rows.map((row) => row.offsetHeight)"
+        )
+    assert max(high) < 200
+
+
+def test_a_tablet_cuts_no_number_of_alerts(browser: Browser, past: Site) -> None:
+    with frozen_page(browser, past, (768, 1024)) as page:
+        page.goto(past.url)
+        settle(page, "#map-fit:enabled")
+        wide = page.evaluate(NUMBER_OF_ALERTS)
+    assert wide[0] <= wide[1]
+
+
+NUMBER_OF_ALERTS = """() => {
+  document.querySelector('.brand__house').textContent = 'Invernadero '.repeat(9);
+  document.querySelector('#alerts-count').textContent = '125';
+  const button = document.querySelector('#alerts-button');
+  return [button.scrollWidth, button.clientWidth];
+}"""
+"""How wide the number of alerts is beside a long name, and its place (px)."""
+
 CUT_LISTS = """() => [...document.querySelectorAll('.scroll-x')]
   .filter((it) => it.querySelector('.table--list, #machines'))
   .filter((it) => it.checkVisibility() && it.scrollWidth > it.clientWidth)

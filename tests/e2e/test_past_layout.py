@@ -15,7 +15,7 @@ from tests.processes import Site
 
 pytestmark = pytest.mark.e2e
 
-SIZES = ((390, 844), (768, 1024), (1440, 900))
+SIZES = ((390, 844), (844, 390), (768, 1024), (1024, 768), (1440, 900))
 
 
 @pytest.fixture(scope="module")

@@ -152,8 +152,13 @@ test("a card moves once its order has lasted, and never under a finger or in use
   equal(shown(CLEAR, 5100), "AB");
   first.blur();
   equal(shown(CLEAR, 5200), "BA");
-  equal([shown(NOT_SLOWING, 5300), shown(CLEAR, 5900)], ["BA", "BA"]);
-  equal([shown(NOT_SLOWING, 6000), shown(NOT_SLOWING, 7000)], ["BA", "AB"]);
+  place.tabIndex = -1;
+  place.focus();
+  equal([shown(NOT_SLOWING, 5210), shown(NOT_SLOWING, 6220)], ["BA", "AB"]);
+  place.blur();
+  equal([shown(CLEAR, 6230), shown(CLEAR, 7240)], ["AB", "BA"]);
+  equal([shown(NOT_SLOWING, 7300), shown(CLEAR, 7900)], ["BA", "BA"]);
+  equal([shown(NOT_SLOWING, 8000), shown(NOT_SLOWING, 9000)], ["BA", "AB"]);
 });
 
 test("each cause has its drawing, and a robot at work none", () => {

@@ -450,6 +450,7 @@ function bell() {
     "alerts-flood",
     "alerts-empty",
     "alerts-earlier",
+    "alerts-unheard",
   ]) {
     const element = document.createElement(id === "alerts-button" ? "button" : "p");
     element.id = id;
@@ -474,7 +475,10 @@ function bell() {
   const store = new Store({ schedule: (flush) => frames.push(flush) });
   const tell = (/** @type {object[]} */ alerts) => {
     store.apply("alerts", alerts);
-    for (const flush of frames.splice(0)) flush();
+    flush();
+  };
+  const flush = () => {
+    for (const one of frames.splice(0)) one();
   };
   const heardBy = /** @type {import("../../iveg/static/js/main.js").App} */ (
     /** @type {unknown} */ ({
@@ -483,7 +487,7 @@ function bell() {
     })
   );
   createAlertsPanel(heardBy, tone);
-  return { tell, heard, panel, list };
+  return { tell, heard, panel, list, store, flush };
 }
 
 test("each time that a group repeats it chimes, and once", () => {
@@ -504,6 +508,23 @@ test("a group that holds a P1 sounds, whatever it began as", () => {
   tell([alert({ priority: "P1", count: 2 })]);
   equal(heard.at(-1), "loud");
   equal(document.querySelector("#alerts-button")?.getAttribute("data-worst"), "P1");
+  document.body.replaceChildren();
+});
+
+test("without the server nobody is told that there are no alerts", () => {
+  const { tell, store, flush } = bell();
+  const said = () =>
+    ["#alerts-empty", "#alerts-unheard"].map((id) =>
+      Boolean(document.querySelector(id)?.hasAttribute("hidden")),
+    );
+  const count = () => document.querySelector("#alerts-count")?.textContent;
+  store.setConnection("open");
+  store.apply("snapshot", { robots: [], alerts: [] });
+  tell([]);
+  equal([said(), count()], [[false, true], "0"]);
+  store.setConnection("lost");
+  flush();
+  equal([said(), count()], [[true, false], "0?"]);
   document.body.replaceChildren();
 });
 

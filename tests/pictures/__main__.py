@@ -21,7 +21,13 @@ from playwright.sync_api import (
 
 from tests.browsers import running_browser
 from tests.e2e.frozen import Frozen, frozen_page, past_site, settle
-from tests.e2e.reading import COVERED_STOPS, OVERFLOW, RUN_OVER, evaluate
+from tests.e2e.reading import (
+    COVERED_STOPS,
+    CUT_HEADER,
+    OVERFLOW,
+    RUN_OVER,
+    evaluate,
+)
 from tests.pictures.pages import PAGES, READY, TABLETS, act, prepare
 from tests.pictures.pairs import Case, covering
 from tests.pictures.people import Sessions, signed_in
@@ -140,10 +146,12 @@ def _found(page: Page) -> list[str]:
     wide = evaluate(page, OVERFLOW)
     covered = evaluate(page, COVERED_STOPS)
     runs = evaluate(page, RUN_OVER)
+    cut = evaluate(page, CUT_HEADER)
     return [
         *([f"{wide} px too wide"] if wide > 0 else []),
         *(f"covered: {stop}" for stop in covered),
         *(f"runs over: {words}" for words in runs[:2]),
+        *(f"cut: {words}" for words in cut),
     ]
 
 

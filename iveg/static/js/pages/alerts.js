@@ -4,7 +4,7 @@
 
 import { createAlertList, pinOf, sentenceOf } from "../panels/alert_list.js";
 import { createMembers, writeFlood } from "../panels/alert_members.js";
-import { earlierUnknown, isKnown } from "../panels/alerts.js";
+import { earlierUnknown, isKnown, isUnheard } from "../panels/alerts.js";
 import { make, need, setHidden } from "../panels/dom.js";
 import { createNotes, sharedNotes } from "../panels/notes.js";
 import { createSoundPanel } from "../panels/sound.js";
@@ -40,6 +40,7 @@ export function start({ store, i18n, tone }) {
     const isUnknown = earlierUnknown(store);
     setHidden(need("#active-empty"), alerts.length > 0 || !isKnown(store));
     setHidden(need("#earlier-unknown"), !isUnknown);
+    setHidden(need("#active-unheard"), !isUnheard(store));
   }
 
   store.subscribe("alerts", () => {
@@ -47,6 +48,7 @@ export function start({ store, i18n, tone }) {
     reload();
   });
   store.subscribe("health", draw);
+  store.subscribe("connection", draw);
   const drawFlood = () => writeFlood(need("#flood"), store.get("flood"), i18n);
   store.subscribe("flood", drawFlood);
   i18n.onChange(draw);

@@ -27,8 +27,10 @@ export function createAlertsPanel({ store, i18n }, tone) {
     const alerts = store.get("alerts") ?? [];
     const open = alerts.length;
     const isUnknown = earlierUnknown(store);
-    setText(need("#alerts-count"), isUnknown ? `${open}?` : String(open));
+    const isCut = isUnheard(store);
+    setText(need("#alerts-count"), isUnknown || isCut ? `${open}?` : String(open));
     setHidden(need("#alerts-earlier"), !isUnknown);
+    setHidden(need("#alerts-unheard"), !isCut);
     // A past and unseen alert may be graver than the active ones.
     const [worst] = alerts.map(({ priority }) => priority).sort();
     setAttribute(button, "data-worst", worst ?? "none");
@@ -67,6 +69,7 @@ export function createAlertsPanel({ store, i18n }, tone) {
   });
   store.subscribe("flood", draw);
   store.subscribe("health", draw);
+  store.subscribe("connection", draw);
   document.addEventListener("iveg:panel", drawList);
   i18n.onChange(draw);
   draw();
@@ -79,6 +82,16 @@ export function createAlertsPanel({ store, i18n }, tone) {
  */
 export function earlierUnknown(store) {
   return store.get("health")?.earlier === "unknown";
+}
+
+/**
+ * Whether alerts may have come and gone since the server was heard.
+ *
+ * @param {import("../core/store.js").Store} store
+ */
+export function isUnheard(store) {
+  const { state } = store.connection;
+  return state !== "open" && Boolean(store.get("snapshot"));
 }
 
 /** The absence of alerts is known only from a connected server that knows its past.

@@ -26,12 +26,14 @@ export function createCardOrder(place) {
   listen("pointerup", ({ pointerId }) => fingers.delete(pointerId));
   listen("pointercancel", ({ pointerId }) => fingers.delete(pointerId));
 
-  /** Whether somebody presses, points at a card, is in it or has swiped to one. */
+  /** Whether somebody presses, points at a card, is in it or has swiped to one.  The
+   * list itself has the focus of whoever came by a link to it, and is no card. */
   function isBusy() {
+    const focus = document.activeElement;
     return (
       fingers.size > 0 ||
       place.scrollLeft > 0 ||
-      place.contains(document.activeElement) ||
+      (focus !== place && place.contains(focus)) ||
       place.querySelector("dialog[open]") !== null ||
       (HOVERS.matches && place.matches(":hover"))
     );

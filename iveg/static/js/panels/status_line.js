@@ -21,8 +21,8 @@ const TICK_MS = 200;
 const BACK_SHOWN_MS = 3000;
 /** A first connection quicker than this is not worth a word (ms). */
 const PATIENCE_MS = 1500;
-/** More letters than this are smaller on a phone; than that, everywhere: long names of
- * robots, and a sentence of now over a map of then. */
+/** More letters than this, or more lines than fit, are smaller on a phone; than that,
+ * everywhere: long names of robots, and a sentence of now over a map of then. */
 const LONG = 64;
 const VERY_LONG = 86;
 /** What lasts less than this is not told (ms). */
@@ -55,12 +55,28 @@ export function createStatusLine({ store, i18n }) {
     setAttribute(place, "data-level", shown.level);
     const isPast = document.body.hasAttribute("data-past");
     const said = isPast ? i18n.t("past.now", { said: shown.said }) : shown.said;
-    place.toggleAttribute("data-long", said.length > LONG);
-    place.toggleAttribute("data-very-long", said.length > VERY_LONG);
-    setText(need("#status-said"), said);
+    say(said);
     if (shown.robotId) setAttribute(place, "href", addressOf(shown.robotId));
     else place.removeAttribute("href");
     if (aloud) setText(need("#status-told"), aloud.said);
+  }
+
+  /** Writes a sentence whole. @param {string} said */
+  function say(said) {
+    const text = need("#status-said");
+    if (text.textContent === said) return;
+    setText(text, said);
+    place.toggleAttribute("data-very-long", said.length > VERY_LONG);
+    fit();
+  }
+
+  /** Costs a layout, so it is asked of new sentences and of new windows only. */
+  function fit() {
+    const text = need("#status-said");
+    const isLong = (text.textContent ?? "").length > LONG;
+    place.toggleAttribute("data-long", isLong);
+    if (text.offsetHeight > place.clientHeight)
+      place.toggleAttribute("data-long", true);
   }
 
   /** @param {ConnectionState} state */
@@ -81,6 +97,7 @@ export function createStatusLine({ store, i18n }) {
   store.subscribe("connection", draw);
   store.subscribe("snapshot", draw);
   i18n.onChange(draw);
+  addEventListener("resize", fit);
   setInterval(onBeat, TICK_MS, draw);
   draw();
 }

@@ -151,7 +151,7 @@ async function warmUp(plotly) {
  */
 function dressed(trace, index, i18n) {
   const { kind, robot, class_id } = trace.meta;
-  const colour = colourOf(kind, robot ?? class_id, index);
+  const colour = colourOf(trace.meta, index);
   const name = class_id
     ? i18n.t("history.trace.class", { class: class_id })
     : i18n.t(`history.trace.${kind}`, { robot });
@@ -172,12 +172,15 @@ function dressed(trace, index, i18n) {
  * Robots and people keep the colour that they have on the map; alert colours stay with
  * alerts.
  *
- * @param {string} kind @param {string | undefined} who @param {number} index
+ * @param {Trace["meta"]} meta @param {number} index
  */
-function colourOf(kind, who, index) {
+function colourOf({ kind, robot, class_id }, index) {
+  const who = robot ?? class_id;
   const slots = all("[data-robot][data-slot]");
   const slot = slots.find((chip) => chip.dataset.robot === who)?.dataset.slot;
   if (slot) return token(`--robot-${slot}`);
+  // One that is no longer in the fleet has one colour for all of its lines.
+  if (robot) return token("--text-2");
   if (PEOPLE.has(String(who))) return token("--person");
   if (AIR.has(kind)) return token("--text-2");
   if (kind === "class") return token(`--robot-${((index + 3) % 6) + 3}`);
