@@ -364,7 +364,7 @@ MUTANTS = (
     ),
     Mutant(
         "rule: somebody without a place slows nobody",
-        "self.unplaced += may_be_somebody(detection, rule)",
+        "self.unplaced += _may_be_somebody(detection, rule)",
         "self.unplaced += 0",
         ("unit/pipeline/test_frames.py",),
     ),

@@ -24,9 +24,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.limits import LIMITS
-from iveg.domain.observations import Detection, Instant
+from iveg.domain.observations import Instant
 from iveg.domain.tracking.calibration import PLAIN, Calibration
 
 FAINT_FROM = 0.50
@@ -285,10 +284,3 @@ def _judged(
 def _kept(known: Sequence[_Suspect], now: float) -> list[_Suspect]:
     going_on = [one for one in known if not one.is_over(now)]
     return sorted(going_on, key=lambda one: one.seen_at)[-MOST_SUSPECTS:]
-
-
-def may_be_somebody(detection: Detection, rule: DetectionRule) -> bool:
-    """Whether a detection would slow robots if its place were known."""
-    verdict = rule.judge(detection.class_id, detection.probability)
-    suspected = verdict.class_ == "person" and detection.probability >= FAINT_FROM
-    return verdict.kind == "alert" or (rule.possible_people and suspected)

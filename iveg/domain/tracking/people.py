@@ -19,12 +19,12 @@ from iveg.domain.observations import Detection, DetectionFrame, Instant
 from iveg.domain.robot_state import RobotState
 from iveg.domain.tracking.calibration import Calibration, Calibrations
 from iveg.domain.tracking.looks import (
+    FAINT_FROM,
     KEPT_FROM,
     MOST_SUSPECTS,
     FaintPerson,
     Looks,
     Suspicions,
-    may_be_somebody,
 )
 from iveg.domain.tracking.numbers import TrackNumbers
 from iveg.domain.tracking.person import Sighting, TrackedPerson
@@ -167,7 +167,7 @@ class People:
                 if box is None and detection.frame_id is not None:
                     unknown.add(detection.frame_id)
             if not is_placed:
-                self.unplaced += may_be_somebody(detection, rule)
+                self.unplaced += _may_be_somebody(detection, rule)
         self.unknown_frames = frozenset(unknown)
         return placed
 
@@ -292,18 +292,13 @@ class People:
     ) -> bool:
         """Whether a robot's newest frame has such a faint detection near a sighting.
 
-        Who counts by looks has a ring, which may end one of looks; one of a box only if
-        it is the same track.
+        Who counts by looks has a ring, which may end one of looks, but none of a box.
         """
-        is_guess, name = sighting.possible or sighting.laser, person.person_id
-        # Marked by an operator, who counts by looks may have no ring.
-        has_ring = not self.things.known
+        is_guess = (sighting.possible or sighting.laser) and not self.things.known
         return any(
             one.class_ == person.class_
             and math.dist(one.position[:2], (sighting.x, sighting.y)) <= _SUSPECT_M
-            and not (
-                has_ring and one.person and (is_guess or one.person.person_id == name)
-            )
+            and not (is_guess and one.person)
             for one in self.faint.get(observer, ())
         )
 
@@ -344,6 +339,13 @@ def _looked_at(one: Placed, looks: Looks | None) -> Placed:
         looks=looks,
         possible=possible,
     )
+
+
+def _may_be_somebody(detection: Detection, rule: DetectionRule) -> bool:
+    """Whether a detection would slow robots if its place were known."""
+    verdict = rule.judge(detection.class_id, detection.probability)
+    suspected = verdict.class_ == "person" and detection.probability >= FAINT_FROM
+    return verdict.kind == "alert" or (rule.possible_people and suspected)
 
 
 def _match_peer(one: Placed, observer: RobotState, world: World, at: Instant) -> Placed:
