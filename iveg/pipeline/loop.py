@@ -118,7 +118,8 @@ class RuleLoop:
                 await asyncio.sleep(0)
             if judges:
                 judged_at = now.mono
-                self.step((), self._clock())
+                # With what came meanwhile: the past takes whatever came before a step.
+                self.step(self._ingest.drain(), self._clock())
 
     def step(
         self, arrived: Iterable[Received], now: Instant, *, judges: bool = True

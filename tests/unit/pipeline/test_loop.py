@@ -1,6 +1,9 @@
 """One loop, one order: take what came, then let time pass."""
 
 import asyncio
+from typing import Any
+
+import pytest
 
 from iveg.domain.observations import CommandAnswer, HeartbeatProbe, Origin, Received
 from iveg.domain.transports import DIRECT, FIWARE
@@ -55,6 +58,30 @@ async def test_pages_are_shown_what_came_before_the_fleet_is_judged() -> None:
     await settle()
 
     assert (was_unjudged, desk.evaluator.is_unjudged) == (True, False)
+    running.cancel()
+    await asyncio.gather(running, return_exceptions=True)
+
+
+async def test_what_comes_before_the_fleet_is_judged_is_taken_first(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    desk, taken = Desk(), list[bool]()
+    tick, peer = desk.evaluator.tick, desk.evaluator.world.robot("AGII")
+
+    def judged(*args: Any) -> None:
+        taken.append(peer.odometry is not None)
+        tick(*args)
+
+    monkeypatch.setattr(desk.evaluator, "tick", judged)
+    browser = desk.hub.join()
+    desk.ingest.enqueue(Received(odometry(), desk.clock()))
+    running = asyncio.create_task(desk.loop.run())
+    async with asyncio.timeout(30):
+        await browser.news()
+    desk.ingest.enqueue(Received(odometry("AGII"), desk.clock()))
+    await settle()
+
+    assert taken[:1] == [True]
     running.cancel()
     await asyncio.gather(running, return_exceptions=True)
 
