@@ -412,7 +412,7 @@ MUTANTS = (
     ),
     Mutant(
         "clear: a laser whose walls are not the plan's finds a spot empty",
-        "is_fit = len(strange) <= (1.0 - _EXPLAINED) * len(points)",
+        "is_fit = len(strange) <= (1.0 - EXPLAINED) * len(points)",
         "is_fit = True",
         ("unit/domain/tracking/test_laser_sight.py",),
     ),

@@ -100,6 +100,26 @@ class Rectangle:
     xmax: float
     ymax: float
 
+    @property
+    def middle(self) -> tuple[float, float]:
+        """Its centre, in ``map`` (m)."""
+        return (self.xmin + self.xmax) / 2, (self.ymin + self.ymax) / 2
+
+    def joined(self, other: "Rectangle") -> "Rectangle":
+        """The least one that holds both."""
+        return Rectangle(
+            min(self.xmin, other.xmin),
+            min(self.ymin, other.ymin),
+            max(self.xmax, other.xmax),
+            max(self.ymax, other.ymax),
+        )
+
+    def farthest_m(self, x: float, y: float) -> float:
+        """How far its farthest corner is from a spot (m)."""
+        return math.hypot(
+            max(x - self.xmin, self.xmax - x), max(y - self.ymin, self.ymax - y)
+        )
+
     def contains(self, x: float, y: float, margin: float = 0.0) -> bool:
         """Whether a point lies inside, the rectangle grown by ``margin`` (m)."""
         return (

@@ -39,7 +39,7 @@ class KnownPlace:
         return (
             not seen.stirred
             and seen.out_m <= self.most_out_m
-            and seen.farthest_m(self.x, self.y) <= self.radius_m
+            and seen.around.farthest_m(self.x, self.y) <= self.radius_m
         )
 
 

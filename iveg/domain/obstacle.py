@@ -133,13 +133,6 @@ class Obstacle:
         """Whether it ever moved farther than noise does, or walked just now."""
         return self.most_way_m > _MOVED_M or self.is_somebody
 
-    def farthest_m(self, x: float, y: float) -> float:
-        """How far its farthest return ever was from a spot at most (m)."""
-        box = self.around
-        return math.hypot(
-            max(x - box.xmin, box.xmax - x), max(y - box.ymin, box.ymax - y)
-        )
-
     def seen_again(self, body: Body, now: float) -> "Obstacle":
         """The same, seen again."""
         gain = (now - self.at) / (_SMOOTHED_S + now - self.at)
@@ -155,7 +148,7 @@ class Obstacle:
             vx=self.vx + gain * ((body.x - self.x) / after_s - self.vx),
             vy=self.vy + gain * ((body.y - self.y) / after_s - self.vy),
             passed_m=math.dist(body.beside, self.first_seen),
-            around=_joined(self.around, body.around),
+            around=self.around.joined(body.around),
             out_m=max(self.out_m, body.out_m),
             most_way_m=max(self.most_way_m, way_m),
             beside=body.beside,
@@ -171,13 +164,3 @@ class Obstacle:
     def counts(self) -> bool:
         """Whether it is there for long enough, too."""
         return self.fits and self.at - self.since >= LASTS_S - 1e-6
-
-
-def _joined(one: Rectangle, other: Rectangle) -> Rectangle:
-    """The box that holds both."""
-    return Rectangle(
-        min(one.xmin, other.xmin),
-        min(one.ymin, other.ymin),
-        max(one.xmax, other.xmax),
-        max(one.ymax, other.ymax),
-    )

@@ -68,8 +68,7 @@ class ThingMarks:
         seen = self._shown(robot_id, at)
         if seen is None:
             raise UnknownNameError("obstacle", robot_id)
-        box = seen.around
-        middle = (box.xmin + box.xmax) / 2, (box.ymin + box.ymax) / 2
+        middle = seen.around.middle
         thing = self._new("obstacle", middle, by, until, at)
         if not thing.place.explains(seen) or self._is_somebody_at(*middle, at):
             raise MarkRefusedError("somebody")

@@ -104,7 +104,8 @@ def _check_what_is_explained(pair: Pair) -> None:
         assert not one.is_somebody
         assert one.most_way_m <= 0.4
         assert any(
-            one.farthest_m(place.x, place.y) <= place.radius_m for place in _PLACES
+            one.around.farthest_m(place.x, place.y) <= place.radius_m
+            for place in _PLACES
         )
 
 

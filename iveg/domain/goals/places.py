@@ -84,7 +84,7 @@ def _obstructed(
 
 def _from_the_middle(area: Rectangle) -> Iterator[tuple[float, float]]:
     """Places on the middle line of a lane, from its middle outwards."""
-    x, y = (area.xmin + area.xmax) / 2, (area.ymin + area.ymax) / 2
+    x, y = area.middle
     along_x = area.xmax - area.xmin >= area.ymax - area.ymin
     half = (area.xmax - area.xmin if along_x else area.ymax - area.ymin) / 2
     for step in range(int(half / _STEP_M) + 1):

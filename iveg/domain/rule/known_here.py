@@ -193,8 +193,8 @@ class KnownHere:
         """Every place that is known."""
         return (one for one in self._spots if one.known_since is not None)
 
-    def take(self, robot_id: str, seen: Iterable[Obstacle], now: Instant) -> None:
-        """Take what a laser that may be believed saw and nobody explained."""
+    def learn(self, robot_id: str, seen: Iterable[Obstacle], now: Instant) -> None:
+        """Learn what a laser that may be believed saw and nobody explained."""
         for one in seen:
             if _is_still(one):
                 self._note(robot_id, one, now)
@@ -211,11 +211,7 @@ class KnownHere:
             if spot.is_left_by({name for name in near if name}, seen):
                 self._end(spot)
         self.stir(around.moving, now)
-        marks = self._things.obstacles_at(now)
-        for index, _ in _pairs(
-            [(one.x, one.y) for one in marks], around.present, RADIUS_M
-        ):
-            self._end(marks[index])
+        self._end_marks(around.present, now)
 
     def _near(
         self, people: Sequence[Somebody]

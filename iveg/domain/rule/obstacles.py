@@ -28,7 +28,7 @@ from iveg.domain.rule.foresight import Encounter, Foretold, path_of
 from iveg.domain.rule.known_here import Around, KnownHere, Somebody
 from iveg.domain.rule.paths import HORIZON_S, MOVES_M_S, Circles
 from iveg.domain.rule.zones import Zone
-from iveg.domain.tracking.laser_sight import passes_by
+from iveg.domain.tracking.laser_sight import EXPLAINED, passes_by
 from iveg.domain.tracking.people import People
 from iveg.domain.tracking.sight import seen_sightings
 from iveg.domain.witness import (
@@ -46,9 +46,8 @@ CAUSE = "obstacle"
 _CHECKED_S, _FAULTY_S = 1.0, 5.0
 _LEAST_RETURNS, _STRANGE = 0.05, 0.5
 """Shares of the beams that come back at least, and of those that the plan explains."""
-_EXPLAINED, _TURNS_RAD_S = 0.7, 0.5
-"""Share of the returns that the plan explains to a laser from which places are learnt,
-and how fast its robot turns at most."""
+_TURNS_RAD_S = 0.5
+"""A robot from whose laser places are learnt turns so fast at most."""
 _WATCHED_S, _SHOWN_S = 0.45, 10.0
 _FOLLOW_M = 8.0
 """Beyond, too few beams meet somebody."""
@@ -194,7 +193,7 @@ class Obstacles:
     ) -> None:
         """Learn what is beside the plan, and what is seen to be gone."""
         if self._plan.is_drawn:
-            self.known_here.take(robot_id, seen, now)
+            self.known_here.learn(robot_id, seen, now)
         if now.mono - self._swept_at.get(robot_id, -math.inf) >= _CHECKED_S:
             self._swept_at[robot_id] = now.mono
             passes = partial(passes_by, scan, pose.compose(scan.mount))
@@ -205,7 +204,7 @@ class Obstacles:
         odometry, fit = robot.odometry, self._fits.get(robot.robot_id)
         before = self._ranges.get(robot.robot_id)
         self._ranges[robot.robot_id] = scan.ranges
-        fits = fit is not None and fit.explained >= _EXPLAINED
+        fits = fit is not None and fit.explained >= EXPLAINED
         return (
             odometry is not None
             and abs(odometry.twist.angular_z) <= _TURNS_RAD_S

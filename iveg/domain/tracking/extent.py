@@ -3,23 +3,22 @@
 Extents are only ever joined: what one sighting of a track knew no other forgets.
 """
 
-import math
 from dataclasses import dataclass
+
+from iveg.domain.geometry import Rectangle
 
 
 @dataclass(frozen=True, slots=True)
 class Extent:
-    """The box in ``map`` that holds every place of some sightings (m).
+    """Of some sightings.
 
     Attributes:
-        surest: Greatest confidence of theirs (0 to 1).
+        around: The box in ``map`` that holds every place of theirs.
+        surest: Greatest confidence (0 to 1).
         fastest: Greatest speed (m/s).
     """
 
-    xmin: float
-    xmax: float
-    ymin: float
-    ymax: float
+    around: Rectangle
     surest: float
     fastest: float = 0.0
 
@@ -28,16 +27,7 @@ class Extent:
         if other is None:
             return self
         return Extent(
-            min(self.xmin, other.xmin),
-            max(self.xmax, other.xmax),
-            min(self.ymin, other.ymin),
-            max(self.ymax, other.ymax),
+            self.around.joined(other.around),
             max(self.surest, other.surest),
             max(self.fastest, other.fastest),
-        )
-
-    def farthest_m(self, x: float, y: float) -> float:
-        """How far its farthest corner is from a spot (m)."""
-        return math.hypot(
-            max(x - self.xmin, self.xmax - x), max(y - self.ymin, self.ymax - y)
         )

@@ -27,6 +27,8 @@ from iveg.domain.witness import PLAN_M, KnownBody, Plan
 ScanOf = Callable[[RobotState], LaserScan | None]
 """Reads a robot's newest scan; None where there is none that can be read."""
 _Floats = NDArray[np.float64]
+Strange = Callable[[LaserScan, Pose2D], _Floats | None]
+"""Returns of a scan made at a pose that nothing explains; None: of too many."""
 _Bearing = TypeVar("_Bearing", float, NDArray[np.float64])
 _NONE = np.empty(0, np.intp)
 _FRESH_S = 0.5
@@ -35,7 +37,7 @@ _NEAREST_M, _FARTHEST_M = 0.5, 12.0
 _BESIDE_M, _BEHIND_M = 0.3, 0.2
 """Half of a person and the error of a pose: so wide, and so far behind."""
 _LEAST_BEAMS = 3
-_EXPLAINED = 0.7
+EXPLAINED = 0.7
 """Share of the returns that a plan explains to a laser that works."""
 _WALKED_MOST_M = 4.0
 
@@ -73,17 +75,13 @@ class LaserSight:
         scan = self._newest(robot)
         if scan is None or self._is_frozen(scan):
             return _NONE
-        passed = _passed(scan, pose, spots)
-        strange = self._strange_of(scan, pose) if passed else None
-        return (
-            _NONE if strange is None else _empty(passed, strange, spots, ages, bodies)
-        )
+        return swept_by(scan, pose, spots, ages, self._strange_of, bodies)
 
     def _strange_of(self, scan: LaserScan, pose: Pose2D) -> _Floats | None:
-        """``_unexplained``, once for all rings and ticks that ask the same scan."""
+        """``unexplained``, once for all rings and ticks that ask the same scan."""
         before = self._strange.get(scan.robot_id)
         if before is None or before[0] is not scan or before[1] != pose:
-            before = scan, pose, _unexplained(scan, pose, self._plan)
+            before = scan, pose, unexplained(scan, pose, self._plan)
             self._strange[scan.robot_id] = before
         return before[2]
 
@@ -101,7 +99,7 @@ def swept_by(
     pose: Pose2D,
     spots: _Floats,
     ages: _Floats,
-    plan: Plan,
+    strange_of: Strange,
     bodies: Iterable[KnownBody] = (),
 ) -> NDArray[np.intp]:
     """The spots that a scan shows to be empty.
@@ -111,11 +109,11 @@ def swept_by(
         pose: Of the robot's ``base_link``.
         spots: Shape (n, 2), in ``map`` (m).
         ages: Shape (n,): how long ago somebody stood there (s).
-        plan: What stands in the greenhouse.
+        strange_of: What the plan leaves of the scan, asked where any spot is seen past.
         bodies: Who is seen by now and has a ring: whoever walked there is one of them.
     """
     passed = _passed(scan, pose, spots)
-    strange = _unexplained(scan, pose, plan) if passed else None
+    strange = strange_of(scan, pose) if passed else None
     return _NONE if strange is None else _empty(passed, strange, spots, ages, bodies)
 
 
@@ -129,11 +127,11 @@ def _passed(scan: LaserScan, pose: Pose2D, spots: _Floats) -> list[int]:
     ]
 
 
-def _unexplained(scan: LaserScan, pose: Pose2D, plan: Plan) -> _Floats | None:
+def unexplained(scan: LaserScan, pose: Pose2D, plan: Plan) -> _Floats | None:
     """Returns that the plan does not explain, in ``map`` (m); None: of too many."""
     points = scan.points(pose).astype(np.float64)
     strange = points[plan.distance_to(points[:, 0], points[:, 1]) > PLAN_M]
-    is_fit = len(strange) <= (1.0 - _EXPLAINED) * len(points)
+    is_fit = len(strange) <= (1.0 - EXPLAINED) * len(points)
     return strange if is_fit else None
 
 

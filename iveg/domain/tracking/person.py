@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from iveg.domain.detection_rule import Class, DetectionRule
+from iveg.domain.geometry import Rectangle
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
 from iveg.domain.tracking.extent import Extent
@@ -86,7 +87,7 @@ class Sighting:
         """The same sighting as the newest of a chain, after the one ``before``."""
         vx, vy = (0.0, 0.0) if before is None else self._going_on(before)
         x, y = self.x, self.y
-        extent = Extent(x, x, y, y, self.confidence, math.hypot(vx, vy))
+        extent = Extent(Rectangle(x, y, x, y), self.confidence, math.hypot(vx, vy))
         # Made for each box of each picture: ``replace`` takes three times as long.
         return Sighting(
             self.observer,
@@ -187,7 +188,7 @@ class TrackedPerson:
         extent = self.newest.extent
         if extent is None:
             return self.newest.x, self.newest.y
-        return (extent.xmin + extent.xmax) / 2, (extent.ymin + extent.ymax) / 2
+        return extent.around.middle
 
     @property
     def is_possible(self) -> bool:

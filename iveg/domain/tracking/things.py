@@ -70,7 +70,7 @@ class Thing:
             and not sighting.laser
             and extent.surest < SURELY_FROM
             and extent.fastest < MOVES_FROM_M_S
-            and extent.farthest_m(self.x, self.y) <= RADIUS_M
+            and extent.around.farthest_m(self.x, self.y) <= RADIUS_M
         )
 
 

@@ -33,6 +33,7 @@ const WORDS = {
   },
 };
 const MARKERS = new Set(["operator", "admin"]);
+const mayMark = () => MARKERS.has(document.body.dataset.role ?? "");
 /** So long a first press waits for its second. */
 const ASKED_MS = 8000;
 /** So long after a robot was slow for it something may be marked; the server's, too. */
@@ -55,14 +56,19 @@ export function createThings(i18n) {
 
   function makeItem() {
     const item = make("li");
-    const button = make("button", "button");
-    button.type = "button";
-    button.addEventListener("click", () => {
-      const id = button.dataset.person ?? "";
-      press(button, id, { person_id: id }, WORDS.person);
-    });
+    const button = makeButton((id) =>
+      press(button, id, { person_id: id }, WORDS.person),
+    );
     item.append(make("b"), make("small"), make("p"), button);
     return item;
+  }
+
+  /** @param {(id: string) => void} pressed with the id of what it stands beside then */
+  function makeButton(pressed) {
+    const button = make("button", "button");
+    button.type = "button";
+    button.addEventListener("click", () => pressed(button.dataset.of ?? ""));
+    return button;
   }
 
   /**
@@ -110,9 +116,8 @@ export function createThings(i18n) {
   function write(item, person) {
     const button = /** @type {HTMLButtonElement} */ (need("button", item));
     const { person_id, thing_id } = person;
-    const may = MARKERS.has(document.body.dataset.role ?? "");
-    setHidden(button, !may || person.class !== "person" || thing_id !== null);
-    button.dataset.person = person_id;
+    setHidden(button, !mayMark() || person.class !== "person" || thing_id !== null);
+    button.dataset.of = person_id;
     setText(button, i18n.t(isAsked(person_id) ? WORDS.person.sure : WORDS.person.mark));
   }
 
@@ -125,23 +130,24 @@ export function createThings(i18n) {
     for (const [robot, atMs] of slowedMs) {
       if (nowMs - atMs > SHOWN_MS) slowedMs.delete(robot);
     }
-    const may = MARKERS.has(document.body.dataset.role ?? "");
     fill(
       need("#slowed-list"),
-      may ? [...slowedMs.keys()] : [],
+      mayMark() ? [...slowedMs.keys()] : [],
       makeSlowed,
       writeSlowed,
     );
   }
 
   function makeSlowed() {
+    const button = makeButton((id) =>
+      press(button, id, { robot_id: id }, WORDS.obstacle),
+    );
+    return makeLine(button);
+  }
+
+  /** A sentence with a button. @param {HTMLElement} button */
+  function makeLine(button) {
     const item = make("li");
-    const button = make("button", "button");
-    button.type = "button";
-    button.addEventListener("click", () => {
-      const id = button.dataset.robot ?? "";
-      press(button, id, { robot_id: id }, WORDS.obstacle);
-    });
     item.append(make("p"), button);
     return item;
   }
@@ -149,7 +155,7 @@ export function createThings(i18n) {
   /** @param {Element} item @param {string} robot */
   function writeSlowed(item, robot) {
     const button = /** @type {HTMLButtonElement} */ (need("button", item));
-    button.dataset.robot = robot;
+    button.dataset.of = robot;
     setText(need("p", item), i18n.t("things.known_beside", { robot }));
     setText(button, i18n.t(isAsked(robot) ? WORDS.obstacle.sure : WORDS.obstacle.mark));
   }
@@ -161,26 +167,18 @@ export function createThings(i18n) {
   }
 
   function draw() {
-    const may = MARKERS.has(document.body.dataset.role ?? "");
     setHidden(need("#things-title"), things.length === 0);
     fill(list, things, makeMark, (item, thing) => {
       const slots = { ...thing, until: dayAndTime(thing.until) };
       setText(need("p", item), i18n.t(WORDS[thing.kind].one, slots));
       const button = /** @type {HTMLButtonElement} */ (need("button", item));
-      button.dataset.thing = thing.thing_id;
+      button.dataset.of = thing.thing_id;
       setText(button, i18n.t("things.unmark"));
-      setHidden(button, !may);
+      setHidden(button, !mayMark());
     });
   }
 
-  function makeMark() {
-    const item = make("li");
-    const button = make("button", "button");
-    button.type = "button";
-    button.addEventListener("click", () => takeBack(button.dataset.thing ?? ""));
-    item.append(make("p"), button);
-    return item;
-  }
+  const makeMark = () => makeLine(makeButton(takeBack));
 
   i18n.onChange(draw);
   return { makeItem, write, keep, drawSlowed, renew };

@@ -64,7 +64,7 @@ class Visits:
         for time in times:
             for x in ahead:
                 look = replace(one or seen(), beside=(x, 0.5))
-                self.known.take("AGI", [look], at(time))
+                self.known.learn("AGI", [look], at(time))
         return self.is_known
 
     @property
@@ -226,7 +226,7 @@ def test_there_are_bounds(monkeypatch: pytest.MonkeyPatch) -> None:
     for number in range(MOST_SPOTS + 50):
         for ahead in (0.6, 0.0):
             one = seen(float(number), beside=(ahead, 0.5))
-            visits.known.take("AGI", [one], at(float(number)))
+            visits.known.learn("AGI", [one], at(float(number)))
     visits.known.watch(Around(), at(1050.0))
     assert len(list(visits.known.known)) == MOST_KNOWN
     assert len(visits.known.near("AGI", Pose2D(100.0, 0.0, 0.0), at(1050.0))) <= 32

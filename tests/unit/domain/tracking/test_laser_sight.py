@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import LaserScan, Origin
-from iveg.domain.tracking.laser_sight import LaserSight, swept_by
+from iveg.domain.tracking.laser_sight import LaserSight, swept_by, unexplained
 from iveg.domain.witness import KnownBody, Plan
 from iveg.lab.emulator.greenhouse import Disc, Scenery
 from iveg.lab.emulator.lidar import LaserModel, sweep
@@ -25,6 +26,7 @@ ROOM = Greenhouse(
     rows=(Rectangle(-6.0, 2.0, 6.0, 2.6), Rectangle(-6.0, -2.6, 6.0, -2.0)),
 )
 PLAN = Plan.of(ROOM)
+STRANGE = partial(unexplained, plan=PLAN)
 MODEL = LaserModel()
 HERE = Pose2D(0.0, 0.0, 0.0)
 SPOT = (-3.0, 0.5)
@@ -59,7 +61,7 @@ def is_swept(
     pose: Pose2D = HERE,
     age_s: float = 1.5,
 ) -> bool:
-    return swept_by(scan, pose, np.array([spot]), np.array([age_s]), PLAN).size == 1
+    return swept_by(scan, pose, np.array([spot]), np.array([age_s]), STRANGE).size == 1
 
 
 def test_beams_that_pass_find_a_spot_empty_wherever_the_robot_looks() -> None:
@@ -100,10 +102,10 @@ def test_who_cannot_have_come_from_the_spot_does_not_keep_it() -> None:
 
 def test_who_has_a_ring_by_now_keeps_no_second_one_where_they_were() -> None:
     scan, spots, ages = scan_of((0.9, 0.5)), np.array([SPOT]), np.array([6.0])
-    assert not swept_by(scan, HERE, spots, ages, PLAN).size
+    assert not swept_by(scan, HERE, spots, ages, STRANGE).size
     there, elsewhere = KnownBody(0.9, 0.5, 0.6), KnownBody(0.9, -0.5, 0.6)
-    assert swept_by(scan, HERE, spots, ages, PLAN, [there]).size == 1
-    assert not swept_by(scan, HERE, spots, ages, PLAN, [elsewhere]).size
+    assert swept_by(scan, HERE, spots, ages, STRANGE, [there]).size == 1
+    assert not swept_by(scan, HERE, spots, ages, STRANGE, [elsewhere]).size
 
 
 def test_who_leans_into_a_row_is_not_taken_for_the_row() -> None:
@@ -158,8 +160,8 @@ def test_a_laser_whose_walls_are_not_the_plans_proves_nothing(believed: Pose2D) 
     spots = [(0.5 * x, 0.5 * y) for x in range(-14, 15) for y in range(-14, 15)]
     everywhere, just_left = np.array(spots), np.zeros(len(spots))
     scan = scan_of()
-    assert swept_by(scan, HERE, everywhere, just_left, PLAN).size > 100
-    assert swept_by(scan, believed, everywhere, just_left, PLAN).size == 0
+    assert swept_by(scan, HERE, everywhere, just_left, STRANGE).size > 100
+    assert swept_by(scan, believed, everywhere, just_left, STRANGE).size == 0
 
 
 # --- by the newest scan of a robot ----------------------------------------------------
