@@ -183,8 +183,8 @@ MUTANTS = (
     ),
     Mutant(
         "rule: a robot is let go on the border, at every flutter",
-        "    if depth > LIMITS.release_beyond_m:",
-        "    if depth > 0.0:",
+        "    if depth_m > LIMITS.release_beyond_m:",
+        "    if depth_m > 0.0:",
         ("unit/domain/rule/test_speed_limits.py",),
     ),
     Mutant(

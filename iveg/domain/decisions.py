@@ -18,7 +18,7 @@ from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import HALF_SPEED
 from iveg.domain.first_reports import FirstReports
 from iveg.domain.observations import Instant, Odometry, SafetyReport
-from iveg.domain.rule.speed_limits import Crossing
+from iveg.domain.rule.crossings import Crossing
 
 LinkVerdict = Literal["ok", "late", "missing", "n/a", "open", "unknown"]
 LinkName = Literal[

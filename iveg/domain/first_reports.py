@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from iveg.domain.feedback import HALF_SPEED
 from iveg.domain.observations import Instant, SafetyReport
-from iveg.domain.rule.speed_limits import Crossing
+from iveg.domain.rule.crossings import Crossing
 
 FRESH_S = 0.25
 """Without a newer frame a ring was known: a robot that enters it is not timed."""

@@ -28,10 +28,11 @@ from iveg.domain.observations import (
 )
 from iveg.domain.plausibility import ignores_limit
 from iveg.domain.records import AlertRecord, DecisionRecord
+from iveg.domain.rule.crossings import Crossing, LimitChange
 from iveg.domain.rule.foresight import Encounter
 from iveg.domain.rule.obstacles import Obstacles, Walkers
 from iveg.domain.rule.premises import Missing
-from iveg.domain.rule.speed_limits import Crossing, LimitChange, SpeedLimits
+from iveg.domain.rule.speed_limits import SpeedLimits
 from iveg.domain.tracking.laser_sight import LaserSight, ScanOf
 from iveg.domain.tracking.people import People
 from iveg.domain.witness import Plan

@@ -8,7 +8,7 @@ from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import HALF_SPEED
 from iveg.domain.obstacle import Obstacle
 from iveg.domain.records import DecisionRecord
-from iveg.domain.rule.speed_limits import Crossing
+from iveg.domain.rule.crossings import Crossing
 from iveg.domain.rule.zones import Zone
 from iveg.domain.stamps import wall_of
 from iveg.domain.tracking.looks import Looks

@@ -14,8 +14,8 @@ from iveg.domain.tracking.people import People
 from iveg.domain.world import World
 from iveg.pipeline.ports import FleetPort
 
-USED_HZ, BURST = 30.0, 8.0
-"""Greatest mean rate of feedback, and size of a burst (1/s, 1)."""
+USED_HZ, BURST = 20.0, 8.0
+"""Greatest mean rate of feedback that slows nobody, and size of a burst (1/s, 1)."""
 MOST_ALERTS = 256
 """A robot refuses feedback with more."""
 KnownNear = Callable[[str, Pose2D, Instant], tuple[KnownPlace, ...]]
@@ -57,7 +57,7 @@ class FeedbackPublisher:
         self._left = BURST
 
     def may_publish(self, now: Instant) -> bool:
-        """Whether robots can use one more: 30 Hz in the mean, a few close together."""
+        """Whether robots can use one more: 20 Hz in the mean, a few close together."""
         return self._allowance(now) >= 1.0
 
     def _allowance(self, now: Instant) -> float:

@@ -12,8 +12,8 @@ from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import SafetyReport
 from iveg.domain.robot_state import RobotState
+from iveg.domain.rule.crossings import Crossing
 from iveg.domain.rule.premises import Missing
-from iveg.domain.rule.speed_limits import Crossing
 from iveg.domain.tracking.people import People
 from iveg.domain.world import World
 

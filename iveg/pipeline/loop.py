@@ -29,10 +29,13 @@ from iveg.pipeline.supervision import Supervision
 
 TICK_S = 0.05
 _ANSWERS = (CommandAnswer, GoalAnswer)
-APART_S = 0.0002
-"""Least time between two takings for each robot of the fleet: 4 ms with twenty."""
-JUDGED_APART_S = 2 * APART_S
-"""The same between two judgements: what robots are shown to be needs none."""
+APART_S = 0.0001
+"""Least time between two takings for each robot of the fleet: 2 ms with twenty."""
+JUDGED_APART_S = 10 * APART_S
+"""The same between two judgements: 2 ms with two robots, 10 ms with ten.
+
+A judgement costs as much for one message as for ten, and poses wait behind it.
+"""
 _LATEST_APART_S = JUDGED_APART_S + APART_S / 2
 _HEALTH_PERIOD_S = 1.0
 _WORTH_S = 0.001

@@ -16,8 +16,9 @@ from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import TrialRefusedError
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import DetectionFrame, Instant
+from iveg.domain.rule.crossings import LimitChange
 from iveg.domain.rule.obstacles import Walkers
-from iveg.domain.rule.speed_limits import LimitChange, SpeedLimits
+from iveg.domain.rule.speed_limits import SpeedLimits
 from iveg.domain.rule.trial import Account, Limits, Trial
 from iveg.domain.tracking.laser_sight import LaserSight, ScanOf
 from iveg.domain.tracking.people import People

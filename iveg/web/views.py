@@ -10,7 +10,7 @@ from iveg.domain.margins import LeastMargins
 from iveg.domain.observations import Instant
 from iveg.domain.records import LogRecord
 from iveg.domain.robot_state import RobotState
-from iveg.domain.rule.speed_limits import Crossing
+from iveg.domain.rule.crossings import Crossing
 from iveg.domain.stamps import format_stamp
 from iveg.domain.stop import FollowedCommand, StopMachine
 from iveg.domain.tracking.person import TrackedPerson

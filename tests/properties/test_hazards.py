@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iveg.domain.rule import zones
-from iveg.domain.rule.speed_limits import LimitChange
+from iveg.domain.rule.crossings import LimitChange
 from tests.builders import at
 from tests.unit.domain.scene import Scene, person
 

@@ -8,16 +8,15 @@ rings a robot is clear only while every premise of that claim holds (``premises`
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from copy import copy
-from dataclasses import dataclass, replace
 from itertools import count
 from types import MappingProxyType
 
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import CLEAR, HALF_SPEED, SpeedLimit
 from iveg.domain.greenhouse import Greenhouse
-from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
 from iveg.domain.robot_state import RobotState
+from iveg.domain.rule.crossings import Crossing, LimitChange, leave
 from iveg.domain.rule.entering import is_ahead, is_slow_already, is_speeding_up
 from iveg.domain.rule.foresight import Encounter, Foresight, Foretold
 from iveg.domain.rule.obstacles import CAUSE, SeenBy, SeenObstacle, with_obstacles
@@ -29,47 +28,6 @@ from iveg.domain.tracking.people import People
 from iveg.domain.world import World
 
 _GRAVEST = ("person", "robot", "obstacle")
-
-
-@dataclass(frozen=True, slots=True)
-class Crossing:
-    """One robot inside one ring, from trigger to release.
-
-    Attributes:
-        zone: The nearest circle of the cause at trigger.
-        distance_m: Now; ``entered_m`` at the trigger.
-        outside_since: When it was first found outside (monotonic, s).
-        already_slow: It was slowed for something else: no slow-down will be seen.
-        ahead: It had judged this very zone itself and said so before.
-        foretold_s: When it would reach the ring, at the trigger (s); None: it was
-            inside.
-        speeding_up: It had not reached the speed that it wanted, so half of that may
-            be more than half of what it drove.
-        in_sight: Whether the robot saw it itself, or had a line of sight to the centre
-            at the trigger.
-    """
-
-    decision_id: str
-    robot_id: str
-    zone: Zone
-    entered: Instant
-    entered_m: float
-    speed_before: float
-    in_sight: bool
-    distance_m: float
-    already_slow: bool = False
-    ahead: bool = False
-    speeding_up: bool = False
-    outside_since: float | None = None
-    foretold_s: float | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class LimitChange:
-    """A crossing that began or ended."""
-
-    crossing: Crossing
-    began: bool
 
 
 class SpeedLimits:
@@ -294,12 +252,12 @@ class SpeedLimits:
         for cause, (depth, distance, zone) in met.items():
             crossing = mine.get(cause)
             if crossing is not None:
-                mine[cause] = _still(crossing, depth, distance, now)
+                mine[cause] = crossing.continued(depth, distance, now)
             elif depth <= 0.0:
                 crossing = self._enter(robot, zone, distance, now, next(ids))
                 mine[cause] = crossing
                 yield LimitChange(crossing, began=True)
-        yield from _leave(mine, met, now)
+        yield from leave(mine, met, now)
 
     def _enter(
         self,
@@ -371,26 +329,3 @@ def _beside(seen: SeenObstacle | None) -> Found:
     if seen is None or seen.ahead is not None:
         return {}
     return {CAUSE: (0.0, seen.distance_m, seen.zone)}
-
-
-def _leave(
-    mine: dict[str, Crossing], near: Mapping[str, object], now: Instant
-) -> Iterator[LimitChange]:
-    for cause, crossing in list(mine.items()):
-        if cause not in near and crossing.outside_since is None:
-            crossing = replace(crossing, outside_since=now.mono)
-            mine[cause] = crossing
-        since = crossing.outside_since
-        if since is not None and now.mono - since >= LIMITS.release_after_s:
-            del mine[cause]
-            yield LimitChange(crossing, began=False)
-
-
-def _still(crossing: Crossing, depth: float, distance: float, now: Instant) -> Crossing:
-    """A crossing that continues, or whose robot has just left the circle."""
-    since = None
-    if depth > LIMITS.release_beyond_m:
-        since = crossing.outside_since or now.mono
-    if distance == crossing.distance_m and since == crossing.outside_since:
-        return crossing
-    return replace(crossing, distance_m=distance, outside_since=since)

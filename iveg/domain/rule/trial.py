@@ -14,7 +14,7 @@ from iveg.domain.comparison import Comparison, Doings
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import HALF_SPEED, SpeedLimit
 from iveg.domain.observations import Instant
-from iveg.domain.rule.speed_limits import LimitChange
+from iveg.domain.rule.crossings import LimitChange
 
 MOST_KEPT: Final = 200
 """Differences in the list; all are counted."""

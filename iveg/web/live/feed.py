@@ -20,6 +20,8 @@ PICTURE_S: Final = 1 / 15
 """Between two scans, or detection frames, of one robot."""
 READ_OUT_S: Final = 0.1
 """Between two states of one robot, or lists of people."""
+PEOPLE_A_BEAT: Final = 50
+"""Of more the list is sent so much less often: each takes 0.1 ms to write."""
 STATES_AFTER_S: Final = READ_OUT_S / 2
 """States of robots come this long after lists of people: each takes long to write."""
 
@@ -127,7 +129,7 @@ class TelemetryFeed:
                     self._read_outs, topics.ROBOT_STATE.of(robot_id), _next_state
                 )
             elif row.pace == "read-out":
-                self._note(self._read_outs, topic, _next_beat)
+                self._note(self._read_outs, topic, self._next_list)
             else:
                 self._note(self._pictures, topic, _next_picture)
         self.window.gap_s = max(GAP_S, ROBOT_GAP_S * len(self._robots))
@@ -141,6 +143,11 @@ class TelemetryFeed:
         if topic not in waiting:
             sent = self._sent.get(topic)
             waiting[topic] = -_INF if sent is None else next_after(sent[1])
+
+    def _next_list(self, sent_at: float) -> float:
+        """When a list of people may be sent again (monotonic, s)."""
+        beats = max(1, math.ceil(self._encoder.listed / PEOPLE_A_BEAT))
+        return _next_beat(sent_at + (beats - 1) * READ_OUT_S)
 
     def _due_at(self) -> float:
         """Earliest time of a waiting part; parts without room wait for credit."""

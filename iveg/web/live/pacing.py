@@ -18,10 +18,10 @@ FRAMES: Final = 8
 """Spread over the round trip: 300 ms away a page still gets 26 frames a second."""
 BYTES: Final = 24_576
 """Of what is heavy in them (scans, detections, people): 0.2 s of a line of 1 Mbit/s."""
-GAP_S: Final = 0.004
+GAP_S: Final = 0.002
 """Frames nearer to each other would cost more than the freshness that they bring."""
-ROBOT_GAP_S: Final = 0.0004
-"""The same for each robot of the fleet, where that is more: 8 ms with twenty."""
+ROBOT_GAP_S: Final = 0.0002
+"""The same for each robot of the fleet, where that is more: 4 ms with twenty."""
 SLOW_FRAME_S: Final = 0.03
 """A page that draws for longer than this twice is slow."""
 

@@ -59,6 +59,11 @@ class TelemetryEncoder:
         self._moves: dict[str, tuple[Odometry, Part]] = {}
         self._margins: LeastMargins | None = None
 
+    @property
+    def listed(self) -> int:
+        """How many people the newest list has."""
+        return self._people.count
+
     def begin(self) -> None:
         """Begin a frame: values computed for the one before are dropped."""
         self._margins = None
@@ -215,6 +220,11 @@ class _People:
             text = b'%b,"at":%b}' % (write_json(person)[:-1], orjson.dumps(at))
             self._texts[person.person_id] = version, text
             self._changed = version
+
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        return len(self._ids)
 
     def changes(self, since: int) -> Part | None:
         """The list of people, and those who changed since a version."""

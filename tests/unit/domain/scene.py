@@ -15,8 +15,9 @@ from iveg.domain.observations import (
     Origin,
     Received,
 )
+from iveg.domain.rule.crossings import LimitChange
 from iveg.domain.rule.obstacles import Obstacles
-from iveg.domain.rule.speed_limits import LimitChange, SpeedLimits
+from iveg.domain.rule.speed_limits import SpeedLimits
 from iveg.domain.tracking.calibration import Calibrations
 from iveg.domain.tracking.people import People, Placed
 from iveg.domain.tracking.person import TrackedPerson

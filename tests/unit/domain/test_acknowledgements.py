@@ -7,7 +7,7 @@ import pytest
 from iveg.domain.acknowledgements import ECHO_S, WINDOW_S, acknowledgements_of
 from iveg.domain.decisions import SlowdownDecision
 from iveg.domain.detection_rule import DetectionRule
-from iveg.domain.rule.speed_limits import Crossing
+from iveg.domain.rule.crossings import Crossing
 from iveg.domain.rule.zones import Zone
 from tests.builders import START, at
 

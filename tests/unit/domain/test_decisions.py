@@ -9,7 +9,7 @@ from iveg.domain.decisions import Decisions, SlowdownDecision
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.observations import FeedbackRef, SafetyReport
 from iveg.domain.robot_state import RobotState
-from iveg.domain.rule.speed_limits import Crossing
+from iveg.domain.rule.crossings import Crossing
 from iveg.domain.rule.zones import Zone
 from iveg.domain.tracking.person import Sighting
 from iveg.domain.transports import DIRECT

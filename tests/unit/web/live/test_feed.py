@@ -221,6 +221,27 @@ def test_pictures_and_read_outs_go_as_often_as_eyes_need(
     assert topics.count("robots/AGI") <= seconds / READ_OUT_S + 1
 
 
+@pytest.mark.parametrize(("count", "beats"), [(4, 1), (50, 1), (51, 2)])
+def test_a_long_list_of_people_goes_less_often(
+    desk: WebDesk, page: Page, count: int, beats: int
+) -> None:
+    people = [
+        detection("farmer", 3.0 + 3.0 * (place // 10), 3.0 * (place % 10))
+        for place in range(count)
+    ]
+    steps = 200
+    for step in range(steps):
+        desk.drive("AGI", 0.001 * step)
+        desk.look("AGI", *people)
+        page.read()
+        page.paint()
+        desk.clock.now += 0.01
+
+    seconds, lists = 0.01 * steps, page.topics().count("people")
+    assert len(desk.views.people(desk.clock())) == count
+    assert lists == pytest.approx(seconds / (beats * READ_OUT_S), abs=1.5)
+
+
 def test_states_of_robots_are_not_written_in_the_frame_of_the_list_of_people(
     desk: WebDesk, page: Page
 ) -> None:
