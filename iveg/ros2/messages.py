@@ -31,15 +31,8 @@ Nine = Annotated[NDArray[np.float64], Many("float64", 9)]
 Twelve = Annotated[NDArray[np.float64], Many("float64", 12)]
 
 
-def _zeros(count: int) -> NDArray[np.float64]:
-    return np.zeros(count)
-
-
 def _none() -> NDArray[np.float32]:
     return np.zeros(0, np.float32)
-
-
-# --- std_msgs, builtin_interfaces --------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,9 +87,6 @@ class ColorRGBA(Message, package="std_msgs"):
     a: Float32 = 1.0
 
 
-# --- geometry_msgs, tf2_msgs -------------------------------------------------------
-
-
 @dataclass(frozen=True, slots=True)
 class Point(Message, package="geometry_msgs"):
     """(m)."""
@@ -145,7 +135,7 @@ class PoseWithCovariance(Message, package="geometry_msgs"):
     """A pose with its covariance."""
 
     pose: Pose = Pose()
-    covariance: Covariance = field(default_factory=lambda: _zeros(36))
+    covariance: Covariance = field(default_factory=lambda: np.zeros(36))
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,7 +158,7 @@ class TwistWithCovariance(Message, package="geometry_msgs"):
     """A twist with its covariance."""
 
     twist: Twist = Twist()
-    covariance: Covariance = field(default_factory=lambda: _zeros(36))
+    covariance: Covariance = field(default_factory=lambda: np.zeros(36))
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,9 +182,6 @@ class TFMessage(Message, package="tf2_msgs"):
     """Content of ``/tf`` and ``/tf_static``."""
 
     transforms: tuple[TransformStamped, ...] = ()
-
-
-# --- nav_msgs ----------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -230,9 +217,6 @@ class OccupancyGrid(Stamped, package="nav_msgs"):
 
     info: MapMetaData = MapMetaData()
     data: Cells = field(default_factory=lambda: np.zeros(0, np.int8))
-
-
-# --- sensor_msgs -------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -301,10 +285,10 @@ class CameraInfo(Stamped, package="sensor_msgs"):
     height: Uint32 = 0
     width: Uint32 = 0
     distortion_model: str = ""
-    d: Doubles = field(default_factory=lambda: _zeros(0))
-    k: Nine = field(default_factory=lambda: _zeros(9))
-    r: Nine = field(default_factory=lambda: _zeros(9))
-    p: Twelve = field(default_factory=lambda: _zeros(12))
+    d: Doubles = field(default_factory=lambda: np.zeros(0))
+    k: Nine = field(default_factory=lambda: np.zeros(9))
+    r: Nine = field(default_factory=lambda: np.zeros(9))
+    p: Twelve = field(default_factory=lambda: np.zeros(12))
     binning_x: Uint32 = 0
     binning_y: Uint32 = 0
     roi: RegionOfInterest = RegionOfInterest()
@@ -340,9 +324,6 @@ class CompressedImage(Stamped, package="sensor_msgs"):
 
     format: str = ""
     data: Octets = field(default_factory=lambda: np.zeros(0, np.uint8))
-
-
-# --- vision_msgs -------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
@@ -425,53 +406,3 @@ class Detection2DArray(Stamped, package="vision_msgs"):
     """Detections of one picture, without depth."""
 
     detections: tuple[Detection2D, ...] = ()
-
-
-# --- visualization_msgs ------------------------------------------------------------
-
-
-@dataclass(frozen=True, slots=True)
-class UVCoordinate(Message, package="visualization_msgs"):
-    """A part of ``Marker`` that iVeg leaves empty."""
-
-    u: Float32 = 0.0
-    v: Float32 = 0.0
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class MeshFile(Message, package="visualization_msgs"):
-    """A part of ``Marker`` that iVeg leaves empty."""
-
-    filename: str = ""
-    data: Octets = field(default_factory=lambda: np.zeros(0, np.uint8))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Marker(Stamped, package="visualization_msgs"):
-    """A shape in RViz; ``type`` 3 is a cylinder, 9 a text."""
-
-    ns: str = ""
-    id: Int32 = 0
-    type: Int32 = 0
-    action: Int32 = 0
-    pose: Pose = Pose()
-    scale: Vector3 = Vector3()
-    color: ColorRGBA = ColorRGBA()
-    lifetime: Duration = Duration()
-    frame_locked: Boolean = False
-    points: tuple[Point, ...] = ()
-    colors: tuple[ColorRGBA, ...] = ()
-    texture_resource: str = ""
-    texture: CompressedImage = field(default_factory=CompressedImage)
-    uv_coordinates: tuple[UVCoordinate, ...] = ()
-    text: str = ""
-    mesh_resource: str = ""
-    mesh_file: MeshFile = field(default_factory=MeshFile)
-    mesh_use_embedded_materials: Boolean = False
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class MarkerArray(Message, package="visualization_msgs"):
-    """Shapes in RViz."""
-
-    markers: tuple[Marker, ...] = ()

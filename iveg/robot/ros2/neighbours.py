@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from iveg.domain.geometry import Pose2D
 from iveg.robot.neighbours import PEER_M, Neighbour
 from iveg.ros2 import messages as m
+from iveg.ros2 import visualization_msgs
 
 REACH_M = 8.0
 """Greatest distance of a disc (m); the clearing circle is a metre beyond."""
@@ -75,9 +76,9 @@ def _disc(one: Neighbour, own: Pose2D) -> NDArray[np.float64]:
 
 def markers(
     neighbours: Iterable[Neighbour], stamp: m.Time, frame: str
-) -> m.MarkerArray:
+) -> visualization_msgs.MarkerArray:
     """Body, radius and name of each, with a lifetime of a second."""
-    found: list[m.Marker] = []
+    found: list[visualization_msgs.Marker] = []
     for number, one in enumerate(neighbours):
         place = m.Point(one.x, one.y, 0.9)
         red = m.ColorRGBA(0.9, 0.2, 0.1, 0.9)
@@ -87,7 +88,7 @@ def markers(
         found += [
             _marker(header, f"{one.kind} body", number, place, 2 * one.radius, body),
             _marker(header, f"{one.kind} ring", number, place, 2 * one.ring, ring),
-            m.Marker(
+            visualization_msgs.Marker(
                 header,
                 f"{one.kind} name",
                 number,
@@ -99,7 +100,7 @@ def markers(
                 text=one.name,
             ),
         ]
-    return m.MarkerArray(tuple(found))
+    return visualization_msgs.MarkerArray(tuple(found))
 
 
 def _marker(
@@ -109,9 +110,9 @@ def _marker(
     place: m.Point,
     width: float,
     color: m.ColorRGBA,
-) -> m.Marker:
+) -> visualization_msgs.Marker:
     flat = width > 2 * PEER_M
-    return m.Marker(
+    return visualization_msgs.Marker(
         header,
         ns,
         number,

@@ -7,6 +7,7 @@ from typing import Literal
 from iveg.robot.ros2.detectors import BOXES, LOOKS
 from iveg.robot.ros2.sensors import ROS_SENSORS
 from iveg.ros2 import messages as m
+from iveg.ros2 import visualization_msgs
 from iveg.ros2.names import DEFAULT, LATCHED, SENSOR_DATA, TF, TF_STATIC, Qos
 from iveg.ros2.schema import Message
 
@@ -67,7 +68,9 @@ TOPICS: Mapping[str, RosTopic] = {
     "goal": RosTopic("goal_pose", m.PoseStamped, "output", DEFAULT),
     # People and peers, for Nav2's obstacle layer and for RViz.
     "obstacles": RosTopic("iveg/obstacles", m.PointCloud2, "output", DEFAULT),
-    "markers": RosTopic("iveg/markers", m.MarkerArray, "output", DEFAULT),
+    "markers": RosTopic(
+        "iveg/markers", visualization_msgs.MarkerArray, "output", DEFAULT
+    ),
     # The fleet's picture, for Nav2's static layer.
     "costmap": RosTopic("iveg/costmap", m.OccupancyGrid, "output", LATCHED),
 }

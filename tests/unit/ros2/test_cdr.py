@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iveg.domain.errors import UnreadableError
-from iveg.ros2 import cdr
+from iveg.ros2 import cdr, visualization_msgs
 from iveg.ros2 import messages as m
 from tests.unit.ros2.reference import STORE, as_rosbags
 from tests.unit.ros2.spelled import HALF, MAP, ONE, POSE, STAMP, TWO, ZERO, payload
@@ -199,9 +199,9 @@ CASES: dict[str, tuple[Any, str]] = {
         "03000000 ff 00 64",
     ),
     "MarkerArray, pose after 40 bytes": (
-        m.MarkerArray(
+        visualization_msgs.MarkerArray(
             (
-                m.Marker(
+                visualization_msgs.Marker(
                     IN_MAP,
                     "p",
                     *(7, 3, 0),
@@ -220,9 +220,9 @@ CASES: dict[str, tuple[Any, str]] = {
         "00000000 00",
     ),
     "MarkerArray, pose after 48 bytes": (
-        m.MarkerArray(
+        visualization_msgs.MarkerArray(
             (
-                m.Marker(
+                visualization_msgs.Marker(
                     IN_MAP,
                     "people",
                     *(7, 3, 0),

@@ -4,6 +4,7 @@ import pytest
 
 from iveg.ros2 import detector_messages as d
 from iveg.ros2 import messages as m
+from iveg.ros2 import visualization_msgs
 from iveg.ros2.schema import Message
 from iveg.ros2.type_hash import definition, read_user_data, type_hash, user_data
 from tests.unit.ros2.reference import STORE
@@ -22,7 +23,9 @@ PUBLISHED: dict[type[Message], str] = {
     m.LaserScan: "64c191398013af96509d518dac71d5164f9382553fce5c1f8cca5be7924bd828",
     m.TFMessage: "e369d0f05a23ae52508854b66f6aa0437f3449d652e8cbf22d5abe85d020f087",
     m.CameraInfo: "b3dfd68ff46c9d56c80fd3bd4ed22c7a4ddce8c8348f2f59c299e73118e7e275",
-    m.MarkerArray: "86cb8800b6fb05b5eff1abd7a56f62a5641d3ae9a1c29e78e67e704f1d067dcf",
+    visualization_msgs.MarkerArray: (
+        "86cb8800b6fb05b5eff1abd7a56f62a5641d3ae9a1c29e78e67e704f1d067dcf"
+    ),
     m.Detection3DArray: (
         "793f5eab9595ac1c0da07873cc859db42eae51f0ee76056db8562515d830e018"
     ),
