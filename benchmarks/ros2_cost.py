@@ -36,7 +36,7 @@ from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.domain.feedback import CLEAR, Feedback
 from iveg.domain.observations import Origin, SafetyReport
 from iveg.ngsi import codec
-from iveg.ros2 import cdr, names
+from iveg.ros2 import cdr, names, vision_msgs
 from iveg.ros2 import messages as m
 from iveg.ros2.schema import Message
 from tests.brokers import broker_on
@@ -50,7 +50,7 @@ SENSORS: dict[str, type[Message]] = {
     "/odom": m.Odometry,
     "/scan": m.LaserScan,
     "/tf": m.TFMessage,
-    "/detections_3d": m.Detection3DArray,
+    "/detections_3d": vision_msgs.Detection3DArray,
 }
 WISHES: dict[str, type[Message]] = {"/cmd_vel_nav": m.Twist}
 _HEARD = write_qos(names.SENSOR_DATA.newest(50))
@@ -125,7 +125,9 @@ class Robot:
         stamp = m.Time.of(time.time())
         in_map, in_odom = m.Header(stamp, "map"), m.Header(stamp, "odom")
         base = m.Header(stamp, "base_link")
-        sure = m.ObjectHypothesisWithPose(m.ObjectHypothesis("tomato", 0.9))
+        sure = vision_msgs.ObjectHypothesisWithPose(
+            vision_msgs.ObjectHypothesis("tomato", 0.9)
+        )
         said: dict[str, Message] = {
             "/tf": m.TFMessage(
                 (
@@ -139,8 +141,8 @@ class Robot:
                 *(-math.pi, math.pi, math.tau / 720, 0.0, 0.03, 0.1, 25.0),
                 self._ranges,
             ),
-            "/detections_3d": m.Detection3DArray(
-                base, tuple(m.Detection3D(base, (sure,)) for _ in range(3))
+            "/detections_3d": vision_msgs.Detection3DArray(
+                base, tuple(vision_msgs.Detection3D(base, (sure,)) for _ in range(3))
             ),
         }
         for name, message in said.items():

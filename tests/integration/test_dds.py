@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import pytest
 
 from iveg.domain.errors import HopError
-from iveg.ros2 import cdr, names
+from iveg.ros2 import cdr, names, vision_msgs
 from iveg.ros2 import detector_messages as d
 from iveg.ros2 import messages as m
 from iveg.ros2.names import Qos
@@ -138,7 +138,7 @@ def test_a_detector_is_met_in_its_type_and_tells_its_hash(
     with Dds(loopback(domain), gate="AGI") as other:
         writer = other.writer("/boxes", message, RELIABLE)
         # Tools of ROS may have readers of other types there.
-        dds.reader("/boxes", m.Detection3DArray, RELIABLE)
+        dds.reader("/boxes", vision_msgs.Detection3DArray, RELIABLE)
         reader = dds.reader("/boxes", message, RELIABLE)
         until(lambda: writer.readers == 1 and reader.writers == 1, 30.0, "both met")
 

@@ -23,7 +23,7 @@ from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.network import Network, Writer
 from iveg.robot.ros2.reading import read_twist, write_twist
 from iveg.robot.ros2.sensors import ROS_SENSORS
-from iveg.ros2 import cdr
+from iveg.ros2 import cdr, vision_msgs
 from iveg.ros2 import messages as m
 from iveg.ros2.schema import Message
 
@@ -126,7 +126,7 @@ class Ros2Base:
         )
         self._odometry = writer("odometry", m.Odometry)
         self._scans = writer("scan", m.LaserScan)
-        self._seen = writer("detections_3d", m.Detection3DArray)
+        self._seen = writer("detections_3d", vision_msgs.Detection3DArray)
         self._paths = writer("path", m.Path)
         self._sensors = EmulatedSensors()
         self._readings = {
@@ -226,7 +226,7 @@ class Ros2Base:
         frame = self._rig.detect(now.mono - self._run_began, self._world)
         header = m.Header(m.Time.of(now.wall), self._frames.base_link)
         seen = tuple(_detection(one, header) for one in frame.detections)
-        self._seen.write(cdr.write(m.Detection3DArray(header, seen)))
+        self._seen.write(cdr.write(vision_msgs.Detection3DArray(header, seen)))
 
     def _tell_slowly(self, _: float) -> None:
         header = m.Header(m.Time.of(clock.wall()), self._frames.map)
@@ -262,14 +262,14 @@ def _link(stamp: m.Time, outer: str, inner: str, pose: Pose2D) -> m.TransformSta
     return m.TransformStamped(m.Header(stamp, outer), inner, transform)
 
 
-def _detection(one: Detection, header: m.Header) -> m.Detection3D:
+def _detection(one: Detection, header: m.Header) -> vision_msgs.Detection3D:
     box, (x, y, z) = one.box, one.box.centre
     size = m.Vector3(box.xmax - box.xmin, box.ymax - box.ymin, box.zmax - box.zmin)
-    sure = m.ObjectHypothesis(one.class_id, one.probability)
+    sure = vision_msgs.ObjectHypothesis(one.class_id, one.probability)
     centre = m.Pose(m.Point(x, y, z))
-    return m.Detection3D(
+    return vision_msgs.Detection3D(
         header,
-        (m.ObjectHypothesisWithPose(sure, m.PoseWithCovariance(centre)),),
-        m.BoundingBox3D(centre, size),
+        (vision_msgs.ObjectHypothesisWithPose(sure, m.PoseWithCovariance(centre)),),
+        vision_msgs.BoundingBox3D(centre, size),
         one.det_id or "",
     )

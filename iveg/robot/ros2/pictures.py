@@ -31,6 +31,7 @@ from iveg.robot.ros2.detectors import Look
 from iveg.robot.ros2.reading import class_id_of, read_hypothesis, within_world
 from iveg.robot.ros2.rigid import RigidTransform
 from iveg.ros2 import messages as m
+from iveg.ros2 import vision_msgs
 
 _Pixel = TypeVar("_Pixel", bound=np.generic)
 
@@ -137,7 +138,7 @@ def grounded(
 
 def _place(
     number: int,
-    seen: m.Detection2D,
+    seen: vision_msgs.Detection2D,
     picture: DepthPicture,
     owners: NDArray[np.generic] | None,
     place: RigidTransform,
@@ -157,7 +158,7 @@ def _place(
 
 def _segment(
     number: int,
-    seen: m.Detection2D,
+    seen: vision_msgs.Detection2D,
     picture: DepthPicture,
     owners: NDArray[np.generic] | None,
     classes: tuple[str, ...],

@@ -21,6 +21,7 @@ from iveg.domain.observations import (
 from iveg.ngsi.payloads import FORBIDDEN, MAX_BEAMS, MAX_PATH, clean_text
 from iveg.robot.ros2.rigid import RigidTransform, rigid_of
 from iveg.ros2 import messages as m
+from iveg.ros2 import vision_msgs
 
 FASTEST_M_S = 20.0
 """Speed above which a value is refused: no vehicle in crop rows is so fast (m/s)."""
@@ -124,7 +125,7 @@ def _side(laser: RigidTransform) -> int:
 
 
 def read_detection(
-    detection: m.Detection3D, place: RigidTransform, classes: tuple[str, ...]
+    detection: vision_msgs.Detection3D, place: RigidTransform, classes: tuple[str, ...]
 ) -> Detection:
     """A box in ``map``: the hull of the rotated one.
 
@@ -155,7 +156,7 @@ def read_detection(
 
 
 def read_hypothesis(
-    results: tuple[m.ObjectHypothesisWithPose, ...], classes: tuple[str, ...]
+    results: tuple[vision_msgs.ObjectHypothesisWithPose, ...], classes: tuple[str, ...]
 ) -> tuple[str, float]:
     """Class and score of the most probable hypothesis.
 
@@ -178,7 +179,7 @@ def read_hypothesis(
 
 
 def class_id_of(
-    results: tuple[m.ObjectHypothesisWithPose, ...], classes: tuple[str, ...]
+    results: tuple[vision_msgs.ObjectHypothesisWithPose, ...], classes: tuple[str, ...]
 ) -> str | None:
     """The only class that a detection may be of; None where it may be another."""
     if len(results) != 1:
@@ -189,7 +190,7 @@ def class_id_of(
         return None
 
 
-def _score(hypothesis: m.ObjectHypothesis) -> float:
+def _score(hypothesis: vision_msgs.ObjectHypothesis) -> float:
     return -1.0 if math.isnan(hypothesis.score) else hypothesis.score
 
 

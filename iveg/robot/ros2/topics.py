@@ -7,7 +7,7 @@ from typing import Literal
 from iveg.robot.ros2.detectors import BOXES, LOOKS
 from iveg.robot.ros2.sensors import ROS_SENSORS
 from iveg.ros2 import messages as m
-from iveg.ros2 import visualization_msgs
+from iveg.ros2 import vision_msgs, visualization_msgs
 from iveg.ros2.names import DEFAULT, LATCHED, SENSOR_DATA, TF, TF_STATIC, Qos
 from iveg.ros2.schema import Message
 
@@ -48,10 +48,12 @@ TOPICS: Mapping[str, RosTopic] = {
     "odometry": RosTopic("odom", m.Odometry, "stream"),
     "scan": RosTopic("scan", m.LaserScan, "stream"),
     "detections_3d": RosTopic(
-        "detections_3d", m.Detection3DArray, "stream", forms=tuple(BOXES)
+        "detections_3d", vision_msgs.Detection3DArray, "stream", forms=tuple(BOXES)
     ),
     # With depth and camera_info an alternative to detections_3d.
-    "detections_2d": RosTopic("", m.Detection2DArray, "stream", forms=tuple(LOOKS)),
+    "detections_2d": RosTopic(
+        "", vision_msgs.Detection2DArray, "stream", forms=tuple(LOOKS)
+    ),
     "depth": RosTopic("camera/aligned_depth_to_color/image_raw", m.Image, "picture"),
     "camera_info": RosTopic("camera/color/camera_info", m.CameraInfo),
     # In a mono picture value n marks the n-th detection; without, the whole box counts.

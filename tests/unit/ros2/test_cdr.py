@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iveg.domain.errors import UnreadableError
-from iveg.ros2 import cdr, visualization_msgs
+from iveg.ros2 import cdr, vision_msgs, visualization_msgs
 from iveg.ros2 import messages as m
 from tests.unit.ros2.reference import STORE, as_rosbags
 from tests.unit.ros2.spelled import HALF, MAP, ONE, POSE, STAMP, TWO, ZERO, payload
@@ -30,9 +30,9 @@ def _b(*numbers: int) -> Any:
     return np.array(numbers, np.uint8)
 
 
-def _seen(class_id: str) -> tuple[m.ObjectHypothesisWithPose, ...]:
-    sure = m.ObjectHypothesis(class_id, 0.5)
-    return (m.ObjectHypothesisWithPose(sure, m.PoseWithCovariance(HERE)),)
+def _seen(class_id: str) -> tuple[vision_msgs.ObjectHypothesisWithPose, ...]:
+    sure = vision_msgs.ObjectHypothesis(class_id, 0.5)
+    return (vision_msgs.ObjectHypothesisWithPose(sure, m.PoseWithCovariance(HERE)),)
 
 
 CASES: dict[str, tuple[Any, str]] = {
@@ -107,13 +107,13 @@ CASES: dict[str, tuple[Any, str]] = {
         "3*-- 02000000 'x'",
     ),
     "Detection3DArray, score after 51 bytes": (
-        m.Detection3DArray(
+        vision_msgs.Detection3DArray(
             IN_MAP,
             (
-                m.Detection3D(
+                vision_msgs.Detection3D(
                     IN_MAP,
                     _seen("farmer"),
-                    m.BoundingBox3D(HERE, m.Vector3(0.5, 0.5, 2.0)),
+                    vision_msgs.BoundingBox3D(HERE, m.Vector3(0.5, 0.5, 2.0)),
                     "7",
                 ),
             ),
@@ -122,18 +122,24 @@ CASES: dict[str, tuple[Any, str]] = {
         f"{POSE} {SURE} {POSE} {HALF} {HALF} {TWO} 02000000 '7'",
     ),
     "Detection3DArray, score after 46 bytes": (
-        m.Detection3DArray(IN_MAP, (m.Detection3D(IN_MAP, _seen("x")),)),
+        vision_msgs.Detection3DArray(
+            IN_MAP, (vision_msgs.Detection3D(IN_MAP, _seen("x")),)
+        ),
         f"{STAMP} {MAP} 01000000 {STAMP} {MAP} 01000000 02000000 'x' 2*-- {HALF} "
         f"{POSE} {SURE} 6*{ZERO} {ONE} 3*{ZERO} 01000000 ''",
     ),
     "Detection2DArray": (
-        m.Detection2DArray(
+        vision_msgs.Detection2DArray(
             IN_MAP,
             (
-                m.Detection2D(
+                vision_msgs.Detection2D(
                     IN_MAP,
                     _seen("person"),
-                    m.BoundingBox2D(m.PicturePose(m.Point2D(1.0, 2.0), 0.0), 0.5, 2.0),
+                    vision_msgs.BoundingBox2D(
+                        vision_msgs.PicturePose(vision_msgs.Point2D(1.0, 2.0), 0.0),
+                        0.5,
+                        2.0,
+                    ),
                     "",
                 ),
             ),
@@ -142,7 +148,9 @@ CASES: dict[str, tuple[Any, str]] = {
         f"{POSE} {SURE} {ONE} {TWO} {ZERO} {HALF} {TWO} 01000000 ''",
     ),
     "Detection2DArray, score after 46 bytes": (
-        m.Detection2DArray(IN_MAP, (m.Detection2D(IN_MAP, _seen("x"), id="12"),)),
+        vision_msgs.Detection2DArray(
+            IN_MAP, (vision_msgs.Detection2D(IN_MAP, _seen("x"), id="12"),)
+        ),
         f"{STAMP} {MAP} 01000000 {STAMP} {MAP} 01000000 02000000 'x' 2*-- {HALF} "
         f"{POSE} {SURE} 5*{ZERO} 03000000 '12'",
     ),

@@ -4,7 +4,7 @@ import pytest
 
 from iveg.ros2 import detector_messages as d
 from iveg.ros2 import messages as m
-from iveg.ros2 import visualization_msgs
+from iveg.ros2 import vision_msgs, visualization_msgs
 from iveg.ros2.schema import Message
 from iveg.ros2.type_hash import definition, read_user_data, type_hash, user_data
 from tests.unit.ros2.reference import STORE
@@ -26,7 +26,7 @@ PUBLISHED: dict[type[Message], str] = {
     visualization_msgs.MarkerArray: (
         "86cb8800b6fb05b5eff1abd7a56f62a5641d3ae9a1c29e78e67e704f1d067dcf"
     ),
-    m.Detection3DArray: (
+    vision_msgs.Detection3DArray: (
         "793f5eab9595ac1c0da07873cc859db42eae51f0ee76056db8562515d830e018"
     ),
 }

@@ -8,7 +8,7 @@ import numpy as np
 from iveg.domain.observations import Instant, Observation
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.inputs import SensorInputs
-from iveg.ros2 import cdr
+from iveg.ros2 import cdr, vision_msgs
 from iveg.ros2 import messages as m
 from iveg.ros2.schema import Message
 
@@ -82,14 +82,20 @@ def seen(
     *,
     frame: str = "base_link",
     after: float = 0.0,
-) -> m.Detection3D:
-    sure = m.ObjectHypothesisWithPose(m.ObjectHypothesis(class_id, score))
-    box = m.BoundingBox3D(m.Pose(m.Point(x, 0.0, 0.9)), m.Vector3(0.4, 0.6, 1.8))
-    return m.Detection3D(m.Header(stamp(after), frame), (sure,), box, "7")
+) -> vision_msgs.Detection3D:
+    sure = vision_msgs.ObjectHypothesisWithPose(
+        vision_msgs.ObjectHypothesis(class_id, score)
+    )
+    box = vision_msgs.BoundingBox3D(
+        m.Pose(m.Point(x, 0.0, 0.9)), m.Vector3(0.4, 0.6, 1.8)
+    )
+    return vision_msgs.Detection3D(m.Header(stamp(after), frame), (sure,), box, "7")
 
 
-def look(*found: m.Detection3D, after: float = 0.0) -> m.Detection3DArray:
-    return m.Detection3DArray(m.Header(stamp(after), "base_link"), found)
+def look(
+    *found: vision_msgs.Detection3D, after: float = 0.0
+) -> vision_msgs.Detection3DArray:
+    return vision_msgs.Detection3DArray(m.Header(stamp(after), "base_link"), found)
 
 
 class Bench:

@@ -9,7 +9,7 @@ import pytest
 
 from iveg.domain.observations import DetectionFrame
 from iveg.robot.ros2.config import RobotConfig
-from iveg.ros2 import cdr
+from iveg.ros2 import cdr, vision_msgs
 from iveg.ros2 import detector_messages as d
 from iveg.ros2 import messages as m
 from iveg.ros2.schema import Message
@@ -47,16 +47,20 @@ def told(one: Bench, topic: str, message: Message) -> DetectionFrame:
     return found
 
 
-def sure(name: str = "farmer") -> tuple[m.ObjectHypothesisWithPose, ...]:
-    return (m.ObjectHypothesisWithPose(m.ObjectHypothesis(name, 0.9)),)
+def sure(name: str = "farmer") -> tuple[vision_msgs.ObjectHypothesisWithPose, ...]:
+    return (
+        vision_msgs.ObjectHypothesisWithPose(vision_msgs.ObjectHypothesis(name, 0.9)),
+    )
 
 
 # --- with depth ---------------------------------------------------------------------
 
 
 def vision_3d(header: m.Header, centre: m.Point, size: m.Vector3) -> Message:
-    box = m.BoundingBox3D(m.Pose(centre), size)
-    return m.Detection3DArray(header, (m.Detection3D(UNSEEN, sure(), box),))
+    box = vision_msgs.BoundingBox3D(m.Pose(centre), size)
+    return vision_msgs.Detection3DArray(
+        header, (vision_msgs.Detection3D(UNSEEN, sure(), box),)
+    )
 
 
 def yolact(header: m.Header, centre: m.Point, size: m.Vector3) -> Message:
@@ -119,12 +123,14 @@ def test_a_detection_of_yolo_without_depth_is_no_place_at_the_origin() -> None:
 # --- in a picture -------------------------------------------------------------------
 
 
-def vision_2d(centre: m.Point2D, size: m.Point2D) -> Message:
-    box = m.BoundingBox2D(m.PicturePose(centre), size.x, size.y)
-    return m.Detection2DArray(OPTICAL, (m.Detection2D(UNSEEN, sure(), box),))
+def vision_2d(centre: vision_msgs.Point2D, size: vision_msgs.Point2D) -> Message:
+    box = vision_msgs.BoundingBox2D(vision_msgs.PicturePose(centre), size.x, size.y)
+    return vision_msgs.Detection2DArray(
+        OPTICAL, (vision_msgs.Detection2D(UNSEEN, sure(), box),)
+    )
 
 
-def yolox_box(centre: m.Point2D, size: m.Point2D) -> d.BoundingBox:
+def yolox_box(centre: vision_msgs.Point2D, size: vision_msgs.Point2D) -> d.BoundingBox:
     # A number below zero loses its sign, as in the detector's own uint16.
     return d.BoundingBox(
         0.9,
@@ -139,28 +145,31 @@ def yolox_box(centre: m.Point2D, size: m.Point2D) -> d.BoundingBox:
     )
 
 
-def yolox(centre: m.Point2D, size: m.Point2D) -> Message:
+def yolox(centre: vision_msgs.Point2D, size: vision_msgs.Point2D) -> Message:
     return d.BoundingBoxes(OPTICAL, UNSEEN, (yolox_box(centre, size),))
 
 
-def yolo_2d(centre: m.Point2D, size: m.Point2D) -> Message:
+def yolo_2d(centre: vision_msgs.Point2D, size: vision_msgs.Point2D) -> Message:
     place = d.Pose2D(d.Point2D(centre.x, centre.y))
     box = d.BoundingBox2D(place, d.Vector2(size.x, size.y))
     return d.DetectionArray(OPTICAL, (d.Detection(0, "farmer", 0.9, bbox=box),))
 
 
-Drawn = Callable[[m.Point2D, m.Point2D], Message]
-MIDDLE, TALL = m.Point2D(32.0, 25.0), m.Point2D(20.0, 34.0)
+Drawn = Callable[[vision_msgs.Point2D, vision_msgs.Point2D], Message]
+MIDDLE, TALL = vision_msgs.Point2D(32.0, 25.0), vision_msgs.Point2D(20.0, 34.0)
 
 
 @pytest.mark.parametrize("drawn", [vision_2d, yolox, yolo_2d])
 @pytest.mark.parametrize(
     ("centre", "size"),
-    [(MIDDLE, TALL), (m.Point2D(32.0, 17.0), m.Point2D(20.0, 46.0))],
+    [
+        (MIDDLE, TALL),
+        (vision_msgs.Point2D(32.0, 17.0), vision_msgs.Point2D(20.0, 46.0)),
+    ],
     ids=["within the picture", "over its upper edge"],
 )
 def test_a_box_in_a_picture_lies_where_the_person_is(
-    drawn: Drawn, centre: m.Point2D, size: m.Point2D
+    drawn: Drawn, centre: vision_msgs.Point2D, size: vision_msgs.Point2D
 ) -> None:
     one = bench().hear("depth", depth()).hear("camera_info", info())
 

@@ -18,7 +18,7 @@ from iveg.domain.observations import (
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.input_faults import speed_of
 from iveg.robot.ros2.topics import sensed_topics
-from iveg.ros2 import cdr
+from iveg.ros2 import cdr, vision_msgs
 from iveg.ros2 import messages as m
 from tests.unit.robot.ros2 import said
 from tests.unit.robot.ros2.said import Bench, link, look, seen, tf
@@ -379,7 +379,7 @@ def test_who_was_seen_without_a_place_is_counted_and_not_placed() -> None:
     "bad", [seen(score=math.nan), seen(score=1.5), seen(x=math.nan), seen("()")]
 )
 def test_a_detection_that_cannot_be_is_counted_beside_the_others(
-    bad: m.Detection3D,
+    bad: vision_msgs.Detection3D,
 ) -> None:
     bench = Bench().hear("tf", tf(link("odom", "base_link")))
 

@@ -7,6 +7,7 @@ from iveg.robot.ros2.input_faults import InputFaults, speed_of
 from iveg.robot.ros2.lookout import Lookout, forms_published
 from iveg.ros2 import detector_messages as d
 from iveg.ros2 import messages as m
+from iveg.ros2 import vision_msgs
 from iveg.ros2.names import SENSOR_DATA, TF_STATIC, Endpoint, Qos
 from tests.fakes.ros2_network import endpoint
 
@@ -83,7 +84,7 @@ def test_a_topic_of_a_type_that_is_not_read_is_named_with_it() -> None:
 
 
 @pytest.mark.parametrize(
-    "message", [m.Detection3DArray, d.BoundingBoxes3d, d.DetectionArray]
+    "message", [vision_msgs.Detection3DArray, d.BoundingBoxes3d, d.DetectionArray]
 )
 def test_a_detector_of_a_family_that_is_read_is_no_fault(message: type) -> None:
     assert faults(BASE, endpoint("/detections_3d", message)) == {}
@@ -93,8 +94,8 @@ def test_types_are_told_as_others_publish_them() -> None:
     seen = [
         endpoint("/boxes", d.BoundingBoxes),
         endpoint("/boxes", d.BoundingBoxes, qos=Qos(reliable=False)),
-        endpoint("/boxes", m.Detection2DArray, own=True),
-        endpoint("/boxes", m.Detection2DArray, writes=False),
+        endpoint("/boxes", vision_msgs.Detection2DArray, own=True),
+        endpoint("/boxes", vision_msgs.Detection2DArray, writes=False),
         endpoint("/boxes", m.PointCloud2),
     ]
 

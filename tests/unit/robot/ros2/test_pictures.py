@@ -10,6 +10,7 @@ from iveg.domain.observations import DetectionFrame
 from iveg.robot.ros2 import pictures
 from iveg.robot.ros2.config import RobotConfig
 from iveg.ros2 import messages as m
+from iveg.ros2 import vision_msgs
 from tests.unit.robot.ros2 import said
 from tests.unit.robot.ros2.said import Bench, tf
 
@@ -55,14 +56,18 @@ def depth() -> m.Image:
     return image(scene() * 1000, "16UC1", "u2")
 
 
-def box(score: float = 0.9, x: float = 32.0) -> m.Detection2D:
-    sure = m.ObjectHypothesisWithPose(m.ObjectHypothesis("farmer", score))
-    place = m.PicturePose(m.Point2D(x, 25.0))
-    return m.Detection2D(m.Header(), (sure,), m.BoundingBox2D(place, 20.0, 34.0), "")
+def box(score: float = 0.9, x: float = 32.0) -> vision_msgs.Detection2D:
+    sure = vision_msgs.ObjectHypothesisWithPose(
+        vision_msgs.ObjectHypothesis("farmer", score)
+    )
+    place = vision_msgs.PicturePose(vision_msgs.Point2D(x, 25.0))
+    return vision_msgs.Detection2D(
+        m.Header(), (sure,), vision_msgs.BoundingBox2D(place, 20.0, 34.0), ""
+    )
 
 
-def look(*boxes: m.Detection2D) -> m.Detection2DArray:
-    return m.Detection2DArray(m.Header(said.stamp(), "camera_optical"), boxes)
+def look(*boxes: vision_msgs.Detection2D) -> vision_msgs.Detection2DArray:
+    return vision_msgs.Detection2DArray(m.Header(said.stamp(), "camera_optical"), boxes)
 
 
 def bench() -> Bench:
