@@ -4,17 +4,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from iveg.ros2.messages import (
-    ColorRGBA,
-    CompressedImage,
-    Duration,
-    Octets,
-    Point,
-    Pose,
-    Stamped,
-    Vector3,
-)
+from iveg.ros2.messages import ColorRGBA, Duration, Point, Pose, Stamped, Vector3
 from iveg.ros2.schema import Boolean, Float32, Int32, Message
+from iveg.ros2.sensor_msgs import CompressedImage, Octets
 
 
 @dataclass(frozen=True, slots=True)

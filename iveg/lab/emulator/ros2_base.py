@@ -23,7 +23,7 @@ from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.network import Network, Writer
 from iveg.robot.ros2.reading import read_twist, write_twist
 from iveg.robot.ros2.sensors import ROS_SENSORS
-from iveg.ros2 import cdr, vision_msgs
+from iveg.ros2 import cdr, sensor_msgs, vision_msgs
 from iveg.ros2 import messages as m
 from iveg.ros2.schema import Message
 
@@ -125,7 +125,7 @@ class Ros2Base:
             writer("tf_static", m.TFMessage),
         )
         self._odometry = writer("odometry", m.Odometry)
-        self._scans = writer("scan", m.LaserScan)
+        self._scans = writer("scan", sensor_msgs.LaserScan)
         self._seen = writer("detections_3d", vision_msgs.Detection3DArray)
         self._paths = writer("path", m.Path)
         self._sensors = EmulatedSensors()
@@ -208,7 +208,7 @@ class Ros2Base:
 
     def _scan(self, _: float) -> None:
         sweep = self._rig.scan(self._world)
-        message = m.LaserScan(
+        message = sensor_msgs.LaserScan(
             m.Header(m.Time.of(clock.wall()), _LASER),
             sweep.angle_min,
             sweep.angle_min + sweep.angle_increment * (sweep.ranges.size - 1),

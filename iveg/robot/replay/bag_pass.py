@@ -30,6 +30,7 @@ from iveg.robot.ros2.reading import read_pose, read_scan, read_twist
 from iveg.robot.ros2.rigid import IDENTITY, RigidTransform
 from iveg.ros2 import detector_messages as d
 from iveg.ros2 import messages as m
+from iveg.ros2 import sensor_msgs
 from iveg.ros2.schema import Message
 
 _MAX_AGE_S = 1.0
@@ -116,7 +117,7 @@ class BagPass:
         twist = read_twist(message.twist.twist)
         return Odometry("", UNKNOWN_ORIGIN, place.flat(), twist)
 
-    def _scan(self, message: m.LaserScan, now: Instant) -> LaserScan | None:
+    def _scan(self, message: sensor_msgs.LaserScan, now: Instant) -> LaserScan | None:
         frame, stamp = message.header.frame_id, message.header.stamp.seconds
         if not self._tree.has_mount(frame):
             return replace(read_scan(message, IDENTITY), mount=self._mount)

@@ -32,7 +32,7 @@ from iveg.robot.ros2.rigid import RigidTransform
 from iveg.robot.ros2.sensors import ROS_SENSORS, RosSensor
 from iveg.robot.ros2.stamps import Stamps
 from iveg.robot.ros2.topics import TOPICS
-from iveg.ros2 import cdr
+from iveg.ros2 import cdr, sensor_msgs
 from iveg.ros2 import messages as m
 from iveg.ros2.schema import Message
 
@@ -234,7 +234,9 @@ class SensorInputs:
             return Unplaced("", UNKNOWN_ORIGIN, "odometry", twist)
         return Odometry("", UNKNOWN_ORIGIN, place.flat(), twist)
 
-    def _scan(self, message: m.LaserScan, now: Instant) -> LaserScan | Unplaced:
+    def _scan(
+        self, message: sensor_msgs.LaserScan, now: Instant
+    ) -> LaserScan | Unplaced:
         header = message.header
         laser = self._places.laser(header.frame_id, header.stamp.seconds, now.mono)
         if laser is None:

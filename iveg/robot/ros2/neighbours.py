@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from iveg.domain.geometry import Pose2D
 from iveg.robot.neighbours import PEER_M, Neighbour
 from iveg.ros2 import messages as m
-from iveg.ros2 import visualization_msgs
+from iveg.ros2 import sensor_msgs, visualization_msgs
 
 REACH_M = 8.0
 """Greatest distance of a disc (m); the clearing circle is a metre beyond."""
@@ -27,7 +27,7 @@ _CYLINDER, _TEXT = 3, 9
 
 def cloud(
     neighbours: Iterable[Neighbour], own: Pose2D, stamp: m.Time, frame: str
-) -> m.PointCloud2:
+) -> sensor_msgs.PointCloud2:
     """Discs to mark and a circle to clear, in ``base_link``."""
     discs = [
         _disc(one, own)
@@ -35,11 +35,11 @@ def cloud(
         if own.distance_to(one.x, one.y) <= REACH_M
     ]
     points = np.ascontiguousarray(np.concatenate([_CIRCLE, *discs]), "<f4")
-    return m.PointCloud2(
+    return sensor_msgs.PointCloud2(
         m.Header(stamp, frame),
         1,
         len(points),
-        tuple(m.PointField(name, 4 * n) for n, name in enumerate("xyz")),
+        tuple(sensor_msgs.PointField(name, 4 * n) for n, name in enumerate("xyz")),
         False,
         12,
         12 * len(points),

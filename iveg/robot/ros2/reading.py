@@ -21,7 +21,7 @@ from iveg.domain.observations import (
 from iveg.ngsi.payloads import FORBIDDEN, MAX_BEAMS, MAX_PATH, clean_text
 from iveg.robot.ros2.rigid import RigidTransform, rigid_of
 from iveg.ros2 import messages as m
-from iveg.ros2 import vision_msgs
+from iveg.ros2 import sensor_msgs, vision_msgs
 
 FASTEST_M_S = 20.0
 """Speed above which a value is refused: no vehicle in crop rows is so fast (m/s)."""
@@ -69,7 +69,7 @@ def write_twist(twist: Twist2D) -> m.Twist:
     return m.Twist(m.Vector3(twist.linear_x), m.Vector3(z=twist.angular_z))
 
 
-def read_scan(scan: m.LaserScan, laser: RigidTransform) -> LaserScan:
+def read_scan(scan: sensor_msgs.LaserScan, laser: RigidTransform) -> LaserScan:
     """A scan of a laser that is mounted level, upright or upside down.
 
     Args:
@@ -103,7 +103,7 @@ def read_scan(scan: m.LaserScan, laser: RigidTransform) -> LaserScan:
     )
 
 
-def _ranges(scan: m.LaserScan) -> NDArray[np.float32]:
+def _ranges(scan: sensor_msgs.LaserScan) -> NDArray[np.float32]:
     """Ranges as a measure has them (REP-117).
 
     Only +inf says that nothing came back.  NaN is no measurement and -inf is too near

@@ -8,10 +8,11 @@ from typing import Any
 from iveg.domain.kinds import Kind, row_of
 from iveg.domain.observations import UNKNOWN_ORIGIN, Battery, Observation
 from iveg.ros2 import messages as m
+from iveg.ros2 import sensor_msgs
 from iveg.ros2.schema import Message
 
 
-def read_battery(state: m.BatteryState) -> Battery:
+def read_battery(state: sensor_msgs.BatteryState) -> Battery:
     """Read the state of the battery.
 
     ROS writes NaN for unmeasured values, and some drivers per cent instead of a share.
@@ -27,9 +28,9 @@ def read_battery(state: m.BatteryState) -> Battery:
     return Battery("", UNKNOWN_ORIGIN, share, status, volts)
 
 
-def write_battery(header: m.Header, battery: Any) -> m.BatteryState:
+def write_battery(header: m.Header, battery: Any) -> sensor_msgs.BatteryState:
     """The inverse, for an emulated base."""
-    return m.BatteryState(
+    return sensor_msgs.BatteryState(
         header, voltage=battery.voltage, percentage=battery.percentage
     )
 
@@ -66,7 +67,11 @@ ROS_SENSORS = {
     row.kind.name: row
     for row in (
         RosSensor(
-            Battery, "battery_state", m.BatteryState, read_battery, write_battery
+            Battery,
+            "battery_state",
+            sensor_msgs.BatteryState,
+            read_battery,
+            write_battery,
         ),
     )
 }

@@ -7,7 +7,7 @@ from typing import Literal
 from iveg.robot.ros2.detectors import BOXES, LOOKS
 from iveg.robot.ros2.sensors import ROS_SENSORS
 from iveg.ros2 import messages as m
-from iveg.ros2 import vision_msgs, visualization_msgs
+from iveg.ros2 import sensor_msgs, vision_msgs, visualization_msgs
 from iveg.ros2.names import DEFAULT, LATCHED, SENSOR_DATA, TF, TF_STATIC, Qos
 from iveg.ros2.schema import Message
 
@@ -46,7 +46,7 @@ class RosTopic:
 
 TOPICS: Mapping[str, RosTopic] = {
     "odometry": RosTopic("odom", m.Odometry, "stream"),
-    "scan": RosTopic("scan", m.LaserScan, "stream"),
+    "scan": RosTopic("scan", sensor_msgs.LaserScan, "stream"),
     "detections_3d": RosTopic(
         "detections_3d", vision_msgs.Detection3DArray, "stream", forms=tuple(BOXES)
     ),
@@ -54,10 +54,12 @@ TOPICS: Mapping[str, RosTopic] = {
     "detections_2d": RosTopic(
         "", vision_msgs.Detection2DArray, "stream", forms=tuple(LOOKS)
     ),
-    "depth": RosTopic("camera/aligned_depth_to_color/image_raw", m.Image, "picture"),
-    "camera_info": RosTopic("camera/color/camera_info", m.CameraInfo),
+    "depth": RosTopic(
+        "camera/aligned_depth_to_color/image_raw", sensor_msgs.Image, "picture"
+    ),
+    "camera_info": RosTopic("camera/color/camera_info", sensor_msgs.CameraInfo),
     # In a mono picture value n marks the n-th detection; without, the whole box counts.
-    "mask": RosTopic("", m.Image, "picture"),
+    "mask": RosTopic("", sensor_msgs.Image, "picture"),
     **{name: RosTopic(one.topic, one.message) for name, one in ROS_SENSORS.items()},
     "path": RosTopic("plan", m.Path),
     # After a pause each datum finds the transform that was published before it, though
@@ -69,7 +71,7 @@ TOPICS: Mapping[str, RosTopic] = {
     # Goals of iVeg, as Nav2 takes them.
     "goal": RosTopic("goal_pose", m.PoseStamped, "output", DEFAULT),
     # People and peers, for Nav2's obstacle layer and for RViz.
-    "obstacles": RosTopic("iveg/obstacles", m.PointCloud2, "output", DEFAULT),
+    "obstacles": RosTopic("iveg/obstacles", sensor_msgs.PointCloud2, "output", DEFAULT),
     "markers": RosTopic(
         "iveg/markers", visualization_msgs.MarkerArray, "output", DEFAULT
     ),

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iveg.domain.errors import UnreadableError
-from iveg.ros2 import cdr, vision_msgs, visualization_msgs
+from iveg.ros2 import cdr, sensor_msgs, vision_msgs, visualization_msgs
 from iveg.ros2 import messages as m
 from tests.unit.ros2.reference import STORE, as_rosbags
 from tests.unit.ros2.spelled import HALF, MAP, ONE, POSE, STAMP, TWO, ZERO, payload
@@ -62,7 +62,7 @@ CASES: dict[str, tuple[Any, str]] = {
         f"{STAMP} {MAP} 02000000 'b' 2*-- {POSE} {SURE} {TWIST} {SURE}",
     ),
     "LaserScan": (
-        m.LaserScan(
+        sensor_msgs.LaserScan(
             m.Header(AT_7_S, "laser"),
             *(1.0, 2.0, 0.5, 0.0, 0.25, 0.25, 10.0),
             _f(1.0, np.inf),
@@ -72,7 +72,7 @@ CASES: dict[str, tuple[Any, str]] = {
         "0000803e 0000803e 00002041 02000000 0000803f 0000807f 01000000 00000040",
     ),
     "LaserScan without a beam": (
-        m.LaserScan(IN_MAP),
+        sensor_msgs.LaserScan(IN_MAP),
         f"{STAMP} {MAP} 7*00000000 00000000 00000000",
     ),
     "TFMessage": (
@@ -93,7 +93,7 @@ CASES: dict[str, tuple[Any, str]] = {
         f"{STAMP} 05000000 'odom' 7*-- {POSE}",
     ),
     "BatteryState": (
-        m.BatteryState(
+        sensor_msgs.BatteryState(
             IN_MAP,
             *(10.0, 2.0, -1.0, 1.0, 2.0, 2.0, 0.5),
             *(2, 1, 3, True),
@@ -155,12 +155,12 @@ CASES: dict[str, tuple[Any, str]] = {
         f"{POSE} {SURE} 5*{ZERO} 03000000 '12'",
     ),
     "Image": (
-        m.Image(IN_MAP, 1, 2, "16UC1", 0, 4, _b(1, 2, 3, 4)),
+        sensor_msgs.Image(IN_MAP, 1, 2, "16UC1", 0, 4, _b(1, 2, 3, 4)),
         f"{STAMP} {MAP} 01000000 02000000 06000000 '16UC1' 00 -- 04000000 04000000 "
         "01 02 03 04",
     ),
     "CameraInfo": (
-        m.CameraInfo(
+        sensor_msgs.CameraInfo(
             IN_MAP,
             2,
             4,
@@ -171,23 +171,23 @@ CASES: dict[str, tuple[Any, str]] = {
             np.full(12, 2.0),
             0,
             1,
-            m.RegionOfInterest(1, 2, 3, 4, True),
+            sensor_msgs.RegionOfInterest(1, 2, 3, 4, True),
         ),
         f"{STAMP} {MAP} 02000000 04000000 01000000 '' 3*-- 01000000 4*-- {HALF} "
         f"9*{ONE} 9*{ZERO} 12*{TWO} 00000000 01000000 "
         "01000000 02000000 03000000 04000000 01",
     ),
     "CameraInfo without distortion": (
-        m.CameraInfo(IN_MAP, 2, 4, "", np.zeros(0), np.ones(9)),
+        sensor_msgs.CameraInfo(IN_MAP, 2, 4, "", np.zeros(0), np.ones(9)),
         f"{STAMP} {MAP} 02000000 04000000 01000000 '' 3*-- 00000000 4*-- "
         f"9*{ONE} 21*{ZERO} 2*00000000 4*00000000 00",
     ),
     "PointCloud2": (
-        m.PointCloud2(
+        sensor_msgs.PointCloud2(
             IN_MAP,
             1,
             1,
-            (m.PointField("x", 0, 7, 1),),
+            (sensor_msgs.PointField("x", 0, 7, 1),),
             False,
             4,
             4,

@@ -8,7 +8,7 @@ import numpy as np
 from iveg.domain.observations import Instant, Observation
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.inputs import SensorInputs
-from iveg.ros2 import cdr, vision_msgs
+from iveg.ros2 import cdr, sensor_msgs, vision_msgs
 from iveg.ros2 import messages as m
 from iveg.ros2.schema import Message
 
@@ -67,8 +67,8 @@ def scan(
     *,
     after: float = 0.0,
     frame: str = "laser",
-) -> m.LaserScan:
-    return m.LaserScan(
+) -> sensor_msgs.LaserScan:
+    return sensor_msgs.LaserScan(
         m.Header(stamp(after), frame),
         -0.5, 0.5, 0.5, 0.0, 0.1, 0.1, 20.0,
         np.array(ranges, np.float32),

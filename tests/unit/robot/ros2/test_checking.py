@@ -9,6 +9,7 @@ from iveg.robot.ros2.config import DriveConfig, RobotConfig
 from iveg.robot.ros2.transforms import TransformBuffer
 from iveg.ros2 import detector_messages as d
 from iveg.ros2 import messages as m
+from iveg.ros2 import sensor_msgs
 from iveg.ros2.names import DEFAULT, SENSOR_DATA, TF, TF_STATIC, Endpoint
 from iveg.ros2.type_hash import type_hash
 from tests.fakes.ros2_network import endpoint
@@ -16,7 +17,7 @@ from tests.unit.robot.ros2.said import WALL, link, tf
 
 WHOLE = {
     "odometry": endpoint("/odom", m.Odometry),
-    "scan": endpoint("/scan", m.LaserScan, qos=SENSOR_DATA),
+    "scan": endpoint("/scan", sensor_msgs.LaserScan, qos=SENSOR_DATA),
     "tf": endpoint("/tf", m.TFMessage, qos=TF),
     "tf_static": endpoint("/tf_static", m.TFMessage, qos=TF_STATIC),
     "wishes": endpoint("/cmd_vel_nav", m.Twist),
@@ -101,7 +102,7 @@ def test_a_robot_that_has_everything_misses_nothing() -> None:
             "round it.",
         ),
         (
-            verdict(endpoint("/scan", m.PointCloud2), without="scan"),
+            verdict(endpoint("/scan", sensor_msgs.PointCloud2), without="scan"),
             "/scan is sensor_msgs/msg/PointCloud2, not sensor_msgs/msg/LaserScan.",
         ),
         (
@@ -131,7 +132,7 @@ def test_a_robot_that_has_everything_misses_nothing() -> None:
         ),
         (verdict(broker="No MQTT broker answers."), "No MQTT broker answers."),
         (
-            verdict(endpoint("/odom", m.PointCloud2)),
+            verdict(endpoint("/odom", sensor_msgs.PointCloud2)),
             "/odom is published as nav_msgs/msg/Odometry and as "
             "sensor_msgs/msg/PointCloud2: one may be right.",
         ),
@@ -223,7 +224,7 @@ def test_beside_the_running_gate_the_check_knows_it() -> None:
     gate = [
         replace(endpoint("/cmd_vel", m.Twist), gate="AGI"),
         replace(endpoint("/cmd_vel_nav", m.Twist, writes=False), gate="AGI"),
-        replace(endpoint("/iveg/obstacles", m.PointCloud2), gate="AGI"),
+        replace(endpoint("/iveg/obstacles", sensor_msgs.PointCloud2), gate="AGI"),
     ]
 
     found = verdict(*gate)

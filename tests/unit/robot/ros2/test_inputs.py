@@ -18,7 +18,7 @@ from iveg.domain.observations import (
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.input_faults import speed_of
 from iveg.robot.ros2.topics import sensed_topics
-from iveg.ros2 import cdr, vision_msgs
+from iveg.ros2 import cdr, sensor_msgs, vision_msgs
 from iveg.ros2 import messages as m
 from tests.unit.robot.ros2 import said
 from tests.unit.robot.ros2.said import Bench, link, look, seen, tf
@@ -305,7 +305,9 @@ def test_a_laser_upside_down_turns_the_other_way() -> None:
         (said.scan(frame="elsewhere"), "no_transform"),
     ],
 )
-def test_a_scan_that_cannot_be_used_is_named(message: m.LaserScan, code: str) -> None:
+def test_a_scan_that_cannot_be_used_is_named(
+    message: sensor_msgs.LaserScan, code: str
+) -> None:
     bench = Bench().hear("odometry", said.odometry()).hear("scan", message)
 
     found = bench.tick()
@@ -443,7 +445,9 @@ def test_an_empty_plan_is_an_idle_robot() -> None:
     ("told", "share"), [(0.8, 0.8), (80.0, 0.8), (math.nan, None), (-1.0, None)]
 )
 def test_a_battery_is_read_as_a_share(told: float, share: float | None) -> None:
-    bench = Bench().hear("battery", m.BatteryState(percentage=told, voltage=25.5))
+    bench = Bench().hear(
+        "battery", sensor_msgs.BatteryState(percentage=told, voltage=25.5)
+    )
 
     (battery,) = bench.tick()
 

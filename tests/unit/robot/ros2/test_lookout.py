@@ -7,7 +7,7 @@ from iveg.robot.ros2.input_faults import InputFaults, speed_of
 from iveg.robot.ros2.lookout import Lookout, forms_published
 from iveg.ros2 import detector_messages as d
 from iveg.ros2 import messages as m
-from iveg.ros2 import vision_msgs
+from iveg.ros2 import sensor_msgs, vision_msgs
 from iveg.ros2.names import SENSOR_DATA, TF_STATIC, Endpoint, Qos
 from tests.fakes.ros2_network import endpoint
 
@@ -78,7 +78,7 @@ def test_an_unheard_drive_slows_nobody() -> None:
 
 
 def test_a_topic_of_a_type_that_is_not_read_is_named_with_it() -> None:
-    scan = endpoint("/scan", m.PointCloud2)
+    scan = endpoint("/scan", sensor_msgs.PointCloud2)
 
     assert faults(BASE, scan) == {"wrong_type": "/scan: sensor_msgs/PointCloud2"}
 
@@ -96,7 +96,7 @@ def test_types_are_told_as_others_publish_them() -> None:
         endpoint("/boxes", d.BoundingBoxes, qos=Qos(reliable=False)),
         endpoint("/boxes", vision_msgs.Detection2DArray, own=True),
         endpoint("/boxes", vision_msgs.Detection2DArray, writes=False),
-        endpoint("/boxes", m.PointCloud2),
+        endpoint("/boxes", sensor_msgs.PointCloud2),
     ]
 
     assert forms_published("detections_2d", "/boxes", seen) == [d.BoundingBoxes]

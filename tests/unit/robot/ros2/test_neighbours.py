@@ -12,6 +12,7 @@ from iveg.domain.observations import Origin
 from iveg.robot.neighbours import Neighbour, Neighbours
 from iveg.robot.ros2 import neighbours
 from iveg.ros2 import messages as m
+from iveg.ros2 import sensor_msgs
 
 HERE = Pose2D(1.0, 2.0, math.pi / 2)
 STAMP = m.Time(7, 0)
@@ -34,7 +35,7 @@ def present(*feedback: Feedback, age: float = 0.0) -> list[Neighbour]:
     return known.present(HERE, 10.0 + age)
 
 
-def points(cloud: m.PointCloud2) -> np.ndarray:
+def points(cloud: sensor_msgs.PointCloud2) -> np.ndarray:
     return np.frombuffer(cloud.data.tobytes(), "<f4").reshape(-1, 3)
 
 

@@ -10,7 +10,7 @@ from iveg.domain.observations import DetectionFrame
 from iveg.robot.ros2 import pictures
 from iveg.robot.ros2.config import RobotConfig
 from iveg.ros2 import messages as m
-from iveg.ros2 import vision_msgs
+from iveg.ros2 import sensor_msgs, vision_msgs
 from tests.unit.robot.ros2 import said
 from tests.unit.robot.ros2.said import Bench, tf
 
@@ -25,12 +25,12 @@ TOPICS = {
 }
 
 
-def info(**differs: float) -> m.CameraInfo:
+def info(**differs: float) -> sensor_msgs.CameraInfo:
     p = np.zeros(12)
     p[0], p[5] = differs.get("fx", FOCAL), differs.get("fy", FOCAL)
     p[2], p[6], p[10] = (WIDTH - 1) / 2, (HEIGHT - 1) / 2, 1.0
     header = m.Header(said.stamp(), "camera_optical")
-    return m.CameraInfo(header, HEIGHT, WIDTH, p=p)
+    return sensor_msgs.CameraInfo(header, HEIGHT, WIDTH, p=p)
 
 
 def scene() -> np.ndarray:
@@ -42,17 +42,17 @@ def scene() -> np.ndarray:
 
 def image(
     pixels: np.ndarray, encoding: str, kind: str, *, big: bool = False, pad: int = 0
-) -> m.Image:
+) -> sensor_msgs.Image:
     rows = np.ascontiguousarray(pixels.astype((">" if big else "<") + kind))
     raw = np.frombuffer(rows.tobytes(), np.uint8).reshape(pixels.shape[0], -1)
     raw = np.pad(raw, ((0, 0), (0, pad)))
     header = m.Header(said.stamp(), "camera_optical")
-    return m.Image(
+    return sensor_msgs.Image(
         header, HEIGHT, WIDTH, encoding, int(big), raw.shape[1], raw.reshape(-1)
     )
 
 
-def depth() -> m.Image:
+def depth() -> sensor_msgs.Image:
     return image(scene() * 1000, "16UC1", "u2")
 
 
@@ -182,7 +182,9 @@ def test_a_box_that_lies_nowhere_is_lost(x: float) -> None:
         image(scene() * 1000, "mono16", "u2", pad=2),
     ],
 )
-def test_depth_is_read_in_every_encoding_that_ros_uses(picture: m.Image) -> None:
+def test_depth_is_read_in_every_encoding_that_ros_uses(
+    picture: sensor_msgs.Image,
+) -> None:
     read = pictures.read_depth(picture, info())
 
     assert np.allclose(read.depth, scene(), atol=1e-3)
@@ -192,14 +194,18 @@ def test_depth_is_read_in_every_encoding_that_ros_uses(picture: m.Image) -> None
     ("picture", "camera", "reason"),
     [
         (image(scene(), "rgb8", "u1"), info(), "bad_encoding"),
-        (m.Image(height=9, width=9, encoding="16UC1", step=18), info(), "bad_picture"),
+        (
+            sensor_msgs.Image(height=9, width=9, encoding="16UC1", step=18),
+            info(),
+            "bad_picture",
+        ),
         (depth(), info(fx=math.nan), "bad_camera"),
         (depth(), info(fy=90.0), "bad_camera"),
-        (depth(), m.CameraInfo(height=4, width=4), "bad_camera"),
+        (depth(), sensor_msgs.CameraInfo(height=4, width=4), "bad_camera"),
     ],
 )
 def test_a_picture_that_cannot_be_used_is_named(
-    picture: m.Image, camera: m.CameraInfo, reason: str
+    picture: sensor_msgs.Image, camera: sensor_msgs.CameraInfo, reason: str
 ) -> None:
     with pytest.raises(UnreadableError) as error:
         pictures.read_depth(picture, camera)
