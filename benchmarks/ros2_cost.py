@@ -36,7 +36,7 @@ from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.domain.feedback import CLEAR, Feedback
 from iveg.domain.observations import Origin, SafetyReport
 from iveg.ngsi import codec
-from iveg.ros2 import cdr, names, sensor_msgs, vision_msgs
+from iveg.ros2 import cdr, names, nav_msgs, sensor_msgs, vision_msgs
 from iveg.ros2 import messages as m
 from iveg.ros2.schema import Message
 from tests.brokers import broker_on
@@ -47,7 +47,7 @@ from tests.processes import Site, site
 RATE_HZ, TWISTS_HZ = 30.0, 15.0
 WARM_UP_S, MEASURED_S = 6.0, 40.0
 SENSORS: dict[str, type[Message]] = {
-    "/odom": m.Odometry,
+    "/odom": nav_msgs.Odometry,
     "/scan": sensor_msgs.LaserScan,
     "/tf": m.TFMessage,
     "/detections_3d": vision_msgs.Detection3DArray,
@@ -135,7 +135,7 @@ class Robot:
                     m.TransformStamped(in_odom, "base_link"),
                 )
             ),
-            "/odom": m.Odometry(in_odom, "base_link"),
+            "/odom": nav_msgs.Odometry(in_odom, "base_link"),
             "/scan": sensor_msgs.LaserScan(
                 m.Header(stamp, "laser"),
                 *(-math.pi, math.pi, math.tau / 720, 0.0, 0.03, 0.1, 25.0),

@@ -26,6 +26,7 @@ from iveg.robot.node_settings import NodeSettings
 from iveg.robot.replay.replay import ReplaySettings, run_replay
 from iveg.ros2 import detector_messages as d
 from iveg.ros2 import messages as m
+from iveg.ros2 import nav_msgs
 from tests import data, processes
 from tests.data.bags import Said, bag_directory, db3_bag, drive, mcap_bag, ros1_bag
 from tests.data.message_bags import Said as MessageSaid
@@ -277,7 +278,7 @@ def yolact_bag(path: Path) -> Path:
         at = 1000.0 + tick / 10
         place = m.PoseWithCovariance(m.Pose(m.Point(2.0, 1.0)))
         header = m.Header(m.Time.of(at), "odom")
-        said.append(("/odom", m.Odometry(header, "base_link", place), at))
+        said.append(("/odom", nav_msgs.Odometry(header, "base_link", place), at))
         said.append(("/yolact_coordinate", detected(at), at))
     return message_bag(path, said)
 

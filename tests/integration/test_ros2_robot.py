@@ -19,7 +19,7 @@ from iveg.domain.observations import DetectionFrame, LaserScan, Origin, SafetyRe
 from iveg.domain.peer_scan import peer_scan_of
 from iveg.ngsi import codec
 from iveg.ngsi.names import direct_topic, measure_topic
-from iveg.ros2 import cdr, names
+from iveg.ros2 import cdr, names, nav_msgs
 from iveg.ros2 import detector_messages as d
 from iveg.ros2 import messages as m
 from tests.brokers import broker_on
@@ -123,7 +123,9 @@ class Sensors:
     """A base's odometry, on DDS, and its ear."""
 
     def __init__(self, dds: Dds) -> None:
-        self._odometry = dds.writer("/odom", m.Odometry, names.DEFAULT.newest(_BURST))
+        self._odometry = dds.writer(
+            "/odom", nav_msgs.Odometry, names.DEFAULT.newest(_BURST)
+        )
         self._tf = dds.writer("/tf", m.TFMessage, names.DEFAULT)
         self._boxes = dds.writer("/yolact_coordinate", d.BoundingBoxes3d, names.DEFAULT)
         self.drive = dds.reader("/cmd_vel", m.Twist, names.DEFAULT)
@@ -142,7 +144,7 @@ class Sensors:
             base = m.Header(stamp, "base_link")
             self._boxes.write(cdr.write(d.BoundingBoxes3d(base, (PERSON,))))
             for _ in range(self.burst):
-                self._odometry.write(cdr.write(m.Odometry(odom, "base_link")))
+                self._odometry.write(cdr.write(nav_msgs.Odometry(odom, "base_link")))
             await asyncio.sleep(1 / 30)
 
 
@@ -238,7 +240,7 @@ async def test_nav2s_static_layer_gets_the_fleets_picture(riding: Riding) -> Non
     kept = names.LATCHED
     async with at_work(riding) as (iveg, _):
         with Dds(loopback(riding.domain)) as nav2:
-            layer = nav2.reader("/iveg/costmap", m.OccupancyGrid, kept)
+            layer = nav2.reader("/iveg/costmap", nav_msgs.OccupancyGrid, kept)
             async with asyncio.timeout(30.0):
                 while iveg.report is None or not iveg.report.peer_scans:  # noqa: ASYNC110
                     await asyncio.sleep(0.05)
@@ -254,13 +256,15 @@ async def test_nav2s_static_layer_gets_the_fleets_picture(riding: Riding) -> Non
     assert cost(grid, 0.05, 0.05) == -1
 
 
-def newest(waited: Sequence[bytes], before: m.OccupancyGrid | None) -> m.OccupancyGrid:
+def newest(
+    waited: Sequence[bytes], before: nav_msgs.OccupancyGrid | None
+) -> nav_msgs.OccupancyGrid:
     """The last of what came, if anything did."""
-    empty = m.OccupancyGrid()
-    return cdr.read(m.OccupancyGrid, waited[-1]) if waited else before or empty
+    empty = nav_msgs.OccupancyGrid()
+    return cdr.read(nav_msgs.OccupancyGrid, waited[-1]) if waited else before or empty
 
 
-def cost(grid: m.OccupancyGrid, x: float, y: float) -> int:
+def cost(grid: nav_msgs.OccupancyGrid, x: float, y: float) -> int:
     """At a place in ``map`` (m); unknown in a grid without cells."""
     info = grid.info
     if not grid.data.size:

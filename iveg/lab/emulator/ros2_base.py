@@ -23,7 +23,7 @@ from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.network import Network, Writer
 from iveg.robot.ros2.reading import read_twist, write_twist
 from iveg.robot.ros2.sensors import ROS_SENSORS
-from iveg.ros2 import cdr, sensor_msgs, vision_msgs
+from iveg.ros2 import cdr, nav_msgs, sensor_msgs, vision_msgs
 from iveg.ros2 import messages as m
 from iveg.ros2.schema import Message
 
@@ -124,10 +124,10 @@ class Ros2Base:
             writer("tf", m.TFMessage),
             writer("tf_static", m.TFMessage),
         )
-        self._odometry = writer("odometry", m.Odometry)
+        self._odometry = writer("odometry", nav_msgs.Odometry)
         self._scans = writer("scan", sensor_msgs.LaserScan)
         self._seen = writer("detections_3d", vision_msgs.Detection3DArray)
-        self._paths = writer("path", m.Path)
+        self._paths = writer("path", nav_msgs.Path)
         self._sensors = EmulatedSensors()
         self._readings = {
             sensor.of: (sensor, writer(name, sensor.message))
@@ -193,7 +193,7 @@ class Ros2Base:
         measured = self._rig.odometry()
         in_odom = _relative(self._odom_in_map, measured.pose)
         frames = self._frames
-        odometry = m.Odometry(
+        odometry = nav_msgs.Odometry(
             m.Header(stamp, frames.odom),
             frames.base_link,
             m.PoseWithCovariance(_pose(in_odom)),
@@ -232,7 +232,7 @@ class Ros2Base:
         header = m.Header(m.Time.of(clock.wall()), self._frames.map)
         path = self._rig.navigation().path
         poses = tuple(m.PoseStamped(header, _pose(Pose2D(x, y, 0.0))) for x, y in path)
-        self._paths.write(cdr.write(m.Path(header, poses)))
+        self._paths.write(cdr.write(nav_msgs.Path(header, poses)))
         for reading in self._sensors.due(clock.mono() - self._run_began):
             if type(reading) in self._readings:
                 sensor, out = self._readings[type(reading)]

@@ -30,7 +30,7 @@ from iveg.robot.ros2.reading import read_pose, read_scan, read_twist
 from iveg.robot.ros2.rigid import IDENTITY, RigidTransform
 from iveg.ros2 import detector_messages as d
 from iveg.ros2 import messages as m
-from iveg.ros2 import sensor_msgs
+from iveg.ros2 import nav_msgs, sensor_msgs
 from iveg.ros2.schema import Message
 
 _MAX_AGE_S = 1.0
@@ -107,7 +107,7 @@ class BagPass:
         else:
             self.used[topic] += 1
 
-    def _odometry(self, message: m.Odometry, now: Instant) -> Odometry | None:
+    def _odometry(self, message: nav_msgs.Odometry, now: Instant) -> Odometry | None:
         if self._tree.lacks_base:
             pose = read_pose(message)
             self._places.add(_link(message, pose), static=False)
@@ -149,7 +149,7 @@ class BagTree:
         self,
         static: Sequence[m.TFMessage],
         moving: Sequence[m.TFMessage],
-        odometry: m.Odometry | None,
+        odometry: nav_msgs.Odometry | None,
     ) -> None:
         self._parents = {
             _bare(one.child_frame_id): _bare(one.header.frame_id)
@@ -199,7 +199,7 @@ class _Notes(InputFaults):
         self.reasons[f"{code}, {about}"] = None
 
 
-def _link(odometry: m.Odometry, pose: RigidTransform) -> m.TFMessage:
+def _link(odometry: nav_msgs.Odometry, pose: RigidTransform) -> m.TFMessage:
     """Odometry as a transform."""
     transform = m.Transform(m.Vector3(*pose.move), m.Quaternion(*pose.q))
     child = odometry.child_frame_id or Frames().base_link

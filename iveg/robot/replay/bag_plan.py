@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from iveg.robot.replay.bag_files import BagFile, BagTopic
 from iveg.robot.ros2.detectors import BOXES, LOOKS
 from iveg.ros2 import messages as m
-from iveg.ros2 import sensor_msgs
+from iveg.ros2 import nav_msgs, sensor_msgs
 from iveg.ros2.schema import Message
 from iveg.ros2.type_hash import type_hash
 
@@ -18,7 +18,7 @@ _PREFERRED: tuple[tuple[type[Message], ...], ...] = (
 )
 """Detectors of one row exclude each other."""
 _FORMS: tuple[type[Message], ...] = (
-    m.Odometry,
+    nav_msgs.Odometry,
     sensor_msgs.LaserScan,
     m.TFMessage,
     sensor_msgs.Image,
@@ -77,7 +77,7 @@ class BagPlan:
         self._file = file
         self._uses: dict[BagTopic, Use] = {}
         self._whys: dict[BagTopic, str] = {}
-        self._choose("odometry", (m.Odometry,), options.odometry, "--odom-topic")
+        self._choose("odometry", (nav_msgs.Odometry,), options.odometry, "--odom-topic")
         self._choose("scan", (sensor_msgs.LaserScan,), options.scan, "--scan-topic")
         for one in self._of(m.TFMessage):
             self._use(one, "tf_static" if one.name.endswith("tf_static") else "tf")

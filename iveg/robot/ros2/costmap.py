@@ -16,7 +16,7 @@ from iveg.domain.geometry import Pose2D
 from iveg.robot.costmap import FleetCostmap
 from iveg.robot.neighbours import Neighbours
 from iveg.robot.ros2.network import Writer
-from iveg.ros2 import cdr
+from iveg.ros2 import cdr, nav_msgs
 from iveg.ros2 import messages as m
 
 _log = logging.getLogger(__name__)
@@ -90,9 +90,13 @@ class CostmapTopic:
         self._writer.write(cdr.write(occupancy_grid(costmap, stamp, self._frame)))
 
 
-def occupancy_grid(costmap: InflatedGrid, stamp: m.Time, frame: str) -> m.OccupancyGrid:
+def occupancy_grid(
+    costmap: InflatedGrid, stamp: m.Time, frame: str
+) -> nav_msgs.OccupancyGrid:
     """The message of a costmap."""
     grid = costmap.grid
     corner = m.Pose(m.Point(grid.xmin, grid.ymin))
-    info = m.MapMetaData(stamp, grid.resolution, grid.width, grid.height, corner)
-    return m.OccupancyGrid(m.Header(stamp, frame), info, costmap.data.reshape(-1))
+    info = nav_msgs.MapMetaData(stamp, grid.resolution, grid.width, grid.height, corner)
+    return nav_msgs.OccupancyGrid(
+        m.Header(stamp, frame), info, costmap.data.reshape(-1)
+    )

@@ -32,8 +32,7 @@ from iveg.robot.ros2.rigid import RigidTransform
 from iveg.robot.ros2.sensors import ROS_SENSORS, RosSensor
 from iveg.robot.ros2.stamps import Stamps
 from iveg.robot.ros2.topics import TOPICS
-from iveg.ros2 import cdr, sensor_msgs
-from iveg.ros2 import messages as m
+from iveg.ros2 import cdr, nav_msgs, sensor_msgs
 from iveg.ros2.schema import Message
 
 SILENT_S = 1.0
@@ -227,7 +226,9 @@ class SensorInputs:
 
     # --- topics -------------------------------------------------------------------
 
-    def _odometry(self, message: m.Odometry, now: Instant) -> Odometry | Unplaced:
+    def _odometry(
+        self, message: nav_msgs.Odometry, now: Instant
+    ) -> Odometry | Unplaced:
         twist = reading.read_twist(message.twist.twist)
         place = self._places.locate(message, now.mono)
         if place is None:
@@ -243,7 +244,7 @@ class SensorInputs:
             return Unplaced("", UNKNOWN_ORIGIN, "scan")
         return reading.read_scan(message, laser)
 
-    def _path(self, message: m.Path, now: Instant) -> Navigation | None:
+    def _path(self, message: nav_msgs.Path, now: Instant) -> Navigation | None:
         frame, here = message.header.frame_id or self._map, self._places.here
         # A path is old by nature: it is placed by the present transform.
         stamp = here.stamp if here else message.header.stamp.seconds

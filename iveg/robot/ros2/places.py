@@ -8,6 +8,7 @@ from iveg.robot.ros2.reading import read_pose
 from iveg.robot.ros2.rigid import RigidTransform
 from iveg.robot.ros2.transforms import NoTransformError, TransformBuffer
 from iveg.ros2 import messages as m
+from iveg.ros2 import nav_msgs
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,7 +51,7 @@ class Places:
         self._transforms.clear()
         self.here = None
 
-    def locate(self, odometry: m.Odometry, now: float) -> RigidTransform | None:
+    def locate(self, odometry: nav_msgs.Odometry, now: float) -> RigidTransform | None:
         """Pose of the robot in ``map``; None where a transform is missing.
 
         Raises:
@@ -68,7 +69,7 @@ class Places:
         return place
 
     def _base_in_odom(
-        self, odometry: m.Odometry, stamp: float, now: float
+        self, odometry: nav_msgs.Odometry, stamp: float, now: float
     ) -> RigidTransform | None:
         pose = read_pose(odometry)
         child = odometry.child_frame_id.lstrip("/")

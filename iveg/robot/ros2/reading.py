@@ -21,7 +21,7 @@ from iveg.domain.observations import (
 from iveg.ngsi.payloads import FORBIDDEN, MAX_BEAMS, MAX_PATH, clean_text
 from iveg.robot.ros2.rigid import RigidTransform, rigid_of
 from iveg.ros2 import messages as m
-from iveg.ros2 import sensor_msgs, vision_msgs
+from iveg.ros2 import nav_msgs, sensor_msgs, vision_msgs
 
 FASTEST_M_S = 20.0
 """Speed above which a value is refused: no vehicle in crop rows is so fast (m/s)."""
@@ -37,7 +37,7 @@ _LONGEST_RANGE_M = 1e4
 _FORBIDDEN = str.maketrans(dict.fromkeys(FORBIDDEN))
 
 
-def read_pose(odometry: m.Odometry) -> RigidTransform:
+def read_pose(odometry: nav_msgs.Odometry) -> RigidTransform:
     """Pose of the robot in the odometry frame.
 
     Raises:
@@ -211,7 +211,7 @@ def within_world(box: Box3D) -> Box3D:
     raise UnreadableError("absurd", "a box outside of the world")
 
 
-def read_path(path: m.Path, place: RigidTransform) -> Navigation:
+def read_path(path: nav_msgs.Path, place: RigidTransform) -> Navigation:
     """The path in ``map``; a long one is thinned to 1,024 points.
 
     Raises:

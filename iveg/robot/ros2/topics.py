@@ -7,7 +7,7 @@ from typing import Literal
 from iveg.robot.ros2.detectors import BOXES, LOOKS
 from iveg.robot.ros2.sensors import ROS_SENSORS
 from iveg.ros2 import messages as m
-from iveg.ros2 import sensor_msgs, vision_msgs, visualization_msgs
+from iveg.ros2 import nav_msgs, sensor_msgs, vision_msgs, visualization_msgs
 from iveg.ros2.names import DEFAULT, LATCHED, SENSOR_DATA, TF, TF_STATIC, Qos
 from iveg.ros2.schema import Message
 
@@ -45,7 +45,7 @@ class RosTopic:
 
 
 TOPICS: Mapping[str, RosTopic] = {
-    "odometry": RosTopic("odom", m.Odometry, "stream"),
+    "odometry": RosTopic("odom", nav_msgs.Odometry, "stream"),
     "scan": RosTopic("scan", sensor_msgs.LaserScan, "stream"),
     "detections_3d": RosTopic(
         "detections_3d", vision_msgs.Detection3DArray, "stream", forms=tuple(BOXES)
@@ -61,7 +61,7 @@ TOPICS: Mapping[str, RosTopic] = {
     # In a mono picture value n marks the n-th detection; without, the whole box counts.
     "mask": RosTopic("", sensor_msgs.Image, "picture"),
     **{name: RosTopic(one.topic, one.message) for name, one in ROS_SENSORS.items()},
-    "path": RosTopic("plan", m.Path),
+    "path": RosTopic("plan", nav_msgs.Path),
     # After a pause each datum finds the transform that was published before it, though
     # both arrive while the topics are being read.
     "tf_static": RosTopic("tf_static", m.TFMessage, "transforms", TF_STATIC),
@@ -76,7 +76,7 @@ TOPICS: Mapping[str, RosTopic] = {
         "iveg/markers", visualization_msgs.MarkerArray, "output", DEFAULT
     ),
     # The fleet's picture, for Nav2's static layer.
-    "costmap": RosTopic("iveg/costmap", m.OccupancyGrid, "output", LATCHED),
+    "costmap": RosTopic("iveg/costmap", nav_msgs.OccupancyGrid, "output", LATCHED),
 }
 """By key in ``robot.toml``."""
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iveg.domain.errors import UnreadableError
-from iveg.ros2 import cdr, sensor_msgs, vision_msgs, visualization_msgs
+from iveg.ros2 import cdr, nav_msgs, sensor_msgs, vision_msgs, visualization_msgs
 from iveg.ros2 import messages as m
 from tests.unit.ros2.reference import STORE, as_rosbags
 from tests.unit.ros2.spelled import HALF, MAP, ONE, POSE, STAMP, TWO, ZERO, payload
@@ -46,7 +46,7 @@ CASES: dict[str, tuple[Any, str]] = {
         f"{STAMP} 05000000 'odom' 7*-- {TWIST}",
     ),
     "Odometry, pose after 34 bytes": (
-        m.Odometry(
+        nav_msgs.Odometry(
             IN_ODOM,
             "base_link",
             m.PoseWithCovariance(HERE),
@@ -56,7 +56,7 @@ CASES: dict[str, tuple[Any, str]] = {
         f"{POSE} {SURE} {TWIST} {SURE}",
     ),
     "Odometry, pose after 22 bytes": (
-        m.Odometry(
+        nav_msgs.Odometry(
             IN_MAP, "b", m.PoseWithCovariance(HERE), m.TwistWithCovariance(DRIVES)
         ),
         f"{STAMP} {MAP} 02000000 'b' 2*-- {POSE} {SURE} {TWIST} {SURE}",
@@ -88,7 +88,9 @@ CASES: dict[str, tuple[Any, str]] = {
         f"{STAMP} 05000000 'odom' 3*-- 0a000000 'base_link' 6*-- {POSE}",
     ),
     "Path": (
-        m.Path(IN_MAP, (m.PoseStamped(IN_MAP, HERE), m.PoseStamped(IN_ODOM, HERE))),
+        nav_msgs.Path(
+            IN_MAP, (m.PoseStamped(IN_MAP, HERE), m.PoseStamped(IN_ODOM, HERE))
+        ),
         f"{STAMP} {MAP} 02000000 {STAMP} {MAP} 4*-- {POSE} "
         f"{STAMP} 05000000 'odom' 7*-- {POSE}",
     ),
@@ -198,9 +200,9 @@ CASES: dict[str, tuple[Any, str]] = {
         "01000000 00 3*-- 04000000 04000000 04000000 00 00 80 3f 01",
     ),
     "OccupancyGrid": (
-        m.OccupancyGrid(
+        nav_msgs.OccupancyGrid(
             IN_MAP,
-            m.MapMetaData(AT_7_S, 0.5, 3, 1, HERE),
+            nav_msgs.MapMetaData(AT_7_S, 0.5, 3, 1, HERE),
             np.array([-1, 0, 100], np.int8),
         ),
         f"{STAMP} {MAP} {STAMP} 0000003f 03000000 01000000 4*-- {POSE} "

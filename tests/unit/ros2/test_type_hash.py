@@ -4,7 +4,7 @@ import pytest
 
 from iveg.ros2 import detector_messages as d
 from iveg.ros2 import messages as m
-from iveg.ros2 import sensor_msgs, vision_msgs, visualization_msgs
+from iveg.ros2 import nav_msgs, sensor_msgs, vision_msgs, visualization_msgs
 from iveg.ros2.schema import Message
 from iveg.ros2.type_hash import definition, read_user_data, type_hash, user_data
 from tests.unit.ros2.reference import STORE
@@ -19,7 +19,9 @@ MESSAGES = [
 PUBLISHED: dict[type[Message], str] = {
     m.Twist: "9c45bf16fe0983d80e3cfe750d6835843d265a9a6c46bd2e609fcddde6fb8d2a",
     m.TwistStamped: "5f0fcd4f81d5d06ad9b4c4c63e3ea51b82d6ae4d0558f1d475229b1121db6f64",
-    m.Odometry: "3cc97dc7fb7502f8714462c526d369e35b603cfc34d946e3f2eda2766dfec6e0",
+    nav_msgs.Odometry: (
+        "3cc97dc7fb7502f8714462c526d369e35b603cfc34d946e3f2eda2766dfec6e0"
+    ),
     sensor_msgs.LaserScan: (
         "64c191398013af96509d518dac71d5164f9382553fce5c1f8cca5be7924bd828"
     ),

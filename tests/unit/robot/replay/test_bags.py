@@ -18,6 +18,7 @@ from iveg.robot.replay.bags import AS_RECORDED, BagOptions
 from iveg.robot.replay.recordings import open_recording
 from iveg.ros2 import detector_messages as d
 from iveg.ros2 import messages as m
+from iveg.ros2 import nav_msgs
 from iveg.ros2.schema import Message
 from tests.data.message_bags import Said, message_bag, ros1_message_bag
 from tests.unit.robot.ros2 import said
@@ -278,7 +279,7 @@ def test_the_table_tells_of_every_topic_what_becomes_of_it(tmp_path: Path) -> No
     seen = [
         ("/scan", said.scan(), WALL),
         ("/yolox/bounding_box", yolox(MIDDLE, TALL), WALL),
-        ("/plan", m.Path(), WALL),
+        ("/plan", nav_msgs.Path(), WALL),
     ]
 
     _, lines = recorded(tmp_path, [*frames(), *drive(), *seen])

@@ -8,7 +8,7 @@ import numpy as np
 from iveg.domain.observations import Instant, Observation
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.inputs import SensorInputs
-from iveg.ros2 import cdr, sensor_msgs, vision_msgs
+from iveg.ros2 import cdr, nav_msgs, sensor_msgs, vision_msgs
 from iveg.ros2 import messages as m
 from iveg.ros2.schema import Message
 
@@ -53,8 +53,8 @@ def odometry(
     after: float = 0.0,
     child: str = "base_link",
     w: float = 0.0,
-) -> m.Odometry:
-    return m.Odometry(
+) -> nav_msgs.Odometry:
+    return nav_msgs.Odometry(
         m.Header(stamp(after), "odom"),
         child,
         m.PoseWithCovariance(m.Pose(m.Point(x))),

@@ -9,14 +9,14 @@ from iveg.robot.ros2.config import DriveConfig, RobotConfig
 from iveg.robot.ros2.transforms import TransformBuffer
 from iveg.ros2 import detector_messages as d
 from iveg.ros2 import messages as m
-from iveg.ros2 import sensor_msgs
+from iveg.ros2 import nav_msgs, sensor_msgs
 from iveg.ros2.names import DEFAULT, SENSOR_DATA, TF, TF_STATIC, Endpoint
 from iveg.ros2.type_hash import type_hash
 from tests.fakes.ros2_network import endpoint
 from tests.unit.robot.ros2.said import WALL, link, tf
 
 WHOLE = {
-    "odometry": endpoint("/odom", m.Odometry),
+    "odometry": endpoint("/odom", nav_msgs.Odometry),
     "scan": endpoint("/scan", sensor_msgs.LaserScan, qos=SENSOR_DATA),
     "tf": endpoint("/tf", m.TFMessage, qos=TF),
     "tf_static": endpoint("/tf_static", m.TFMessage, qos=TF_STATIC),

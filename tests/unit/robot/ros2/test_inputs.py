@@ -18,7 +18,7 @@ from iveg.domain.observations import (
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.input_faults import speed_of
 from iveg.robot.ros2.topics import sensed_topics
-from iveg.ros2 import cdr, sensor_msgs, vision_msgs
+from iveg.ros2 import cdr, nav_msgs, sensor_msgs, vision_msgs
 from iveg.ros2 import messages as m
 from tests.unit.robot.ros2 import said
 from tests.unit.robot.ros2.said import Bench, link, look, seen, tf
@@ -194,7 +194,7 @@ def test_the_same_message_again_is_no_news() -> None:
     ],
 )
 def test_odometry_that_cannot_be_is_named_and_slows(
-    message: m.Odometry, code: str
+    message: nav_msgs.Odometry, code: str
 ) -> None:
     bench = Bench()
 
@@ -410,7 +410,7 @@ def test_a_plan_is_moved_into_map() -> None:
     header = m.Header(said.stamp(), "odom")
     poses = tuple(m.PoseStamped(header, m.Pose(m.Point(float(n)))) for n in range(3000))
 
-    (found,) = bench.hear("path", m.Path(header, poses)).tick()
+    (found,) = bench.hear("path", nav_msgs.Path(header, poses)).tick()
 
     assert isinstance(found, Navigation)
     assert (found.path[0], found.goal) == ((10.0, 0.0), (3009.0, 0.0))
@@ -424,7 +424,7 @@ def test_no_pose_of_a_path_is_told_twice(count: int) -> None:
         m.PoseStamped(header, m.Pose(m.Point(float(x)))) for x in range(count)
     )
 
-    (found,) = Bench().hear("path", m.Path(header, poses)).tick()
+    (found,) = Bench().hear("path", nav_msgs.Path(header, poses)).tick()
 
     assert isinstance(found, Navigation)
     assert len(set(found.path)) == len(found.path) <= 1024
@@ -435,7 +435,7 @@ def test_no_pose_of_a_path_is_told_twice(count: int) -> None:
 def test_an_empty_plan_is_an_idle_robot() -> None:
     header = m.Header(said.stamp(), "map")
 
-    (found,) = Bench().hear("path", m.Path(header)).tick()
+    (found,) = Bench().hear("path", nav_msgs.Path(header)).tick()
 
     assert isinstance(found, Navigation)
     assert (found.task, found.path) == ("idle", ())

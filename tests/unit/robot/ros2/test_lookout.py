@@ -7,7 +7,7 @@ from iveg.robot.ros2.input_faults import InputFaults, speed_of
 from iveg.robot.ros2.lookout import Lookout, forms_published
 from iveg.ros2 import detector_messages as d
 from iveg.ros2 import messages as m
-from iveg.ros2 import sensor_msgs, vision_msgs
+from iveg.ros2 import nav_msgs, sensor_msgs, vision_msgs
 from iveg.ros2.names import SENSOR_DATA, TF_STATIC, Endpoint, Qos
 from tests.fakes.ros2_network import endpoint
 
@@ -64,7 +64,7 @@ def test_a_base_that_cannot_hear_the_gate_is_named_at_once(
 
 
 def test_a_drive_on_which_nobody_listens_is_named_after_discovery() -> None:
-    odometry = endpoint("/odom", m.Odometry)
+    odometry = endpoint("/odom", nav_msgs.Odometry)
 
     assert faults(odometry, after=4.0) == {}
     assert faults(odometry, after=5.5) == {"drive_unheard": "/cmd_vel"}

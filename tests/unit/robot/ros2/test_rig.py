@@ -24,6 +24,7 @@ from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.rig import Ros2Robot
 from iveg.ros2 import detector_messages as d
 from iveg.ros2 import messages as m
+from iveg.ros2 import nav_msgs
 from tests.builders import AGI
 from tests.fakes.ros2_network import FakeNetwork, endpoint
 from tests.ports import free_ports
@@ -102,7 +103,7 @@ def placed(network: FakeNetwork) -> None:
     links = (m.TransformStamped(header, "odom"),)
     network.publish("/agi/tf", m.TFMessage(links))
     odom = m.Header(header.stamp, "odom")
-    network.publish("/agi/odom", m.Odometry(odom, "base_link"))
+    network.publish("/agi/odom", nav_msgs.Odometry(odom, "base_link"))
 
 
 async def test_while_it_is_held_the_base_is_told_zero_again_and_again(
