@@ -36,7 +36,7 @@ from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.domain.feedback import CLEAR, Feedback
 from iveg.domain.observations import Origin, SafetyReport
 from iveg.ngsi import codec
-from iveg.ros2 import cdr, names, nav_msgs, sensor_msgs, vision_msgs
+from iveg.ros2 import cdr, names, nav_msgs, sensor_msgs, std_msgs, vision_msgs
 from iveg.ros2 import messages as m
 from iveg.ros2.schema import Message
 from tests.brokers import broker_on
@@ -115,16 +115,16 @@ class Robot:
             for name, kind in SENSORS.items()
         }
         self._static = dds.writer("/tf_static", m.TFMessage, names.TF_STATIC)
-        header = m.Header(m.Time.of(time.time()), "base_link")
+        header = std_msgs.Header(std_msgs.Time.of(time.time()), "base_link")
         mount = m.TransformStamped(header, "laser")
         self._static.write(cdr.write(m.TFMessage((mount,))))
         self._ranges = np.linspace(1.0, 20.0, 720, dtype=np.float32)
 
     def say(self) -> None:
         """Everything once."""
-        stamp = m.Time.of(time.time())
-        in_map, in_odom = m.Header(stamp, "map"), m.Header(stamp, "odom")
-        base = m.Header(stamp, "base_link")
+        stamp = std_msgs.Time.of(time.time())
+        in_map, in_odom = std_msgs.Header(stamp, "map"), std_msgs.Header(stamp, "odom")
+        base = std_msgs.Header(stamp, "base_link")
         sure = vision_msgs.ObjectHypothesisWithPose(
             vision_msgs.ObjectHypothesis("tomato", 0.9)
         )
@@ -137,7 +137,7 @@ class Robot:
             ),
             "/odom": nav_msgs.Odometry(in_odom, "base_link"),
             "/scan": sensor_msgs.LaserScan(
-                m.Header(stamp, "laser"),
+                std_msgs.Header(stamp, "laser"),
                 *(-math.pi, math.pi, math.tau / 720, 0.0, 0.03, 0.1, 25.0),
                 self._ranges,
             ),

@@ -47,7 +47,7 @@ from iveg.robot.ros2.network import Network
 from iveg.robot.ros2.rig import Ros2Robot
 from iveg.robot.ros2.topics import TOPICS, sensed_topics
 from iveg.robot.ros2.transforms import TransformBuffer
-from iveg.ros2 import cdr
+from iveg.ros2 import cdr, std_msgs
 from iveg.ros2 import messages as m
 from iveg.ros2.schema import Message
 from iveg.settings import Settings
@@ -345,7 +345,7 @@ def _hear(
     if isinstance(message, m.TFMessage):
         transforms.add(message, static=topic == "tf_static")
         return 0.0
-    if not isinstance(message, m.Stamped):
+    if not isinstance(message, std_msgs.Stamped):
         return 0.0
     header = message.header
     one.frame = header.frame_id

@@ -10,11 +10,10 @@ from iveg.ros2.messages import (
     Pose,
     PoseStamped,
     PoseWithCovariance,
-    Stamped,
-    Time,
     TwistWithCovariance,
 )
 from iveg.ros2.schema import Float32, Many, Message, Uint32
+from iveg.ros2.std_msgs import Stamped, Time
 
 Cells = Annotated[NDArray[np.int8], Many("int8")]
 

@@ -6,8 +6,8 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from iveg.ros2.messages import Stamped
 from iveg.ros2.schema import Boolean, Float32, Many, Message, Uint8, Uint32
+from iveg.ros2.std_msgs import Stamped
 
 Floats = Annotated[NDArray[np.float32], Many("float32")]
 

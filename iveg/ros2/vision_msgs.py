@@ -3,8 +3,9 @@
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from iveg.ros2.messages import Pose, PoseWithCovariance, Stamped, Vector3
+from iveg.ros2.messages import Pose, PoseWithCovariance, Vector3
 from iveg.ros2.schema import Float64, Message
+from iveg.ros2.std_msgs import Stamped
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,9 +4,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from iveg.ros2.messages import ColorRGBA, Duration, Point, Pose, Stamped, Vector3
+from iveg.ros2.messages import Point, Pose, Vector3
 from iveg.ros2.schema import Boolean, Float32, Int32, Message
 from iveg.ros2.sensor_msgs import CompressedImage, Octets
+from iveg.ros2.std_msgs import ColorRGBA, Duration, Stamped
 
 
 @dataclass(frozen=True, slots=True)

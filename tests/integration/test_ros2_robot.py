@@ -19,7 +19,7 @@ from iveg.domain.observations import DetectionFrame, LaserScan, Origin, SafetyRe
 from iveg.domain.peer_scan import peer_scan_of
 from iveg.ngsi import codec
 from iveg.ngsi.names import direct_topic, measure_topic
-from iveg.ros2 import cdr, names, nav_msgs
+from iveg.ros2 import cdr, names, nav_msgs, std_msgs
 from iveg.ros2 import detector_messages as d
 from iveg.ros2 import messages as m
 from tests.brokers import broker_on
@@ -134,14 +134,14 @@ class Sensors:
     async def talk(self) -> None:
         """Say where the base is thirty times a second, as often as ``burst``."""
         while True:
-            stamp = m.Time.of(clock.wall())
-            odom = m.Header(stamp, "odom")
+            stamp = std_msgs.Time.of(clock.wall())
+            odom = std_msgs.Header(stamp, "odom")
             links = (
-                m.TransformStamped(m.Header(stamp, "map"), "odom"),
+                m.TransformStamped(std_msgs.Header(stamp, "map"), "odom"),
                 m.TransformStamped(odom, "base_link"),
             )
             self._tf.write(cdr.write(m.TFMessage(links)))
-            base = m.Header(stamp, "base_link")
+            base = std_msgs.Header(stamp, "base_link")
             self._boxes.write(cdr.write(d.BoundingBoxes3d(base, (PERSON,))))
             for _ in range(self.burst):
                 self._odometry.write(cdr.write(nav_msgs.Odometry(odom, "base_link")))

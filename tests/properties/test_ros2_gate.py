@@ -22,7 +22,7 @@ from iveg.robot.ros2.config import DriveConfig
 from iveg.robot.ros2.drive import DriveTopics
 from iveg.robot.ros2.input_faults import InputFaults
 from iveg.robot.ros2.reading import read_twist
-from iveg.ros2 import cdr
+from iveg.ros2 import cdr, std_msgs
 from iveg.ros2 import messages as m
 from tests.unit.robot.rig import STEP_S, Rig, person, release, resume, stop
 
@@ -81,8 +81,8 @@ class Gate:
 
     def on_wish(self, forward: float, turn: float, back_s: float) -> None:
         twist = m.Twist(m.Vector3(forward), m.Vector3(z=turn))
-        stamp = m.Time.of(WALL + self.rig.now + back_s)
-        self.on_junk(cdr.write(m.TwistStamped(m.Header(stamp), twist)))
+        stamp = std_msgs.Time.of(WALL + self.rig.now + back_s)
+        self.on_junk(cdr.write(m.TwistStamped(std_msgs.Header(stamp), twist)))
 
     def on_junk(self, payload: bytes) -> None:
         if not self.runs:

@@ -23,7 +23,7 @@ from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.network import Network, Writer
 from iveg.robot.ros2.reading import read_twist, write_twist
 from iveg.robot.ros2.sensors import ROS_SENSORS
-from iveg.ros2 import cdr, nav_msgs, sensor_msgs, vision_msgs
+from iveg.ros2 import cdr, nav_msgs, sensor_msgs, std_msgs, vision_msgs
 from iveg.ros2 import messages as m
 from iveg.ros2.schema import Message
 
@@ -164,7 +164,7 @@ class Ros2Base:
         self._wishes.write(cdr.write(write_twist(asked)))
         self._rig.move(min(dt * SLOTS, LONGEST_STEP_S))
         if not self._is_odometry_frozen:
-            self._tell_place(m.Time.of(now.wall))
+            self._tell_place(std_msgs.Time.of(now.wall))
 
     def _read_commands(self, now: float) -> None:
         waited = self._commands.take()
@@ -189,12 +189,12 @@ class Ros2Base:
             return
         self._rig.pursue(Goal("", "here", place.x, place.y), self._world)
 
-    def _tell_place(self, stamp: m.Time) -> None:
+    def _tell_place(self, stamp: std_msgs.Time) -> None:
         measured = self._rig.odometry()
         in_odom = _relative(self._odom_in_map, measured.pose)
         frames = self._frames
         odometry = nav_msgs.Odometry(
-            m.Header(stamp, frames.odom),
+            std_msgs.Header(stamp, frames.odom),
             frames.base_link,
             m.PoseWithCovariance(_pose(in_odom)),
             m.TwistWithCovariance(write_twist(measured.twist)),
@@ -209,7 +209,7 @@ class Ros2Base:
     def _scan(self, _: float) -> None:
         sweep = self._rig.scan(self._world)
         message = sensor_msgs.LaserScan(
-            m.Header(m.Time.of(clock.wall()), _LASER),
+            std_msgs.Header(std_msgs.Time.of(clock.wall()), _LASER),
             sweep.angle_min,
             sweep.angle_min + sweep.angle_increment * (sweep.ranges.size - 1),
             sweep.angle_increment,
@@ -224,12 +224,12 @@ class Ros2Base:
     def _look(self, _: float) -> None:
         now = clock.now()
         frame = self._rig.detect(now.mono - self._run_began, self._world)
-        header = m.Header(m.Time.of(now.wall), self._frames.base_link)
+        header = std_msgs.Header(std_msgs.Time.of(now.wall), self._frames.base_link)
         seen = tuple(_detection(one, header) for one in frame.detections)
         self._seen.write(cdr.write(vision_msgs.Detection3DArray(header, seen)))
 
     def _tell_slowly(self, _: float) -> None:
-        header = m.Header(m.Time.of(clock.wall()), self._frames.map)
+        header = std_msgs.Header(std_msgs.Time.of(clock.wall()), self._frames.map)
         path = self._rig.navigation().path
         poses = tuple(m.PoseStamped(header, _pose(Pose2D(x, y, 0.0))) for x, y in path)
         self._paths.write(cdr.write(nav_msgs.Path(header, poses)))
@@ -239,7 +239,7 @@ class Ros2Base:
                 out.write(cdr.write(sensor.write(header, reading)))
 
     def _mounts(self) -> m.TFMessage:
-        stamp = m.Time.of(clock.wall())
+        stamp = std_msgs.Time.of(clock.wall())
         laser = self._rig.profile.laser
         return m.TFMessage((_link(stamp, self._frames.base_link, _LASER, laser),))
 
@@ -257,12 +257,14 @@ def _pose(pose: Pose2D) -> m.Pose:
     return m.Pose(m.Point(pose.x, pose.y), _turned(pose.yaw))
 
 
-def _link(stamp: m.Time, outer: str, inner: str, pose: Pose2D) -> m.TransformStamped:
+def _link(
+    stamp: std_msgs.Time, outer: str, inner: str, pose: Pose2D
+) -> m.TransformStamped:
     transform = m.Transform(m.Vector3(pose.x, pose.y), _turned(pose.yaw))
-    return m.TransformStamped(m.Header(stamp, outer), inner, transform)
+    return m.TransformStamped(std_msgs.Header(stamp, outer), inner, transform)
 
 
-def _detection(one: Detection, header: m.Header) -> vision_msgs.Detection3D:
+def _detection(one: Detection, header: std_msgs.Header) -> vision_msgs.Detection3D:
     box, (x, y, z) = one.box, one.box.centre
     size = m.Vector3(box.xmax - box.xmin, box.ymax - box.ymin, box.zmax - box.zmin)
     sure = vision_msgs.ObjectHypothesis(one.class_id, one.probability)

@@ -30,7 +30,7 @@ from iveg.robot.ros2.reading import read_pose, read_scan, read_twist
 from iveg.robot.ros2.rigid import IDENTITY, RigidTransform
 from iveg.ros2 import detector_messages as d
 from iveg.ros2 import messages as m
-from iveg.ros2 import nav_msgs, sensor_msgs
+from iveg.ros2 import nav_msgs, sensor_msgs, std_msgs
 from iveg.ros2.schema import Message
 
 _MAX_AGE_S = 1.0
@@ -169,7 +169,7 @@ class BagTree:
         root = self._up(odom)[-1]
         self.links = [*static]
         if usual.map not in self._up(odom):
-            header = m.Header(frame_id=usual.map)
+            header = std_msgs.Header(frame_id=usual.map)
             self.links.append(m.TFMessage((m.TransformStamped(header, root),)))
 
     def has_mount(self, frame: str) -> bool:

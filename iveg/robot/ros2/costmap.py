@@ -16,7 +16,7 @@ from iveg.domain.geometry import Pose2D
 from iveg.robot.costmap import FleetCostmap
 from iveg.robot.neighbours import Neighbours
 from iveg.robot.ros2.network import Writer
-from iveg.ros2 import cdr, nav_msgs
+from iveg.ros2 import cdr, nav_msgs, std_msgs
 from iveg.ros2 import messages as m
 
 _log = logging.getLogger(__name__)
@@ -86,17 +86,17 @@ class CostmapTopic:
         self._newest = None
 
     def _write(self, costmap: InflatedGrid) -> None:
-        stamp = m.Time.of(clock.wall())
+        stamp = std_msgs.Time.of(clock.wall())
         self._writer.write(cdr.write(occupancy_grid(costmap, stamp, self._frame)))
 
 
 def occupancy_grid(
-    costmap: InflatedGrid, stamp: m.Time, frame: str
+    costmap: InflatedGrid, stamp: std_msgs.Time, frame: str
 ) -> nav_msgs.OccupancyGrid:
     """The message of a costmap."""
     grid = costmap.grid
     corner = m.Pose(m.Point(grid.xmin, grid.ymin))
     info = nav_msgs.MapMetaData(stamp, grid.resolution, grid.width, grid.height, corner)
     return nav_msgs.OccupancyGrid(
-        m.Header(stamp, frame), info, costmap.data.reshape(-1)
+        std_msgs.Header(stamp, frame), info, costmap.data.reshape(-1)
     )

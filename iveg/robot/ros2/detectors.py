@@ -11,7 +11,7 @@ from typing import Any
 
 from iveg.ros2 import detector_messages as d
 from iveg.ros2 import messages as m
-from iveg.ros2 import vision_msgs
+from iveg.ros2 import std_msgs, vision_msgs
 from iveg.ros2.schema import Message
 
 _SIGN, _WRAP = 1 << 15, 1 << 16
@@ -26,7 +26,7 @@ class Look:
         width: Of the picture (pixels), ``height`` likewise; 0: not told.
     """
 
-    header: m.Header
+    header: std_msgs.Header
     detections: tuple[vision_msgs.Detection2D, ...]
     width: int = 0
     height: int = 0
@@ -38,7 +38,7 @@ def _vision(look: vision_msgs.Detection2DArray) -> Look:
 
 def _yolox(look: d.BoundingBoxes) -> Look:
     boxes, own = look.bounding_boxes, look.image_header
-    header = own if own.frame_id or own.stamp != m.Time() else look.header
+    header = own if own.frame_id or own.stamp != std_msgs.Time() else look.header
     width = max((one.img_width for one in boxes), default=0)
     height = max((one.img_height for one in boxes), default=0)
     return Look(header, tuple(map(_yolox_box, boxes)), width, height)
@@ -54,7 +54,7 @@ def _yolox_box(one: d.BoundingBox) -> vision_msgs.Detection2D:
         vision_msgs.PicturePose(centre), xmax - xmin, ymax - ymin
     )
     return vision_msgs.Detection2D(
-        m.Header(), _sure(one.class_id, one.probability), box
+        std_msgs.Header(), _sure(one.class_id, one.probability), box
     )
 
 
@@ -68,7 +68,7 @@ def _yolo_box(one: d.Detection) -> vision_msgs.Detection2D:
         vision_msgs.Point2D(centre.position.x, centre.position.y), centre.theta
     )
     box = vision_msgs.BoundingBox2D(place, size.x, size.y)
-    return vision_msgs.Detection2D(m.Header(), _yolo_class(one), box, one.id)
+    return vision_msgs.Detection2D(std_msgs.Header(), _yolo_class(one), box, one.id)
 
 
 def _yolo_3d(found: d.DetectionArray) -> vision_msgs.Detection3DArray:
@@ -81,7 +81,7 @@ def _yolo_box_3d(one: d.Detection) -> vision_msgs.Detection3D:
     box = one.bbox3d
     # Without a frame no node has added depth, and zeros are no place.
     centre = box.center if box.frame_id else m.Pose(m.Point(math.nan))
-    header = m.Header(frame_id=box.frame_id)
+    header = std_msgs.Header(frame_id=box.frame_id)
     found = vision_msgs.BoundingBox3D(centre, box.size)
     return vision_msgs.Detection3D(header, _yolo_class(one), found, one.id)
 
@@ -105,7 +105,7 @@ def _yolact_box(one: d.BoundingBox3d) -> vision_msgs.Detection3D:
     size = m.Vector3(one.xmax - one.xmin, one.ymax - one.ymin, one.zmax - one.zmin)
     box = vision_msgs.BoundingBox3D(m.Pose(centre), size)
     return vision_msgs.Detection3D(
-        m.Header(), _sure(one.object_name, one.probability), box
+        std_msgs.Header(), _sure(one.object_name, one.probability), box
     )
 
 

@@ -11,7 +11,7 @@ from iveg.domain.geometry import REST, Twist2D
 from iveg.robot.ros2.config import DriveConfig
 from iveg.robot.ros2.input_faults import InputFaults
 from iveg.robot.ros2.reading import read_twist, write_twist
-from iveg.ros2 import cdr
+from iveg.ros2 import cdr, std_msgs
 from iveg.ros2 import messages as m
 from iveg.ros2.schema import Message
 
@@ -65,7 +65,7 @@ class DriveTopics:
     def write(self, twist: Twist2D, wall: float) -> bytes:
         """Bytes for the base; ``wall`` is the robot's clock (Unix s)."""
         if self._drive.stamped_out:
-            header = m.Header(m.Time.of(wall), self._base_link)
+            header = std_msgs.Header(std_msgs.Time.of(wall), self._base_link)
             return cdr.write(m.TwistStamped(header, write_twist(twist)))
         return _unstamped(twist)
 

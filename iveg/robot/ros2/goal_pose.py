@@ -5,6 +5,7 @@ import math
 from iveg.domain.geometry import Pose2D
 from iveg.domain.goals import Goal
 from iveg.ros2 import messages as m
+from iveg.ros2 import std_msgs
 
 
 def pose_for(goal: Goal | None, here: Pose2D, wall: float, frame: str) -> m.PoseStamped:
@@ -23,5 +24,5 @@ def pose_for(goal: Goal | None, here: Pose2D, wall: float, frame: str) -> m.Pose
         yaw = math.atan2(y - here.y, x - here.x)
     turned = m.Quaternion(z=math.sin(yaw / 2), w=math.cos(yaw / 2))
     return m.PoseStamped(
-        m.Header(m.Time.of(wall), frame), m.Pose(m.Point(x, y), turned)
+        std_msgs.Header(std_msgs.Time.of(wall), frame), m.Pose(m.Point(x, y), turned)
     )

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from iveg.domain.geometry import Pose2D
 from iveg.robot.neighbours import PEER_M, Neighbour
 from iveg.ros2 import messages as m
-from iveg.ros2 import sensor_msgs, visualization_msgs
+from iveg.ros2 import sensor_msgs, std_msgs, visualization_msgs
 
 REACH_M = 8.0
 """Greatest distance of a disc (m); the clearing circle is a metre beyond."""
@@ -26,7 +26,7 @@ _CYLINDER, _TEXT = 3, 9
 
 
 def cloud(
-    neighbours: Iterable[Neighbour], own: Pose2D, stamp: m.Time, frame: str
+    neighbours: Iterable[Neighbour], own: Pose2D, stamp: std_msgs.Time, frame: str
 ) -> sensor_msgs.PointCloud2:
     """Discs to mark and a circle to clear, in ``base_link``."""
     discs = [
@@ -36,7 +36,7 @@ def cloud(
     ]
     points = np.ascontiguousarray(np.concatenate([_CIRCLE, *discs]), "<f4")
     return sensor_msgs.PointCloud2(
-        m.Header(stamp, frame),
+        std_msgs.Header(stamp, frame),
         1,
         len(points),
         tuple(sensor_msgs.PointField(name, 4 * n) for n, name in enumerate("xyz")),
@@ -75,16 +75,16 @@ def _disc(one: Neighbour, own: Pose2D) -> NDArray[np.float64]:
 
 
 def markers(
-    neighbours: Iterable[Neighbour], stamp: m.Time, frame: str
+    neighbours: Iterable[Neighbour], stamp: std_msgs.Time, frame: str
 ) -> visualization_msgs.MarkerArray:
     """Body, radius and name of each, with a lifetime of a second."""
     found: list[visualization_msgs.Marker] = []
     for number, one in enumerate(neighbours):
         place = m.Point(one.x, one.y, 0.9)
-        red = m.ColorRGBA(0.9, 0.2, 0.1, 0.9)
-        body = red if one.kind == "person" else m.ColorRGBA(0.1, 0.4, 0.9, 0.9)
-        ring = m.ColorRGBA(body.r, body.g, body.b, 0.15)
-        header = m.Header(stamp, frame)
+        red = std_msgs.ColorRGBA(0.9, 0.2, 0.1, 0.9)
+        body = red if one.kind == "person" else std_msgs.ColorRGBA(0.1, 0.4, 0.9, 0.9)
+        ring = std_msgs.ColorRGBA(body.r, body.g, body.b, 0.15)
+        header = std_msgs.Header(stamp, frame)
         found += [
             _marker(header, f"{one.kind} body", number, place, 2 * one.radius, body),
             _marker(header, f"{one.kind} ring", number, place, 2 * one.ring, ring),
@@ -95,8 +95,8 @@ def markers(
                 _TEXT,
                 pose=m.Pose(m.Point(one.x, one.y, 2.1)),
                 scale=m.Vector3(0.0, 0.0, 0.4),
-                color=m.ColorRGBA(1.0, 1.0, 1.0, 1.0),
-                lifetime=m.Duration(_MARKER_LIVES_S),
+                color=std_msgs.ColorRGBA(1.0, 1.0, 1.0, 1.0),
+                lifetime=std_msgs.Duration(_MARKER_LIVES_S),
                 text=one.name,
             ),
         ]
@@ -104,12 +104,12 @@ def markers(
 
 
 def _marker(
-    header: m.Header,
+    header: std_msgs.Header,
     ns: str,
     number: int,
     place: m.Point,
     width: float,
-    color: m.ColorRGBA,
+    color: std_msgs.ColorRGBA,
 ) -> visualization_msgs.Marker:
     flat = width > 2 * PEER_M
     return visualization_msgs.Marker(
@@ -120,5 +120,5 @@ def _marker(
         pose=m.Pose(m.Point(place.x, place.y, 0.01) if flat else place),
         scale=m.Vector3(width, width, 0.02 if flat else 1.8),
         color=color,
-        lifetime=m.Duration(_MARKER_LIVES_S),
+        lifetime=std_msgs.Duration(_MARKER_LIVES_S),
     )

@@ -34,8 +34,7 @@ from iveg.robot.ros2.inputs import SensorInputs
 from iveg.robot.ros2.lookout import Lookout, forms_published
 from iveg.robot.ros2.network import Network, Reader, Writer
 from iveg.robot.ros2.topics import TOPICS, sensed_topics
-from iveg.ros2 import cdr
-from iveg.ros2 import messages as m
+from iveg.ros2 import cdr, std_msgs
 from iveg.ros2.names import Endpoint
 from iveg.ros2.schema import Message
 
@@ -290,7 +289,7 @@ class Ros2Robot:
         if place is None or (cloud is None and drawing is None):
             return
         now = clock.now()
-        own, stamp = place.flat(), m.Time.of(now.wall)
+        own, stamp = place.flat(), std_msgs.Time.of(now.wall)
         present = self._neighbours.present(own, now.mono)
         frames = self._config.frames
         if cloud is not None:

@@ -7,8 +7,7 @@ from typing import Any
 
 from iveg.domain.kinds import Kind, row_of
 from iveg.domain.observations import UNKNOWN_ORIGIN, Battery, Observation
-from iveg.ros2 import messages as m
-from iveg.ros2 import sensor_msgs
+from iveg.ros2 import sensor_msgs, std_msgs
 from iveg.ros2.schema import Message
 
 
@@ -28,7 +27,7 @@ def read_battery(state: sensor_msgs.BatteryState) -> Battery:
     return Battery("", UNKNOWN_ORIGIN, share, status, volts)
 
 
-def write_battery(header: m.Header, battery: Any) -> sensor_msgs.BatteryState:
+def write_battery(header: std_msgs.Header, battery: Any) -> sensor_msgs.BatteryState:
     """The inverse, for an emulated base."""
     return sensor_msgs.BatteryState(
         header, voltage=battery.voltage, percentage=battery.percentage
@@ -50,7 +49,7 @@ class RosSensor:
     topic: str
     message: type[Message]
     read: Callable[[Any], Observation]
-    write: Callable[[m.Header, Any], Message]
+    write: Callable[[std_msgs.Header, Any], Message]
 
     @property
     def kind(self) -> Kind:

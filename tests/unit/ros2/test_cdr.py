@@ -8,14 +8,21 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iveg.domain.errors import UnreadableError
-from iveg.ros2 import cdr, nav_msgs, sensor_msgs, vision_msgs, visualization_msgs
+from iveg.ros2 import (
+    cdr,
+    nav_msgs,
+    sensor_msgs,
+    std_msgs,
+    vision_msgs,
+    visualization_msgs,
+)
 from iveg.ros2 import messages as m
 from tests.unit.ros2.reference import STORE, as_rosbags
 from tests.unit.ros2.spelled import HALF, MAP, ONE, POSE, STAMP, TWO, ZERO, payload
 
-AT_7_S = m.Time(7, 5)
-IN_MAP = m.Header(AT_7_S, "map")
-IN_ODOM = m.Header(AT_7_S, "odom")
+AT_7_S = std_msgs.Time(7, 5)
+IN_MAP = std_msgs.Header(AT_7_S, "map")
+IN_ODOM = std_msgs.Header(AT_7_S, "odom")
 HERE = m.Pose(m.Point(1.0, 2.0))
 DRIVES = m.Twist(m.Vector3(0.5), m.Vector3(z=1.0))
 TWIST = f"{HALF} {ZERO} {ZERO} {ZERO} {ZERO} {ONE}"
@@ -63,7 +70,7 @@ CASES: dict[str, tuple[Any, str]] = {
     ),
     "LaserScan": (
         sensor_msgs.LaserScan(
-            m.Header(AT_7_S, "laser"),
+            std_msgs.Header(AT_7_S, "laser"),
             *(1.0, 2.0, 0.5, 0.0, 0.25, 0.25, 10.0),
             _f(1.0, np.inf),
             _f(2.0),
@@ -217,8 +224,8 @@ CASES: dict[str, tuple[Any, str]] = {
                     *(7, 3, 0),
                     HERE,
                     m.Vector3(2.0, 2.0, 0.5),
-                    m.ColorRGBA(1.0, 0.5, 0.0, 0.5),
-                    m.Duration(1, 0),
+                    std_msgs.ColorRGBA(1.0, 0.5, 0.0, 0.5),
+                    std_msgs.Duration(1, 0),
                 ),
             )
         ),
@@ -238,8 +245,8 @@ CASES: dict[str, tuple[Any, str]] = {
                     *(7, 3, 0),
                     HERE,
                     m.Vector3(2.0, 2.0, 0.5),
-                    m.ColorRGBA(1.0, 0.5, 0.0, 0.5),
-                    m.Duration(1, 0),
+                    std_msgs.ColorRGBA(1.0, 0.5, 0.0, 0.5),
+                    std_msgs.Duration(1, 0),
                     points=(m.Point(1.0),),
                     text="hi",
                 ),
@@ -327,6 +334,6 @@ def test_another_encapsulation_is_named(head: str) -> None:
 
 
 def test_a_stamp_keeps_its_nanoseconds() -> None:
-    assert m.Time.of(1700000000.25) == m.Time(1700000000, 250_000_000)
-    assert m.Time(3, 500_000_000).seconds == 3.5
-    assert m.Time.of(-0.25) == m.Time(-1, 750_000_000)
+    assert std_msgs.Time.of(1700000000.25) == std_msgs.Time(1700000000, 250_000_000)
+    assert std_msgs.Time(3, 500_000_000).seconds == 3.5
+    assert std_msgs.Time.of(-0.25) == std_msgs.Time(-1, 750_000_000)

@@ -26,6 +26,7 @@ from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.inputs import SensorInputs
 from iveg.robot.ros2.topics import sensed_topics
 from iveg.ros2 import messages as m
+from iveg.ros2 import std_msgs
 from tests.fakes.ros2_network import FakeNetwork
 
 AHEAD = Twist2D(0.5, 0.1)
@@ -129,7 +130,7 @@ async def test_algorithm_1_finds_the_robot_where_it_believes_itself(
 async def test_it_drives_to_a_goal_and_ignores_one_without_a_way(
     emulated: Emulated,
 ) -> None:
-    header = m.Header(m.Time(), "map")
+    header = std_msgs.Header(std_msgs.Time(), "map")
     for x, y in ((18.0, 10.0), (2.0, 5.0)):
         pose = m.Pose(m.Point(x, y))
         emulated.network.publish("/agii/goal_pose", m.PoseStamped(header, pose))

@@ -18,7 +18,7 @@ from iveg.robot.replay.bags import AS_RECORDED, BagOptions
 from iveg.robot.replay.recordings import open_recording
 from iveg.ros2 import detector_messages as d
 from iveg.ros2 import messages as m
-from iveg.ros2 import nav_msgs
+from iveg.ros2 import nav_msgs, std_msgs
 from iveg.ros2.schema import Message
 from tests.data.message_bags import Said, message_bag, ros1_message_bag
 from tests.unit.robot.ros2 import said
@@ -50,7 +50,7 @@ def frames() -> list[Said]:
     """A robot at (10, 0) in map that looks east; its camera 1 m above the floor."""
     turned = m.Quaternion(-0.5, 0.5, -0.5, 0.5)
     camera = m.Transform(m.Vector3(-2.0, 0.0, 1.0), turned)
-    base = m.Header(frame_id="base_link")
+    base = std_msgs.Header(frame_id="base_link")
     at_camera = m.TransformStamped(base, OPTICAL.frame_id, camera)
     backwards = link("base_link", "laser", -0.3, yaw=math.pi)
     return [
@@ -211,7 +211,7 @@ def test_a_look_at_nobody_is_an_empty_frame(tmp_path: Path) -> None:
 def test_a_person_whose_frame_the_bag_lacks_is_lost_and_told(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    seen = ("/seen", yolact(m.Header(said.stamp(), "left_eye"), *PERSON), WALL)
+    seen = ("/seen", yolact(std_msgs.Header(said.stamp(), "left_eye"), *PERSON), WALL)
 
     found, _ = recorded(tmp_path, [*frames(), *drive(), seen])
 
@@ -356,7 +356,7 @@ def test_a_bag_of_a_day_to_come_plays_and_says_so_once(
 ) -> None:
     later = 2_140_000_000.0
     message = said.odometry()
-    message = replace(message, header=m.Header(m.Time.of(later), "odom"))
+    message = replace(message, header=std_msgs.Header(std_msgs.Time.of(later), "odom"))
     bag = message_bag(tmp_path / "run", [("/odom", message, later)])
 
     found = list(open_recording(bag, FLEET)())

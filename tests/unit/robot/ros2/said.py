@@ -8,7 +8,7 @@ import numpy as np
 from iveg.domain.observations import Instant, Observation
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.inputs import SensorInputs
-from iveg.ros2 import cdr, nav_msgs, sensor_msgs, vision_msgs
+from iveg.ros2 import cdr, nav_msgs, sensor_msgs, std_msgs, vision_msgs
 from iveg.ros2 import messages as m
 from iveg.ros2.schema import Message
 
@@ -20,8 +20,8 @@ def at(seconds: float) -> Instant:
     return Instant(MONO + seconds, WALL + seconds)
 
 
-def stamp(seconds: float = 0.0) -> m.Time:
-    return m.Time.of(WALL + seconds)
+def stamp(seconds: float = 0.0) -> std_msgs.Time:
+    return std_msgs.Time.of(WALL + seconds)
 
 
 def turned(yaw: float) -> m.Quaternion:
@@ -39,7 +39,7 @@ def link(
     z: float = 0.0,
 ) -> m.TransformStamped:
     transform = m.Transform(m.Vector3(x, y, z), turned(yaw))
-    return m.TransformStamped(m.Header(stamp(after), outer), inner, transform)
+    return m.TransformStamped(std_msgs.Header(stamp(after), outer), inner, transform)
 
 
 def tf(*links: m.TransformStamped) -> m.TFMessage:
@@ -55,7 +55,7 @@ def odometry(
     w: float = 0.0,
 ) -> nav_msgs.Odometry:
     return nav_msgs.Odometry(
-        m.Header(stamp(after), "odom"),
+        std_msgs.Header(stamp(after), "odom"),
         child,
         m.PoseWithCovariance(m.Pose(m.Point(x))),
         m.TwistWithCovariance(m.Twist(m.Vector3(v), m.Vector3(z=w))),
@@ -69,7 +69,7 @@ def scan(
     frame: str = "laser",
 ) -> sensor_msgs.LaserScan:
     return sensor_msgs.LaserScan(
-        m.Header(stamp(after), frame),
+        std_msgs.Header(stamp(after), frame),
         -0.5, 0.5, 0.5, 0.0, 0.1, 0.1, 20.0,
         np.array(ranges, np.float32),
     )  # fmt: skip
@@ -89,13 +89,17 @@ def seen(
     box = vision_msgs.BoundingBox3D(
         m.Pose(m.Point(x, 0.0, 0.9)), m.Vector3(0.4, 0.6, 1.8)
     )
-    return vision_msgs.Detection3D(m.Header(stamp(after), frame), (sure,), box, "7")
+    return vision_msgs.Detection3D(
+        std_msgs.Header(stamp(after), frame), (sure,), box, "7"
+    )
 
 
 def look(
     *found: vision_msgs.Detection3D, after: float = 0.0
 ) -> vision_msgs.Detection3DArray:
-    return vision_msgs.Detection3DArray(m.Header(stamp(after), "base_link"), found)
+    return vision_msgs.Detection3DArray(
+        std_msgs.Header(stamp(after), "base_link"), found
+    )
 
 
 class Bench:

@@ -9,7 +9,7 @@ import pytest
 
 from iveg.domain.observations import DetectionFrame
 from iveg.robot.ros2.config import RobotConfig
-from iveg.ros2 import cdr, vision_msgs
+from iveg.ros2 import cdr, std_msgs, vision_msgs
 from iveg.ros2 import detector_messages as d
 from iveg.ros2 import messages as m
 from iveg.ros2.schema import Message
@@ -21,8 +21,8 @@ from tests.unit.ros2.reference import STORE, as_rosbags
 TRUTH = (13.0, 0.0)
 """Where the person stands in map (m): 3 m before a camera that is at (10, 0, 1) and
 looks east; ``test_pictures`` draws the same person."""
-OPTICAL = m.Header(said.stamp(), "camera_optical")
-UNSEEN = m.Header()
+OPTICAL = std_msgs.Header(said.stamp(), "camera_optical")
+UNSEEN = std_msgs.Header()
 CLOSE_M = 0.1
 
 
@@ -31,7 +31,9 @@ def bench(classes: tuple[str, ...] = ()) -> Bench:
     optical = m.Quaternion(-0.5, 0.5, -0.5, 0.5)
     place = m.Transform(m.Vector3(10.0, 0.0, 1.0), optical)
     links = (
-        m.TransformStamped(m.Header(said.stamp(), "map"), "camera_optical", place),
+        m.TransformStamped(
+            std_msgs.Header(said.stamp(), "map"), "camera_optical", place
+        ),
         said.link("map", "base_link", 11.0, 1.0, math.pi / 2),
     )
     found.hear("tf_static", tf(*links))
@@ -56,27 +58,27 @@ def sure(name: str = "farmer") -> tuple[vision_msgs.ObjectHypothesisWithPose, ..
 # --- with depth ---------------------------------------------------------------------
 
 
-def vision_3d(header: m.Header, centre: m.Point, size: m.Vector3) -> Message:
+def vision_3d(header: std_msgs.Header, centre: m.Point, size: m.Vector3) -> Message:
     box = vision_msgs.BoundingBox3D(m.Pose(centre), size)
     return vision_msgs.Detection3DArray(
         header, (vision_msgs.Detection3D(UNSEEN, sure(), box),)
     )
 
 
-def yolact(header: m.Header, centre: m.Point, size: m.Vector3) -> Message:
+def yolact(header: std_msgs.Header, centre: m.Point, size: m.Vector3) -> Message:
     x, y, z = centre.x, centre.y, centre.z
     u, v, w = size.x / 2, size.y / 2, size.z / 2
     box = d.BoundingBox3d("farmer", 0.9, x - u, y - v, x + u, y + v, z - w, z + w)
     return d.BoundingBoxes3d(header, (box,))
 
 
-def yolo_3d(header: m.Header, centre: m.Point, size: m.Vector3) -> Message:
+def yolo_3d(header: std_msgs.Header, centre: m.Point, size: m.Vector3) -> Message:
     box = d.BoundingBox3D(m.Pose(centre), size, header.frame_id)
     one = d.Detection(0, "farmer", 0.9, "4", bbox3d=box)
-    return d.DetectionArray(m.Header(header.stamp, "elsewhere"), (one,))
+    return d.DetectionArray(std_msgs.Header(header.stamp, "elsewhere"), (one,))
 
 
-Made = Callable[[m.Header, m.Point, m.Vector3], Message]
+Made = Callable[[std_msgs.Header, m.Point, m.Vector3], Message]
 
 
 @pytest.mark.parametrize("made", [vision_3d, yolact, yolo_3d])
@@ -91,7 +93,7 @@ Made = Callable[[m.Header, m.Point, m.Vector3], Message]
 def test_a_box_with_depth_lies_where_the_person_is(
     made: Made, frame: str, centre: m.Point, size: m.Vector3
 ) -> None:
-    header = m.Header(said.stamp(), frame)
+    header = std_msgs.Header(said.stamp(), frame)
 
     (one,) = told(bench(), "detections_3d", made(header, centre, size)).detections
 
@@ -104,7 +106,7 @@ def test_a_box_with_depth_lies_where_the_person_is(
 @pytest.mark.parametrize("made", [vision_3d, yolact, yolo_3d])
 def test_a_frame_that_nobody_knows_places_nothing_and_is_named(made: Made) -> None:
     one = bench()
-    header = m.Header(said.stamp(), "left_eye")
+    header = std_msgs.Header(said.stamp(), "left_eye")
 
     found = told(one, "detections_3d", made(header, m.Point(1.0), m.Vector3(1, 1, 1)))
 
@@ -182,7 +184,7 @@ def test_a_box_in_a_picture_lies_where_the_person_is(
 
 def test_the_picture_that_yolox_looked_at_is_the_one_that_counts() -> None:
     """Some builds put the time of publishing into the first header."""
-    late = m.Header(said.stamp(0.2), "")
+    late = std_msgs.Header(said.stamp(0.2), "")
     seen = d.BoundingBoxes(late, OPTICAL, (yolox_box(MIDDLE, TALL),))
     one = bench().hear("depth", depth()).hear("camera_info", info())
 

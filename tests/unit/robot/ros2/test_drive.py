@@ -8,7 +8,7 @@ from iveg.domain.geometry import REST, Twist2D
 from iveg.robot.ros2.config import DriveConfig
 from iveg.robot.ros2.drive import DriveTopics
 from iveg.robot.ros2.input_faults import InputFaults, speed_of
-from iveg.ros2 import cdr
+from iveg.ros2 import cdr, std_msgs
 from iveg.ros2 import messages as m
 from tests.unit.robot.ros2.said import stamp
 
@@ -22,7 +22,7 @@ def topics(**drive: bool) -> tuple[DriveTopics, InputFaults]:
 
 
 def wished(after: float, forward: float = 0.5) -> bytes:
-    header = m.Header(stamp(after), "base_link")
+    header = std_msgs.Header(stamp(after), "base_link")
     return cdr.write(m.TwistStamped(header, m.Twist(m.Vector3(forward))))
 
 
@@ -78,7 +78,7 @@ def test_a_sender_whose_clock_was_set_back_is_believed() -> None:
 
 def test_a_sender_that_stamps_nothing_is_believed() -> None:
     found, _ = topics(stamped_in=True)
-    bare = cdr.write(m.TwistStamped(m.Header(), AHEAD))
+    bare = cdr.write(m.TwistStamped(std_msgs.Header(), AHEAD))
 
     assert [found.read(bare, n / 10) for n in range(2)] == [Twist2D(0.5, -0.2)] * 2
 

@@ -18,7 +18,7 @@ from iveg.domain.observations import (
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.input_faults import speed_of
 from iveg.robot.ros2.topics import sensed_topics
-from iveg.ros2 import cdr, nav_msgs, sensor_msgs, vision_msgs
+from iveg.ros2 import cdr, nav_msgs, sensor_msgs, std_msgs, vision_msgs
 from iveg.ros2 import messages as m
 from tests.unit.robot.ros2 import said
 from tests.unit.robot.ros2.said import Bench, link, look, seen, tf
@@ -287,7 +287,7 @@ def test_a_scan_is_placed_by_where_the_laser_was_when_it_swept() -> None:
 def test_a_laser_upside_down_turns_the_other_way() -> None:
     bench = Bench()
     rolled = m.Transform(m.Vector3(0.3), m.Quaternion(1.0, 0.0, 0.0, 0.0))
-    header = m.Header(said.stamp(), "base_link")
+    header = std_msgs.Header(said.stamp(), "base_link")
     bench.hear("tf_static", tf(m.TransformStamped(header, "laser", rolled)))
     bench.hear("odometry", said.odometry()).hear("scan", said.scan())
 
@@ -407,7 +407,7 @@ def test_a_class_list_gives_numbers_their_names() -> None:
 def test_a_plan_is_moved_into_map() -> None:
     bench = Bench().hear("odometry", said.odometry())
     bench.tick()
-    header = m.Header(said.stamp(), "odom")
+    header = std_msgs.Header(said.stamp(), "odom")
     poses = tuple(m.PoseStamped(header, m.Pose(m.Point(float(n)))) for n in range(3000))
 
     (found,) = bench.hear("path", nav_msgs.Path(header, poses)).tick()
@@ -419,7 +419,7 @@ def test_a_plan_is_moved_into_map() -> None:
 
 @pytest.mark.parametrize("count", [1, 2, 5, 1023, 1024, 2045, 3069])
 def test_no_pose_of_a_path_is_told_twice(count: int) -> None:
-    header = m.Header(said.stamp(), "map")
+    header = std_msgs.Header(said.stamp(), "map")
     poses = tuple(
         m.PoseStamped(header, m.Pose(m.Point(float(x)))) for x in range(count)
     )
@@ -433,7 +433,7 @@ def test_no_pose_of_a_path_is_told_twice(count: int) -> None:
 
 
 def test_an_empty_plan_is_an_idle_robot() -> None:
-    header = m.Header(said.stamp(), "map")
+    header = std_msgs.Header(said.stamp(), "map")
 
     (found,) = Bench().hear("path", nav_msgs.Path(header)).tick()
 

@@ -11,11 +11,10 @@ from iveg.domain.geometry import Pose2D
 from iveg.domain.observations import Origin
 from iveg.robot.neighbours import Neighbour, Neighbours
 from iveg.robot.ros2 import neighbours
-from iveg.ros2 import messages as m
-from iveg.ros2 import sensor_msgs
+from iveg.ros2 import sensor_msgs, std_msgs
 
 HERE = Pose2D(1.0, 2.0, math.pi / 2)
-STAMP = m.Time(7, 0)
+STAMP = std_msgs.Time(7, 0)
 
 
 def alert(

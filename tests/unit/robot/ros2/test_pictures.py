@@ -10,7 +10,7 @@ from iveg.domain.observations import DetectionFrame
 from iveg.robot.ros2 import pictures
 from iveg.robot.ros2.config import RobotConfig
 from iveg.ros2 import messages as m
-from iveg.ros2 import sensor_msgs, vision_msgs
+from iveg.ros2 import sensor_msgs, std_msgs, vision_msgs
 from tests.unit.robot.ros2 import said
 from tests.unit.robot.ros2.said import Bench, tf
 
@@ -29,7 +29,7 @@ def info(**differs: float) -> sensor_msgs.CameraInfo:
     p = np.zeros(12)
     p[0], p[5] = differs.get("fx", FOCAL), differs.get("fy", FOCAL)
     p[2], p[6], p[10] = (WIDTH - 1) / 2, (HEIGHT - 1) / 2, 1.0
-    header = m.Header(said.stamp(), "camera_optical")
+    header = std_msgs.Header(said.stamp(), "camera_optical")
     return sensor_msgs.CameraInfo(header, HEIGHT, WIDTH, p=p)
 
 
@@ -46,7 +46,7 @@ def image(
     rows = np.ascontiguousarray(pixels.astype((">" if big else "<") + kind))
     raw = np.frombuffer(rows.tobytes(), np.uint8).reshape(pixels.shape[0], -1)
     raw = np.pad(raw, ((0, 0), (0, pad)))
-    header = m.Header(said.stamp(), "camera_optical")
+    header = std_msgs.Header(said.stamp(), "camera_optical")
     return sensor_msgs.Image(
         header, HEIGHT, WIDTH, encoding, int(big), raw.shape[1], raw.reshape(-1)
     )
@@ -62,12 +62,14 @@ def box(score: float = 0.9, x: float = 32.0) -> vision_msgs.Detection2D:
     )
     place = vision_msgs.PicturePose(vision_msgs.Point2D(x, 25.0))
     return vision_msgs.Detection2D(
-        m.Header(), (sure,), vision_msgs.BoundingBox2D(place, 20.0, 34.0), ""
+        std_msgs.Header(), (sure,), vision_msgs.BoundingBox2D(place, 20.0, 34.0), ""
     )
 
 
 def look(*boxes: vision_msgs.Detection2D) -> vision_msgs.Detection2DArray:
-    return vision_msgs.Detection2DArray(m.Header(said.stamp(), "camera_optical"), boxes)
+    return vision_msgs.Detection2DArray(
+        std_msgs.Header(said.stamp(), "camera_optical"), boxes
+    )
 
 
 def bench() -> Bench:
@@ -75,7 +77,7 @@ def bench() -> Bench:
     found = Bench(RobotConfig(topics=TOPICS), tree=False)
     optical = m.Quaternion(-0.5, 0.5, -0.5, 0.5)
     place = m.Transform(m.Vector3(10.0, 0.0, 1.0), optical)
-    header = m.Header(said.stamp(), "map")
+    header = std_msgs.Header(said.stamp(), "map")
     found.hear("tf_static", tf(m.TransformStamped(header, "camera_optical", place)))
     return found
 

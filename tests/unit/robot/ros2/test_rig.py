@@ -24,7 +24,7 @@ from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.rig import Ros2Robot
 from iveg.ros2 import detector_messages as d
 from iveg.ros2 import messages as m
-from iveg.ros2 import nav_msgs
+from iveg.ros2 import nav_msgs, std_msgs
 from tests.builders import AGI
 from tests.fakes.ros2_network import FakeNetwork, endpoint
 from tests.ports import free_ports
@@ -99,10 +99,10 @@ async def site(tmp_path: Path) -> AsyncIterator[Site]:
 
 def placed(network: FakeNetwork) -> None:
     """Odometry in map, as a localised robot has it."""
-    header = m.Header(m.Time.of(clock.wall()), "map")
+    header = std_msgs.Header(std_msgs.Time.of(clock.wall()), "map")
     links = (m.TransformStamped(header, "odom"),)
     network.publish("/agi/tf", m.TFMessage(links))
-    odom = m.Header(header.stamp, "odom")
+    odom = std_msgs.Header(header.stamp, "odom")
     network.publish("/agi/odom", nav_msgs.Odometry(odom, "base_link"))
 
 

@@ -11,6 +11,7 @@ from iveg.domain.geometry import Pose2D
 from iveg.robot.ros2.rigid import rigid_of
 from iveg.robot.ros2.transforms import NoTransformError, TransformBuffer
 from iveg.ros2 import messages as m
+from iveg.ros2 import std_msgs
 from tests.unit.robot.ros2.said import WALL, link, stamp, tf
 
 SMALL = st.floats(-10, 10)
@@ -115,7 +116,7 @@ def test_only_ten_seconds_are_kept() -> None:
         link("map", "map"),
         link("", "odom"),
         m.TransformStamped(
-            m.Header(stamp(), "map"),
+            std_msgs.Header(stamp(), "map"),
             "odom",
             m.Transform(m.Vector3(), m.Quaternion(0.0, 0.0, 0.0, 0.0)),
         ),
