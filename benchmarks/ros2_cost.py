@@ -36,8 +36,15 @@ from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.domain.feedback import CLEAR, Feedback
 from iveg.domain.observations import Origin, SafetyReport
 from iveg.ngsi import codec
-from iveg.ros2 import cdr, names, nav_msgs, sensor_msgs, std_msgs, vision_msgs
-from iveg.ros2 import messages as m
+from iveg.ros2 import (
+    cdr,
+    geometry_msgs,
+    names,
+    nav_msgs,
+    sensor_msgs,
+    std_msgs,
+    vision_msgs,
+)
 from iveg.ros2.schema import Message
 from tests.brokers import broker_on
 from tests.dds import free_domain, loopback
@@ -49,10 +56,10 @@ WARM_UP_S, MEASURED_S = 6.0, 40.0
 SENSORS: dict[str, type[Message]] = {
     "/odom": nav_msgs.Odometry,
     "/scan": sensor_msgs.LaserScan,
-    "/tf": m.TFMessage,
+    "/tf": geometry_msgs.TFMessage,
     "/detections_3d": vision_msgs.Detection3DArray,
 }
-WISHES: dict[str, type[Message]] = {"/cmd_vel_nav": m.Twist}
+WISHES: dict[str, type[Message]] = {"/cmd_vel_nav": geometry_msgs.Twist}
 _HEARD = write_qos(names.SENSOR_DATA.newest(50))
 _ANY = SampleState.NotRead | ViewState.Any | InstanceState.Any
 
@@ -80,7 +87,7 @@ def bare(domain: int) -> None:
 def echo(domain: int) -> None:
     """Answer each twist with itself, decoded and encoded."""
     participant, waitset, _ = _participant(domain)
-    kind = announced(m.Twist, decodes=True)
+    kind = announced(geometry_msgs.Twist, decodes=True)
     heard = Topic(participant, names.dds_topic("/echo_in"), kind)
     said = Topic(participant, names.dds_topic("/echo_out"), kind)
     reader = DataReader(participant, heard, _HEARD)
@@ -114,10 +121,12 @@ class Robot:
             name: dds.writer(name, kind, names.DEFAULT)
             for name, kind in SENSORS.items()
         }
-        self._static = dds.writer("/tf_static", m.TFMessage, names.TF_STATIC)
+        self._static = dds.writer(
+            "/tf_static", geometry_msgs.TFMessage, names.TF_STATIC
+        )
         header = std_msgs.Header(std_msgs.Time.of(time.time()), "base_link")
-        mount = m.TransformStamped(header, "laser")
-        self._static.write(cdr.write(m.TFMessage((mount,))))
+        mount = geometry_msgs.TransformStamped(header, "laser")
+        self._static.write(cdr.write(geometry_msgs.TFMessage((mount,))))
         self._ranges = np.linspace(1.0, 20.0, 720, dtype=np.float32)
 
     def say(self) -> None:
@@ -129,10 +138,10 @@ class Robot:
             vision_msgs.ObjectHypothesis("tomato", 0.9)
         )
         said: dict[str, Message] = {
-            "/tf": m.TFMessage(
+            "/tf": geometry_msgs.TFMessage(
                 (
-                    m.TransformStamped(in_map, "odom"),
-                    m.TransformStamped(in_odom, "base_link"),
+                    geometry_msgs.TransformStamped(in_map, "odom"),
+                    geometry_msgs.TransformStamped(in_odom, "base_link"),
                 )
             ),
             "/odom": nav_msgs.Odometry(in_odom, "base_link"),
@@ -181,7 +190,7 @@ class Times:
 
     def send(self, speed: float) -> None:
         """Ask for this speed."""
-        payload = cdr.write(m.Twist(m.Vector3(speed)))
+        payload = cdr.write(geometry_msgs.Twist(geometry_msgs.Vector3(speed)))
         self._sent[speed] = time.perf_counter()
         self._writer.write(payload)
 
@@ -189,7 +198,7 @@ class Times:
         """Take what came back."""
         for one in self._reader.take():
             now = time.perf_counter()
-            speed = cdr.read(m.Twist, one).linear.x
+            speed = cdr.read(geometry_msgs.Twist, one).linear.x
             if speed in self._sent:
                 self.took.append(now - self._sent.pop(speed))
 
@@ -202,8 +211,8 @@ def measure(dds: Dds, programs: dict[str, int]) -> tuple[dict[str, Times], Any]:
     robot = Robot(dds)
     times = {
         name: Times(
-            dds.reader(out, m.Twist, names.SENSOR_DATA.newest(50)),
-            dds.writer(in_, m.Twist, names.DEFAULT.newest(1)),
+            dds.reader(out, geometry_msgs.Twist, names.SENSOR_DATA.newest(50)),
+            dds.writer(in_, geometry_msgs.Twist, names.DEFAULT.newest(1)),
         )
         for name, in_, out in (
             ("iveg robot", "/cmd_vel_nav", "/cmd_vel"),

@@ -47,8 +47,7 @@ from iveg.robot.ros2.network import Network
 from iveg.robot.ros2.rig import Ros2Robot
 from iveg.robot.ros2.topics import TOPICS, sensed_topics
 from iveg.robot.ros2.transforms import TransformBuffer
-from iveg.ros2 import cdr, std_msgs
-from iveg.ros2 import messages as m
+from iveg.ros2 import cdr, geometry_msgs, std_msgs
 from iveg.ros2.schema import Message
 from iveg.settings import Settings
 
@@ -342,7 +341,7 @@ def _hear(
     except UnreadableError:
         one.unreadable += 1
         return 0.0
-    if isinstance(message, m.TFMessage):
+    if isinstance(message, geometry_msgs.TFMessage):
         transforms.add(message, static=topic == "tf_static")
         return 0.0
     if not isinstance(message, std_msgs.Stamped):

@@ -6,7 +6,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from iveg.ros2.messages import (
+from iveg.ros2.geometry_msgs import (
     Pose,
     PoseStamped,
     PoseWithCovariance,

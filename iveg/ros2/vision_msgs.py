@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from iveg.ros2.messages import Pose, PoseWithCovariance, Vector3
+from iveg.ros2.geometry_msgs import Pose, PoseWithCovariance, Vector3
 from iveg.ros2.schema import Float64, Message
 from iveg.ros2.std_msgs import Stamped
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from iveg.ros2.messages import Point, Pose, Vector3
+from iveg.ros2.geometry_msgs import Point, Pose, Vector3
 from iveg.ros2.schema import Boolean, Float32, Int32, Message
 from iveg.ros2.sensor_msgs import CompressedImage, Octets
 from iveg.ros2.std_msgs import ColorRGBA, Duration, Stamped

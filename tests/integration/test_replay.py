@@ -25,8 +25,7 @@ from iveg.ngsi import codec
 from iveg.robot.node_settings import NodeSettings
 from iveg.robot.replay.replay import ReplaySettings, run_replay
 from iveg.ros2 import detector_messages as d
-from iveg.ros2 import messages as m
-from iveg.ros2 import nav_msgs, std_msgs
+from iveg.ros2 import geometry_msgs, nav_msgs, std_msgs
 from tests import data, processes
 from tests.data.bags import Said, bag_directory, db3_bag, drive, mcap_bag, ros1_bag
 from tests.data.message_bags import Said as MessageSaid
@@ -276,7 +275,9 @@ def yolact_bag(path: Path) -> Path:
     said: list[MessageSaid] = []
     for tick in range(20):
         at = 1000.0 + tick / 10
-        place = m.PoseWithCovariance(m.Pose(m.Point(2.0, 1.0)))
+        place = geometry_msgs.PoseWithCovariance(
+            geometry_msgs.Pose(geometry_msgs.Point(2.0, 1.0))
+        )
         header = std_msgs.Header(std_msgs.Time.of(at), "odom")
         said.append(("/odom", nav_msgs.Odometry(header, "base_link", place), at))
         said.append(("/yolact_coordinate", detected(at), at))

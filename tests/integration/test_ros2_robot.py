@@ -19,9 +19,8 @@ from iveg.domain.observations import DetectionFrame, LaserScan, Origin, SafetyRe
 from iveg.domain.peer_scan import peer_scan_of
 from iveg.ngsi import codec
 from iveg.ngsi.names import direct_topic, measure_topic
-from iveg.ros2 import cdr, names, nav_msgs, std_msgs
+from iveg.ros2 import cdr, geometry_msgs, names, nav_msgs, std_msgs
 from iveg.ros2 import detector_messages as d
-from iveg.ros2 import messages as m
 from tests.brokers import broker_on
 from tests.dds import Dds, free_domain, loopback
 from tests.processes import Program, Site, site
@@ -126,9 +125,9 @@ class Sensors:
         self._odometry = dds.writer(
             "/odom", nav_msgs.Odometry, names.DEFAULT.newest(_BURST)
         )
-        self._tf = dds.writer("/tf", m.TFMessage, names.DEFAULT)
+        self._tf = dds.writer("/tf", geometry_msgs.TFMessage, names.DEFAULT)
         self._boxes = dds.writer("/yolact_coordinate", d.BoundingBoxes3d, names.DEFAULT)
-        self.drive = dds.reader("/cmd_vel", m.Twist, names.DEFAULT)
+        self.drive = dds.reader("/cmd_vel", geometry_msgs.Twist, names.DEFAULT)
         self.burst = 1
 
     async def talk(self) -> None:
@@ -137,10 +136,10 @@ class Sensors:
             stamp = std_msgs.Time.of(clock.wall())
             odom = std_msgs.Header(stamp, "odom")
             links = (
-                m.TransformStamped(std_msgs.Header(stamp, "map"), "odom"),
-                m.TransformStamped(odom, "base_link"),
+                geometry_msgs.TransformStamped(std_msgs.Header(stamp, "map"), "odom"),
+                geometry_msgs.TransformStamped(odom, "base_link"),
             )
-            self._tf.write(cdr.write(m.TFMessage(links)))
+            self._tf.write(cdr.write(geometry_msgs.TFMessage(links)))
             base = std_msgs.Header(stamp, "base_link")
             self._boxes.write(cdr.write(d.BoundingBoxes3d(base, (PERSON,))))
             for _ in range(self.burst):

@@ -23,8 +23,7 @@ from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.network import Network, Writer
 from iveg.robot.ros2.reading import read_twist, write_twist
 from iveg.robot.ros2.sensors import ROS_SENSORS
-from iveg.ros2 import cdr, nav_msgs, sensor_msgs, std_msgs, vision_msgs
-from iveg.ros2 import messages as m
+from iveg.ros2 import cdr, geometry_msgs, nav_msgs, sensor_msgs, std_msgs, vision_msgs
 from iveg.ros2.schema import Message
 
 _log = logging.getLogger(__name__)
@@ -114,15 +113,17 @@ class Ros2Base:
             return network.writer(names[topic], message, config.qualities[topic])
 
         self._commands = network.reader(
-            names["cmd_vel_out"], m.Twist, config.qualities["cmd_vel_out"].newest(50)
+            names["cmd_vel_out"],
+            geometry_msgs.Twist,
+            config.qualities["cmd_vel_out"].newest(50),
         )
         self._goals = network.reader(
-            names["goal"], m.PoseStamped, config.qualities["goal"].newest()
+            names["goal"], geometry_msgs.PoseStamped, config.qualities["goal"].newest()
         )
-        self._wishes = writer("cmd_vel_in", m.Twist)
+        self._wishes = writer("cmd_vel_in", geometry_msgs.Twist)
         self._tf, self._tf_static = (
-            writer("tf", m.TFMessage),
-            writer("tf_static", m.TFMessage),
+            writer("tf", geometry_msgs.TFMessage),
+            writer("tf_static", geometry_msgs.TFMessage),
         )
         self._odometry = writer("odometry", nav_msgs.Odometry)
         self._scans = writer("scan", sensor_msgs.LaserScan)
@@ -171,7 +172,7 @@ class Ros2Base:
         if not waited:
             return
         try:
-            twist = read_twist(cdr.read(m.Twist, waited[-1]))
+            twist = read_twist(cdr.read(geometry_msgs.Twist, waited[-1]))
         except UnreadableError as error:
             _log.warning("%s: unusable command: %s", self.robot_id, error)
             return
@@ -183,7 +184,7 @@ class Ros2Base:
         if not waited:
             return
         try:
-            place = cdr.read(m.PoseStamped, waited[-1]).pose.position
+            place = cdr.read(geometry_msgs.PoseStamped, waited[-1]).pose.position
         except UnreadableError as error:
             _log.warning("%s: unusable goal: %s", self.robot_id, error)
             return
@@ -196,14 +197,14 @@ class Ros2Base:
         odometry = nav_msgs.Odometry(
             std_msgs.Header(stamp, frames.odom),
             frames.base_link,
-            m.PoseWithCovariance(_pose(in_odom)),
-            m.TwistWithCovariance(write_twist(measured.twist)),
+            geometry_msgs.PoseWithCovariance(_pose(in_odom)),
+            geometry_msgs.TwistWithCovariance(write_twist(measured.twist)),
         )
         links = (
             _link(stamp, frames.map, frames.odom, self._odom_in_map),
             _link(stamp, frames.odom, frames.base_link, in_odom),
         )
-        self._tf.write(cdr.write(m.TFMessage(links)))
+        self._tf.write(cdr.write(geometry_msgs.TFMessage(links)))
         self._odometry.write(cdr.write(odometry))
 
     def _scan(self, _: float) -> None:
@@ -231,17 +232,21 @@ class Ros2Base:
     def _tell_slowly(self, _: float) -> None:
         header = std_msgs.Header(std_msgs.Time.of(clock.wall()), self._frames.map)
         path = self._rig.navigation().path
-        poses = tuple(m.PoseStamped(header, _pose(Pose2D(x, y, 0.0))) for x, y in path)
+        poses = tuple(
+            geometry_msgs.PoseStamped(header, _pose(Pose2D(x, y, 0.0))) for x, y in path
+        )
         self._paths.write(cdr.write(nav_msgs.Path(header, poses)))
         for reading in self._sensors.due(clock.mono() - self._run_began):
             if type(reading) in self._readings:
                 sensor, out = self._readings[type(reading)]
                 out.write(cdr.write(sensor.write(header, reading)))
 
-    def _mounts(self) -> m.TFMessage:
+    def _mounts(self) -> geometry_msgs.TFMessage:
         stamp = std_msgs.Time.of(clock.wall())
         laser = self._rig.profile.laser
-        return m.TFMessage((_link(stamp, self._frames.base_link, _LASER, laser),))
+        return geometry_msgs.TFMessage(
+            (_link(stamp, self._frames.base_link, _LASER, laser),)
+        )
 
 
 def _relative(outer: Pose2D, pose: Pose2D) -> Pose2D:
@@ -249,29 +254,39 @@ def _relative(outer: Pose2D, pose: Pose2D) -> Pose2D:
     return Pose2D(*into(outer, pose.x, pose.y), pose.yaw - outer.yaw)
 
 
-def _turned(yaw: float) -> m.Quaternion:
-    return m.Quaternion(z=math.sin(yaw / 2), w=math.cos(yaw / 2))
+def _turned(yaw: float) -> geometry_msgs.Quaternion:
+    return geometry_msgs.Quaternion(z=math.sin(yaw / 2), w=math.cos(yaw / 2))
 
 
-def _pose(pose: Pose2D) -> m.Pose:
-    return m.Pose(m.Point(pose.x, pose.y), _turned(pose.yaw))
+def _pose(pose: Pose2D) -> geometry_msgs.Pose:
+    return geometry_msgs.Pose(geometry_msgs.Point(pose.x, pose.y), _turned(pose.yaw))
 
 
 def _link(
     stamp: std_msgs.Time, outer: str, inner: str, pose: Pose2D
-) -> m.TransformStamped:
-    transform = m.Transform(m.Vector3(pose.x, pose.y), _turned(pose.yaw))
-    return m.TransformStamped(std_msgs.Header(stamp, outer), inner, transform)
+) -> geometry_msgs.TransformStamped:
+    transform = geometry_msgs.Transform(
+        geometry_msgs.Vector3(pose.x, pose.y), _turned(pose.yaw)
+    )
+    return geometry_msgs.TransformStamped(
+        std_msgs.Header(stamp, outer), inner, transform
+    )
 
 
 def _detection(one: Detection, header: std_msgs.Header) -> vision_msgs.Detection3D:
     box, (x, y, z) = one.box, one.box.centre
-    size = m.Vector3(box.xmax - box.xmin, box.ymax - box.ymin, box.zmax - box.zmin)
+    size = geometry_msgs.Vector3(
+        box.xmax - box.xmin, box.ymax - box.ymin, box.zmax - box.zmin
+    )
     sure = vision_msgs.ObjectHypothesis(one.class_id, one.probability)
-    centre = m.Pose(m.Point(x, y, z))
+    centre = geometry_msgs.Pose(geometry_msgs.Point(x, y, z))
     return vision_msgs.Detection3D(
         header,
-        (vision_msgs.ObjectHypothesisWithPose(sure, m.PoseWithCovariance(centre)),),
+        (
+            vision_msgs.ObjectHypothesisWithPose(
+                sure, geometry_msgs.PoseWithCovariance(centre)
+            ),
+        ),
         vision_msgs.BoundingBox3D(centre, size),
         one.det_id or "",
     )

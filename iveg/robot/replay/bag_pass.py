@@ -29,8 +29,7 @@ from iveg.robot.ros2.places import Places
 from iveg.robot.ros2.reading import read_pose, read_scan, read_twist
 from iveg.robot.ros2.rigid import IDENTITY, RigidTransform
 from iveg.ros2 import detector_messages as d
-from iveg.ros2 import messages as m
-from iveg.ros2 import nav_msgs, sensor_msgs, std_msgs
+from iveg.ros2 import geometry_msgs, nav_msgs, sensor_msgs, std_msgs
 from iveg.ros2.schema import Message
 
 _MAX_AGE_S = 1.0
@@ -147,8 +146,8 @@ class BagTree:
 
     def __init__(
         self,
-        static: Sequence[m.TFMessage],
-        moving: Sequence[m.TFMessage],
+        static: Sequence[geometry_msgs.TFMessage],
+        moving: Sequence[geometry_msgs.TFMessage],
         odometry: nav_msgs.Odometry | None,
     ) -> None:
         self._parents = {
@@ -170,7 +169,9 @@ class BagTree:
         self.links = [*static]
         if usual.map not in self._up(odom):
             header = std_msgs.Header(frame_id=usual.map)
-            self.links.append(m.TFMessage((m.TransformStamped(header, root),)))
+            self.links.append(
+                geometry_msgs.TFMessage((geometry_msgs.TransformStamped(header, root),))
+            )
 
     def has_mount(self, frame: str) -> bool:
         """Whether the bag tells where a frame is on the robot."""
@@ -199,12 +200,14 @@ class _Notes(InputFaults):
         self.reasons[f"{code}, {about}"] = None
 
 
-def _link(odometry: nav_msgs.Odometry, pose: RigidTransform) -> m.TFMessage:
+def _link(odometry: nav_msgs.Odometry, pose: RigidTransform) -> geometry_msgs.TFMessage:
     """Odometry as a transform."""
-    transform = m.Transform(m.Vector3(*pose.move), m.Quaternion(*pose.q))
+    transform = geometry_msgs.Transform(
+        geometry_msgs.Vector3(*pose.move), geometry_msgs.Quaternion(*pose.q)
+    )
     child = odometry.child_frame_id or Frames().base_link
-    one = m.TransformStamped(odometry.header, child, transform)
-    return m.TFMessage((one,))
+    one = geometry_msgs.TransformStamped(odometry.header, child, transform)
+    return geometry_msgs.TFMessage((one,))
 
 
 def _is_3d(message: Message) -> bool:

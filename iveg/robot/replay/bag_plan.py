@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 from iveg.robot.replay.bag_files import BagFile, BagTopic
 from iveg.robot.ros2.detectors import BOXES, LOOKS
-from iveg.ros2 import messages as m
-from iveg.ros2 import nav_msgs, sensor_msgs
+from iveg.ros2 import geometry_msgs, nav_msgs, sensor_msgs
 from iveg.ros2.schema import Message
 from iveg.ros2.type_hash import type_hash
 
@@ -20,7 +19,7 @@ _PREFERRED: tuple[tuple[type[Message], ...], ...] = (
 _FORMS: tuple[type[Message], ...] = (
     nav_msgs.Odometry,
     sensor_msgs.LaserScan,
-    m.TFMessage,
+    geometry_msgs.TFMessage,
     sensor_msgs.Image,
     sensor_msgs.CameraInfo,
     *DETECTORS,
@@ -79,7 +78,7 @@ class BagPlan:
         self._whys: dict[BagTopic, str] = {}
         self._choose("odometry", (nav_msgs.Odometry,), options.odometry, "--odom-topic")
         self._choose("scan", (sensor_msgs.LaserScan,), options.scan, "--scan-topic")
-        for one in self._of(m.TFMessage):
+        for one in self._of(geometry_msgs.TFMessage):
             self._use(one, "tf_static" if one.name.endswith("tf_static") else "tf")
         if not file.is_ros1:
             self._choose_detector(options)

@@ -16,8 +16,7 @@ from iveg.domain.geometry import Pose2D
 from iveg.robot.costmap import FleetCostmap
 from iveg.robot.neighbours import Neighbours
 from iveg.robot.ros2.network import Writer
-from iveg.ros2 import cdr, nav_msgs, std_msgs
-from iveg.ros2 import messages as m
+from iveg.ros2 import cdr, geometry_msgs, nav_msgs, std_msgs
 
 _log = logging.getLogger(__name__)
 EVERY_S = 0.5
@@ -95,7 +94,7 @@ def occupancy_grid(
 ) -> nav_msgs.OccupancyGrid:
     """The message of a costmap."""
     grid = costmap.grid
-    corner = m.Pose(m.Point(grid.xmin, grid.ymin))
+    corner = geometry_msgs.Pose(geometry_msgs.Point(grid.xmin, grid.ymin))
     info = nav_msgs.MapMetaData(stamp, grid.resolution, grid.width, grid.height, corner)
     return nav_msgs.OccupancyGrid(
         std_msgs.Header(stamp, frame), info, costmap.data.reshape(-1)

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from iveg.ros2 import detector_messages as d
-from iveg.ros2 import messages as m
-from iveg.ros2 import std_msgs, vision_msgs
+from iveg.ros2 import geometry_msgs, std_msgs, vision_msgs
 from iveg.ros2.schema import Message
 
 _SIGN, _WRAP = 1 << 15, 1 << 16
@@ -80,7 +79,11 @@ def _yolo_3d(found: d.DetectionArray) -> vision_msgs.Detection3DArray:
 def _yolo_box_3d(one: d.Detection) -> vision_msgs.Detection3D:
     box = one.bbox3d
     # Without a frame no node has added depth, and zeros are no place.
-    centre = box.center if box.frame_id else m.Pose(m.Point(math.nan))
+    centre = (
+        box.center
+        if box.frame_id
+        else geometry_msgs.Pose(geometry_msgs.Point(math.nan))
+    )
     header = std_msgs.Header(frame_id=box.frame_id)
     found = vision_msgs.BoundingBox3D(centre, box.size)
     return vision_msgs.Detection3D(header, _yolo_class(one), found, one.id)
@@ -97,13 +100,15 @@ def _yolact(found: d.BoundingBoxes3d) -> vision_msgs.Detection3DArray:
 
 
 def _yolact_box(one: d.BoundingBox3d) -> vision_msgs.Detection3D:
-    centre = m.Point(
+    centre = geometry_msgs.Point(
         (one.xmin + one.xmax) / 2,
         (one.ymin + one.ymax) / 2,
         (one.zmin + one.zmax) / 2,
     )
-    size = m.Vector3(one.xmax - one.xmin, one.ymax - one.ymin, one.zmax - one.zmin)
-    box = vision_msgs.BoundingBox3D(m.Pose(centre), size)
+    size = geometry_msgs.Vector3(
+        one.xmax - one.xmin, one.ymax - one.ymin, one.zmax - one.zmin
+    )
+    box = vision_msgs.BoundingBox3D(geometry_msgs.Pose(centre), size)
     return vision_msgs.Detection3D(
         std_msgs.Header(), _sure(one.object_name, one.probability), box
     )

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from iveg.domain.geometry import Pose2D
 from iveg.robot.neighbours import PEER_M, Neighbour
-from iveg.ros2 import messages as m
-from iveg.ros2 import sensor_msgs, std_msgs, visualization_msgs
+from iveg.ros2 import geometry_msgs, sensor_msgs, std_msgs, visualization_msgs
 
 REACH_M = 8.0
 """Greatest distance of a disc (m); the clearing circle is a metre beyond."""
@@ -80,7 +79,7 @@ def markers(
     """Body, radius and name of each, with a lifetime of a second."""
     found: list[visualization_msgs.Marker] = []
     for number, one in enumerate(neighbours):
-        place = m.Point(one.x, one.y, 0.9)
+        place = geometry_msgs.Point(one.x, one.y, 0.9)
         red = std_msgs.ColorRGBA(0.9, 0.2, 0.1, 0.9)
         body = red if one.kind == "person" else std_msgs.ColorRGBA(0.1, 0.4, 0.9, 0.9)
         ring = std_msgs.ColorRGBA(body.r, body.g, body.b, 0.15)
@@ -93,8 +92,8 @@ def markers(
                 f"{one.kind} name",
                 number,
                 _TEXT,
-                pose=m.Pose(m.Point(one.x, one.y, 2.1)),
-                scale=m.Vector3(0.0, 0.0, 0.4),
+                pose=geometry_msgs.Pose(geometry_msgs.Point(one.x, one.y, 2.1)),
+                scale=geometry_msgs.Vector3(0.0, 0.0, 0.4),
                 color=std_msgs.ColorRGBA(1.0, 1.0, 1.0, 1.0),
                 lifetime=std_msgs.Duration(_MARKER_LIVES_S),
                 text=one.name,
@@ -107,7 +106,7 @@ def _marker(
     header: std_msgs.Header,
     ns: str,
     number: int,
-    place: m.Point,
+    place: geometry_msgs.Point,
     width: float,
     color: std_msgs.ColorRGBA,
 ) -> visualization_msgs.Marker:
@@ -117,8 +116,10 @@ def _marker(
         ns,
         number,
         _CYLINDER,
-        pose=m.Pose(m.Point(place.x, place.y, 0.01) if flat else place),
-        scale=m.Vector3(width, width, 0.02 if flat else 1.8),
+        pose=geometry_msgs.Pose(
+            geometry_msgs.Point(place.x, place.y, 0.01) if flat else place
+        ),
+        scale=geometry_msgs.Vector3(width, width, 0.02 if flat else 1.8),
         color=color,
         lifetime=std_msgs.Duration(_MARKER_LIVES_S),
     )

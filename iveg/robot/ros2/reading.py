@@ -20,8 +20,7 @@ from iveg.domain.observations import (
 )
 from iveg.ngsi.payloads import FORBIDDEN, MAX_BEAMS, MAX_PATH, clean_text
 from iveg.robot.ros2.rigid import RigidTransform, rigid_of
-from iveg.ros2 import messages as m
-from iveg.ros2 import nav_msgs, sensor_msgs, vision_msgs
+from iveg.ros2 import geometry_msgs, nav_msgs, sensor_msgs, vision_msgs
 
 FASTEST_M_S = 20.0
 """Speed above which a value is refused: no vehicle in crop rows is so fast (m/s)."""
@@ -50,7 +49,7 @@ def read_pose(odometry: nav_msgs.Odometry) -> RigidTransform:
     return rigid
 
 
-def read_twist(twist: m.Twist) -> Twist2D:
+def read_twist(twist: geometry_msgs.Twist) -> Twist2D:
     """Forward speed and yaw rate; the other components do not apply to wheels.
 
     Raises:
@@ -64,9 +63,11 @@ def read_twist(twist: m.Twist) -> Twist2D:
     return Twist2D(forward, turn)
 
 
-def write_twist(twist: Twist2D) -> m.Twist:
+def write_twist(twist: Twist2D) -> geometry_msgs.Twist:
     """Inverse of ``read_twist``."""
-    return m.Twist(m.Vector3(twist.linear_x), m.Vector3(z=twist.angular_z))
+    return geometry_msgs.Twist(
+        geometry_msgs.Vector3(twist.linear_x), geometry_msgs.Vector3(z=twist.angular_z)
+    )
 
 
 def read_scan(scan: sensor_msgs.LaserScan, laser: RigidTransform) -> LaserScan:

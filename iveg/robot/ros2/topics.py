@@ -6,8 +6,13 @@ from typing import Literal
 
 from iveg.robot.ros2.detectors import BOXES, LOOKS
 from iveg.robot.ros2.sensors import ROS_SENSORS
-from iveg.ros2 import messages as m
-from iveg.ros2 import nav_msgs, sensor_msgs, vision_msgs, visualization_msgs
+from iveg.ros2 import (
+    geometry_msgs,
+    nav_msgs,
+    sensor_msgs,
+    vision_msgs,
+    visualization_msgs,
+)
 from iveg.ros2.names import DEFAULT, LATCHED, SENSOR_DATA, TF, TF_STATIC, Qos
 from iveg.ros2.schema import Message
 
@@ -64,12 +69,14 @@ TOPICS: Mapping[str, RosTopic] = {
     "path": RosTopic("plan", nav_msgs.Path),
     # After a pause each datum finds the transform that was published before it, though
     # both arrive while the topics are being read.
-    "tf_static": RosTopic("tf_static", m.TFMessage, "transforms", TF_STATIC),
-    "tf": RosTopic("tf", m.TFMessage, "transforms", TF),
-    "cmd_vel_in": RosTopic("cmd_vel_nav", m.Twist, "drive"),
-    "cmd_vel_out": RosTopic("cmd_vel", m.Twist, "drive", DEFAULT),
+    "tf_static": RosTopic(
+        "tf_static", geometry_msgs.TFMessage, "transforms", TF_STATIC
+    ),
+    "tf": RosTopic("tf", geometry_msgs.TFMessage, "transforms", TF),
+    "cmd_vel_in": RosTopic("cmd_vel_nav", geometry_msgs.Twist, "drive"),
+    "cmd_vel_out": RosTopic("cmd_vel", geometry_msgs.Twist, "drive", DEFAULT),
     # Goals of iVeg, as Nav2 takes them.
-    "goal": RosTopic("goal_pose", m.PoseStamped, "output", DEFAULT),
+    "goal": RosTopic("goal_pose", geometry_msgs.PoseStamped, "output", DEFAULT),
     # People and peers, for Nav2's obstacle layer and for RViz.
     "obstacles": RosTopic("iveg/obstacles", sensor_msgs.PointCloud2, "output", DEFAULT),
     "markers": RosTopic(

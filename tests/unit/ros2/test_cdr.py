@@ -10,21 +10,21 @@ from hypothesis import strategies as st
 from iveg.domain.errors import UnreadableError
 from iveg.ros2 import (
     cdr,
+    geometry_msgs,
     nav_msgs,
     sensor_msgs,
     std_msgs,
     vision_msgs,
     visualization_msgs,
 )
-from iveg.ros2 import messages as m
 from tests.unit.ros2.reference import STORE, as_rosbags
 from tests.unit.ros2.spelled import HALF, MAP, ONE, POSE, STAMP, TWO, ZERO, payload
 
 AT_7_S = std_msgs.Time(7, 5)
 IN_MAP = std_msgs.Header(AT_7_S, "map")
 IN_ODOM = std_msgs.Header(AT_7_S, "odom")
-HERE = m.Pose(m.Point(1.0, 2.0))
-DRIVES = m.Twist(m.Vector3(0.5), m.Vector3(z=1.0))
+HERE = geometry_msgs.Pose(geometry_msgs.Point(1.0, 2.0))
+DRIVES = geometry_msgs.Twist(geometry_msgs.Vector3(0.5), geometry_msgs.Vector3(z=1.0))
 TWIST = f"{HALF} {ZERO} {ZERO} {ZERO} {ZERO} {ONE}"
 SURE = f"36*{ZERO}"
 
@@ -39,32 +39,39 @@ def _b(*numbers: int) -> Any:
 
 def _seen(class_id: str) -> tuple[vision_msgs.ObjectHypothesisWithPose, ...]:
     sure = vision_msgs.ObjectHypothesis(class_id, 0.5)
-    return (vision_msgs.ObjectHypothesisWithPose(sure, m.PoseWithCovariance(HERE)),)
+    return (
+        vision_msgs.ObjectHypothesisWithPose(
+            sure, geometry_msgs.PoseWithCovariance(HERE)
+        ),
+    )
 
 
 CASES: dict[str, tuple[Any, str]] = {
     "Twist": (DRIVES, TWIST),
     "TwistStamped, 16 bytes before it": (
-        m.TwistStamped(IN_MAP, DRIVES),
+        geometry_msgs.TwistStamped(IN_MAP, DRIVES),
         f"{STAMP} {MAP} {TWIST}",
     ),
     "TwistStamped, 17 bytes before it": (
-        m.TwistStamped(IN_ODOM, DRIVES),
+        geometry_msgs.TwistStamped(IN_ODOM, DRIVES),
         f"{STAMP} 05000000 'odom' 7*-- {TWIST}",
     ),
     "Odometry, pose after 34 bytes": (
         nav_msgs.Odometry(
             IN_ODOM,
             "base_link",
-            m.PoseWithCovariance(HERE),
-            m.TwistWithCovariance(DRIVES),
+            geometry_msgs.PoseWithCovariance(HERE),
+            geometry_msgs.TwistWithCovariance(DRIVES),
         ),
         f"{STAMP} 05000000 'odom' 3*-- 0a000000 'base_link' 6*-- "
         f"{POSE} {SURE} {TWIST} {SURE}",
     ),
     "Odometry, pose after 22 bytes": (
         nav_msgs.Odometry(
-            IN_MAP, "b", m.PoseWithCovariance(HERE), m.TwistWithCovariance(DRIVES)
+            IN_MAP,
+            "b",
+            geometry_msgs.PoseWithCovariance(HERE),
+            geometry_msgs.TwistWithCovariance(DRIVES),
         ),
         f"{STAMP} {MAP} 02000000 'b' 2*-- {POSE} {SURE} {TWIST} {SURE}",
     ),
@@ -83,11 +90,17 @@ CASES: dict[str, tuple[Any, str]] = {
         f"{STAMP} {MAP} 7*00000000 00000000 00000000",
     ),
     "TFMessage": (
-        m.TFMessage(
+        geometry_msgs.TFMessage(
             (
-                m.TransformStamped(IN_MAP, "odom", m.Transform(m.Vector3(1.0, 2.0))),
-                m.TransformStamped(
-                    IN_ODOM, "base_link", m.Transform(m.Vector3(1.0, 2.0))
+                geometry_msgs.TransformStamped(
+                    IN_MAP,
+                    "odom",
+                    geometry_msgs.Transform(geometry_msgs.Vector3(1.0, 2.0)),
+                ),
+                geometry_msgs.TransformStamped(
+                    IN_ODOM,
+                    "base_link",
+                    geometry_msgs.Transform(geometry_msgs.Vector3(1.0, 2.0)),
                 ),
             )
         ),
@@ -96,7 +109,11 @@ CASES: dict[str, tuple[Any, str]] = {
     ),
     "Path": (
         nav_msgs.Path(
-            IN_MAP, (m.PoseStamped(IN_MAP, HERE), m.PoseStamped(IN_ODOM, HERE))
+            IN_MAP,
+            (
+                geometry_msgs.PoseStamped(IN_MAP, HERE),
+                geometry_msgs.PoseStamped(IN_ODOM, HERE),
+            ),
         ),
         f"{STAMP} {MAP} 02000000 {STAMP} {MAP} 4*-- {POSE} "
         f"{STAMP} 05000000 'odom' 7*-- {POSE}",
@@ -122,7 +139,9 @@ CASES: dict[str, tuple[Any, str]] = {
                 vision_msgs.Detection3D(
                     IN_MAP,
                     _seen("farmer"),
-                    vision_msgs.BoundingBox3D(HERE, m.Vector3(0.5, 0.5, 2.0)),
+                    vision_msgs.BoundingBox3D(
+                        HERE, geometry_msgs.Vector3(0.5, 0.5, 2.0)
+                    ),
                     "7",
                 ),
             ),
@@ -223,7 +242,7 @@ CASES: dict[str, tuple[Any, str]] = {
                     "p",
                     *(7, 3, 0),
                     HERE,
-                    m.Vector3(2.0, 2.0, 0.5),
+                    geometry_msgs.Vector3(2.0, 2.0, 0.5),
                     std_msgs.ColorRGBA(1.0, 0.5, 0.0, 0.5),
                     std_msgs.Duration(1, 0),
                 ),
@@ -244,10 +263,10 @@ CASES: dict[str, tuple[Any, str]] = {
                     "people",
                     *(7, 3, 0),
                     HERE,
-                    m.Vector3(2.0, 2.0, 0.5),
+                    geometry_msgs.Vector3(2.0, 2.0, 0.5),
                     std_msgs.ColorRGBA(1.0, 0.5, 0.0, 0.5),
                     std_msgs.Duration(1, 0),
-                    points=(m.Point(1.0),),
+                    points=(geometry_msgs.Point(1.0),),
                     text="hi",
                 ),
             )
@@ -324,13 +343,13 @@ def test_a_count_that_no_message_can_hold_takes_no_memory() -> None:
     bytes_ = payload("ffffff7f", "<") + bytes(64)
 
     with pytest.raises(UnreadableError, match="too_short"):
-        cdr.read(m.TFMessage, bytes_)
+        cdr.read(geometry_msgs.TFMessage, bytes_)
 
 
 @pytest.mark.parametrize("head", ["00060000", "00020000", "01010000", ""])
 def test_another_encapsulation_is_named(head: str) -> None:
     with pytest.raises(UnreadableError, match="bad_encapsulation"):
-        cdr.read(m.Twist, bytes.fromhex(head) + bytes(48 if head else 0))
+        cdr.read(geometry_msgs.Twist, bytes.fromhex(head) + bytes(48 if head else 0))
 
 
 def test_a_stamp_keeps_its_nanoseconds() -> None:

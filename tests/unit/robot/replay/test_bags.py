@@ -17,8 +17,7 @@ from iveg.domain.observations import DetectionFrame, LaserScan, Odometry
 from iveg.robot.replay.bags import AS_RECORDED, BagOptions
 from iveg.robot.replay.recordings import open_recording
 from iveg.ros2 import detector_messages as d
-from iveg.ros2 import messages as m
-from iveg.ros2 import nav_msgs, std_msgs
+from iveg.ros2 import geometry_msgs, nav_msgs, std_msgs
 from iveg.ros2.schema import Message
 from tests.data.message_bags import Said, message_bag, ros1_message_bag
 from tests.unit.robot.ros2 import said
@@ -42,19 +41,19 @@ from tests.unit.robot.ros2.test_pictures import depth, info
 
 FLEET = Pose2D(0.5, 0.0, 0.0)
 """Where the fleet file says that the laser sits."""
-PERSON = m.Point(0.0, 0.1, 3.0), m.Vector3(0.6, 1.8, 0.4)
+PERSON = geometry_msgs.Point(0.0, 0.1, 3.0), geometry_msgs.Vector3(0.6, 1.8, 0.4)
 """In the camera's optical frame."""
 
 
 def frames() -> list[Said]:
     """A robot at (10, 0) in map that looks east; its camera 1 m above the floor."""
-    turned = m.Quaternion(-0.5, 0.5, -0.5, 0.5)
-    camera = m.Transform(m.Vector3(-2.0, 0.0, 1.0), turned)
+    turned = geometry_msgs.Quaternion(-0.5, 0.5, -0.5, 0.5)
+    camera = geometry_msgs.Transform(geometry_msgs.Vector3(-2.0, 0.0, 1.0), turned)
     base = std_msgs.Header(frame_id="base_link")
-    at_camera = m.TransformStamped(base, OPTICAL.frame_id, camera)
+    at_camera = geometry_msgs.TransformStamped(base, OPTICAL.frame_id, camera)
     backwards = link("base_link", "laser", -0.3, yaw=math.pi)
     return [
-        ("/tf_static", m.TFMessage((at_camera, backwards)), WALL),
+        ("/tf_static", geometry_msgs.TFMessage((at_camera, backwards)), WALL),
         ("/tf", tf(link("map", "odom", 10.0)), WALL),
         ("/tf", tf(link("odom", "base_link", 2.0)), WALL),
     ]

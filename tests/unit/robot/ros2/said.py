@@ -8,8 +8,7 @@ import numpy as np
 from iveg.domain.observations import Instant, Observation
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.inputs import SensorInputs
-from iveg.ros2 import cdr, nav_msgs, sensor_msgs, std_msgs, vision_msgs
-from iveg.ros2 import messages as m
+from iveg.ros2 import cdr, geometry_msgs, nav_msgs, sensor_msgs, std_msgs, vision_msgs
 from iveg.ros2.schema import Message
 
 WALL = 1_700_000_000.0
@@ -24,8 +23,8 @@ def stamp(seconds: float = 0.0) -> std_msgs.Time:
     return std_msgs.Time.of(WALL + seconds)
 
 
-def turned(yaw: float) -> m.Quaternion:
-    return m.Quaternion(z=math.sin(yaw / 2), w=math.cos(yaw / 2))
+def turned(yaw: float) -> geometry_msgs.Quaternion:
+    return geometry_msgs.Quaternion(z=math.sin(yaw / 2), w=math.cos(yaw / 2))
 
 
 def link(
@@ -37,13 +36,15 @@ def link(
     *,
     after: float = 0.0,
     z: float = 0.0,
-) -> m.TransformStamped:
-    transform = m.Transform(m.Vector3(x, y, z), turned(yaw))
-    return m.TransformStamped(std_msgs.Header(stamp(after), outer), inner, transform)
+) -> geometry_msgs.TransformStamped:
+    transform = geometry_msgs.Transform(geometry_msgs.Vector3(x, y, z), turned(yaw))
+    return geometry_msgs.TransformStamped(
+        std_msgs.Header(stamp(after), outer), inner, transform
+    )
 
 
-def tf(*links: m.TransformStamped) -> m.TFMessage:
-    return m.TFMessage(links)
+def tf(*links: geometry_msgs.TransformStamped) -> geometry_msgs.TFMessage:
+    return geometry_msgs.TFMessage(links)
 
 
 def odometry(
@@ -57,8 +58,10 @@ def odometry(
     return nav_msgs.Odometry(
         std_msgs.Header(stamp(after), "odom"),
         child,
-        m.PoseWithCovariance(m.Pose(m.Point(x))),
-        m.TwistWithCovariance(m.Twist(m.Vector3(v), m.Vector3(z=w))),
+        geometry_msgs.PoseWithCovariance(geometry_msgs.Pose(geometry_msgs.Point(x))),
+        geometry_msgs.TwistWithCovariance(
+            geometry_msgs.Twist(geometry_msgs.Vector3(v), geometry_msgs.Vector3(z=w))
+        ),
     )
 
 
@@ -87,7 +90,8 @@ def seen(
         vision_msgs.ObjectHypothesis(class_id, score)
     )
     box = vision_msgs.BoundingBox3D(
-        m.Pose(m.Point(x, 0.0, 0.9)), m.Vector3(0.4, 0.6, 1.8)
+        geometry_msgs.Pose(geometry_msgs.Point(x, 0.0, 0.9)),
+        geometry_msgs.Vector3(0.4, 0.6, 1.8),
     )
     return vision_msgs.Detection3D(
         std_msgs.Header(stamp(after), frame), (sure,), box, "7"

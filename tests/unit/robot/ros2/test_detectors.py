@@ -9,9 +9,8 @@ import pytest
 
 from iveg.domain.observations import DetectionFrame
 from iveg.robot.ros2.config import RobotConfig
-from iveg.ros2 import cdr, std_msgs, vision_msgs
+from iveg.ros2 import cdr, geometry_msgs, std_msgs, vision_msgs
 from iveg.ros2 import detector_messages as d
-from iveg.ros2 import messages as m
 from iveg.ros2.schema import Message
 from tests.unit.robot.ros2 import said
 from tests.unit.robot.ros2.said import MONO, Bench, tf
@@ -28,10 +27,10 @@ CLOSE_M = 0.1
 
 def bench(classes: tuple[str, ...] = ()) -> Bench:
     found = Bench(RobotConfig(topics=TOPICS), tree=False, classes=classes)
-    optical = m.Quaternion(-0.5, 0.5, -0.5, 0.5)
-    place = m.Transform(m.Vector3(10.0, 0.0, 1.0), optical)
+    optical = geometry_msgs.Quaternion(-0.5, 0.5, -0.5, 0.5)
+    place = geometry_msgs.Transform(geometry_msgs.Vector3(10.0, 0.0, 1.0), optical)
     links = (
-        m.TransformStamped(
+        geometry_msgs.TransformStamped(
             std_msgs.Header(said.stamp(), "map"), "camera_optical", place
         ),
         said.link("map", "base_link", 11.0, 1.0, math.pi / 2),
@@ -58,40 +57,58 @@ def sure(name: str = "farmer") -> tuple[vision_msgs.ObjectHypothesisWithPose, ..
 # --- with depth ---------------------------------------------------------------------
 
 
-def vision_3d(header: std_msgs.Header, centre: m.Point, size: m.Vector3) -> Message:
-    box = vision_msgs.BoundingBox3D(m.Pose(centre), size)
+def vision_3d(
+    header: std_msgs.Header, centre: geometry_msgs.Point, size: geometry_msgs.Vector3
+) -> Message:
+    box = vision_msgs.BoundingBox3D(geometry_msgs.Pose(centre), size)
     return vision_msgs.Detection3DArray(
         header, (vision_msgs.Detection3D(UNSEEN, sure(), box),)
     )
 
 
-def yolact(header: std_msgs.Header, centre: m.Point, size: m.Vector3) -> Message:
+def yolact(
+    header: std_msgs.Header, centre: geometry_msgs.Point, size: geometry_msgs.Vector3
+) -> Message:
     x, y, z = centre.x, centre.y, centre.z
     u, v, w = size.x / 2, size.y / 2, size.z / 2
     box = d.BoundingBox3d("farmer", 0.9, x - u, y - v, x + u, y + v, z - w, z + w)
     return d.BoundingBoxes3d(header, (box,))
 
 
-def yolo_3d(header: std_msgs.Header, centre: m.Point, size: m.Vector3) -> Message:
-    box = d.BoundingBox3D(m.Pose(centre), size, header.frame_id)
+def yolo_3d(
+    header: std_msgs.Header, centre: geometry_msgs.Point, size: geometry_msgs.Vector3
+) -> Message:
+    box = d.BoundingBox3D(geometry_msgs.Pose(centre), size, header.frame_id)
     one = d.Detection(0, "farmer", 0.9, "4", bbox3d=box)
     return d.DetectionArray(std_msgs.Header(header.stamp, "elsewhere"), (one,))
 
 
-Made = Callable[[std_msgs.Header, m.Point, m.Vector3], Message]
+Made = Callable[[std_msgs.Header, geometry_msgs.Point, geometry_msgs.Vector3], Message]
 
 
 @pytest.mark.parametrize("made", [vision_3d, yolact, yolo_3d])
 @pytest.mark.parametrize(
     ("frame", "centre", "size"),
     [
-        ("camera_optical", m.Point(0.0, 0.1, 3.0), m.Vector3(0.6, 1.8, 0.4)),
-        ("base_link", m.Point(-1.0, -2.0, 0.9), m.Vector3(0.6, 0.4, 1.8)),
-        ("/map", m.Point(13.0, 0.0, 0.9), m.Vector3(0.4, 0.6, 1.8)),
+        (
+            "camera_optical",
+            geometry_msgs.Point(0.0, 0.1, 3.0),
+            geometry_msgs.Vector3(0.6, 1.8, 0.4),
+        ),
+        (
+            "base_link",
+            geometry_msgs.Point(-1.0, -2.0, 0.9),
+            geometry_msgs.Vector3(0.6, 0.4, 1.8),
+        ),
+        (
+            "/map",
+            geometry_msgs.Point(13.0, 0.0, 0.9),
+            geometry_msgs.Vector3(0.4, 0.6, 1.8),
+        ),
     ],
 )
 def test_a_box_with_depth_lies_where_the_person_is(
-    made: Made, frame: str, centre: m.Point, size: m.Vector3
+    made: Made, frame: str, centre: geometry_msgs.Point, size: geometry_msgs.Vector3
 ) -> None:
     header = std_msgs.Header(said.stamp(), frame)
 
@@ -108,7 +125,11 @@ def test_a_frame_that_nobody_knows_places_nothing_and_is_named(made: Made) -> No
     one = bench()
     header = std_msgs.Header(said.stamp(), "left_eye")
 
-    found = told(one, "detections_3d", made(header, m.Point(1.0), m.Vector3(1, 1, 1)))
+    found = told(
+        one,
+        "detections_3d",
+        made(header, geometry_msgs.Point(1.0), geometry_msgs.Vector3(1, 1, 1)),
+    )
 
     assert (found.detections, found.unread) == ((), ("farmer",))
     assert one.faults() == {"no_transform": "map → left_eye"}
@@ -228,7 +249,8 @@ def test_a_picture_with_nobody_in_it_is_an_empty_frame(
         ("detections_2d", d.BoundingBoxes(OPTICAL, UNSEEN, (
             replace(yolox_box(MIDDLE, TALL), class_id="1"),))),
         ("detections_3d", d.DetectionArray(OPTICAL, (d.Detection(1, "", 0.9, "", bbox3d=
-            d.BoundingBox3D(m.Pose(m.Point(z=3.0)), frame_id="camera_optical")),))),
+            d.BoundingBox3D(geometry_msgs.Pose(geometry_msgs.Point(z=3.0)),
+                            frame_id="camera_optical")),))),
     ],
 )  # fmt: skip
 def test_a_class_that_is_a_number_gets_its_name(topic: str, message: Any) -> None:
@@ -255,8 +277,10 @@ def test_a_score_that_is_none_is_lost(score: float) -> None:
     "message",
     [
         yolox(MIDDLE, TALL),
-        yolact(OPTICAL, m.Point(1.0), m.Vector3(1.0, 2.0, 3.0)),
-        yolo_3d(OPTICAL, m.Point(1.0), m.Vector3(1.0, 2.0, 3.0)),
+        yolact(OPTICAL, geometry_msgs.Point(1.0), geometry_msgs.Vector3(1.0, 2.0, 3.0)),
+        yolo_3d(
+            OPTICAL, geometry_msgs.Point(1.0), geometry_msgs.Vector3(1.0, 2.0, 3.0)
+        ),
         d.DetectionArray(
             OPTICAL,
             (

@@ -18,8 +18,7 @@ from iveg.domain.observations import (
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.input_faults import speed_of
 from iveg.robot.ros2.topics import sensed_topics
-from iveg.ros2 import cdr, nav_msgs, sensor_msgs, std_msgs, vision_msgs
-from iveg.ros2 import messages as m
+from iveg.ros2 import cdr, geometry_msgs, nav_msgs, sensor_msgs, std_msgs, vision_msgs
 from tests.unit.robot.ros2 import said
 from tests.unit.robot.ros2.said import Bench, link, look, seen, tf
 
@@ -86,7 +85,7 @@ def test_the_first_data_wait_for_the_transforms_that_follow_them() -> None:
     ],
 )
 def test_the_first_data_wait_for_the_whole_chain_not_for_its_first_link(
-    links: list[m.TFMessage],
+    links: list[geometry_msgs.TFMessage],
 ) -> None:
     """Localisation publishes map → odom later than the base publishes its own."""
     bench = Bench(tree=False, heard_for=0.0).hear("odometry", said.odometry(2.0))
@@ -286,9 +285,11 @@ def test_a_scan_is_placed_by_where_the_laser_was_when_it_swept() -> None:
 
 def test_a_laser_upside_down_turns_the_other_way() -> None:
     bench = Bench()
-    rolled = m.Transform(m.Vector3(0.3), m.Quaternion(1.0, 0.0, 0.0, 0.0))
+    rolled = geometry_msgs.Transform(
+        geometry_msgs.Vector3(0.3), geometry_msgs.Quaternion(1.0, 0.0, 0.0, 0.0)
+    )
     header = std_msgs.Header(said.stamp(), "base_link")
-    bench.hear("tf_static", tf(m.TransformStamped(header, "laser", rolled)))
+    bench.hear("tf_static", tf(geometry_msgs.TransformStamped(header, "laser", rolled)))
     bench.hear("odometry", said.odometry()).hear("scan", said.scan())
 
     found = bench.tick()[1]
@@ -408,7 +409,12 @@ def test_a_plan_is_moved_into_map() -> None:
     bench = Bench().hear("odometry", said.odometry())
     bench.tick()
     header = std_msgs.Header(said.stamp(), "odom")
-    poses = tuple(m.PoseStamped(header, m.Pose(m.Point(float(n)))) for n in range(3000))
+    poses = tuple(
+        geometry_msgs.PoseStamped(
+            header, geometry_msgs.Pose(geometry_msgs.Point(float(n)))
+        )
+        for n in range(3000)
+    )
 
     (found,) = bench.hear("path", nav_msgs.Path(header, poses)).tick()
 
@@ -421,7 +427,10 @@ def test_a_plan_is_moved_into_map() -> None:
 def test_no_pose_of_a_path_is_told_twice(count: int) -> None:
     header = std_msgs.Header(said.stamp(), "map")
     poses = tuple(
-        m.PoseStamped(header, m.Pose(m.Point(float(x)))) for x in range(count)
+        geometry_msgs.PoseStamped(
+            header, geometry_msgs.Pose(geometry_msgs.Point(float(x)))
+        )
+        for x in range(count)
     )
 
     (found,) = Bench().hear("path", nav_msgs.Path(header, poses)).tick()

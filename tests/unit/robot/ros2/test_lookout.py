@@ -6,13 +6,12 @@ from iveg.robot.ros2.config import DriveConfig, RobotConfig
 from iveg.robot.ros2.input_faults import InputFaults, speed_of
 from iveg.robot.ros2.lookout import Lookout, forms_published
 from iveg.ros2 import detector_messages as d
-from iveg.ros2 import messages as m
-from iveg.ros2 import nav_msgs, sensor_msgs, vision_msgs
+from iveg.ros2 import geometry_msgs, nav_msgs, sensor_msgs, vision_msgs
 from iveg.ros2.names import SENSOR_DATA, TF_STATIC, Endpoint, Qos
 from tests.fakes.ros2_network import endpoint
 
-BASE = endpoint("/cmd_vel", m.Twist, writes=False)
-STAMPED_BASE = endpoint("/cmd_vel", m.TwistStamped, writes=False)
+BASE = endpoint("/cmd_vel", geometry_msgs.Twist, writes=False)
+STAMPED_BASE = endpoint("/cmd_vel", geometry_msgs.TwistStamped, writes=False)
 
 
 def faults(
@@ -44,7 +43,7 @@ def test_a_base_that_hears_the_gate_is_no_fault() -> None:
             "/cmd_vel: TwistStamped → Twist",
         ),
         (
-            endpoint("/cmd_vel", m.Twist, writes=False, qos=TF_STATIC),
+            endpoint("/cmd_vel", geometry_msgs.Twist, writes=False, qos=TF_STATIC),
             RobotConfig(),
             "/cmd_vel: volatile → transient local",
         ),

@@ -9,8 +9,7 @@ from iveg.domain.errors import UnreadableError
 from iveg.domain.observations import DetectionFrame
 from iveg.robot.ros2 import pictures
 from iveg.robot.ros2.config import RobotConfig
-from iveg.ros2 import messages as m
-from iveg.ros2 import sensor_msgs, std_msgs, vision_msgs
+from iveg.ros2 import geometry_msgs, sensor_msgs, std_msgs, vision_msgs
 from tests.unit.robot.ros2 import said
 from tests.unit.robot.ros2.said import Bench, tf
 
@@ -75,10 +74,12 @@ def look(*boxes: vision_msgs.Detection2D) -> vision_msgs.Detection2DArray:
 def bench() -> Bench:
     """A camera 1 m above the floor, 10 m east of map's origin, looking east."""
     found = Bench(RobotConfig(topics=TOPICS), tree=False)
-    optical = m.Quaternion(-0.5, 0.5, -0.5, 0.5)
-    place = m.Transform(m.Vector3(10.0, 0.0, 1.0), optical)
+    optical = geometry_msgs.Quaternion(-0.5, 0.5, -0.5, 0.5)
+    place = geometry_msgs.Transform(geometry_msgs.Vector3(10.0, 0.0, 1.0), optical)
     header = std_msgs.Header(said.stamp(), "map")
-    found.hear("tf_static", tf(m.TransformStamped(header, "camera_optical", place)))
+    found.hear(
+        "tf_static", tf(geometry_msgs.TransformStamped(header, "camera_optical", place))
+    )
     return found
 
 

@@ -1,8 +1,4 @@
-"""The ROS 2 messages that iVeg reads and writes, field for field as ROS defines them.
-
-Layouts are those of ROS 2 Humble and later (``vision_msgs`` 4).  Units and frames are
-those of REP-103 and REP-105.
-"""
+"""Messages of ``geometry_msgs`` and ``tf2_msgs``: places, velocities and frames."""
 
 from dataclasses import dataclass, field
 from typing import Annotated
@@ -10,11 +6,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from iveg.ros2.schema import (
-    Float64,
-    Many,
-    Message,
-)
+from iveg.ros2.schema import Float64, Many, Message
 from iveg.ros2.std_msgs import Stamped
 
 Covariance = Annotated[NDArray[np.float64], Many("float64", 36)]
