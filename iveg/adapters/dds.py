@@ -10,10 +10,8 @@ import asyncio
 import threading
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
 from functools import cache
 from types import TracebackType
-from xml.sax.saxutils import quoteattr
 
 from cyclonedds.builtin import (
     BuiltinDataReader,
@@ -38,60 +36,17 @@ from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 from cyclonedds.util import duration
 
+from iveg.adapters.dds_network import DdsNetwork
 from iveg.domain.errors import HopError
 from iveg.ros2.names import Endpoint, Qos, dds_topic, dds_type, ros_topic, ros_type
 from iveg.ros2.schema import Many, Message, One, Structure, Text, fields_of
 from iveg.ros2.type_hash import read_user_data, user_data
 
-_LEASE = "3 s"
-"""How long others remember a participant that died without a word."""
-_MOST_PARTICIPANTS = 60
 _WAIT_MS = 250
 _REARM_S = 0.002
 _MOST_TAKEN = 200
 _FEW = 8
 """Cyclone makes room for as many as are asked for, and mostly one waits."""
-
-
-@dataclass(frozen=True, slots=True)
-class DdsNetwork:
-    """Domain, interface and peers of the network.
-
-    Attributes:
-        domain: 0 to 232, as ``ROS_DOMAIN_ID``.
-        interface: Network interface by name or address; empty: Cyclone's choice.
-        peers: Addresses to ask instead of the whole network; none: multicast.
-        uri: What ``CYCLONEDDS_URI`` says; counts where nothing above does.
-    """
-
-    domain: int = 0
-    interface: str = ""
-    peers: tuple[str, ...] = ()
-    uri: str = ""
-
-    def config(self) -> str:
-        """Cyclone's configuration, one fragment after the other."""
-        return ",".join(part for part in (self.uri, self._own()) if part)
-
-    def _own(self) -> str:
-        general = discovery = ""
-        if self.interface:
-            key = "address" if self.interface[0].isdigit() else "name"
-            one = f"{key}={quoteattr(self.interface)}"
-            general += f"<Interfaces><NetworkInterface {one}/></Interfaces>"
-        if self.peers:
-            general += "<AllowMulticast>false</AllowMulticast>"
-            peers = "".join(f"<Peer address={quoteattr(one)}/>" for one in self.peers)
-            discovery = (
-                "<ParticipantIndex>auto</ParticipantIndex>"
-                f"<MaxAutoParticipantIndex>{_MOST_PARTICIPANTS}"
-                f"</MaxAutoParticipantIndex><Peers>{peers}</Peers>"
-            )
-        discovery += f"<LeaseDuration>{_LEASE}</LeaseDuration>"
-        return (
-            f'<CycloneDDS><Domain Id="any"><General>{general}</General>'
-            f"<Discovery>{discovery}</Discovery></Domain></CycloneDDS>"
-        )
 
 
 class Dds(AbstractContextManager["Dds"]):

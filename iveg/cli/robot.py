@@ -52,7 +52,8 @@ from iveg.ros2.schema import Message
 from iveg.settings import Settings
 
 if TYPE_CHECKING:
-    from iveg.adapters.dds import Dds, DdsNetwork, DdsReader
+    from iveg.adapters.dds import Dds, DdsReader
+    from iveg.adapters.dds_network import DdsNetwork
 
 _CHECK_S = 3.0
 _DOMAINS = "a whole number from 0 to 232"
@@ -255,7 +256,7 @@ def network_of(
         MissingExtraError: Cyclone DDS is not installed.
     """
     require_extra("ros2", what)
-    from iveg.adapters.dds import DdsNetwork
+    from iveg.adapters.dds_network import DdsNetwork
 
     uri = environment.get("CYCLONEDDS_URI", "")
     return DdsNetwork(config.domain, config.interface, config.peers, uri)
