@@ -1,6 +1,7 @@
 """DDS, the network of ROS 2: raw payloads in and out, and its endpoints.
 
-Uses Eclipse Cyclone DDS, an optional extra (``iveg[ros2]``); nothing else imports it.
+Uses Eclipse Cyclone DDS, an optional extra (``iveg[ros2]``); nothing but this module
+and ``dds_types`` imports it.
 Payloads stay bytes here:  DDS checks them against the type, and ``iveg.ros2.cdr`` reads
 the few that are wanted.  None of Cyclone's threads calls iVeg; one thread of ours waits
 for messages that must be answered at once and wakes the event loop.
@@ -10,7 +11,6 @@ import asyncio
 import threading
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager
-from functools import cache
 from types import TracebackType
 
 from cyclonedds.builtin import (
@@ -28,7 +28,7 @@ from cyclonedds.core import (
     WaitSet,
 )
 from cyclonedds.domain import Domain, DomainParticipant
-from cyclonedds.idl import IdlStruct, make_idl_struct, types
+from cyclonedds.idl import IdlStruct
 from cyclonedds.pub import DataWriter
 from cyclonedds.qos import Policy
 from cyclonedds.qos import Qos as DdsQos
@@ -37,10 +37,11 @@ from cyclonedds.topic import Topic
 from cyclonedds.util import duration
 
 from iveg.adapters.dds_network import DdsNetwork
+from iveg.adapters.dds_types import announced, read_qos, user_data_of, write_qos
 from iveg.domain.errors import HopError
-from iveg.ros2.names import Endpoint, Qos, dds_topic, dds_type, ros_topic, ros_type
-from iveg.ros2.schema import Many, Message, One, Structure, Text, fields_of
-from iveg.ros2.type_hash import read_user_data, user_data
+from iveg.ros2.names import Endpoint, Qos, dds_topic, ros_topic, ros_type
+from iveg.ros2.schema import Message
+from iveg.ros2.type_hash import user_data
 
 _WAIT_MS = 250
 _REARM_S = 0.002
@@ -159,9 +160,9 @@ class Dds(AbstractContextManager["Dds"]):
             topic,
             ros_type(sample.type_name),
             writes,
-            _read_qos(sample.qos),
+            read_qos(sample.qos),
             str(sample.participant_key) == self._guid,
-            *_read_user_data(sample.qos),
+            *user_data_of(sample.qos),
         )
 
 
@@ -257,98 +258,6 @@ def _configure(network: DdsNetwork) -> None:
         _configured[network.domain] = config, Domain(network.domain, config)
     elif known[0] != config:
         raise HopError("dds", f"domain {network.domain} is configured otherwise")
-
-
-def _leave_in_bytes(kind: type[IdlStruct]) -> None:
-    """Let samples of a type of ours stay bytes: ``iveg.ros2.cdr`` reads them.
-
-    Cyclone's reader and writer ask a type to deserialize and serialize its samples, and
-    a base of ours would be announced with it.
-    """
-
-    def deserialize(cls: type[IdlStruct], data: bytes, /, **_: object) -> IdlStruct:
-        made = cls()
-        made.payload = data
-        return made
-
-    kind.deserialize = classmethod(deserialize)
-    kind.deserialize_key = classmethod(deserialize)
-    kind.serialize = lambda sample, **_: sample.payload
-
-
-@cache
-def announced(message: type[Message], *, decodes: bool = False) -> type[IdlStruct]:
-    """The type that DDS announces for a message.
-
-    Args:
-        message: Ours.
-        decodes: Cyclone's Python shall make and read its samples.
-    """
-    members = {name: _idl_type(kind, decodes) for name, kind in fields_of(message)}
-    typename = dds_type(message.ROS).replace("::", ".")
-    kind: type[IdlStruct] = make_idl_struct(
-        message.__name__, typename, members, dataclassify=decodes
-    )
-    if not decodes:
-        _leave_in_bytes(kind)
-    return kind
-
-
-def _idl_type(kind: One | Many | Text | Structure, decodes: bool) -> object:
-    match kind:
-        case One("boolean"):
-            return bool
-        case One(primitive):
-            return getattr(types, primitive)
-        case Many(primitive, None):
-            return types.sequence[getattr(types, primitive)]
-        case Many(primitive, count):
-            return types.array[getattr(types, primitive), count]
-        case Text():
-            return str
-        case Structure(message, many):
-            nested = announced(message, decodes=decodes)
-            return types.sequence[nested] if many else nested
-
-
-def write_qos(qos: Qos) -> DdsQos:
-    """A quality of service in Cyclone's words, and what ROS 2 adds to each."""
-    reliability = (
-        Policy.Reliability.Reliable(duration(milliseconds=100))
-        if qos.reliable
-        else Policy.Reliability.BestEffort
-    )
-    durability = (
-        Policy.Durability.TransientLocal
-        if qos.transient_local
-        else Policy.Durability.Volatile
-    )
-    history = Policy.History.KeepLast(qos.depth)
-    return DdsQos(
-        reliability,
-        durability,
-        history,
-        # A late reader gets as many as an early one could have kept.
-        Policy.DurabilityService(0, history, -1, -1, -1),
-        # ROS 2 sends and takes plain CDR of version 1.
-        Policy.DataRepresentation(use_cdrv0_representation=True),
-        # Its endpoints name the members of a type freely, or give no type.
-        Policy.TypeConsistency.AllowTypeCoercion(ignore_member_names=True),
-    )
-
-
-def _read_qos(qos: DdsQos) -> Qos:
-    history = qos[Policy.History]
-    return Qos(
-        isinstance(qos[Policy.Reliability], Policy.Reliability.Reliable),
-        qos[Policy.Durability] != Policy.Durability.Volatile,
-        getattr(history, "depth", 0),
-    )
-
-
-def _read_user_data(qos: DdsQos) -> tuple[str, str]:
-    policy = qos[Policy.Userdata]
-    return read_user_data(b"" if policy is None else bytes(policy.data))
 
 
 class _Watch:
