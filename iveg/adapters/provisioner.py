@@ -14,7 +14,8 @@ import random
 from collections.abc import Awaitable, Callable, Iterable, Sequence
 from typing import TypeVar
 
-from iveg.adapters.iot_agent import IotAgentClient, Provisioned, provision
+from iveg.adapters.fleet_provisioning import Provisioned, provision
+from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.mqtt import MqttLink
 from iveg.adapters.orion import OrionClient
 from iveg.adapters.subscriptions import Ensured, ensure_subscriptions, wanted_for

@@ -6,7 +6,8 @@ import aiomqtt
 import orjson
 import pytest
 
-from iveg.adapters.iot_agent import IotAgentClient, provision
+from iveg.adapters.fleet_provisioning import provision
+from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.orion import OrionClient
 from iveg.adapters.subscriptions import (
     PREFIX,
