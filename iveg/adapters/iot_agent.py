@@ -1,9 +1,4 @@
-"""The IoT Agent's north port, and provisioning a fleet through it.
-
-Provisioning reads first and changes only what differs, so it can run at every start.
-It keeps the way of commands to the robot clear; the traps are in docs/fiware.md,
-"Provisioning".
-"""
+"""The IoT Agent's north port: its groups and devices."""
 
 from collections.abc import Sequence
 

@@ -9,7 +9,8 @@ import pytest
 
 from iveg.cli import COMMANDS, main, robot
 from iveg.cli.arguments import CommandCall, parser
-from iveg.cli.robot import load_config, refuse_second_gate
+from iveg.cli.robot import refuse_second_gate
+from iveg.cli.robot_config import load_config
 from iveg.domain.errors import DataFileError, HopError, SettingsError
 from iveg.ros2 import geometry_msgs
 from iveg.settings import Settings
