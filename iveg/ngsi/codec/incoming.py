@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from iveg.domain.errors import UnreadableError
 from iveg.domain.kinds import KIND_OF
 from iveg.domain.observations import DetectionFrame, EntityReading
-from iveg.ngsi import names, payloads
+from iveg.ngsi import names, payloads, texts
 from iveg.ngsi.codec.attributes import (
     NO_OTHERS,
     IsPast,
@@ -83,7 +83,7 @@ def read_entity(
     }
     if entity_type == names.ROBOT_TYPE:
         if not names.is_robot_id(entity_id):
-            return unread(payloads.clean_text(entity_id), "bad_robot_id")
+            return unread(texts.clean_text(entity_id), "bad_robot_id")
         return read_attributes(entity_id, attributes, is_past, instead)
     if (entity_id, entity_type) == (names.CLIMATE_ID, names.CLIMATE_TYPE):
         return read_one(entity_id, climate, attributes)
@@ -92,9 +92,9 @@ def read_entity(
     if (entity_id, entity_type) in equipment:
         return ReadResult(equipment=(EntityReading(entity_id, attributes),))
     return unread(
-        payloads.clean_text(entity_id),
+        texts.clean_text(entity_id),
         "foreign_entity",
-        payloads.clean_text(entity_type),
+        texts.clean_text(entity_type),
     )
 
 
@@ -113,7 +113,7 @@ def read_measure(
     """Read what a robot's device published on its ``attrs`` topic."""
     robot_id = names.robot_of_device(device_id)
     if not names.is_robot_id(robot_id):
-        return unread(payloads.clean_text(device_id), "bad_robot_id")
+        return unread(texts.clean_text(device_id), "bad_robot_id")
     try:
         attributes = load_json(payload)
     except UnreadableError as error:

@@ -18,7 +18,8 @@ from iveg.domain.observations import (
     LaserScan,
     Navigation,
 )
-from iveg.ngsi.payloads import FORBIDDEN, MAX_BEAMS, MAX_PATH, clean_text
+from iveg.ngsi.payloads import MAX_BEAMS, MAX_PATH
+from iveg.ngsi.texts import FORBIDDEN, clean_text
 from iveg.robot.ros2.rigid import RigidTransform, rigid_of
 from iveg.ros2 import geometry_msgs, nav_msgs, sensor_msgs, vision_msgs
 

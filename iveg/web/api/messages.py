@@ -27,7 +27,7 @@ from iveg.domain.messages import (
 from iveg.models.alert import Told
 from iveg.models.base import Body
 from iveg.models.messages import Messages, MessageTest
-from iveg.ngsi.payloads import clean_text
+from iveg.ngsi.texts import clean_text
 from iveg.pipeline.messenger import Messenger
 from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json

@@ -16,7 +16,7 @@ from iveg.domain.events import LogEvent, Slot
 from iveg.domain.observations import Instant
 from iveg.models.base import Listing
 from iveg.models.note import Note
-from iveg.ngsi.payloads import legible
+from iveg.ngsi.texts import legible
 from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.api.history_filters import Moment, Span, seconds
