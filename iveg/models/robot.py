@@ -1,15 +1,14 @@
 """A robot of the fleet, with the age of everything that is said of it."""
 
-from typing import TYPE_CHECKING, Any, Literal, get_type_hints
+from typing import TYPE_CHECKING, Literal
 
 from pydantic import Field, create_model
 
 from iveg.domain import feedback, observations
 from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import Pose2D, Twist2D
-from iveg.domain.kinds import SENSED, Kind
+from iveg.domain.kinds import SENSED
 from iveg.domain.observations import Instant
-from iveg.domain.quantities import quantities_of, value_of
 from iveg.domain.revocation import BrokerTold
 from iveg.domain.robot_state import Link, RobotState
 from iveg.domain.rule import foresight
@@ -21,6 +20,7 @@ from iveg.models.command import Command
 from iveg.models.goal import Goal
 from iveg.models.margin import Margin
 from iveg.models.places import Point
+from iveg.models.sensor_reading import READINGS, SensorReading, newest_reading
 from iveg.models.situation import Situation
 
 Mode = Literal["RUNNING", "SLOW", "STOPPED"]
@@ -210,38 +210,6 @@ class RobotAccess(Model):
         return cls(robot_id=robot.robot_id, revoked=Revoked.of(robot), broker=broker)
 
 
-class SensorReading(Model):
-    """The newest reading of a small sensor; its quantities by name."""
-
-    age_s: float | None
-
-
-def _reading_model(kind: Kind) -> type[SensorReading]:
-    """The model of a small sensor: the quantities of its observation, and its age."""
-    types = get_type_hints(kind.of)
-    members: dict[str, Any] = {
-        name: (types[name], Field(description=f"{one.meaning} ({one.unit})"))
-        for name, one in quantities_of(kind.of).items()
-    }
-    return create_model(
-        kind.of.__name__, __base__=SensorReading, __doc__=kind.of.__doc__, **members
-    )
-
-
-_READINGS = {kind.name: _reading_model(kind) for kind in SENSED}
-
-
-def _newest_reading(
-    robot: RobotState, kind: Kind, now: Instant
-) -> SensorReading | None:
-    """What a small sensor said last; None before the first."""
-    read = robot.sensed.get(kind.of)
-    if read is None:
-        return None
-    age_s = None if read.at is None else round(now.mono - read.at.mono, 1)
-    return _READINGS[kind.name](**value_of(read.observation), age_s=age_s)
-
-
 class Navigation(Model):
     """The robot's intent, in ``map`` (m)."""
 
@@ -327,7 +295,7 @@ class _Robot(Model):
     @staticmethod
     def sensed(robot: RobotState, now: Instant) -> dict[str, SensorReading | None]:
         """The members that are small sensors' newest readings."""
-        return {kind.name: _newest_reading(robot, kind, now) for kind in SENSED}
+        return {kind.name: newest_reading(robot, kind, now) for kind in SENSED}
 
 
 if TYPE_CHECKING:
@@ -337,5 +305,5 @@ else:
         "Robot",
         __base__=_Robot,
         __doc__=_Robot.__doc__,
-        **{name: (made | None, ...) for name, made in _READINGS.items()},
+        **{name: (made | None, ...) for name, made in READINGS.items()},
     )
