@@ -9,7 +9,6 @@ from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.kinds import SENSED
 from iveg.domain.observations import Instant
-from iveg.domain.revocation import BrokerTold
 from iveg.domain.robot_state import Link, RobotState
 from iveg.domain.rule import foresight
 from iveg.domain.stamps import format_stamp
@@ -20,6 +19,7 @@ from iveg.models.command import Command
 from iveg.models.goal import Goal
 from iveg.models.margin import Margin
 from iveg.models.places import Point
+from iveg.models.robot_access import Revoked
 from iveg.models.sensor_reading import READINGS, SensorReading, newest_reading
 from iveg.models.situation import Situation
 
@@ -179,35 +179,6 @@ class Detector(Model):
             out_since=None if out is None else format_stamp(out.since),
             bias=CameraBias.of(robot.detector.peer_looks, now),
         )
-
-
-class Revoked(Model):
-    """Who had a robot heard no more."""
-
-    by: str
-    since: str
-    stood: bool = Field(description="Whether the STOP before it was confirmed.")
-
-    @classmethod
-    def of(cls, robot: RobotState) -> "Revoked | None":
-        """None of a robot that is heard."""
-        word = robot.revoked
-        if word is None:
-            return None
-        return cls(by=word.by, since=format_stamp(word.since), stood=word.stood)
-
-
-class RobotAccess(Model):
-    """What came of revoking a robot, or of allowing it again."""
-
-    robot_id: str
-    revoked: Revoked | None
-    broker: BrokerTold = Field(description="What came of asking the broker.")
-
-    @classmethod
-    def of(cls, robot: RobotState, broker: BrokerTold) -> "RobotAccess":
-        """Of one robot."""
-        return cls(robot_id=robot.robot_id, revoked=Revoked.of(robot), broker=broker)
 
 
 class Navigation(Model):

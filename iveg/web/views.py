@@ -37,11 +37,11 @@ from iveg.models.robot import (
     Navigation,
     Pose,
     Profile,
-    Revoked,
     Robot,
     SpeedLimit,
     Twist,
 )
+from iveg.models.robot_access import Revoked
 from iveg.models.rule import Rule
 from iveg.models.situation import Situation
 from iveg.ngsi.names import ROBOT_DEVICES
