@@ -27,23 +27,11 @@ from iveg.models.margin import Margin
 from iveg.models.people import Acting, Detection, DetectionFrame, Evidence
 from iveg.models.people import Person as PersonModel
 from iveg.models.places import GreenhouseMap, Position, Scan
-from iveg.models.robot import (
-    Applied,
-    Detector,
-    Encounter,
-    Hold,
-    MissingPremise,
-    Mode,
-    Navigation,
-    Pose,
-    Profile,
-    Robot,
-    SpeedLimit,
-    Twist,
-)
+from iveg.models.robot import Detector, Mode, Navigation, Pose, Profile, Robot, Twist
 from iveg.models.robot_access import Revoked
 from iveg.models.rule import Rule
 from iveg.models.situation import Situation
+from iveg.models.speed_limit import Applied, Encounter, Hold, MissingPremise, SpeedLimit
 from iveg.ngsi.names import ROBOT_DEVICES
 from iveg.pipeline.build import Pipeline
 from iveg.pipeline.health_monitor import HopHealth
