@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING, Literal
 from pydantic import Field, create_model
 
 from iveg.domain.fleet import RobotProfile
-from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.kinds import SENSED
 from iveg.domain.observations import Instant
 from iveg.domain.robot_state import Link, RobotState
@@ -17,37 +16,13 @@ from iveg.models.command import Command
 from iveg.models.goal import Goal
 from iveg.models.margin import Margin
 from iveg.models.places import Point
+from iveg.models.pose import Pose, Twist
 from iveg.models.robot_access import Revoked
 from iveg.models.sensor_reading import READINGS, SensorReading, newest_reading
 from iveg.models.situation import Situation
 from iveg.models.speed_limit import Applied, Encounter, Hold, MissingPremise, SpeedLimit
 
 Mode = Literal["RUNNING", "SLOW", "STOPPED"]
-
-
-class Pose(Model):
-    """Pose of ``base_link`` in ``map``."""
-
-    x: float
-    y: float
-    yaw: float
-
-    @classmethod
-    def of(cls, pose: Pose2D) -> "Pose":
-        """As the robot measured it."""
-        return cls(x=pose.x, y=pose.y, yaw=pose.yaw)
-
-
-class Twist(Model):
-    """Speed (m/s) and turn rate (rad/s)."""
-
-    linear: float
-    angular: float
-
-    @classmethod
-    def of(cls, twist: Twist2D) -> "Twist":
-        """As the robot measured it."""
-        return cls(linear=twist.linear_x, angular=twist.angular_z)
 
 
 class Detector(Model):

@@ -27,7 +27,8 @@ from iveg.models.margin import Margin
 from iveg.models.people import Acting, Detection, DetectionFrame, Evidence
 from iveg.models.people import Person as PersonModel
 from iveg.models.places import GreenhouseMap, Position, Scan
-from iveg.models.robot import Detector, Mode, Navigation, Pose, Profile, Robot, Twist
+from iveg.models.pose import Pose, Twist
+from iveg.models.robot import Detector, Mode, Navigation, Profile, Robot
 from iveg.models.robot_access import Revoked
 from iveg.models.rule import Rule
 from iveg.models.situation import Situation
