@@ -260,29 +260,6 @@ def _note(of: stop.FollowedCommand) -> Sentence | None:
     return Sentence(key=key, slots={"lag": round(lag, 1)})
 
 
-class Pressed(Model):
-    """A STOP, release or resume that was accepted."""
-
-    robot_id: str
-    command_id: str
-    state: str
-
-    @classmethod
-    def of(cls, command: stop.FollowedCommand) -> "Pressed":
-        """As it stands just after the press."""
-        return cls(
-            robot_id=command.robot_id,
-            command_id=command.command_id,
-            state=command.state,
-        )
-
-
-class FleetPressed(Model):
-    """A fleet STOP: one command a robot."""
-
-    commands: list[Pressed]
-
-
 class LatencySpread(Model):
     """Times of one step (ms); null where nothing was measured."""
 

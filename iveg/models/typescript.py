@@ -19,12 +19,13 @@ from iveg.models.alert import AlertListing
 from iveg.models.audit import AuditEntry
 from iveg.models.base import Model
 from iveg.models.climate import ClimateReading
-from iveg.models.command import Drill, FleetPressed, Latency
+from iveg.models.command import Drill, Latency
 from iveg.models.decision import Decision
 from iveg.models.experiment import Experiments
 from iveg.models.latency import LatencyTable
 from iveg.models.messages import Messages, MessageTest
 from iveg.models.places import Costmap, Coverage, Scan
+from iveg.models.press import FleetPressed
 from iveg.models.reading import Reading
 from iveg.models.robot_access import RobotAccess
 from iveg.models.rule import Trial
