@@ -19,7 +19,6 @@ from iveg.models.alert import AlertListing
 from iveg.models.audit import AuditEntry
 from iveg.models.base import Model
 from iveg.models.climate import ClimateReading
-from iveg.models.command import Drill, Latency
 from iveg.models.decision import Decision
 from iveg.models.experiment import Experiments
 from iveg.models.latency import LatencyTable
@@ -40,6 +39,7 @@ from iveg.models.signing_in import (
     Tablet,
 )
 from iveg.models.snapshot import PastWorld, Snapshot
+from iveg.models.stop_latency import Drill, Latency
 from iveg.models.thing import KnownSpot, Thing
 from iveg.models.what_if import WhatIf
 

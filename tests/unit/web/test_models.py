@@ -7,7 +7,7 @@ from pydantic import TypeAdapter
 from iveg.models.alert import Alert, AlertListing, LogEntry
 from iveg.models.base import Listing
 from iveg.models.climate import Climate
-from iveg.models.command import Command, Drill, Latency
+from iveg.models.command import Command
 from iveg.models.decision import Decision
 from iveg.models.health import Health
 from iveg.models.latency import LatencyTable
@@ -15,6 +15,7 @@ from iveg.models.people import DetectionRow, Person
 from iveg.models.places import GreenhouseMap, Scan
 from iveg.models.robot import Robot
 from iveg.models.rule import Rule
+from iveg.models.stop_latency import Drill, Latency
 from tests.data.answers import answers
 
 PROMISED: dict[str, Any] = {
