@@ -18,6 +18,7 @@ from sqlalchemy import (
 )
 
 from iveg.adapters.history.lists import record_of
+from iveg.adapters.history.rounding import whole
 from iveg.adapters.history.tables import (
     climate,
     commands,
@@ -331,10 +332,3 @@ def _columns(
     statement = select(*wanted).where(*asked).group_by(*place).order_by(wanted[0])
     rows = connection.execute(statement).all()
     return list(zip(*rows, strict=True)) or [()] * len(wanted)
-
-
-def whole(connection: Connection, value: ColumnElement[Any]) -> ColumnElement[int]:
-    """Rounded down: a cast does that on SQLite, and rounds to nearest on PostgreSQL."""
-    if connection.dialect.name == "sqlite":
-        return cast(value, Integer)
-    return cast(func.floor(value), Integer)
