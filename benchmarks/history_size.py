@@ -34,12 +34,11 @@ from iveg.adapters.history.day_partitions import (
 from iveg.adapters.history.engine import writing_engine
 from iveg.adapters.history.lists import Filter
 from iveg.adapters.history.migrate import upgrade
+from iveg.adapters.history.places import people_seen, poses_of
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.series import (
     command_latencies,
     confidence_counts,
-    people_seen,
-    poses_of,
     speed_series,
 )
 from iveg.domain.retention import DAY_S

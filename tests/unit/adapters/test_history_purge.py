@@ -16,6 +16,7 @@ from iveg.adapters.history.ages import recorded_days
 from iveg.adapters.history.engine import writing_engine
 from iveg.adapters.history.lists import Filter
 from iveg.adapters.history.migrate import alembic_config, upgrade
+from iveg.adapters.history.places import people_seen
 from iveg.adapters.history.purge import (
     BOUND_S,
     CHUNK,
@@ -27,7 +28,7 @@ from iveg.adapters.history.purge import (
 )
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.recorder import Recorder
-from iveg.adapters.history.series import people_seen, speed_series
+from iveg.adapters.history.series import speed_series
 from iveg.adapters.history.store import Store
 from iveg.adapters.history.table_mappings import TABLE_MAPPINGS
 from iveg.adapters.history.upkeep import RecordedHistory
