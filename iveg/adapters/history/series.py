@@ -17,17 +17,14 @@ from sqlalchemy import (
     select,
 )
 
-from iveg.adapters.history.lists import record_of
 from iveg.adapters.history.rounding import whole
 from iveg.adapters.history.tables import (
     climate,
-    commands,
     detections,
     measurements,
     odometry,
 )
 from iveg.domain.fleet import as_counted
-from iveg.domain.records import ByTransport, CommandRecord
 
 MOST_POINTS = 2000
 MOST_READINGS = 288
@@ -106,28 +103,6 @@ class ConfidenceCount:
     count: int
 
 
-@dataclass(frozen=True, slots=True)
-class CommandLatency:
-    """Times of one STOP from the press (ms); None where a step never came.
-
-    Without a told press, the press is when it was accepted.
-
-    Attributes:
-        answer_ms: To the robot's answer by each transport that brought one.
-        standstill_ms: To the first standing sample.
-        accepted_ms: To this server, where the page told when it was pressed.
-        sent_ms: Until it left by each transport that took it.
-    """
-
-    command_id: str
-    robot_id: str
-    requested_at: float
-    answer_ms: ByTransport
-    sent_ms: ByTransport
-    standstill_ms: float | None
-    accepted_ms: float | None = None
-
-
 def speed_series(
     connection: Connection,
     since: float,
@@ -204,41 +179,6 @@ def confidence_counts(
         ConfidenceCount(class_id, slot / CONFIDENCE_BINS, count)
         for (class_id, slot), count in sorted(counts.items())
     )
-
-
-def command_latencies(
-    connection: Connection, since: float, until: float, robot: str | None = None
-) -> tuple[CommandLatency, ...]:
-    """The newest STOPs of ``since <= requested_at < until``, oldest first."""
-    c = commands.c
-    statement = (
-        select(commands)
-        .where(c.kind == "stop", c.requested_at >= since, c.requested_at < until)
-        .order_by(c.requested_at.desc(), c.command_id.desc())
-        .limit(MOST_POINTS)
-    )
-    if robot is not None:
-        statement = statement.where(c.robot_id == robot)
-    rows = connection.execute(statement).mappings().all()
-    return tuple(_latency(record_of(CommandRecord, row)) for row in reversed(rows))
-
-
-def _latency(record: CommandRecord) -> CommandLatency:
-    pressed = record.pressed_at
-    asked = record.requested_at if pressed is None else pressed
-    return CommandLatency(
-        record.command_id,
-        record.robot_id,
-        record.requested_at,
-        {one: _ms(asked, at) for one, at in record.answer_at.items()},
-        {one: _ms(asked, at) for one, at in record.sent_at.items()},
-        record.standstill_ms,
-        None if pressed is None else _ms(pressed, record.requested_at),
-    )
-
-
-def _ms(start: float, end: float) -> float:
-    return 1000.0 * (end - start)
 
 
 def _robots(connection: Connection) -> Iterator[str]:

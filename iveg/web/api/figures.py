@@ -7,11 +7,11 @@ from typing import Annotated
 from fastapi import APIRouter, HTTPException, Query, Response
 from orjson import Fragment
 
-from iveg.adapters.history import series
+from iveg.adapters.history import command_latencies, series
+from iveg.adapters.history.command_latencies import CommandLatency
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.series import (
     ClimateSeries,
-    CommandLatency,
     ConfidenceCount,
     MeasurementSeries,
     SpeedSeries,
@@ -53,7 +53,7 @@ def add_routes(
         found = await asyncio.gather(
             queries.ask(series.speed_series, since, until, asked.robot),
             queries.ask(series.confidence_counts, since, until, asked.robot),
-            queries.ask(series.command_latencies, since, until, asked.robot),
+            queries.ask(command_latencies.command_latencies, since, until, asked.robot),
         )
         body = await worker.run(_draw_charts, *found, threshold(), fleet)
         return Response(body, media_type=MEDIA_TYPES["json"])

@@ -9,9 +9,9 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, HTTPException, Path, Query, Response
 
+from iveg.adapters.history.command_latencies import CommandLatency, command_latencies
 from iveg.adapters.history.lists import COMMANDS
 from iveg.adapters.history.queries import Queries
-from iveg.adapters.history.series import CommandLatency, command_latencies
 from iveg.domain.errors import HopError
 from iveg.domain.fleet import as_counted
 from iveg.domain.observations import Instant

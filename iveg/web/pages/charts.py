@@ -16,10 +16,10 @@ from functools import cache
 from itertools import pairwise
 from typing import Any
 
+from iveg.adapters.history.command_latencies import CommandLatency
 from iveg.adapters.history.series import (
     CONFIDENCE_BINS,
     ClimateSeries,
-    CommandLatency,
     ConfidenceCount,
     MeasurementSeries,
     SpeedSeries,
