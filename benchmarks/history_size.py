@@ -25,6 +25,7 @@ from benchmarks.process import machine, percentile, print_table
 from iveg.adapters.history import lists
 from iveg.adapters.history.ages import lost_of
 from iveg.adapters.history.command_latencies import command_latencies
+from iveg.adapters.history.confidence import confidence_counts
 from iveg.adapters.history.cost import cost_rows
 from iveg.adapters.history.day_partitions import (
     PARTITIONED,
@@ -37,7 +38,7 @@ from iveg.adapters.history.lists import Filter
 from iveg.adapters.history.migrate import upgrade
 from iveg.adapters.history.places import people_seen, poses_of
 from iveg.adapters.history.queries import Queries
-from iveg.adapters.history.series import confidence_counts, speed_series
+from iveg.adapters.history.series import speed_series
 from iveg.domain.retention import DAY_S
 from tests.fakes.postgresql import programs, running_postgresql
 

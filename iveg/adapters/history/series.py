@@ -20,7 +20,6 @@ from sqlalchemy import (
 from iveg.adapters.history.rounding import whole
 from iveg.adapters.history.tables import (
     climate,
-    detections,
     measurements,
     odometry,
 )
@@ -31,7 +30,6 @@ MOST_READINGS = 288
 """A day of the air in slices of five minutes."""
 READING_PERIOD_S = 60.0
 """Between two kept readings (``pipeline.event_log``)."""
-CONFIDENCE_BINS = 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,20 +87,6 @@ class MeasurementSeries:
     slice_s: float = field(default=0.0, kw_only=True)
 
 
-@dataclass(frozen=True, slots=True)
-class ConfidenceCount:
-    """Number of detections of a class in one interval of confidence.
-
-    Attributes:
-        class_id: As the detector said.
-        least: Lower edge, inclusive; the slice is 1 / ``CONFIDENCE_BINS`` wide.
-    """
-
-    class_id: str
-    least: float
-    count: int
-
-
 def speed_series(
     connection: Connection,
     since: float,
@@ -155,30 +139,6 @@ def measurement_series(
         key: MeasurementSeries(*zip(*points, strict=True), slice_s=width_s)
         for key, points in found.items()
     }
-
-
-def confidence_counts(
-    connection: Connection, since: float, until: float, robot: str | None = None
-) -> tuple[ConfidenceCount, ...]:
-    """Detections of ``since <= at < until`` by class and confidence."""
-    bins = detections.c.probability * CONFIDENCE_BINS
-    place = whole(connection, bins).label("place")
-    statement = (
-        select(detections.c.class_id, place, func.count())
-        .where(detections.c.at >= since, detections.c.at < until)
-        .group_by(detections.c.class_id, place)
-    )
-    if robot is not None:
-        statement = statement.where(detections.c.robot_id == robot)
-    counts: dict[tuple[str, int], int] = {}
-    for class_id, number, count in connection.execute(statement):
-        # Certainty itself, 1.0, belongs to the uppermost slice.
-        slot = (class_id, min(int(number), CONFIDENCE_BINS - 1))
-        counts[slot] = counts.get(slot, 0) + count
-    return tuple(
-        ConfidenceCount(class_id, slot / CONFIDENCE_BINS, count)
-        for (class_id, slot), count in sorted(counts.items())
-    )
 
 
 def _robots(connection: Connection) -> Iterator[str]:
