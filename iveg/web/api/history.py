@@ -15,8 +15,9 @@ from orjson import Fragment
 
 from iveg.adapters import clock
 from iveg.adapters.extras import require_extra
-from iveg.adapters.history import lists
-from iveg.adapters.history.lists import Filter, ListOf, Page
+from iveg.adapters.history import listings, lists
+from iveg.adapters.history.listings import ListOf
+from iveg.adapters.history.lists import Filter, Page
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.parquet import parquet_end, parquet_page
 from iveg.domain.alerts.flood import FloodState as NoFlood
@@ -85,35 +86,35 @@ class HistoryList(Generic[R]):
 _MEASURED: tuple[HistoryList[Any], ...] = (
     HistoryList(
         "detections",
-        lists.DETECTIONS,
+        listings.DETECTIONS,
         DetectionRow.of_row,
         Listing[DetectionRow],
         "What robots saw, by when it reached iVeg",
     ),
     HistoryList(
         "tracks",
-        lists.TRACKS,
+        listings.TRACKS,
         DetectionRow.of_row,
         Listing[DetectionRow],
         "Where people were: their detections, by when each reached iVeg",
     ),
     HistoryList(
         "odometry",
-        lists.ODOMETRY,
+        listings.ODOMETRY,
         OdometryRow.of_record,
         Listing[OdometryRow],
         "Poses and speeds of robots with their speed limits, twice a second",
     ),
     HistoryList(
         "readings",
-        lists.READINGS,
+        listings.READINGS,
         Reading.of_record,
         Listing[Reading],
         "What small sensors of robots said; `class` asks for a kind, as `battery`",
     ),
     HistoryList(
         "measurements",
-        lists.MEASUREMENTS,
+        listings.MEASUREMENTS,
         Measurement.of_record,
         Listing[Measurement],
         "Numbers of other equipment; `class` asks for an entity or an attribute",
@@ -159,7 +160,9 @@ def router(
     async def decision(
         decision_id: Annotated[str, Path(pattern=r"^[ -~]{1,64}$")],
     ) -> Response:
-        found = present(decision_id) or await queries.one(lists.DECISIONS, decision_id)
+        found = present(decision_id) or await queries.one(
+            listings.DECISIONS, decision_id
+        )
         if found is None:
             raise HTTPException(404, "There is no such decision.")
         return Json(Decision.of_record(found))
@@ -188,14 +191,14 @@ def lists_of(
     return (
         HistoryList(
             "decisions",
-            lists.DECISIONS,
+            listings.DECISIONS,
             Decision.of_record,
             Listing[Decision],
             "Why robots were slowed, by when it began",
         ),
         HistoryList(
             "commands",
-            lists.COMMANDS,
+            listings.COMMANDS,
             Command.of_record,
             Listing[Command],
             "Every STOP, release and resume, by when it was asked",
@@ -203,7 +206,7 @@ def lists_of(
         ),
         HistoryList(
             "alerts",
-            lists.ALERTS,
+            listings.ALERTS,
             Alert.of_record,
             AlertListing,
             "Every alert, by when it was last raised, and how fast they come",
@@ -211,14 +214,14 @@ def lists_of(
         ),
         HistoryList(
             "log",
-            lists.LOG,
+            listings.LOG,
             LogEntry.of_record,
             Listing[LogEntry],
             "The action and inference log",
         ),
         HistoryList(
             "audit",
-            lists.AUDIT,
+            listings.AUDIT,
             AuditEntry.of_record,
             Listing[AuditEntry],
             "Who did what; `robot` asks for a subject, `class` for an action or name",

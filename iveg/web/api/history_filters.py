@@ -20,7 +20,8 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from iveg.adapters.history import lists
-from iveg.adapters.history.lists import Cursor, Filter, ListOf
+from iveg.adapters.history.listings import ListOf
+from iveg.adapters.history.lists import Cursor, Filter
 from iveg.domain.errors import UnreadableError
 from iveg.domain.records import Record
 from iveg.pipeline.newest_detections import JudgedDetection

@@ -10,7 +10,7 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, HTTPException, Path, Query, Response
 
 from iveg.adapters.history.command_latencies import CommandLatency, command_latencies
-from iveg.adapters.history.lists import COMMANDS
+from iveg.adapters.history.listings import COMMANDS
 from iveg.adapters.history.queries import Queries
 from iveg.domain.errors import HopError
 from iveg.domain.fleet import as_counted
