@@ -22,7 +22,7 @@ from sqlalchemy import Connection, Engine, event, text
 from sqlalchemy.engine.interfaces import DBAPICursor
 
 from benchmarks.process import machine, percentile, print_table
-from iveg.adapters.history import listings, lists
+from iveg.adapters.history import cursors, listings
 from iveg.adapters.history.ages import lost_of
 from iveg.adapters.history.command_latencies import command_latencies
 from iveg.adapters.history.confidence import confidence_counts
@@ -109,7 +109,7 @@ QUESTIONS: Mapping[str, Question] = {
     "odometry": lambda q, f, _: q.page(listings.ODOMETRY, f),
     "odometry, 1000 in the middle": lambda q, f, at: q.page(
         listings.ODOMETRY,
-        replace(f, limit=1000, cursor=lists.Cursor(at + DAY_S / 2, 0)),
+        replace(f, limit=1000, cursor=cursors.Cursor(at + DAY_S / 2, 0)),
     ),
     "odometry, oldest first": lambda q, f, _: q.page(
         listings.ODOMETRY, replace(f, sort="at")

@@ -4,14 +4,11 @@ A page ends in a cursor that names its last row, not a count of rows, so that ne
 new rows nor deep pages make the next one wrong or slow.
 """
 
-import base64
-import binascii
 import string
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from typing import Any, Generic
 
-import orjson
 from sqlalchemy import (
     ColumnElement,
     Connection,
@@ -24,25 +21,12 @@ from sqlalchemy import (
     tuple_,
 )
 
+from iveg.adapters.history.cursors import Cursor
 from iveg.adapters.history.listings import ListOf, R
 from iveg.adapters.history.table_mappings import TABLE_MAPPINGS
-from iveg.domain.errors import UnreadableError
 
 USUAL_ROWS, MOST_ROWS = 100, 1000
 BY_TIME, NEWEST_FIRST = "at", "-at"
-
-
-@dataclass(frozen=True, slots=True)
-class Cursor:
-    """The last row of a page: its time and what tells it from others of that time.
-
-    Attributes:
-        group: Its value in the column that the list is sorted by; None: by time.
-    """
-
-    at: float
-    key: int | str
-    group: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -171,34 +155,3 @@ def record_of(kind: type[R], row: RowMapping) -> R:
     columns = TABLE_MAPPINGS[kind].table.c
     values = {field.name: row[columns[field.name]] for field in fields(kind)}
     return kind(**{name: one for name, one in values.items() if one is not None})
-
-
-def write_cursor(cursor: Cursor) -> str:
-    """A cursor as opaque text that fits into a URL."""
-    group = () if cursor.group is None else (cursor.group,)
-    text = base64.urlsafe_b64encode(orjson.dumps([cursor.at, cursor.key, *group]))
-    return text.decode().rstrip("=")
-
-
-def read_cursor(text: str, of: ListOf[R]) -> Cursor:
-    """A cursor that ``write_cursor`` wrote for the same list.
-
-    Raises:
-        UnreadableError: it did not.
-    """
-    try:
-        padded = text.encode("ascii") + b"=" * (-len(text) % 4)
-        at, key, *group = orjson.loads(base64.urlsafe_b64decode(padded))
-    except (ValueError, TypeError, binascii.Error) as error:
-        raise UnreadableError("bad_cursor") from error
-    is_group = [*map(type, group)] in ([], [str]) and "".join(group).isprintable()
-    if not (isinstance(at, float) and _is_key(key, of) and is_group):
-        raise UnreadableError("bad_cursor")
-    return Cursor(at, key, *group)
-
-
-def _is_key(key: object, of: ListOf[R]) -> bool:
-    # Only what a column can hold: the rest would fail inside the database.
-    if of.key.type.python_type is int:
-        return type(key) is int and 0 <= key < 2**63
-    return isinstance(key, str) and key.isascii() and key.isprintable()

@@ -15,7 +15,7 @@ from orjson import Fragment
 
 from iveg.adapters import clock
 from iveg.adapters.extras import require_extra
-from iveg.adapters.history import listings, lists
+from iveg.adapters.history import cursors, listings, lists
 from iveg.adapters.history.listings import ListOf
 from iveg.adapters.history.lists import Filter, Page
 from iveg.adapters.history.queries import Queries
@@ -253,7 +253,7 @@ def _add_list(
 
 
 async def _listing(page: Page[R], one: HistoryList[R], worker: Apart) -> Response:
-    after = None if page.next is None else lists.write_cursor(page.next)
+    after = None if page.next is None else cursors.write_cursor(page.next)
     rows = await one.rows(page.items)
     if len(rows) <= FEW_ROWS:
         items = [one.model(*row) for row in rows]

@@ -7,7 +7,8 @@ import pytest
 from iveg.adapters.history import listings
 from iveg.adapters.history.command_latencies import command_latencies
 from iveg.adapters.history.confidence import confidence_counts
-from iveg.adapters.history.lists import Cursor, Filter, read_cursor, write_cursor
+from iveg.adapters.history.cursors import Cursor, read_cursor, write_cursor
+from iveg.adapters.history.lists import Filter
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.series import climate_series, speed_series
 from iveg.adapters.history.store import Store
