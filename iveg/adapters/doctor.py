@@ -12,9 +12,10 @@ from contextlib import asynccontextmanager
 import aiomqtt
 from sqlalchemy.exc import DatabaseError
 
+from iveg.adapters.broker_address import BrokerAddress
 from iveg.adapters.history.engine import reading_engine, sqlite_file
 from iveg.adapters.history.migrate import reason_of, revisions
-from iveg.adapters.mqtt import NODELAY, BrokerAddress
+from iveg.adapters.mqtt import NODELAY
 from iveg.domain.errors import HopError
 
 _REFUSED = 128

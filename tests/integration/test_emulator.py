@@ -11,8 +11,8 @@ import httpx
 import pytest
 
 from iveg.adapters import clock
+from iveg.adapters.broker_address import BrokerAddress
 from iveg.adapters.greenhouses import load_greenhouse
-from iveg.adapters.mqtt import BrokerAddress
 from iveg.domain.errors import DataFileError, SettingsError
 from iveg.domain.feedback import SpeedLimit
 from iveg.domain.observations import (

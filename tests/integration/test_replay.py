@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from iveg.adapters.mqtt import BrokerAddress
+from iveg.adapters.broker_address import BrokerAddress
 from iveg.domain.errors import DataFileError
 from iveg.domain.feedback import SpeedLimit
 from iveg.domain.observations import (

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from iveg.adapters import clock
-from iveg.adapters.mqtt import BrokerAddress, MqttLink
+from iveg.adapters.broker_address import BrokerAddress
+from iveg.adapters.mqtt import MqttLink
 from iveg.domain.feedback import CLEAR, Feedback
 from iveg.domain.geometry import Pose2D
 from iveg.domain.observations import DetectionFrame, LaserScan, Origin, SafetyReport

@@ -10,10 +10,11 @@ import pytest
 
 from iveg.adapters import clock
 from iveg.adapters.bounded_json import BoundedJson
+from iveg.adapters.broker_address import BrokerAddress
 from iveg.adapters.fiware_http import Document
 from iveg.adapters.fiware_token import HOP, FiwareToken, TokenGrant
 from iveg.adapters.iot_agent import IotAgentClient
-from iveg.adapters.mqtt import BrokerAddress, MqttLink
+from iveg.adapters.mqtt import MqttLink
 from iveg.adapters.orion import OrionClient
 from iveg.adapters.provisioner import Provisioner
 from iveg.adapters.subscriptions import ensure_subscriptions, wanted_for

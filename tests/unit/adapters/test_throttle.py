@@ -5,7 +5,8 @@ from typing import Any
 
 import pytest
 
-from iveg.adapters.mqtt import BrokerAddress, MqttLink
+from iveg.adapters.broker_address import BrokerAddress
+from iveg.adapters.mqtt import MqttLink
 from iveg.adapters.orion import OrionClient
 from iveg.adapters.subscriptions import ensure_subscriptions, wanted_for
 from iveg.adapters.throttle import Throttle

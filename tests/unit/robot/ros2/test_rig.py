@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from iveg.adapters import clock
-from iveg.adapters.mqtt import BrokerAddress
+from iveg.adapters.broker_address import BrokerAddress
 from iveg.domain.feedback import Feedback
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.goals import Goal
