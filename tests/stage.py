@@ -8,7 +8,7 @@ from iveg.adapters.greenhouses import load_greenhouse
 from iveg.app.virtual import read_direct
 from iveg.domain.observations import Instant
 from iveg.domain.records import DecisionRecord, DetectionRecord
-from iveg.lab.emulator.camera import DETECTORS
+from iveg.lab.emulator.detector_model import DETECTORS
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.scenarios import scenario_named
 from iveg.lab.emulator.world import SimulatedWorld

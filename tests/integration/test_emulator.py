@@ -23,7 +23,7 @@ from iveg.domain.observations import (
     Odometry,
     SafetyReport,
 )
-from iveg.lab.emulator.camera import DETECTORS
+from iveg.lab.emulator.detector_model import DETECTORS
 from iveg.lab.emulator.emulated_robot import FleetSettings
 from iveg.lab.emulator.fleet import SimulatedFleet, run_emulator
 from iveg.lab.emulator.layout import lay_out

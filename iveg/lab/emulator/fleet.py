@@ -18,7 +18,7 @@ from iveg.domain.errors import DataFileError
 from iveg.domain.fleet import FleetDescription
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.stamps import format_stamp
-from iveg.lab.emulator.camera import DETECTORS
+from iveg.lab.emulator.detector_model import DETECTORS
 from iveg.lab.emulator.emulated_robot import EmulatedRobot, FleetSettings
 from iveg.lab.emulator.equipment import tell_all
 from iveg.lab.emulator.layout import lay_out

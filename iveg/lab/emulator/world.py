@@ -23,8 +23,6 @@ from iveg.domain.observations import (
     Origin,
 )
 from iveg.lab.emulator.camera import (
-    PERSON,
-    DetectorModel,
     EmulatedDetector,
     Target,
     person_target,
@@ -32,6 +30,7 @@ from iveg.lab.emulator.camera import (
     thing_target,
     upright_box,
 )
+from iveg.lab.emulator.detector_model import PERSON, DetectorModel
 from iveg.lab.emulator.greenhouse import Body, Disc, Scenery
 from iveg.lab.emulator.grounded import GroundedCamera
 from iveg.lab.emulator.kinematics import Odometer, Vehicle

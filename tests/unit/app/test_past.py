@@ -35,7 +35,7 @@ from iveg.domain.observations import Instant, Received
 from iveg.domain.records import Record
 from iveg.domain.robot_state import RobotState
 from iveg.domain.transports import DIRECT, FIWARE
-from iveg.lab.emulator.camera import DETECTORS
+from iveg.lab.emulator.detector_model import DETECTORS
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.orders import FaultOrder
 from iveg.lab.emulator.scenarios import scenario_named

@@ -9,14 +9,12 @@ from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import Detection
 from iveg.lab.emulator.camera import (
-    DETECTORS,
-    FIELD_COUNTS,
-    DetectorModel,
     EmulatedDetector,
     Target,
     person_target,
     robot_target,
 )
+from iveg.lab.emulator.detector_model import DETECTORS, FIELD_COUNTS, DetectorModel
 from iveg.lab.emulator.greenhouse import Body, Disc, Scenery
 from tests.builders import AGI
 

@@ -15,7 +15,7 @@ from iveg.domain.observations import (
     Observation,
     Odometry,
 )
-from iveg.lab.emulator.camera import DETECTORS
+from iveg.lab.emulator.detector_model import DETECTORS
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.orders import FaultOrder
 from iveg.lab.emulator.ros2_base import TIMEOUT_S, DriveWatchdog, Ros2Base
