@@ -12,62 +12,27 @@ encounter, that false boxes are less sure than true ones.
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import (
-    PERSON_HEIGHT_M,
     Box3D,
     Pose2D,
     box_of_a_person,
     wrap_angle,
 )
 from iveg.domain.observations import Detection
-from iveg.lab.emulator.detector_model import PERSON, DetectorModel
-from iveg.lab.emulator.greenhouse import Body, Disc, Scenery, into
+from iveg.lab.emulator.detector_model import DetectorModel
+from iveg.lab.emulator.greenhouse import Body, Scenery, into
+from iveg.lab.emulator.targets import Target
 
-ROBOT_HEIGHT_M = 1.2
 _NEAREST_M = 0.3
 _LONGEST_S, _SHORTEST_S = 2.0, 0.5
 _GHOST_NEAR_M, _GHOST_FAR_M = 2.0, 6.0
-_THING_RADIUS_M = 0.2
 _HIDDEN_LOSS = 0.15
 """Loss of confidence for a target that is almost fully hidden."""
-
-
-@dataclass(frozen=True, slots=True)
-class Target:
-    """An object that a detector may detect.
-
-    Attributes:
-        key: Unique id.
-        class_id: As the paper's detector names it.
-        body: Its outline; a person's is a square.
-    """
-
-    key: str
-    class_id: str
-    body: Body
-    height: float
-
-
-def person_target(number: int, person: Disc) -> Target:
-    """A person as a target."""
-    pose, size = Pose2D(person.x, person.y, 0.0), 2 * person.radius
-    body = Body(f"person-{number}", pose, size, size)
-    return Target(body.robot_id, PERSON, body, PERSON_HEIGHT_M)
-
-
-def thing_target(x: float, y: float) -> Target:
-    """A post or coat at a position in ``map`` (m), which is taken for a person."""
-    return replace(person_target(0, Disc(x, y, _THING_RADIUS_M)), key="thing")
-
-
-def robot_target(body: Body) -> Target:
-    """A robot as a target: the class is its id, as in the paper."""
-    return Target(body.robot_id, body.robot_id, body, ROBOT_HEIGHT_M)
 
 
 @dataclass(frozen=True, slots=True)

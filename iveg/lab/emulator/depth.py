@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 
 from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import PERSON_HEIGHT_M, Pose2D
-from iveg.lab.emulator.camera import ROBOT_HEIGHT_M
 from iveg.lab.emulator.greenhouse import (
     Body,
     Disc,
@@ -29,6 +28,7 @@ from iveg.lab.emulator.greenhouse import (
     sides_of,
     slab_span,
 )
+from iveg.lab.emulator.targets import ROBOT_HEIGHT_M
 from iveg.robot.grounding.cloud import DepthPicture, Pinhole
 from iveg.robot.grounding.locate import Segment
 from iveg.robot.grounding.mask import Mask, write_mask

@@ -14,7 +14,7 @@ import numpy as np
 from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import Pose2D
 from iveg.domain.observations import Detection, Origin
-from iveg.lab.emulator.camera import FoundTarget, Target
+from iveg.lab.emulator.camera import FoundTarget
 from iveg.lab.emulator.depth import (
     DepthCamera,
     Foliage,
@@ -25,6 +25,7 @@ from iveg.lab.emulator.depth import (
 )
 from iveg.lab.emulator.detector_model import PERSON
 from iveg.lab.emulator.greenhouse import Disc, Scenery, into
+from iveg.lab.emulator.targets import Target
 from iveg.robot.grounding.cloud import Pinhole
 from iveg.robot.grounding.locate import Grounding, Mount, ground_frame
 

@@ -22,14 +22,7 @@ from iveg.domain.observations import (
     Odometry,
     Origin,
 )
-from iveg.lab.emulator.camera import (
-    EmulatedDetector,
-    Target,
-    person_target,
-    robot_target,
-    thing_target,
-    upright_box,
-)
+from iveg.lab.emulator.camera import EmulatedDetector, upright_box
 from iveg.lab.emulator.detector_model import PERSON, DetectorModel
 from iveg.lab.emulator.greenhouse import Body, Disc, Scenery
 from iveg.lab.emulator.grounded import GroundedCamera
@@ -40,6 +33,7 @@ from iveg.lab.emulator.navigation import Navigator
 from iveg.lab.emulator.orders import FaultOrder
 from iveg.lab.emulator.people import SimulatedPerson
 from iveg.lab.emulator.scripts import RobotScript
+from iveg.lab.emulator.targets import Target, person_target, robot_target, thing_target
 
 Camera = Literal["boxes", "grounding"]
 _LASER = LaserModel()
