@@ -16,8 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import PERSON_HEIGHT_M, Pose2D
+from iveg.lab.emulator.depth_camera import DepthCamera
 from iveg.lab.emulator.greenhouse import (
     Body,
     Disc,
@@ -38,33 +38,6 @@ _SHOULDERS_M = 1.5
 _HEAD_RADIUS_M = 0.1
 _NOISE_PATCH = 8
 """Pixels across: stereo matches windows, so neighbours err together."""
-
-
-@dataclass(frozen=True, slots=True)
-class DepthCamera:
-    """Depth camera on a robot, looking level.
-
-    Attributes:
-        lens: Of the picture that the depth is registered to.
-        height: Above the floor (m).
-        most: Largest measured depth (m).
-        baseline: Between the two imagers (m).
-        disparity_error: Standard deviation (pixels); depth errs by z² · e / (f · b).
-        dropouts: Share of pixels that are not measured, 0 to 1.
-    """
-
-    lens: Pinhole
-    height: float
-    most: float
-    baseline: float = 0.05
-    disparity_error: float = 0.08
-    dropouts: float = 0.005
-
-    @classmethod
-    def of(cls, profile: RobotProfile, baseline: float = 0.05) -> "DepthCamera":
-        """The camera of a kind of robot, 640 × 480."""
-        lens = Pinhole.across(profile.camera_fov)
-        return cls(lens, profile.camera_height, profile.camera_range, baseline)
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,13 +16,13 @@ from iveg.domain.geometry import Pose2D
 from iveg.domain.observations import Detection, Origin
 from iveg.lab.emulator.camera import FoundTarget
 from iveg.lab.emulator.depth import (
-    DepthCamera,
     Foliage,
     Upright,
     person_shape,
     robot_shape,
     take_picture,
 )
+from iveg.lab.emulator.depth_camera import DepthCamera
 from iveg.lab.emulator.detector_model import PERSON
 from iveg.lab.emulator.greenhouse import Disc, Scenery, into
 from iveg.lab.emulator.targets import Target

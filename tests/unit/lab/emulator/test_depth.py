@@ -8,7 +8,6 @@ from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.greenhouse import Greenhouse, StructuralPost
 from iveg.lab.emulator.depth import (
-    DepthCamera,
     DepthView,
     Foliage,
     Upright,
@@ -16,6 +15,7 @@ from iveg.lab.emulator.depth import (
     robot_shape,
     take_picture,
 )
+from iveg.lab.emulator.depth_camera import DepthCamera
 from iveg.lab.emulator.greenhouse import Body, Disc, Scenery
 from iveg.robot.grounding.cloud import DepthPicture, Pinhole
 from iveg.robot.grounding.locate import (
