@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from iveg.domain.geometry import PERSON_HEIGHT_M, Pose2D
 from iveg.lab.emulator.depth_camera import DepthCamera
+from iveg.lab.emulator.foliage import Foliage, hang_leaves
 from iveg.lab.emulator.greenhouse import (
     Body,
     Disc,
@@ -29,7 +30,7 @@ from iveg.lab.emulator.greenhouse import (
     slab_span,
 )
 from iveg.lab.emulator.targets import ROBOT_HEIGHT_M
-from iveg.robot.grounding.cloud import DepthPicture, Pinhole
+from iveg.robot.grounding.cloud import DepthPicture
 from iveg.robot.grounding.locate import Segment
 from iveg.robot.grounding.mask import Mask, write_mask
 
@@ -38,25 +39,6 @@ _SHOULDERS_M = 1.5
 _HEAD_RADIUS_M = 0.1
 _NOISE_PATCH = 8
 """Pixels across: stereo matches windows, so neighbours err together."""
-
-
-@dataclass(frozen=True, slots=True)
-class Foliage:
-    """Leaves about a target's outline that the mask network assigns to the target.
-
-    Attributes:
-        leaves: How many.
-        least_radius: (m); ``most_radius`` (m).
-        least_gap: How far behind or before the target they hang (m); ``most_gap`` (m).
-        before: Share that hangs in front of the target and hides a part of it, 0 to 1.
-    """
-
-    leaves: int = 30
-    least_radius: float = 0.01
-    most_radius: float = 0.03
-    least_gap: float = 0.2
-    most_gap: float = 0.8
-    before: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,7 +125,7 @@ def take_picture(
     leaked = np.zeros_like(instances)
     if foliage is not None:
         for number in range(1, len(targets) + 1):
-            _hang(camera.lens, foliage, number, depth, instances, leaked, rng)
+            hang_leaves(camera.lens, foliage, number, depth, instances, leaked, rng)
     measured = _measure(camera, depth, rng)
     return DepthView(DepthPicture(camera.lens, measured), instances, leaked)
 
@@ -228,45 +210,6 @@ def _height_span(rays: _Rays, bottom: float, top: float) -> Span:
 
 
 # --- leaves -----------------------------------------------------------------------
-
-
-def _hang(
-    lens: Pinhole,
-    foliage: Foliage,
-    number: int,
-    depth: Floats,
-    instances: NDArray[np.int16],
-    leaked: NDArray[np.int16],
-    rng: np.random.Generator,
-) -> None:
-    """Hang leaves about one target's outline, each a disc that faces the camera."""
-    rows, columns = np.nonzero(_outline(instances == number))
-    if not rows.size:
-        return
-    for pick in rng.integers(0, rows.size, foliage.leaves):
-        row, column = int(rows[pick]), int(columns[pick])
-        gap = rng.uniform(foliage.least_gap, foliage.most_gap)
-        side = -1.0 if rng.random() < foliage.before else 1.0
-        away = max(depth[row, column] + side * gap, 0.3)
-        radius = rng.uniform(foliage.least_radius, foliage.most_radius)
-        leaf = _disc(depth.shape, row, column, radius / away * lens.focal)
-        shows = leaf & (away < depth)
-        depth[shows] = away
-        instances[shows], leaked[shows] = 0, number
-
-
-def _outline(mask: Mask) -> Mask:
-    """Pixels of a mask that have one outside beside them."""
-    wide = np.pad(mask, 1, constant_values=True)
-    inner = wide[:-2, 1:-1] & wide[2:, 1:-1] & wide[1:-1, :-2] & wide[1:-1, 2:]
-    return mask & ~inner
-
-
-def _disc(shape: tuple[int, ...], row: int, column: int, radius: float) -> Mask:
-    rows = np.arange(shape[0])[:, None] - row
-    columns = np.arange(shape[1])[None, :] - column
-    disc: Mask = rows**2 + columns**2 <= radius**2
-    return disc
 
 
 # --- what is measured -------------------------------------------------------------
