@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from iveg.domain.geometry import PERSON_HEIGHT_M, Pose2D
 from iveg.lab.emulator.depth_camera import DepthCamera
+from iveg.lab.emulator.depth_errors import with_errors
 from iveg.lab.emulator.foliage import Foliage, hang_leaves
 from iveg.lab.emulator.greenhouse import (
     Body,
@@ -37,8 +38,6 @@ from iveg.robot.grounding.mask import Mask, write_mask
 _CROP_HEIGHT_M = 2.0
 _SHOULDERS_M = 1.5
 _HEAD_RADIUS_M = 0.1
-_NOISE_PATCH = 8
-"""Pixels across: stereo matches windows, so neighbours err together."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,7 +125,7 @@ def take_picture(
     if foliage is not None:
         for number in range(1, len(targets) + 1):
             hang_leaves(camera.lens, foliage, number, depth, instances, leaked, rng)
-    measured = _measure(camera, depth, rng)
+    measured = with_errors(camera, depth, rng)
     return DepthView(DepthPicture(camera.lens, measured), instances, leaked)
 
 
@@ -213,30 +212,3 @@ def _height_span(rays: _Rays, bottom: float, top: float) -> Span:
 
 
 # --- what is measured -------------------------------------------------------------
-
-
-def _measure(
-    camera: DepthCamera, depth: Floats, rng: np.random.Generator
-) -> NDArray[np.float32]:
-    """Depth with its errors; 0 where nothing was measured."""
-    scale = camera.disparity_error / (camera.lens.focal * camera.baseline)
-    measured = depth + depth**2 * scale * _patches(depth.shape, rng)
-    lost = rng.random(depth.shape) < camera.dropouts
-    measured[lost | (depth > camera.most) | (measured < 0.0)] = 0.0
-    return measured.astype(np.float32)
-
-
-def _patches(shape: tuple[int, ...], rng: np.random.Generator) -> Floats:
-    """Normal noise that neighbours share: drawn every few pixels, linear between."""
-    rows, columns = shape[0] / _NOISE_PATCH, shape[1] / _NOISE_PATCH
-    knots = rng.normal(0.0, 1.0, (math.ceil(rows) + 1, math.ceil(columns) + 1))
-    return _between(_between(knots, shape[0]).T, shape[1]).T
-
-
-def _between(knots: Floats, count: int) -> Floats:
-    """Linear between rows of knots; shape (count, …)."""
-    at = np.arange(count) / _NOISE_PATCH
-    below = at.astype(int)
-    share = (at - below)[:, None]
-    between: Floats = knots[below] * (1.0 - share) + knots[below + 1] * share
-    return between
