@@ -14,7 +14,8 @@ from typing import Generic, TypeVar
 from urllib.parse import parse_qsl, unquote
 
 from iveg.adapters import clock
-from iveg.adapters.connections import Connection, ConnectionCaps, ConnectionTable
+from iveg.adapters.connection_caps import ConnectionCaps
+from iveg.adapters.connections import Connection, ConnectionTable
 
 _log = logging.getLogger(__name__)
 _MAX_BODY = 8 << 20
