@@ -4,11 +4,12 @@ A hop is tested only when the hops it depends on are well, so that one broken pa
 one failed row and not six.  The order is the order of the examination.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 from iveg.adapters.fiware_http import NO_TOKEN
+from iveg.cli.findings import Case, Finding, Findings, Lag, Stack
 from iveg.domain.hops import NEEDS, Check, Hop
 from iveg.domain.probe import SLOW_S, lag_in_words
 
@@ -20,75 +21,6 @@ _ORION_WAITS_S = 4.0
 
 
 @dataclass(frozen=True, slots=True)
-class Lag:
-    """Delay of measures on their way to Orion.
-
-    Attributes:
-        lag_s: Seconds.
-        growing: Whether it is known to grow.
-        at_least: Whether the true lag may be longer.
-        told_by: Source of the lag, as a clause; empty for the doctor's own measure.
-    """
-
-    lag_s: float
-    growing: bool = False
-    at_least: bool = False
-    told_by: str = ""
-
-    @property
-    def sentence(self) -> str:
-        """A sentence such as "Measures reach Orion 23 s late, growing"."""
-        said = lag_in_words(self.lag_s, growing=self.growing, at_least=self.at_least)
-        return said[0].upper() + said[1:] + self.told_by
-
-
-@dataclass(frozen=True, slots=True)
-class Stack:
-    """Addresses for the sentences.
-
-    Attributes:
-        broker: Host and port of the MQTT broker.
-        user: User name at the broker; empty for anonymous.
-        listener: Address that Orion was asked to post to.
-        topics: The probe device's topics, up to the last slash.
-        token: Address of the token endpoint; empty: no proxy asks for one.
-        lag: Delay of measures, where that is known to be the cause.
-        waited_s: Time that the doctor waited for its measure (s).
-    """
-
-    broker: str
-    user: str
-    orion: str
-    agent: str
-    listener: str
-    database: str
-    page: str
-    topics: str
-    token: str = ""
-    lag: Lag | None = None
-    waited_s: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """Result of one tested hop.
-
-    Attributes:
-        took_s: Duration, or time waited (s).
-        trouble: None for success; the reason of a refusal; empty for a time-out.
-    """
-
-    check: Check
-    took_s: float
-    trouble: str | None = None
-
-    @property
-    def well(self) -> bool:
-        """Whether the hop works."""
-        return self.trouble is None
-
-
-@dataclass(frozen=True, slots=True)
 class DiagnosisRow:
     """One line of the table; ``sentence`` is empty for a hop that works."""
 
@@ -96,11 +28,6 @@ class DiagnosisRow:
     state: State
     took_s: float | None = None
     sentence: str = ""
-
-
-Findings = Mapping[Check, Finding]
-Case = Callable[[str, Findings], bool]
-"""Whether a cause explains a failure, by its reason and by all findings."""
 
 
 def missing(check: Check, findings: Findings) -> tuple[Check, ...]:

@@ -36,15 +36,8 @@ from iveg.adapters.history.engine import describe, history_url
 from iveg.adapters.post_listener import post_listener
 from iveg.app.fiware import open_fiware
 from iveg.cli.arguments import CommandCall
-from iveg.cli.diagnosis import (
-    Finding,
-    Lag,
-    Stack,
-    exit_code,
-    judge,
-    missing,
-    table,
-)
+from iveg.cli.diagnosis import exit_code, judge, missing, table
+from iveg.cli.findings import Finding, Lag, Stack
 from iveg.cli.nodes import broker_of
 from iveg.cli.probe import Probe
 from iveg.cli.running import run_until_stopped
