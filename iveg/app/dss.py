@@ -28,13 +28,13 @@ from iveg.adapters.recordings.recorder import RecordedSink
 from iveg.adapters.transports import MqttTransport, OrionTransport
 from iveg.adapters.webauthn import has_passkeys
 from iveg.adapters.worker import PACK_LIMIT_S, Worker
+from iveg.app.agreement import picture
 from iveg.app.counts import count_all, read_queues
 from iveg.app.door import open_door
 from iveg.app.laboratory import find_laboratory
 from iveg.app.life import Work, live
 from iveg.app.outside import Outside, open_outside
 from iveg.app.past import Site as PastSite
-from iveg.app.past import picture
 from iveg.app.viewers import Viewers
 from iveg.app.what_if import WhatIfs
 from iveg.domain.errors import HopError, VitalPartError

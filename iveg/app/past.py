@@ -23,16 +23,14 @@ from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.adapters.recordings.incoming import NOTIFICATIONS
 from iveg.adapters.recordings.timeline import Found, Place, Timeline
+from iveg.app.agreement import Agreement, picture
 from iveg.app.virtual import VirtualPipeline
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import NotRecordedError, UnreadableError
 from iveg.domain.kinds import Scope
 from iveg.domain.observations import Instant
 from iveg.domain.transports import DIRECT, FIWARE
-from iveg.models.base import write_json
-from iveg.pipeline import topics
 from iveg.pipeline.memory import Memory
-from iveg.pipeline.topics import StateReader
 from iveg.pipeline.trace import (
     HASHES_S,
     JUDGED,
@@ -58,16 +56,6 @@ _PLAY_ON_NS: Final = 2 * round(KEYFRAMES_S * _NS)
 """What is farther on is reached sooner from a memory."""
 _COMPARED_NS: Final = 2 * round(HASHES_S * _NS)
 """Of what leads to a moment the newest hashes are compared: one costs a picture."""
-_NOT_HASHED = topics.LOG, topics.HEALTH, topics.MAP
-"""They tell of the server, and not of the world."""
-
-
-def picture(views: StateReader, now: Instant) -> bytes:
-    """The world as it is hashed: what a page is shown, but of the server itself."""
-    rows = (row for row in topics.TOPICS if row not in _NOT_HASHED)
-    body = write_json({row.member: row.read(views, now) for row in rows if row.read})
-    # Some parts keep things in sets, which are in no order.
-    return orjson.dumps(orjson.loads(body), option=orjson.OPT_SORT_KEYS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,25 +90,6 @@ class Site:
             settings.direct_read,
             settings.stop_direct,
         )
-
-
-@dataclass(slots=True)
-class Agreement:
-    """How the hashes of a run compare: with the live ones, so far.
-
-    Attributes:
-        newest: Of the last one that was passed; None: of none yet.
-    """
-
-    equal: int = 0
-    unequal: int = 0
-    newest: bool | None = None
-
-    def note(self, is_equal: bool) -> None:
-        """One more."""
-        self.newest = is_equal
-        self.equal += is_equal
-        self.unequal += not is_equal
 
 
 @dataclass(slots=True)
