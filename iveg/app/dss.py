@@ -34,7 +34,7 @@ from iveg.app.door import open_door
 from iveg.app.laboratory import find_laboratory
 from iveg.app.life import Work, live
 from iveg.app.outside import Outside, open_outside
-from iveg.app.past import Site as PastSite
+from iveg.app.site import Site as PastSite
 from iveg.app.viewers import Viewers
 from iveg.app.what_if import WhatIfs
 from iveg.domain.errors import HopError, VitalPartError

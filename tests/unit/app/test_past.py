@@ -23,7 +23,8 @@ from iveg.adapters.recordings.chunks import ChunkedRecording
 from iveg.adapters.recordings.recorder import InputRecorder
 from iveg.adapters.recordings.writer import WriterSetup
 from iveg.app.agreement import picture
-from iveg.app.past import Past, Site
+from iveg.app.past import Past
+from iveg.app.site import Site
 from iveg.app.viewers import (
     IDLE_S,
     MOST_READY,
