@@ -17,7 +17,8 @@ from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.mqtt import MqttLink
 from iveg.adapters.orion import OrionClient
 from iveg.adapters.provisioner import Provisioner
-from iveg.adapters.subscriptions import ensure_subscriptions, wanted_for
+from iveg.adapters.subscriptions import ensure_subscriptions
+from iveg.adapters.wanted_subscriptions import wanted_for
 from iveg.domain.feeds import Feeds
 from iveg.domain.observations import Odometry, Origin, Received
 from iveg.lab.embedded.http_server import Request, Response, http_server
