@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from iveg.domain.feedback import SpeedLimit
 from iveg.domain.geometry import REST, Twist2D
-from iveg.lab.emulator.ros2_base import TIMEOUT_S, DriveWatchdog
+from iveg.lab.emulator.ros2_navigation import TIMEOUT_S, DriveWatchdog
 from iveg.robot.caps import Cap
 from iveg.robot.effects import Drive as Told
 from iveg.robot.gate import RAMP_M_S2, RAMP_RAD_S2

@@ -18,8 +18,9 @@ from iveg.domain.observations import (
 from iveg.lab.emulator.detector_model import DETECTORS
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.orders import FaultOrder
-from iveg.lab.emulator.ros2_base import TIMEOUT_S, DriveWatchdog, Ros2Base
-from iveg.lab.emulator.ros2_base import SimulatedNavigation as Nav
+from iveg.lab.emulator.ros2_base import Ros2Base
+from iveg.lab.emulator.ros2_navigation import TIMEOUT_S, DriveWatchdog
+from iveg.lab.emulator.ros2_navigation import SimulatedNavigation as Nav
 from iveg.lab.emulator.scenarios import scenario_named
 from iveg.lab.emulator.world import SimulatedWorld
 from iveg.robot.ros2.config import RobotConfig
