@@ -34,7 +34,7 @@ from iveg.lab.emulator.truth import true_picture
 from iveg.lab.experiment.moments import moments_of
 from iveg.lab.experiment.protection import AHEAD_S, NEAR_M, entries_of
 from iveg.lab.experiment.recording import Row
-from iveg.lab.experiment.stage import STEP_S
+from iveg.lab.experiment.staged_robot import STEP_S
 from iveg.lab.experiment.virtual_run import foretold_row
 
 _SAME_M = 1.0

@@ -26,7 +26,8 @@ from iveg.lab.experiment.plan import ROBOTS, WATCHED, PlannedRun
 from iveg.lab.experiment.protection import protection_of
 from iveg.lab.experiment.recording import Row, RunRecording, picture_of
 from iveg.lab.experiment.scoring import Picture
-from iveg.lab.experiment.stage import STEP_S, Stage
+from iveg.lab.experiment.stage import Stage
+from iveg.lab.experiment.staged_robot import STEP_S
 from iveg.pipeline.mapping import Mapper
 from iveg.robot.costmap import FleetCostmap
 from iveg.web.views import Views

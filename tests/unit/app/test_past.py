@@ -42,7 +42,8 @@ from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.orders import FaultOrder
 from iveg.lab.emulator.scenarios import scenario_named
 from iveg.lab.emulator.world import SimulatedWorld
-from iveg.lab.experiment.stage import STEP_S, Stage
+from iveg.lab.experiment.stage import Stage
+from iveg.lab.experiment.staged_robot import STEP_S
 from iveg.ngsi import codec
 from iveg.pipeline.build import Choices, Pipeline, Ports, build
 from iveg.pipeline.memory import Memory
