@@ -26,7 +26,8 @@ from iveg.lab.emulator.truth import true_picture
 from iveg.lab.emulator.world import SimulatedWorld
 from iveg.lab.experiment import protection_tables
 from iveg.lab.experiment.moments import moments_of
-from iveg.lab.experiment.protection import Protection, protection_of, whole
+from iveg.lab.experiment.protection import Protection, whole
+from iveg.lab.experiment.protection_scoring import protection_of
 from iveg.lab.experiment.recording import Row
 from iveg.lab.experiment.stage import Stage
 from iveg.lab.experiment.staged_robot import STEP_S

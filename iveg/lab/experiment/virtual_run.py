@@ -23,7 +23,7 @@ from iveg.lab.experiment.beliefs import belief_of
 from iveg.lab.experiment.failures import FAILURES, LINK_LOST_S, drawn
 from iveg.lab.experiment.moments import moments_of
 from iveg.lab.experiment.plan import ROBOTS, WATCHED, PlannedRun
-from iveg.lab.experiment.protection import protection_of
+from iveg.lab.experiment.protection_scoring import protection_of
 from iveg.lab.experiment.recording import Row, RunRecording, picture_of
 from iveg.lab.experiment.scoring import Picture
 from iveg.lab.experiment.stage import Stage
