@@ -23,8 +23,8 @@ from iveg.adapters.greenhouses import load_greenhouse
 from iveg.adapters.ids import new_id
 from iveg.adapters.loop_watch import LoopWatch
 from iveg.adapters.provisioner import Provisioner
+from iveg.adapters.recordings.recorded_sink import RecordedSink
 from iveg.adapters.recordings.recorder import PART as RECORDINGS
-from iveg.adapters.recordings.recorder import RecordedSink
 from iveg.adapters.transports import MqttTransport, OrionTransport
 from iveg.adapters.webauthn import has_passkeys
 from iveg.adapters.worker import PACK_LIMIT_S, Worker

@@ -30,7 +30,6 @@ from iveg.domain.observations import Instant, LaserScan, Observation, Overtaken
 from iveg.domain.recordings import RecordingFile
 from iveg.domain.records import Record, is_telemetry
 from iveg.pipeline.ports import Clock
-from iveg.pipeline.record import RecordSink
 
 _log = logging.getLogger(__name__)
 _T = TypeVar("_T")
@@ -42,22 +41,6 @@ QUIET_S = 60.0
 """What is dropped is told again where nothing was for so long (s)."""
 _NUMBERS = re.compile(rb"\[[-+.,\deE\snul]{100,}\]")
 """A long list of numbers in JSON."""
-
-
-class RecordedSink:
-    """The history's recorder, whose rows are recorded here, too.
-
-    Implements ``pipeline.record.RecordSink``.
-    """
-
-    def __init__(self, history: RecordSink, row: Callable[[Record], None]) -> None:
-        self._history, self._row = history, row
-        self.flushed = history.flushed
-
-    def enqueue(self, record: Record) -> None:
-        """Queue a record in both."""
-        self._history.enqueue(record)
-        self._row(record)
 
 
 class InputRecorder:
