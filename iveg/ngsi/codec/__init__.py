@@ -14,7 +14,8 @@ from iveg.ngsi.codec.commands import (
     write_resume,
     write_stop,
 )
-from iveg.ngsi.codec.feedback import FeedbackWriter, read_feedback, write_feedback
+from iveg.ngsi.codec.feedback import read_feedback
+from iveg.ngsi.codec.feedback_writer import FeedbackWriter, write_feedback
 from iveg.ngsi.codec.incoming import (
     read_answer,
     read_entity,
