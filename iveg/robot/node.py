@@ -41,7 +41,8 @@ from iveg.ngsi.codec import read_feedback
 from iveg.robot.caps import FREE, Cap
 from iveg.robot.echo import Echo
 from iveg.robot.effects import Drive, Effect, Persist, Report, SendAnswer
-from iveg.robot.goals import Facts, Navigate, RobotGoals, read_goal
+from iveg.robot.goal_orders import read_goal
+from iveg.robot.goals import Facts, Navigate, RobotGoals
 from iveg.robot.hold_file import read_holds, write_holds
 from iveg.robot.judgement import Limits
 from iveg.robot.keepsake import Keepsake
