@@ -24,7 +24,7 @@ from iveg.robot.goals import Navigate
 from iveg.robot.neighbours import Neighbours
 from iveg.robot.node import RobotNode
 from iveg.robot.pacing import every
-from iveg.robot.ros2 import neighbours
+from iveg.robot.ros2 import markers, neighbours
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.costmap import CostmapTopic
 from iveg.robot.ros2.drive import DriveTopics, message_of
@@ -296,7 +296,7 @@ class Ros2Robot:
             found = neighbours.cloud(present, own, stamp, frames.base_link)
             cloud.write(cdr.write(found))
         if drawing is not None:
-            drawn = neighbours.markers(present, stamp, frames.map)
+            drawn = markers.markers(present, stamp, frames.map)
             drawing.write(cdr.write(drawn))
 
 
