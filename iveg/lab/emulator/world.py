@@ -25,10 +25,11 @@ from iveg.lab.emulator.camera import EmulatedDetector, upright_box
 from iveg.lab.emulator.detector_model import PERSON, DetectorModel
 from iveg.lab.emulator.greenhouse import Body, Disc, Scenery
 from iveg.lab.emulator.grounded import GroundedCamera
-from iveg.lab.emulator.kinematics import Odometer, Vehicle
+from iveg.lab.emulator.kinematics import Vehicle
 from iveg.lab.emulator.layout import Layout
 from iveg.lab.emulator.lidar import LaserModel, sweep
 from iveg.lab.emulator.navigation import Navigator
+from iveg.lab.emulator.odometer import Odometer
 from iveg.lab.emulator.orders import FaultOrder
 from iveg.lab.emulator.people import SimulatedPerson
 from iveg.lab.emulator.scripts import RobotScript
