@@ -18,13 +18,14 @@ from iveg.models.alert import Alert, Flood, LogEntry
 from iveg.models.base import moment, rounded
 from iveg.models.climate import Climate
 from iveg.models.command import Command as CommandModel
+from iveg.models.detection import Detection, DetectionFrame
 from iveg.models.device import Device
 from iveg.models.equipment import Tile
 from iveg.models.goal import Goal
 from iveg.models.health import Health, Safety
 from iveg.models.health import HopHealth as HopModel
 from iveg.models.margin import Margin
-from iveg.models.people import Acting, Detection, DetectionFrame, Evidence
+from iveg.models.people import Acting, Evidence
 from iveg.models.people import Person as PersonModel
 from iveg.models.places import GreenhouseMap, Position, Scan
 from iveg.models.pose import Pose, Twist

@@ -29,10 +29,10 @@ from iveg.models.audit import AuditEntry
 from iveg.models.base import Listing, Model, write_json
 from iveg.models.command import Command
 from iveg.models.decision import Decision
+from iveg.models.detection import DetectionRow
 from iveg.models.dictionary import DictionaryColumn, dictionary_columns
 from iveg.models.equipment import Measurement
 from iveg.models.odometry import OdometryRow
-from iveg.models.people import DetectionRow
 from iveg.models.reading import Reading
 from iveg.pipeline.ports import Clock
 from iveg.web.api import exports, figures

@@ -9,9 +9,10 @@ from iveg.models.base import Listing
 from iveg.models.climate import Climate
 from iveg.models.command import Command
 from iveg.models.decision import Decision
+from iveg.models.detection import DetectionRow
 from iveg.models.health import Health
 from iveg.models.latency import LatencyTable
-from iveg.models.people import DetectionRow, Person
+from iveg.models.people import Person
 from iveg.models.places import GreenhouseMap, Scan
 from iveg.models.robot import Robot
 from iveg.models.rule import Rule
