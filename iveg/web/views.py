@@ -14,7 +14,7 @@ from iveg.domain.rule.speed_limits import Crossing
 from iveg.domain.stamps import format_stamp
 from iveg.domain.stop import FollowedCommand, StopMachine
 from iveg.domain.tracking.person import TrackedPerson
-from iveg.models.alert import Alert, Flood, LogEntry
+from iveg.models.alert import Alert, Flood
 from iveg.models.base import moment, rounded
 from iveg.models.climate import Climate
 from iveg.models.command import Command as CommandModel
@@ -24,6 +24,7 @@ from iveg.models.equipment import Tile
 from iveg.models.goal import Goal
 from iveg.models.health import Health, Safety
 from iveg.models.health import HopHealth as HopModel
+from iveg.models.log_entry import LogEntry
 from iveg.models.margin import Margin
 from iveg.models.people import Acting, Evidence
 from iveg.models.people import Person as PersonModel

@@ -24,7 +24,7 @@ from iveg.domain.alerts.flood import FloodState as NoFlood
 from iveg.domain.errors import MissingExtraError
 from iveg.domain.fleet import NOBODY, FleetDescription
 from iveg.domain.records import CommandRecord, DecisionRecord, Record
-from iveg.models.alert import Alert, AlertListing, Flood, LogEntry
+from iveg.models.alert import Alert, AlertListing, Flood
 from iveg.models.audit import AuditEntry
 from iveg.models.base import Listing, Model, write_json
 from iveg.models.command import Command
@@ -32,6 +32,7 @@ from iveg.models.decision import Decision
 from iveg.models.detection import DetectionRow
 from iveg.models.dictionary import DictionaryColumn, dictionary_columns
 from iveg.models.equipment import Measurement
+from iveg.models.log_entry import LogEntry
 from iveg.models.odometry import OdometryRow
 from iveg.models.reading import Reading
 from iveg.pipeline.ports import Clock
