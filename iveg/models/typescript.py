@@ -25,12 +25,12 @@ from iveg.models.latency import LatencyTable
 from iveg.models.messages import Messages, MessageTest
 from iveg.models.places import Costmap, Coverage, Scan
 from iveg.models.press import FleetPressed
+from iveg.models.programs import NewToken
 from iveg.models.reading import Reading
 from iveg.models.robot_access import RobotAccess
 from iveg.models.rule import Trial
 from iveg.models.signing_in import (
     Invitation,
-    NewToken,
     OpenSession,
     OwnAccount,
     PasskeyOfPerson,
