@@ -23,6 +23,7 @@ from iveg.models.decision import Decision
 from iveg.models.experiment import Experiments
 from iveg.models.latency import LatencyTable
 from iveg.models.messages import Messages, MessageTest
+from iveg.models.passkeys import PasskeyOfPerson, Proof
 from iveg.models.places import Costmap, Coverage, Scan
 from iveg.models.press import FleetPressed
 from iveg.models.programs import NewToken
@@ -33,8 +34,6 @@ from iveg.models.signing_in import (
     Invitation,
     OpenSession,
     OwnAccount,
-    PasskeyOfPerson,
-    Proof,
     SignInCode,
     Tablet,
 )
