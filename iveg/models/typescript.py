@@ -30,15 +30,10 @@ from iveg.models.programs import NewToken
 from iveg.models.reading import Reading
 from iveg.models.robot_access import RobotAccess
 from iveg.models.rule import Trial
-from iveg.models.signing_in import (
-    Invitation,
-    OpenSession,
-    OwnAccount,
-    SignInCode,
-    Tablet,
-)
+from iveg.models.signing_in import Invitation, OpenSession, OwnAccount, SignInCode
 from iveg.models.snapshot import PastWorld, Snapshot
 from iveg.models.stop_latency import Drill, Latency
+from iveg.models.tablets import Tablet
 from iveg.models.thing import KnownSpot, Thing
 from iveg.models.what_if import WhatIf
 
