@@ -14,7 +14,7 @@ from fastapi import APIRouter, Depends, HTTPException, Response
 from pydantic import AfterValidator, Field
 
 from iveg.adapters import web_push
-from iveg.adapters.outbound import is_public_target
+from iveg.adapters.public_addresses import is_public_target
 from iveg.domain import messages
 from iveg.domain.messages import (
     Channel,

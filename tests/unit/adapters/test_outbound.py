@@ -12,7 +12,8 @@ from cryptography.hazmat.primitives.asymmetric import ec, utils
 
 from iveg.adapters import web_push
 from iveg.adapters.mail import MailSender
-from iveg.adapters.outbound import OutboundHttp, is_public, is_public_target
+from iveg.adapters.outbound import OutboundHttp
+from iveg.adapters.public_addresses import is_public, is_public_target
 from iveg.adapters.web_push import PushSender, decode, encode, encrypted, new_key
 from iveg.adapters.webhook import WebhookSender
 from iveg.domain.errors import OutboundError
