@@ -24,12 +24,8 @@ from urllib.parse import urlsplit
 import orjson
 
 from iveg.adapters import clock
-from iveg.adapters.doctor import (
-    ProbeDevice,
-    TopicListener,
-    check_database,
-    probe_device,
-)
+from iveg.adapters.database_check import check_database
+from iveg.adapters.doctor import ProbeDevice, TopicListener, probe_device
 from iveg.adapters.fiware_http import FiwareHttp
 from iveg.adapters.history.engine import describe, history_url
 from iveg.adapters.post_listener import post_listener

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 
 from iveg.adapters import clock
 from iveg.adapters.admission import Admission, admit_program, has_admin
-from iveg.adapters.doctor import check_database
+from iveg.adapters.database_check import check_database
 from iveg.adapters.history.accounts import AccountRows, AccountStore
 from iveg.adapters.history.api_tokens import ApiTokenStore
 from iveg.adapters.history.engine import history_url
