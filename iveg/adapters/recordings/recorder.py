@@ -17,10 +17,11 @@ from typing import TypeVar
 
 import orjson
 
-from iveg.adapters.recordings.directory import RecordingDirectory, finish_broken
+from iveg.adapters.recordings.directory import RecordingDirectory
 from iveg.adapters.recordings.excerpt import write_excerpt
 from iveg.adapters.recordings.incoming import Sort, pack
 from iveg.adapters.recordings.live_feed import LiveFeed
+from iveg.adapters.recordings.repair import finish_broken
 from iveg.adapters.recordings.writer import PRUNE_S, WriterSetup
 from iveg.adapters.recordings.writer_process import WriterProcess
 from iveg.adapters.worker import Worker

@@ -13,7 +13,6 @@ import pytest
 from mcap.reader import make_reader
 
 from iveg.adapters import clock
-from iveg.adapters.recordings.directory import finish_broken
 from iveg.adapters.recordings.incoming import Sort, Unpacking, pack
 from iveg.adapters.recordings.mcap_file import CHUNK_BYTES, PADDING
 from iveg.adapters.recordings.reading import is_own, read_messages
@@ -24,6 +23,7 @@ from iveg.adapters.recordings.recorder import (
     WRITE_S,
     InputRecorder,
 )
+from iveg.adapters.recordings.repair import finish_broken
 from iveg.adapters.recordings.writer import WriterSetup
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.disk_space import DiskSpace
