@@ -7,7 +7,7 @@ from typing import Annotated, Final
 
 from fastapi import APIRouter, Depends, HTTPException, Response
 
-from iveg.adapters.admission import admit_program
+from iveg.adapters.program_admission import admit_program
 from iveg.domain.accounts import ApiToken, TokenScope, name_key
 from iveg.domain.errors import UnknownNameError
 from iveg.models.base import Body, Listing
