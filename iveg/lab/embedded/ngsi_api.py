@@ -8,7 +8,7 @@ from iveg.adapters import clock
 from iveg.lab.embedded import entity_paths, subscription_paths
 from iveg.lab.embedded.context_broker import ContextBroker
 from iveg.lab.embedded.errors import FiwareError, bad_request
-from iveg.lab.embedded.http_server import Request, Response, Routes
+from iveg.lab.embedded.http_server import Request, Response
 from iveg.lab.embedded.ngsi_request import (
     NgsiCall,
     check_accept,
@@ -16,6 +16,7 @@ from iveg.lab.embedded.ngsi_request import (
     read_options,
     read_scope,
 )
+from iveg.lab.embedded.routes import Routes
 
 _Route = Callable[[ContextBroker, NgsiCall], Awaitable[Response]]
 
