@@ -14,8 +14,8 @@ from iveg.lab.embedded.ngsi_request import (
     check_accept,
     check_content,
     read_options,
-    read_scope,
 )
+from iveg.lab.embedded.request_scope import read_scope
 from iveg.lab.embedded.routes import Routes
 
 _Route = Callable[[ContextBroker, NgsiCall], Awaitable[Response]]

@@ -1,6 +1,5 @@
 """Common parts of NGSI-v2 requests: headers, options, paging, body."""
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -17,8 +16,6 @@ from iveg.lab.embedded.orion_text import check_given_name, load_json, looks_clea
 from iveg.lab.embedded.views import EntityView
 
 _MAX_BODY = 1 << 20
-_SERVICE = re.compile(r"[a-z0-9_]{0,50}")
-_PATH = re.compile(r"/|(/[A-Za-z0-9_]{1,50}){1,10}")
 _OPTIONS = {
     "keyValues", "values", "count", "upsert", "skipForwarding", "forcedUpdate",
     "normalized", "skipInitialNotification",
@@ -143,29 +140,6 @@ def check_accept(request: Request) -> None:
     usable = {"*/*", "application/*", _JSON}
     if kinds.isdisjoint(usable):
         raise FiwareError("NotAcceptable", "no acceptable mime-type in accept header")
-
-
-def read_scope(request: Request, correlator: str, now: float) -> Scope:
-    """Tenant and service path of a request.
-
-    Raises:
-        FiwareError: 400, invalid tenant or service path.
-    """
-    service = request.headers.get("fiware-service", "").lower()
-    if _SERVICE.fullmatch(service) is None:
-        raise bad_request(
-            "bad character in tenant name - only underscore and alphanumeric "
-            "characters are allowed"
-        )
-    reads = request.method == "GET"
-    path = request.headers.get("fiware-servicepath", "/#" if reads else "/")
-    if not path.startswith("/"):
-        raise bad_request(
-            "Only /absolute/ Service Paths allowed [a service path must begin with /]"
-        )
-    if _PATH.fullmatch(path) is None and not (reads and path == "/#"):
-        raise bad_request("Bad Character in Service-Path")
-    return Scope(service, path, correlator, now)
 
 
 def _read_paging(query: Mapping[str, str]) -> tuple[int, int]:
