@@ -2,7 +2,7 @@
 
 Uses Eclipse Cyclone DDS, an optional extra (``iveg[ros2]``); nothing but this module
 and ``dds_types`` imports it.
-Payloads stay bytes here:  DDS checks them against the type, and ``iveg.ros2.cdr`` reads
+Payloads stay bytes here: DDS checks them against the type, and ``iveg.ros2.cdr`` reads
 the few that are wanted.  None of Cyclone's threads calls iVeg; one thread of ours waits
 for messages that must be answered at once and wakes the event loop.
 """

@@ -1,6 +1,6 @@
-"""Adapters of ``iveg doctor`` alone: a probe device, a check of the database.
+"""The probe device of ``iveg doctor``.
 
-They report the reason of a failure where a running iVeg tries again.
+It reports the reason of a failure where a running iVeg tries again.
 """
 
 import asyncio

@@ -1,4 +1,8 @@
-"""Encryption and signing of messages to browsers (RFC 8291, 8188 and 8292)."""
+"""Encryption and signing of messages to browsers (RFC 8291, 8188 and 8292, VAPID).
+
+``pywebpush`` does the same and brings requests, aiohttp and four more; this is what is
+left of it over ``cryptography``.
+"""
 
 import os
 from base64 import urlsafe_b64decode, urlsafe_b64encode

@@ -1,11 +1,7 @@
-"""The subscriptions that iVeg wants at Orion, and their repair.
+"""Repair of the subscriptions that iVeg wants at Orion.
 
 They are found again after a restart by the beginning of their description, so there is
 always one of each, however often iVeg starts.
-
-Odometry and scans have one subscription for each robot:  Orion throttles a subscription
-as a whole, so in a common one the robot that sends first in each second would silence
-the others.
 """
 
 from collections.abc import Mapping, Sequence

@@ -1,4 +1,9 @@
-"""The subscriptions that iVeg wants at Orion."""
+"""The subscriptions that iVeg wants at Orion.
+
+Odometry and scans have one subscription for each robot:  Orion throttles a subscription
+as a whole, so in a common one the robot that sends first in each second would silence
+the others.
+"""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass

@@ -1,8 +1,6 @@
 """Messages to browsers by their push services.
 
-Sent by RFC 8030, encrypted by RFC 8291, signed by RFC 8292 (VAPID).  ``pywebpush`` does
-the same and brings requests, aiohttp and four more; this is what is left of it over
-``cryptography``.
+Sent by RFC 8030; ``push_encryption`` encrypts and signs.
 """
 
 import asyncio

@@ -1,4 +1,4 @@
-"""Alerts (ISA-18.2) and lines of the log."""
+"""Alerts (ISA-18.2)."""
 
 from typing import cast
 

@@ -1,4 +1,4 @@
-"""People, and what detectors saw of them."""
+"""People, and the robots that are slowed for them."""
 
 from pydantic import Field
 

@@ -1,4 +1,4 @@
-"""The way in for another device, and for other people."""
+"""Accounts, the links that people sign in with, and open sessions."""
 
 from typing import Literal
 

@@ -1,4 +1,4 @@
-"""The directory of the recordings: names, sizes, what a crash left, what goes."""
+"""The directory of the recordings: names, sizes, and which file is deleted next."""
 
 import logging
 from collections.abc import Sequence

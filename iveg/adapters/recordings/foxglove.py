@@ -1,7 +1,6 @@
 """Observations as Foxglove's well-known messages, so that its viewers draw them.
 
-Names and fields: https://docs.foxglove.dev/docs/sdk/schemas.  Frames are ``map`` and
-``{robot}/base_link``.
+Frames are ``map`` and ``{robot}/base_link``.
 """
 
 import math

@@ -1,4 +1,7 @@
-"""Schemas of Foxglove's well-known messages, as far as they are used."""
+"""Schemas of Foxglove's well-known messages, as far as they are used.
+
+Names and fields: https://docs.foxglove.dev/docs/sdk/schemas.
+"""
 
 _NUMBER, _TEXT, _FLAG = {"type": "number"}, {"type": "string"}, {"type": "boolean"}
 

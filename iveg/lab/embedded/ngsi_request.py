@@ -1,4 +1,4 @@
-"""Common parts of NGSI-v2 requests: headers, options, paging, body."""
+"""Common parts of NGSI-v2 requests: options, paging, body."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

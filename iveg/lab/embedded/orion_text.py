@@ -1,4 +1,4 @@
-"""Orion's dates and text: JSON of limited depth without forbidden characters."""
+"""Texts as Orion takes them: JSON of limited depth without forbidden characters."""
 
 import re
 from functools import lru_cache

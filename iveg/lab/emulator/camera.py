@@ -5,9 +5,7 @@ view, in range and not hidden by crop or crates opens an *encounter* of 0.5 to 2
 a miss, the confidence and a possible false box are drawn once per encounter, so that
 errors last as long as real ones and do not flicker between two frames.
 
-Source of the rates: the seed paper's field table (true positives, false positives,
-false negatives per class).  Assumed: the spread of confidence, the length of an
-encounter, that false boxes are less sure than true ones.
+Assumed: the length of an encounter.  The rates are those of ``detector_model``.
 """
 
 import math

@@ -4,9 +4,7 @@ Everything is upright on a flat floor - a footprint from one height to another -
 pixel's ray meets it where its column meets the footprint and its row the heights: two
 small problems instead of 307,200.  Depth runs along the optical axis (m).
 
-Sources: Intel's D400 tuning paper (disparity error 0.08 pixels, baseline 50 mm) and
-Point Grey's Bumblebee2 sheet (120 mm) for noise; sizes of leaves are assumed.  Left
-out: arms and legs, lens distortion, shadows of the second imager, flying pixels.
+Left out: arms and legs, lens distortion, shadows of the second imager, flying pixels.
 """
 
 import math

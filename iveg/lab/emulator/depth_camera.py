@@ -1,4 +1,8 @@
-"""A depth camera on a robot: its picture, its height and its errors."""
+"""A depth camera on a robot: its picture, its height and its errors.
+
+Sources of the noise: Intel's D400 tuning paper (disparity error 0.08 pixels, baseline
+50 mm) and Point Grey's Bumblebee2 sheet (120 mm).
+"""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,7 @@
-"""Leaves about a target's outline, which the mask network takes for the target."""
+"""Leaves about a target's outline, which the mask network takes for the target.
+
+Sizes of leaves are assumed.
+"""
 
 from dataclasses import dataclass
 

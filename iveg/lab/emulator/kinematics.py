@@ -1,4 +1,4 @@
-"""Robot motion: drives with limits, and odometry with noise.
+"""Robot motion: drives with limits.
 
 Source: the seed paper (AGI turns on the spot, AGII has a turning radius of 2 m).  Left
 out: slip, load, slopes.

@@ -1,4 +1,4 @@
-"""The simulated world: robots, people and climate, and each robot's sensor values.
+"""The simulated world: robots and people, and each robot's sensor values.
 
 Deterministic for a seed: time is an argument, so an hour is a loop of steps.
 ``fleet.py`` runs the same world in real time over MQTT.

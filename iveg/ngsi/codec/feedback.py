@@ -1,4 +1,4 @@
-"""The feedback that iVeg publishes for the fleet, both ways."""
+"""Reading of the feedback that iVeg publishes for the fleet."""
 
 import math
 from typing import Annotated

@@ -1,4 +1,4 @@
-"""From Orion's notifications and the robots' topics to observations.
+"""From Orion's notifications to observations.
 
 A part that cannot be read becomes a ``Problem`` beside its neighbours and never hurts
 them.

@@ -1,4 +1,4 @@
-"""Neighbours as shapes in RViz."""
+"""Neighbours as shapes in RViz, in ``map``."""
 
 from collections.abc import Iterable
 

@@ -1,8 +1,8 @@
-"""People and robots nearby for Nav2's costmap and for RViz.
+"""People and robots nearby for Nav2's costmap.
 
 The paper's costmap injection.  A point cloud in ``base_link`` holds a disc for each
 person and peer, and a circle of far points that clear the layer: a separate layer
-(docs/robots.md) marks the discs and removes old ones.  Markers are in ``map``.
+(docs/robots.md) marks the discs and removes old ones.
 """
 
 import math
