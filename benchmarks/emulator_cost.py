@@ -10,7 +10,7 @@ import time
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.domain.geometry import Twist2D
 from iveg.domain.observations import Instant
-from iveg.lab.emulator.camera import DETECTORS
+from iveg.lab.emulator.detector_model import DETECTORS
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.scenarios import scenario_named
 from iveg.lab.emulator.world import Camera, SimulatedWorld

@@ -20,9 +20,11 @@ import uvloop
 
 from benchmarks.fiware_ends import HOST
 from benchmarks.process import Usage, machine, pause, percentile, print_table
-from iveg.adapters.iot_agent import IotAgentClient, provision
+from iveg.adapters.fleet_provisioning import provision
+from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.orion import OrionClient
-from iveg.adapters.subscriptions import ensure_subscriptions, wanted_for
+from iveg.adapters.subscriptions import ensure_subscriptions
+from iveg.adapters.wanted_subscriptions import wanted_for
 from iveg.lab.embedded.server import embedded_fiware
 
 TENANT = ("agroconnect", "/greenhouse")

@@ -15,13 +15,9 @@ from iveg.adapters.fleet_files import built_in
 from iveg.domain.geometry import Rectangle
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import Origin
-from iveg.lab.emulator.depth import (
-    DepthCamera,
-    DepthView,
-    Foliage,
-    person_shape,
-    take_picture,
-)
+from iveg.lab.emulator.depth import DepthView, person_shape, take_picture
+from iveg.lab.emulator.depth_camera import DepthCamera
+from iveg.lab.emulator.foliage import Foliage
 from iveg.lab.emulator.greenhouse import Disc, Scenery
 from iveg.robot.grounding.locate import Mount, body_of, ground_frame
 

@@ -22,8 +22,10 @@ from sqlalchemy import Connection, Engine, event, text
 from sqlalchemy.engine.interfaces import DBAPICursor
 
 from benchmarks.process import machine, percentile, print_table
-from iveg.adapters.history import lists
+from iveg.adapters.history import cursors, listings
 from iveg.adapters.history.ages import lost_of
+from iveg.adapters.history.command_latencies import command_latencies
+from iveg.adapters.history.confidence import confidence_counts
 from iveg.adapters.history.cost import cost_rows
 from iveg.adapters.history.day_partitions import (
     PARTITIONED,
@@ -34,14 +36,9 @@ from iveg.adapters.history.day_partitions import (
 from iveg.adapters.history.engine import writing_engine
 from iveg.adapters.history.lists import Filter
 from iveg.adapters.history.migrate import upgrade
+from iveg.adapters.history.places import people_seen, poses_of
 from iveg.adapters.history.queries import Queries
-from iveg.adapters.history.series import (
-    command_latencies,
-    confidence_counts,
-    people_seen,
-    poses_of,
-    speed_series,
-)
+from iveg.adapters.history.series import speed_series
 from iveg.domain.retention import DAY_S
 from tests.fakes.postgresql import programs, running_postgresql
 
@@ -109,36 +106,36 @@ async def _evening(queries: Queries, _: Filter, since: float) -> object:
 
 
 QUESTIONS: Mapping[str, Question] = {
-    "odometry": lambda q, f, _: q.page(lists.ODOMETRY, f),
+    "odometry": lambda q, f, _: q.page(listings.ODOMETRY, f),
     "odometry, 1000 in the middle": lambda q, f, at: q.page(
-        lists.ODOMETRY,
-        replace(f, limit=1000, cursor=lists.Cursor(at + DAY_S / 2, 0)),
+        listings.ODOMETRY,
+        replace(f, limit=1000, cursor=cursors.Cursor(at + DAY_S / 2, 0)),
     ),
     "odometry, oldest first": lambda q, f, _: q.page(
-        lists.ODOMETRY, replace(f, sort="at")
+        listings.ODOMETRY, replace(f, sort="at")
     ),
     "odometry, newest of all days": lambda q, f, _: q.page(
-        lists.ODOMETRY, Filter(robot=f.robot)
+        listings.ODOMETRY, Filter(robot=f.robot)
     ),
-    "detections": lambda q, f, _: q.page(lists.DETECTIONS, f),
+    "detections": lambda q, f, _: q.page(listings.DETECTIONS, f),
     "detections of a class": lambda q, f, _: q.page(
-        lists.DETECTIONS, replace(f, class_="robot")
+        listings.DETECTIONS, replace(f, class_="robot")
     ),
     "detections of no class": lambda q, f, _: q.page(
-        lists.DETECTIONS, replace(f, class_="bird")
+        listings.DETECTIONS, replace(f, class_="bird")
     ),
     "detections, 90 % at least": lambda q, f, _: q.page(
-        lists.DETECTIONS, replace(f, min_probability=0.9)
+        listings.DETECTIONS, replace(f, min_probability=0.9)
     ),
     "tracks of a person": lambda q, f, _: q.page(
-        lists.TRACKS, replace(f, person="P64")
+        listings.TRACKS, replace(f, person="P64")
     ),
-    "decisions": lambda q, f, _: q.page(lists.DECISIONS, f),
-    "log": lambda q, f, _: q.page(lists.LOG, f),
-    "log of no class": lambda q, f, _: q.page(lists.LOG, replace(f, class_="bird")),
-    "log by kind": lambda q, f, _: q.page(lists.LOG, replace(f, sort="kind")),
-    "commands": lambda q, f, _: q.page(lists.COMMANDS, f),
-    "alerts": lambda q, f, _: q.page(lists.ALERTS, f),
+    "decisions": lambda q, f, _: q.page(listings.DECISIONS, f),
+    "log": lambda q, f, _: q.page(listings.LOG, f),
+    "log of no class": lambda q, f, _: q.page(listings.LOG, replace(f, class_="bird")),
+    "log by kind": lambda q, f, _: q.page(listings.LOG, replace(f, sort="kind")),
+    "commands": lambda q, f, _: q.page(listings.COMMANDS, f),
+    "alerts": lambda q, f, _: q.page(listings.ALERTS, f),
     "* speed": lambda q, f, at: q.ask(speed_series, at, at + DAY_S, f.robot),
     "* confidence": lambda q, f, at: q.ask(confidence_counts, at, at + DAY_S, f.robot),
     "* STOPs": lambda q, f, at: q.ask(command_latencies, at, at + DAY_S, f.robot),
@@ -151,7 +148,7 @@ FLEET: Mapping[str, Question] = {
         confidence_counts, at, at + DAY_S
     ),
     "odometry of all robots": lambda q, f, _: q.page(
-        lists.ODOMETRY, replace(f, robot=None)
+        listings.ODOMETRY, replace(f, robot=None)
     ),
     "cost": lambda q, f, at: q.ask(cost_rows, at, at + DAY_S, {str(f.robot): 0.5}),
     "evening sheet": _evening,

@@ -34,7 +34,7 @@ from iveg.domain.tracking.sight import visible_from
 from iveg.lab.emulator.scripts import EXACT, SiteErrors
 from iveg.lab.emulator.world import SimulatedWorld
 from iveg.lab.experiment.protection import AWAY_M, MOVES_M_S
-from iveg.lab.experiment.stage import STEP_S
+from iveg.lab.experiment.staged_robot import STEP_S
 from iveg.pipeline.evaluate import Evaluator
 
 _TRUE_M, _PAUSE_S = 1.0, 1.0

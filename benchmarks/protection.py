@@ -18,17 +18,19 @@ from iveg.adapters.greenhouses import load_greenhouse
 from iveg.app.virtual import VirtualPipeline
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.witness import Plan
-from iveg.lab.emulator.camera import DETECTORS
+from iveg.lab.emulator.detector_model import DETECTORS
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.scenarios import scenario_named
 from iveg.lab.emulator.scripts import EXACT, SiteErrors
 from iveg.lab.emulator.truth import true_picture
 from iveg.lab.emulator.world import SimulatedWorld
-from iveg.lab.experiment import tables
+from iveg.lab.experiment import protection_tables
 from iveg.lab.experiment.moments import moments_of
-from iveg.lab.experiment.protection import Protection, protection_of, whole
+from iveg.lab.experiment.protection import Protection, whole
+from iveg.lab.experiment.protection_scoring import protection_of
 from iveg.lab.experiment.recording import Row
-from iveg.lab.experiment.stage import STEP_S, Stage
+from iveg.lab.experiment.stage import Stage
+from iveg.lab.experiment.staged_robot import STEP_S
 from iveg.lab.experiment.virtual_run import foretold_row
 
 ROBOTS = ("AGI", "AGII")
@@ -112,8 +114,8 @@ def main() -> None:
         rows.append({**chosen, **whole(runs).row()})
     result = {"protection": rows}
     for head, cells in (
-        (tables.PROTECTION, tables.protection(result)),
-        (tables.ENTRIES, tables.entries(result)),
+        (protection_tables.PROTECTION, protection_tables.protection(result)),
+        (protection_tables.ENTRIES, protection_tables.entries(result)),
     ):
         told = [[str(one) for one in row] for row in cells]
         print_table(f"Protection, seeds {asked.seeds}", [*head], told)

@@ -28,11 +28,11 @@ from sqlalchemy import Connection, func, insert, select, text
 import iveg.pipeline.retention
 from benchmarks.history_size import begin_at, own_database, run_alone
 from benchmarks.process import machine, percentile, print_table
+from iveg.adapters.broker_address import BrokerAddress
 from iveg.adapters.history import tables
 from iveg.adapters.history.day_partitions import prepare_days
 from iveg.adapters.history.engine import reading_engine, sqlite_file, writing_engine
 from iveg.adapters.history.migrate import upgrade
-from iveg.adapters.mqtt import BrokerAddress
 from iveg.cli import main as run_iveg
 from iveg.domain.retention import DAY_S
 from tests.fleet import names

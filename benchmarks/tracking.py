@@ -30,10 +30,11 @@ from iveg.domain.tracking.people import People
 from iveg.domain.tracking.person import TrackedPerson
 from iveg.domain.tracking.sight import AllClear
 from iveg.domain.world import World
-from iveg.lab.emulator.camera import DETECTORS, person_target
+from iveg.lab.emulator.detector_model import DETECTORS
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.people import SimulatedPerson
 from iveg.lab.emulator.scenarios import scenario_named
+from iveg.lab.emulator.targets import person_target
 from iveg.lab.emulator.world import RobotHardware, SimulatedWorld
 
 ROBOTS = ("AGI", "AGII")

@@ -32,9 +32,10 @@ from iveg.domain.rule.paths import MOVES_M_S, Path
 from iveg.domain.rule.zones import Zone, zones_of
 from iveg.lab.emulator.truth import true_picture
 from iveg.lab.experiment.moments import moments_of
-from iveg.lab.experiment.protection import AHEAD_S, NEAR_M, entries_of
+from iveg.lab.experiment.protection import AHEAD_S, NEAR_M
+from iveg.lab.experiment.protection_scoring import entries_of
 from iveg.lab.experiment.recording import Row
-from iveg.lab.experiment.stage import STEP_S
+from iveg.lab.experiment.staged_robot import STEP_S
 from iveg.lab.experiment.virtual_run import foretold_row
 
 _SAME_M = 1.0

@@ -8,7 +8,7 @@ import time
 from collections.abc import AsyncIterator
 from pathlib import Path
 
-from iveg.adapters.mqtt import BrokerAddress
+from iveg.adapters.broker_address import BrokerAddress
 from iveg.lab.embedded.mqtt_server import mqtt_broker
 from tests.bonds import bound
 

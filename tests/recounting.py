@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from iveg.lab.experiment import tables
+from iveg.lab.experiment import protection_tables, tables
 from tests.processes import ROOT
 
 
@@ -34,11 +34,11 @@ def _rows(result: Mapping[str, Any]) -> Iterator[Sequence[object]]:
     yield from _named("place", tables.place(result), own)
     for row in tables.claims(result):
         yield "claims", row[1]
-    for row in tables.out_of_sight(result):
+    for row in protection_tables.out_of_sight(result):
         yield "sight", *row[1:]
-    for row in tables.protection(result):
+    for row in protection_tables.protection(result):
         yield "protection", *row
-    for row in tables.entries(result):
+    for row in protection_tables.entries(result):
         yield "entries", *row
     yield from _named("latency", tables.latency(result), own)
     for name, rows in (

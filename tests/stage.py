@@ -8,12 +8,12 @@ from iveg.adapters.greenhouses import load_greenhouse
 from iveg.app.virtual import read_direct
 from iveg.domain.observations import Instant
 from iveg.domain.records import DecisionRecord, DetectionRecord
-from iveg.lab.emulator.camera import DETECTORS
+from iveg.lab.emulator.detector_model import DETECTORS
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.scenarios import scenario_named
 from iveg.lab.emulator.world import SimulatedWorld
 from iveg.lab.experiment import stage as staging
-from iveg.lab.experiment.stage import STEP_S
+from iveg.lab.experiment.staged_robot import STEP_S
 from iveg.pipeline.build import Pipeline
 from iveg.pipeline.things import ThingMarks
 from iveg.web.views import Views

@@ -12,9 +12,7 @@ from typing import Final, Protocol
 from iveg.adapters.ids import new_id
 from iveg.domain.accounts import (
     Account,
-    ApiToken,
     PersonRole,
-    TokenScope,
     digest_of,
     is_name,
 )
@@ -155,36 +153,6 @@ class Admission:
         invitation = secrets.token_urlsafe(32)
         digest, until = digest_of(invitation), self._now + waits_s
         return invitation, replace(account, invitation=digest, invited_until=until)
-
-
-class ChangingTokens(Protocol):
-    """Storage that takes changes of tokens; blocks, raises HopError."""
-
-    def add(self, token: ApiToken, by: Actor) -> None:
-        """Keep a new token. Raises NameTakenError."""
-
-
-def admit_program(
-    store: ChangingTokens,
-    name: str,
-    scope: TokenScope,
-    ends_at: float | None = None,
-    *,
-    by: Actor,
-    now: float,
-) -> tuple[str, ApiToken]:
-    """Let a program in by a token, which is returned here alone.
-
-    Raises:
-        NotANameError: no program may be called so.
-        NameTakenError: one is called so already.
-    """
-    if not is_name(name):
-        raise NotANameError(name)
-    token = secrets.token_urlsafe(32)
-    made = ApiToken(new_id(), name, scope, digest_of(token), now, ends_at=ends_at)
-    store.add(made, by)
-    return token, made
 
 
 def has_admin(accounts: Iterable[Account], now: float) -> bool:

@@ -12,12 +12,13 @@ while it is busy.  A part of all places is kept for addresses that have signed i
 
 import asyncio
 import logging
-import resource
 from collections import Counter, OrderedDict
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from ipaddress import IPv6Address, ip_address
 from typing import Final
+
+from iveg.adapters.connection_caps import ConnectionCaps
 
 CONNECTION: Final = "iveg.connection"
 """Key of a :class:`Connection` in the ``state`` of an ASGI scope."""
@@ -26,60 +27,6 @@ _LOOKS_EVERY_S = 0.5
 _KNOWN_S = 12 * 3600.0
 """How long an address that signed in keeps its share: as long as an idle session."""
 _MOST_ADDRESSES = 1024
-
-
-_MOST_DESCRIPTORS = 4096
-
-
-def raise_descriptor_limit() -> None:
-    """Allow this process as many open files as it may have by itself, in reason."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    wanted = _MOST_DESCRIPTORS if hard == resource.RLIM_INFINITY else hard
-    wanted = min(wanted, _MOST_DESCRIPTORS)
-    if soft != resource.RLIM_INFINITY and soft < wanted:
-        resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
-
-
-@dataclass(frozen=True, slots=True)
-class ConnectionCaps:
-    """What a listener bears.
-
-    Attributes:
-        connections: In all.
-        of_strangers: Of addresses that nobody has signed in from.
-        of_an_address: Of one address; of IPv6 one network of 64 bits.
-        head_bytes: Request line and headers of one request.
-        head_s: Time in which they have to be here (s); ``body_s`` the body after them.
-    """
-
-    connections: int = 512
-    of_strangers: int = 384
-    of_an_address: int = 192
-    head_bytes: int = 16_384
-    head_s: float = 5.0
-    body_s: float = 30.0
-
-    @classmethod
-    def for_this_process(cls, listeners: int = 1) -> "ConnectionCaps":
-        """As many as leave a share of the file descriptors to everything else.
-
-        Args:
-            listeners: Of this process; each has as large a share.
-        """
-        soft, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
-        most = cls().connections
-        if soft != resource.RLIM_INFINITY:
-            most = max(8, min(most, soft // (listeners + 1)))
-        return cls(most, most * 3 // 4, most * 3 // 8)
-
-    @classmethod
-    def on_loopback(cls) -> "ConnectionCaps":
-        """Of one of the three listeners whose clients are all on this machine.
-
-        One address has all.
-        """
-        most = cls.for_this_process(3).connections
-        return cls(most, most, most)
 
 
 @dataclass(eq=False, slots=True)

@@ -1,7 +1,8 @@
 """DDS, the network of ROS 2: raw payloads in and out, and its endpoints.
 
-Uses Eclipse Cyclone DDS, an optional extra (``iveg[ros2]``); nothing else imports it.
-Payloads stay bytes here:  DDS checks them against the type, and ``iveg.ros2.cdr`` reads
+Uses Eclipse Cyclone DDS, an optional extra (``iveg[ros2]``); nothing but this module
+and ``dds_types`` imports it.
+Payloads stay bytes here: DDS checks them against the type, and ``iveg.ros2.cdr`` reads
 the few that are wanted.  None of Cyclone's threads calls iVeg; one thread of ours waits
 for messages that must be answered at once and wakes the event loop.
 """
@@ -10,10 +11,7 @@ import asyncio
 import threading
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
-from functools import cache
 from types import TracebackType
-from xml.sax.saxutils import quoteattr
 
 from cyclonedds.builtin import (
     BuiltinDataReader,
@@ -30,7 +28,7 @@ from cyclonedds.core import (
     WaitSet,
 )
 from cyclonedds.domain import Domain, DomainParticipant
-from cyclonedds.idl import IdlStruct, make_idl_struct, types
+from cyclonedds.idl import IdlStruct
 from cyclonedds.pub import DataWriter
 from cyclonedds.qos import Policy
 from cyclonedds.qos import Qos as DdsQos
@@ -38,60 +36,18 @@ from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 from cyclonedds.util import duration
 
+from iveg.adapters.dds_network import DdsNetwork
+from iveg.adapters.dds_types import announced, read_qos, user_data_of, write_qos
 from iveg.domain.errors import HopError
-from iveg.ros2.names import Endpoint, Qos, dds_topic, dds_type, ros_topic, ros_type
-from iveg.ros2.schema import Many, Message, One, Structure, Text, fields_of
-from iveg.ros2.type_hash import read_user_data, user_data
+from iveg.ros2.names import Endpoint, Qos, dds_topic, ros_topic, ros_type
+from iveg.ros2.schema import Message
+from iveg.ros2.type_hash import user_data
 
-_LEASE = "3 s"
-"""How long others remember a participant that died without a word."""
-_MOST_PARTICIPANTS = 60
 _WAIT_MS = 250
 _REARM_S = 0.002
 _MOST_TAKEN = 200
 _FEW = 8
 """Cyclone makes room for as many as are asked for, and mostly one waits."""
-
-
-@dataclass(frozen=True, slots=True)
-class DdsNetwork:
-    """Domain, interface and peers of the network.
-
-    Attributes:
-        domain: 0 to 232, as ``ROS_DOMAIN_ID``.
-        interface: Network interface by name or address; empty: Cyclone's choice.
-        peers: Addresses to ask instead of the whole network; none: multicast.
-        uri: What ``CYCLONEDDS_URI`` says; counts where nothing above does.
-    """
-
-    domain: int = 0
-    interface: str = ""
-    peers: tuple[str, ...] = ()
-    uri: str = ""
-
-    def config(self) -> str:
-        """Cyclone's configuration, one fragment after the other."""
-        return ",".join(part for part in (self.uri, self._own()) if part)
-
-    def _own(self) -> str:
-        general = discovery = ""
-        if self.interface:
-            key = "address" if self.interface[0].isdigit() else "name"
-            one = f"{key}={quoteattr(self.interface)}"
-            general += f"<Interfaces><NetworkInterface {one}/></Interfaces>"
-        if self.peers:
-            general += "<AllowMulticast>false</AllowMulticast>"
-            peers = "".join(f"<Peer address={quoteattr(one)}/>" for one in self.peers)
-            discovery = (
-                "<ParticipantIndex>auto</ParticipantIndex>"
-                f"<MaxAutoParticipantIndex>{_MOST_PARTICIPANTS}"
-                f"</MaxAutoParticipantIndex><Peers>{peers}</Peers>"
-            )
-        discovery += f"<LeaseDuration>{_LEASE}</LeaseDuration>"
-        return (
-            f'<CycloneDDS><Domain Id="any"><General>{general}</General>'
-            f"<Discovery>{discovery}</Discovery></Domain></CycloneDDS>"
-        )
 
 
 class Dds(AbstractContextManager["Dds"]):
@@ -204,9 +160,9 @@ class Dds(AbstractContextManager["Dds"]):
             topic,
             ros_type(sample.type_name),
             writes,
-            _read_qos(sample.qos),
+            read_qos(sample.qos),
             str(sample.participant_key) == self._guid,
-            *_read_user_data(sample.qos),
+            *user_data_of(sample.qos),
         )
 
 
@@ -302,98 +258,6 @@ def _configure(network: DdsNetwork) -> None:
         _configured[network.domain] = config, Domain(network.domain, config)
     elif known[0] != config:
         raise HopError("dds", f"domain {network.domain} is configured otherwise")
-
-
-def _leave_in_bytes(kind: type[IdlStruct]) -> None:
-    """Let samples of a type of ours stay bytes: ``iveg.ros2.cdr`` reads them.
-
-    Cyclone's reader and writer ask a type to deserialize and serialize its samples, and
-    a base of ours would be announced with it.
-    """
-
-    def deserialize(cls: type[IdlStruct], data: bytes, /, **_: object) -> IdlStruct:
-        made = cls()
-        made.payload = data
-        return made
-
-    kind.deserialize = classmethod(deserialize)
-    kind.deserialize_key = classmethod(deserialize)
-    kind.serialize = lambda sample, **_: sample.payload
-
-
-@cache
-def announced(message: type[Message], *, decodes: bool = False) -> type[IdlStruct]:
-    """The type that DDS announces for a message.
-
-    Args:
-        message: Ours.
-        decodes: Cyclone's Python shall make and read its samples.
-    """
-    members = {name: _idl_type(kind, decodes) for name, kind in fields_of(message)}
-    typename = dds_type(message.ROS).replace("::", ".")
-    kind: type[IdlStruct] = make_idl_struct(
-        message.__name__, typename, members, dataclassify=decodes
-    )
-    if not decodes:
-        _leave_in_bytes(kind)
-    return kind
-
-
-def _idl_type(kind: One | Many | Text | Structure, decodes: bool) -> object:
-    match kind:
-        case One("boolean"):
-            return bool
-        case One(primitive):
-            return getattr(types, primitive)
-        case Many(primitive, None):
-            return types.sequence[getattr(types, primitive)]
-        case Many(primitive, count):
-            return types.array[getattr(types, primitive), count]
-        case Text():
-            return str
-        case Structure(message, many):
-            nested = announced(message, decodes=decodes)
-            return types.sequence[nested] if many else nested
-
-
-def write_qos(qos: Qos) -> DdsQos:
-    """A quality of service in Cyclone's words, and what ROS 2 adds to each."""
-    reliability = (
-        Policy.Reliability.Reliable(duration(milliseconds=100))
-        if qos.reliable
-        else Policy.Reliability.BestEffort
-    )
-    durability = (
-        Policy.Durability.TransientLocal
-        if qos.transient_local
-        else Policy.Durability.Volatile
-    )
-    history = Policy.History.KeepLast(qos.depth)
-    return DdsQos(
-        reliability,
-        durability,
-        history,
-        # A late reader gets as many as an early one could have kept.
-        Policy.DurabilityService(0, history, -1, -1, -1),
-        # ROS 2 sends and takes plain CDR of version 1.
-        Policy.DataRepresentation(use_cdrv0_representation=True),
-        # Its endpoints name the members of a type freely, or give no type.
-        Policy.TypeConsistency.AllowTypeCoercion(ignore_member_names=True),
-    )
-
-
-def _read_qos(qos: DdsQos) -> Qos:
-    history = qos[Policy.History]
-    return Qos(
-        isinstance(qos[Policy.Reliability], Policy.Reliability.Reliable),
-        qos[Policy.Durability] != Policy.Durability.Volatile,
-        getattr(history, "depth", 0),
-    )
-
-
-def _read_user_data(qos: DdsQos) -> tuple[str, str]:
-    policy = qos[Policy.Userdata]
-    return read_user_data(b"" if policy is None else bytes(policy.data))
 
 
 class _Watch:

@@ -1,6 +1,6 @@
-"""Adapters of ``iveg doctor`` alone: a probe device, a check of the database.
+"""The probe device of ``iveg doctor``.
 
-They report the reason of a failure where a running iVeg tries again.
+It reports the reason of a failure where a running iVeg tries again.
 """
 
 import asyncio
@@ -10,11 +10,9 @@ from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 
 import aiomqtt
-from sqlalchemy.exc import DatabaseError
 
-from iveg.adapters.history.engine import reading_engine, sqlite_file
-from iveg.adapters.history.migrate import reason_of, revisions
-from iveg.adapters.mqtt import NODELAY, BrokerAddress
+from iveg.adapters.broker_address import BrokerAddress
+from iveg.adapters.mqtt import NODELAY
 from iveg.domain.errors import HopError
 
 _REFUSED = 128
@@ -129,39 +127,3 @@ async def _end(task: asyncio.Task[None]) -> None:
 async def _leave(client: aiomqtt.Client) -> None:
     with contextlib.suppress(aiomqtt.MqttError):
         await client.__aexit__(None, None, None)
-
-
-def check_database(database_url: str) -> None:
-    """Check that the history can be read and has the newest shape; change nothing.
-
-    Raises:
-        HopError: it is not there, cannot be read, or has another shape.
-        SettingsError: the address cannot be used.
-    """
-    file = sqlite_file(database_url)
-    if file is not None and not file.is_file():
-        raise HopError(
-            "database", f"there is none at {file}; `iveg db upgrade` makes it"
-        )
-    engine = reading_engine(database_url)
-    try:
-        with engine.connect() as connection:
-            found, known = revisions(connection)
-    except DatabaseError as error:
-        raise HopError("database", reason_of(error)) from error
-    finally:
-        engine.dispose()
-    _compare(found, known)
-
-
-def _compare(found: str | None, newest_first: Sequence[str]) -> None:
-    newest = newest_first[0]
-    if found == newest:
-        return
-    if found is not None and found not in newest_first:
-        raise HopError("database", f"a newer iVeg wrote it (migration {found})")
-    raise HopError(
-        "database",
-        f"it is at migration {found or 'none'} and the newest is {newest}; "
-        "`iveg db upgrade` mends that",
-    )

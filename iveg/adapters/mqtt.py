@@ -10,18 +10,16 @@ import asyncio
 import logging
 import random
 import socket
-import ssl
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
-from urllib.parse import unquote, urlsplit
 
 import aiomqtt
 
+from iveg.adapters.broker_address import BrokerAddress
 from iveg.adapters.log_filter import quiet
 from iveg.adapters.mqtt_inbox import Arrived, Qos1Message
 from iveg.adapters.mqtt_outbox import OutboxClient
-from iveg.adapters.tls import NO_FILES, FileState, TlsFiles
+from iveg.adapters.tls import FileState
 from iveg.domain.errors import HopError
 
 _log = logging.getLogger(__name__)
@@ -33,42 +31,6 @@ MOST_EARLY = 2000
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.2, 2.0
 _KEEPALIVE_S = 5
 _ANSWERED_WITHIN_S, _CONFIRMED_WITHIN_S = 5.0, 1.5
-
-
-@dataclass(frozen=True, slots=True)
-class BrokerAddress:
-    """Address of the broker, user and password, and the files of TLS."""
-
-    host: str
-    port: int
-    user: str | None = None
-    password: str | None = None
-    tls: bool = False
-    files: TlsFiles = NO_FILES
-
-    @classmethod
-    def from_url(
-        cls, url: str, user: str = "", password: str = "", files: TlsFiles = NO_FILES
-    ) -> "BrokerAddress":
-        """Read ``mqtt://user:password@host:port``; arguments win over the URL."""
-        parts = urlsplit(url)
-        tls = parts.scheme == "mqtts"
-        return cls(
-            parts.hostname or "127.0.0.1",
-            parts.port or (8883 if tls else 1883),
-            user or unquote(parts.username or "") or None,
-            password or unquote(parts.password or "") or None,
-            tls,
-            files,
-        )
-
-    def context(self) -> ssl.SSLContext | None:
-        """What TLS needs, from the files as they are now; None without TLS.
-
-        Raises:
-            OSError: a file is missing or is no certificate.
-        """
-        return self.files.context() if self.tls else None
 
 
 class MqttLink:

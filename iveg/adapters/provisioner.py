@@ -14,11 +14,13 @@ import random
 from collections.abc import Awaitable, Callable, Iterable, Sequence
 from typing import TypeVar
 
-from iveg.adapters.iot_agent import IotAgentClient, Provisioned, provision
+from iveg.adapters.fleet_provisioning import Provisioned, provision
+from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.mqtt import MqttLink
 from iveg.adapters.orion import OrionClient
-from iveg.adapters.subscriptions import Ensured, ensure_subscriptions, wanted_for
+from iveg.adapters.subscriptions import Ensured, ensure_subscriptions
 from iveg.adapters.throttle import Throttle
+from iveg.adapters.wanted_subscriptions import wanted_for
 from iveg.domain.equipment import Tile
 from iveg.domain.errors import HopError, NoAnswerError
 from iveg.domain.feeds import Feeds

@@ -10,12 +10,11 @@ from collections.abc import Awaitable, Callable, Mapping
 
 from iveg.adapters.mqtt import MqttLink
 from iveg.adapters.subscriptions import (
-    THROTTLING_S,
     SubscriptionStore,
-    WantedSubscription,
     is_throttled,
     write_subscription,
 )
+from iveg.adapters.wanted_subscriptions import THROTTLING_S, WantedSubscription
 from iveg.domain.errors import HopError
 from iveg.domain.feeds import Feeds
 from iveg.domain.observations import Instant

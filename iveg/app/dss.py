@@ -23,18 +23,18 @@ from iveg.adapters.greenhouses import load_greenhouse
 from iveg.adapters.ids import new_id
 from iveg.adapters.loop_watch import LoopWatch
 from iveg.adapters.provisioner import Provisioner
+from iveg.adapters.recordings.recorded_sink import RecordedSink
 from iveg.adapters.recordings.recorder import PART as RECORDINGS
-from iveg.adapters.recordings.recorder import RecordedSink
 from iveg.adapters.transports import MqttTransport, OrionTransport
 from iveg.adapters.webauthn import has_passkeys
 from iveg.adapters.worker import PACK_LIMIT_S, Worker
+from iveg.app.agreement import picture
 from iveg.app.counts import count_all, read_queues
 from iveg.app.door import open_door
 from iveg.app.laboratory import find_laboratory
 from iveg.app.life import Work, live
 from iveg.app.outside import Outside, open_outside
-from iveg.app.past import Site as PastSite
-from iveg.app.past import picture
+from iveg.app.site import Site as PastSite
 from iveg.app.viewers import Viewers
 from iveg.app.what_if import WhatIfs
 from iveg.domain.errors import HopError, VitalPartError

@@ -8,6 +8,7 @@ from pydantic import TypeAdapter
 
 from iveg.adapters import clock
 from iveg.adapters.broker_access import BrokerAccessCommand
+from iveg.adapters.broker_address import BrokerAddress
 from iveg.adapters.by_robot import FileByRobot
 from iveg.adapters.contacts import FileContacts
 from iveg.adapters.history.accounts import AccountStore
@@ -21,7 +22,7 @@ from iveg.adapters.identity_provider import IdentityProvider
 from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.journal import FileJournal
 from iveg.adapters.mail import MailSender, Write
-from iveg.adapters.mqtt import BrokerAddress, MqttLink
+from iveg.adapters.mqtt import MqttLink
 from iveg.adapters.orion import OrionClient
 from iveg.adapters.outbound import OutboundHttp
 from iveg.adapters.recordings.live_feed import PART as FOXGLOVE

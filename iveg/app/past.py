@@ -10,7 +10,6 @@ from base64 import b64decode
 from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, Final
 
 import orjson
@@ -23,16 +22,14 @@ from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.adapters.recordings.incoming import NOTIFICATIONS
 from iveg.adapters.recordings.timeline import Found, Place, Timeline
+from iveg.app.agreement import Agreement, picture
+from iveg.app.site import Site
 from iveg.app.virtual import VirtualPipeline
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import NotRecordedError, UnreadableError
-from iveg.domain.kinds import Scope
 from iveg.domain.observations import Instant
 from iveg.domain.transports import DIRECT, FIWARE
-from iveg.models.base import write_json
-from iveg.pipeline import topics
 from iveg.pipeline.memory import Memory
-from iveg.pipeline.topics import StateReader
 from iveg.pipeline.trace import (
     HASHES_S,
     JUDGED,
@@ -43,7 +40,6 @@ from iveg.pipeline.trace import (
     digest,
     in_ns,
 )
-from iveg.settings import Settings
 from iveg.web.notifications import NotificationEndpoint
 from iveg.web.security.secrets import NotifySecret
 from iveg.web.views import Views
@@ -58,69 +54,6 @@ _PLAY_ON_NS: Final = 2 * round(KEYFRAMES_S * _NS)
 """What is farther on is reached sooner from a memory."""
 _COMPARED_NS: Final = 2 * round(HASHES_S * _NS)
 """Of what leads to a moment the newest hashes are compared: one costs a picture."""
-_NOT_HASHED = topics.LOG, topics.HEALTH, topics.MAP
-"""They tell of the server, and not of the world."""
-
-
-def picture(views: StateReader, now: Instant) -> bytes:
-    """The world as it is hashed: what a page is shown, but of the server itself."""
-    rows = (row for row in topics.TOPICS if row not in _NOT_HASHED)
-    body = write_json({row.member: row.read(views, now) for row in rows if row.read})
-    # Some parts keep things in sets, which are in no order.
-    return orjson.dumps(orjson.loads(body), option=orjson.OPT_SORT_KEYS)
-
-
-@dataclass(frozen=True, slots=True)
-class Site:
-    """What a world of the past is made with; the same as the live one.
-
-    Attributes:
-        folder: Of the recordings.
-    """
-
-    folder: Path
-    fleet: str
-    robots: tuple[str, ...]
-    greenhouse: str
-    equipment: str
-    calibration: str
-    apikey: str
-    direct_read: Scope
-    stop_direct: bool
-
-    @classmethod
-    def of(cls, settings: Settings, folder: Path) -> "Site":
-        """As the settings say."""
-        return cls(
-            folder,
-            settings.fleet,
-            tuple(settings.robots),
-            settings.greenhouse,
-            settings.equipment,
-            settings.calibration,
-            settings.apikey,
-            settings.direct_read,
-            settings.stop_direct,
-        )
-
-
-@dataclass(slots=True)
-class Agreement:
-    """How the hashes of a run compare: with the live ones, so far.
-
-    Attributes:
-        newest: Of the last one that was passed; None: of none yet.
-    """
-
-    equal: int = 0
-    unequal: int = 0
-    newest: bool | None = None
-
-    def note(self, is_equal: bool) -> None:
-        """One more."""
-        self.newest = is_equal
-        self.equal += is_equal
-        self.unequal += not is_equal
 
 
 @dataclass(slots=True)

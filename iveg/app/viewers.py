@@ -11,7 +11,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from iveg.adapters.worker import Worker
-from iveg.app.past import Past, Site
+from iveg.app.past import Past
+from iveg.app.site import Site
 from iveg.domain.errors import (
     DataFileError,
     HopError,

@@ -1,6 +1,6 @@
 """``iveg audit``: whether the audit is whole, and its newest hash."""
 
-from iveg.adapters.doctor import check_database
+from iveg.adapters.database_check import check_database
 from iveg.adapters.history.asking import ask_once
 from iveg.adapters.history.audit import chain_end, faults, sealed_end
 from iveg.adapters.history.engine import history_url

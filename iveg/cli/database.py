@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from functools import partial
 
 from iveg.adapters import clock
-from iveg.adapters.doctor import check_database
+from iveg.adapters.database_check import check_database
 from iveg.adapters.history.ages import recorded_days
 from iveg.adapters.history.asking import ask_once
 from iveg.adapters.history.engine import history_url

@@ -4,88 +4,16 @@ A hop is tested only when the hops it depends on are well, so that one broken pa
 one failed row and not six.  The order is the order of the examination.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from iveg.adapters.fiware_http import NO_TOKEN
+from iveg.cli.advice import advise
+from iveg.cli.findings import Findings, Lag, Stack
 from iveg.domain.hops import NEEDS, Check, Hop
-from iveg.domain.probe import SLOW_S, lag_in_words
+from iveg.domain.probe import SLOW_S
 
 State = Literal["ok", "failed", "not tried"]
-
-
-_ORION_WAITS_S = 4.0
-"""Nearly the five seconds for which Orion waits for an agent."""
-
-
-@dataclass(frozen=True, slots=True)
-class Lag:
-    """Delay of measures on their way to Orion.
-
-    Attributes:
-        lag_s: Seconds.
-        growing: Whether it is known to grow.
-        at_least: Whether the true lag may be longer.
-        told_by: Source of the lag, as a clause; empty for the doctor's own measure.
-    """
-
-    lag_s: float
-    growing: bool = False
-    at_least: bool = False
-    told_by: str = ""
-
-    @property
-    def sentence(self) -> str:
-        """A sentence such as "Measures reach Orion 23 s late, growing"."""
-        said = lag_in_words(self.lag_s, growing=self.growing, at_least=self.at_least)
-        return said[0].upper() + said[1:] + self.told_by
-
-
-@dataclass(frozen=True, slots=True)
-class Stack:
-    """Addresses for the sentences.
-
-    Attributes:
-        broker: Host and port of the MQTT broker.
-        user: User name at the broker; empty for anonymous.
-        listener: Address that Orion was asked to post to.
-        topics: The probe device's topics, up to the last slash.
-        token: Address of the token endpoint; empty: no proxy asks for one.
-        lag: Delay of measures, where that is known to be the cause.
-        waited_s: Time that the doctor waited for its measure (s).
-    """
-
-    broker: str
-    user: str
-    orion: str
-    agent: str
-    listener: str
-    database: str
-    page: str
-    topics: str
-    token: str = ""
-    lag: Lag | None = None
-    waited_s: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """Result of one tested hop.
-
-    Attributes:
-        took_s: Duration, or time waited (s).
-        trouble: None for success; the reason of a refusal; empty for a time-out.
-    """
-
-    check: Check
-    took_s: float
-    trouble: str | None = None
-
-    @property
-    def well(self) -> bool:
-        """Whether the hop works."""
-        return self.trouble is None
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,11 +24,6 @@ class DiagnosisRow:
     state: State
     took_s: float | None = None
     sentence: str = ""
-
-
-Findings = Mapping[Check, Finding]
-Case = Callable[[str, Findings], bool]
-"""Whether a cause explains a failure, by its reason and by all findings."""
 
 
 def missing(check: Check, findings: Findings) -> tuple[Check, ...]:
@@ -141,7 +64,7 @@ def _row(check: Check, findings: Findings, stack: Stack) -> DiagnosisRow:
         sentence = f"{Lag(finding.took_s).sentence}." if late else ""
         return DiagnosisRow(check, "ok", finding.took_s, sentence)
     return DiagnosisRow(
-        check, "failed", finding.took_s, _advice(finding, findings, stack)
+        check, "failed", finding.took_s, advise(finding, findings, stack)
     )
 
 
@@ -150,171 +73,3 @@ def _why_not(check: Check, findings: Findings, stack: Stack) -> str:
         return "The agent is behind: nothing is added."
     because = " and ".join(f"“{need}”" for need in missing(check, findings))
     return f"Stands on {because}." if because else ""
-
-
-def _advice(failed: Finding, findings: Findings, stack: Stack) -> str:
-    """Sentence about a failure; overload comes before addresses and databases."""
-    check, lag = failed.check, stack.lag
-    said = failed.trouble or f"nothing came in {failed.took_s:.1f} s"
-    is_away = check == Check.AGENT and not _is_silence(said, findings)
-    if lag is not None and check.hop is Hop.AGENT and not is_away:
-        is_first = check in (Check.AGENT, Check.MEASURE)
-        form = _OVERLOADED if is_first else _BEHIND
-    else:
-        known = (
-            form
-            for one, applies, form in _KNOWN_CAUSES
-            if one == check and applies(said, findings)
-        )
-        form = next(known, _FAILED[check])
-    return form.format(
-        said=said,
-        at=stack,
-        user=stack.user or "(nobody)",
-        who=f"user {stack.user}" if stack.user else "nobody in particular",
-        lag=lag and lag.sentence,
-        late=lag and lag_in_words(lag.lag_s),
-        least=Lag(stack.waited_s, at_least=True).sentence,
-    )
-
-
-def _says(*words: str) -> Case:
-    """A failure whose reason names one of these words."""
-    return lambda said, _: any(word in said.lower() for word in words)
-
-
-def _is_silence(said: str, _: Findings) -> bool:
-    return said.startswith(("no answer", "nothing came"))
-
-
-def _sends(_: str, findings: Findings) -> bool:
-    """Whether the agent sends commands, though it receives nothing."""
-    command = findings.get(Check.COMMAND)
-    return command is not None and command.well
-
-
-def _is_refused(said: str, _: Findings) -> bool:
-    return said.startswith("404")
-
-
-def _is_refused_late(said: str, findings: Findings) -> bool:
-    """Orion answers 404 at once for an absent agent, after 5 s for a silent one."""
-    return (
-        _is_refused(said, findings) and findings[Check.COMMAND].took_s > _ORION_WAITS_S
-    )
-
-
-_OVERLOADED = (
-    "{lag} ({said}): the agent at {at.agent} is overloaded. Let the robots send less, "
-    "or let several agents share the load; STOP still goes straight over MQTT."
-)
-_BEHIND = "The agent is behind ({said}); {late}."
-_NEVER_CAME = (
-    "{least}, or never ({said}). First look whether the agent is overloaded: the "
-    "processor time it takes, and whether this changes within a minute. If not, "
-)
-
-
-def _at_the_proxy(
-    check: Check, name: str, at: str
-) -> Sequence[tuple[Check, Case, str]]:
-    """What fails before a neighbour: the token endpoint, or a proxy that refuses."""
-    no_token = (
-        f"There is no bearer for {name} ({{said}}), and without one it is not asked: "
-        "look at the token endpoint {at.token} (IVEG_FIWARE_TOKEN_URL), and at client, "
-        "secret and user there."
-    )
-    refused = (
-        f"A proxy before {name} at {at} refuses iVeg ({{said}}): look at the roles "
-        "that it asks for, at IVEG_FIWARE_TOKEN_HEADER, and whether "
-        "IVEG_FIWARE_TOKEN_URL is set."
-    )
-    return (
-        (check, _says(NO_TOKEN), no_token),
-        (check, lambda said, _: said.startswith(("401 ", "403 ")), refused),
-    )
-
-
-_KNOWN_CAUSES: Sequence[tuple[Check, Case, str]] = (
-    *_at_the_proxy(Check.ORION, "Orion", "{at.orion}"),
-    *_at_the_proxy(Check.AGENT, "the IoT Agent", "{at.agent}"),
-    (
-        Check.BROKER,
-        _says("not auth", "password"),
-        "The broker at {at.broker} refuses {who} ({said}): look at IVEG_MQTT_USER and "
-        "IVEG_MQTT_PASSWORD and at the broker's password file.",
-    ),
-    (
-        Check.BROKER,
-        _says("echo"),
-        "The broker at {at.broker} lets us in and {said}: look at its access list; "
-        "user {user} must write and read {at.topics}#.",
-    ),
-    (
-        Check.AGENT,
-        _is_silence,
-        "The IoT Agent at {at.agent} takes questions and does not answer ({said}): it "
-        "is overloaded or hung; look at its processor time first, then at its log.",
-    ),
-    (
-        Check.DEVICE,
-        _is_silence,
-        "The agent at {at.agent} did not answer to a new device ({said}): it is "
-        "overloaded or hung; look at its processor time first, then at its log.",
-    ),
-    (
-        Check.MEASURE,
-        _sends,
-        _NEVER_CAME + "it sends commands and receives nothing on {at.topics}attrs: its "
-        "connection is broken, or the broker's access list keeps the topic from it; "
-        "restart the agent and look at its log.",
-    ),
-    (
-        Check.COMMAND,
-        _is_refused_late,
-        "Orion cannot pass a command on ({said}): the agent did not answer Orion in "
-        "five seconds, so it is overloaded or hung; look at its processor time.",
-    ),
-    (
-        Check.COMMAND,
-        _is_refused,
-        "Orion cannot pass a command on ({said}): with this answer it says that it "
-        "does not reach the agent; look at IOTA_PROVIDER_URL of the agent, the "
-        "address under which Orion calls it.",
-    ),
-    (
-        Check.DATABASE,
-        _says("iveg db upgrade"),
-        "The history in {at.database} cannot be used yet: {said}.",
-    ),
-)
-"""Failures whose cause the reason tells."""
-_FAILED: Mapping[Check, str] = {
-    Check.BROKER: "No MQTT at {at.broker} ({said}): look whether the broker runs, and "
-    "at IVEG_MQTT_URL.",
-    Check.ORION: "No Orion at {at.orion} ({said}): look whether Orion and its MongoDB "
-    "run, and at IVEG_ORION_URL.",
-    Check.AGENT: "No IoT Agent at {at.agent} ({said}): look whether it runs, at its "
-    "log, and at IVEG_IOTA_URL.",
-    Check.DEVICE: "The agent at {at.agent} does not take a device with a command "
-    "({said}): it registers the command at Orion, so look at the agent's own address "
-    "of Orion, at its MongoDB and at IVEG_FIWARE_SERVICE and IVEG_FIWARE_SERVICEPATH.",
-    Check.MEASURE: _NEVER_CAME + "look whether the agent is connected to the same "
-    "broker, may read {at.topics}attrs, and reaches Orion at the address that iVeg "
-    "gave it (IVEG_IOTA_CB_URL).",
-    Check.NOTIFICATION: "Orion did not post to {at.listener} ({said}): look whether "
-    "Orion's machine reaches this one there (firewall, container network), and at the "
-    "host in IVEG_NOTIFY_URL.",
-    Check.COMMAND: "Orion took a command and the device never got it ({said}): look "
-    "whether the agent is connected to the broker and may write {at.topics}cmd. STOP "
-    "still goes straight over MQTT.",
-    Check.ANSWER: "The device's answer on {at.topics}cmdexe is not in Orion ({said}), "
-    "though its measure was: look whether the broker lets the agent read the topic.",
-    Check.DIRECT: "A command straight on {at.topics}cmd did not arrive ({said}): look "
-    "at the broker's access list; user {user} must write /+/+/cmd.",
-    Check.DATABASE: "The history in {at.database} cannot be read ({said}): look "
-    "whether the server runs, and at IVEG_DATABASE_URL. STOP and the live map go on "
-    "without.",
-    Check.PAGE: "iVeg itself does not answer at {at.page} ({said}): look whether `iveg "
-    "serve` runs, and at IVEG_HOST and IVEG_PORT.",
-}

@@ -18,33 +18,22 @@ from collections.abc import Awaitable, Callable, Mapping
 from contextlib import AsyncExitStack
 from functools import partial
 from http import HTTPStatus
-from ipaddress import ip_address
 from pathlib import Path
 from urllib.parse import urlsplit
 
 import orjson
 
 from iveg.adapters import clock
-from iveg.adapters.doctor import (
-    ProbeDevice,
-    TopicListener,
-    check_database,
-    probe_device,
-)
+from iveg.adapters.database_check import check_database
+from iveg.adapters.doctor import ProbeDevice, TopicListener, probe_device
 from iveg.adapters.fiware_http import FiwareHttp
 from iveg.adapters.history.engine import describe, history_url
 from iveg.adapters.post_listener import post_listener
 from iveg.app.fiware import open_fiware
 from iveg.cli.arguments import CommandCall
-from iveg.cli.diagnosis import (
-    Finding,
-    Lag,
-    Stack,
-    exit_code,
-    judge,
-    missing,
-    table,
-)
+from iveg.cli.diagnosis import exit_code, judge, missing, table
+from iveg.cli.doctor_addresses import bind_to, in_url, page_url_of
+from iveg.cli.findings import Finding, Lag, Stack
 from iveg.cli.nodes import broker_of
 from iveg.cli.probe import Probe
 from iveg.cli.running import run_until_stopped
@@ -63,7 +52,6 @@ _WAITS = 3
 _LOOK_EVERY_S = 0.05
 _FRESH_S = 10.0
 """Age from which the probe of a running iVeg is ignored (s)."""
-_ANYWHERE = {"0.0.0.0": "127.0.0.1", "::": "::1"}  # noqa: S104 - read, not bound
 
 
 def run(call: CommandCall) -> int:
@@ -108,7 +96,7 @@ class Examination:
         self._address = broker_of(settings)
         self._database = history_url(settings.database_url, data)
         self._orion, self._agent = open_fiware(settings)
-        self._page = _Page(_page_url(settings), *service, bearer=settings.api_token)
+        self._page = _Page(page_url_of(settings), *service, bearer=settings.api_token)
         self._probe = Probe(self._orion, self._agent, settings.apikey)
         self._device: ProbeDevice | None = None
         self._listening_at = ""
@@ -132,7 +120,7 @@ class Examination:
             agent=settings.iota_url,
             listener=self._listening_at,
             database=describe(self._database),
-            page=_page_url(settings),
+            page=page_url_of(settings),
             topics=self._probe.topic(""),
             token=settings.fiware_token_url,
             lag=self.lag,
@@ -286,8 +274,8 @@ class Examination:
             ear.hear(body)
             return HTTPStatus.NO_CONTENT, ""
 
-        async with post_listener(hear, _bind_to(host)) as port:
-            self._listening_at = f"http://{_in_url(host)}:{port}/"
+        async with post_listener(hear, bind_to(host)) as port:
+            self._listening_at = f"http://{in_url(host)}:{port}/"
             subscription = await self._probe.subscribe(self._listening_at)
             mark = ear.mark()
             # The steps so far are preparation; the hop begins here.
@@ -344,22 +332,3 @@ def _lag_told(health: Json) -> Lag | None:
         return None
     told_by = ", as the running iVeg says"
     return Lag(lag_s, growing=growing, told_by=told_by) if lag_s > SLOW_S else None
-
-
-def _bind_to(host: str) -> str:
-    """Address to bind; any name but loopback may be a container's or a router's."""
-    with contextlib.suppress(ValueError):
-        address = ip_address(host)
-        if address.is_loopback:
-            return host
-        return "::" if address.version == 6 else "0.0.0.0"  # noqa: S104
-    return "127.0.0.1" if host == "localhost" else "0.0.0.0"  # noqa: S104
-
-
-def _page_url(settings: Settings) -> str:
-    host = _ANYWHERE.get(settings.host, settings.host)
-    return f"http://{_in_url(host)}:{settings.port}"
-
-
-def _in_url(host: str) -> str:
-    return f"[{host}]" if ":" in host else host

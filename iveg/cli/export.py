@@ -8,7 +8,7 @@ import sys
 from collections.abc import AsyncIterator, Callable, Sequence
 from typing import Any
 
-from iveg.adapters.doctor import check_database
+from iveg.adapters.database_check import check_database
 from iveg.adapters.extras import require_extra
 from iveg.adapters.history.engine import history_url
 from iveg.adapters.history.lists import MOST_ROWS, Filter

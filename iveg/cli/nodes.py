@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from iveg.adapters.mqtt import BrokerAddress
+from iveg.adapters.broker_address import BrokerAddress
 from iveg.adapters.tls import TlsFiles
 from iveg.domain.witness import Plan
 from iveg.robot.node_settings import NodeSettings

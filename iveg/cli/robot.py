@@ -2,19 +2,20 @@
 
 import argparse
 import asyncio
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from iveg.adapters import clock
-from iveg.adapters.extras import require_extra
+from iveg.adapters.dds_network import DdsNetwork
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.adapters.mqtt import MqttLink
 from iveg.cli.arguments import CommandCall
 from iveg.cli.nodes import broker_of, node_settings
+from iveg.cli.robot_config import load_config, network_of
 from iveg.cli.running import (
     LOOPBACK,
     report_ready,
@@ -22,7 +23,6 @@ from iveg.cli.running import (
     tune_garbage_collection,
 )
 from iveg.domain.errors import (
-    DataFileError,
     HopError,
     SettingsError,
     UnreadableError,
@@ -41,22 +41,20 @@ from iveg.robot.goals import Navigate
 from iveg.robot.node import RobotNode
 from iveg.robot.node_settings import NodeSettings
 from iveg.robot.ros2.checking import Heard, judge, lines
-from iveg.robot.ros2.config import RobotConfig, read_classes, read_config
+from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.lookout import forms_published
 from iveg.robot.ros2.network import Network
 from iveg.robot.ros2.rig import Ros2Robot
 from iveg.robot.ros2.topics import TOPICS, sensed_topics
 from iveg.robot.ros2.transforms import TransformBuffer
-from iveg.ros2 import cdr
-from iveg.ros2 import messages as m
+from iveg.ros2 import cdr, geometry_msgs, std_msgs
 from iveg.ros2.schema import Message
 from iveg.settings import Settings
 
 if TYPE_CHECKING:
-    from iveg.adapters.dds import Dds, DdsNetwork, DdsReader
+    from iveg.adapters.dds import Dds, DdsReader
 
 _CHECK_S = 3.0
-_DOMAINS = "a whole number from 0 to 232"
 
 
 def run(call: CommandCall) -> int:
@@ -86,7 +84,7 @@ async def _ride(
     data: Path,
     config: RobotConfig,
     classes: tuple[str, ...],
-    network: "DdsNetwork",
+    network: DdsNetwork,
 ) -> None:
     from iveg.adapters.dds import Dds
 
@@ -182,91 +180,11 @@ async def refuse_second_gate(
 # --- configuration -----------------------------------------------------------------
 
 
-def load_config(
-    options: argparse.Namespace, environment: Mapping[str, str]
-) -> tuple[RobotConfig, tuple[str, ...]]:
-    """Configuration of file and command line, and a detector's class list.
-
-    Raises:
-        DataFileError: a file or a name that cannot be used.
-        SettingsError: invalid domain.
-    """
-    text, file = "", "robot.toml"
-    if getattr(options, "config", None) is not None:
-        file = str(options.config)
-        text = _text_of(options.config)
-    config = read_config(text, file)
-    if options.ros_domain is None and "[ros]" not in text:
-        options.ros_domain = _domain_of(environment)
-    config = _with_words(config, options)
-    try:
-        _ = config.full_topics
-    except UnreadableError as error:
-        raise DataFileError("command line", "", f"{error.detail}.") from error
-    if not config.class_list:
-        return config, ()
-    beside = options.config.parent if options.config is not None else Path()
-    return config, read_classes(_text_of(beside / config.class_list))
-
-
-def _domain_of(environment: Mapping[str, str]) -> int | None:
-    said = environment.get("ROS_DOMAIN_ID", "")
-    if not said:
-        return None
-    if not said.isdecimal():
-        raise SettingsError("ROS_DOMAIN_ID", said, _DOMAINS)
-    return int(said)
-
-
-def _with_words(config: RobotConfig, options: argparse.Namespace) -> RobotConfig:
-    domain, peers = options.ros_domain, options.ros_peer
-    if domain is not None and not 0 <= domain <= 232:
-        raise SettingsError("--ros-domain", str(domain), _DOMAINS)
-    said = {
-        "domain": domain,
-        "namespace": getattr(options, "namespace", None),
-        "interface": options.ros_interface,
-        "peers": None if peers is None else tuple(peers),
-    }
-    topics = {key: getattr(options, key, None) for key in ("cmd_vel_in", "cmd_vel_out")}
-    return replace(
-        config,
-        topics={**config.topics, **_without_none(topics)},
-        **_without_none(said),
-    )
-
-
-def _without_none(said: Mapping[str, object]) -> dict[str, Any]:
-    return {key: value for key, value in said.items() if value is not None}
-
-
-def _text_of(file: Path) -> str:
-    try:
-        return file.read_text("utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise DataFileError(str(file), "", "cannot be read.") from error
-
-
-def network_of(
-    config: RobotConfig, environment: Mapping[str, str], what: str
-) -> "DdsNetwork":
-    """DDS network for a command or option.
-
-    Raises:
-        MissingExtraError: Cyclone DDS is not installed.
-    """
-    require_extra("ros2", what)
-    from iveg.adapters.dds import DdsNetwork
-
-    uri = environment.get("CYCLONEDDS_URI", "")
-    return DdsNetwork(config.domain, config.interface, config.peers, uri)
-
-
 # --- check -------------------------------------------------------------------------
 
 
 async def _check(
-    robot_id: str, config: RobotConfig, network: "DdsNetwork", settings: Settings
+    robot_id: str, config: RobotConfig, network: DdsNetwork, settings: Settings
 ) -> int:
     """Listen for three seconds without publishing, and print what is missing."""
     from iveg.adapters.dds import Dds
@@ -342,10 +260,10 @@ def _hear(
     except UnreadableError:
         one.unreadable += 1
         return 0.0
-    if isinstance(message, m.TFMessage):
+    if isinstance(message, geometry_msgs.TFMessage):
         transforms.add(message, static=topic == "tf_static")
         return 0.0
-    if not isinstance(message, m.Stamped):
+    if not isinstance(message, std_msgs.Stamped):
         return 0.0
     header = message.header
     one.frame = header.frame_id

@@ -11,11 +11,8 @@ import uvicorn
 from fastapi import FastAPI
 
 from iveg.adapters import clock
-from iveg.adapters.connections import (
-    ConnectionCaps,
-    ConnectionTable,
-    raise_descriptor_limit,
-)
+from iveg.adapters.connection_caps import ConnectionCaps, raise_descriptor_limit
+from iveg.adapters.connections import ConnectionTable
 from iveg.adapters.history.engine import history_url
 from iveg.adapters.history.migrate import upgrade
 from iveg.app.dss import Dss, open_dss

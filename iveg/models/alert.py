@@ -1,4 +1,4 @@
-"""Alerts (ISA-18.2) and lines of the log."""
+"""Alerts (ISA-18.2)."""
 
 from typing import cast
 
@@ -7,7 +7,7 @@ from pydantic import Field
 from iveg.domain.alerts import alert_book, flood
 from iveg.domain.alerts.stored import write_alert, write_delivery
 from iveg.domain.messages import Channel, MessageDelivery, Priority
-from iveg.domain.records import AlertRecord, Json, LogRecord
+from iveg.domain.records import AlertRecord, Json
 from iveg.domain.stamps import format_stamp
 from iveg.models.base import Listing, Model, Slots, moment, stamp
 
@@ -140,30 +140,3 @@ class AcknowledgedAlerts(Model):
     left: list[str] = Field(
         description="Ids that were left: P1s, seen ones, and what is no longer there."
     )
-
-
-class LogEntry(Model):
-    """One line of the action and inference log."""
-
-    id: int
-    at: str
-    kind: str
-    robot_id: str | None
-    key: str
-    slots: Slots
-    class_: str | None = Field(validation_alias="class", serialization_alias="class")
-    decision_id: str | None
-
-    @classmethod
-    def of_record(cls, record: LogRecord) -> "LogEntry":
-        """One line, live and remembered."""
-        return cls(
-            id=record.id,
-            at=format_stamp(record.at),
-            kind=record.kind,
-            robot_id=record.robot_id,
-            key=record.key,
-            slots=dict(record.slots),
-            class_=record.class_,
-            decision_id=record.decision_id,
-        )

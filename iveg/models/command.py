@@ -1,6 +1,6 @@
 """STOP, release and resume as people follow them, live and remembered."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from math import isfinite
 from typing import Any, Literal
 
@@ -10,7 +10,6 @@ from iveg.domain import stop
 from iveg.domain.goals import GoalKind
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
-from iveg.domain.ranks import nearest_rank
 from iveg.domain.records import ByTransport, CommandEventRecord, CommandRecord, Json
 from iveg.domain.stamps import format_stamp
 from iveg.domain.stop import StopMachine
@@ -258,84 +257,3 @@ def _note(of: stop.FollowedCommand) -> Sentence | None:
     direct = of.transports[DIRECT.id] not in ("off", "failed")
     key = "stop.note.direct" if direct else "stop.note.fiware"
     return Sentence(key=key, slots={"lag": round(lag, 1)})
-
-
-class Pressed(Model):
-    """A STOP, release or resume that was accepted."""
-
-    robot_id: str
-    command_id: str
-    state: str
-
-    @classmethod
-    def of(cls, command: stop.FollowedCommand) -> "Pressed":
-        """As it stands just after the press."""
-        return cls(
-            robot_id=command.robot_id,
-            command_id=command.command_id,
-            state=command.state,
-        )
-
-
-class FleetPressed(Model):
-    """A fleet STOP: one command a robot."""
-
-    commands: list[Pressed]
-
-
-class LatencySpread(Model):
-    """Times of one step (ms); null where nothing was measured."""
-
-    count: int
-    p50_ms: float | None
-    p95_ms: float | None
-    max_ms: float | None
-
-    @classmethod
-    def of(cls, values: Iterable[float | None]) -> "LatencySpread":
-        """Of measured times, to a tenth of a millisecond; missing ones do not count."""
-        known = sorted(value for value in values if value is not None)
-        return cls(
-            count=len(known),
-            p50_ms=rounded(nearest_rank(known, 0.50), 1),
-            p95_ms=rounded(nearest_rank(known, 0.95), 1),
-            max_ms=rounded(nearest_rank(known, 1.0), 1),
-        )
-
-
-class RobotLatency(Model):
-    """One robot's STOPs: how many, and each step from the press on."""
-
-    robot_id: str
-    stops: int
-    accepted: LatencySpread
-    sent: dict[TransportId, LatencySpread] = Field(
-        description=(
-            "By transport, until it left; ``answer`` until the robot said that it has"
-            " it."
-        )
-    )
-    answer: dict[TransportId, LatencySpread]
-    standing: LatencySpread
-
-
-class Latency(Model):
-    """Times of the newest STOPs of a range."""
-
-    since: str
-    until: str
-    robots: list[RobotLatency]
-
-
-class Drill(Model):
-    """One drill and its verdict."""
-
-    robot_id: str
-    command_id: str
-    drilled_at: str
-    by: str
-    passed: bool | None = Field(
-        description="Standing in time; null while it may still come true."
-    )
-    standstill_ms: float | None
-    command: Command

@@ -1,162 +1,28 @@
 """A robot of the fleet, with the age of everything that is said of it."""
 
-from typing import TYPE_CHECKING, Any, Literal, get_type_hints
+from typing import TYPE_CHECKING, Literal
 
 from pydantic import Field, create_model
 
-from iveg.domain import feedback, observations
 from iveg.domain.fleet import RobotProfile
-from iveg.domain.geometry import Pose2D, Twist2D
-from iveg.domain.kinds import SENSED, Kind
+from iveg.domain.kinds import SENSED
 from iveg.domain.observations import Instant
-from iveg.domain.quantities import quantities_of, value_of
-from iveg.domain.revocation import BrokerTold
 from iveg.domain.robot_state import Link, RobotState
-from iveg.domain.rule import foresight
 from iveg.domain.stamps import format_stamp
 from iveg.domain.transports import TransportId
-from iveg.models.base import Model, rounded
+from iveg.models.base import Model
 from iveg.models.camera_bias import CameraBias
 from iveg.models.command import Command
 from iveg.models.goal import Goal
 from iveg.models.margin import Margin
 from iveg.models.places import Point
+from iveg.models.pose import Pose, Twist
+from iveg.models.robot_access import Revoked
+from iveg.models.sensor_reading import READINGS, SensorReading, newest_reading
 from iveg.models.situation import Situation
+from iveg.models.speed_limit import Applied, Encounter, Hold, MissingPremise, SpeedLimit
 
 Mode = Literal["RUNNING", "SLOW", "STOPPED"]
-
-
-class Pose(Model):
-    """Pose of ``base_link`` in ``map``."""
-
-    x: float
-    y: float
-    yaw: float
-
-    @classmethod
-    def of(cls, pose: Pose2D) -> "Pose":
-        """As the robot measured it."""
-        return cls(x=pose.x, y=pose.y, yaw=pose.yaw)
-
-
-class Twist(Model):
-    """Speed (m/s) and turn rate (rad/s)."""
-
-    linear: float
-    angular: float
-
-    @classmethod
-    def of(cls, twist: Twist2D) -> "Twist":
-        """As the robot measured it."""
-        return cls(linear=twist.linear_x, angular=twist.angular_z)
-
-
-class Hold(Model):
-    """A reason why a robot may not move."""
-
-    id: str
-    source: str
-    ack: str
-
-    @classmethod
-    def of(cls, hold: observations.Hold) -> "Hold":
-        """As the robot reported it."""
-        return cls(id=hold.id, source=hold.source, ack=hold.ack)
-
-
-class Fault(Model):
-    """A fault of a robot's own data, as the robot reports it."""
-
-    code: str
-    about: str
-    for_s: float | None
-
-
-class Applied(Model):
-    """Limit that the robot reports to apply."""
-
-    reason: str
-    cause: str | None
-    age_s: float
-    feedback_age_s: float | None
-    faults: list[Fault]
-
-    @classmethod
-    def of(cls, robot: RobotState, now: Instant) -> "Applied | None":
-        """From its newest report; None before the first."""
-        report, received = robot.safety, robot.safety_received
-        if report is None or received is None:
-            return None
-        return cls(
-            reason=report.reason,
-            cause=report.cause,
-            age_s=round(now.mono - received.mono, 3),
-            feedback_age_s=report.feedback_age_s,
-            faults=[
-                Fault(code=one.code, about=one.about, for_s=one.for_s)
-                for one in report.faults
-            ],
-        )
-
-
-class SpeedLimit(Model):
-    """Greatest speed factor of a robot, and its reason."""
-
-    speed_factor: float
-    reason: str
-    cause: str | None
-    distance_m: float | None
-    decision_id: str | None
-    foretold_s: float | None = Field(
-        description="Until it reaches the ring of the cause; null: it is inside."
-    )
-
-    @classmethod
-    def of(cls, limit: feedback.SpeedLimit) -> "SpeedLimit":
-        """The speed limit in force."""
-        return cls(
-            speed_factor=limit.speed_factor,
-            reason=limit.reason,
-            cause=limit.cause,
-            distance_m=rounded(limit.distance_m),
-            decision_id=limit.decision_id,
-            foretold_s=rounded(limit.foretold_s),
-        )
-
-
-class Encounter(Model):
-    """A zone that the robot will reach (docs/safety.md, "Foresight")."""
-
-    cause: str
-    reason: str
-    in_s: float
-    probability: float = Field(
-        description="Share of encounters foretold so far ahead that came true."
-    )
-    place: Point = Field(description="Where the robot will be.")
-    centre: Point = Field(description="Where the zone's centre will be.")
-    radius_m: float
-
-    @classmethod
-    def of(cls, foretold: foresight.Encounter, now: Instant) -> "Encounter":
-        """At this moment."""
-        left_s = foretold.left_s(now)
-        return cls(
-            cause=foretold.zone.cause,
-            reason=foretold.zone.reason,
-            in_s=round(left_s, 1),
-            probability=round(foresight.probability(left_s), 2),
-            place=Point(x=round(foretold.x, 2), y=round(foretold.y, 2)),
-            centre=Point(x=round(foretold.centre_x, 2), y=round(foretold.centre_y, 2)),
-            radius_m=round(foretold.zone.radius_m, 2),
-        )
-
-
-class MissingPremise(Model):
-    """One thing without which a robot is not clear (docs/safety.md, "Clear")."""
-
-    premise: Literal["pose", "doubt", "detector"]
-    robot_id: str = Field(description="Whose pose, word or detector it is.")
 
 
 class Detector(Model):
@@ -179,67 +45,6 @@ class Detector(Model):
             out_since=None if out is None else format_stamp(out.since),
             bias=CameraBias.of(robot.detector.peer_looks, now),
         )
-
-
-class Revoked(Model):
-    """Who had a robot heard no more."""
-
-    by: str
-    since: str
-    stood: bool = Field(description="Whether the STOP before it was confirmed.")
-
-    @classmethod
-    def of(cls, robot: RobotState) -> "Revoked | None":
-        """None of a robot that is heard."""
-        word = robot.revoked
-        if word is None:
-            return None
-        return cls(by=word.by, since=format_stamp(word.since), stood=word.stood)
-
-
-class RobotAccess(Model):
-    """What came of revoking a robot, or of allowing it again."""
-
-    robot_id: str
-    revoked: Revoked | None
-    broker: BrokerTold = Field(description="What came of asking the broker.")
-
-    @classmethod
-    def of(cls, robot: RobotState, broker: BrokerTold) -> "RobotAccess":
-        """Of one robot."""
-        return cls(robot_id=robot.robot_id, revoked=Revoked.of(robot), broker=broker)
-
-
-class SensorReading(Model):
-    """The newest reading of a small sensor; its quantities by name."""
-
-    age_s: float | None
-
-
-def _reading_model(kind: Kind) -> type[SensorReading]:
-    """The model of a small sensor: the quantities of its observation, and its age."""
-    types = get_type_hints(kind.of)
-    members: dict[str, Any] = {
-        name: (types[name], Field(description=f"{one.meaning} ({one.unit})"))
-        for name, one in quantities_of(kind.of).items()
-    }
-    return create_model(
-        kind.of.__name__, __base__=SensorReading, __doc__=kind.of.__doc__, **members
-    )
-
-
-_READINGS = {kind.name: _reading_model(kind) for kind in SENSED}
-
-
-def _newest_reading(
-    robot: RobotState, kind: Kind, now: Instant
-) -> SensorReading | None:
-    """What a small sensor said last; None before the first."""
-    read = robot.sensed.get(kind.of)
-    if read is None:
-        return None
-    age_s = None if read.at is None else round(now.mono - read.at.mono, 1)
-    return _READINGS[kind.name](**value_of(read.observation), age_s=age_s)
 
 
 class Navigation(Model):
@@ -327,7 +132,7 @@ class _Robot(Model):
     @staticmethod
     def sensed(robot: RobotState, now: Instant) -> dict[str, SensorReading | None]:
         """The members that are small sensors' newest readings."""
-        return {kind.name: _newest_reading(robot, kind, now) for kind in SENSED}
+        return {kind.name: newest_reading(robot, kind, now) for kind in SENSED}
 
 
 if TYPE_CHECKING:
@@ -337,5 +142,5 @@ else:
         "Robot",
         __base__=_Robot,
         __doc__=_Robot.__doc__,
-        **{name: (made | None, ...) for name, made in _READINGS.items()},
+        **{name: (made | None, ...) for name, made in READINGS.items()},
     )

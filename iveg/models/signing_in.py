@@ -1,4 +1,4 @@
-"""The way in for another device, and for other people."""
+"""Accounts, the links that people sign in with, and open sessions."""
 
 from typing import Literal
 
@@ -7,13 +7,9 @@ from pydantic import Field
 from iveg.domain.accounts import (
     Account,
     AccountState,
-    ApiToken,
     PersonRole,
     SignInMethod,
-    TokenScope,
 )
-from iveg.domain.passkeys import Passkey
-from iveg.domain.stamps import format_stamp
 from iveg.models.base import Model, stamp
 
 SessionKind = Literal["link", "account", "wall"]
@@ -86,90 +82,6 @@ class UserAccount(Model):
             own=own,
             provided=bool(account.provider),
         )
-
-
-class PasskeyOfPerson(Model):
-    """A passkey of whoever asks."""
-
-    passkey_id: str
-    name: str = Field(description="What the person calls it.")
-    host: str = Field(description="The address it works at.")
-    made_at: str
-    used_at: str | None = Field(description="Null: never.")
-
-    @classmethod
-    def of(cls, passkey: Passkey) -> "PasskeyOfPerson":
-        """As it is kept."""
-        return cls(
-            passkey_id=passkey.credential_id,
-            name=passkey.name,
-            host=passkey.rp_id,
-            made_at=format_stamp(passkey.made_at),
-            used_at=stamp(passkey.used_at),
-        )
-
-
-class Proof(Model):
-    """Whether a release would ask whoever asks to prove anew who they are."""
-
-    needed: bool
-    until: str | None = Field(description="When it would; null: never.")
-    ways: list[str] = Field(description="`password`, `passkey`, `pin`, `sso`.")
-
-    @classmethod
-    def of(cls, until: float | None, ways: list[str], *, needed: bool) -> "Proof":
-        """With the end of the proof before (Unix s)."""
-        return cls(needed=needed, until=stamp(until), ways=ways)
-
-
-class ProgramToken(Model):
-    """A program that may call, as admins see it."""
-
-    token_id: str
-    name: str
-    scope: TokenScope
-    made_at: str
-    used_at: str | None = Field(description="The last time; null: never.")
-    ends_at: str | None = Field(description="When it ends by itself; null: never.")
-    over: bool = Field(description="It has ended by itself.")
-
-    @classmethod
-    def of(cls, token: ApiToken, now: float) -> "ProgramToken":
-        """As it is at this moment (Unix s)."""
-        return cls(
-            token_id=token.token_id,
-            name=token.name,
-            scope=token.scope,
-            made_at=format_stamp(token.made_at),
-            used_at=stamp(token.used_at),
-            ends_at=stamp(token.ends_at),
-            over=not token.is_open(now),
-        )
-
-
-class NewToken(Model):
-    """A program with its token, which is shown this once."""
-
-    program: ProgramToken
-    token: str
-
-
-class TabletPerson(Model):
-    """Somebody who may unlock a shared tablet."""
-
-    person_id: str
-    name: str
-    blocked_s: int = Field(description="How long their PIN is refused; 0: not at all.")
-
-
-class Tablet(Model):
-    """A shared tablet as it is now."""
-
-    name: str
-    holder: str | None = Field(description="Who has unlocked it; null: it is locked.")
-    role: PersonRole = Field(description="What may be done on it now.")
-    left_s: float = Field(description="Until it locks by itself if nothing is done.")
-    people: list[TabletPerson]
 
 
 class Invitation(Model):

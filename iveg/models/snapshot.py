@@ -2,13 +2,15 @@
 
 from pydantic import Field
 
-from iveg.models.alert import Alert, Flood, LogEntry
+from iveg.models.alert import Alert, Flood
 from iveg.models.base import Model
 from iveg.models.climate import Climate
 from iveg.models.command import Command
+from iveg.models.detection import DetectionFrame
 from iveg.models.equipment import Tile
 from iveg.models.health import Health
-from iveg.models.people import DetectionFrame, Person
+from iveg.models.log_entry import LogEntry
+from iveg.models.people import Person
 from iveg.models.places import GreenhouseMap, Scan
 from iveg.models.robot import Robot
 from iveg.models.rule import Rule

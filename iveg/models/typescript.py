@@ -19,26 +19,21 @@ from iveg.models.alert import AlertListing
 from iveg.models.audit import AuditEntry
 from iveg.models.base import Model
 from iveg.models.climate import ClimateReading
-from iveg.models.command import Drill, FleetPressed, Latency
 from iveg.models.decision import Decision
 from iveg.models.experiment import Experiments
 from iveg.models.latency import LatencyTable
 from iveg.models.messages import Messages, MessageTest
+from iveg.models.passkeys import PasskeyOfPerson, Proof
 from iveg.models.places import Costmap, Coverage, Scan
+from iveg.models.press import FleetPressed
+from iveg.models.programs import NewToken
 from iveg.models.reading import Reading
-from iveg.models.robot import RobotAccess
+from iveg.models.robot_access import RobotAccess
 from iveg.models.rule import Trial
-from iveg.models.signing_in import (
-    Invitation,
-    NewToken,
-    OpenSession,
-    OwnAccount,
-    PasskeyOfPerson,
-    Proof,
-    SignInCode,
-    Tablet,
-)
+from iveg.models.signing_in import Invitation, OpenSession, OwnAccount, SignInCode
 from iveg.models.snapshot import PastWorld, Snapshot
+from iveg.models.stop_latency import Drill, Latency
+from iveg.models.tablets import Tablet
 from iveg.models.thing import KnownSpot, Thing
 from iveg.models.what_if import WhatIf
 

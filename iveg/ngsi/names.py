@@ -52,6 +52,7 @@ FEEDBACK_FILTER = "/+/mqtt_feedback"
 DESIRED_TOPIC = "/{robot_id}/iveg/desired"
 PEER_SCAN_TOPIC = "/{robot_id}/iveg/peer_scan"
 PEER_SCAN_FILTER = "/+/iveg/peer_scan"
+PEER_SCAN_END = PEER_SCAN_FILTER.removeprefix("/+")
 BACKFILL_TOPIC = "/{robot_id}/iveg/backfill"
 
 _ROBOT_ID = re.compile(r"[A-Za-z0-9-]{1,64}")

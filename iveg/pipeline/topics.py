@@ -13,12 +13,14 @@ from typing import Any, Literal, Protocol
 from iveg.domain.observations import Instant
 from iveg.domain.records import LogRecord
 from iveg.domain.stop import FollowedCommand as StopCommand
-from iveg.models.alert import Alert, Flood, LogEntry
+from iveg.models.alert import Alert, Flood
 from iveg.models.climate import Climate
 from iveg.models.command import Command
+from iveg.models.detection import DetectionFrame
 from iveg.models.equipment import Tile
 from iveg.models.health import Health
-from iveg.models.people import DetectionFrame, Person
+from iveg.models.log_entry import LogEntry
+from iveg.models.people import Person
 from iveg.models.places import GreenhouseMap, Scan
 from iveg.models.robot import Robot
 from iveg.models.rule import Rule

@@ -41,7 +41,8 @@ from iveg.ngsi.codec import read_feedback
 from iveg.robot.caps import FREE, Cap
 from iveg.robot.echo import Echo
 from iveg.robot.effects import Drive, Effect, Persist, Report, SendAnswer
-from iveg.robot.goals import Facts, Navigate, RobotGoals, read_goal
+from iveg.robot.goal_orders import read_goal
+from iveg.robot.goals import Facts, Navigate, RobotGoals
 from iveg.robot.hold_file import read_holds, write_holds
 from iveg.robot.judgement import Limits
 from iveg.robot.keepsake import Keepsake
@@ -53,7 +54,6 @@ from iveg.robot.uplink import Uplink
 _log = logging.getLogger(__name__)
 _GATE_EVERY_S = 0.04
 """25 Hz, so that a late timer still gives the drive its 20."""
-_PEER_SCAN = names.PEER_SCAN_TOPIC.format(robot_id="")[1:]
 _SAID_WITHIN_S = 0.03
 """Odometry, upstream twist and feedback that arrive together give one drive command."""
 
@@ -319,7 +319,7 @@ class RobotNode:
                 self._tell_goal(self._goals.answer(order, self._facts(now)))
         elif topic == self._desired_topic:
             self._perform(self._machine.desired(payload, now), now)
-        elif self._on_peer_scan is not None and topic.endswith(_PEER_SCAN):
+        elif self._on_peer_scan is not None and topic.endswith(names.PEER_SCAN_END):
             self._on_peer_scan(topic, payload)
         else:
             self._on_feedback(topic, payload, now)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from iveg.adapters.mqtt import BrokerAddress
+from iveg.adapters.broker_address import BrokerAddress
 from iveg.domain.limits import LIMITS
 from iveg.domain.witness import Plan
 from iveg.robot.judgement import OnLinkLoss

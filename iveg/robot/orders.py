@@ -10,7 +10,7 @@ from typing import Annotated
 from pydantic import AfterValidator, Field, ValidationError
 
 from iveg.domain.errors import UnreadableError
-from iveg.ngsi import names, payloads
+from iveg.ngsi import names, payloads, texts
 from iveg.ngsi.codec import load_json
 
 _STOP = "stop"
@@ -122,9 +122,9 @@ def _member(value: object, name: str) -> object:
 
 
 def _usable_id(value: object) -> str | None:
-    if not isinstance(value, str) or not value or payloads.FORBIDDEN & set(value):
+    if not isinstance(value, str) or not value or texts.FORBIDDEN & set(value):
         return None
-    return value if payloads.clean_text(value) == value else None
+    return value if texts.clean_text(value) == value else None
 
 
 def _release_or_resume(message: object) -> Order:

@@ -15,13 +15,13 @@ import itertools
 import operator
 import struct
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field
 from functools import cache
-from typing import Any, Literal, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
 from iveg.domain.errors import UnreadableError
+from iveg.ros2.cdr_bytes import HEADS, ByteOrder, ByteReader, ByteWriter
 from iveg.ros2.schema import (
     PRIMITIVES,
     Kind,
@@ -32,12 +32,7 @@ from iveg.ros2.schema import (
     fields_of,
 )
 
-ByteOrder = Literal["<", ">"]
 _ORDERS: dict[bytes, ByteOrder] = {b"\x00\x00": ">", b"\x00\x01": "<"}
-_HEADS: dict[ByteOrder, bytes] = {">": b"\x00\x00\x00\x00", "<": b"\x00\x01\x00\x00"}
-_COUNT: dict[ByteOrder, struct.Struct] = {
-    order: struct.Struct(order + "I") for order in _HEADS
-}
 
 _M = TypeVar("_M", bound=Message)
 
@@ -56,7 +51,7 @@ def read(message: type[_M], payload: bytes) -> _M:
     if order is None or len(payload) < 4:
         raise UnreadableError("bad_encapsulation", payload[:4].hex())
     try:
-        found: _M = _codec_of(message).read(_In(order, memoryview(payload)[4:]))
+        found: _M = _codec_of(message).read(ByteReader(order, memoryview(payload)[4:]))
     except struct.error as error:
         raise UnreadableError("too_short", f"{len(payload)} bytes") from error
     except UnicodeDecodeError as error:
@@ -66,60 +61,12 @@ def read(message: type[_M], payload: bytes) -> _M:
 
 def write(message: Message, order: ByteOrder = "<") -> bytes:
     """The bytes of one message, with its encapsulation."""
-    out = _Out(order)
+    out = ByteWriter(order)
     _codec_of(type(message)).write(out, message)
-    return _HEADS[order] + bytes(out.data)
+    return HEADS[order] + bytes(out.data)
 
 
 # --- the bytes ---------------------------------------------------------------------
-
-
-@dataclass(slots=True)
-class _In:
-    """Bytes that are read, from ``at`` on."""
-
-    order: ByteOrder
-    data: memoryview
-    at: int = 0
-
-    def align(self, size: int) -> None:
-        """Go on at the next multiple of ``size``."""
-        self.at += -self.at % size
-
-    def count(self) -> int:
-        """A length or count."""
-        self.align(4)
-        (count,) = _COUNT[self.order].unpack_from(self.data, self.at)
-        self.at += 4
-        return int(count)
-
-    def pass_over(self, size: int) -> int:
-        """Where the next ``size`` bytes begin; the reader stands behind them.
-
-        Raises:
-            UnreadableError: there are fewer.
-        """
-        begin, self.at = self.at, self.at + size
-        if self.at > len(self.data):
-            raise UnreadableError("too_short", f"at byte {begin}")
-        return begin
-
-
-@dataclass(slots=True)
-class _Out:
-    """Bytes that are written."""
-
-    order: ByteOrder
-    data: bytearray = field(default_factory=bytearray)
-
-    def align(self, size: int) -> None:
-        """Zeros up to the next multiple of ``size``."""
-        self.data += bytes(-len(self.data) % size)
-
-    def count(self, count: int) -> None:
-        """A length or count."""
-        self.align(4)
-        self.data += _COUNT[self.order].pack(count)
 
 
 # --- a message ---------------------------------------------------------------------
@@ -135,12 +82,12 @@ class _Codec:
         self._values_of = operator.attrgetter(*(name for name, _ in leaves), "ROS")
         self._make = _maker(message)
 
-    def read(self, source: _In) -> Any:
+    def read(self, source: ByteReader) -> Any:
         """The message at the reader's place."""
         found = (value for step in self._steps for value in step.read(source))
         return self._make(found)
 
-    def write(self, out: _Out, message: Message) -> None:
+    def write(self, out: ByteWriter, message: Message) -> None:
         """Write a message of this type."""
         values = iter(self._values_of(message))
         for step in self._steps:
@@ -198,17 +145,17 @@ class _Run:
         self._length = len(primitives)
         self._layouts = {
             order: [struct.Struct(order + _layout(primitives, n)) for n in range(8)]
-            for order in _HEADS
+            for order in HEADS
         }
 
-    def read(self, source: _In) -> Iterable[object]:
+    def read(self, source: ByteReader) -> Iterable[object]:
         """The values, by one ``struct``."""
         prepared = self._layouts[source.order][source.at % 8]
         found = prepared.unpack_from(source.data, source.at)
         source.at += prepared.size
         return found
 
-    def write(self, out: _Out, values: Iterator[object]) -> None:
+    def write(self, out: ByteWriter, values: Iterator[object]) -> None:
         """The inverse."""
         prepared = self._layouts[out.order][len(out.data) % 8]
         out.data += prepared.pack(*itertools.islice(values, self._length))
@@ -228,13 +175,13 @@ def _layout(primitives: Iterable[str], start: int) -> str:
 class _String:
     """A text: its length with the zero at its end, and its bytes."""
 
-    def read(self, source: _In) -> Iterable[object]:
+    def read(self, source: ByteReader) -> Iterable[object]:
         """The text; some senders leave an empty one without its zero."""
         size = source.count()
         begin = source.pass_over(size)
         return (str(source.data[begin : max(begin, source.at - 1)], "utf-8"),)
 
-    def write(self, out: _Out, values: Iterator[object]) -> None:
+    def write(self, out: ByteWriter, values: Iterator[object]) -> None:
         """The inverse."""
         raw = str(next(values)).encode() + b"\x00"
         out.count(len(raw))
@@ -247,9 +194,9 @@ class _Numbers:
     def __init__(self, kind: Many) -> None:
         self._fixed = kind.count
         code, self._size = PRIMITIVES[kind.primitive]
-        self._types = {order: np.dtype(order + code) for order in _HEADS}
+        self._types = {order: np.dtype(order + code) for order in HEADS}
 
-    def read(self, source: _In) -> Iterable[object]:
+    def read(self, source: ByteReader) -> Iterable[object]:
         """The array, in this machine's byte order."""
         count = source.count() if self._fixed is None else self._fixed
         if count:
@@ -259,7 +206,7 @@ class _Numbers:
         found = np.frombuffer(source.data, kind, count, begin)
         return (found if kind.isnative else found.astype(kind.newbyteorder("=")),)
 
-    def write(self, out: _Out, values: Iterator[object]) -> None:
+    def write(self, out: ByteWriter, values: Iterator[object]) -> None:
         """The inverse."""
         numbers = np.asarray(next(values), self._types[out.order])
         if self._fixed is None:
@@ -277,14 +224,14 @@ class _Messages:
     def __init__(self, message: type[Message]) -> None:
         self._codec = _codec_of(message)
 
-    def read(self, source: _In) -> Iterable[object]:
+    def read(self, source: ByteReader) -> Iterable[object]:
         """The messages; each has a byte at least."""
         count = source.count()
         if count > len(source.data) - source.at:
             raise UnreadableError("too_short", f"at byte {source.at}")
         return (tuple(self._codec.read(source) for _ in range(count)),)
 
-    def write(self, out: _Out, values: Iterator[Any]) -> None:
+    def write(self, out: ByteWriter, values: Iterator[Any]) -> None:
         """The inverse."""
         items = next(values)
         out.count(len(items))

@@ -7,8 +7,9 @@ Sources: ``bboxes_ex_msgs`` (Ar-Ray-code, the messages of YOLOX-ROS),
 
 from dataclasses import dataclass, field
 
-from iveg.ros2.messages import Header, Point, Pose, Stamped, Vector3
+from iveg.ros2.geometry_msgs import Point, Pose, Vector3
 from iveg.ros2.schema import Float32, Float64, Int32, Message, Uint16
+from iveg.ros2.std_msgs import Header, Stamped
 
 # --- bboxes_ex_msgs ----------------------------------------------------------------
 

@@ -9,7 +9,7 @@ A message is a frozen dataclass whose annotations define the wire format::
     ranges: Annotated[Floats, Many("float32")]     a sequence of primitives
     poses: tuple[PoseStamped, ...]                 a sequence of structures
 
-``cdr`` makes codecs from them, ``adapters/dds`` the types that DDS announces.
+``cdr`` makes codecs from them, ``adapters/dds_types`` the types that DDS announces.
 """
 
 from abc import ABC

@@ -47,7 +47,7 @@ from iveg.domain.errors import (
     WhatIfRefusedError,
 )
 from iveg.models.base import stamp
-from iveg.ngsi.payloads import all_legible
+from iveg.ngsi.texts import all_legible
 
 _MOST_COMPLAINTS = 20
 

@@ -14,36 +14,27 @@ from iveg.domain.rule.crossings import Crossing
 from iveg.domain.stamps import format_stamp
 from iveg.domain.stop import FollowedCommand, StopMachine
 from iveg.domain.tracking.person import TrackedPerson
-from iveg.models.alert import Alert, Flood, LogEntry
+from iveg.models.alert import Alert, Flood
 from iveg.models.base import moment, rounded
 from iveg.models.climate import Climate
 from iveg.models.command import Command as CommandModel
+from iveg.models.detection import Detection, DetectionFrame
 from iveg.models.device import Device
 from iveg.models.equipment import Tile
 from iveg.models.goal import Goal
 from iveg.models.health import Health, Safety
 from iveg.models.health import HopHealth as HopModel
+from iveg.models.log_entry import LogEntry
 from iveg.models.margin import Margin
-from iveg.models.people import Acting, Detection, DetectionFrame, Evidence
+from iveg.models.people import Acting, Evidence
 from iveg.models.people import Person as PersonModel
 from iveg.models.places import GreenhouseMap, Position, Scan
-from iveg.models.robot import (
-    Applied,
-    Detector,
-    Encounter,
-    Hold,
-    MissingPremise,
-    Mode,
-    Navigation,
-    Pose,
-    Profile,
-    Revoked,
-    Robot,
-    SpeedLimit,
-    Twist,
-)
+from iveg.models.pose import Pose, Twist
+from iveg.models.robot import Detector, Mode, Navigation, Profile, Robot
+from iveg.models.robot_access import Revoked
 from iveg.models.rule import Rule
 from iveg.models.situation import Situation
+from iveg.models.speed_limit import Applied, Encounter, Hold, MissingPremise, SpeedLimit
 from iveg.ngsi.names import ROBOT_DEVICES
 from iveg.pipeline.build import Pipeline
 from iveg.pipeline.health_monitor import HopHealth

@@ -75,7 +75,7 @@ def read_moisture(message: Float32) -> SoilMoisture:
     return SoilMoisture("", UNKNOWN_ORIGIN, message.data)
 
 
-def write_moisture(_: m.Header, moisture: Any) -> Float32:
+def write_moisture(_: std_msgs.Header, moisture: Any) -> Float32:
     \"\"\"The inverse.\"\"\"
     return Float32(moisture.percentage)
 """,
@@ -109,7 +109,7 @@ GUARDS = ("tests/architecture/test_sensors.py", "tests/unit/test_page_types.py")
 WRITERS = "iveg.models.typescript", "tests.architecture.sensor_pages"
 WHOLE = """
 from dataclasses import replace
-from iveg.adapters.subscriptions import WANTED_OF_ALL
+from iveg.adapters.wanted_subscriptions import WANTED_OF_ALL
 from iveg.domain.observations import Instant, Received, SoilMoisture
 from iveg.domain.records import ReadingRecord
 from iveg.domain.world import World

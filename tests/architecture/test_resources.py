@@ -9,12 +9,12 @@ from iveg.models.alert import AcknowledgedAlerts
 from iveg.models.base import Model
 from iveg.models.cost import Cost
 from iveg.models.day import Day
+from iveg.models.detection import DetectionRow, KeptDetection
 from iveg.models.device import Device
 from iveg.models.dictionary import DictionaryColumn
 from iveg.models.equipment import Measurement
 from iveg.models.note import Note
 from iveg.models.odometry import OdometryRow
-from iveg.models.people import DetectionRow, KeptDetection
 from iveg.models.recordings import Recording
 from iveg.models.signing_in import SessionsEnded
 from iveg.models.typescript import TOLD

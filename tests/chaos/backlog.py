@@ -10,7 +10,8 @@ import contextlib
 from collections import deque
 from dataclasses import dataclass
 
-from iveg.adapters.mqtt import BrokerAddress, MqttLink
+from iveg.adapters.broker_address import BrokerAddress
+from iveg.adapters.mqtt import MqttLink
 from iveg.domain.errors import HopError
 from tests.threads import running
 

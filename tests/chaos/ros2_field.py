@@ -11,8 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from iveg.domain.errors import UnreadableError
-from iveg.ros2 import cdr, names
-from iveg.ros2 import messages as m
+from iveg.ros2 import cdr, names, nav_msgs
 from tests.dds import Dds, free_domain, loopback
 from tests.processes import Program, Site, until
 
@@ -36,7 +35,7 @@ class Witness:
     def __init__(self, dds: Dds) -> None:
         self._reader = dds.reader(
             f"/{names.namespace_of(ROBOT)}/odom",
-            m.Odometry,
+            nav_msgs.Odometry,
             names.SENSOR_DATA.newest(200),
         )
         self._heard: deque[tuple[float, float]] = deque(maxlen=5000)
@@ -52,7 +51,7 @@ class Witness:
         while not self._ended.wait(0.01):
             for one in self._reader.take():
                 try:
-                    said = cdr.read(m.Odometry, one)
+                    said = cdr.read(nav_msgs.Odometry, one)
                 except UnreadableError:
                     continue
                 speed = said.twist.twist.linear.x

@@ -14,9 +14,9 @@ from pathlib import Path
 
 import pytest
 
-from iveg.adapters.recordings.directory import finish_broken
 from iveg.adapters.recordings.reading import read_messages
 from iveg.adapters.recordings.recorder import WRITE_S
+from iveg.adapters.recordings.repair import finish_broken
 from iveg.adapters.recordings.writer import SETTLE_S
 from tests.processes import ROOT, children_of, until
 

@@ -3,7 +3,8 @@
 import contextlib
 from dataclasses import dataclass, field
 
-from iveg.adapters.mqtt import BrokerAddress, MqttLink
+from iveg.adapters.broker_address import BrokerAddress
+from iveg.adapters.mqtt import MqttLink
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Odometry, SafetyReport
 from iveg.ngsi import codec

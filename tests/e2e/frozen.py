@@ -15,7 +15,7 @@ from playwright.sync_api import Browser, Page, Route, WebSocketRoute
 
 from iveg.adapters.history.store import Store
 from iveg.domain.records import Record
-from iveg.lab.emulator.world import climate_at
+from iveg.lab.emulator.climate import climate_at
 from iveg.ngsi.codec import format_stamp
 from iveg.pipeline.record import Waiting
 from tests.fakes.records import (

@@ -14,7 +14,8 @@ from pathlib import Path
 import orjson
 
 from iveg.adapters import clock
-from iveg.adapters.mqtt import BrokerAddress, MqttLink
+from iveg.adapters.broker_address import BrokerAddress
+from iveg.adapters.mqtt import MqttLink
 from iveg.domain.errors import UnreadableError
 from iveg.domain.observations import Origin
 from iveg.ngsi import names

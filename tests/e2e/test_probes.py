@@ -13,7 +13,7 @@ from paho.mqtt import publish
 from playwright.sync_api import expect
 
 import iveg
-from iveg.adapters.mqtt import BrokerAddress
+from iveg.adapters.broker_address import BrokerAddress
 from tests.e2e.conftest import OpenPage
 from tests.e2e.reading import evaluate, visit
 from tests.processes import EMULATOR, Site, site, until

@@ -13,7 +13,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Literal
 
-from iveg.adapters.mqtt import BrokerAddress, MqttLink
+from iveg.adapters.broker_address import BrokerAddress
+from iveg.adapters.mqtt import MqttLink
 from iveg.domain.errors import HopError
 from tests.threads import running
 

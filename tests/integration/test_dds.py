@@ -9,9 +9,8 @@ from collections.abc import Iterator
 import pytest
 
 from iveg.domain.errors import HopError
-from iveg.ros2 import cdr, names
+from iveg.ros2 import cdr, geometry_msgs, names, vision_msgs
 from iveg.ros2 import detector_messages as d
-from iveg.ros2 import messages as m
 from iveg.ros2.names import Qos
 from iveg.ros2.schema import Message
 from iveg.ros2.type_hash import type_hash
@@ -51,7 +50,7 @@ def dds(domain: int, talker: subprocess.Popen[bytes]) -> Iterator[Dds]:
 
 def heard(reader: DdsReader) -> list[float] | None:
     """Numbers that wait; None when there are none."""
-    found = [cdr.read(m.Twist, one).linear.x for one in reader.take()]
+    found = [cdr.read(geometry_msgs.Twist, one).linear.x for one in reader.take()]
     return found or None
 
 
@@ -67,7 +66,7 @@ def heard(reader: DdsReader) -> list[float] | None:
 def test_a_reader_hears_a_writer_that_offers_what_it_asks(
     dds: Dds, topic: str, asked: Qos
 ) -> None:
-    reader = dds.reader(topic, m.Twist, asked)
+    reader = dds.reader(topic, geometry_msgs.Twist, asked)
 
     found = until(lambda: heard(reader), 10.0, f"a message on {topic}")
 
@@ -75,7 +74,7 @@ def test_a_reader_hears_a_writer_that_offers_what_it_asks(
 
 
 def test_who_comes_late_gets_what_was_kept(dds: Dds) -> None:
-    kept = dds.reader("/kept", m.Twist, KEPT)
+    kept = dds.reader("/kept", geometry_msgs.Twist, KEPT)
 
     numbers = until(lambda: heard(kept), 30.0, "what was kept")
 
@@ -88,8 +87,8 @@ def test_who_comes_late_gets_what_was_kept(dds: Dds) -> None:
 def test_a_reader_that_asks_for_more_than_is_offered_hears_nothing_and_shows_it(
     dds: Dds, topic: str, asked: Qos
 ) -> None:
-    reader = dds.reader(topic, m.Twist, asked)
-    other = dds.reader(topic, m.Twist, BEST_EFFORT)
+    reader = dds.reader(topic, geometry_msgs.Twist, asked)
+    other = dds.reader(topic, geometry_msgs.Twist, BEST_EFFORT)
 
     until(lambda: heard(other), 10.0, f"a message on {topic}")
     offered = next(one for one in dds.endpoints() if one.topic == topic and one.writes)
@@ -99,7 +98,7 @@ def test_a_reader_that_asks_for_more_than_is_offered_hears_nothing_and_shows_it(
 
 
 def test_endpoints_have_the_names_of_ros_and_say_whose_they_are(dds: Dds) -> None:
-    writer = dds.writer("/ours", m.TwistStamped, RELIABLE)
+    writer = dds.writer("/ours", geometry_msgs.TwistStamped, RELIABLE)
 
     def foreign() -> bool:
         return {"/best_effort", "/reliable", "/kept"} <= {
@@ -118,12 +117,12 @@ def test_endpoints_have_the_names_of_ros_and_say_whose_they_are(dds: Dds) -> Non
 def test_a_message_of_another_layout_never_arrives(dds: Dds, domain: int) -> None:
     """DDS checks payloads against the type before anybody reads them."""
     with Dds(loopback(domain)) as other:
-        writer = other.writer("/short", m.Twist, RELIABLE)
-        reader = dds.reader("/short", m.Twist, RELIABLE)
+        writer = other.writer("/short", geometry_msgs.Twist, RELIABLE)
+        reader = dds.reader("/short", geometry_msgs.Twist, RELIABLE)
         until(lambda: writer.readers == 1 and reader.writers == 1, 30.0, "both met")
 
         with pytest.raises(HopError):
-            writer.write(cdr.write(m.Vector3()))
+            writer.write(cdr.write(geometry_msgs.Vector3()))
 
         assert reader.take() == []
 
@@ -138,7 +137,7 @@ def test_a_detector_is_met_in_its_type_and_tells_its_hash(
     with Dds(loopback(domain), gate="AGI") as other:
         writer = other.writer("/boxes", message, RELIABLE)
         # Tools of ROS may have readers of other types there.
-        dds.reader("/boxes", m.Detection3DArray, RELIABLE)
+        dds.reader("/boxes", vision_msgs.Detection3DArray, RELIABLE)
         reader = dds.reader("/boxes", message, RELIABLE)
         until(lambda: writer.readers == 1 and reader.writers == 1, 30.0, "both met")
 

@@ -18,7 +18,7 @@ from mcap.reader import make_reader
 
 from iveg.adapters.recordings.chunks import ChunkedRecording
 from iveg.app.past import Past
-from iveg.app.past import Site as PastSite
+from iveg.app.site import Site as PastSite
 from iveg.pipeline.trace import KEYFRAMES_S
 from iveg.settings import Settings
 from tests.processes import Site, site, until

@@ -18,8 +18,9 @@ from pathlib import Path
 import aiomqtt
 import pytest
 
+from iveg.adapters.broker_address import BrokerAddress
 from iveg.adapters.certificates import write_secret
-from iveg.adapters.mqtt import BrokerAddress, MqttLink
+from iveg.adapters.mqtt import MqttLink
 from iveg.adapters.orion import OrionClient
 from iveg.adapters.tls import TlsFiles
 from iveg.cli.diagnosis import judge

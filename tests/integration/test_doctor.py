@@ -11,8 +11,9 @@ import orjson
 import pytest
 
 from iveg.adapters import clock
+from iveg.adapters.fleet_provisioning import provision
 from iveg.adapters.history.migrate import upgrade
-from iveg.adapters.iot_agent import IotAgentClient, provision
+from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.orion import OrionClient
 from iveg.cli.diagnosis import State, exit_code, judge
 from iveg.cli.doctor import Examination

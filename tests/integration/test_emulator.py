@@ -11,8 +11,8 @@ import httpx
 import pytest
 
 from iveg.adapters import clock
+from iveg.adapters.broker_address import BrokerAddress
 from iveg.adapters.greenhouses import load_greenhouse
-from iveg.adapters.mqtt import BrokerAddress
 from iveg.domain.errors import DataFileError, SettingsError
 from iveg.domain.feedback import SpeedLimit
 from iveg.domain.observations import (
@@ -23,7 +23,7 @@ from iveg.domain.observations import (
     Odometry,
     SafetyReport,
 )
-from iveg.lab.emulator.camera import DETECTORS
+from iveg.lab.emulator.detector_model import DETECTORS
 from iveg.lab.emulator.emulated_robot import FleetSettings
 from iveg.lab.emulator.fleet import SimulatedFleet, run_emulator
 from iveg.lab.emulator.layout import lay_out

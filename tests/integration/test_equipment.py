@@ -7,7 +7,7 @@ import aiomqtt
 import httpx
 import pytest
 
-from iveg.adapters.mqtt import BrokerAddress
+from iveg.adapters.broker_address import BrokerAddress
 from tests.processes import Site, site, until
 
 TILES = """\

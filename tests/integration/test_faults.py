@@ -19,8 +19,8 @@ from typing import Any
 import httpx
 import pytest
 
-from iveg.adapters.mqtt import BrokerAddress
-from iveg.adapters.subscriptions import wanted_for
+from iveg.adapters.broker_address import BrokerAddress
+from iveg.adapters.wanted_subscriptions import wanted_for
 from tests.bonds import bound
 from tests.brokers import MOSQUITTO, PLAIN
 from tests.faulty_fiware import MODULE

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import httpx
 import pytest
 
-from iveg.adapters.mqtt import BrokerAddress
+from iveg.adapters.broker_address import BrokerAddress
 from tests.bonds import bound
 from tests.brokers import MOSQUITTO, PLAIN
 from tests.integration.gate import Gate, bridge, gate

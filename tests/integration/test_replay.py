@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from iveg.adapters.mqtt import BrokerAddress
+from iveg.adapters.broker_address import BrokerAddress
 from iveg.domain.errors import DataFileError
 from iveg.domain.feedback import SpeedLimit
 from iveg.domain.observations import (
@@ -25,7 +25,7 @@ from iveg.ngsi import codec
 from iveg.robot.node_settings import NodeSettings
 from iveg.robot.replay.replay import ReplaySettings, run_replay
 from iveg.ros2 import detector_messages as d
-from iveg.ros2 import messages as m
+from iveg.ros2 import geometry_msgs, nav_msgs, std_msgs
 from tests import data, processes
 from tests.data.bags import Said, bag_directory, db3_bag, drive, mcap_bag, ros1_bag
 from tests.data.message_bags import Said as MessageSaid
@@ -265,7 +265,7 @@ async def test_a_bag_of_ros_is_played_like_any_recording(
 
 def detected(stamp: float) -> d.BoundingBoxes3d:
     """A person 3 m before the robot, in its own frame, as YOLACT tells it."""
-    header = m.Header(m.Time.of(stamp), "base_link")
+    header = std_msgs.Header(std_msgs.Time.of(stamp), "base_link")
     box = d.BoundingBox3d("farmer", 0.9, 2.8, -0.3, 3.2, 0.3, 0.0, 1.8)
     return d.BoundingBoxes3d(header, (box,))
 
@@ -275,9 +275,11 @@ def yolact_bag(path: Path) -> Path:
     said: list[MessageSaid] = []
     for tick in range(20):
         at = 1000.0 + tick / 10
-        place = m.PoseWithCovariance(m.Pose(m.Point(2.0, 1.0)))
-        header = m.Header(m.Time.of(at), "odom")
-        said.append(("/odom", m.Odometry(header, "base_link", place), at))
+        place = geometry_msgs.PoseWithCovariance(
+            geometry_msgs.Pose(geometry_msgs.Point(2.0, 1.0))
+        )
+        header = std_msgs.Header(std_msgs.Time.of(at), "odom")
+        said.append(("/odom", nav_msgs.Odometry(header, "base_link", place), at))
         said.append(("/yolact_coordinate", detected(at), at))
     return message_bag(path, said)
 

@@ -15,7 +15,8 @@ from pathlib import Path
 import pytest
 
 from iveg.adapters import clock
-from iveg.adapters.mqtt import BrokerAddress, MqttLink
+from iveg.adapters.broker_address import BrokerAddress
+from iveg.adapters.mqtt import MqttLink
 from iveg.domain.feedback import CLEAR, Feedback, SpeedLimit
 from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import Pose2D, Twist2D

@@ -12,16 +12,16 @@ import numpy as np
 import pytest
 
 from iveg.adapters import clock
-from iveg.adapters.mqtt import BrokerAddress, MqttLink
+from iveg.adapters.broker_address import BrokerAddress
+from iveg.adapters.mqtt import MqttLink
 from iveg.domain.feedback import CLEAR, Feedback
 from iveg.domain.geometry import Pose2D
 from iveg.domain.observations import DetectionFrame, LaserScan, Origin, SafetyReport
 from iveg.domain.peer_scan import peer_scan_of
 from iveg.ngsi import codec
 from iveg.ngsi.names import direct_topic, measure_topic
-from iveg.ros2 import cdr, names
+from iveg.ros2 import cdr, geometry_msgs, names, nav_msgs, std_msgs
 from iveg.ros2 import detector_messages as d
-from iveg.ros2 import messages as m
 from tests.brokers import broker_on
 from tests.dds import Dds, free_domain, loopback
 from tests.processes import Program, Site, site
@@ -123,26 +123,28 @@ class Sensors:
     """A base's odometry, on DDS, and its ear."""
 
     def __init__(self, dds: Dds) -> None:
-        self._odometry = dds.writer("/odom", m.Odometry, names.DEFAULT.newest(_BURST))
-        self._tf = dds.writer("/tf", m.TFMessage, names.DEFAULT)
+        self._odometry = dds.writer(
+            "/odom", nav_msgs.Odometry, names.DEFAULT.newest(_BURST)
+        )
+        self._tf = dds.writer("/tf", geometry_msgs.TFMessage, names.DEFAULT)
         self._boxes = dds.writer("/yolact_coordinate", d.BoundingBoxes3d, names.DEFAULT)
-        self.drive = dds.reader("/cmd_vel", m.Twist, names.DEFAULT)
+        self.drive = dds.reader("/cmd_vel", geometry_msgs.Twist, names.DEFAULT)
         self.burst = 1
 
     async def talk(self) -> None:
         """Say where the base is thirty times a second, as often as ``burst``."""
         while True:
-            stamp = m.Time.of(clock.wall())
-            odom = m.Header(stamp, "odom")
+            stamp = std_msgs.Time.of(clock.wall())
+            odom = std_msgs.Header(stamp, "odom")
             links = (
-                m.TransformStamped(m.Header(stamp, "map"), "odom"),
-                m.TransformStamped(odom, "base_link"),
+                geometry_msgs.TransformStamped(std_msgs.Header(stamp, "map"), "odom"),
+                geometry_msgs.TransformStamped(odom, "base_link"),
             )
-            self._tf.write(cdr.write(m.TFMessage(links)))
-            base = m.Header(stamp, "base_link")
+            self._tf.write(cdr.write(geometry_msgs.TFMessage(links)))
+            base = std_msgs.Header(stamp, "base_link")
             self._boxes.write(cdr.write(d.BoundingBoxes3d(base, (PERSON,))))
             for _ in range(self.burst):
-                self._odometry.write(cdr.write(m.Odometry(odom, "base_link")))
+                self._odometry.write(cdr.write(nav_msgs.Odometry(odom, "base_link")))
             await asyncio.sleep(1 / 30)
 
 
@@ -238,7 +240,7 @@ async def test_nav2s_static_layer_gets_the_fleets_picture(riding: Riding) -> Non
     kept = names.LATCHED
     async with at_work(riding) as (iveg, _):
         with Dds(loopback(riding.domain)) as nav2:
-            layer = nav2.reader("/iveg/costmap", m.OccupancyGrid, kept)
+            layer = nav2.reader("/iveg/costmap", nav_msgs.OccupancyGrid, kept)
             async with asyncio.timeout(30.0):
                 while iveg.report is None or not iveg.report.peer_scans:  # noqa: ASYNC110
                     await asyncio.sleep(0.05)
@@ -254,13 +256,15 @@ async def test_nav2s_static_layer_gets_the_fleets_picture(riding: Riding) -> Non
     assert cost(grid, 0.05, 0.05) == -1
 
 
-def newest(waited: Sequence[bytes], before: m.OccupancyGrid | None) -> m.OccupancyGrid:
+def newest(
+    waited: Sequence[bytes], before: nav_msgs.OccupancyGrid | None
+) -> nav_msgs.OccupancyGrid:
     """The last of what came, if anything did."""
-    empty = m.OccupancyGrid()
-    return cdr.read(m.OccupancyGrid, waited[-1]) if waited else before or empty
+    empty = nav_msgs.OccupancyGrid()
+    return cdr.read(nav_msgs.OccupancyGrid, waited[-1]) if waited else before or empty
 
 
-def cost(grid: m.OccupancyGrid, x: float, y: float) -> int:
+def cost(grid: nav_msgs.OccupancyGrid, x: float, y: float) -> int:
     """At a place in ``map`` (m); unknown in a grid without cells."""
     info = grid.info
     if not grid.data.size:

@@ -9,7 +9,8 @@ import httpx
 import orjson
 import pytest
 
-from iveg.adapters.mqtt import BrokerAddress, MqttLink
+from iveg.adapters.broker_address import BrokerAddress
+from iveg.adapters.mqtt import MqttLink
 from iveg.domain.observations import Origin
 from iveg.ngsi import codec, names
 from tests.builders import odometry, scan

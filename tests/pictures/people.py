@@ -5,9 +5,10 @@ from dataclasses import dataclass
 from playwright.sync_api import APIRequestContext, Browser, StorageState
 
 from iveg.adapters import clock
-from iveg.adapters.admission import Admission, admit_program
+from iveg.adapters.admission import Admission
 from iveg.adapters.history.accounts import AccountRows, AccountStore
 from iveg.adapters.history.api_tokens import ApiTokenStore
+from iveg.adapters.program_admission import admit_program
 from iveg.domain.accounts import TokenScope
 from iveg.domain.audit import CONSOLE
 from tests.pictures.pages import OWN, PIN

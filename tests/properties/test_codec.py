@@ -27,7 +27,7 @@ from iveg.domain.observations import (
     SafetyReport,
 )
 from iveg.ngsi import codec, names
-from iveg.ngsi.payloads import MAX_TEXT, clean_text
+from iveg.ngsi.texts import MAX_TEXT, clean_text
 
 alphabet = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_.: áéñ"
 texts = st.text(alphabet, min_size=1, max_size=40)

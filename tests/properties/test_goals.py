@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from iveg.adapters.mqtt import BrokerAddress
+from iveg.adapters.broker_address import BrokerAddress
 from iveg.domain.errors import CommandRefusedError
 from iveg.domain.feedback import CLEAR, Feedback, SpeedLimit
 from iveg.domain.fleet import RobotProfile

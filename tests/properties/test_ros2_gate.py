@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from iveg.domain.feedback import SpeedLimit
 from iveg.domain.geometry import REST, Twist2D
-from iveg.lab.emulator.ros2_base import TIMEOUT_S, DriveWatchdog
+from iveg.lab.emulator.ros2_navigation import TIMEOUT_S, DriveWatchdog
 from iveg.robot.caps import Cap
 from iveg.robot.effects import Drive as Told
 from iveg.robot.gate import RAMP_M_S2, RAMP_RAD_S2
@@ -22,8 +22,7 @@ from iveg.robot.ros2.config import DriveConfig
 from iveg.robot.ros2.drive import DriveTopics
 from iveg.robot.ros2.input_faults import InputFaults
 from iveg.robot.ros2.reading import read_twist
-from iveg.ros2 import cdr
-from iveg.ros2 import messages as m
+from iveg.ros2 import cdr, geometry_msgs, std_msgs
 from tests.unit.robot.rig import STEP_S, Rig, person, release, resume, stop
 
 WALL = 1_700_000_000.0
@@ -80,9 +79,13 @@ class Gate:
     # --- what happens -------------------------------------------------------------
 
     def on_wish(self, forward: float, turn: float, back_s: float) -> None:
-        twist = m.Twist(m.Vector3(forward), m.Vector3(z=turn))
-        stamp = m.Time.of(WALL + self.rig.now + back_s)
-        self.on_junk(cdr.write(m.TwistStamped(m.Header(stamp), twist)))
+        twist = geometry_msgs.Twist(
+            geometry_msgs.Vector3(forward), geometry_msgs.Vector3(z=turn)
+        )
+        stamp = std_msgs.Time.of(WALL + self.rig.now + back_s)
+        self.on_junk(
+            cdr.write(geometry_msgs.TwistStamped(std_msgs.Header(stamp), twist))
+        )
 
     def on_junk(self, payload: bytes) -> None:
         if not self.runs:
@@ -155,7 +158,7 @@ class Gate:
 
     def deliver(self, at: float, payload: bytes) -> None:
         """What arrives at the base, held against what the node allows."""
-        twist = read_twist(cdr.read(m.TwistStamped, payload).twist)
+        twist = read_twist(cdr.read(geometry_msgs.TwistStamped, payload).twist)
         cap = self.rig.machine.cap.factor
         lived = at - self.wished_at <= 0.5
         wish = self.wished if lived else REST

@@ -13,8 +13,9 @@ from types import FrameType
 
 import pytest
 
+from iveg.adapters.broker_address import BrokerAddress
 from iveg.adapters.direct import DirectReader
-from iveg.adapters.mqtt import BrokerAddress, MqttLink
+from iveg.adapters.mqtt import MqttLink
 from iveg.adapters.transports import MqttTransport
 from iveg.ngsi import codec, names
 from tests.architecture.test_tour import DETECTION, STOP

@@ -14,7 +14,7 @@ from typing import Any
 from sqlalchemy import Connection, and_, case, func, literal, select, text
 
 from iveg.adapters.history.partial_indexes import IS_NEAR, IS_SLOWED
-from iveg.adapters.history.series import whole
+from iveg.adapters.history.rounding import whole
 from iveg.adapters.history.tables import (
     alerts,
     command_events,

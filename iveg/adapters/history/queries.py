@@ -12,10 +12,11 @@ from typing import Any, Concatenate
 
 from sqlalchemy import Connection, Select, func, select
 
-from iveg.adapters.history import lists
+from iveg.adapters.history import listings, lists
 from iveg.adapters.history.asking import P, T, ask
 from iveg.adapters.history.engine import reading_engine
-from iveg.adapters.history.lists import Filter, ListOf, Page, R, record_of
+from iveg.adapters.history.listings import ListOf, R
+from iveg.adapters.history.lists import Filter, Page, record_of
 from iveg.adapters.history.tables import (
     alerts,
     command_events,
@@ -162,7 +163,7 @@ class Queries:
 
     async def newest_lines(self, most: int) -> tuple[LogRecord, ...]:
         """The newest lines of the log, newest first."""
-        return (await self.page(lists.LOG, Filter(limit=most))).items
+        return (await self.page(listings.LOG, Filter(limit=most))).items
 
     async def latency_minutes(self, since: float) -> tuple[LatencyRecord, ...]:
         """Every minute of every hop from then on (Unix s), oldest first."""

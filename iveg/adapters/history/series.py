@@ -17,24 +17,19 @@ from sqlalchemy import (
     select,
 )
 
-from iveg.adapters.history.lists import record_of
+from iveg.adapters.history.rounding import whole
 from iveg.adapters.history.tables import (
     climate,
-    commands,
-    detections,
     measurements,
     odometry,
 )
-from iveg.domain.day import DaySighting, Pose
 from iveg.domain.fleet import as_counted
-from iveg.domain.records import ByTransport, CommandRecord
 
 MOST_POINTS = 2000
 MOST_READINGS = 288
 """A day of the air in slices of five minutes."""
 READING_PERIOD_S = 60.0
 """Between two kept readings (``pipeline.event_log``)."""
-CONFIDENCE_BINS = 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,42 +87,6 @@ class MeasurementSeries:
     slice_s: float = field(default=0.0, kw_only=True)
 
 
-@dataclass(frozen=True, slots=True)
-class ConfidenceCount:
-    """Number of detections of a class in one interval of confidence.
-
-    Attributes:
-        class_id: As the detector said.
-        least: Lower edge, inclusive; the slice is 1 / ``CONFIDENCE_BINS`` wide.
-    """
-
-    class_id: str
-    least: float
-    count: int
-
-
-@dataclass(frozen=True, slots=True)
-class CommandLatency:
-    """Times of one STOP from the press (ms); None where a step never came.
-
-    Without a told press, the press is when it was accepted.
-
-    Attributes:
-        answer_ms: To the robot's answer by each transport that brought one.
-        standstill_ms: To the first standing sample.
-        accepted_ms: To this server, where the page told when it was pressed.
-        sent_ms: Until it left by each transport that took it.
-    """
-
-    command_id: str
-    robot_id: str
-    requested_at: float
-    answer_ms: ByTransport
-    sent_ms: ByTransport
-    standstill_ms: float | None
-    accepted_ms: float | None = None
-
-
 def speed_series(
     connection: Connection,
     since: float,
@@ -180,102 +139,6 @@ def measurement_series(
         key: MeasurementSeries(*zip(*points, strict=True), slice_s=width_s)
         for key, points in found.items()
     }
-
-
-def poses_of(connection: Connection, since: float, until: float) -> tuple[Pose, ...]:
-    """Poses of robots in each second of ``since <= at < until``, in order."""
-    c = odometry.c
-    second = whole(connection, c.at)
-    wanted = (
-        select(
-            c.robot_id,
-            second,
-            func.avg(c.x),
-            func.avg(c.y),
-            func.avg(func.abs(c.linear)),
-        )
-        .where(c.at >= since, c.at < until)
-        .group_by(c.robot_id, second)
-        .order_by(second)
-    )
-    return tuple(Pose(*row) for row in connection.execute(wanted))
-
-
-def people_seen(
-    connection: Connection, since: float, until: float
-) -> tuple[DaySighting, ...]:
-    """Positions of confirmed people in each second of ``since <= at < until``."""
-    c = detections.c
-    second = whole(connection, c.at)
-    wanted = (
-        select(second, func.avg(c.x), func.avg(c.y), c.robot_id)
-        .where(c.at >= since, c.at < until, c.confident, c.class_ == "person")
-        # A place that is no longer kept is no place near a robot.
-        .where(c.x.is_not(None))
-        # Two people of one second must not become one between them.
-        .group_by(c.robot_id, c.person_id, second)
-        .order_by(second)
-    )
-    return tuple(DaySighting(*row) for row in connection.execute(wanted))
-
-
-def confidence_counts(
-    connection: Connection, since: float, until: float, robot: str | None = None
-) -> tuple[ConfidenceCount, ...]:
-    """Detections of ``since <= at < until`` by class and confidence."""
-    bins = detections.c.probability * CONFIDENCE_BINS
-    place = whole(connection, bins).label("place")
-    statement = (
-        select(detections.c.class_id, place, func.count())
-        .where(detections.c.at >= since, detections.c.at < until)
-        .group_by(detections.c.class_id, place)
-    )
-    if robot is not None:
-        statement = statement.where(detections.c.robot_id == robot)
-    counts: dict[tuple[str, int], int] = {}
-    for class_id, number, count in connection.execute(statement):
-        # Certainty itself, 1.0, belongs to the uppermost slice.
-        slot = (class_id, min(int(number), CONFIDENCE_BINS - 1))
-        counts[slot] = counts.get(slot, 0) + count
-    return tuple(
-        ConfidenceCount(class_id, slot / CONFIDENCE_BINS, count)
-        for (class_id, slot), count in sorted(counts.items())
-    )
-
-
-def command_latencies(
-    connection: Connection, since: float, until: float, robot: str | None = None
-) -> tuple[CommandLatency, ...]:
-    """The newest STOPs of ``since <= requested_at < until``, oldest first."""
-    c = commands.c
-    statement = (
-        select(commands)
-        .where(c.kind == "stop", c.requested_at >= since, c.requested_at < until)
-        .order_by(c.requested_at.desc(), c.command_id.desc())
-        .limit(MOST_POINTS)
-    )
-    if robot is not None:
-        statement = statement.where(c.robot_id == robot)
-    rows = connection.execute(statement).mappings().all()
-    return tuple(_latency(record_of(CommandRecord, row)) for row in reversed(rows))
-
-
-def _latency(record: CommandRecord) -> CommandLatency:
-    pressed = record.pressed_at
-    asked = record.requested_at if pressed is None else pressed
-    return CommandLatency(
-        record.command_id,
-        record.robot_id,
-        record.requested_at,
-        {one: _ms(asked, at) for one, at in record.answer_at.items()},
-        {one: _ms(asked, at) for one, at in record.sent_at.items()},
-        record.standstill_ms,
-        None if pressed is None else _ms(pressed, record.requested_at),
-    )
-
-
-def _ms(start: float, end: float) -> float:
-    return 1000.0 * (end - start)
 
 
 def _robots(connection: Connection) -> Iterator[str]:
@@ -331,10 +194,3 @@ def _columns(
     statement = select(*wanted).where(*asked).group_by(*place).order_by(wanted[0])
     rows = connection.execute(statement).all()
     return list(zip(*rows, strict=True)) or [()] * len(wanted)
-
-
-def whole(connection: Connection, value: ColumnElement[Any]) -> ColumnElement[int]:
-    """Rounded down: a cast does that on SQLite, and rounds to nearest on PostgreSQL."""
-    if connection.dialect.name == "sqlite":
-        return cast(value, Integer)
-    return cast(func.floor(value), Integer)

@@ -1,13 +1,18 @@
 """Observations as Foxglove's well-known messages, so that its viewers draw them.
 
-Names and fields: https://docs.foxglove.dev/docs/sdk/schemas.  Frames are ``map`` and
-``{robot}/base_link``.
+Frames are ``map`` and ``{robot}/base_link``.
 """
 
 import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from iveg.adapters.recordings.foxglove_schemas import (
+    POSE_IN_FRAME,
+    SCAN,
+    SCENE,
+    TRANSFORM,
+)
 from iveg.adapters.recordings.mcap_file import Channel
 from iveg.domain.geometry import Pose2D
 from iveg.domain.observations import (
@@ -21,54 +26,12 @@ from iveg.domain.observations import (
 Told = tuple[Channel, Mapping[str, Any]]
 """A message and its channel."""
 
-_NUMBER, _TEXT, _FLAG = {"type": "number"}, {"type": "string"}, {"type": "boolean"}
 _MAP, _BASE = "map", "base_link"
 _SHOWN_S = 1.0
 """How long a box is drawn; the next picture takes its place before that."""
 
 
-def _object(**properties: object) -> dict[str, object]:
-    return {"type": "object", "properties": properties}
-
-
-def _list(of: object) -> dict[str, object]:
-    return {"type": "array", "items": of}
-
-
-_TIME = _object(sec={"type": "integer"}, nsec={"type": "integer"})
-_VECTOR = _object(x=_NUMBER, y=_NUMBER, z=_NUMBER)
-_QUATERNION = _object(x=_NUMBER, y=_NUMBER, z=_NUMBER, w=_NUMBER)
-_POSE = _object(position=_VECTOR, orientation=_QUATERNION)
-_COLOUR = _object(r=_NUMBER, g=_NUMBER, b=_NUMBER, a=_NUMBER)
-_POSE_IN_FRAME = _object(timestamp=_TIME, frame_id=_TEXT, pose=_POSE)
-_TRANSFORM = _object(
-    timestamp=_TIME,
-    parent_frame_id=_TEXT,
-    child_frame_id=_TEXT,
-    translation=_VECTOR,
-    rotation=_QUATERNION,
-)
-_SCAN = _object(
-    timestamp=_TIME,
-    frame_id=_TEXT,
-    pose=_POSE,
-    start_angle=_NUMBER,
-    end_angle=_NUMBER,
-    ranges=_list(_NUMBER),
-    intensities=_list(_NUMBER),
-)
-_CUBE = _object(pose=_POSE, size=_VECTOR, color=_COLOUR)
-_ENTITY = _object(
-    timestamp=_TIME,
-    frame_id=_TEXT,
-    id=_TEXT,
-    lifetime=_TIME,
-    frame_locked=_FLAG,
-    metadata=_list(_object(key=_TEXT, value=_TEXT)),
-    cubes=_list(_CUBE),
-)
-_SCENE = _object(deletions=_list(_object()), entities=_list(_ENTITY))
-_TRANSFORMS = Channel("/tf", "foxglove.FrameTransform", _TRANSFORM)
+_TRANSFORMS = Channel("/tf", "foxglove.FrameTransform", TRANSFORM)
 
 
 def channels_of(robot_id: str) -> tuple[Channel, ...]:
@@ -82,15 +45,15 @@ def channels_of(robot_id: str) -> tuple[Channel, ...]:
 
 
 def _pose_channel(robot_id: str) -> Channel:
-    return Channel(f"/{robot_id}/pose", "foxglove.PoseInFrame", _POSE_IN_FRAME)
+    return Channel(f"/{robot_id}/pose", "foxglove.PoseInFrame", POSE_IN_FRAME)
 
 
 def _scan_channel(robot_id: str) -> Channel:
-    return Channel(f"/{robot_id}/scan", "foxglove.LaserScan", _SCAN)
+    return Channel(f"/{robot_id}/scan", "foxglove.LaserScan", SCAN)
 
 
 def _scene_channel(robot_id: str) -> Channel:
-    return Channel(f"/{robot_id}/detections", "foxglove.SceneUpdate", _SCENE)
+    return Channel(f"/{robot_id}/detections", "foxglove.SceneUpdate", SCENE)
 
 
 def messages_of(observation: Observation, wall: float) -> Iterator[Told]:

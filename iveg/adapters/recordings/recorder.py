@@ -17,10 +17,11 @@ from typing import TypeVar
 
 import orjson
 
-from iveg.adapters.recordings.directory import RecordingDirectory, finish_broken
+from iveg.adapters.recordings.directory import RecordingDirectory
 from iveg.adapters.recordings.excerpt import write_excerpt
 from iveg.adapters.recordings.incoming import Sort, pack
 from iveg.adapters.recordings.live_feed import LiveFeed
+from iveg.adapters.recordings.repair import finish_broken
 from iveg.adapters.recordings.writer import PRUNE_S, WriterSetup
 from iveg.adapters.recordings.writer_process import WriterProcess
 from iveg.adapters.worker import Worker
@@ -30,7 +31,6 @@ from iveg.domain.observations import Instant, LaserScan, Observation, Overtaken
 from iveg.domain.recordings import RecordingFile
 from iveg.domain.records import Record, is_telemetry
 from iveg.pipeline.ports import Clock
-from iveg.pipeline.record import RecordSink
 
 _log = logging.getLogger(__name__)
 _T = TypeVar("_T")
@@ -42,22 +42,6 @@ QUIET_S = 60.0
 """What is dropped is told again where nothing was for so long (s)."""
 _NUMBERS = re.compile(rb"\[[-+.,\deE\snul]{100,}\]")
 """A long list of numbers in JSON."""
-
-
-class RecordedSink:
-    """The history's recorder, whose rows are recorded here, too.
-
-    Implements ``pipeline.record.RecordSink``.
-    """
-
-    def __init__(self, history: RecordSink, row: Callable[[Record], None]) -> None:
-        self._history, self._row = history, row
-        self.flushed = history.flushed
-
-    def enqueue(self, record: Record) -> None:
-        """Queue a record in both."""
-        self._history.enqueue(record)
-        self._row(record)
 
 
 class InputRecorder:

@@ -79,7 +79,7 @@ def _network(options: argparse.Namespace) -> "AbstractContextManager[Dds | None]
     """DDS for robots that speak ROS 2, if requested."""
     if not options.dds:
         return nullcontext()
-    from iveg.cli.robot import load_config, network_of
+    from iveg.cli.robot_config import load_config, network_of
 
     config, _ = load_config(options, os.environ)
     network = network_of(config, os.environ, "iveg emulator --dds")

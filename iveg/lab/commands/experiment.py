@@ -43,9 +43,10 @@ from iveg.lab.experiment.plan import (
     PlannedRun,
     directory_of,
 )
+from iveg.lab.experiment.progress import Progress
 from iveg.lab.experiment.raw import write_raw
 from iveg.lab.experiment.recording import read_truth
-from iveg.lab.experiment.run_store import Progress, RunStore
+from iveg.lab.experiment.run_store import RunStore
 from iveg.lab.experiment.virtual_run import VirtualRun
 from iveg.settings import Settings
 

@@ -2,7 +2,7 @@
 
 from urllib.parse import urlsplit
 
-from iveg.adapters.connections import raise_descriptor_limit
+from iveg.adapters.connection_caps import raise_descriptor_limit
 from iveg.cli.arguments import CommandCall
 from iveg.cli.running import report_ready, run_until_stopped, tune_garbage_collection
 from iveg.lab.embedded.server import serve_fiware

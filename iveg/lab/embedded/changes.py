@@ -4,11 +4,11 @@ from collections.abc import Collection, Mapping
 
 from iveg.lab.embedded.entities import EntityChange, default_type, metadata_json
 from iveg.lab.embedded.errors import bad_request
+from iveg.lab.embedded.orion_dates import date_text
 from iveg.lab.embedded.orion_text import (
     UNRESTRICTED,
     check_given_name,
     check_name,
-    date_text,
     holds_forbidden,
 )
 

@@ -11,8 +11,9 @@ from typing import NamedTuple
 import orjson
 
 from iveg.lab.embedded.errors import not_supported
+from iveg.lab.embedded.orion_dates import date_json, date_text
 from iveg.lab.embedded.orion_numbers import print_value
-from iveg.lab.embedded.orion_text import date_json, date_text, quoted
+from iveg.lab.embedded.orion_text import quoted
 
 BUILTIN_DATES = ("dateCreated", "dateModified")
 

@@ -6,21 +6,20 @@ frameworks do not allow easily.
 
 import asyncio
 import logging
-from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field, replace
 from http import HTTPStatus
-from typing import Generic, TypeVar
 from urllib.parse import parse_qsl, unquote
 
 from iveg.adapters import clock
-from iveg.adapters.connections import Connection, ConnectionCaps, ConnectionTable
+from iveg.adapters.connection_caps import ConnectionCaps
+from iveg.adapters.connections import Connection, ConnectionTable
 
 _log = logging.getLogger(__name__)
 _MAX_BODY = 8 << 20
 _MOST_DIGITS = 10
 _CLOSED = (asyncio.IncompleteReadError, ConnectionError)
-_Route = TypeVar("_Route")
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,29 +55,6 @@ class Response:
 
 
 Handler = Callable[[Request], Awaitable[Response]]
-
-
-class Routes(Generic[_Route]):
-    """A table of routes.
-
-    Args:
-        table: By method and path, such as ``GET /v2/entities/*``.
-    """
-
-    def __init__(self, table: Mapping[str, _Route]) -> None:
-        self._table = []
-        for line, route in table.items():
-            method, *shape = line.replace("/", " ").split()
-            self._table.append((shape, method, route))
-
-    def of_path(self, parts: tuple[str, ...]) -> dict[str, _Route]:
-        """Methods of a path with their routes, in the order of the table."""
-        return {
-            method: route
-            for shape, method, route in self._table
-            if len(shape) == len(parts)
-            and all(one in ("*", part) for one, part in zip(shape, parts, strict=True))
-        }
 
 
 @asynccontextmanager

@@ -6,8 +6,9 @@ import orjson
 
 from iveg.lab.embedded.devices import AgentDevice, Group, Tenancy, read_group
 from iveg.lab.embedded.errors import FiwareError, wrong_syntax
-from iveg.lab.embedded.http_server import Request, Response, Routes
+from iveg.lab.embedded.http_server import Request, Response
 from iveg.lab.embedded.iot_agent import IotAgent
+from iveg.lab.embedded.routes import Routes
 
 _ABOUT = {
     "libVersion": "4.14.0-iveg-embedded",

@@ -14,11 +14,10 @@ from iveg.lab.embedded.entities import (
     Value,
 )
 from iveg.lab.embedded.errors import FiwareError, bad_request
+from iveg.lab.embedded.orion_dates import date_json, date_text
 from iveg.lab.embedded.orion_text import (
     UNRESTRICTED,
     check_name,
-    date_json,
-    date_text,
     holds_forbidden,
     load_json,
     looks_clean,

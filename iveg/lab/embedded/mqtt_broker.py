@@ -13,7 +13,8 @@ from typing import NamedTuple
 from paho.mqtt.client import topic_matches_sub
 
 from iveg.adapters import clock
-from iveg.adapters.connections import ConnectionCaps, ConnectionTable
+from iveg.adapters.connection_caps import ConnectionCaps
+from iveg.adapters.connections import ConnectionTable
 from iveg.adapters.mqtt_packets import publish_packet
 
 _log = logging.getLogger(__name__)

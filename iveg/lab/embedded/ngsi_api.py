@@ -8,14 +8,11 @@ from iveg.adapters import clock
 from iveg.lab.embedded import entity_paths, subscription_paths
 from iveg.lab.embedded.context_broker import ContextBroker
 from iveg.lab.embedded.errors import FiwareError, bad_request
-from iveg.lab.embedded.http_server import Request, Response, Routes
-from iveg.lab.embedded.ngsi_request import (
-    NgsiCall,
-    check_accept,
-    check_content,
-    read_options,
-    read_scope,
-)
+from iveg.lab.embedded.http_server import Request, Response
+from iveg.lab.embedded.ngsi_request import NgsiCall, read_options
+from iveg.lab.embedded.request_content import check_accept, check_content
+from iveg.lab.embedded.request_scope import read_scope
+from iveg.lab.embedded.routes import Routes
 
 _Route = Callable[[ContextBroker, NgsiCall], Awaitable[Response]]
 

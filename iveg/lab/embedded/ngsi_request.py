@@ -1,13 +1,11 @@
-"""Common parts of NGSI-v2 requests: headers, options, paging, body."""
+"""Common parts of NGSI-v2 requests: options, paging, body."""
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 from iveg.lab.embedded.changes import read_changes
 from iveg.lab.embedded.entities import EntityChange, Scope
 from iveg.lab.embedded.errors import (
-    FiwareError,
     bad_request,
     not_supported,
     parse_error,
@@ -16,9 +14,6 @@ from iveg.lab.embedded.http_server import Request, Response
 from iveg.lab.embedded.orion_text import check_given_name, load_json, looks_clean
 from iveg.lab.embedded.views import EntityView
 
-_MAX_BODY = 1 << 20
-_SERVICE = re.compile(r"[a-z0-9_]{0,50}")
-_PATH = re.compile(r"/|(/[A-Za-z0-9_]{1,50}){1,10}")
 _OPTIONS = {
     "keyValues", "values", "count", "upsert", "skipForwarding", "forcedUpdate",
     "normalized", "skipInitialNotification",
@@ -98,74 +93,6 @@ class NgsiCall:
         body = b"[%b]" % b",".join(shown[offset : offset + limit])
         counted = {"Fiware-Total-Count": str(total)} if "count" in self.options else {}
         return Response(200, body, counted)
-
-
-def check_content(request: Request) -> None:
-    """Refuse a body that is too large, missing or of another type.
-
-    Raises:
-        FiwareError: 411, 413 or 415.
-    """
-    size = len(request.body)
-    if size > _MAX_BODY:
-        raise FiwareError(
-            "RequestEntityTooLarge",
-            f"payload size: {size}, max size supported: {_MAX_BODY}",
-        )
-    if request.method not in ("POST", "PUT", "PATCH"):
-        return
-    if not size:
-        raise FiwareError(
-            "ContentLengthRequired", "Zero/No Content-Length in PUT/POST/PATCH request"
-        )
-    kind = request.headers.get("content-type", "").partition(";")[0].strip()
-    if kind != _JSON:
-        raise FiwareError(
-            "UnsupportedMediaType",
-            f"not supported content type: {kind}" if kind else _NO_CONTENT_TYPE,
-        )
-
-
-_JSON = "application/json"
-_NO_CONTENT_TYPE = (
-    "Content-Type header not used, default application/octet-stream is not supported"
-)
-
-
-def check_accept(request: Request) -> None:
-    """Refuse a client that does not accept what it would get.
-
-    Raises:
-        FiwareError: 406.
-    """
-    accepted = request.headers.get("accept", "*/*").split(",")
-    kinds = {one.partition(";")[0].strip() for one in accepted}
-    usable = {"*/*", "application/*", _JSON}
-    if kinds.isdisjoint(usable):
-        raise FiwareError("NotAcceptable", "no acceptable mime-type in accept header")
-
-
-def read_scope(request: Request, correlator: str, now: float) -> Scope:
-    """Tenant and service path of a request.
-
-    Raises:
-        FiwareError: 400, invalid tenant or service path.
-    """
-    service = request.headers.get("fiware-service", "").lower()
-    if _SERVICE.fullmatch(service) is None:
-        raise bad_request(
-            "bad character in tenant name - only underscore and alphanumeric "
-            "characters are allowed"
-        )
-    reads = request.method == "GET"
-    path = request.headers.get("fiware-servicepath", "/#" if reads else "/")
-    if not path.startswith("/"):
-        raise bad_request(
-            "Only /absolute/ Service Paths allowed [a service path must begin with /]"
-        )
-    if _PATH.fullmatch(path) is None and not (reads and path == "/#"):
-        raise bad_request("Bad Character in Service-Path")
-    return Scope(service, path, correlator, now)
 
 
 def _read_paging(query: Mapping[str, str]) -> tuple[int, int]:

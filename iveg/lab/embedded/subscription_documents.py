@@ -11,11 +11,8 @@ from pydantic import AfterValidator, Field, NonNegativeInt, model_validator
 from iveg.lab.embedded.documents import Document
 from iveg.lab.embedded.entities import Touched
 from iveg.lab.embedded.errors import bad_request, not_supported
-from iveg.lab.embedded.orion_text import (
-    FORBIDDEN,
-    date_text,
-    read_pattern,
-)
+from iveg.lab.embedded.orion_dates import date_text
+from iveg.lab.embedded.orion_text import FORBIDDEN, read_pattern
 from iveg.lab.embedded.views import EntityView
 
 _FORMATS = (

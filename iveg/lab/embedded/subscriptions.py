@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from iveg.lab.embedded.documents import new_id, read_document
 from iveg.lab.embedded.entities import Touched
 from iveg.lab.embedded.errors import bad_request, parse_error
-from iveg.lab.embedded.orion_text import date_iso
+from iveg.lab.embedded.orion_dates import date_iso
 from iveg.lab.embedded.subscription_documents import SubscriptionDocument
 
 

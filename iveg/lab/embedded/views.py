@@ -4,7 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from iveg.lab.embedded.entities import BUILTIN_DATES, Attribute, Entity, Value
-from iveg.lab.embedded.orion_text import date_json, quoted
+from iveg.lab.embedded.orion_dates import date_json
+from iveg.lab.embedded.orion_text import quoted
 
 _NONE: Mapping[str, Attribute] = {}
 _BARE = ("keyValues", "simplifiedKeyValues")

@@ -5,136 +5,32 @@ view, in range and not hidden by crop or crates opens an *encounter* of 0.5 to 2
 a miss, the confidence and a possible false box are drawn once per encounter, so that
 errors last as long as real ones and do not flicker between two frames.
 
-Source of the rates: the seed paper's field table (true positives, false positives,
-false negatives per class).  Assumed: the spread of confidence, the length of an
-encounter, that false boxes are less sure than true ones.
+Assumed: the length of an encounter.  The rates are those of ``detector_model``.
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import (
-    PERSON_HEIGHT_M,
     Box3D,
     Pose2D,
     box_of_a_person,
     wrap_angle,
 )
 from iveg.domain.observations import Detection
-from iveg.lab.emulator.greenhouse import Body, Disc, Scenery, into
+from iveg.lab.emulator.detector_model import DetectorModel
+from iveg.lab.emulator.greenhouse import Body, Scenery, into
+from iveg.lab.emulator.targets import Target
 
-PERSON = "farmer"
-ROBOT_HEIGHT_M = 1.2
 _NEAREST_M = 0.3
 _LONGEST_S, _SHORTEST_S = 2.0, 0.5
 _GHOST_NEAR_M, _GHOST_FAR_M = 2.0, 6.0
-_THING_RADIUS_M = 0.2
 _HIDDEN_LOSS = 0.15
 """Loss of confidence for a target that is almost fully hidden."""
-
-
-@dataclass(frozen=True, slots=True)
-class Counts:
-    """Counts of one class in the paper's field table."""
-
-    true_positives: int
-    false_positives: int
-    false_negatives: int
-
-    @property
-    def encounters(self) -> int:
-        """Number of encounters with a target of the class."""
-        return self.true_positives + self.false_negatives
-
-    @property
-    def miss_rate(self) -> float:
-        """Probability that an encounter is missed."""
-        return self.false_negatives / self.encounters
-
-    @property
-    def ghost_rate(self) -> float:
-        """Probability that an encounter brings a false box of the class."""
-        return self.false_positives / self.encounters
-
-
-FIELD_COUNTS: Mapping[str, Counts] = {
-    PERSON: Counts(36, 6, 3),
-    "AGI": Counts(34, 8, 5),
-    "AGII": Counts(28, 12, 8),
-}
-_FAULTLESS = Counts(1, 0, 0)
-
-
-@dataclass(frozen=True, slots=True)
-class DetectorModel:
-    """Error model of a detector.
-
-    Attributes:
-        confidence: Mean over encounters (0 to 1); ``spread`` its deviation.
-        flicker: Deviation from frame to frame.
-        ghost_confidence: How much less sure false boxes are.
-        position: Deviation of a box for an encounter (m); ``jitter`` per frame (m).
-        counts: By class; other classes have the counts of ``AGI``.
-        name: As its frames tell it; None: they do not.
-    """
-
-    confidence: float
-    spread: float = 0.05
-    flicker: float = 0.01
-    ghost_confidence: float = 0.10
-    position: float = 0.05
-    jitter: float = 0.01
-    counts: Mapping[str, Counts] = field(default_factory=lambda: FIELD_COUNTS)
-    name: str | None = None
-
-    def counts_of(self, class_id: str) -> Counts:
-        """The rates for a class."""
-        return self.counts.get(class_id, self.counts.get("AGI", _FAULTLESS))
-
-
-DETECTORS: Mapping[str, DetectorModel] = {
-    "field": DetectorModel(0.72, name="field"),
-    "simulation": DetectorModel(0.85, spread=0.03, name="simulation"),
-    "noisy": DetectorModel(0.80, 0.06, 0.06, 0.0, 0.10, 0.05, {}),
-    "perfect": DetectorModel(0.95, 0.0, 0.0, 0.0, 0.0, 0.0, {}),
-}
-
-
-@dataclass(frozen=True, slots=True)
-class Target:
-    """An object that a detector may detect.
-
-    Attributes:
-        key: Unique id.
-        class_id: As the paper's detector names it.
-        body: Its outline; a person's is a square.
-    """
-
-    key: str
-    class_id: str
-    body: Body
-    height: float
-
-
-def person_target(number: int, person: Disc) -> Target:
-    """A person as a target."""
-    pose, size = Pose2D(person.x, person.y, 0.0), 2 * person.radius
-    body = Body(f"person-{number}", pose, size, size)
-    return Target(body.robot_id, PERSON, body, PERSON_HEIGHT_M)
-
-
-def thing_target(x: float, y: float) -> Target:
-    """A post or coat at a position in ``map`` (m), which is taken for a person."""
-    return replace(person_target(0, Disc(x, y, _THING_RADIUS_M)), key="thing")
-
-
-def robot_target(body: Body) -> Target:
-    """A robot as a target: the class is its id, as in the paper."""
-    return Target(body.robot_id, body.robot_id, body, ROBOT_HEIGHT_M)
 
 
 @dataclass(frozen=True, slots=True)

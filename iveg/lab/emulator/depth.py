@@ -4,9 +4,7 @@ Everything is upright on a flat floor - a footprint from one height to another -
 pixel's ray meets it where its column meets the footprint and its row the heights: two
 small problems instead of 307,200.  Depth runs along the optical axis (m).
 
-Sources: Intel's D400 tuning paper (disparity error 0.08 pixels, baseline 50 mm) and
-Point Grey's Bumblebee2 sheet (120 mm) for noise; sizes of leaves are assumed.  Left
-out: arms and legs, lens distortion, shadows of the second imager, flying pixels.
+Left out: arms and legs, lens distortion, shadows of the second imager, flying pixels.
 """
 
 import math
@@ -16,9 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import PERSON_HEIGHT_M, Pose2D
-from iveg.lab.emulator.camera import ROBOT_HEIGHT_M
+from iveg.lab.emulator.depth_camera import DepthCamera
+from iveg.lab.emulator.depth_errors import with_errors
+from iveg.lab.emulator.foliage import Foliage, hang_leaves
 from iveg.lab.emulator.greenhouse import (
     Body,
     Disc,
@@ -29,61 +28,14 @@ from iveg.lab.emulator.greenhouse import (
     sides_of,
     slab_span,
 )
-from iveg.robot.grounding.cloud import DepthPicture, Pinhole
+from iveg.lab.emulator.targets import ROBOT_HEIGHT_M
+from iveg.robot.grounding.cloud import DepthPicture
 from iveg.robot.grounding.locate import Segment
 from iveg.robot.grounding.mask import Mask, write_mask
 
 _CROP_HEIGHT_M = 2.0
 _SHOULDERS_M = 1.5
 _HEAD_RADIUS_M = 0.1
-_NOISE_PATCH = 8
-"""Pixels across: stereo matches windows, so neighbours err together."""
-
-
-@dataclass(frozen=True, slots=True)
-class DepthCamera:
-    """Depth camera on a robot, looking level.
-
-    Attributes:
-        lens: Of the picture that the depth is registered to.
-        height: Above the floor (m).
-        most: Largest measured depth (m).
-        baseline: Between the two imagers (m).
-        disparity_error: Standard deviation (pixels); depth errs by z² · e / (f · b).
-        dropouts: Share of pixels that are not measured, 0 to 1.
-    """
-
-    lens: Pinhole
-    height: float
-    most: float
-    baseline: float = 0.05
-    disparity_error: float = 0.08
-    dropouts: float = 0.005
-
-    @classmethod
-    def of(cls, profile: RobotProfile, baseline: float = 0.05) -> "DepthCamera":
-        """The camera of a kind of robot, 640 × 480."""
-        lens = Pinhole.across(profile.camera_fov)
-        return cls(lens, profile.camera_height, profile.camera_range, baseline)
-
-
-@dataclass(frozen=True, slots=True)
-class Foliage:
-    """Leaves about a target's outline that the mask network assigns to the target.
-
-    Attributes:
-        leaves: How many.
-        least_radius: (m); ``most_radius`` (m).
-        least_gap: How far behind or before the target they hang (m); ``most_gap`` (m).
-        before: Share that hangs in front of the target and hides a part of it, 0 to 1.
-    """
-
-    leaves: int = 30
-    least_radius: float = 0.01
-    most_radius: float = 0.03
-    least_gap: float = 0.2
-    most_gap: float = 0.8
-    before: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,8 +122,8 @@ def take_picture(
     leaked = np.zeros_like(instances)
     if foliage is not None:
         for number in range(1, len(targets) + 1):
-            _hang(camera.lens, foliage, number, depth, instances, leaked, rng)
-    measured = _measure(camera, depth, rng)
+            hang_leaves(camera.lens, foliage, number, depth, instances, leaked, rng)
+    measured = with_errors(camera, depth, rng)
     return DepthView(DepthPicture(camera.lens, measured), instances, leaked)
 
 
@@ -257,70 +209,4 @@ def _height_span(rays: _Rays, bottom: float, top: float) -> Span:
 # --- leaves -----------------------------------------------------------------------
 
 
-def _hang(
-    lens: Pinhole,
-    foliage: Foliage,
-    number: int,
-    depth: Floats,
-    instances: NDArray[np.int16],
-    leaked: NDArray[np.int16],
-    rng: np.random.Generator,
-) -> None:
-    """Hang leaves about one target's outline, each a disc that faces the camera."""
-    rows, columns = np.nonzero(_outline(instances == number))
-    if not rows.size:
-        return
-    for pick in rng.integers(0, rows.size, foliage.leaves):
-        row, column = int(rows[pick]), int(columns[pick])
-        gap = rng.uniform(foliage.least_gap, foliage.most_gap)
-        side = -1.0 if rng.random() < foliage.before else 1.0
-        away = max(depth[row, column] + side * gap, 0.3)
-        radius = rng.uniform(foliage.least_radius, foliage.most_radius)
-        leaf = _disc(depth.shape, row, column, radius / away * lens.focal)
-        shows = leaf & (away < depth)
-        depth[shows] = away
-        instances[shows], leaked[shows] = 0, number
-
-
-def _outline(mask: Mask) -> Mask:
-    """Pixels of a mask that have one outside beside them."""
-    wide = np.pad(mask, 1, constant_values=True)
-    inner = wide[:-2, 1:-1] & wide[2:, 1:-1] & wide[1:-1, :-2] & wide[1:-1, 2:]
-    return mask & ~inner
-
-
-def _disc(shape: tuple[int, ...], row: int, column: int, radius: float) -> Mask:
-    rows = np.arange(shape[0])[:, None] - row
-    columns = np.arange(shape[1])[None, :] - column
-    disc: Mask = rows**2 + columns**2 <= radius**2
-    return disc
-
-
 # --- what is measured -------------------------------------------------------------
-
-
-def _measure(
-    camera: DepthCamera, depth: Floats, rng: np.random.Generator
-) -> NDArray[np.float32]:
-    """Depth with its errors; 0 where nothing was measured."""
-    scale = camera.disparity_error / (camera.lens.focal * camera.baseline)
-    measured = depth + depth**2 * scale * _patches(depth.shape, rng)
-    lost = rng.random(depth.shape) < camera.dropouts
-    measured[lost | (depth > camera.most) | (measured < 0.0)] = 0.0
-    return measured.astype(np.float32)
-
-
-def _patches(shape: tuple[int, ...], rng: np.random.Generator) -> Floats:
-    """Normal noise that neighbours share: drawn every few pixels, linear between."""
-    rows, columns = shape[0] / _NOISE_PATCH, shape[1] / _NOISE_PATCH
-    knots = rng.normal(0.0, 1.0, (math.ceil(rows) + 1, math.ceil(columns) + 1))
-    return _between(_between(knots, shape[0]).T, shape[1]).T
-
-
-def _between(knots: Floats, count: int) -> Floats:
-    """Linear between rows of knots; shape (count, …)."""
-    at = np.arange(count) / _NOISE_PATCH
-    below = at.astype(int)
-    share = (at - below)[:, None]
-    between: Floats = knots[below] * (1.0 - share) + knots[below + 1] * share
-    return between

@@ -18,7 +18,8 @@ from iveg.domain.errors import DataFileError
 from iveg.domain.fleet import FleetDescription
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.stamps import format_stamp
-from iveg.lab.emulator.camera import DETECTORS
+from iveg.lab.emulator.climate import climate_at
+from iveg.lab.emulator.detector_model import DETECTORS
 from iveg.lab.emulator.emulated_robot import EmulatedRobot, FleetSettings
 from iveg.lab.emulator.equipment import tell_all
 from iveg.lab.emulator.layout import lay_out
@@ -28,7 +29,7 @@ from iveg.lab.emulator.relay import Relay
 from iveg.lab.emulator.ros2_base import Ros2Base
 from iveg.lab.emulator.scenarios import scenario_named
 from iveg.lab.emulator.scripts import EXACT, Incident, SiteErrors
-from iveg.lab.emulator.world import Camera, RobotHardware, SimulatedWorld, climate_at
+from iveg.lab.emulator.world import Camera, RobotHardware, SimulatedWorld
 from iveg.ngsi import names
 from iveg.ngsi.codec import write_climate
 from iveg.robot.pacing import LONGEST_STEP_S, SLOTS, every

@@ -14,16 +14,13 @@ import numpy as np
 from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import Pose2D
 from iveg.domain.observations import Detection, Origin
-from iveg.lab.emulator.camera import PERSON, FoundTarget, Target
-from iveg.lab.emulator.depth import (
-    DepthCamera,
-    Foliage,
-    Upright,
-    person_shape,
-    robot_shape,
-    take_picture,
-)
+from iveg.lab.emulator.camera import FoundTarget
+from iveg.lab.emulator.depth import Upright, person_shape, robot_shape, take_picture
+from iveg.lab.emulator.depth_camera import DepthCamera
+from iveg.lab.emulator.detector_model import PERSON
+from iveg.lab.emulator.foliage import Foliage
 from iveg.lab.emulator.greenhouse import Disc, Scenery, into
+from iveg.lab.emulator.targets import Target
 from iveg.robot.grounding.cloud import Pinhole
 from iveg.robot.grounding.locate import Grounding, Mount, ground_frame
 

@@ -10,7 +10,7 @@ import ssl
 from types import TracebackType
 
 from iveg.adapters import clock
-from iveg.adapters.mqtt import BrokerAddress
+from iveg.adapters.broker_address import BrokerAddress
 from iveg.adapters.mqtt_packets import packet_bounds, puback_packet
 from iveg.lab.emulator.radio import Packet, Radio
 

@@ -8,8 +8,8 @@ from typing import TextIO
 import orjson
 
 from iveg.domain.geometry import Pose2D
-from iveg.lab.emulator.camera import Target
 from iveg.lab.emulator.greenhouse import Disc
+from iveg.lab.emulator.targets import Target
 from iveg.lab.emulator.world import RobotHardware, SimulatedWorld
 
 

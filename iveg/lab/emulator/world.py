@@ -1,4 +1,4 @@
-"""The simulated world: robots, people and climate, and each robot's sensor values.
+"""The simulated world: robots and people, and each robot's sensor values.
 
 Deterministic for a seed: time is an argument, so an hour is a loop of steps.
 ``fleet.py`` runs the same world in real time over MQTT.
@@ -15,32 +15,25 @@ from iveg.domain.geometry import REST, Twist2D
 from iveg.domain.goals import Goal
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import (
-    Climate,
     DetectionFrame,
     LaserScan,
     Navigation,
     Odometry,
     Origin,
 )
-from iveg.lab.emulator.camera import (
-    PERSON,
-    DetectorModel,
-    EmulatedDetector,
-    Target,
-    person_target,
-    robot_target,
-    thing_target,
-    upright_box,
-)
+from iveg.lab.emulator.camera import EmulatedDetector, upright_box
+from iveg.lab.emulator.detector_model import PERSON, DetectorModel
 from iveg.lab.emulator.greenhouse import Body, Disc, Scenery
 from iveg.lab.emulator.grounded import GroundedCamera
-from iveg.lab.emulator.kinematics import Odometer, Vehicle
+from iveg.lab.emulator.kinematics import Vehicle
 from iveg.lab.emulator.layout import Layout
 from iveg.lab.emulator.lidar import LaserModel, sweep
 from iveg.lab.emulator.navigation import Navigator
+from iveg.lab.emulator.odometer import Odometer
 from iveg.lab.emulator.orders import FaultOrder
 from iveg.lab.emulator.people import SimulatedPerson
 from iveg.lab.emulator.scripts import RobotScript
+from iveg.lab.emulator.targets import Target, person_target, robot_target, thing_target
 
 Camera = Literal["boxes", "grounding"]
 _LASER = LaserModel()
@@ -239,19 +232,3 @@ class SimulatedWorld:
         """Possible targets of a robot's camera."""
         people = [person_target(n, disc) for n, disc in enumerate(self.discs())]
         return people + [robot_target(body) for body in self.bodies_but(robot_id)]
-
-
-_DAY_S = 86_400.0
-
-
-def climate_at(wall: float) -> Climate:
-    """Climate at a time of day (Unix s): warm and dry at 14 h UTC, humid at night.
-
-    Typical of a Mediterranean greenhouse in spring; CO₂ falls while the crop works.
-    """
-    warmth = math.cos((wall % _DAY_S - 14 * 3600.0) / _DAY_S * math.tau)
-    return Climate(
-        temperature=round(22.0 + 6.0 * warmth, 2),
-        relative_humidity=round(0.70 - 0.12 * warmth, 3),
-        co2=round(430.0 - 60.0 * warmth, 1),
-    )

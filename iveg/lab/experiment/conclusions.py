@@ -3,8 +3,9 @@
 from collections.abc import Iterator, Mapping
 
 from iveg.domain.records import Json
+from iveg.lab.experiment.cells import ms, percent
 from iveg.lab.experiment.paper_tables import COMPLETION, P95_BELOW_MS, PRINTED
-from iveg.lab.experiment.tables import ms, percent, worst_p95
+from iveg.lab.experiment.tables import worst_p95
 
 Result = Json
 

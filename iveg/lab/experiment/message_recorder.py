@@ -21,11 +21,8 @@ from paho.mqtt.enums import CallbackAPIVersion
 from iveg.adapters import clock
 from iveg.adapters.orion import OrionClient
 from iveg.adapters.post_listener import post_listener
-from iveg.adapters.subscriptions import (
-    ALL_ROBOTS,
-    WantedSubscription,
-    write_subscription,
-)
+from iveg.adapters.subscriptions import write_subscription
+from iveg.adapters.wanted_subscriptions import ALL_ROBOTS, WantedSubscription
 from iveg.app.fiware import open_fiware
 from iveg.cli.nodes import broker_of
 from iveg.domain.errors import HopError, UnreadableError

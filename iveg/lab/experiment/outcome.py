@@ -20,8 +20,9 @@ from iveg.lab.experiment.moments import moments_of
 from iveg.lab.experiment.observer import ObservedRun
 from iveg.lab.experiment.paper_tables import CLASSES
 from iveg.lab.experiment.plan import FORMAT, ExperimentPlan, PlannedRun
-from iveg.lab.experiment.protection import Protection, protection_of
+from iveg.lab.experiment.protection import Protection
 from iveg.lab.experiment.protection import whole as all_protection
+from iveg.lab.experiment.protection_scoring import protection_of
 from iveg.lab.experiment.recording import RunRecording
 from iveg.lab.experiment.scoring import Tally, score, tally
 from iveg.lab.experiment.slices import HOPS, Slice, whole, with_messages

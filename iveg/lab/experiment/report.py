@@ -15,7 +15,7 @@ import orjson
 from iveg.domain.latency.paper import PAPER
 from iveg.domain.latency.segments import DATA
 from iveg.domain.records import Json
-from iveg.lab.experiment import tables
+from iveg.lab.experiment import protection_tables, tables
 from iveg.lab.experiment.conclusions import conclusions
 from iveg.lab.experiment.outcome import slices_of
 from iveg.lab.experiment.paper_tables import AGAINST_ITS_TEXT
@@ -127,10 +127,20 @@ def _sections(result: Result) -> Iterator[_Section]:
     yield "Detection", _COUNTED, tables.DETECTION, tables.detection(result)
     yield "Error of place (m)", "", tables.PLACE, tables.place(result)
     yield "What the text says", "", tables.CLAIMS, tables.claims(result)
-    yield "Protection", _PROTECTED, tables.PROTECTION, tables.protection(result)
-    yield "Entries into rings", _ENTERED, tables.ENTRIES, tables.entries(result)
-    sight = tables.out_of_sight(result)
-    yield "Slow-downs, and who was not in sight", "", tables.SIGHT, sight
+    yield (
+        "Protection",
+        _PROTECTED,
+        protection_tables.PROTECTION,
+        protection_tables.protection(result),
+    )
+    yield (
+        "Entries into rings",
+        _ENTERED,
+        protection_tables.ENTRIES,
+        protection_tables.entries(result),
+    )
+    sight = protection_tables.out_of_sight(result)
+    yield "Slow-downs, and who was not in sight", "", protection_tables.SIGHT, sight
     yield "Latency (ms)", _TIMED, tables.LATENCY, tables.latency(result)
     stops = tables.stops(result)
     yield "STOP of the fleet (ms since the press)", "", tables.STOPS, stops

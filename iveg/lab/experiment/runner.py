@@ -14,25 +14,28 @@ import asyncio
 import contextlib
 import os
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import lru_cache
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Final
 
 from iveg.domain.errors import DataFileError, ExperimentRefusedError
-from iveg.domain.records import Json
 from iveg.domain.stamps import format_stamp
 from iveg.lab.experiment.plan import (
-    PLAN,
     PLANS,
     PROGRESS,
     Size,
     directory_of,
     expected_s,
-    read_json,
     write_json,
 )
-from iveg.models.experiment import Experiment, Experiments, Protected
+from iveg.lab.experiment.runs_on_disk import (
+    UNKNOWN,
+    began,
+    chosen_of,
+    progress_of,
+    protected_of,
+)
+from iveg.models.experiment import Experiment, Experiments
 
 _KEPT: Final = ("IVEG_CONFIDENCE_THRESHOLD", "IVEG_SAFETY_RADIUS_M")
 """Settings of iVeg that an experiment inherits: it follows the same rule."""
@@ -41,16 +44,6 @@ _LOOK_EVERY_S: Final = 0.2
 _GRACE_S: Final = 20.0
 _OUTPUT_KEPT: Final = 300
 """Characters of a failed program's output that are kept."""
-_UNKNOWN: Final[Mapping[str, object]] = {
-    "state": "broken",
-    "run": None,
-    "phase": None,
-    "done": 0,
-    "of": 0,
-    "left_s": 0,
-    "why": "",
-    "load": None,
-}
 
 
 class ExperimentRunner:
@@ -95,7 +88,7 @@ class ExperimentRunner:
         steps = list(PLANS[size].steps())
         left_s = round(sum(map(expected_s, steps)))
         begun = {"state": "running", "of": len(steps), "left_s": left_s}
-        write_json(directory / PROGRESS, {**_UNKNOWN, **begun})
+        write_json(directory / PROGRESS, {**UNKNOWN, **begun})
         self._running, self._why = directory, None
         self._task = asyncio.create_task(self._run(size, directory), name="experiment")
         return self._experiment(directory)
@@ -175,7 +168,7 @@ class ExperimentRunner:
                 yield from self._place.glob(f"{size}-[0-9][0-9][0-9]")
 
     def _experiment(self, directory: Path) -> Experiment:
-        known = {**_UNKNOWN, **_progress(directory)}
+        known = {**UNKNOWN, **progress_of(directory)}
         if known["state"] == "running" and directory != self._running:
             # Started by another iVeg, or by one that was killed together with it.
             known |= {"state": "broken", "why": "interrupted"}
@@ -183,51 +176,11 @@ class ExperimentRunner:
             name=directory.name,
             size=directory.name.partition("-")[0],
             **known,
-            **_chosen(directory),
-            protected=_protected(self.file(directory.name, "json")),
-            began_at=format_stamp(_began(directory)),
+            **chosen_of(directory),
+            protected=protected_of(self.file(directory.name, "json")),
+            began_at=format_stamp(began(directory)),
             report=self.file(directory.name, "html") is not None,
         )
-
-
-def _began(directory: Path) -> float:
-    """Time at which its plan was written (Unix s)."""
-    file = directory / PLAN
-    return (file if file.exists() else directory).stat().st_mtime
-
-
-def _chosen(directory: Path) -> Json:
-    """Profile and seed of its plan; nothing before it is written."""
-    try:
-        plan = read_json(directory / PLAN)["plan"]
-    except (DataFileError, KeyError):
-        return {}
-    return {key: plan.get(key) for key in ("profile", "seed")}
-
-
-def _protected(result: Path | None) -> Protected | None:
-    """Protection of a result; None: there is none, or of another version."""
-    if result is None:
-        return None
-    try:
-        return _read_protected(result, result.stat().st_mtime_ns)
-    except (OSError, DataFileError, KeyError):
-        return None
-
-
-@lru_cache(maxsize=64)
-def _read_protected(result: Path, _written_ns: int) -> Protected | None:
-    """Read once; a page asks every two seconds, and a result has megabytes."""
-    numbers = read_json(result)["protected"]
-    return None if numbers is None else Protected.of(numbers)
-
-
-def _progress(directory: Path) -> Json:
-    try:
-        progress = read_json(directory / PROGRESS)
-    except DataFileError:
-        return {}
-    return {key: progress[key] for key in _UNKNOWN if key in progress}
 
 
 async def _last_words(process: asyncio.subprocess.Process) -> str:
@@ -250,7 +203,7 @@ def _environment() -> dict[str, str]:
 
 def _close(directory: Path, code: int, why: str | None, said: str) -> None:
     """Record how it ended if the program could not."""
-    progress = _progress(directory)
+    progress = progress_of(directory)
     if progress.get("state") == "running":
         reason = why or f"{said} (exit code {code})".strip()
         _write_partial(directory, reason)

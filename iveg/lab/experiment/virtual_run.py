@@ -13,7 +13,7 @@ from iveg.adapters.greenhouses import load_greenhouse
 from iveg.app.virtual import VirtualPipeline
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.witness import Outline, Plan
-from iveg.lab.emulator.camera import DETECTORS
+from iveg.lab.emulator.detector_model import DETECTORS
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.scenarios import scenario_named
 from iveg.lab.emulator.scripts import Incident
@@ -23,10 +23,11 @@ from iveg.lab.experiment.beliefs import belief_of
 from iveg.lab.experiment.failures import FAILURES, LINK_LOST_S, drawn
 from iveg.lab.experiment.moments import moments_of
 from iveg.lab.experiment.plan import ROBOTS, WATCHED, PlannedRun
-from iveg.lab.experiment.protection import protection_of
+from iveg.lab.experiment.protection_scoring import protection_of
 from iveg.lab.experiment.recording import Row, RunRecording, picture_of
 from iveg.lab.experiment.scoring import Picture
-from iveg.lab.experiment.stage import STEP_S, Stage
+from iveg.lab.experiment.stage import Stage
+from iveg.lab.experiment.staged_robot import STEP_S
 from iveg.pipeline.mapping import Mapper
 from iveg.robot.costmap import FleetCostmap
 from iveg.web.views import Views

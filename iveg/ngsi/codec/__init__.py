@@ -14,13 +14,10 @@ from iveg.ngsi.codec.commands import (
     write_resume,
     write_stop,
 )
-from iveg.ngsi.codec.feedback import FeedbackWriter, read_feedback, write_feedback
-from iveg.ngsi.codec.incoming import (
-    read_answer,
-    read_entity,
-    read_measure,
-    read_notification,
-)
+from iveg.ngsi.codec.feedback import read_feedback
+from iveg.ngsi.codec.feedback_writer import FeedbackWriter, write_feedback
+from iveg.ngsi.codec.incoming import read_entity, read_notification
+from iveg.ngsi.codec.measures import read_answer, read_measure
 from iveg.ngsi.codec.peer_scans import read_peer_scan, write_peer_scan
 from iveg.ngsi.codec.reports import (
     write_answer,

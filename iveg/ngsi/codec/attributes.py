@@ -25,7 +25,7 @@ from iveg.domain.observations import (
     RobotFault,
     SafetyReport,
 )
-from iveg.ngsi import names, payloads
+from iveg.ngsi import names, payloads, texts
 from iveg.ngsi.codec.boxes import read_frame, read_single_detection
 from iveg.ngsi.codec.fields import (
     read_holds,
@@ -85,7 +85,7 @@ def _overtaken(
     boot, seq = raw.get("boot"), raw.get("seq")
     if type(boot) is not str or type(seq) is not int:
         return None
-    if not is_past(robot_id, kind, payloads.clean_text(boot), seq):
+    if not is_past(robot_id, kind, texts.clean_text(boot), seq):
         return None
     try:
         origin = read_origin(payloads.OriginFields.model_validate(raw))
@@ -165,7 +165,7 @@ def _navigation(robot_id: str, attributes: Mapping[str, object]) -> Navigation:
 
 def _command_status(robot_id: str, attributes: Mapping[str, object]) -> CommandStatus:
     return CommandStatus(
-        robot_id, payloads.clean_text(str(attributes[names.COMMAND_STATUS]))
+        robot_id, texts.clean_text(str(attributes[names.COMMAND_STATUS]))
     )
 
 

@@ -7,7 +7,7 @@ from pydantic import TypeAdapter, ValidationError
 from iveg.domain.errors import UnreadableError
 from iveg.domain.geometry import Box3D
 from iveg.domain.observations import Detection, DetectionFrame, Origin
-from iveg.ngsi import names, payloads
+from iveg.ngsi import names, payloads, texts
 from iveg.ngsi.codec.fields import read_origin, read_stamped
 
 _BOXES: TypeAdapter[list[payloads.BoxValue]] = TypeAdapter(list[payloads.BoxValue])
@@ -51,7 +51,7 @@ def _frame(
 
 def _class_of(box: object) -> str | None:
     class_id = box.get("class_id") if isinstance(box, dict) else None
-    return payloads.clean_text(class_id) if isinstance(class_id, str) else None
+    return texts.clean_text(class_id) if isinstance(class_id, str) else None
 
 
 def _detection(raw: object) -> Detection | None:

@@ -1,4 +1,4 @@
-"""From Orion's notifications and the robots' topics to observations.
+"""From Orion's notifications to observations.
 
 A part that cannot be read becomes a ``Problem`` beside its neighbours and never hurts
 them.
@@ -9,20 +9,16 @@ from collections.abc import Container, Mapping
 from pydantic import ValidationError
 
 from iveg.domain.errors import UnreadableError
-from iveg.domain.kinds import KIND_OF
-from iveg.domain.observations import DetectionFrame, EntityReading
-from iveg.ngsi import names, payloads
+from iveg.domain.observations import EntityReading
+from iveg.ngsi import names, payloads, texts
 from iveg.ngsi.codec.attributes import (
     NO_OTHERS,
     IsPast,
     Readers,
     climate,
-    command_answer,
-    goal_answer,
     heartbeat,
     read_attributes,
     read_one,
-    refused_frame,
 )
 from iveg.ngsi.codec.untrusted import (
     ReadResult,
@@ -31,8 +27,6 @@ from iveg.ngsi.codec.untrusted import (
     merge,
     unread,
 )
-
-_FRAME_SUFFIX = KIND_OF[DetectionFrame].suffix or ""
 
 
 def read_notification(
@@ -83,7 +77,7 @@ def read_entity(
     }
     if entity_type == names.ROBOT_TYPE:
         if not names.is_robot_id(entity_id):
-            return unread(payloads.clean_text(entity_id), "bad_robot_id")
+            return unread(texts.clean_text(entity_id), "bad_robot_id")
         return read_attributes(entity_id, attributes, is_past, instead)
     if (entity_id, entity_type) == (names.CLIMATE_ID, names.CLIMATE_TYPE):
         return read_one(entity_id, climate, attributes)
@@ -92,9 +86,9 @@ def read_entity(
     if (entity_id, entity_type) in equipment:
         return ReadResult(equipment=(EntityReading(entity_id, attributes),))
     return unread(
-        payloads.clean_text(entity_id),
+        texts.clean_text(entity_id),
         "foreign_entity",
-        payloads.clean_text(entity_type),
+        texts.clean_text(entity_type),
     )
 
 
@@ -102,38 +96,3 @@ def _attribute_value(attribute: object) -> object:
     if isinstance(attribute, dict) and "value" in attribute and "type" in attribute:
         return attribute["value"]
     return attribute
-
-
-def read_measure(
-    device_id: str,
-    payload: bytes,
-    is_past: IsPast | None = None,
-    instead: Readers = NO_OTHERS,
-) -> ReadResult:
-    """Read what a robot's device published on its ``attrs`` topic."""
-    robot_id = names.robot_of_device(device_id)
-    if not names.is_robot_id(robot_id):
-        return unread(payloads.clean_text(device_id), "bad_robot_id")
-    try:
-        attributes = load_json(payload)
-    except UnreadableError as error:
-        read = unread(device_id, error.reason, error.detail)
-    else:
-        if isinstance(attributes, dict):
-            return read_attributes(robot_id, attributes, is_past, instead)
-        read = unread(device_id, "not_an_object")
-    is_frame = device_id == robot_id + _FRAME_SUFFIX
-    return refused_frame(robot_id, read) if is_frame else read
-
-
-def read_answer(robot_id: str, payload: bytes) -> ReadResult:
-    """Read a robot's answer on its ``cmdexe`` topic."""
-    try:
-        value = load_json(payload)
-    except UnreadableError as error:
-        return unread(robot_id, error.reason, error.detail)
-    if not isinstance(value, dict):
-        return unread(robot_id, "not_an_object")
-    if names.GOAL in value and names.COMMAND not in value:
-        return read_one(robot_id, goal_answer, value, names.GOAL)
-    return read_one(robot_id, command_answer, value, names.COMMAND)

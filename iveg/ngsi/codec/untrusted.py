@@ -8,7 +8,7 @@ from pydantic import ValidationError
 
 from iveg.domain.errors import UnreadableError
 from iveg.domain.observations import EntityReading, Observation
-from iveg.ngsi import payloads
+from iveg.ngsi import texts
 
 MAX_DEPTH = 32
 _CONTAINERS = frozenset({dict, list})
@@ -97,4 +97,4 @@ def first_complaint(error: ValidationError) -> str:
     """The first complaint of pydantic, without echoing the input."""
     complaint = error.errors(include_input=False, include_url=False)[0]
     place = ".".join(str(part) for part in complaint["loc"])
-    return payloads.clean_text(f"{place}: {complaint['msg']}")
+    return texts.clean_text(f"{place}: {complaint['msg']}")

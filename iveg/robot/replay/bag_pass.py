@@ -29,7 +29,7 @@ from iveg.robot.ros2.places import Places
 from iveg.robot.ros2.reading import read_pose, read_scan, read_twist
 from iveg.robot.ros2.rigid import IDENTITY, RigidTransform
 from iveg.ros2 import detector_messages as d
-from iveg.ros2 import messages as m
+from iveg.ros2 import geometry_msgs, nav_msgs, sensor_msgs, std_msgs
 from iveg.ros2.schema import Message
 
 _MAX_AGE_S = 1.0
@@ -106,7 +106,7 @@ class BagPass:
         else:
             self.used[topic] += 1
 
-    def _odometry(self, message: m.Odometry, now: Instant) -> Odometry | None:
+    def _odometry(self, message: nav_msgs.Odometry, now: Instant) -> Odometry | None:
         if self._tree.lacks_base:
             pose = read_pose(message)
             self._places.add(_link(message, pose), static=False)
@@ -116,7 +116,7 @@ class BagPass:
         twist = read_twist(message.twist.twist)
         return Odometry("", UNKNOWN_ORIGIN, place.flat(), twist)
 
-    def _scan(self, message: m.LaserScan, now: Instant) -> LaserScan | None:
+    def _scan(self, message: sensor_msgs.LaserScan, now: Instant) -> LaserScan | None:
         frame, stamp = message.header.frame_id, message.header.stamp.seconds
         if not self._tree.has_mount(frame):
             return replace(read_scan(message, IDENTITY), mount=self._mount)
@@ -146,9 +146,9 @@ class BagTree:
 
     def __init__(
         self,
-        static: Sequence[m.TFMessage],
-        moving: Sequence[m.TFMessage],
-        odometry: m.Odometry | None,
+        static: Sequence[geometry_msgs.TFMessage],
+        moving: Sequence[geometry_msgs.TFMessage],
+        odometry: nav_msgs.Odometry | None,
     ) -> None:
         self._parents = {
             _bare(one.child_frame_id): _bare(one.header.frame_id)
@@ -168,8 +168,10 @@ class BagTree:
         root = self._up(odom)[-1]
         self.links = [*static]
         if usual.map not in self._up(odom):
-            header = m.Header(frame_id=usual.map)
-            self.links.append(m.TFMessage((m.TransformStamped(header, root),)))
+            header = std_msgs.Header(frame_id=usual.map)
+            self.links.append(
+                geometry_msgs.TFMessage((geometry_msgs.TransformStamped(header, root),))
+            )
 
     def has_mount(self, frame: str) -> bool:
         """Whether the bag tells where a frame is on the robot."""
@@ -198,12 +200,14 @@ class _Notes(InputFaults):
         self.reasons[f"{code}, {about}"] = None
 
 
-def _link(odometry: m.Odometry, pose: RigidTransform) -> m.TFMessage:
+def _link(odometry: nav_msgs.Odometry, pose: RigidTransform) -> geometry_msgs.TFMessage:
     """Odometry as a transform."""
-    transform = m.Transform(m.Vector3(*pose.move), m.Quaternion(*pose.q))
+    transform = geometry_msgs.Transform(
+        geometry_msgs.Vector3(*pose.move), geometry_msgs.Quaternion(*pose.q)
+    )
     child = odometry.child_frame_id or Frames().base_link
-    one = m.TransformStamped(odometry.header, child, transform)
-    return m.TFMessage((one,))
+    one = geometry_msgs.TransformStamped(odometry.header, child, transform)
+    return geometry_msgs.TFMessage((one,))
 
 
 def _is_3d(message: Message) -> bool:

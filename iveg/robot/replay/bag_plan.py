@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from iveg.robot.replay.bag_files import BagFile, BagTopic
 from iveg.robot.ros2.detectors import BOXES, LOOKS
-from iveg.ros2 import messages as m
+from iveg.ros2 import geometry_msgs, nav_msgs, sensor_msgs
 from iveg.ros2.schema import Message
 from iveg.ros2.type_hash import type_hash
 
@@ -17,11 +17,11 @@ _PREFERRED: tuple[tuple[type[Message], ...], ...] = (
 )
 """Detectors of one row exclude each other."""
 _FORMS: tuple[type[Message], ...] = (
-    m.Odometry,
-    m.LaserScan,
-    m.TFMessage,
-    m.Image,
-    m.CameraInfo,
+    nav_msgs.Odometry,
+    sensor_msgs.LaserScan,
+    geometry_msgs.TFMessage,
+    sensor_msgs.Image,
+    sensor_msgs.CameraInfo,
     *DETECTORS,
 )
 _LONGEST = 160
@@ -76,9 +76,9 @@ class BagPlan:
         self._file = file
         self._uses: dict[BagTopic, Use] = {}
         self._whys: dict[BagTopic, str] = {}
-        self._choose("odometry", (m.Odometry,), options.odometry, "--odom-topic")
-        self._choose("scan", (m.LaserScan,), options.scan, "--scan-topic")
-        for one in self._of(m.TFMessage):
+        self._choose("odometry", (nav_msgs.Odometry,), options.odometry, "--odom-topic")
+        self._choose("scan", (sensor_msgs.LaserScan,), options.scan, "--scan-topic")
+        for one in self._of(geometry_msgs.TFMessage):
             self._use(one, "tf_static" if one.name.endswith("tf_static") else "tf")
         if not file.is_ros1:
             self._choose_detector(options)
@@ -179,11 +179,11 @@ class BagPlan:
         """Take the depth picture and its camera; whether both are there."""
         depth = [
             one
-            for one in self._named((m.Image,), options.depth, "--depth-topic")
+            for one in self._named((sensor_msgs.Image,), options.depth, "--depth-topic")
             if options.depth or "depth" in one.name.lower()
         ]
         wanted, option = options.camera_info, "--camera-info-topic"
-        cameras = self._named((m.CameraInfo,), wanted, option)
+        cameras = self._named((sensor_msgs.CameraInfo,), wanted, option)
         if len(depth) != 1:
             return False
         beside = f"{depth[0].name.rpartition('/')[0]}/camera_info"
@@ -196,7 +196,9 @@ class BagPlan:
     def _why(self, topic: BagTopic) -> str:
         if topic.type in {one.ROS for one in DETECTORS}:
             return "of ROS 1 only odometry, scans and transforms are read"
-        if topic.type in {one.ROS for one in (m.Image, m.CameraInfo)}:
+        if topic.type in {
+            one.ROS for one in (sensor_msgs.Image, sensor_msgs.CameraInfo)
+        }:
             return "no boxes need it"
         fields = _fields(topic.definition)
         return f"of no use here{fields}"

@@ -15,8 +15,7 @@ from iveg.robot.replay.bag_files import BagFile, BagMessage
 from iveg.robot.replay.bag_pass import BagPass, BagTree
 from iveg.robot.replay.bag_plan import AS_RECORDED, BagOptions, BagPlan, Use
 from iveg.robot.replay.logs import RecordingEntry
-from iveg.ros2 import cdr
-from iveg.ros2 import messages as m
+from iveg.ros2 import cdr, nav_msgs
 
 __all__ = ["AS_RECORDED", "Bag", "BagOptions"]
 
@@ -55,7 +54,7 @@ class Bag:
         if not plan.has("odometry") and (
             needs_odometry or not plan.has("scan", "detections")
         ):
-            raise self._file.unusable(f"holds no topic of type {m.Odometry.ROS}")
+            raise self._file.unusable(f"holds no topic of type {nav_msgs.Odometry.ROS}")
         self._mount = mount
         self._reported: set[str] = set()
         self._tree = self._look_ahead()

@@ -26,15 +26,8 @@ from iveg.domain.observations import (
 )
 from iveg.ngsi.codec import load_json
 from iveg.ngsi.codec.scans import ranges_of
-from iveg.ngsi.payloads import (
-    FORBIDDEN,
-    LidarPoints,
-    Metres,
-    Radians,
-    Speed,
-    Text,
-    Wire,
-)
+from iveg.ngsi.payloads import LidarPoints, Metres, Radians, Speed, Text, Wire
+from iveg.ngsi.texts import FORBIDDEN
 
 _log = logging.getLogger(__name__)
 _LONGEST_LINE = 1 << 20

@@ -8,7 +8,7 @@ from iveg.robot.ros2.detectors import BOXES
 from iveg.robot.ros2.input_faults import InputFaults
 from iveg.robot.ros2.places import Places
 from iveg.robot.ros2.rigid import RigidTransform
-from iveg.ros2 import messages as m
+from iveg.ros2 import vision_msgs
 from iveg.ros2.schema import Message
 
 
@@ -47,7 +47,7 @@ class Boxes:
         return frame_of("", UNKNOWN_ORIGIN, answers)
 
     def _detection(
-        self, one: m.Detection3D, place: RigidTransform | None, now: float
+        self, one: vision_msgs.Detection3D, place: RigidTransform | None, now: float
     ) -> tuple[str | None, Detection | Ungrounded]:
         """A detection, or that it has no place, and the class that it is of."""
         if place is not None:

@@ -11,7 +11,7 @@ from iveg.robot.ros2.detectors import LOOKS, Look
 from iveg.robot.ros2.input_faults import InputFaults
 from iveg.robot.ros2.places import Places
 from iveg.robot.ros2.reading import class_id_of
-from iveg.ros2 import messages as m
+from iveg.ros2 import sensor_msgs
 from iveg.ros2.schema import Message
 
 _PICTURES = 6
@@ -43,20 +43,20 @@ class Camera:
         self._settings = settings
         self._places = places
         self._input_faults = input_faults
-        self._depths: deque[m.Image] = deque(maxlen=_PICTURES)
-        self._masks: deque[m.Image] = deque(maxlen=_PICTURES)
-        self._info: m.CameraInfo | None = None
+        self._depths: deque[sensor_msgs.Image] = deque(maxlen=_PICTURES)
+        self._masks: deque[sensor_msgs.Image] = deque(maxlen=_PICTURES)
+        self._info: sensor_msgs.CameraInfo | None = None
         self._look: tuple[Look, float] | None = None
 
-    def add_depth(self, picture: m.Image, _: Instant) -> None:
+    def add_depth(self, picture: sensor_msgs.Image, _: Instant) -> None:
         """Keep a depth picture."""
         self._depths.append(picture)
 
-    def add_mask(self, picture: m.Image, _: Instant) -> None:
+    def add_mask(self, picture: sensor_msgs.Image, _: Instant) -> None:
         """Keep a mask picture."""
         self._masks.append(picture)
 
-    def set_info(self, info: m.CameraInfo, _: Instant) -> None:
+    def set_info(self, info: sensor_msgs.CameraInfo, _: Instant) -> None:
         """Note the calibration."""
         self._info = info
 
@@ -83,7 +83,9 @@ class Camera:
         lost = (class_id_of(one.results, self._classes) for one in look.detections)
         return frame or DetectionFrame("", UNKNOWN_ORIGIN, (), tuple(lost))
 
-    def _located(self, look: Look, depth: m.Image, now: float) -> DetectionFrame | None:
+    def _located(
+        self, look: Look, depth: sensor_msgs.Image, now: float
+    ) -> DetectionFrame | None:
         """Boxes of a detection frame; None where nothing of it can be located."""
         stamp = look.header.stamp.seconds
         place = self._places.in_map(depth.header.frame_id, stamp, now)

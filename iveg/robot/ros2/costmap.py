@@ -16,8 +16,7 @@ from iveg.domain.geometry import Pose2D
 from iveg.robot.costmap import FleetCostmap
 from iveg.robot.neighbours import Neighbours
 from iveg.robot.ros2.network import Writer
-from iveg.ros2 import cdr
-from iveg.ros2 import messages as m
+from iveg.ros2 import cdr, geometry_msgs, nav_msgs, std_msgs
 
 _log = logging.getLogger(__name__)
 EVERY_S = 0.5
@@ -86,13 +85,17 @@ class CostmapTopic:
         self._newest = None
 
     def _write(self, costmap: InflatedGrid) -> None:
-        stamp = m.Time.of(clock.wall())
+        stamp = std_msgs.Time.of(clock.wall())
         self._writer.write(cdr.write(occupancy_grid(costmap, stamp, self._frame)))
 
 
-def occupancy_grid(costmap: InflatedGrid, stamp: m.Time, frame: str) -> m.OccupancyGrid:
+def occupancy_grid(
+    costmap: InflatedGrid, stamp: std_msgs.Time, frame: str
+) -> nav_msgs.OccupancyGrid:
     """The message of a costmap."""
     grid = costmap.grid
-    corner = m.Pose(m.Point(grid.xmin, grid.ymin))
-    info = m.MapMetaData(stamp, grid.resolution, grid.width, grid.height, corner)
-    return m.OccupancyGrid(m.Header(stamp, frame), info, costmap.data.reshape(-1))
+    corner = geometry_msgs.Pose(geometry_msgs.Point(grid.xmin, grid.ymin))
+    info = nav_msgs.MapMetaData(stamp, grid.resolution, grid.width, grid.height, corner)
+    return nav_msgs.OccupancyGrid(
+        std_msgs.Header(stamp, frame), info, costmap.data.reshape(-1)
+    )

@@ -11,14 +11,13 @@ from iveg.domain.geometry import REST, Twist2D
 from iveg.robot.ros2.config import DriveConfig
 from iveg.robot.ros2.input_faults import InputFaults
 from iveg.robot.ros2.reading import read_twist, write_twist
-from iveg.ros2 import cdr
-from iveg.ros2 import messages as m
+from iveg.ros2 import cdr, geometry_msgs, std_msgs
 from iveg.ros2.schema import Message
 
 
 def message_of(*, stamped: bool) -> type[Message]:
     """Message type of a topic of twists."""
-    return m.TwistStamped if stamped else m.Twist
+    return geometry_msgs.TwistStamped if stamped else geometry_msgs.Twist
 
 
 class DriveTopics:
@@ -44,14 +43,14 @@ class DriveTopics:
         """The twist that upstream requests; None if older than the one before."""
         try:
             if not self._drive.stamped_in:
-                return read_twist(cdr.read(m.Twist, payload))
-            stamped = cdr.read(m.TwistStamped, payload)
+                return read_twist(cdr.read(geometry_msgs.Twist, payload))
+            stamped = cdr.read(geometry_msgs.TwistStamped, payload)
             return None if self._is_old(stamped, now) else read_twist(stamped.twist)
         except UnreadableError as error:
             self._input_faults.note(error.reason, self._topic, now)
             return REST
 
-    def _is_old(self, stamped: m.TwistStamped, now: float) -> bool:
+    def _is_old(self, stamped: geometry_msgs.TwistStamped, now: float) -> bool:
         stamp = stamped.header.stamp.seconds
         if stamp == 0.0:  # the sender sets no stamp
             return False
@@ -65,8 +64,8 @@ class DriveTopics:
     def write(self, twist: Twist2D, wall: float) -> bytes:
         """Bytes for the base; ``wall`` is the robot's clock (Unix s)."""
         if self._drive.stamped_out:
-            header = m.Header(m.Time.of(wall), self._base_link)
-            return cdr.write(m.TwistStamped(header, write_twist(twist)))
+            header = std_msgs.Header(std_msgs.Time.of(wall), self._base_link)
+            return cdr.write(geometry_msgs.TwistStamped(header, write_twist(twist)))
         return _unstamped(twist)
 
 

@@ -4,10 +4,12 @@ import math
 
 from iveg.domain.geometry import Pose2D
 from iveg.domain.goals import Goal
-from iveg.ros2 import messages as m
+from iveg.ros2 import geometry_msgs, std_msgs
 
 
-def pose_for(goal: Goal | None, here: Pose2D, wall: float, frame: str) -> m.PoseStamped:
+def pose_for(
+    goal: Goal | None, here: Pose2D, wall: float, frame: str
+) -> geometry_msgs.PoseStamped:
     """The pose to drive to, looking the way that leads there.
 
     Args:
@@ -21,7 +23,8 @@ def pose_for(goal: Goal | None, here: Pose2D, wall: float, frame: str) -> m.Pose
     else:
         x, y = goal.x, goal.y
         yaw = math.atan2(y - here.y, x - here.x)
-    turned = m.Quaternion(z=math.sin(yaw / 2), w=math.cos(yaw / 2))
-    return m.PoseStamped(
-        m.Header(m.Time.of(wall), frame), m.Pose(m.Point(x, y), turned)
+    turned = geometry_msgs.Quaternion(z=math.sin(yaw / 2), w=math.cos(yaw / 2))
+    return geometry_msgs.PoseStamped(
+        std_msgs.Header(std_msgs.Time.of(wall), frame),
+        geometry_msgs.Pose(geometry_msgs.Point(x, y), turned),
     )

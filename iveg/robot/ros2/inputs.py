@@ -32,8 +32,7 @@ from iveg.robot.ros2.rigid import RigidTransform
 from iveg.robot.ros2.sensors import ROS_SENSORS, RosSensor
 from iveg.robot.ros2.stamps import Stamps
 from iveg.robot.ros2.topics import TOPICS
-from iveg.ros2 import cdr
-from iveg.ros2 import messages as m
+from iveg.ros2 import cdr, nav_msgs, sensor_msgs
 from iveg.ros2.schema import Message
 
 SILENT_S = 1.0
@@ -227,21 +226,25 @@ class SensorInputs:
 
     # --- topics -------------------------------------------------------------------
 
-    def _odometry(self, message: m.Odometry, now: Instant) -> Odometry | Unplaced:
+    def _odometry(
+        self, message: nav_msgs.Odometry, now: Instant
+    ) -> Odometry | Unplaced:
         twist = reading.read_twist(message.twist.twist)
         place = self._places.locate(message, now.mono)
         if place is None:
             return Unplaced("", UNKNOWN_ORIGIN, "odometry", twist)
         return Odometry("", UNKNOWN_ORIGIN, place.flat(), twist)
 
-    def _scan(self, message: m.LaserScan, now: Instant) -> LaserScan | Unplaced:
+    def _scan(
+        self, message: sensor_msgs.LaserScan, now: Instant
+    ) -> LaserScan | Unplaced:
         header = message.header
         laser = self._places.laser(header.frame_id, header.stamp.seconds, now.mono)
         if laser is None:
             return Unplaced("", UNKNOWN_ORIGIN, "scan")
         return reading.read_scan(message, laser)
 
-    def _path(self, message: m.Path, now: Instant) -> Navigation | None:
+    def _path(self, message: nav_msgs.Path, now: Instant) -> Navigation | None:
         frame, here = message.header.frame_id or self._map, self._places.here
         # A path is old by nature: it is placed by the present transform.
         stamp = here.stamp if here else message.header.stamp.seconds

@@ -1,8 +1,8 @@
-"""People and robots nearby for Nav2's costmap and for RViz.
+"""People and robots nearby for Nav2's costmap.
 
 The paper's costmap injection.  A point cloud in ``base_link`` holds a disc for each
 person and peer, and a circle of far points that clear the layer: a separate layer
-(docs/robots.md) marks the discs and removes old ones.  Markers are in ``map``.
+(docs/robots.md) marks the discs and removes old ones.
 """
 
 import math
@@ -12,21 +12,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iveg.domain.geometry import Pose2D
-from iveg.robot.neighbours import PEER_M, Neighbour
-from iveg.ros2 import messages as m
+from iveg.robot.neighbours import Neighbour
+from iveg.ros2 import sensor_msgs, std_msgs
 
 REACH_M = 8.0
 """Greatest distance of a disc (m); the clearing circle is a metre beyond."""
 _SPACING_M = 0.1
 _HEIGHT_M = 0.5
 _RAYS = 1440
-_MARKER_LIVES_S = 1
-_CYLINDER, _TEXT = 3, 9
 
 
 def cloud(
-    neighbours: Iterable[Neighbour], own: Pose2D, stamp: m.Time, frame: str
-) -> m.PointCloud2:
+    neighbours: Iterable[Neighbour], own: Pose2D, stamp: std_msgs.Time, frame: str
+) -> sensor_msgs.PointCloud2:
     """Discs to mark and a circle to clear, in ``base_link``."""
     discs = [
         _disc(one, own)
@@ -34,11 +32,11 @@ def cloud(
         if own.distance_to(one.x, one.y) <= REACH_M
     ]
     points = np.ascontiguousarray(np.concatenate([_CIRCLE, *discs]), "<f4")
-    return m.PointCloud2(
-        m.Header(stamp, frame),
+    return sensor_msgs.PointCloud2(
+        std_msgs.Header(stamp, frame),
         1,
         len(points),
-        tuple(m.PointField(name, 4 * n) for n, name in enumerate("xyz")),
+        tuple(sensor_msgs.PointField(name, 4 * n) for n, name in enumerate("xyz")),
         False,
         12,
         12 * len(points),
@@ -70,54 +68,4 @@ def _disc(one: Neighbour, own: Pose2D) -> NDArray[np.float64]:
             np.full(x.size, _HEIGHT_M),
         ),
         axis=1,
-    )
-
-
-def markers(
-    neighbours: Iterable[Neighbour], stamp: m.Time, frame: str
-) -> m.MarkerArray:
-    """Body, radius and name of each, with a lifetime of a second."""
-    found: list[m.Marker] = []
-    for number, one in enumerate(neighbours):
-        place = m.Point(one.x, one.y, 0.9)
-        red = m.ColorRGBA(0.9, 0.2, 0.1, 0.9)
-        body = red if one.kind == "person" else m.ColorRGBA(0.1, 0.4, 0.9, 0.9)
-        ring = m.ColorRGBA(body.r, body.g, body.b, 0.15)
-        header = m.Header(stamp, frame)
-        found += [
-            _marker(header, f"{one.kind} body", number, place, 2 * one.radius, body),
-            _marker(header, f"{one.kind} ring", number, place, 2 * one.ring, ring),
-            m.Marker(
-                header,
-                f"{one.kind} name",
-                number,
-                _TEXT,
-                pose=m.Pose(m.Point(one.x, one.y, 2.1)),
-                scale=m.Vector3(0.0, 0.0, 0.4),
-                color=m.ColorRGBA(1.0, 1.0, 1.0, 1.0),
-                lifetime=m.Duration(_MARKER_LIVES_S),
-                text=one.name,
-            ),
-        ]
-    return m.MarkerArray(tuple(found))
-
-
-def _marker(
-    header: m.Header,
-    ns: str,
-    number: int,
-    place: m.Point,
-    width: float,
-    color: m.ColorRGBA,
-) -> m.Marker:
-    flat = width > 2 * PEER_M
-    return m.Marker(
-        header,
-        ns,
-        number,
-        _CYLINDER,
-        pose=m.Pose(m.Point(place.x, place.y, 0.01) if flat else place),
-        scale=m.Vector3(width, width, 0.02 if flat else 1.8),
-        color=color,
-        lifetime=m.Duration(_MARKER_LIVES_S),
     )

@@ -30,7 +30,7 @@ from iveg.robot.grounding.mask import EDGE_LIMIT, write_mask
 from iveg.robot.ros2.detectors import Look
 from iveg.robot.ros2.reading import class_id_of, read_hypothesis, within_world
 from iveg.robot.ros2.rigid import RigidTransform
-from iveg.ros2 import messages as m
+from iveg.ros2 import sensor_msgs, vision_msgs
 
 _Pixel = TypeVar("_Pixel", bound=np.generic)
 
@@ -47,8 +47,8 @@ _MASKS = {"mono8": "u1", "8UC1": "u1", "mono16": "u2", "16UC1": "u2"}
 
 
 def nearest(
-    pictures: Iterable[m.Image], stamp: float, within_s: float
-) -> m.Image | None:
+    pictures: Iterable[sensor_msgs.Image], stamp: float, within_s: float
+) -> sensor_msgs.Image | None:
     """The picture of a stamp, within ``within_s``."""
     best = min(
         pictures, key=lambda one: abs(one.header.stamp.seconds - stamp), default=None
@@ -58,7 +58,7 @@ def nearest(
     return best
 
 
-def read_camera(info: m.CameraInfo) -> Pinhole:
+def read_camera(info: sensor_msgs.CameraInfo) -> Pinhole:
     """A rectified camera.
 
     Raises:
@@ -73,7 +73,7 @@ def read_camera(info: m.CameraInfo) -> Pinhole:
     return Pinhole(info.width, info.height, fx, cx, cy)
 
 
-def read_depth(image: m.Image, info: m.CameraInfo) -> DepthPicture:
+def read_depth(image: sensor_msgs.Image, info: sensor_msgs.CameraInfo) -> DepthPicture:
     """The depth of each pixel (m).
 
     Raises:
@@ -88,7 +88,7 @@ def read_depth(image: m.Image, info: m.CameraInfo) -> DepthPicture:
     return DepthPicture(read_camera(info), depth)
 
 
-def _pixels(image: m.Image, kind: str) -> NDArray[np.generic]:
+def _pixels(image: sensor_msgs.Image, kind: str) -> NDArray[np.generic]:
     dtype = np.dtype((">" if image.is_bigendian else "<") + kind)
     width, height, step = image.width, image.height, image.step
     fits = 0 < width <= EDGE_LIMIT and 0 < height <= EDGE_LIMIT
@@ -102,7 +102,7 @@ def _pixels(image: m.Image, kind: str) -> NDArray[np.generic]:
 def grounded(
     look: Look,
     picture: DepthPicture,
-    mask: m.Image | None,
+    mask: sensor_msgs.Image | None,
     place: RigidTransform,
     classes: tuple[str, ...],
     settings: Grounding,
@@ -137,7 +137,7 @@ def grounded(
 
 def _place(
     number: int,
-    seen: m.Detection2D,
+    seen: vision_msgs.Detection2D,
     picture: DepthPicture,
     owners: NDArray[np.generic] | None,
     place: RigidTransform,
@@ -157,7 +157,7 @@ def _place(
 
 def _segment(
     number: int,
-    seen: m.Detection2D,
+    seen: vision_msgs.Detection2D,
     picture: DepthPicture,
     owners: NDArray[np.generic] | None,
     classes: tuple[str, ...],

@@ -7,7 +7,7 @@ from iveg.robot.ros2.input_faults import InputFaults
 from iveg.robot.ros2.reading import read_pose
 from iveg.robot.ros2.rigid import RigidTransform
 from iveg.robot.ros2.transforms import NoTransformError, TransformBuffer
-from iveg.ros2 import messages as m
+from iveg.ros2 import geometry_msgs, nav_msgs
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,7 +41,7 @@ class Places:
         self._transforms = TransformBuffer(max_age_s)
         self.here: Here | None = None
 
-    def add(self, message: m.TFMessage, *, static: bool) -> None:
+    def add(self, message: geometry_msgs.TFMessage, *, static: bool) -> None:
         """Store a message of ``/tf`` or ``/tf_static``."""
         self._transforms.add(message, static=static)
 
@@ -50,7 +50,7 @@ class Places:
         self._transforms.clear()
         self.here = None
 
-    def locate(self, odometry: m.Odometry, now: float) -> RigidTransform | None:
+    def locate(self, odometry: nav_msgs.Odometry, now: float) -> RigidTransform | None:
         """Pose of the robot in ``map``; None where a transform is missing.
 
         Raises:
@@ -68,7 +68,7 @@ class Places:
         return place
 
     def _base_in_odom(
-        self, odometry: m.Odometry, stamp: float, now: float
+        self, odometry: nav_msgs.Odometry, stamp: float, now: float
     ) -> RigidTransform | None:
         pose = read_pose(odometry)
         child = odometry.child_frame_id.lstrip("/")

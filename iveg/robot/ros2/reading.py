@@ -18,9 +18,10 @@ from iveg.domain.observations import (
     LaserScan,
     Navigation,
 )
-from iveg.ngsi.payloads import FORBIDDEN, MAX_BEAMS, MAX_PATH, clean_text
+from iveg.ngsi.payloads import MAX_BEAMS, MAX_PATH
+from iveg.ngsi.texts import FORBIDDEN, clean_text
 from iveg.robot.ros2.rigid import RigidTransform, rigid_of
-from iveg.ros2 import messages as m
+from iveg.ros2 import geometry_msgs, nav_msgs, sensor_msgs, vision_msgs
 
 FASTEST_M_S = 20.0
 """Speed above which a value is refused: no vehicle in crop rows is so fast (m/s)."""
@@ -36,7 +37,7 @@ _LONGEST_RANGE_M = 1e4
 _FORBIDDEN = str.maketrans(dict.fromkeys(FORBIDDEN))
 
 
-def read_pose(odometry: m.Odometry) -> RigidTransform:
+def read_pose(odometry: nav_msgs.Odometry) -> RigidTransform:
     """Pose of the robot in the odometry frame.
 
     Raises:
@@ -49,7 +50,7 @@ def read_pose(odometry: m.Odometry) -> RigidTransform:
     return rigid
 
 
-def read_twist(twist: m.Twist) -> Twist2D:
+def read_twist(twist: geometry_msgs.Twist) -> Twist2D:
     """Forward speed and yaw rate; the other components do not apply to wheels.
 
     Raises:
@@ -63,12 +64,14 @@ def read_twist(twist: m.Twist) -> Twist2D:
     return Twist2D(forward, turn)
 
 
-def write_twist(twist: Twist2D) -> m.Twist:
+def write_twist(twist: Twist2D) -> geometry_msgs.Twist:
     """Inverse of ``read_twist``."""
-    return m.Twist(m.Vector3(twist.linear_x), m.Vector3(z=twist.angular_z))
+    return geometry_msgs.Twist(
+        geometry_msgs.Vector3(twist.linear_x), geometry_msgs.Vector3(z=twist.angular_z)
+    )
 
 
-def read_scan(scan: m.LaserScan, laser: RigidTransform) -> LaserScan:
+def read_scan(scan: sensor_msgs.LaserScan, laser: RigidTransform) -> LaserScan:
     """A scan of a laser that is mounted level, upright or upside down.
 
     Args:
@@ -102,7 +105,7 @@ def read_scan(scan: m.LaserScan, laser: RigidTransform) -> LaserScan:
     )
 
 
-def _ranges(scan: m.LaserScan) -> NDArray[np.float32]:
+def _ranges(scan: sensor_msgs.LaserScan) -> NDArray[np.float32]:
     """Ranges as a measure has them (REP-117).
 
     Only +inf says that nothing came back.  NaN is no measurement and -inf is too near
@@ -124,7 +127,7 @@ def _side(laser: RigidTransform) -> int:
 
 
 def read_detection(
-    detection: m.Detection3D, place: RigidTransform, classes: tuple[str, ...]
+    detection: vision_msgs.Detection3D, place: RigidTransform, classes: tuple[str, ...]
 ) -> Detection:
     """A box in ``map``: the hull of the rotated one.
 
@@ -155,7 +158,7 @@ def read_detection(
 
 
 def read_hypothesis(
-    results: tuple[m.ObjectHypothesisWithPose, ...], classes: tuple[str, ...]
+    results: tuple[vision_msgs.ObjectHypothesisWithPose, ...], classes: tuple[str, ...]
 ) -> tuple[str, float]:
     """Class and score of the most probable hypothesis.
 
@@ -178,7 +181,7 @@ def read_hypothesis(
 
 
 def class_id_of(
-    results: tuple[m.ObjectHypothesisWithPose, ...], classes: tuple[str, ...]
+    results: tuple[vision_msgs.ObjectHypothesisWithPose, ...], classes: tuple[str, ...]
 ) -> str | None:
     """The only class that a detection may be of; None where it may be another."""
     if len(results) != 1:
@@ -189,7 +192,7 @@ def class_id_of(
         return None
 
 
-def _score(hypothesis: m.ObjectHypothesis) -> float:
+def _score(hypothesis: vision_msgs.ObjectHypothesis) -> float:
     return -1.0 if math.isnan(hypothesis.score) else hypothesis.score
 
 
@@ -210,7 +213,7 @@ def within_world(box: Box3D) -> Box3D:
     raise UnreadableError("absurd", "a box outside of the world")
 
 
-def read_path(path: m.Path, place: RigidTransform) -> Navigation:
+def read_path(path: nav_msgs.Path, place: RigidTransform) -> Navigation:
     """The path in ``map``; a long one is thinned to 1,024 points.
 
     Raises:

@@ -24,7 +24,7 @@ from iveg.robot.goals import Navigate
 from iveg.robot.neighbours import Neighbours
 from iveg.robot.node import RobotNode
 from iveg.robot.pacing import every
-from iveg.robot.ros2 import neighbours
+from iveg.robot.ros2 import markers, neighbours
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.costmap import CostmapTopic
 from iveg.robot.ros2.drive import DriveTopics, message_of
@@ -34,8 +34,7 @@ from iveg.robot.ros2.inputs import SensorInputs
 from iveg.robot.ros2.lookout import Lookout, forms_published
 from iveg.robot.ros2.network import Network, Reader, Writer
 from iveg.robot.ros2.topics import TOPICS, sensed_topics
-from iveg.ros2 import cdr
-from iveg.ros2 import messages as m
+from iveg.ros2 import cdr, std_msgs
 from iveg.ros2.names import Endpoint
 from iveg.ros2.schema import Message
 
@@ -290,14 +289,14 @@ class Ros2Robot:
         if place is None or (cloud is None and drawing is None):
             return
         now = clock.now()
-        own, stamp = place.flat(), m.Time.of(now.wall)
+        own, stamp = place.flat(), std_msgs.Time.of(now.wall)
         present = self._neighbours.present(own, now.mono)
         frames = self._config.frames
         if cloud is not None:
             found = neighbours.cloud(present, own, stamp, frames.base_link)
             cloud.write(cdr.write(found))
         if drawing is not None:
-            drawn = neighbours.markers(present, stamp, frames.map)
+            drawn = markers.markers(present, stamp, frames.map)
             drawing.write(cdr.write(drawn))
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iveg.domain.geometry import Pose2D
-from iveg.ros2 import messages as m
+from iveg.ros2 import geometry_msgs
 
 Three = tuple[float, float, float]
 Four = tuple[float, float, float, float]
@@ -99,7 +99,8 @@ IDENTITY = RigidTransform()
 
 
 def rigid_of(
-    translation: m.Vector3 | m.Point, rotation: m.Quaternion
+    translation: geometry_msgs.Vector3 | geometry_msgs.Point,
+    rotation: geometry_msgs.Quaternion,
 ) -> RigidTransform | None:
     """A translation and a quaternion of any length; None for an invalid rotation."""
     move = translation.x, translation.y, translation.z

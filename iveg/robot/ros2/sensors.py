@@ -7,11 +7,11 @@ from typing import Any
 
 from iveg.domain.kinds import Kind, row_of
 from iveg.domain.observations import UNKNOWN_ORIGIN, Battery, Observation
-from iveg.ros2 import messages as m
+from iveg.ros2 import sensor_msgs, std_msgs
 from iveg.ros2.schema import Message
 
 
-def read_battery(state: m.BatteryState) -> Battery:
+def read_battery(state: sensor_msgs.BatteryState) -> Battery:
     """Read the state of the battery.
 
     ROS writes NaN for unmeasured values, and some drivers per cent instead of a share.
@@ -27,9 +27,9 @@ def read_battery(state: m.BatteryState) -> Battery:
     return Battery("", UNKNOWN_ORIGIN, share, status, volts)
 
 
-def write_battery(header: m.Header, battery: Any) -> m.BatteryState:
+def write_battery(header: std_msgs.Header, battery: Any) -> sensor_msgs.BatteryState:
     """The inverse, for an emulated base."""
-    return m.BatteryState(
+    return sensor_msgs.BatteryState(
         header, voltage=battery.voltage, percentage=battery.percentage
     )
 
@@ -49,7 +49,7 @@ class RosSensor:
     topic: str
     message: type[Message]
     read: Callable[[Any], Observation]
-    write: Callable[[m.Header, Any], Message]
+    write: Callable[[std_msgs.Header, Any], Message]
 
     @property
     def kind(self) -> Kind:
@@ -66,7 +66,11 @@ ROS_SENSORS = {
     row.kind.name: row
     for row in (
         RosSensor(
-            Battery, "battery_state", m.BatteryState, read_battery, write_battery
+            Battery,
+            "battery_state",
+            sensor_msgs.BatteryState,
+            read_battery,
+            write_battery,
         ),
     )
 }

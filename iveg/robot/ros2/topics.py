@@ -6,7 +6,13 @@ from typing import Literal
 
 from iveg.robot.ros2.detectors import BOXES, LOOKS
 from iveg.robot.ros2.sensors import ROS_SENSORS
-from iveg.ros2 import messages as m
+from iveg.ros2 import (
+    geometry_msgs,
+    nav_msgs,
+    sensor_msgs,
+    vision_msgs,
+    visualization_msgs,
+)
 from iveg.ros2.names import DEFAULT, LATCHED, SENSOR_DATA, TF, TF_STATIC, Qos
 from iveg.ros2.schema import Message
 
@@ -44,32 +50,40 @@ class RosTopic:
 
 
 TOPICS: Mapping[str, RosTopic] = {
-    "odometry": RosTopic("odom", m.Odometry, "stream"),
-    "scan": RosTopic("scan", m.LaserScan, "stream"),
+    "odometry": RosTopic("odom", nav_msgs.Odometry, "stream"),
+    "scan": RosTopic("scan", sensor_msgs.LaserScan, "stream"),
     "detections_3d": RosTopic(
-        "detections_3d", m.Detection3DArray, "stream", forms=tuple(BOXES)
+        "detections_3d", vision_msgs.Detection3DArray, "stream", forms=tuple(BOXES)
     ),
     # With depth and camera_info an alternative to detections_3d.
-    "detections_2d": RosTopic("", m.Detection2DArray, "stream", forms=tuple(LOOKS)),
-    "depth": RosTopic("camera/aligned_depth_to_color/image_raw", m.Image, "picture"),
-    "camera_info": RosTopic("camera/color/camera_info", m.CameraInfo),
+    "detections_2d": RosTopic(
+        "", vision_msgs.Detection2DArray, "stream", forms=tuple(LOOKS)
+    ),
+    "depth": RosTopic(
+        "camera/aligned_depth_to_color/image_raw", sensor_msgs.Image, "picture"
+    ),
+    "camera_info": RosTopic("camera/color/camera_info", sensor_msgs.CameraInfo),
     # In a mono picture value n marks the n-th detection; without, the whole box counts.
-    "mask": RosTopic("", m.Image, "picture"),
+    "mask": RosTopic("", sensor_msgs.Image, "picture"),
     **{name: RosTopic(one.topic, one.message) for name, one in ROS_SENSORS.items()},
-    "path": RosTopic("plan", m.Path),
+    "path": RosTopic("plan", nav_msgs.Path),
     # After a pause each datum finds the transform that was published before it, though
     # both arrive while the topics are being read.
-    "tf_static": RosTopic("tf_static", m.TFMessage, "transforms", TF_STATIC),
-    "tf": RosTopic("tf", m.TFMessage, "transforms", TF),
-    "cmd_vel_in": RosTopic("cmd_vel_nav", m.Twist, "drive"),
-    "cmd_vel_out": RosTopic("cmd_vel", m.Twist, "drive", DEFAULT),
+    "tf_static": RosTopic(
+        "tf_static", geometry_msgs.TFMessage, "transforms", TF_STATIC
+    ),
+    "tf": RosTopic("tf", geometry_msgs.TFMessage, "transforms", TF),
+    "cmd_vel_in": RosTopic("cmd_vel_nav", geometry_msgs.Twist, "drive"),
+    "cmd_vel_out": RosTopic("cmd_vel", geometry_msgs.Twist, "drive", DEFAULT),
     # Goals of iVeg, as Nav2 takes them.
-    "goal": RosTopic("goal_pose", m.PoseStamped, "output", DEFAULT),
+    "goal": RosTopic("goal_pose", geometry_msgs.PoseStamped, "output", DEFAULT),
     # People and peers, for Nav2's obstacle layer and for RViz.
-    "obstacles": RosTopic("iveg/obstacles", m.PointCloud2, "output", DEFAULT),
-    "markers": RosTopic("iveg/markers", m.MarkerArray, "output", DEFAULT),
+    "obstacles": RosTopic("iveg/obstacles", sensor_msgs.PointCloud2, "output", DEFAULT),
+    "markers": RosTopic(
+        "iveg/markers", visualization_msgs.MarkerArray, "output", DEFAULT
+    ),
     # The fleet's picture, for Nav2's static layer.
-    "costmap": RosTopic("iveg/costmap", m.OccupancyGrid, "output", LATCHED),
+    "costmap": RosTopic("iveg/costmap", nav_msgs.OccupancyGrid, "output", LATCHED),
 }
 """By key in ``robot.toml``."""
 

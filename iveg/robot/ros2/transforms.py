@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from iveg.domain.errors import IvegError
 from iveg.robot.ros2.rigid import IDENTITY, RigidTransform, rigid_of
-from iveg.ros2 import messages as m
+from iveg.ros2 import geometry_msgs
 
 KEPT_S = 10.0
 MOST_FRAMES = 256
@@ -74,7 +74,7 @@ class TransformBuffer:
         self._max_age_s = max_age_s
         self._links: dict[str, _Link] = {}
 
-    def add(self, message: m.TFMessage, *, static: bool) -> int:
+    def add(self, message: geometry_msgs.TFMessage, *, static: bool) -> int:
         """Take a message of ``/tf`` or ``/tf_static``.
 
         Returns:
@@ -82,7 +82,7 @@ class TransformBuffer:
         """
         return sum(not self._add(one, static=static) for one in message.transforms)
 
-    def _add(self, one: m.TransformStamped, *, static: bool) -> bool:
+    def _add(self, one: geometry_msgs.TransformStamped, *, static: bool) -> bool:
         parent = one.header.frame_id.lstrip("/")
         child = one.child_frame_id.lstrip("/")
         rigid = rigid_of(one.transform.translation, one.transform.rotation)

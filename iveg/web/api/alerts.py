@@ -6,7 +6,7 @@ from fastapi import APIRouter, Depends, HTTPException, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from iveg.models.alert import AcknowledgedAlerts, Alert
-from iveg.ngsi.payloads import clean_text
+from iveg.ngsi.texts import clean_text
 from iveg.pipeline.evaluate import Evaluator
 from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json

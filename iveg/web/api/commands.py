@@ -9,7 +9,7 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Request, Response
 from pydantic import BaseModel, ConfigDict, Field
 
-from iveg.models.command import FleetPressed, Pressed
+from iveg.models.press import FleetPressed, Pressed
 from iveg.pipeline.command import Commander
 from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json

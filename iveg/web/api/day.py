@@ -9,9 +9,10 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Depends, Query, Request, Response
 
 from iveg.adapters.history.ages import lost_of
-from iveg.adapters.history.lists import COMMANDS, DECISIONS, MOST_ROWS, Filter
+from iveg.adapters.history.listings import COMMANDS, DECISIONS
+from iveg.adapters.history.lists import MOST_ROWS, Filter
+from iveg.adapters.history.places import people_seen, poses_of
 from iveg.adapters.history.queries import Queries
-from iveg.adapters.history.series import people_seen, poses_of
 from iveg.domain.alerts.alert_book import MOST_KEPT
 from iveg.domain.day import (
     Passing,

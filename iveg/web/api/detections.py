@@ -8,7 +8,7 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 from iveg.adapters.history.lists import USUAL_ROWS
 from iveg.domain.records import DetectionRecord
 from iveg.models.base import Listing, write_json
-from iveg.models.people import DetectionRow
+from iveg.models.detection import DetectionRow
 from iveg.pipeline.newest_detections import NewestDetections
 from iveg.web.api import exports
 from iveg.web.api.answers import FEW_ROWS, Apart

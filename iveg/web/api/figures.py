@@ -7,15 +7,11 @@ from typing import Annotated
 from fastapi import APIRouter, HTTPException, Query, Response
 from orjson import Fragment
 
-from iveg.adapters.history import series
+from iveg.adapters.history import command_latencies, confidence, series
+from iveg.adapters.history.command_latencies import CommandLatency
+from iveg.adapters.history.confidence import ConfidenceCount
 from iveg.adapters.history.queries import Queries
-from iveg.adapters.history.series import (
-    ClimateSeries,
-    CommandLatency,
-    ConfidenceCount,
-    MeasurementSeries,
-    SpeedSeries,
-)
+from iveg.adapters.history.series import ClimateSeries, MeasurementSeries, SpeedSeries
 from iveg.domain.fleet import FleetDescription
 from iveg.domain.stamps import format_stamp
 from iveg.models.base import write_json
@@ -52,8 +48,8 @@ def add_routes(
         since, until = range_of(asked, read_clock().wall)
         found = await asyncio.gather(
             queries.ask(series.speed_series, since, until, asked.robot),
-            queries.ask(series.confidence_counts, since, until, asked.robot),
-            queries.ask(series.command_latencies, since, until, asked.robot),
+            queries.ask(confidence.confidence_counts, since, until, asked.robot),
+            queries.ask(command_latencies.command_latencies, since, until, asked.robot),
         )
         body = await worker.run(_draw_charts, *found, threshold(), fleet)
         return Response(body, media_type=MEDIA_TYPES["json"])

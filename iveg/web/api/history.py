@@ -15,23 +15,25 @@ from orjson import Fragment
 
 from iveg.adapters import clock
 from iveg.adapters.extras import require_extra
-from iveg.adapters.history import lists
-from iveg.adapters.history.lists import Filter, ListOf, Page
+from iveg.adapters.history import cursors, listings, lists
+from iveg.adapters.history.listings import ListOf
+from iveg.adapters.history.lists import Filter, Page
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.parquet import parquet_end, parquet_page
 from iveg.domain.alerts.flood import FloodState as NoFlood
 from iveg.domain.errors import MissingExtraError
 from iveg.domain.fleet import NOBODY, FleetDescription
 from iveg.domain.records import CommandRecord, DecisionRecord, Record
-from iveg.models.alert import Alert, AlertListing, Flood, LogEntry
+from iveg.models.alert import Alert, AlertListing, Flood
 from iveg.models.audit import AuditEntry
 from iveg.models.base import Listing, Model, write_json
 from iveg.models.command import Command
 from iveg.models.decision import Decision
+from iveg.models.detection import DetectionRow
 from iveg.models.dictionary import DictionaryColumn, dictionary_columns
 from iveg.models.equipment import Measurement
+from iveg.models.log_entry import LogEntry
 from iveg.models.odometry import OdometryRow
-from iveg.models.people import DetectionRow
 from iveg.models.reading import Reading
 from iveg.pipeline.ports import Clock
 from iveg.web.api import exports, figures
@@ -85,35 +87,35 @@ class HistoryList(Generic[R]):
 _MEASURED: tuple[HistoryList[Any], ...] = (
     HistoryList(
         "detections",
-        lists.DETECTIONS,
+        listings.DETECTIONS,
         DetectionRow.of_row,
         Listing[DetectionRow],
         "What robots saw, by when it reached iVeg",
     ),
     HistoryList(
         "tracks",
-        lists.TRACKS,
+        listings.TRACKS,
         DetectionRow.of_row,
         Listing[DetectionRow],
         "Where people were: their detections, by when each reached iVeg",
     ),
     HistoryList(
         "odometry",
-        lists.ODOMETRY,
+        listings.ODOMETRY,
         OdometryRow.of_record,
         Listing[OdometryRow],
         "Poses and speeds of robots with their speed limits, twice a second",
     ),
     HistoryList(
         "readings",
-        lists.READINGS,
+        listings.READINGS,
         Reading.of_record,
         Listing[Reading],
         "What small sensors of robots said; `class` asks for a kind, as `battery`",
     ),
     HistoryList(
         "measurements",
-        lists.MEASUREMENTS,
+        listings.MEASUREMENTS,
         Measurement.of_record,
         Listing[Measurement],
         "Numbers of other equipment; `class` asks for an entity or an attribute",
@@ -159,7 +161,9 @@ def router(
     async def decision(
         decision_id: Annotated[str, Path(pattern=r"^[ -~]{1,64}$")],
     ) -> Response:
-        found = present(decision_id) or await queries.one(lists.DECISIONS, decision_id)
+        found = present(decision_id) or await queries.one(
+            listings.DECISIONS, decision_id
+        )
         if found is None:
             raise HTTPException(404, "There is no such decision.")
         return Json(Decision.of_record(found))
@@ -188,14 +192,14 @@ def lists_of(
     return (
         HistoryList(
             "decisions",
-            lists.DECISIONS,
+            listings.DECISIONS,
             Decision.of_record,
             Listing[Decision],
             "Why robots were slowed, by when it began",
         ),
         HistoryList(
             "commands",
-            lists.COMMANDS,
+            listings.COMMANDS,
             Command.of_record,
             Listing[Command],
             "Every STOP, release and resume, by when it was asked",
@@ -203,7 +207,7 @@ def lists_of(
         ),
         HistoryList(
             "alerts",
-            lists.ALERTS,
+            listings.ALERTS,
             Alert.of_record,
             AlertListing,
             "Every alert, by when it was last raised, and how fast they come",
@@ -211,14 +215,14 @@ def lists_of(
         ),
         HistoryList(
             "log",
-            lists.LOG,
+            listings.LOG,
             LogEntry.of_record,
             Listing[LogEntry],
             "The action and inference log",
         ),
         HistoryList(
             "audit",
-            lists.AUDIT,
+            listings.AUDIT,
             AuditEntry.of_record,
             Listing[AuditEntry],
             "Who did what; `robot` asks for a subject, `class` for an action or name",
@@ -250,7 +254,7 @@ def _add_list(
 
 
 async def _listing(page: Page[R], one: HistoryList[R], worker: Apart) -> Response:
-    after = None if page.next is None else lists.write_cursor(page.next)
+    after = None if page.next is None else cursors.write_cursor(page.next)
     rows = await one.rows(page.items)
     if len(rows) <= FEW_ROWS:
         items = [one.model(*row) for row in rows]

@@ -19,8 +19,10 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-from iveg.adapters.history import lists
-from iveg.adapters.history.lists import Cursor, Filter, ListOf
+from iveg.adapters.history import cursors, lists
+from iveg.adapters.history.cursors import Cursor
+from iveg.adapters.history.listings import ListOf
+from iveg.adapters.history.lists import Filter
 from iveg.domain.errors import UnreadableError
 from iveg.domain.records import Record
 from iveg.pipeline.newest_detections import JudgedDetection
@@ -203,7 +205,7 @@ def _cursor(text: str | None, of: ListOf[R], *, by_time: bool) -> Cursor | None:
     if text is None:
         return None
     try:
-        cursor = lists.read_cursor(text, of)
+        cursor = cursors.read_cursor(text, of)
     except UnreadableError as error:
         raise _invalid("cursor", "not a cursor of this list") from error
     if (cursor.group is None) != by_time:

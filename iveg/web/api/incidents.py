@@ -19,8 +19,9 @@ from fastapi.responses import FileResponse
 from pydantic import Field
 from starlette.background import BackgroundTask
 
-from iveg.adapters.history import lists
-from iveg.adapters.history.lists import MOST_ROWS, Filter, ListOf, R
+from iveg.adapters.history import listings
+from iveg.adapters.history.listings import ListOf, R
+from iveg.adapters.history.lists import MOST_ROWS, Filter
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.incident_files import write_pack
 from iveg.adapters.pdf import print_pdf
@@ -121,9 +122,9 @@ def router(sources: Sources) -> APIRouter:
 async def _range(asked: About, sources: Sources) -> tuple[float, float, str]:
     """Since, until (Unix s), and what it is about."""
     rows: dict[str, tuple[ListOf[Any], str]] = {
-        "decision": (lists.DECISIONS, "ended_at"),
-        "command": (lists.COMMANDS, "standing_at"),
-        "alert": (lists.ALERTS, "cleared_at"),
+        "decision": (listings.DECISIONS, "ended_at"),
+        "command": (listings.COMMANDS, "standing_at"),
+        "alert": (listings.ALERTS, "cleared_at"),
     }
     for kind, (of, ends) in rows.items():
         wanted = getattr(asked, kind)
@@ -177,17 +178,17 @@ async def _rows(
 ) -> dict[str, list[Record]]:
     """Rows of the history by list, oldest first."""
     parts: dict[str, ListOf[Any]] = {
-        "decisions": lists.DECISIONS,
-        "commands": lists.COMMANDS,
-        "alerts": lists.ALERTS,
-        "log": lists.LOG,
-        "detections": lists.DETECTIONS,
-        "odometry": lists.ODOMETRY,
+        "decisions": listings.DECISIONS,
+        "commands": listings.COMMANDS,
+        "alerts": listings.ALERTS,
+        "log": listings.LOG,
+        "detections": listings.DETECTIONS,
+        "odometry": listings.ODOMETRY,
     }
     asked = Filter(since=since, until=until, limit=MOST_ROWS)
     found = {name: await _all(queries, of, asked) for name, of in parts.items()}
     # A note is about a moment, whenever it was written after it.
-    later = await _all(queries, lists.NOTES, Filter(since=since, limit=MOST_ROWS))
+    later = await _all(queries, listings.NOTES, Filter(since=since, limit=MOST_ROWS))
     found["notes"] = [
         one for one in later if since <= one.slots.get("pinned_at", one.at) < until
     ]

@@ -13,8 +13,8 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Depends, HTTPException, Response
 from pydantic import AfterValidator, Field
 
-from iveg.adapters import web_push
-from iveg.adapters.outbound import is_public_target
+from iveg.adapters import push_encryption
+from iveg.adapters.public_addresses import is_public_target
 from iveg.domain import messages
 from iveg.domain.messages import (
     Channel,
@@ -27,7 +27,7 @@ from iveg.domain.messages import (
 from iveg.models.alert import Told
 from iveg.models.base import Body
 from iveg.models.messages import Messages, MessageTest
-from iveg.ngsi.payloads import clean_text
+from iveg.ngsi.texts import clean_text
 from iveg.pipeline.messenger import Messenger
 from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json
@@ -182,7 +182,7 @@ class Desk:
     def answer(self) -> Response:
         """All of it, as operators read it."""
         key = self.contacts.push.key
-        public = web_push.public_key(key) if key else None
+        public = push_encryption.public_key(key) if key else None
         last, counts = self.messenger.last, self.messenger.counters
         return Json(Messages.of(self.contacts, public, last, counts))
 
@@ -204,7 +204,7 @@ class Desk:
             raise HTTPException(422, "Web push was never on here.")
         if len(_others(push, body.endpoint)) >= messages.MOST_DEVICES:
             raise HTTPException(422, "There are as many devices as can be told.")
-        is_key = web_push.is_public_key(body.keys.p256dh)
+        is_key = push_encryption.is_public_key(body.keys.p256dh)
         if not is_key or not is_public_target(body.endpoint):
             raise HTTPException(
                 422, "That is no subscription of a public push service."
@@ -295,7 +295,7 @@ def _add_devices(routes: APIRouter, desk: Desk) -> None:
 
 
 def _switched(all_: Contacts, body: PushBody) -> Contacts:
-    key = all_.push.key or web_push.new_key()
+    key = all_.push.key or push_encryption.new_key()
     push = replace(all_.push, on=body.on, contact=body.contact, key=key)
     return replace(all_, push=push)
 

@@ -10,13 +10,13 @@ from typing import Annotated, Self
 from fastapi import APIRouter, Depends, HTTPException, Query, Response
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from iveg.adapters.history import lists
+from iveg.adapters.history import listings, lists
 from iveg.adapters.history.queries import Queries
 from iveg.domain.events import LogEvent, Slot
 from iveg.domain.observations import Instant
 from iveg.models.base import Listing
 from iveg.models.note import Note
-from iveg.ngsi.payloads import legible
+from iveg.ngsi.texts import legible
 from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.api.history_filters import Moment, Span, seconds
@@ -24,7 +24,7 @@ from iveg.web.pages.local_time import local_stamp
 from iveg.web.refusals import refusals
 from iveg.web.security.authentication import Principal, require
 
-KEY = lists.NOTE
+KEY = listings.NOTE
 MOST_TEXT = 1000
 LONGEST_AGO_S = 400 * 86_400.0
 _FARTHEST_M = 1e4
@@ -68,7 +68,7 @@ def router(
         """Notes by when they were written, newest first."""
         since, until = seconds(asked.since), seconds(asked.until)
         wanted = lists.Filter(since=since, until=until, limit=lists.MOST_ROWS)
-        page = await queries.page(lists.NOTES, wanted)
+        page = await queries.page(listings.NOTES, wanted)
         return Json(Listing(items=[Note.of_record(one) for one in page.items]))
 
     @routes.post("/notes", status_code=201)

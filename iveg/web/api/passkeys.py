@@ -8,7 +8,7 @@ from iveg.domain.accounts import Account
 from iveg.domain.errors import UnknownNameError
 from iveg.domain.passkeys import MOST_PASSKEYS, Passkey
 from iveg.models.base import Body, Listing
-from iveg.models.signing_in import PasskeyOfPerson
+from iveg.models.passkeys import PasskeyOfPerson
 from iveg.web.api.answers import Json
 from iveg.web.api.users import Name
 from iveg.web.problems import Problem

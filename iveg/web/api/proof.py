@@ -11,7 +11,7 @@ from iveg.domain.accounts import Account
 from iveg.domain.errors import UnknownNameError
 from iveg.domain.pins import MOST_DIGITS
 from iveg.models.base import Body
-from iveg.models.signing_in import Proof
+from iveg.models.passkeys import Proof
 from iveg.web.api.answers import Json
 from iveg.web.api.passkeys import account_of
 from iveg.web.problems import Problem

@@ -4,7 +4,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Response
 
-from iveg.models.robot import RobotAccess
+from iveg.models.robot_access import RobotAccess
 from iveg.pipeline.revocations import Revocations
 from iveg.web.api.answers import Json
 from iveg.web.refusals import refusals

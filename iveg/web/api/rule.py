@@ -16,7 +16,7 @@ from iveg.domain.limits import LIMITS
 from iveg.models.base import Body, Listing
 from iveg.models.rule import Rule as RuleModel
 from iveg.models.rule import Trial as TrialModel
-from iveg.ngsi.payloads import clean_text
+from iveg.ngsi.texts import clean_text
 from iveg.pipeline.ports import Clock
 from iveg.pipeline.rules import Rules
 from iveg.pipeline.shadow import Trials

@@ -9,9 +9,9 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, HTTPException, Path, Query, Response
 
-from iveg.adapters.history.lists import COMMANDS
+from iveg.adapters.history.command_latencies import CommandLatency, command_latencies
+from iveg.adapters.history.listings import COMMANDS
 from iveg.adapters.history.queries import Queries
-from iveg.adapters.history.series import CommandLatency, command_latencies
 from iveg.domain.errors import HopError
 from iveg.domain.fleet import as_counted
 from iveg.domain.observations import Instant
@@ -19,13 +19,8 @@ from iveg.domain.records import ByTransport, CommandRecord
 from iveg.domain.stamps import format_stamp
 from iveg.domain.transports import TRANSPORTS, TransportId
 from iveg.models.base import Listing, rounded
-from iveg.models.command import (
-    Command,
-    Drill,
-    Latency,
-    LatencySpread,
-    RobotLatency,
-)
+from iveg.models.command import Command
+from iveg.models.stop_latency import Drill, Latency, LatencySpread, RobotLatency
 from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.api.history_filters import Range, range_of

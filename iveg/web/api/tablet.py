@@ -8,7 +8,7 @@ from pydantic import AfterValidator, Field
 
 from iveg.domain.pins import MOST_DIGITS, is_pin
 from iveg.models.base import Body
-from iveg.models.signing_in import Tablet, TabletPerson
+from iveg.models.tablets import Tablet, TabletPerson
 from iveg.web.api.answers import Json
 from iveg.web.api.passkeys import account_of
 from iveg.web.api.users import Name

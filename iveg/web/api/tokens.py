@@ -7,11 +7,11 @@ from typing import Annotated, Final
 
 from fastapi import APIRouter, Depends, HTTPException, Response
 
-from iveg.adapters.admission import admit_program
+from iveg.adapters.program_admission import admit_program
 from iveg.domain.accounts import ApiToken, TokenScope, name_key
 from iveg.domain.errors import UnknownNameError
 from iveg.models.base import Body, Listing
-from iveg.models.signing_in import NewToken, ProgramToken
+from iveg.models.programs import NewToken, ProgramToken
 from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.api.users import Days, Name, end_of

@@ -21,7 +21,7 @@ from iveg.domain.stop import Press
 from iveg.models.base import write_json
 from iveg.models.snapshot import Snapshot
 from iveg.ngsi.codec import load_json
-from iveg.ngsi.payloads import legible
+from iveg.ngsi.texts import legible
 from iveg.pipeline import topics
 from iveg.pipeline.ports import Clock
 from iveg.pipeline.publish import Hub, Subscriber

@@ -16,14 +16,9 @@ from functools import cache
 from itertools import pairwise
 from typing import Any
 
-from iveg.adapters.history.series import (
-    CONFIDENCE_BINS,
-    ClimateSeries,
-    CommandLatency,
-    ConfidenceCount,
-    MeasurementSeries,
-    SpeedSeries,
-)
+from iveg.adapters.history.command_latencies import CommandLatency
+from iveg.adapters.history.confidence import CONFIDENCE_BINS, ConfidenceCount
+from iveg.adapters.history.series import ClimateSeries, MeasurementSeries, SpeedSeries
 from iveg.domain.feedback import FULL_SPEED
 from iveg.domain.fleet import FleetDescription
 from iveg.domain.transports import TRANSPORTS

@@ -14,7 +14,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from iveg.domain.errors import UnreadableError
 from iveg.ngsi.codec import load_json
-from iveg.ngsi.payloads import all_legible, clean_text
+from iveg.ngsi.texts import all_legible, clean_text
 from iveg.pipeline.audit import AuditTrail
 from iveg.pipeline.ports import Clock
 from iveg.web.security.roles import Principal

@@ -10,7 +10,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Final, Protocol, TypeVar
 
-from iveg.adapters.admission import ChangingTokens
+from iveg.adapters.program_admission import ChangingTokens
 from iveg.domain.accounts import ApiToken, TokenScope, digest_of
 from iveg.domain.audit import Actor
 from iveg.domain.errors import HopError

@@ -11,7 +11,7 @@ import pytest
 from paho.mqtt import publish
 from playwright.sync_api import Page, expect
 
-from iveg.adapters.mqtt import BrokerAddress
+from iveg.adapters.broker_address import BrokerAddress
 from tests.e2e.conftest import OpenPage
 from tests.e2e.reading import OVERFLOW, evaluate, serious, strip_stop, visit
 from tests.processes import Site, until

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from iveg.adapters.contacts import FileContacts
-from iveg.adapters.web_push import new_key
+from iveg.adapters.push_encryption import new_key
 from iveg.domain.errors import HopError
 from iveg.domain.messages import (
     Contacts,

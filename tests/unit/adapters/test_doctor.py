@@ -1,7 +1,7 @@
 import pytest
 from sqlalchemy import text
 
-from iveg.adapters.doctor import check_database
+from iveg.adapters.database_check import check_database
 from iveg.adapters.history.engine import writing_engine
 from iveg.adapters.history.migrate import upgrade
 from iveg.domain.errors import HopError

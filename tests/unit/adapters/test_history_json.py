@@ -7,7 +7,7 @@ import pytest
 from alembic import command
 from sqlalchemy import Connection, text
 
-from iveg.adapters.history import lists
+from iveg.adapters.history import listings
 from iveg.adapters.history.engine import writing_engine
 from iveg.adapters.history.lists import Filter
 from iveg.adapters.history.migrate import alembic_config, upgrade
@@ -83,11 +83,11 @@ async def test_rows_of_the_version_before_read_as_values(
 ) -> None:
     upgrade(old)
 
-    [decision] = (await queries.page(lists.DECISIONS, Filter())).items
-    [unboxed, boxed] = (await queries.page(lists.DETECTIONS, Filter())).items
-    [alert] = (await queries.page(lists.ALERTS, Filter())).items
-    [spoilt, line] = (await queries.page(lists.LOG, Filter())).items
-    [order] = (await queries.page(lists.COMMANDS, Filter())).items
+    [decision] = (await queries.page(listings.DECISIONS, Filter())).items
+    [unboxed, boxed] = (await queries.page(listings.DETECTIONS, Filter())).items
+    [alert] = (await queries.page(listings.ALERTS, Filter())).items
+    [spoilt, line] = (await queries.page(listings.LOG, Filter())).items
+    [order] = (await queries.page(listings.COMMANDS, Filter())).items
     assert order.sent_at == {"fiware": 1700000000.223456, "direct": 1700000000.133457}
     assert order.answer_at == {"direct": 1700000000.153}
     assert decision.rule_parameters == {"radius_m": 2.0}
@@ -132,7 +132,7 @@ async def test_what_is_stored_is_found_by_its_members(
         wanted = f"SELECT {member[connection.dialect.name]} FROM log"  # noqa: S608
         robot = connection.scalar(text(wanted))
 
-    [line] = (await queries.page(lists.LOG, Filter(since=NOON))).items
+    [line] = (await queries.page(listings.LOG, Filter(since=NOON))).items
     assert (robot, line.slots) == ("AGI", {"robot": "AGI"})
 
 
@@ -144,7 +144,7 @@ async def test_a_row_whose_json_has_another_shape_hides_no_other(
     store.write([Waiting(record, n, 0.0) for n, record in enumerate(rows, 1)])
     store.close()
 
-    lines = (await queries.page(lists.LOG, Filter(since=NOON))).items
+    lines = (await queries.page(listings.LOG, Filter(since=NOON))).items
     assert sorted(len(line.slots) for line in lines) == [0, 1]
 
 

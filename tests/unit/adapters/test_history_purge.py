@@ -11,11 +11,12 @@ import pytest
 from alembic import command
 from sqlalchemy import Engine, text
 
-from iveg.adapters.history import lists
+from iveg.adapters.history import listings
 from iveg.adapters.history.ages import recorded_days
 from iveg.adapters.history.engine import writing_engine
 from iveg.adapters.history.lists import Filter
 from iveg.adapters.history.migrate import alembic_config, upgrade
+from iveg.adapters.history.places import people_seen
 from iveg.adapters.history.purge import (
     BOUND_S,
     CHUNK,
@@ -27,7 +28,7 @@ from iveg.adapters.history.purge import (
 )
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.recorder import Recorder
-from iveg.adapters.history.series import people_seen, speed_series
+from iveg.adapters.history.series import speed_series
 from iveg.adapters.history.store import Store
 from iveg.adapters.history.table_mappings import TABLE_MAPPINGS
 from iveg.adapters.history.upkeep import RecordedHistory
@@ -164,16 +165,16 @@ async def test_places_go_and_all_else_of_the_rows_stays(
     engine: Engine, database_url: str, queries: Queries
 ) -> None:
     write(database_url, everything(OLD - 1.0, "M"))
-    [decided] = (await queries.page(lists.DECISIONS, Filter())).items
-    [seen] = (await queries.page(lists.DETECTIONS, Filter())).items
-    [told] = (await queries.page(lists.LOG, Filter())).items
+    [decided] = (await queries.page(listings.DECISIONS, Filter())).items
+    [seen] = (await queries.page(listings.DETECTIONS, Filter())).items
+    [told] = (await queries.page(listings.LOG, Filter())).items
 
     for step in PURGE_STEPS[:3]:
         run(engine, step, OLD)
 
-    [decision] = (await queries.page(lists.DECISIONS, Filter())).items
-    [detection] = (await queries.page(lists.DETECTIONS, Filter())).items
-    [line] = (await queries.page(lists.LOG, Filter())).items
+    [decision] = (await queries.page(listings.DECISIONS, Filter())).items
+    [detection] = (await queries.page(listings.DETECTIONS, Filter())).items
+    [line] = (await queries.page(listings.LOG, Filter())).items
     assert (decision.x, decision.y, decision.z) == (None, None, None)
     assert decision.rule_parameters == {"radius_m": 2.0}
     assert (decision.distance_m, decision.links) == (decided.distance_m, decided.links)

@@ -4,15 +4,13 @@ from dataclasses import replace
 
 import pytest
 
-from iveg.adapters.history import lists
-from iveg.adapters.history.lists import Cursor, Filter, read_cursor, write_cursor
+from iveg.adapters.history import listings
+from iveg.adapters.history.command_latencies import command_latencies
+from iveg.adapters.history.confidence import confidence_counts
+from iveg.adapters.history.cursors import Cursor, read_cursor, write_cursor
+from iveg.adapters.history.lists import Filter
 from iveg.adapters.history.queries import Queries
-from iveg.adapters.history.series import (
-    climate_series,
-    command_latencies,
-    confidence_counts,
-    speed_series,
-)
+from iveg.adapters.history.series import climate_series, speed_series
 from iveg.adapters.history.store import Store
 from iveg.domain.errors import HopError, UnreadableError
 from iveg.domain.records import DetectionRecord, Record
@@ -47,10 +45,10 @@ def queries(database_url: str) -> Iterator[Queries]:
 
 async def detections(queries: Queries, asked: Filter) -> list[DetectionRecord]:
     """Every page, one after the other."""
-    page = await queries.page(lists.DETECTIONS, asked)
+    page = await queries.page(listings.DETECTIONS, asked)
     found = list(page.items)
     while page.next is not None:
-        page = await queries.page(lists.DETECTIONS, replace(asked, cursor=page.next))
+        page = await queries.page(listings.DETECTIONS, replace(asked, cursor=page.next))
         found += page.items
     return found
 
@@ -67,13 +65,17 @@ async def test_what_was_stored_comes_back_as_it_was(
         log_record(),
     )
 
-    assert (await queries.page(lists.ALERTS, Filter())).items == (alert_record(),)
-    assert (await queries.page(lists.COMMANDS, Filter())).items == (command_record(),)
-    assert (await queries.page(lists.DECISIONS, Filter())).items == (decision_record(),)
-    assert (await queries.page(lists.DETECTIONS, Filter())).items == (
+    assert (await queries.page(listings.ALERTS, Filter())).items == (alert_record(),)
+    assert (await queries.page(listings.COMMANDS, Filter())).items == (
+        command_record(),
+    )
+    assert (await queries.page(listings.DECISIONS, Filter())).items == (
+        decision_record(),
+    )
+    assert (await queries.page(listings.DETECTIONS, Filter())).items == (
         detection_record(),
     )
-    assert (await queries.page(lists.LOG, Filter())).items == (log_record(),)
+    assert (await queries.page(listings.LOG, Filter())).items == (log_record(),)
 
 
 async def test_pages_hold_every_row_once_though_times_are_equal_and_rows_arrive(
@@ -82,7 +84,7 @@ async def test_pages_hold_every_row_once_though_times_are_equal_and_rows_arrive(
     rows = [detection_record(at=NOON + n // 4, x=float(n)) for n in range(25)]
     remember(database_url, *rows)
 
-    first = await queries.page(lists.DETECTIONS, Filter(limit=7))
+    first = await queries.page(listings.DETECTIONS, Filter(limit=7))
     remember(database_url, detection_record(at=NOON + 99.0, x=99.0))
     rest = await detections(queries, Filter(limit=7, cursor=first.next))
 
@@ -96,8 +98,8 @@ async def test_pages_of_text_ids_stay_in_step_too(
 ) -> None:
     remember(database_url, *(decision_record(decision_id=f"D{n}") for n in range(5)))
 
-    first = await queries.page(lists.DECISIONS, Filter(limit=3))
-    second = await queries.page(lists.DECISIONS, Filter(limit=3, cursor=first.next))
+    first = await queries.page(listings.DECISIONS, Filter(limit=3))
+    second = await queries.page(listings.DECISIONS, Filter(limit=3, cursor=first.next))
 
     found = [row.decision_id for row in (*first.items, *second.items)]
     assert found == ["D4", "D3", "D2", "D1", "D0"]
@@ -123,7 +125,9 @@ async def test_28_9_a_sorted_list_keeps_its_order_over_pages_and_new_rows(
 
     ids, cursor = "", None
     for _ in range(5):
-        page = await queries.page(lists.LOG, Filter(limit=1, sort=sort, cursor=cursor))
+        page = await queries.page(
+            listings.LOG, Filter(limit=1, sort=sort, cursor=cursor)
+        )
         ids, cursor = ids + "".join(str(one.id) for one in page.items), page.next
         if sort == "-at" and len(ids) == 1:
             remember(database_url, log_record(id=9, at=NOON + 1))
@@ -141,7 +145,9 @@ async def test_robots_stand_as_people_count_over_pages(
 
     found, cursor = [], None
     for _ in range(4):
-        page = await queries.page(lists.LOG, Filter(limit=3, sort=sort, cursor=cursor))
+        page = await queries.page(
+            listings.LOG, Filter(limit=3, sort=sort, cursor=cursor)
+        )
         found += [one.robot_id for one in page.items]
         cursor = page.next
 
@@ -163,7 +169,7 @@ async def test_charts_have_robots_as_people_count(
 async def test_a_full_last_page_is_the_end(queries: Queries, database_url: str) -> None:
     remember(database_url, log_record(id=1), log_record(id=2))
 
-    assert (await queries.page(lists.LOG, Filter(limit=2))).next is None
+    assert (await queries.page(listings.LOG, Filter(limit=2))).next is None
 
 
 async def test_since_is_inclusive_and_until_is_not(
@@ -209,7 +215,7 @@ async def test_a_filter_that_a_row_has_no_field_for_asks_nothing(
     remember(database_url, command_record())
 
     page = await queries.page(
-        lists.COMMANDS, Filter(class_="person", min_probability=0.9)
+        listings.COMMANDS, Filter(class_="person", min_probability=0.9)
     )
 
     assert len(page.items) == 1
@@ -219,8 +225,8 @@ def test_a_cursor_survives_the_url() -> None:
     number = Cursor(NOON + 0.1234567, 2**53)
     text = Cursor(NOON, "01HF")
 
-    assert read_cursor(write_cursor(number), lists.DETECTIONS) == number
-    assert read_cursor(write_cursor(text), lists.DECISIONS) == text
+    assert read_cursor(write_cursor(number), listings.DETECTIONS) == number
+    assert read_cursor(write_cursor(text), listings.DECISIONS) == text
 
 
 @pytest.mark.parametrize(
@@ -238,7 +244,7 @@ def test_a_cursor_survives_the_url() -> None:
 )
 def test_a_cursor_of_nobody_or_of_another_list_is_refused(text: str) -> None:
     with pytest.raises(UnreadableError):
-        read_cursor(text, lists.DETECTIONS)
+        read_cursor(text, listings.DETECTIONS)
 
 
 async def test_one_decision_is_found_by_its_id(
@@ -246,8 +252,8 @@ async def test_one_decision_is_found_by_its_id(
 ) -> None:
     remember(database_url, decision_record())
 
-    assert await queries.one(lists.DECISIONS, "D1") == decision_record()
-    assert await queries.one(lists.DECISIONS, "D2") is None
+    assert await queries.one(listings.DECISIONS, "D1") == decision_record()
+    assert await queries.one(listings.DECISIONS, "D2") is None
 
 
 async def test_open_commands_are_those_that_say_that_they_still_go_on(
@@ -432,7 +438,7 @@ async def test_a_database_that_does_not_answer_is_a_hop() -> None:
     queries = Queries("postgresql://somebody:secret@127.0.0.1:1/history")
 
     with pytest.raises(HopError, match="database") as caught:
-        await queries.page(lists.LOG, Filter())
+        await queries.page(listings.LOG, Filter())
 
     queries.close()
     assert "secret" not in str(caught.value)

@@ -7,11 +7,8 @@ from typing import Any
 import aiomqtt
 import pytest
 
-from iveg.adapters.iot_agent import (
-    IotAgentClient,
-    Provisioned,
-    provision,
-)
+from iveg.adapters.fleet_provisioning import Provisioned, provision
+from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.orion import OrionClient
 from iveg.domain.errors import HopError
 from iveg.lab.embedded.server import Running, embedded_fiware

@@ -8,7 +8,8 @@ from collections.abc import AsyncIterator, Callable
 import orjson
 import pytest
 
-from iveg.adapters.mqtt import BrokerAddress, MqttLink
+from iveg.adapters.broker_address import BrokerAddress
+from iveg.adapters.mqtt import MqttLink
 from iveg.adapters.transports import MqttTransport
 from iveg.domain.errors import HopError
 from iveg.domain.feedback import Feedback

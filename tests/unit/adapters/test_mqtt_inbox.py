@@ -16,7 +16,8 @@ from hypothesis import strategies as st
 from paho.mqtt import client as paho
 from paho.mqtt.enums import CallbackAPIVersion
 
-from iveg.adapters.mqtt import MOST_EARLY, BrokerAddress, MqttLink
+from iveg.adapters.broker_address import BrokerAddress
+from iveg.adapters.mqtt import MOST_EARLY, MqttLink
 from iveg.adapters.mqtt_inbox import (
     Arrived,
     InboxClient,

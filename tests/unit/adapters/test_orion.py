@@ -5,7 +5,8 @@ import aiomqtt
 import pytest
 
 from iveg.adapters import clock
-from iveg.adapters.iot_agent import IotAgentClient, provision
+from iveg.adapters.fleet_provisioning import provision
+from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.orion import OrionClient
 from iveg.domain.errors import HopError
 from iveg.lab.embedded.http_server import Request, Response, http_server

@@ -10,10 +10,12 @@ import pytest
 from cryptography.hazmat.primitives import hashes
 from cryptography.hazmat.primitives.asymmetric import ec, utils
 
-from iveg.adapters import web_push
+from iveg.adapters import push_encryption
 from iveg.adapters.mail import MailSender
-from iveg.adapters.outbound import OutboundHttp, is_public, is_public_target
-from iveg.adapters.web_push import PushSender, decode, encode, encrypted, new_key
+from iveg.adapters.outbound import OutboundHttp
+from iveg.adapters.public_addresses import is_public, is_public_target
+from iveg.adapters.push_encryption import decode, encode, encrypted, new_key
+from iveg.adapters.web_push import PushSender
 from iveg.adapters.webhook import WebhookSender
 from iveg.domain.errors import OutboundError
 from iveg.domain.messages import (
@@ -258,7 +260,7 @@ def test_a_push_is_encrypted_as_the_example_of_rfc_8291() -> None:
 
 
 def subscribed(stand: HttpsStand) -> Contacts:
-    browser = web_push.public_key(new_key())
+    browser = push_encryption.public_key(new_key())
     device = SubscribedBrowser(
         "D1", "ana", stand.url("/push/1"), browser, encode(b"s" * 16), "es", 0.0
     )
@@ -284,7 +286,9 @@ async def test_a_push_is_signed_for_the_service_that_carries_it() -> None:
 
 
 def test_without_a_contact_a_push_names_none() -> None:
-    header = web_push.signed("https://push.coop.es/1", Push(True, key=new_key()), 0.0)
+    header = push_encryption.signed(
+        "https://push.coop.es/1", Push(True, key=new_key()), 0.0
+    )
 
     claims = orjson.loads(decode(header.removeprefix("vapid t=").split(".")[1]))
     assert claims.keys() == {"aud", "exp"}

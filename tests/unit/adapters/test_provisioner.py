@@ -10,13 +10,15 @@ import pytest
 
 from iveg.adapters import clock
 from iveg.adapters.bounded_json import BoundedJson
+from iveg.adapters.broker_address import BrokerAddress
 from iveg.adapters.fiware_http import Document
 from iveg.adapters.fiware_token import HOP, FiwareToken, TokenGrant
 from iveg.adapters.iot_agent import IotAgentClient
-from iveg.adapters.mqtt import BrokerAddress, MqttLink
+from iveg.adapters.mqtt import MqttLink
 from iveg.adapters.orion import OrionClient
 from iveg.adapters.provisioner import Provisioner
-from iveg.adapters.subscriptions import ensure_subscriptions, wanted_for
+from iveg.adapters.subscriptions import ensure_subscriptions
+from iveg.adapters.wanted_subscriptions import wanted_for
 from iveg.domain.feeds import Feeds
 from iveg.domain.observations import Odometry, Origin, Received
 from iveg.lab.embedded.http_server import Request, Response, http_server

@@ -13,17 +13,17 @@ import pytest
 from mcap.reader import make_reader
 
 from iveg.adapters import clock
-from iveg.adapters.recordings.directory import finish_broken
 from iveg.adapters.recordings.incoming import Sort, Unpacking, pack
 from iveg.adapters.recordings.mcap_file import CHUNK_BYTES, PADDING
 from iveg.adapters.recordings.reading import is_own, read_messages
+from iveg.adapters.recordings.recorded_sink import RecordedSink
 from iveg.adapters.recordings.recorder import (
     MOST_BYTES,
     MOST_WAITING,
     WRITE_S,
     InputRecorder,
-    RecordedSink,
 )
+from iveg.adapters.recordings.repair import finish_broken
 from iveg.adapters.recordings.writer import WriterSetup
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.disk_space import DiskSpace

@@ -6,14 +6,11 @@ import aiomqtt
 import orjson
 import pytest
 
-from iveg.adapters.iot_agent import IotAgentClient, provision
+from iveg.adapters.fleet_provisioning import provision
+from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.orion import OrionClient
-from iveg.adapters.subscriptions import (
-    PREFIX,
-    TOKEN_HEADER,
-    ensure_subscriptions,
-    wanted_for,
-)
+from iveg.adapters.subscriptions import ensure_subscriptions
+from iveg.adapters.wanted_subscriptions import PREFIX, TOKEN_HEADER, wanted_for
 from iveg.lab.embedded.http_server import Request, Response, http_server
 from iveg.lab.embedded.server import embedded_fiware
 from iveg.ngsi import codec, names

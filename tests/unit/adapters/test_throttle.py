@@ -5,10 +5,12 @@ from typing import Any
 
 import pytest
 
-from iveg.adapters.mqtt import BrokerAddress, MqttLink
+from iveg.adapters.broker_address import BrokerAddress
+from iveg.adapters.mqtt import MqttLink
 from iveg.adapters.orion import OrionClient
-from iveg.adapters.subscriptions import ensure_subscriptions, wanted_for
+from iveg.adapters.subscriptions import ensure_subscriptions
 from iveg.adapters.throttle import Throttle
+from iveg.adapters.wanted_subscriptions import wanted_for
 from iveg.domain.errors import HopError
 from iveg.domain.feeds import Feeds
 from iveg.domain.observations import LaserScan, Odometry

@@ -22,7 +22,9 @@ from iveg.adapters.greenhouses import load_greenhouse
 from iveg.adapters.recordings.chunks import ChunkedRecording
 from iveg.adapters.recordings.recorder import InputRecorder
 from iveg.adapters.recordings.writer import WriterSetup
-from iveg.app.past import Past, Site, picture
+from iveg.app.agreement import picture
+from iveg.app.past import Past
+from iveg.app.site import Site
 from iveg.app.viewers import (
     IDLE_S,
     MOST_READY,
@@ -35,12 +37,13 @@ from iveg.domain.observations import Instant, Received
 from iveg.domain.records import Record
 from iveg.domain.robot_state import RobotState
 from iveg.domain.transports import DIRECT, FIWARE
-from iveg.lab.emulator.camera import DETECTORS
+from iveg.lab.emulator.detector_model import DETECTORS
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.orders import FaultOrder
 from iveg.lab.emulator.scenarios import scenario_named
 from iveg.lab.emulator.world import SimulatedWorld
-from iveg.lab.experiment.stage import STEP_S, Stage
+from iveg.lab.experiment.stage import Stage
+from iveg.lab.experiment.staged_robot import STEP_S
 from iveg.ngsi import codec
 from iveg.pipeline.build import Choices, Pipeline, Ports, build
 from iveg.pipeline.memory import Memory

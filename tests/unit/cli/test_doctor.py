@@ -2,16 +2,8 @@ from dataclasses import replace
 
 import pytest
 
-from iveg.cli.diagnosis import (
-    DiagnosisRow,
-    Finding,
-    Lag,
-    Stack,
-    exit_code,
-    judge,
-    missing,
-    table,
-)
+from iveg.cli.diagnosis import DiagnosisRow, exit_code, judge, missing, table
+from iveg.cli.findings import Finding, Lag, Stack
 from iveg.domain.hops import NEEDS, Check
 
 STACK = Stack(

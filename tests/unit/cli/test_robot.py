@@ -9,9 +9,10 @@ import pytest
 
 from iveg.cli import COMMANDS, main, robot
 from iveg.cli.arguments import CommandCall, parser
-from iveg.cli.robot import load_config, refuse_second_gate
+from iveg.cli.robot import refuse_second_gate
+from iveg.cli.robot_config import load_config
 from iveg.domain.errors import DataFileError, HopError, SettingsError
-from iveg.ros2 import messages as m
+from iveg.ros2 import geometry_msgs
 from iveg.settings import Settings
 from tests.fakes.ros2_network import FakeNetwork, endpoint
 
@@ -91,7 +92,7 @@ def test_nobody_lets_a_robot_go_over_a_broker_that_is_not_here(
 
 async def test_a_drive_that_somebody_else_publishes_is_refused() -> None:
     network = FakeNetwork()
-    network.others.append(endpoint("/cmd_vel", m.Twist))
+    network.others.append(endpoint("/cmd_vel", geometry_msgs.Twist))
 
     with pytest.raises(HopError, match="/cmd_vel has a publisher already"):
         await refuse_second_gate(network, "/cmd_vel", 0.01, 0.2)
@@ -99,8 +100,8 @@ async def test_a_drive_that_somebody_else_publishes_is_refused() -> None:
 
 async def test_a_gate_that_was_killed_is_waited_for_until_it_is_forgotten() -> None:
     network = FakeNetwork()
-    network.others.append(endpoint("/cmd_vel", m.Twist))
-    network.others.append(endpoint("/cmd_vel", m.Twist, writes=False))
+    network.others.append(endpoint("/cmd_vel", geometry_msgs.Twist))
+    network.others.append(endpoint("/cmd_vel", geometry_msgs.Twist, writes=False))
     asyncio.get_running_loop().call_later(0.1, network.others.pop, 0)
 
     await refuse_second_gate(network, "/cmd_vel", 0.01, 5.0)

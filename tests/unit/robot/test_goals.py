@@ -9,7 +9,8 @@ from iveg.domain.geometry import Pose2D
 from iveg.domain.goals import CancelOrder, Goal, GoalOrder
 from iveg.domain.observations import GoalAnswer
 from iveg.ngsi import codec, names
-from iveg.robot.goals import Facts, RobotGoals, read_goal
+from iveg.robot.goal_orders import read_goal
+from iveg.robot.goals import Facts, RobotGoals
 
 GOAL = Goal("01G", "here", 2.0, 3.0)
 ORDER = GoalOrder(GOAL, "c1", 17.0)

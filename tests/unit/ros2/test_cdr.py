@@ -8,16 +8,23 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iveg.domain.errors import UnreadableError
-from iveg.ros2 import cdr
-from iveg.ros2 import messages as m
+from iveg.ros2 import (
+    cdr,
+    geometry_msgs,
+    nav_msgs,
+    sensor_msgs,
+    std_msgs,
+    vision_msgs,
+    visualization_msgs,
+)
 from tests.unit.ros2.reference import STORE, as_rosbags
 from tests.unit.ros2.spelled import HALF, MAP, ONE, POSE, STAMP, TWO, ZERO, payload
 
-AT_7_S = m.Time(7, 5)
-IN_MAP = m.Header(AT_7_S, "map")
-IN_ODOM = m.Header(AT_7_S, "odom")
-HERE = m.Pose(m.Point(1.0, 2.0))
-DRIVES = m.Twist(m.Vector3(0.5), m.Vector3(z=1.0))
+AT_7_S = std_msgs.Time(7, 5)
+IN_MAP = std_msgs.Header(AT_7_S, "map")
+IN_ODOM = std_msgs.Header(AT_7_S, "odom")
+HERE = geometry_msgs.Pose(geometry_msgs.Point(1.0, 2.0))
+DRIVES = geometry_msgs.Twist(geometry_msgs.Vector3(0.5), geometry_msgs.Vector3(z=1.0))
 TWIST = f"{HALF} {ZERO} {ZERO} {ZERO} {ZERO} {ONE}"
 SURE = f"36*{ZERO}"
 
@@ -30,40 +37,47 @@ def _b(*numbers: int) -> Any:
     return np.array(numbers, np.uint8)
 
 
-def _seen(class_id: str) -> tuple[m.ObjectHypothesisWithPose, ...]:
-    sure = m.ObjectHypothesis(class_id, 0.5)
-    return (m.ObjectHypothesisWithPose(sure, m.PoseWithCovariance(HERE)),)
+def _seen(class_id: str) -> tuple[vision_msgs.ObjectHypothesisWithPose, ...]:
+    sure = vision_msgs.ObjectHypothesis(class_id, 0.5)
+    return (
+        vision_msgs.ObjectHypothesisWithPose(
+            sure, geometry_msgs.PoseWithCovariance(HERE)
+        ),
+    )
 
 
 CASES: dict[str, tuple[Any, str]] = {
     "Twist": (DRIVES, TWIST),
     "TwistStamped, 16 bytes before it": (
-        m.TwistStamped(IN_MAP, DRIVES),
+        geometry_msgs.TwistStamped(IN_MAP, DRIVES),
         f"{STAMP} {MAP} {TWIST}",
     ),
     "TwistStamped, 17 bytes before it": (
-        m.TwistStamped(IN_ODOM, DRIVES),
+        geometry_msgs.TwistStamped(IN_ODOM, DRIVES),
         f"{STAMP} 05000000 'odom' 7*-- {TWIST}",
     ),
     "Odometry, pose after 34 bytes": (
-        m.Odometry(
+        nav_msgs.Odometry(
             IN_ODOM,
             "base_link",
-            m.PoseWithCovariance(HERE),
-            m.TwistWithCovariance(DRIVES),
+            geometry_msgs.PoseWithCovariance(HERE),
+            geometry_msgs.TwistWithCovariance(DRIVES),
         ),
         f"{STAMP} 05000000 'odom' 3*-- 0a000000 'base_link' 6*-- "
         f"{POSE} {SURE} {TWIST} {SURE}",
     ),
     "Odometry, pose after 22 bytes": (
-        m.Odometry(
-            IN_MAP, "b", m.PoseWithCovariance(HERE), m.TwistWithCovariance(DRIVES)
+        nav_msgs.Odometry(
+            IN_MAP,
+            "b",
+            geometry_msgs.PoseWithCovariance(HERE),
+            geometry_msgs.TwistWithCovariance(DRIVES),
         ),
         f"{STAMP} {MAP} 02000000 'b' 2*-- {POSE} {SURE} {TWIST} {SURE}",
     ),
     "LaserScan": (
-        m.LaserScan(
-            m.Header(AT_7_S, "laser"),
+        sensor_msgs.LaserScan(
+            std_msgs.Header(AT_7_S, "laser"),
             *(1.0, 2.0, 0.5, 0.0, 0.25, 0.25, 10.0),
             _f(1.0, np.inf),
             _f(2.0),
@@ -72,15 +86,21 @@ CASES: dict[str, tuple[Any, str]] = {
         "0000803e 0000803e 00002041 02000000 0000803f 0000807f 01000000 00000040",
     ),
     "LaserScan without a beam": (
-        m.LaserScan(IN_MAP),
+        sensor_msgs.LaserScan(IN_MAP),
         f"{STAMP} {MAP} 7*00000000 00000000 00000000",
     ),
     "TFMessage": (
-        m.TFMessage(
+        geometry_msgs.TFMessage(
             (
-                m.TransformStamped(IN_MAP, "odom", m.Transform(m.Vector3(1.0, 2.0))),
-                m.TransformStamped(
-                    IN_ODOM, "base_link", m.Transform(m.Vector3(1.0, 2.0))
+                geometry_msgs.TransformStamped(
+                    IN_MAP,
+                    "odom",
+                    geometry_msgs.Transform(geometry_msgs.Vector3(1.0, 2.0)),
+                ),
+                geometry_msgs.TransformStamped(
+                    IN_ODOM,
+                    "base_link",
+                    geometry_msgs.Transform(geometry_msgs.Vector3(1.0, 2.0)),
                 ),
             )
         ),
@@ -88,12 +108,18 @@ CASES: dict[str, tuple[Any, str]] = {
         f"{STAMP} 05000000 'odom' 3*-- 0a000000 'base_link' 6*-- {POSE}",
     ),
     "Path": (
-        m.Path(IN_MAP, (m.PoseStamped(IN_MAP, HERE), m.PoseStamped(IN_ODOM, HERE))),
+        nav_msgs.Path(
+            IN_MAP,
+            (
+                geometry_msgs.PoseStamped(IN_MAP, HERE),
+                geometry_msgs.PoseStamped(IN_ODOM, HERE),
+            ),
+        ),
         f"{STAMP} {MAP} 02000000 {STAMP} {MAP} 4*-- {POSE} "
         f"{STAMP} 05000000 'odom' 7*-- {POSE}",
     ),
     "BatteryState": (
-        m.BatteryState(
+        sensor_msgs.BatteryState(
             IN_MAP,
             *(10.0, 2.0, -1.0, 1.0, 2.0, 2.0, 0.5),
             *(2, 1, 3, True),
@@ -107,13 +133,15 @@ CASES: dict[str, tuple[Any, str]] = {
         "3*-- 02000000 'x'",
     ),
     "Detection3DArray, score after 51 bytes": (
-        m.Detection3DArray(
+        vision_msgs.Detection3DArray(
             IN_MAP,
             (
-                m.Detection3D(
+                vision_msgs.Detection3D(
                     IN_MAP,
                     _seen("farmer"),
-                    m.BoundingBox3D(HERE, m.Vector3(0.5, 0.5, 2.0)),
+                    vision_msgs.BoundingBox3D(
+                        HERE, geometry_msgs.Vector3(0.5, 0.5, 2.0)
+                    ),
                     "7",
                 ),
             ),
@@ -122,18 +150,24 @@ CASES: dict[str, tuple[Any, str]] = {
         f"{POSE} {SURE} {POSE} {HALF} {HALF} {TWO} 02000000 '7'",
     ),
     "Detection3DArray, score after 46 bytes": (
-        m.Detection3DArray(IN_MAP, (m.Detection3D(IN_MAP, _seen("x")),)),
+        vision_msgs.Detection3DArray(
+            IN_MAP, (vision_msgs.Detection3D(IN_MAP, _seen("x")),)
+        ),
         f"{STAMP} {MAP} 01000000 {STAMP} {MAP} 01000000 02000000 'x' 2*-- {HALF} "
         f"{POSE} {SURE} 6*{ZERO} {ONE} 3*{ZERO} 01000000 ''",
     ),
     "Detection2DArray": (
-        m.Detection2DArray(
+        vision_msgs.Detection2DArray(
             IN_MAP,
             (
-                m.Detection2D(
+                vision_msgs.Detection2D(
                     IN_MAP,
                     _seen("person"),
-                    m.BoundingBox2D(m.PicturePose(m.Point2D(1.0, 2.0), 0.0), 0.5, 2.0),
+                    vision_msgs.BoundingBox2D(
+                        vision_msgs.PicturePose(vision_msgs.Point2D(1.0, 2.0), 0.0),
+                        0.5,
+                        2.0,
+                    ),
                     "",
                 ),
             ),
@@ -142,17 +176,19 @@ CASES: dict[str, tuple[Any, str]] = {
         f"{POSE} {SURE} {ONE} {TWO} {ZERO} {HALF} {TWO} 01000000 ''",
     ),
     "Detection2DArray, score after 46 bytes": (
-        m.Detection2DArray(IN_MAP, (m.Detection2D(IN_MAP, _seen("x"), id="12"),)),
+        vision_msgs.Detection2DArray(
+            IN_MAP, (vision_msgs.Detection2D(IN_MAP, _seen("x"), id="12"),)
+        ),
         f"{STAMP} {MAP} 01000000 {STAMP} {MAP} 01000000 02000000 'x' 2*-- {HALF} "
         f"{POSE} {SURE} 5*{ZERO} 03000000 '12'",
     ),
     "Image": (
-        m.Image(IN_MAP, 1, 2, "16UC1", 0, 4, _b(1, 2, 3, 4)),
+        sensor_msgs.Image(IN_MAP, 1, 2, "16UC1", 0, 4, _b(1, 2, 3, 4)),
         f"{STAMP} {MAP} 01000000 02000000 06000000 '16UC1' 00 -- 04000000 04000000 "
         "01 02 03 04",
     ),
     "CameraInfo": (
-        m.CameraInfo(
+        sensor_msgs.CameraInfo(
             IN_MAP,
             2,
             4,
@@ -163,23 +199,23 @@ CASES: dict[str, tuple[Any, str]] = {
             np.full(12, 2.0),
             0,
             1,
-            m.RegionOfInterest(1, 2, 3, 4, True),
+            sensor_msgs.RegionOfInterest(1, 2, 3, 4, True),
         ),
         f"{STAMP} {MAP} 02000000 04000000 01000000 '' 3*-- 01000000 4*-- {HALF} "
         f"9*{ONE} 9*{ZERO} 12*{TWO} 00000000 01000000 "
         "01000000 02000000 03000000 04000000 01",
     ),
     "CameraInfo without distortion": (
-        m.CameraInfo(IN_MAP, 2, 4, "", np.zeros(0), np.ones(9)),
+        sensor_msgs.CameraInfo(IN_MAP, 2, 4, "", np.zeros(0), np.ones(9)),
         f"{STAMP} {MAP} 02000000 04000000 01000000 '' 3*-- 00000000 4*-- "
         f"9*{ONE} 21*{ZERO} 2*00000000 4*00000000 00",
     ),
     "PointCloud2": (
-        m.PointCloud2(
+        sensor_msgs.PointCloud2(
             IN_MAP,
             1,
             1,
-            (m.PointField("x", 0, 7, 1),),
+            (sensor_msgs.PointField("x", 0, 7, 1),),
             False,
             4,
             4,
@@ -190,25 +226,25 @@ CASES: dict[str, tuple[Any, str]] = {
         "01000000 00 3*-- 04000000 04000000 04000000 00 00 80 3f 01",
     ),
     "OccupancyGrid": (
-        m.OccupancyGrid(
+        nav_msgs.OccupancyGrid(
             IN_MAP,
-            m.MapMetaData(AT_7_S, 0.5, 3, 1, HERE),
+            nav_msgs.MapMetaData(AT_7_S, 0.5, 3, 1, HERE),
             np.array([-1, 0, 100], np.int8),
         ),
         f"{STAMP} {MAP} {STAMP} 0000003f 03000000 01000000 4*-- {POSE} "
         "03000000 ff 00 64",
     ),
     "MarkerArray, pose after 40 bytes": (
-        m.MarkerArray(
+        visualization_msgs.MarkerArray(
             (
-                m.Marker(
+                visualization_msgs.Marker(
                     IN_MAP,
                     "p",
                     *(7, 3, 0),
                     HERE,
-                    m.Vector3(2.0, 2.0, 0.5),
-                    m.ColorRGBA(1.0, 0.5, 0.0, 0.5),
-                    m.Duration(1, 0),
+                    geometry_msgs.Vector3(2.0, 2.0, 0.5),
+                    std_msgs.ColorRGBA(1.0, 0.5, 0.0, 0.5),
+                    std_msgs.Duration(1, 0),
                 ),
             )
         ),
@@ -220,17 +256,17 @@ CASES: dict[str, tuple[Any, str]] = {
         "00000000 00",
     ),
     "MarkerArray, pose after 48 bytes": (
-        m.MarkerArray(
+        visualization_msgs.MarkerArray(
             (
-                m.Marker(
+                visualization_msgs.Marker(
                     IN_MAP,
                     "people",
                     *(7, 3, 0),
                     HERE,
-                    m.Vector3(2.0, 2.0, 0.5),
-                    m.ColorRGBA(1.0, 0.5, 0.0, 0.5),
-                    m.Duration(1, 0),
-                    points=(m.Point(1.0),),
+                    geometry_msgs.Vector3(2.0, 2.0, 0.5),
+                    std_msgs.ColorRGBA(1.0, 0.5, 0.0, 0.5),
+                    std_msgs.Duration(1, 0),
+                    points=(geometry_msgs.Point(1.0),),
                     text="hi",
                 ),
             )
@@ -307,16 +343,16 @@ def test_a_count_that_no_message_can_hold_takes_no_memory() -> None:
     bytes_ = payload("ffffff7f", "<") + bytes(64)
 
     with pytest.raises(UnreadableError, match="too_short"):
-        cdr.read(m.TFMessage, bytes_)
+        cdr.read(geometry_msgs.TFMessage, bytes_)
 
 
 @pytest.mark.parametrize("head", ["00060000", "00020000", "01010000", ""])
 def test_another_encapsulation_is_named(head: str) -> None:
     with pytest.raises(UnreadableError, match="bad_encapsulation"):
-        cdr.read(m.Twist, bytes.fromhex(head) + bytes(48 if head else 0))
+        cdr.read(geometry_msgs.Twist, bytes.fromhex(head) + bytes(48 if head else 0))
 
 
 def test_a_stamp_keeps_its_nanoseconds() -> None:
-    assert m.Time.of(1700000000.25) == m.Time(1700000000, 250_000_000)
-    assert m.Time(3, 500_000_000).seconds == 3.5
-    assert m.Time.of(-0.25) == m.Time(-1, 750_000_000)
+    assert std_msgs.Time.of(1700000000.25) == std_msgs.Time(1700000000, 250_000_000)
+    assert std_msgs.Time(3, 500_000_000).seconds == 3.5
+    assert std_msgs.Time.of(-0.25) == std_msgs.Time(-1, 750_000_000)

@@ -3,7 +3,7 @@
 import pytest
 
 from iveg.domain.errors import UnreadableError
-from iveg.ros2 import messages, names
+from iveg.ros2 import names, nav_msgs
 from iveg.ros2.names import Qos
 
 
@@ -20,7 +20,7 @@ def test_what_is_no_topic_of_ros_has_no_name_there(foreign: str) -> None:
 def test_a_type_gets_the_module_and_the_underscore_of_ros() -> None:
     dds = "nav_msgs::msg::dds_::Odometry_"
 
-    assert names.dds_type(messages.Odometry.ROS) == dds
+    assert names.dds_type(nav_msgs.Odometry.ROS) == dds
     assert names.ros_type(dds) == "nav_msgs/msg/Odometry"
 
 

@@ -9,7 +9,8 @@ from functools import cache
 import httpx
 import uvicorn
 
-from iveg.adapters.connections import ConnectionCaps, ConnectionTable
+from iveg.adapters.connection_caps import ConnectionCaps
+from iveg.adapters.connections import ConnectionTable
 from iveg.domain.equipment import Tile
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.messages import CHANNELS

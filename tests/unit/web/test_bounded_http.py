@@ -7,7 +7,8 @@ from contextlib import asynccontextmanager
 
 import pytest
 
-from iveg.adapters.connections import ConnectionCaps, ConnectionTable
+from iveg.adapters.connection_caps import ConnectionCaps
+from iveg.adapters.connections import ConnectionTable
 from iveg.web.security.connections import proxies
 from tests.unit.web.desk import API_TOKEN, SECRET, TENANT, WebDesk
 

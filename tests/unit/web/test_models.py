@@ -4,17 +4,20 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-from iveg.models.alert import Alert, AlertListing, LogEntry
+from iveg.models.alert import Alert, AlertListing
 from iveg.models.base import Listing
 from iveg.models.climate import Climate
-from iveg.models.command import Command, Drill, Latency
+from iveg.models.command import Command
 from iveg.models.decision import Decision
+from iveg.models.detection import DetectionRow
 from iveg.models.health import Health
 from iveg.models.latency import LatencyTable
-from iveg.models.people import DetectionRow, Person
+from iveg.models.log_entry import LogEntry
+from iveg.models.people import Person
 from iveg.models.places import GreenhouseMap, Scan
 from iveg.models.robot import Robot
 from iveg.models.rule import Rule
+from iveg.models.stop_latency import Drill, Latency
 from tests.data.answers import answers
 
 PROMISED: dict[str, Any] = {

@@ -6,7 +6,7 @@ import pytest
 
 from iveg.lab.embedded.entities import Entity, EntityChange, Touched, apply
 from iveg.lab.embedded.errors import FiwareError
-from iveg.lab.embedded.orion_text import date_text
+from iveg.lab.embedded.orion_dates import date_text
 from iveg.lab.embedded.subscriptions import Subscription, read_subscription
 
 UNPRINTABLE = object()

@@ -4,7 +4,8 @@ from collections.abc import AsyncIterator
 
 import pytest
 
-from iveg.lab.embedded.http_server import Request, Response, Routes, http_server
+from iveg.lab.embedded.http_server import Request, Response, http_server
+from iveg.lab.embedded.routes import Routes
 
 
 async def echo(request: Request) -> Response:

@@ -6,7 +6,8 @@ import httpx
 import orjson
 import pytest
 
-from iveg.adapters.iot_agent import IotAgentClient, provision
+from iveg.adapters.fleet_provisioning import provision
+from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.orion import OrionClient
 from iveg.domain.errors import HopError
 from iveg.lab.embedded.server import Running, embedded_fiware

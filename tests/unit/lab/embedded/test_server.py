@@ -8,7 +8,7 @@ import aiomqtt
 import httpx
 import pytest
 
-from iveg.adapters.connections import ConnectionCaps
+from iveg.adapters.connection_caps import ConnectionCaps
 from iveg.domain.errors import SettingsError
 from iveg.lab.embedded.server import embedded_fiware, serve_fiware
 from tests.ports import free_ports

@@ -8,16 +8,10 @@ import pytest
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import Detection
-from iveg.lab.emulator.camera import (
-    DETECTORS,
-    FIELD_COUNTS,
-    DetectorModel,
-    EmulatedDetector,
-    Target,
-    person_target,
-    robot_target,
-)
+from iveg.lab.emulator.camera import EmulatedDetector
+from iveg.lab.emulator.detector_model import DETECTORS, FIELD_COUNTS, DetectorModel
 from iveg.lab.emulator.greenhouse import Body, Disc, Scenery
+from iveg.lab.emulator.targets import Target, person_target, robot_target
 from tests.builders import AGI
 
 BOUNDS = Rectangle(-20.0, -20.0, 20.0, 20.0)

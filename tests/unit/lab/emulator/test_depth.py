@@ -8,14 +8,14 @@ from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.greenhouse import Greenhouse, StructuralPost
 from iveg.lab.emulator.depth import (
-    DepthCamera,
     DepthView,
-    Foliage,
     Upright,
     person_shape,
     robot_shape,
     take_picture,
 )
+from iveg.lab.emulator.depth_camera import DepthCamera
+from iveg.lab.emulator.foliage import Foliage
 from iveg.lab.emulator.greenhouse import Body, Disc, Scenery
 from iveg.robot.grounding.cloud import DepthPicture, Pinhole
 from iveg.robot.grounding.locate import (

@@ -9,18 +9,13 @@ import pytest
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.greenhouse import Greenhouse
-from iveg.lab.emulator.camera import (
-    DETECTORS,
-    EmulatedDetector,
-    FoundTarget,
-    Target,
-    person_target,
-    robot_target,
-)
+from iveg.lab.emulator.camera import EmulatedDetector, FoundTarget
+from iveg.lab.emulator.detector_model import DETECTORS
 from iveg.lab.emulator.greenhouse import Body, Disc, Scenery
 from iveg.lab.emulator.grounded import GroundedCamera
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.scenarios import scenario_named
+from iveg.lab.emulator.targets import Target, person_target, robot_target
 from iveg.lab.emulator.world import SimulatedWorld
 from tests.builders import AGI
 

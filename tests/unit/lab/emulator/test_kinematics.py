@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iveg.domain.geometry import Pose2D, Twist2D
-from iveg.lab.emulator.kinematics import Odometer, Vehicle
+from iveg.lab.emulator.kinematics import Vehicle
+from iveg.lab.emulator.odometer import Odometer
 from tests.builders import AGI, AGII
 
 DT = 1 / 30

@@ -7,7 +7,7 @@ import pytest
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.domain.geometry import REST
 from iveg.domain.goals import Goal, GoalKind
-from iveg.lab.emulator.camera import DETECTORS
+from iveg.lab.emulator.detector_model import DETECTORS
 from iveg.lab.emulator.greenhouse import Scenery
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.scenarios import scenario_named

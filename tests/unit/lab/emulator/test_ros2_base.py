@@ -15,17 +15,18 @@ from iveg.domain.observations import (
     Observation,
     Odometry,
 )
-from iveg.lab.emulator.camera import DETECTORS
+from iveg.lab.emulator.detector_model import DETECTORS
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.orders import FaultOrder
-from iveg.lab.emulator.ros2_base import TIMEOUT_S, DriveWatchdog, Ros2Base
-from iveg.lab.emulator.ros2_base import SimulatedNavigation as Nav
+from iveg.lab.emulator.ros2_base import Ros2Base
+from iveg.lab.emulator.ros2_navigation import TIMEOUT_S, DriveWatchdog
+from iveg.lab.emulator.ros2_navigation import SimulatedNavigation as Nav
 from iveg.lab.emulator.scenarios import scenario_named
 from iveg.lab.emulator.world import SimulatedWorld
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.inputs import SensorInputs
 from iveg.robot.ros2.topics import sensed_topics
-from iveg.ros2 import messages as m
+from iveg.ros2 import geometry_msgs, std_msgs
 from tests.fakes.ros2_network import FakeNetwork
 
 AHEAD = Twist2D(0.5, 0.1)
@@ -129,10 +130,12 @@ async def test_algorithm_1_finds_the_robot_where_it_believes_itself(
 async def test_it_drives_to_a_goal_and_ignores_one_without_a_way(
     emulated: Emulated,
 ) -> None:
-    header = m.Header(m.Time(), "map")
+    header = std_msgs.Header(std_msgs.Time(), "map")
     for x, y in ((18.0, 10.0), (2.0, 5.0)):
-        pose = m.Pose(m.Point(x, y))
-        emulated.network.publish("/agii/goal_pose", m.PoseStamped(header, pose))
+        pose = geometry_msgs.Pose(geometry_msgs.Point(x, y))
+        emulated.network.publish(
+            "/agii/goal_pose", geometry_msgs.PoseStamped(header, pose)
+        )
         await until(lambda: not emulated.network.readers["/agii/goal_pose"].waiting)
 
     assert emulated.rig.navigation().goal == (18.0, 10.0)
@@ -142,7 +145,9 @@ async def test_it_drives_as_it_is_told_and_halts_when_nothing_comes(
     emulated: Emulated,
 ) -> None:
     def drives() -> bool:
-        emulated.network.publish("/agii/cmd_vel", m.Twist(m.Vector3(0.5)))
+        emulated.network.publish(
+            "/agii/cmd_vel", geometry_msgs.Twist(geometry_msgs.Vector3(0.5))
+        )
         return emulated.rig.vehicle.twist.linear_x > 0.1
 
     await until(drives)

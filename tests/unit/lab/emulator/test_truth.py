@@ -9,7 +9,7 @@ import pytest
 
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.adapters.truth_files import read_nearest
-from iveg.lab.emulator.camera import Counts, DetectorModel
+from iveg.lab.emulator.detector_model import Counts, DetectorModel
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.scenarios import scenario_named
 from iveg.lab.emulator.truth import Driving, TruthLog

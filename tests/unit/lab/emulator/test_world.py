@@ -8,11 +8,12 @@ from iveg.adapters.greenhouses import load_greenhouse
 from iveg.domain.errors import DataFileError
 from iveg.domain.geometry import PERSON_RADIUS_M, Twist2D
 from iveg.domain.greenhouse import Greenhouse
-from iveg.lab.emulator.camera import DETECTORS, PERSON
+from iveg.lab.emulator.climate import climate_at
+from iveg.lab.emulator.detector_model import DETECTORS, PERSON
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.scenarios import SCENARIOS, scenario_named
 from iveg.lab.emulator.scripts import SiteErrors
-from iveg.lab.emulator.world import SimulatedWorld, climate_at
+from iveg.lab.emulator.world import SimulatedWorld
 from tests.touching import bodies_touch, touches
 
 FLEET = ("AGI", "AGII")

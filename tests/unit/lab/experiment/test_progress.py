@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from iveg.lab.experiment.plan import PlannedRun, expected_s, read_json
-from iveg.lab.experiment.run_store import Progress
+from iveg.lab.experiment.progress import Progress
 
 STEPS = [PlannedRun("peers", n, 20.0, n) for n in (1, 2)]
 

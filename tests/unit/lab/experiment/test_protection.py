@@ -14,9 +14,9 @@ from iveg.lab.experiment.protection import (
     NearPerson,
     Protection,
     Sight,
-    protection_of,
     whole,
 )
+from iveg.lab.experiment.protection_scoring import protection_of
 
 STEP_S = 0.5
 

@@ -17,7 +17,7 @@ from iveg.domain.observations import DetectionFrame, LaserScan, Odometry
 from iveg.robot.replay.bags import AS_RECORDED, BagOptions
 from iveg.robot.replay.recordings import open_recording
 from iveg.ros2 import detector_messages as d
-from iveg.ros2 import messages as m
+from iveg.ros2 import geometry_msgs, nav_msgs, std_msgs
 from iveg.ros2.schema import Message
 from tests.data.message_bags import Said, message_bag, ros1_message_bag
 from tests.unit.robot.ros2 import said
@@ -41,19 +41,19 @@ from tests.unit.robot.ros2.test_pictures import depth, info
 
 FLEET = Pose2D(0.5, 0.0, 0.0)
 """Where the fleet file says that the laser sits."""
-PERSON = m.Point(0.0, 0.1, 3.0), m.Vector3(0.6, 1.8, 0.4)
+PERSON = geometry_msgs.Point(0.0, 0.1, 3.0), geometry_msgs.Vector3(0.6, 1.8, 0.4)
 """In the camera's optical frame."""
 
 
 def frames() -> list[Said]:
     """A robot at (10, 0) in map that looks east; its camera 1 m above the floor."""
-    turned = m.Quaternion(-0.5, 0.5, -0.5, 0.5)
-    camera = m.Transform(m.Vector3(-2.0, 0.0, 1.0), turned)
-    base = m.Header(frame_id="base_link")
-    at_camera = m.TransformStamped(base, OPTICAL.frame_id, camera)
+    turned = geometry_msgs.Quaternion(-0.5, 0.5, -0.5, 0.5)
+    camera = geometry_msgs.Transform(geometry_msgs.Vector3(-2.0, 0.0, 1.0), turned)
+    base = std_msgs.Header(frame_id="base_link")
+    at_camera = geometry_msgs.TransformStamped(base, OPTICAL.frame_id, camera)
     backwards = link("base_link", "laser", -0.3, yaw=math.pi)
     return [
-        ("/tf_static", m.TFMessage((at_camera, backwards)), WALL),
+        ("/tf_static", geometry_msgs.TFMessage((at_camera, backwards)), WALL),
         ("/tf", tf(link("map", "odom", 10.0)), WALL),
         ("/tf", tf(link("odom", "base_link", 2.0)), WALL),
     ]
@@ -210,7 +210,7 @@ def test_a_look_at_nobody_is_an_empty_frame(tmp_path: Path) -> None:
 def test_a_person_whose_frame_the_bag_lacks_is_lost_and_told(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    seen = ("/seen", yolact(m.Header(said.stamp(), "left_eye"), *PERSON), WALL)
+    seen = ("/seen", yolact(std_msgs.Header(said.stamp(), "left_eye"), *PERSON), WALL)
 
     found, _ = recorded(tmp_path, [*frames(), *drive(), seen])
 
@@ -278,7 +278,7 @@ def test_the_table_tells_of_every_topic_what_becomes_of_it(tmp_path: Path) -> No
     seen = [
         ("/scan", said.scan(), WALL),
         ("/yolox/bounding_box", yolox(MIDDLE, TALL), WALL),
-        ("/plan", m.Path(), WALL),
+        ("/plan", nav_msgs.Path(), WALL),
     ]
 
     _, lines = recorded(tmp_path, [*frames(), *drive(), *seen])
@@ -355,7 +355,7 @@ def test_a_bag_of_a_day_to_come_plays_and_says_so_once(
 ) -> None:
     later = 2_140_000_000.0
     message = said.odometry()
-    message = replace(message, header=m.Header(m.Time.of(later), "odom"))
+    message = replace(message, header=std_msgs.Header(std_msgs.Time.of(later), "odom"))
     bag = message_bag(tmp_path / "run", [("/odom", message, later)])
 
     found = list(open_recording(bag, FLEET)())

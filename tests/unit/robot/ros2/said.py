@@ -8,8 +8,7 @@ import numpy as np
 from iveg.domain.observations import Instant, Observation
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.inputs import SensorInputs
-from iveg.ros2 import cdr
-from iveg.ros2 import messages as m
+from iveg.ros2 import cdr, geometry_msgs, nav_msgs, sensor_msgs, std_msgs, vision_msgs
 from iveg.ros2.schema import Message
 
 WALL = 1_700_000_000.0
@@ -20,12 +19,12 @@ def at(seconds: float) -> Instant:
     return Instant(MONO + seconds, WALL + seconds)
 
 
-def stamp(seconds: float = 0.0) -> m.Time:
-    return m.Time.of(WALL + seconds)
+def stamp(seconds: float = 0.0) -> std_msgs.Time:
+    return std_msgs.Time.of(WALL + seconds)
 
 
-def turned(yaw: float) -> m.Quaternion:
-    return m.Quaternion(z=math.sin(yaw / 2), w=math.cos(yaw / 2))
+def turned(yaw: float) -> geometry_msgs.Quaternion:
+    return geometry_msgs.Quaternion(z=math.sin(yaw / 2), w=math.cos(yaw / 2))
 
 
 def link(
@@ -37,13 +36,15 @@ def link(
     *,
     after: float = 0.0,
     z: float = 0.0,
-) -> m.TransformStamped:
-    transform = m.Transform(m.Vector3(x, y, z), turned(yaw))
-    return m.TransformStamped(m.Header(stamp(after), outer), inner, transform)
+) -> geometry_msgs.TransformStamped:
+    transform = geometry_msgs.Transform(geometry_msgs.Vector3(x, y, z), turned(yaw))
+    return geometry_msgs.TransformStamped(
+        std_msgs.Header(stamp(after), outer), inner, transform
+    )
 
 
-def tf(*links: m.TransformStamped) -> m.TFMessage:
-    return m.TFMessage(links)
+def tf(*links: geometry_msgs.TransformStamped) -> geometry_msgs.TFMessage:
+    return geometry_msgs.TFMessage(links)
 
 
 def odometry(
@@ -53,12 +54,14 @@ def odometry(
     after: float = 0.0,
     child: str = "base_link",
     w: float = 0.0,
-) -> m.Odometry:
-    return m.Odometry(
-        m.Header(stamp(after), "odom"),
+) -> nav_msgs.Odometry:
+    return nav_msgs.Odometry(
+        std_msgs.Header(stamp(after), "odom"),
         child,
-        m.PoseWithCovariance(m.Pose(m.Point(x))),
-        m.TwistWithCovariance(m.Twist(m.Vector3(v), m.Vector3(z=w))),
+        geometry_msgs.PoseWithCovariance(geometry_msgs.Pose(geometry_msgs.Point(x))),
+        geometry_msgs.TwistWithCovariance(
+            geometry_msgs.Twist(geometry_msgs.Vector3(v), geometry_msgs.Vector3(z=w))
+        ),
     )
 
 
@@ -67,9 +70,9 @@ def scan(
     *,
     after: float = 0.0,
     frame: str = "laser",
-) -> m.LaserScan:
-    return m.LaserScan(
-        m.Header(stamp(after), frame),
+) -> sensor_msgs.LaserScan:
+    return sensor_msgs.LaserScan(
+        std_msgs.Header(stamp(after), frame),
         -0.5, 0.5, 0.5, 0.0, 0.1, 0.1, 20.0,
         np.array(ranges, np.float32),
     )  # fmt: skip
@@ -82,14 +85,25 @@ def seen(
     *,
     frame: str = "base_link",
     after: float = 0.0,
-) -> m.Detection3D:
-    sure = m.ObjectHypothesisWithPose(m.ObjectHypothesis(class_id, score))
-    box = m.BoundingBox3D(m.Pose(m.Point(x, 0.0, 0.9)), m.Vector3(0.4, 0.6, 1.8))
-    return m.Detection3D(m.Header(stamp(after), frame), (sure,), box, "7")
+) -> vision_msgs.Detection3D:
+    sure = vision_msgs.ObjectHypothesisWithPose(
+        vision_msgs.ObjectHypothesis(class_id, score)
+    )
+    box = vision_msgs.BoundingBox3D(
+        geometry_msgs.Pose(geometry_msgs.Point(x, 0.0, 0.9)),
+        geometry_msgs.Vector3(0.4, 0.6, 1.8),
+    )
+    return vision_msgs.Detection3D(
+        std_msgs.Header(stamp(after), frame), (sure,), box, "7"
+    )
 
 
-def look(*found: m.Detection3D, after: float = 0.0) -> m.Detection3DArray:
-    return m.Detection3DArray(m.Header(stamp(after), "base_link"), found)
+def look(
+    *found: vision_msgs.Detection3D, after: float = 0.0
+) -> vision_msgs.Detection3DArray:
+    return vision_msgs.Detection3DArray(
+        std_msgs.Header(stamp(after), "base_link"), found
+    )
 
 
 class Bench:

@@ -8,19 +8,19 @@ from iveg.robot.ros2.checking import CheckVerdict, Heard, judge, lines
 from iveg.robot.ros2.config import DriveConfig, RobotConfig
 from iveg.robot.ros2.transforms import TransformBuffer
 from iveg.ros2 import detector_messages as d
-from iveg.ros2 import messages as m
+from iveg.ros2 import geometry_msgs, nav_msgs, sensor_msgs
 from iveg.ros2.names import DEFAULT, SENSOR_DATA, TF, TF_STATIC, Endpoint
 from iveg.ros2.type_hash import type_hash
 from tests.fakes.ros2_network import endpoint
 from tests.unit.robot.ros2.said import WALL, link, tf
 
 WHOLE = {
-    "odometry": endpoint("/odom", m.Odometry),
-    "scan": endpoint("/scan", m.LaserScan, qos=SENSOR_DATA),
-    "tf": endpoint("/tf", m.TFMessage, qos=TF),
-    "tf_static": endpoint("/tf_static", m.TFMessage, qos=TF_STATIC),
-    "wishes": endpoint("/cmd_vel_nav", m.Twist),
-    "base": endpoint("/cmd_vel", m.Twist, writes=False),
+    "odometry": endpoint("/odom", nav_msgs.Odometry),
+    "scan": endpoint("/scan", sensor_msgs.LaserScan, qos=SENSOR_DATA),
+    "tf": endpoint("/tf", geometry_msgs.TFMessage, qos=TF),
+    "tf_static": endpoint("/tf_static", geometry_msgs.TFMessage, qos=TF_STATIC),
+    "wishes": endpoint("/cmd_vel_nav", geometry_msgs.Twist),
+    "base": endpoint("/cmd_vel", geometry_msgs.Twist, writes=False),
 }
 FOREIGN = Endpoint("/detections_3d", "darknet_msgs/msg/Boxes", True, DEFAULT, False)
 
@@ -91,25 +91,29 @@ def test_a_robot_that_has_everything_misses_nothing() -> None:
             "Nobody publishes /cmd_vel_nav: is navigation running?",
         ),
         (
-            verdict(endpoint("/cmd_vel", m.Twist)),
+            verdict(endpoint("/cmd_vel", geometry_msgs.Twist)),
             "Somebody else publishes /cmd_vel: only the gate may, remap it to "
             "/cmd_vel_nav.",
         ),
         (
-            verdict(endpoint("/cmd_vel_nav", m.Twist, writes=False)),
+            verdict(endpoint("/cmd_vel_nav", geometry_msgs.Twist, writes=False)),
             "Somebody listens on /cmd_vel_nav beside the gate: a base that does goes "
             "round it.",
         ),
         (
-            verdict(endpoint("/scan", m.PointCloud2), without="scan"),
+            verdict(endpoint("/scan", sensor_msgs.PointCloud2), without="scan"),
             "/scan is sensor_msgs/msg/PointCloud2, not sensor_msgs/msg/LaserScan.",
         ),
         (
-            verdict(endpoint("/tf", m.TFMessage, qos=SENSOR_DATA), without="tf"),
+            verdict(
+                endpoint("/tf", geometry_msgs.TFMessage, qos=SENSOR_DATA), without="tf"
+            ),
             "/tf: asked for reliably, published best effort; qos.tf.reliable = false.",
         ),
         (
-            verdict(endpoint("/tf_static", m.TFMessage), without="tf_static"),
+            verdict(
+                endpoint("/tf_static", geometry_msgs.TFMessage), without="tf_static"
+            ),
             "/tf_static: asked for transient local, published volatile; "
             "qos.tf_static.transient_local = false.",
         ),
@@ -131,18 +135,18 @@ def test_a_robot_that_has_everything_misses_nothing() -> None:
         ),
         (verdict(broker="No MQTT broker answers."), "No MQTT broker answers."),
         (
-            verdict(endpoint("/odom", m.PointCloud2)),
+            verdict(endpoint("/odom", sensor_msgs.PointCloud2)),
             "/odom is published as nav_msgs/msg/Odometry and as "
             "sensor_msgs/msg/PointCloud2: one may be right.",
         ),
         (
-            verdict(replace(endpoint("/cmd_vel", m.Twist), gate="AGII")),
+            verdict(replace(endpoint("/cmd_vel", geometry_msgs.Twist), gate="AGII")),
             "The gate of AGII publishes /cmd_vel: only the gate may, remap it to "
             "/cmd_vel_nav.",
         ),
         (
             verdict(
-                endpoint("/cmd_vel", m.Twist, writes=False, qos=TF_STATIC),
+                endpoint("/cmd_vel", geometry_msgs.Twist, writes=False, qos=TF_STATIC),
                 without="base",
             ),
             "/cmd_vel, offered → asked: volatile → transient local; qos.cmd_vel_out.",
@@ -191,7 +195,7 @@ def test_what_is_missing_is_said_in_one_sentence(
 def test_a_domain_where_nobody_is_says_so_once() -> None:
     found = judge(
         RobotConfig(domain=7),
-        [endpoint("/cmd_vel", m.Twist, own=True)],
+        [endpoint("/cmd_vel", geometry_msgs.Twist, own=True)],
         {},
         TransformBuffer(),
         seconds=3.0,
@@ -221,9 +225,11 @@ def test_without_odometry_a_broken_chain_is_still_told() -> None:
 
 def test_beside_the_running_gate_the_check_knows_it() -> None:
     gate = [
-        replace(endpoint("/cmd_vel", m.Twist), gate="AGI"),
-        replace(endpoint("/cmd_vel_nav", m.Twist, writes=False), gate="AGI"),
-        replace(endpoint("/iveg/obstacles", m.PointCloud2), gate="AGI"),
+        replace(endpoint("/cmd_vel", geometry_msgs.Twist), gate="AGI"),
+        replace(
+            endpoint("/cmd_vel_nav", geometry_msgs.Twist, writes=False), gate="AGI"
+        ),
+        replace(endpoint("/iveg/obstacles", sensor_msgs.PointCloud2), gate="AGI"),
     ]
 
     found = verdict(*gate)
@@ -233,9 +239,9 @@ def test_beside_the_running_gate_the_check_knows_it() -> None:
 
 
 def test_a_second_publisher_beside_the_running_gate_is_still_told() -> None:
-    gate = replace(endpoint("/cmd_vel", m.Twist), gate="AGI")
+    gate = replace(endpoint("/cmd_vel", geometry_msgs.Twist), gate="AGI")
 
-    (sentence,) = verdict(gate, endpoint("/cmd_vel", m.Twist)).missing
+    (sentence,) = verdict(gate, endpoint("/cmd_vel", geometry_msgs.Twist)).missing
 
     assert sentence.startswith("Somebody else publishes /cmd_vel")
 

@@ -9,9 +9,8 @@ import pytest
 
 from iveg.domain.observations import DetectionFrame
 from iveg.robot.ros2.config import RobotConfig
-from iveg.ros2 import cdr
+from iveg.ros2 import cdr, geometry_msgs, std_msgs, vision_msgs
 from iveg.ros2 import detector_messages as d
-from iveg.ros2 import messages as m
 from iveg.ros2.schema import Message
 from tests.unit.robot.ros2 import said
 from tests.unit.robot.ros2.said import MONO, Bench, tf
@@ -21,17 +20,19 @@ from tests.unit.ros2.reference import STORE, as_rosbags
 TRUTH = (13.0, 0.0)
 """Where the person stands in map (m): 3 m before a camera that is at (10, 0, 1) and
 looks east; ``test_pictures`` draws the same person."""
-OPTICAL = m.Header(said.stamp(), "camera_optical")
-UNSEEN = m.Header()
+OPTICAL = std_msgs.Header(said.stamp(), "camera_optical")
+UNSEEN = std_msgs.Header()
 CLOSE_M = 0.1
 
 
 def bench(classes: tuple[str, ...] = ()) -> Bench:
     found = Bench(RobotConfig(topics=TOPICS), tree=False, classes=classes)
-    optical = m.Quaternion(-0.5, 0.5, -0.5, 0.5)
-    place = m.Transform(m.Vector3(10.0, 0.0, 1.0), optical)
+    optical = geometry_msgs.Quaternion(-0.5, 0.5, -0.5, 0.5)
+    place = geometry_msgs.Transform(geometry_msgs.Vector3(10.0, 0.0, 1.0), optical)
     links = (
-        m.TransformStamped(m.Header(said.stamp(), "map"), "camera_optical", place),
+        geometry_msgs.TransformStamped(
+            std_msgs.Header(said.stamp(), "map"), "camera_optical", place
+        ),
         said.link("map", "base_link", 11.0, 1.0, math.pi / 2),
     )
     found.hear("tf_static", tf(*links))
@@ -47,47 +48,69 @@ def told(one: Bench, topic: str, message: Message) -> DetectionFrame:
     return found
 
 
-def sure(name: str = "farmer") -> tuple[m.ObjectHypothesisWithPose, ...]:
-    return (m.ObjectHypothesisWithPose(m.ObjectHypothesis(name, 0.9)),)
+def sure(name: str = "farmer") -> tuple[vision_msgs.ObjectHypothesisWithPose, ...]:
+    return (
+        vision_msgs.ObjectHypothesisWithPose(vision_msgs.ObjectHypothesis(name, 0.9)),
+    )
 
 
 # --- with depth ---------------------------------------------------------------------
 
 
-def vision_3d(header: m.Header, centre: m.Point, size: m.Vector3) -> Message:
-    box = m.BoundingBox3D(m.Pose(centre), size)
-    return m.Detection3DArray(header, (m.Detection3D(UNSEEN, sure(), box),))
+def vision_3d(
+    header: std_msgs.Header, centre: geometry_msgs.Point, size: geometry_msgs.Vector3
+) -> Message:
+    box = vision_msgs.BoundingBox3D(geometry_msgs.Pose(centre), size)
+    return vision_msgs.Detection3DArray(
+        header, (vision_msgs.Detection3D(UNSEEN, sure(), box),)
+    )
 
 
-def yolact(header: m.Header, centre: m.Point, size: m.Vector3) -> Message:
+def yolact(
+    header: std_msgs.Header, centre: geometry_msgs.Point, size: geometry_msgs.Vector3
+) -> Message:
     x, y, z = centre.x, centre.y, centre.z
     u, v, w = size.x / 2, size.y / 2, size.z / 2
     box = d.BoundingBox3d("farmer", 0.9, x - u, y - v, x + u, y + v, z - w, z + w)
     return d.BoundingBoxes3d(header, (box,))
 
 
-def yolo_3d(header: m.Header, centre: m.Point, size: m.Vector3) -> Message:
-    box = d.BoundingBox3D(m.Pose(centre), size, header.frame_id)
+def yolo_3d(
+    header: std_msgs.Header, centre: geometry_msgs.Point, size: geometry_msgs.Vector3
+) -> Message:
+    box = d.BoundingBox3D(geometry_msgs.Pose(centre), size, header.frame_id)
     one = d.Detection(0, "farmer", 0.9, "4", bbox3d=box)
-    return d.DetectionArray(m.Header(header.stamp, "elsewhere"), (one,))
+    return d.DetectionArray(std_msgs.Header(header.stamp, "elsewhere"), (one,))
 
 
-Made = Callable[[m.Header, m.Point, m.Vector3], Message]
+Made = Callable[[std_msgs.Header, geometry_msgs.Point, geometry_msgs.Vector3], Message]
 
 
 @pytest.mark.parametrize("made", [vision_3d, yolact, yolo_3d])
 @pytest.mark.parametrize(
     ("frame", "centre", "size"),
     [
-        ("camera_optical", m.Point(0.0, 0.1, 3.0), m.Vector3(0.6, 1.8, 0.4)),
-        ("base_link", m.Point(-1.0, -2.0, 0.9), m.Vector3(0.6, 0.4, 1.8)),
-        ("/map", m.Point(13.0, 0.0, 0.9), m.Vector3(0.4, 0.6, 1.8)),
+        (
+            "camera_optical",
+            geometry_msgs.Point(0.0, 0.1, 3.0),
+            geometry_msgs.Vector3(0.6, 1.8, 0.4),
+        ),
+        (
+            "base_link",
+            geometry_msgs.Point(-1.0, -2.0, 0.9),
+            geometry_msgs.Vector3(0.6, 0.4, 1.8),
+        ),
+        (
+            "/map",
+            geometry_msgs.Point(13.0, 0.0, 0.9),
+            geometry_msgs.Vector3(0.4, 0.6, 1.8),
+        ),
     ],
 )
 def test_a_box_with_depth_lies_where_the_person_is(
-    made: Made, frame: str, centre: m.Point, size: m.Vector3
+    made: Made, frame: str, centre: geometry_msgs.Point, size: geometry_msgs.Vector3
 ) -> None:
-    header = m.Header(said.stamp(), frame)
+    header = std_msgs.Header(said.stamp(), frame)
 
     (one,) = told(bench(), "detections_3d", made(header, centre, size)).detections
 
@@ -100,9 +123,13 @@ def test_a_box_with_depth_lies_where_the_person_is(
 @pytest.mark.parametrize("made", [vision_3d, yolact, yolo_3d])
 def test_a_frame_that_nobody_knows_places_nothing_and_is_named(made: Made) -> None:
     one = bench()
-    header = m.Header(said.stamp(), "left_eye")
+    header = std_msgs.Header(said.stamp(), "left_eye")
 
-    found = told(one, "detections_3d", made(header, m.Point(1.0), m.Vector3(1, 1, 1)))
+    found = told(
+        one,
+        "detections_3d",
+        made(header, geometry_msgs.Point(1.0), geometry_msgs.Vector3(1, 1, 1)),
+    )
 
     assert (found.detections, found.unread) == ((), ("farmer",))
     assert one.faults() == {"no_transform": "map → left_eye"}
@@ -119,12 +146,14 @@ def test_a_detection_of_yolo_without_depth_is_no_place_at_the_origin() -> None:
 # --- in a picture -------------------------------------------------------------------
 
 
-def vision_2d(centre: m.Point2D, size: m.Point2D) -> Message:
-    box = m.BoundingBox2D(m.PicturePose(centre), size.x, size.y)
-    return m.Detection2DArray(OPTICAL, (m.Detection2D(UNSEEN, sure(), box),))
+def vision_2d(centre: vision_msgs.Point2D, size: vision_msgs.Point2D) -> Message:
+    box = vision_msgs.BoundingBox2D(vision_msgs.PicturePose(centre), size.x, size.y)
+    return vision_msgs.Detection2DArray(
+        OPTICAL, (vision_msgs.Detection2D(UNSEEN, sure(), box),)
+    )
 
 
-def yolox_box(centre: m.Point2D, size: m.Point2D) -> d.BoundingBox:
+def yolox_box(centre: vision_msgs.Point2D, size: vision_msgs.Point2D) -> d.BoundingBox:
     # A number below zero loses its sign, as in the detector's own uint16.
     return d.BoundingBox(
         0.9,
@@ -139,28 +168,31 @@ def yolox_box(centre: m.Point2D, size: m.Point2D) -> d.BoundingBox:
     )
 
 
-def yolox(centre: m.Point2D, size: m.Point2D) -> Message:
+def yolox(centre: vision_msgs.Point2D, size: vision_msgs.Point2D) -> Message:
     return d.BoundingBoxes(OPTICAL, UNSEEN, (yolox_box(centre, size),))
 
 
-def yolo_2d(centre: m.Point2D, size: m.Point2D) -> Message:
+def yolo_2d(centre: vision_msgs.Point2D, size: vision_msgs.Point2D) -> Message:
     place = d.Pose2D(d.Point2D(centre.x, centre.y))
     box = d.BoundingBox2D(place, d.Vector2(size.x, size.y))
     return d.DetectionArray(OPTICAL, (d.Detection(0, "farmer", 0.9, bbox=box),))
 
 
-Drawn = Callable[[m.Point2D, m.Point2D], Message]
-MIDDLE, TALL = m.Point2D(32.0, 25.0), m.Point2D(20.0, 34.0)
+Drawn = Callable[[vision_msgs.Point2D, vision_msgs.Point2D], Message]
+MIDDLE, TALL = vision_msgs.Point2D(32.0, 25.0), vision_msgs.Point2D(20.0, 34.0)
 
 
 @pytest.mark.parametrize("drawn", [vision_2d, yolox, yolo_2d])
 @pytest.mark.parametrize(
     ("centre", "size"),
-    [(MIDDLE, TALL), (m.Point2D(32.0, 17.0), m.Point2D(20.0, 46.0))],
+    [
+        (MIDDLE, TALL),
+        (vision_msgs.Point2D(32.0, 17.0), vision_msgs.Point2D(20.0, 46.0)),
+    ],
     ids=["within the picture", "over its upper edge"],
 )
 def test_a_box_in_a_picture_lies_where_the_person_is(
-    drawn: Drawn, centre: m.Point2D, size: m.Point2D
+    drawn: Drawn, centre: vision_msgs.Point2D, size: vision_msgs.Point2D
 ) -> None:
     one = bench().hear("depth", depth()).hear("camera_info", info())
 
@@ -173,7 +205,7 @@ def test_a_box_in_a_picture_lies_where_the_person_is(
 
 def test_the_picture_that_yolox_looked_at_is_the_one_that_counts() -> None:
     """Some builds put the time of publishing into the first header."""
-    late = m.Header(said.stamp(0.2), "")
+    late = std_msgs.Header(said.stamp(0.2), "")
     seen = d.BoundingBoxes(late, OPTICAL, (yolox_box(MIDDLE, TALL),))
     one = bench().hear("depth", depth()).hear("camera_info", info())
 
@@ -217,7 +249,8 @@ def test_a_picture_with_nobody_in_it_is_an_empty_frame(
         ("detections_2d", d.BoundingBoxes(OPTICAL, UNSEEN, (
             replace(yolox_box(MIDDLE, TALL), class_id="1"),))),
         ("detections_3d", d.DetectionArray(OPTICAL, (d.Detection(1, "", 0.9, "", bbox3d=
-            d.BoundingBox3D(m.Pose(m.Point(z=3.0)), frame_id="camera_optical")),))),
+            d.BoundingBox3D(geometry_msgs.Pose(geometry_msgs.Point(z=3.0)),
+                            frame_id="camera_optical")),))),
     ],
 )  # fmt: skip
 def test_a_class_that_is_a_number_gets_its_name(topic: str, message: Any) -> None:
@@ -244,8 +277,10 @@ def test_a_score_that_is_none_is_lost(score: float) -> None:
     "message",
     [
         yolox(MIDDLE, TALL),
-        yolact(OPTICAL, m.Point(1.0), m.Vector3(1.0, 2.0, 3.0)),
-        yolo_3d(OPTICAL, m.Point(1.0), m.Vector3(1.0, 2.0, 3.0)),
+        yolact(OPTICAL, geometry_msgs.Point(1.0), geometry_msgs.Vector3(1.0, 2.0, 3.0)),
+        yolo_3d(
+            OPTICAL, geometry_msgs.Point(1.0), geometry_msgs.Vector3(1.0, 2.0, 3.0)
+        ),
         d.DetectionArray(
             OPTICAL,
             (

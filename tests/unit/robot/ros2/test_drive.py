@@ -8,11 +8,12 @@ from iveg.domain.geometry import REST, Twist2D
 from iveg.robot.ros2.config import DriveConfig
 from iveg.robot.ros2.drive import DriveTopics
 from iveg.robot.ros2.input_faults import InputFaults, speed_of
-from iveg.ros2 import cdr
-from iveg.ros2 import messages as m
+from iveg.ros2 import cdr, geometry_msgs, std_msgs
 from tests.unit.robot.ros2.said import stamp
 
-AHEAD = m.Twist(m.Vector3(0.5, 0.1, 0.2), m.Vector3(0.3, 0.4, -0.2))
+AHEAD = geometry_msgs.Twist(
+    geometry_msgs.Vector3(0.5, 0.1, 0.2), geometry_msgs.Vector3(0.3, 0.4, -0.2)
+)
 
 
 def topics(**drive: bool) -> tuple[DriveTopics, InputFaults]:
@@ -22,8 +23,12 @@ def topics(**drive: bool) -> tuple[DriveTopics, InputFaults]:
 
 
 def wished(after: float, forward: float = 0.5) -> bytes:
-    header = m.Header(stamp(after), "base_link")
-    return cdr.write(m.TwistStamped(header, m.Twist(m.Vector3(forward))))
+    header = std_msgs.Header(stamp(after), "base_link")
+    return cdr.write(
+        geometry_msgs.TwistStamped(
+            header, geometry_msgs.Twist(geometry_msgs.Vector3(forward))
+        )
+    )
 
 
 def test_of_a_twist_what_wheels_can_do_is_read() -> None:
@@ -46,7 +51,9 @@ def test_a_twist_that_nobody_can_mean_is_a_wish_to_rest(
 ) -> None:
     found, input_faults = topics()
 
-    wish = found.read(cdr.write(m.Twist(m.Vector3(forward))), 5.0)
+    wish = found.read(
+        cdr.write(geometry_msgs.Twist(geometry_msgs.Vector3(forward))), 5.0
+    )
 
     assert wish == REST
     assert speed_of(input_faults.faults(5.0)) == (0.5, code)
@@ -78,7 +85,7 @@ def test_a_sender_whose_clock_was_set_back_is_believed() -> None:
 
 def test_a_sender_that_stamps_nothing_is_believed() -> None:
     found, _ = topics(stamped_in=True)
-    bare = cdr.write(m.TwistStamped(m.Header(), AHEAD))
+    bare = cdr.write(geometry_msgs.TwistStamped(std_msgs.Header(), AHEAD))
 
     assert [found.read(bare, n / 10) for n in range(2)] == [Twist2D(0.5, -0.2)] * 2
 
@@ -88,8 +95,8 @@ def test_what_the_gate_says_is_written_as_the_base_wants_it() -> None:
     stamped, _ = topics(stamped_out=True)
     twist = Twist2D(0.25, -0.5)
 
-    bare = cdr.read(m.Twist, plain.write(twist, 12.5))
-    whole = cdr.read(m.TwistStamped, stamped.write(twist, 12.5))
+    bare = cdr.read(geometry_msgs.Twist, plain.write(twist, 12.5))
+    whole = cdr.read(geometry_msgs.TwistStamped, stamped.write(twist, 12.5))
 
     assert (bare.linear.x, bare.angular.z, bare.linear.y) == (0.25, -0.5, 0.0)
     assert whole.twist == bare

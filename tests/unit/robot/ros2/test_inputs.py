@@ -18,8 +18,7 @@ from iveg.domain.observations import (
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.input_faults import speed_of
 from iveg.robot.ros2.topics import sensed_topics
-from iveg.ros2 import cdr
-from iveg.ros2 import messages as m
+from iveg.ros2 import cdr, geometry_msgs, nav_msgs, sensor_msgs, std_msgs, vision_msgs
 from tests.unit.robot.ros2 import said
 from tests.unit.robot.ros2.said import Bench, link, look, seen, tf
 
@@ -86,7 +85,7 @@ def test_the_first_data_wait_for_the_transforms_that_follow_them() -> None:
     ],
 )
 def test_the_first_data_wait_for_the_whole_chain_not_for_its_first_link(
-    links: list[m.TFMessage],
+    links: list[geometry_msgs.TFMessage],
 ) -> None:
     """Localisation publishes map → odom later than the base publishes its own."""
     bench = Bench(tree=False, heard_for=0.0).hear("odometry", said.odometry(2.0))
@@ -194,7 +193,7 @@ def test_the_same_message_again_is_no_news() -> None:
     ],
 )
 def test_odometry_that_cannot_be_is_named_and_slows(
-    message: m.Odometry, code: str
+    message: nav_msgs.Odometry, code: str
 ) -> None:
     bench = Bench()
 
@@ -286,9 +285,11 @@ def test_a_scan_is_placed_by_where_the_laser_was_when_it_swept() -> None:
 
 def test_a_laser_upside_down_turns_the_other_way() -> None:
     bench = Bench()
-    rolled = m.Transform(m.Vector3(0.3), m.Quaternion(1.0, 0.0, 0.0, 0.0))
-    header = m.Header(said.stamp(), "base_link")
-    bench.hear("tf_static", tf(m.TransformStamped(header, "laser", rolled)))
+    rolled = geometry_msgs.Transform(
+        geometry_msgs.Vector3(0.3), geometry_msgs.Quaternion(1.0, 0.0, 0.0, 0.0)
+    )
+    header = std_msgs.Header(said.stamp(), "base_link")
+    bench.hear("tf_static", tf(geometry_msgs.TransformStamped(header, "laser", rolled)))
     bench.hear("odometry", said.odometry()).hear("scan", said.scan())
 
     found = bench.tick()[1]
@@ -305,7 +306,9 @@ def test_a_laser_upside_down_turns_the_other_way() -> None:
         (said.scan(frame="elsewhere"), "no_transform"),
     ],
 )
-def test_a_scan_that_cannot_be_used_is_named(message: m.LaserScan, code: str) -> None:
+def test_a_scan_that_cannot_be_used_is_named(
+    message: sensor_msgs.LaserScan, code: str
+) -> None:
     bench = Bench().hear("odometry", said.odometry()).hear("scan", message)
 
     found = bench.tick()
@@ -379,7 +382,7 @@ def test_who_was_seen_without_a_place_is_counted_and_not_placed() -> None:
     "bad", [seen(score=math.nan), seen(score=1.5), seen(x=math.nan), seen("()")]
 )
 def test_a_detection_that_cannot_be_is_counted_beside_the_others(
-    bad: m.Detection3D,
+    bad: vision_msgs.Detection3D,
 ) -> None:
     bench = Bench().hear("tf", tf(link("odom", "base_link")))
 
@@ -405,10 +408,15 @@ def test_a_class_list_gives_numbers_their_names() -> None:
 def test_a_plan_is_moved_into_map() -> None:
     bench = Bench().hear("odometry", said.odometry())
     bench.tick()
-    header = m.Header(said.stamp(), "odom")
-    poses = tuple(m.PoseStamped(header, m.Pose(m.Point(float(n)))) for n in range(3000))
+    header = std_msgs.Header(said.stamp(), "odom")
+    poses = tuple(
+        geometry_msgs.PoseStamped(
+            header, geometry_msgs.Pose(geometry_msgs.Point(float(n)))
+        )
+        for n in range(3000)
+    )
 
-    (found,) = bench.hear("path", m.Path(header, poses)).tick()
+    (found,) = bench.hear("path", nav_msgs.Path(header, poses)).tick()
 
     assert isinstance(found, Navigation)
     assert (found.path[0], found.goal) == ((10.0, 0.0), (3009.0, 0.0))
@@ -417,12 +425,15 @@ def test_a_plan_is_moved_into_map() -> None:
 
 @pytest.mark.parametrize("count", [1, 2, 5, 1023, 1024, 2045, 3069])
 def test_no_pose_of_a_path_is_told_twice(count: int) -> None:
-    header = m.Header(said.stamp(), "map")
+    header = std_msgs.Header(said.stamp(), "map")
     poses = tuple(
-        m.PoseStamped(header, m.Pose(m.Point(float(x)))) for x in range(count)
+        geometry_msgs.PoseStamped(
+            header, geometry_msgs.Pose(geometry_msgs.Point(float(x)))
+        )
+        for x in range(count)
     )
 
-    (found,) = Bench().hear("path", m.Path(header, poses)).tick()
+    (found,) = Bench().hear("path", nav_msgs.Path(header, poses)).tick()
 
     assert isinstance(found, Navigation)
     assert len(set(found.path)) == len(found.path) <= 1024
@@ -431,9 +442,9 @@ def test_no_pose_of_a_path_is_told_twice(count: int) -> None:
 
 
 def test_an_empty_plan_is_an_idle_robot() -> None:
-    header = m.Header(said.stamp(), "map")
+    header = std_msgs.Header(said.stamp(), "map")
 
-    (found,) = Bench().hear("path", m.Path(header)).tick()
+    (found,) = Bench().hear("path", nav_msgs.Path(header)).tick()
 
     assert isinstance(found, Navigation)
     assert (found.task, found.path) == ("idle", ())
@@ -443,7 +454,9 @@ def test_an_empty_plan_is_an_idle_robot() -> None:
     ("told", "share"), [(0.8, 0.8), (80.0, 0.8), (math.nan, None), (-1.0, None)]
 )
 def test_a_battery_is_read_as_a_share(told: float, share: float | None) -> None:
-    bench = Bench().hear("battery", m.BatteryState(percentage=told, voltage=25.5))
+    bench = Bench().hear(
+        "battery", sensor_msgs.BatteryState(percentage=told, voltage=25.5)
+    )
 
     (battery,) = bench.tick()
 

@@ -6,12 +6,12 @@ from iveg.robot.ros2.config import DriveConfig, RobotConfig
 from iveg.robot.ros2.input_faults import InputFaults, speed_of
 from iveg.robot.ros2.lookout import Lookout, forms_published
 from iveg.ros2 import detector_messages as d
-from iveg.ros2 import messages as m
+from iveg.ros2 import geometry_msgs, nav_msgs, sensor_msgs, vision_msgs
 from iveg.ros2.names import SENSOR_DATA, TF_STATIC, Endpoint, Qos
 from tests.fakes.ros2_network import endpoint
 
-BASE = endpoint("/cmd_vel", m.Twist, writes=False)
-STAMPED_BASE = endpoint("/cmd_vel", m.TwistStamped, writes=False)
+BASE = endpoint("/cmd_vel", geometry_msgs.Twist, writes=False)
+STAMPED_BASE = endpoint("/cmd_vel", geometry_msgs.TwistStamped, writes=False)
 
 
 def faults(
@@ -43,7 +43,7 @@ def test_a_base_that_hears_the_gate_is_no_fault() -> None:
             "/cmd_vel: TwistStamped → Twist",
         ),
         (
-            endpoint("/cmd_vel", m.Twist, writes=False, qos=TF_STATIC),
+            endpoint("/cmd_vel", geometry_msgs.Twist, writes=False, qos=TF_STATIC),
             RobotConfig(),
             "/cmd_vel: volatile → transient local",
         ),
@@ -63,7 +63,7 @@ def test_a_base_that_cannot_hear_the_gate_is_named_at_once(
 
 
 def test_a_drive_on_which_nobody_listens_is_named_after_discovery() -> None:
-    odometry = endpoint("/odom", m.Odometry)
+    odometry = endpoint("/odom", nav_msgs.Odometry)
 
     assert faults(odometry, after=4.0) == {}
     assert faults(odometry, after=5.5) == {"drive_unheard": "/cmd_vel"}
@@ -77,13 +77,13 @@ def test_an_unheard_drive_slows_nobody() -> None:
 
 
 def test_a_topic_of_a_type_that_is_not_read_is_named_with_it() -> None:
-    scan = endpoint("/scan", m.PointCloud2)
+    scan = endpoint("/scan", sensor_msgs.PointCloud2)
 
     assert faults(BASE, scan) == {"wrong_type": "/scan: sensor_msgs/PointCloud2"}
 
 
 @pytest.mark.parametrize(
-    "message", [m.Detection3DArray, d.BoundingBoxes3d, d.DetectionArray]
+    "message", [vision_msgs.Detection3DArray, d.BoundingBoxes3d, d.DetectionArray]
 )
 def test_a_detector_of_a_family_that_is_read_is_no_fault(message: type) -> None:
     assert faults(BASE, endpoint("/detections_3d", message)) == {}
@@ -93,9 +93,9 @@ def test_types_are_told_as_others_publish_them() -> None:
     seen = [
         endpoint("/boxes", d.BoundingBoxes),
         endpoint("/boxes", d.BoundingBoxes, qos=Qos(reliable=False)),
-        endpoint("/boxes", m.Detection2DArray, own=True),
-        endpoint("/boxes", m.Detection2DArray, writes=False),
-        endpoint("/boxes", m.PointCloud2),
+        endpoint("/boxes", vision_msgs.Detection2DArray, own=True),
+        endpoint("/boxes", vision_msgs.Detection2DArray, writes=False),
+        endpoint("/boxes", sensor_msgs.PointCloud2),
     ]
 
     assert forms_published("detections_2d", "/boxes", seen) == [d.BoundingBoxes]

@@ -10,11 +10,11 @@ from iveg.domain.feedback import Feedback, FeedbackAlert
 from iveg.domain.geometry import Pose2D
 from iveg.domain.observations import Origin
 from iveg.robot.neighbours import Neighbour, Neighbours
-from iveg.robot.ros2 import neighbours
-from iveg.ros2 import messages as m
+from iveg.robot.ros2 import markers, neighbours
+from iveg.ros2 import sensor_msgs, std_msgs
 
 HERE = Pose2D(1.0, 2.0, math.pi / 2)
-STAMP = m.Time(7, 0)
+STAMP = std_msgs.Time(7, 0)
 
 
 def alert(
@@ -34,7 +34,7 @@ def present(*feedback: Feedback, age: float = 0.0) -> list[Neighbour]:
     return known.present(HERE, 10.0 + age)
 
 
-def points(cloud: m.PointCloud2) -> np.ndarray:
+def points(cloud: sensor_msgs.PointCloud2) -> np.ndarray:
     return np.frombuffer(cloud.data.tobytes(), "<f4").reshape(-1, 3)
 
 
@@ -123,7 +123,7 @@ def test_who_is_out_of_reach_is_left_out_of_the_cloud() -> None:
 def test_rviz_gets_a_body_a_ring_and_a_name_that_fade() -> None:
     person = Neighbour("person", "farmer", 1.0, 4.0, 0.35, 2.5)
 
-    body, ring, name = neighbours.markers([person], STAMP, "map").markers
+    body, ring, name = markers.markers([person], STAMP, "map").markers
 
     assert (body.scale.x, ring.scale.x) == (0.7, 5.0)
     assert (name.text, name.type) == ("farmer", 9)

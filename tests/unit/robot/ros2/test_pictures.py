@@ -9,7 +9,7 @@ from iveg.domain.errors import UnreadableError
 from iveg.domain.observations import DetectionFrame
 from iveg.robot.ros2 import pictures
 from iveg.robot.ros2.config import RobotConfig
-from iveg.ros2 import messages as m
+from iveg.ros2 import geometry_msgs, sensor_msgs, std_msgs, vision_msgs
 from tests.unit.robot.ros2 import said
 from tests.unit.robot.ros2.said import Bench, tf
 
@@ -24,12 +24,12 @@ TOPICS = {
 }
 
 
-def info(**differs: float) -> m.CameraInfo:
+def info(**differs: float) -> sensor_msgs.CameraInfo:
     p = np.zeros(12)
     p[0], p[5] = differs.get("fx", FOCAL), differs.get("fy", FOCAL)
     p[2], p[6], p[10] = (WIDTH - 1) / 2, (HEIGHT - 1) / 2, 1.0
-    header = m.Header(said.stamp(), "camera_optical")
-    return m.CameraInfo(header, HEIGHT, WIDTH, p=p)
+    header = std_msgs.Header(said.stamp(), "camera_optical")
+    return sensor_msgs.CameraInfo(header, HEIGHT, WIDTH, p=p)
 
 
 def scene() -> np.ndarray:
@@ -41,37 +41,45 @@ def scene() -> np.ndarray:
 
 def image(
     pixels: np.ndarray, encoding: str, kind: str, *, big: bool = False, pad: int = 0
-) -> m.Image:
+) -> sensor_msgs.Image:
     rows = np.ascontiguousarray(pixels.astype((">" if big else "<") + kind))
     raw = np.frombuffer(rows.tobytes(), np.uint8).reshape(pixels.shape[0], -1)
     raw = np.pad(raw, ((0, 0), (0, pad)))
-    header = m.Header(said.stamp(), "camera_optical")
-    return m.Image(
+    header = std_msgs.Header(said.stamp(), "camera_optical")
+    return sensor_msgs.Image(
         header, HEIGHT, WIDTH, encoding, int(big), raw.shape[1], raw.reshape(-1)
     )
 
 
-def depth() -> m.Image:
+def depth() -> sensor_msgs.Image:
     return image(scene() * 1000, "16UC1", "u2")
 
 
-def box(score: float = 0.9, x: float = 32.0) -> m.Detection2D:
-    sure = m.ObjectHypothesisWithPose(m.ObjectHypothesis("farmer", score))
-    place = m.PicturePose(m.Point2D(x, 25.0))
-    return m.Detection2D(m.Header(), (sure,), m.BoundingBox2D(place, 20.0, 34.0), "")
+def box(score: float = 0.9, x: float = 32.0) -> vision_msgs.Detection2D:
+    sure = vision_msgs.ObjectHypothesisWithPose(
+        vision_msgs.ObjectHypothesis("farmer", score)
+    )
+    place = vision_msgs.PicturePose(vision_msgs.Point2D(x, 25.0))
+    return vision_msgs.Detection2D(
+        std_msgs.Header(), (sure,), vision_msgs.BoundingBox2D(place, 20.0, 34.0), ""
+    )
 
 
-def look(*boxes: m.Detection2D) -> m.Detection2DArray:
-    return m.Detection2DArray(m.Header(said.stamp(), "camera_optical"), boxes)
+def look(*boxes: vision_msgs.Detection2D) -> vision_msgs.Detection2DArray:
+    return vision_msgs.Detection2DArray(
+        std_msgs.Header(said.stamp(), "camera_optical"), boxes
+    )
 
 
 def bench() -> Bench:
     """A camera 1 m above the floor, 10 m east of map's origin, looking east."""
     found = Bench(RobotConfig(topics=TOPICS), tree=False)
-    optical = m.Quaternion(-0.5, 0.5, -0.5, 0.5)
-    place = m.Transform(m.Vector3(10.0, 0.0, 1.0), optical)
-    header = m.Header(said.stamp(), "map")
-    found.hear("tf_static", tf(m.TransformStamped(header, "camera_optical", place)))
+    optical = geometry_msgs.Quaternion(-0.5, 0.5, -0.5, 0.5)
+    place = geometry_msgs.Transform(geometry_msgs.Vector3(10.0, 0.0, 1.0), optical)
+    header = std_msgs.Header(said.stamp(), "map")
+    found.hear(
+        "tf_static", tf(geometry_msgs.TransformStamped(header, "camera_optical", place))
+    )
     return found
 
 
@@ -177,7 +185,9 @@ def test_a_box_that_lies_nowhere_is_lost(x: float) -> None:
         image(scene() * 1000, "mono16", "u2", pad=2),
     ],
 )
-def test_depth_is_read_in_every_encoding_that_ros_uses(picture: m.Image) -> None:
+def test_depth_is_read_in_every_encoding_that_ros_uses(
+    picture: sensor_msgs.Image,
+) -> None:
     read = pictures.read_depth(picture, info())
 
     assert np.allclose(read.depth, scene(), atol=1e-3)
@@ -187,14 +197,18 @@ def test_depth_is_read_in_every_encoding_that_ros_uses(picture: m.Image) -> None
     ("picture", "camera", "reason"),
     [
         (image(scene(), "rgb8", "u1"), info(), "bad_encoding"),
-        (m.Image(height=9, width=9, encoding="16UC1", step=18), info(), "bad_picture"),
+        (
+            sensor_msgs.Image(height=9, width=9, encoding="16UC1", step=18),
+            info(),
+            "bad_picture",
+        ),
         (depth(), info(fx=math.nan), "bad_camera"),
         (depth(), info(fy=90.0), "bad_camera"),
-        (depth(), m.CameraInfo(height=4, width=4), "bad_camera"),
+        (depth(), sensor_msgs.CameraInfo(height=4, width=4), "bad_camera"),
     ],
 )
 def test_a_picture_that_cannot_be_used_is_named(
-    picture: m.Image, camera: m.CameraInfo, reason: str
+    picture: sensor_msgs.Image, camera: sensor_msgs.CameraInfo, reason: str
 ) -> None:
     with pytest.raises(UnreadableError) as error:
         pictures.read_depth(picture, camera)

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from iveg.adapters import clock
-from iveg.adapters.mqtt import BrokerAddress
+from iveg.adapters.broker_address import BrokerAddress
 from iveg.domain.feedback import Feedback
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.goals import Goal
@@ -23,7 +23,7 @@ from iveg.robot.node_settings import NodeSettings
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.rig import Ros2Robot
 from iveg.ros2 import detector_messages as d
-from iveg.ros2 import messages as m
+from iveg.ros2 import geometry_msgs, nav_msgs, std_msgs
 from tests.builders import AGI
 from tests.fakes.ros2_network import FakeNetwork, endpoint
 from tests.ports import free_ports
@@ -46,7 +46,7 @@ class Site:
     task: asyncio.Task[None]
 
     @property
-    def driven(self) -> list[m.Twist]:
+    def driven(self) -> list[geometry_msgs.Twist]:
         """All that the base was told."""
         return self.network.writers["/agi/cmd_vel"].said()
 
@@ -98,22 +98,24 @@ async def site(tmp_path: Path) -> AsyncIterator[Site]:
 
 def placed(network: FakeNetwork) -> None:
     """Odometry in map, as a localised robot has it."""
-    header = m.Header(m.Time.of(clock.wall()), "map")
-    links = (m.TransformStamped(header, "odom"),)
-    network.publish("/agi/tf", m.TFMessage(links))
-    odom = m.Header(header.stamp, "odom")
-    network.publish("/agi/odom", m.Odometry(odom, "base_link"))
+    header = std_msgs.Header(std_msgs.Time.of(clock.wall()), "map")
+    links = (geometry_msgs.TransformStamped(header, "odom"),)
+    network.publish("/agi/tf", geometry_msgs.TFMessage(links))
+    odom = std_msgs.Header(header.stamp, "odom")
+    network.publish("/agi/odom", nav_msgs.Odometry(odom, "base_link"))
 
 
 async def test_while_it_is_held_the_base_is_told_zero_again_and_again(
     site: Site,
 ) -> None:
     for _ in range(10):
-        site.network.publish("/agi/cmd_vel_nav", m.Twist(m.Vector3(0.5)))
+        site.network.publish(
+            "/agi/cmd_vel_nav", geometry_msgs.Twist(geometry_msgs.Vector3(0.5))
+        )
 
     await until(lambda: len(site.driven) >= 20)
 
-    assert set(site.driven) == {m.Twist()}
+    assert set(site.driven) == {geometry_msgs.Twist()}
 
 
 async def test_a_goal_goes_out_as_nav2_takes_it_and_is_given_up_by_staying(
@@ -131,7 +133,7 @@ async def test_a_goal_goes_out_as_nav2_takes_it_and_is_given_up_by_staying(
     assert sent.header.frame_id == "map"
     assert (sent.pose.position.x, sent.pose.position.y) == (0.0, 5.0)
     assert sent.pose.orientation.z == pytest.approx(math.sin(math.pi / 4))
-    assert paused.pose == stays.pose == m.Pose()
+    assert paused.pose == stays.pose == geometry_msgs.Pose()
 
 
 async def test_a_goal_that_nobody_hears_is_none(site: Site) -> None:
@@ -150,15 +152,15 @@ async def test_a_second_publisher_of_the_drives_topic_makes_it_stand(
     site: Site,
 ) -> None:
     placed(site.network)
-    site.network.others.append(endpoint("/agi/cmd_vel", m.Twist))
+    site.network.others.append(endpoint("/agi/cmd_vel", geometry_msgs.Twist))
 
     await until(lambda: "second_publisher" in site.faults())
     await until(lambda: site.robot.node.speed_factor == 0.0)
 
 
 async def test_our_own_writer_is_no_second_publisher(site: Site) -> None:
-    site.network.others.append(endpoint("/agi/cmd_vel", m.Twist, own=True))
-    site.network.others.append(endpoint("/agii/cmd_vel", m.Twist))
+    site.network.others.append(endpoint("/agi/cmd_vel", geometry_msgs.Twist, own=True))
+    site.network.others.append(endpoint("/agii/cmd_vel", geometry_msgs.Twist))
 
     await until(lambda: len(site.driven) >= 20)
 
@@ -166,7 +168,7 @@ async def test_our_own_writer_is_no_second_publisher(site: Site) -> None:
 
 
 async def test_a_flood_of_wishes_is_named(site: Site) -> None:
-    site.network.publish("/agi/cmd_vel_nav", m.Twist(), times=50)
+    site.network.publish("/agi/cmd_vel_nav", geometry_msgs.Twist(), times=50)
 
     await until(lambda: "flood" in site.faults())
 
@@ -238,7 +240,7 @@ async def test_when_it_ends_the_base_is_told_to_rest(tmp_path: Path) -> None:
         before = len(site.driven)
 
     assert len(site.driven) > before
-    assert site.driven[-1] == m.Twist()
+    assert site.driven[-1] == geometry_msgs.Twist()
 
 
 async def test_a_detector_is_read_in_the_type_in_which_it_publishes(
@@ -275,7 +277,7 @@ async def test_a_detector_that_changes_its_type_is_told_in_one_sentence(
 async def test_a_base_that_wants_another_type_is_a_fault_of_the_running_gate(
     site: Site,
 ) -> None:
-    base = endpoint("/agi/cmd_vel", m.TwistStamped, writes=False)
+    base = endpoint("/agi/cmd_vel", geometry_msgs.TwistStamped, writes=False)
     site.network.others.append(base)
 
     await until(lambda: "drive_unheard" in site.faults())

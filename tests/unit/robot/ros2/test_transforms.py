@@ -10,14 +10,14 @@ from hypothesis import strategies as st
 from iveg.domain.geometry import Pose2D
 from iveg.robot.ros2.rigid import rigid_of
 from iveg.robot.ros2.transforms import NoTransformError, TransformBuffer
-from iveg.ros2 import messages as m
+from iveg.ros2 import geometry_msgs, std_msgs
 from tests.unit.robot.ros2.said import WALL, link, stamp, tf
 
 SMALL = st.floats(-10, 10)
 ANGLE = st.floats(-3.1, 3.1)
 
 
-def tree(*moving: m.TransformStamped) -> TransformBuffer:
+def tree(*moving: geometry_msgs.TransformStamped) -> TransformBuffer:
     found = TransformBuffer(0.5)
     found.add(tf(link("base_link", "laser", 0.3, 0.0, math.pi / 2)), static=True)
     found.add(tf(*moving), static=False)
@@ -114,14 +114,16 @@ def test_only_ten_seconds_are_kept() -> None:
         link("map", "odom", math.nan),
         link("map", "map"),
         link("", "odom"),
-        m.TransformStamped(
-            m.Header(stamp(), "map"),
+        geometry_msgs.TransformStamped(
+            std_msgs.Header(stamp(), "map"),
             "odom",
-            m.Transform(m.Vector3(), m.Quaternion(0.0, 0.0, 0.0, 0.0)),
+            geometry_msgs.Transform(
+                geometry_msgs.Vector3(), geometry_msgs.Quaternion(0.0, 0.0, 0.0, 0.0)
+            ),
         ),
     ],
 )
-def test_what_is_no_transform_is_refused(bad: m.TransformStamped) -> None:
+def test_what_is_no_transform_is_refused(bad: geometry_msgs.TransformStamped) -> None:
     assert TransformBuffer().add(tf(bad), static=False) == 1
 
 
@@ -151,7 +153,9 @@ def test_as_many_frames_as_somebody_invents_take_no_memory() -> None:
 
 
 def test_a_quaternion_of_any_length_is_a_turn() -> None:
-    rigid = rigid_of(m.Vector3(), m.Quaternion(0.0, 0.0, 3.0, 3.0))
+    rigid = rigid_of(
+        geometry_msgs.Vector3(), geometry_msgs.Quaternion(0.0, 0.0, 3.0, 3.0)
+    )
 
     assert rigid is not None
     assert rigid.flat().yaw == pytest.approx(math.pi / 2)

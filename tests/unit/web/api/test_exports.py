@@ -14,7 +14,7 @@ from iveg.adapters.history.store import Store
 from iveg.adapters.parquet import MOST_OPEN, parquet_end, parquet_page
 from iveg.cli import UNUSABLE, main
 from iveg.domain.errors import HopError
-from iveg.models import dictionary
+from iveg.models import column_meanings, dictionary
 from iveg.models.dictionary import LISTS, columns_of
 from iveg.pipeline.record import Waiting
 from iveg.web.api import exports
@@ -48,8 +48,8 @@ def test_each_column_of_each_list_is_told_and_none_besides() -> None:
     }
     assert all(meanings.values())
     names = {column for _, column in meanings}
-    assert names == set(dictionary.MEANINGS)
-    assert set(dictionary.MEANINGS_APART) <= set(meanings)
+    assert names == set(column_meanings.MEANINGS)
+    assert set(column_meanings.MEANINGS_APART) <= set(meanings)
     for name, kind in LISTS.items():
         head = exports.csv_head(kind).decode().strip().split(",")
         assert head == [one.name for one in columns_of(name)]

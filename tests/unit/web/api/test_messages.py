@@ -5,7 +5,7 @@ from typing import Any
 import httpx
 import pytest
 
-from iveg.adapters.web_push import encode, new_key, public_key
+from iveg.adapters.push_encryption import encode, new_key, public_key
 from iveg.domain.messages import AlertItem, MessageText, OutboundMessage
 from iveg.web.api.messages import writer
 from iveg.web.security.authentication import Role

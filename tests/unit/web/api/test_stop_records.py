@@ -9,7 +9,8 @@ import pytest
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.recorder import Recorder, journal_file
 from iveg.domain.records import CommandEventRecord, CommandRecord
-from iveg.models.command import Command, LatencySpread
+from iveg.models.command import Command
+from iveg.models.stop_latency import LatencySpread
 from iveg.web.api import stop_records
 from tests.builders import START
 from tests.unit.web.desk import WebDesk

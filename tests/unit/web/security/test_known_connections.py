@@ -6,12 +6,8 @@ import pytest
 from starlette.requests import HTTPConnection
 from starlette.types import Message, Scope
 
-from iveg.adapters.connections import (
-    CONNECTION,
-    Connection,
-    ConnectionCaps,
-    ConnectionTable,
-)
+from iveg.adapters.connection_caps import ConnectionCaps
+from iveg.adapters.connections import CONNECTION, Connection, ConnectionTable
 from iveg.web.security.connections import KnownConnections
 from iveg.web.security.roles import Principal
 

@@ -1,0 +1,45 @@
+"""Whether the history's database can be used."""
+
+from collections.abc import Sequence
+
+from sqlalchemy.exc import DatabaseError
+
+from iveg.adapters.history.engine import reading_engine, sqlite_file
+from iveg.adapters.history.migrate import reason_of, revisions
+from iveg.domain.errors import HopError
+
+
+def check_database(database_url: str) -> None:
+    """Check that the history can be read and has the newest shape; change nothing.
+
+    Raises:
+        HopError: it is not there, cannot be read, or has another shape.
+        SettingsError: the address cannot be used.
+    """
+    file = sqlite_file(database_url)
+    if file is not None and not file.is_file():
+        raise HopError(
+            "database", f"there is none at {file}; `iveg db upgrade` makes it"
+        )
+    engine = reading_engine(database_url)
+    try:
+        with engine.connect() as connection:
+            found, known = revisions(connection)
+    except DatabaseError as error:
+        raise HopError("database", reason_of(error)) from error
+    finally:
+        engine.dispose()
+    _compare(found, known)
+
+
+def _compare(found: str | None, newest_first: Sequence[str]) -> None:
+    newest = newest_first[0]
+    if found == newest:
+        return
+    if found is not None and found not in newest_first:
+        raise HopError("database", f"a newer iVeg wrote it (migration {found})")
+    raise HopError(
+        "database",
+        f"it is at migration {found or 'none'} and the newest is {newest}; "
+        "`iveg db upgrade` mends that",
+    )
