@@ -9,6 +9,7 @@ import binascii
 import string
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
+from hashlib import blake2s
 from typing import Any, Generic, TypeVar
 
 import orjson
@@ -53,11 +54,13 @@ class Cursor:
     """The last row of a page: its time and what tells it from others of that time.
 
     Attributes:
+        question: What was asked for (``question_of``): only that goes on here.
         group: Its value in the column that the list is sorted by; None: by time.
     """
 
     at: float
     key: int | str
+    question: str = ""
     group: str | None = None
 
 
@@ -203,7 +206,14 @@ def read_page(connection: Connection, of: ListOf[R], asked: Filter) -> Page[R]:
         return Page(items, None)
     last = rows[limit - 1]
     value = None if not group else last[of.sorts[_name(asked.sort)]] or ""
-    return Page(items, Cursor(last[of.at], last[of.key], value))
+    asked_for = question_of(of, asked)
+    return Page(items, Cursor(last[of.at], last[of.key], asked_for, value))
+
+
+def question_of(of: ListOf[Any], asked: Filter) -> str:
+    """What tells a question from others: its list, filters and order, short."""
+    rows = of.table.name, str(of.which), replace(asked, limit=0, cursor=None)
+    return blake2s(repr(rows).encode(), digest_size=6).hexdigest()
 
 
 def _name(sort: str) -> str:
@@ -285,7 +295,8 @@ def record_of(kind: type[R], row: RowMapping) -> R:
 def write_cursor(cursor: Cursor) -> str:
     """A cursor as opaque text that fits into a URL."""
     group = () if cursor.group is None else (cursor.group,)
-    text = base64.urlsafe_b64encode(orjson.dumps([cursor.at, cursor.key, *group]))
+    parts = [cursor.at, cursor.key, cursor.question, *group]
+    text = base64.urlsafe_b64encode(orjson.dumps(parts))
     return text.decode().rstrip("=")
 
 
@@ -297,13 +308,14 @@ def read_cursor(text: str, of: ListOf[R]) -> Cursor:
     """
     try:
         padded = text.encode("ascii") + b"=" * (-len(text) % 4)
-        at, key, *group = orjson.loads(base64.urlsafe_b64decode(padded))
+        at, key, question, *group = orjson.loads(base64.urlsafe_b64decode(padded))
     except (ValueError, TypeError, binascii.Error) as error:
         raise UnreadableError("bad_cursor") from error
     is_group = [*map(type, group)] in ([], [str]) and "".join(group).isprintable()
-    if not (isinstance(at, float) and _is_key(key, of) and is_group):
+    is_named = isinstance(question, str) and is_group
+    if not (isinstance(at, float) and _is_key(key, of) and is_named):
         raise UnreadableError("bad_cursor")
-    return Cursor(at, key, *group)
+    return Cursor(at, key, question, *group)
 
 
 def _is_key(key: object, of: ListOf[R]) -> bool:
