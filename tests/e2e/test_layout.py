@@ -16,6 +16,7 @@ from tests import staged
 from tests.e2e.frozen import Frozen, frozen, frozen_page, past_site, settle
 from tests.e2e.reading import (
     COVERED_STOPS,
+    CUT_HEADER,
     OVERFLOW,
     SMALLEST_STOP,
     evaluate,
@@ -555,6 +556,39 @@ NUMBER_OF_ALERTS = """() => {
   return [button.scrollWidth, button.clientWidth];
 }"""
 """How wide the number of alerts is beside a long name, and its place (px)."""
+
+
+@pytest.mark.parametrize("size", [(390, 844), (667, 375), (768, 1024)])
+def test_a_silent_server_is_told_whole_beside_whose_tablet_it_is(
+    browser: Browser, past: Site, size: tuple[int, int]
+) -> None:
+    lines: list[WebSocketRoute] = []
+    with frozen_page(browser, past, size, lines=lines) as page:
+        page.goto(past.url)
+        settle(page, "#map-fit:enabled")
+        page.evaluate(TABLET)
+        page.route_web_socket("**/live", lambda line: line.close())
+        lines[-1].close()
+        page.clock.run_for(4000)
+
+        expect(page.locator("#health-sentence")).to_have_text("Servidor no responde")
+        assert evaluate(page, CUT_HEADER) == []
+
+
+TABLET = """() => {
+  const make = (tag, name, ...parts) => {
+    const one = document.createElement(tag);
+    one.className = name;
+    one.append(...parts);
+    return one;
+  };
+  const said = make('b', '', 'Bloqueada');
+  said.id = 'tablet-said';
+  const text = make('span', 'chip-button__text', said, make('small', '', 'Nave 2'));
+  const chip = make('button', 'chip-button tablet', make('i', 'icon'), text);
+  document.querySelector('.header__bar .user').before(chip);
+}"""
+"""The chip of a shared tablet, which says whose it is."""
 
 CUT_LISTS = """() => [...document.querySelectorAll('.scroll-x')]
   .filter((it) => it.querySelector('.table--list, #machines'))
