@@ -5,6 +5,7 @@ measured, and each fleet has one page for all sizes.
 """
 
 import json
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
@@ -556,6 +557,28 @@ NUMBER_OF_ALERTS = """() => {
   return [button.scrollWidth, button.clientWidth];
 }"""
 """How wide the number of alerts is beside a long name, and its place (px)."""
+
+
+@pytest.mark.parametrize("route", ["/", "/fleet"])
+def test_a_page_that_has_heard_nothing_does_not_claim_that_nothing_is_there(
+    browser: Browser, past: Site, route: str
+) -> None:
+    with frozen_page(browser, past, (1440, 900), language="en") as page:
+        page.route_web_socket("**/live", lambda _: None)
+        page.goto(past.url + route)
+        settle(page, "body[data-loaded]")
+        page.clock.run_for(1500)
+
+        expect(page.locator("#alerts-count")).to_have_text("?")
+        shown = page.locator(".empty:visible").all_inner_texts()
+        assert [said for said in shown if NOTHING.search(said)] == []
+        if route == "/":
+            page.locator("[data-opens=people-panel]").click()
+            said = page.locator("#people-none")
+            expect(said).to_have_text("No link: unknown who is there")
+
+
+NOTHING = re.compile("No robot|Nobody|Nothing has happened|No active alerts")
 
 
 @pytest.mark.parametrize("size", [(390, 844), (667, 375), (768, 1024)])
