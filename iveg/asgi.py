@@ -114,7 +114,7 @@ def _past_routers(dss: Dss, pages: routes.Pages) -> Iterator[APIRouter]:
         )
     )
     yield what_if.router(dss.what_ifs, dss.services.rules, clock, worker)
-    yield notes.router(queries, dss.pipeline.event_log.log, clock)
+    yield notes.router(queries, dss.fleet.members, dss.pipeline.event_log.log, clock)
     if dss.sign_in_token:
         yield sign_in_code.router(dss.sign_in_token)
     yield account.router(dss.door.people)

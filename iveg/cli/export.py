@@ -6,6 +6,7 @@ import contextlib
 import os
 import sys
 from collections.abc import AsyncIterator, Callable, Sequence
+from datetime import UTC, datetime
 from typing import Any
 
 from iveg.adapters.database_check import check_database
@@ -20,6 +21,7 @@ from iveg.domain.records import Record
 from iveg.domain.stamps import parse_stamp
 from iveg.web.api import exports
 from iveg.web.api.history import HistoryList, lists_of
+from iveg.web.api.history_filters import NO_DAY, is_kept
 
 _Pages = AsyncIterator[Sequence[Record]]
 _MOMENT = "a moment as ISO-8601, in UTC unless it says otherwise"
@@ -52,7 +54,16 @@ def _moment(option: str, text: str | None) -> float | None:
     found = parse_stamp(text)
     if found is None:
         raise SettingsError(option, text, _MOMENT)
+    if not _is_of_history(found):
+        raise SettingsError(option, text, f"{_MOMENT}; that is {NO_DAY}")
     return found
+
+
+def _is_of_history(moment: float) -> bool:
+    try:
+        return is_kept(datetime.fromtimestamp(moment, UTC).date())
+    except (OverflowError, ValueError):
+        return False
 
 
 def _write(options: argparse.Namespace, queries: Queries, asked: Filter) -> None:

@@ -82,13 +82,16 @@ RUN_OVER = """() => [...document.querySelectorAll('td')]
   .map((cell) => cell.innerText)"""
 """The words of table cells that run into the cell below."""
 
-CUT_HEADER = """() => [...document.querySelectorAll('#status, #alerts-count')]
+CUT_HEADER = """() => [...document.querySelectorAll(
+    '#status, #alerts-count, [data-state=down] #health-sentence, #tablet-said')]
   .filter((it) => it.checkVisibility())
   .filter((it) => it.scrollWidth > it.clientWidth
+    || (it.id === 'health-sentence' && it.scrollHeight > it.clientHeight + 1)
     || [...it.children].some((part) => part.checkVisibility()
       && part.matches('#status-said') && part.offsetHeight > it.clientHeight))
   .map((it) => it.innerText)"""
-"""The words of the status line, and the number of alerts, where they are cut."""
+"""The words of the status line, of a fault and of whose tablet it is, and the number
+of alerts, where they are cut."""
 
 OVERFLOW = "() => document.documentElement.scrollWidth - innerWidth"
 """By how much the page is wider than the screen (px)."""

@@ -5,6 +5,7 @@ measured, and each fleet has one page for all sizes.
 """
 
 import json
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
@@ -16,6 +17,7 @@ from tests import staged
 from tests.e2e.frozen import Frozen, frozen, frozen_page, past_site, settle
 from tests.e2e.reading import (
     COVERED_STOPS,
+    CUT_HEADER,
     OVERFLOW,
     SMALLEST_STOP,
     evaluate,
@@ -555,6 +557,61 @@ NUMBER_OF_ALERTS = """() => {
   return [button.scrollWidth, button.clientWidth];
 }"""
 """How wide the number of alerts is beside a long name, and its place (px)."""
+
+
+@pytest.mark.parametrize("route", ["/", "/fleet"])
+def test_a_page_that_has_heard_nothing_does_not_claim_that_nothing_is_there(
+    browser: Browser, past: Site, route: str
+) -> None:
+    with frozen_page(browser, past, (1440, 900), language="en") as page:
+        page.route_web_socket("**/live", lambda _: None)
+        page.goto(past.url + route)
+        settle(page, "body[data-loaded]")
+        page.clock.run_for(1500)
+
+        expect(page.locator("#alerts-count")).to_have_text("?")
+        shown = page.locator(".empty:visible").all_inner_texts()
+        assert [said for said in shown if NOTHING.search(said)] == []
+        if route == "/":
+            page.locator("[data-opens=people-panel]").click()
+            said = page.locator("#people-none")
+            expect(said).to_have_text("No link: unknown who is there")
+
+
+NOTHING = re.compile("No robot|Nobody|Nothing has happened|No active alerts")
+
+
+@pytest.mark.parametrize("size", [(390, 844), (667, 375), (768, 1024)])
+def test_a_silent_server_is_told_whole_beside_whose_tablet_it_is(
+    browser: Browser, past: Site, size: tuple[int, int]
+) -> None:
+    lines: list[WebSocketRoute] = []
+    with frozen_page(browser, past, size, lines=lines) as page:
+        page.goto(past.url)
+        settle(page, "#map-fit:enabled")
+        page.evaluate(TABLET)
+        page.route_web_socket("**/live", lambda line: line.close())
+        lines[-1].close()
+        page.clock.run_for(4000)
+
+        expect(page.locator("#health-sentence")).to_have_text("Servidor no responde")
+        assert evaluate(page, CUT_HEADER) == []
+
+
+TABLET = """() => {
+  const make = (tag, name, ...parts) => {
+    const one = document.createElement(tag);
+    one.className = name;
+    one.append(...parts);
+    return one;
+  };
+  const said = make('b', '', 'Bloqueada');
+  said.id = 'tablet-said';
+  const text = make('span', 'chip-button__text', said, make('small', '', 'Nave 2'));
+  const chip = make('button', 'chip-button tablet', make('i', 'icon'), text);
+  document.querySelector('.header__bar .user').before(chip);
+}"""
+"""The chip of a shared tablet, which says whose it is."""
 
 CUT_LISTS = """() => [...document.querySelectorAll('.scroll-x')]
   .filter((it) => it.querySelector('.table--list, #machines'))

@@ -15,7 +15,10 @@ from tests.processes import Site
 
 pytestmark = pytest.mark.e2e
 
-SIZES = ((390, 844), (844, 390), (768, 1024), (1024, 768), (1440, 900))
+SIZES = (
+    *((390, 844), (667, 375), (844, 390)),
+    *((768, 1024), (1024, 768), (1440, 900)),
+)
 
 
 @pytest.fixture(scope="module")
@@ -48,6 +51,27 @@ def test_the_bar_of_the_past_covers_no_stop_and_no_tool_of_the_map(
     page.evaluate("() => scrollTo(0, 0)")
     assert evaluate(page, UNDER_BAR) == []
     assert evaluate(page, OVERFLOW) == 0
+
+
+@pytest.mark.parametrize(
+    ("language", "says"),
+    [
+        ("es", "No se puede mostrar la hora de este enlace: esto es el directo."),
+        ("en", "The time in this link cannot be shown: this is live."),
+    ],
+)
+def test_a_link_whose_time_cannot_be_read_says_that_this_is_live(
+    browser: Browser, past: Site, language: str, says: str
+) -> None:
+    with frozen_page(browser, past, (390, 844), language=language) as page:
+        page.goto(f"{past.url}/?t=garbage")
+        settle(page, "#past-unread")
+
+        assert page.locator("#past-unread").inner_text() == says
+        assert page.locator("#past").count() == 0
+        page.goto(past.url)
+        settle(page, "#map-fit:enabled")
+        assert page.locator("#past-unread").is_hidden()
 
 
 def test_what_plays_keeps_its_rate_where_pictures_take_half_a_second(

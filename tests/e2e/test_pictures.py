@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from PIL import Image
 from playwright.sync_api import Browser, Page
 
+from iveg.domain.limits import LIMITS
 from iveg.models.snapshot import Snapshot
 from tests.e2e.frozen import frozen, frozen_page, past_site, settle
 from tests.e2e.reading import evaluate
@@ -93,6 +94,20 @@ def test_the_recorded_snapshot_is_one_that_a_server_may_send() -> None:
     told = frozen()["snapshot"]
 
     assert Snapshot.model_validate(told).model_dump(mode="json") == told
+
+
+def test_no_margin_of_the_recorded_snapshot_is_known_from_old_data() -> None:
+    told = frozen()["snapshot"]
+    shown = [one["margin"] for one in (*told["robots"], *told["people"])]
+    worst = told["health"]["safety"]["worst_margin"]["margin"]
+
+    known = [one for one in (*shown, worst) if one and one["band"] != "unknown"]
+    assert worst in known
+    for one in known:
+        reacts_s = max(LIMITS.reaction_s, one["age_s"] + LIMITS.onward_s)
+        walks_m = one["parts"]["person_walks_m"]
+        assert one["age_s"] <= LIMITS.seen_s
+        assert walks_m >= LIMITS.walking_m_s * reacts_s - 0.01
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)

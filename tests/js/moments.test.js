@@ -1,5 +1,6 @@
 import {
   askedMoment,
+  isUnread,
   nextEvent,
   pastAddress,
 } from "../../iveg/static/js/core/moments.js";
@@ -11,7 +12,17 @@ test("a moment is an address, and an address without one is now", () => {
 
   equal(askedMoment(address.slice(1)), atS);
   equal(askedMoment(""), null);
-  equal(askedMoment("?t=yesterday"), null);
+  equal(isUnread(""), false);
+  equal(isUnread(address.slice(1)), false);
+  equal(askedMoment("?t=2026-11-24T10:42:07+01:00"), atS);
+});
+
+test("a moment that cannot be shown is told, not shown as live without a word", () => {
+  const tomorrow = new Date(Date.now() + 90_000_000).toISOString();
+  for (const asked of ["yesterday", "", "12", "2026-13-45T00:00Z", tomorrow]) {
+    equal(askedMoment(`?t=${asked}`), null);
+    equal(isUnread(`?t=${asked}`), true);
+  }
 });
 
 test("the next event is the nearest that somebody would look for", () => {

@@ -119,3 +119,21 @@ test("28.6: a scale holds zero and all values; without any there is no plot", ()
   const plot = { title: "", says: "", span: { since: 0, until: 1 }, lines: [line()] };
   equal(makePlot(plot, /** @type {any} */ ({})), null);
 });
+
+test("a line without any value has no key", () => {
+  const i18n = /** @type {any} */ ({ number: String, time: String, t: String });
+  const lines = [
+    { kind: "speed", name: "measured", samples: [{ at: 0, value: 0.8 }] },
+    { kind: "limit", name: "limit", samples: [] },
+    { kind: "ring", name: "zone", samples: [{ at: 0, value: null }] },
+  ];
+  const plot = makePlot(
+    { title: "", says: "", span: { since: 0, until: 1 }, lines },
+    i18n,
+  );
+  const keys = [...(plot?.querySelectorAll(".plot__key") ?? [])];
+  equal(
+    keys.map((key) => key.textContent),
+    ["measured"],
+  );
+});

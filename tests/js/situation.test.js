@@ -105,8 +105,10 @@ test("all clear needs every robot: one away, waiting or late is not clear", () =
   const waiting = heard(0, situation({ state: "waiting" }), "B");
   equal(said([clear]).said, "A at work, all clear");
   equal(said([clear, heard(0, CLEAR, "B")]).said, "2 robots at work, all clear");
-  equal(said([waiting]).said, "Nothing to report: B");
-  equal(said([clear, waiting]).said, "1 at work, all clear. Nothing to report: B");
+  equal(said([waiting]).said, "Waiting: B");
+  equal(said([clear, waiting]).said, "1 at work, all clear. Waiting: B");
+  const replay = heard(0, situation({ state: "replay" }), "C");
+  equal(said([waiting, replay]).said, "Nothing to report: B, C");
   const away = said([clear, heard(null, CLEAR, "B")]);
   equal([away.level, away.said], ["away", "Nothing heard yet of B"]);
   equal(said([heard(null, CLEAR)]).said, "No robot has spoken yet");

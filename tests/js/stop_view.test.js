@@ -226,7 +226,18 @@ test("the fleet can be stopped while one robot still runs", () => {
 
 test("the fleet's control is dead only when nobody can be reached", () => {
   equal(fleetOf({ link: "LOST" }, { link: "LOST" }).state, "lost");
-  equal(fleetOf({ link: "LOST" }, {}).state, "ready");
+  equal(fleetOf({ link: "LOST" }, {}).state, "late");
+});
+
+test("the fleet's control says how many robots a press does not reach", () => {
+  const never = { link: /** @type {const} */ ("UNKNOWN"), ageS: Infinity };
+  const late = { link: /** @type {const} */ ("LATE"), ageS: 2.2 };
+  equal(fleetOf({ link: "LOST", ageS: 9 }, late, never, {}), {
+    state: "late",
+    key: "stop.part_fleet",
+    slots: { count: 2, total: 4 },
+  });
+  equal(fleetOf(late, {}).key, "stop.late_fleet");
 });
 
 const STATES = [null, "REQUESTED", "SENT", "DELIVERED", "STANDING", "UNCONFIRMED"];

@@ -41,7 +41,7 @@ FACTORS = {
     "page": tuple(PAGES),
     "window": ("390x844", "844x390", "768x1024", "1024x768", "1440x900", "1920x1080"),
     "language": ("es", "en"),
-    "theme": ("light", "dark", "sunlight"),
+    "theme": ("light", "dark", "sunlight", "forced"),
     "situation": tuple(SITUATIONS),
 }
 _LOST_MS = 4000

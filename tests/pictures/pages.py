@@ -52,6 +52,7 @@ READY = {
     "past-gap": "#past[data-problem=true]",
     "alerts": "#past-rows tbody tr",
     "commands": "#orders-rows tbody tr",
+    "command": ".chain li",
     "decision": ".chain li",
     "history": "#chart-stops .main-svg",
     **{

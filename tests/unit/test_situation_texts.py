@@ -201,8 +201,7 @@ def test_the_status_line_alone_names_robot_danger_and_action(
 
 TOGETHER = {
     "lost while moving": (
-        "Los 10 robots: sin contacto hace hasta 4 s, en marcha — aléjese, "
-        "deberían pararse",
+        "Los 10 robots: hasta 4 s sin contacto, en marcha — aléjese, deberían pararse",
         "All 10 robots: no contact for up to 4 s while moving — keep away, "
         "they should stop",
     ),
@@ -211,7 +210,7 @@ TOGETHER = {
         "All 10 robots: at half speed: person in aisle 3",
     ),
     "late": (
-        "Los 10 robots: última noticia hace hasta 1,8\xa0s — trátelos como en marcha",
+        "Los 10 robots: noticias de hace hasta 1,8\xa0s — trátelos como en marcha",
         "All 10 robots: last news up to 1.8\xa0s ago — treat them as moving",
     ),
     "contradicts itself": (

@@ -15,18 +15,21 @@ class Cursor:
     """The last row of a page: its time and what tells it from others of that time.
 
     Attributes:
+        question: What was asked for (``lists.question_of``): only that goes on here.
         group: Its value in the column that the list is sorted by; None: by time.
     """
 
     at: float
     key: int | str
+    question: str = ""
     group: str | None = None
 
 
 def write_cursor(cursor: Cursor) -> str:
     """A cursor as opaque text that fits into a URL."""
     group = () if cursor.group is None else (cursor.group,)
-    text = base64.urlsafe_b64encode(orjson.dumps([cursor.at, cursor.key, *group]))
+    parts = [cursor.at, cursor.key, cursor.question, *group]
+    text = base64.urlsafe_b64encode(orjson.dumps(parts))
     return text.decode().rstrip("=")
 
 
@@ -38,13 +41,14 @@ def read_cursor(text: str, of: ListOf[R]) -> Cursor:
     """
     try:
         padded = text.encode("ascii") + b"=" * (-len(text) % 4)
-        at, key, *group = orjson.loads(base64.urlsafe_b64decode(padded))
+        at, key, question, *group = orjson.loads(base64.urlsafe_b64decode(padded))
     except (ValueError, TypeError, binascii.Error) as error:
         raise UnreadableError("bad_cursor") from error
     is_group = [*map(type, group)] in ([], [str]) and "".join(group).isprintable()
-    if not (isinstance(at, float) and _is_key(key, of) and is_group):
+    is_named = isinstance(question, str) and is_group
+    if not (isinstance(at, float) and _is_key(key, of) and is_named):
         raise UnreadableError("bad_cursor")
-    return Cursor(at, key, *group)
+    return Cursor(at, key, question, *group)
 
 
 def _is_key(key: object, of: ListOf[R]) -> bool:

@@ -6,7 +6,8 @@ new rows nor deep pages make the next one wrong or slow.
 
 import string
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
+from hashlib import blake2s
 from typing import Any, Generic
 
 from sqlalchemy import (
@@ -78,7 +79,14 @@ def read_page(connection: Connection, of: ListOf[R], asked: Filter) -> Page[R]:
         return Page(items, None)
     last = rows[limit - 1]
     value = None if not group else last[of.sorts[_name(asked.sort)]] or ""
-    return Page(items, Cursor(last[of.at], last[of.key], value))
+    asked_for = question_of(of, asked)
+    return Page(items, Cursor(last[of.at], last[of.key], asked_for, value))
+
+
+def question_of(of: ListOf[Any], asked: Filter) -> str:
+    """What tells a question from others: its list, filters and order, short."""
+    rows = of.table.name, str(of.which), replace(asked, limit=0, cursor=None)
+    return blake2s(repr(rows).encode(), digest_size=6).hexdigest()
 
 
 def _name(sort: str) -> str:

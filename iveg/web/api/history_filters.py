@@ -5,6 +5,7 @@ refused: a misspelt filter that answers everything would mislead.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from datetime import UTC, date, datetime
 from typing import Annotated, Literal, Self, TypeVar
 
@@ -32,6 +33,7 @@ R = TypeVar("R", bound=Record)
 LONGEST_RANGE_S = 31 * 86_400.0
 _FIRST_DAY, _LAST_DAY = date(1970, 1, 2), date(9000, 1, 1)
 """Days with which time zones and ranges can be computed."""
+NO_DAY = "no day of any history"
 _USUAL_RANGE_S = 15 * 60.0
 _ROBOT_ID = r"^[A-Za-z0-9-]{1,64}$"
 _NO_CONTROLS = r"^[^\x00-\x1f]*$"
@@ -54,9 +56,14 @@ def _in_utc(moment: datetime) -> datetime:
 
 def as_kept(day: date) -> date:
     """The day, if a history may have it.  Raises PydanticCustomError."""
-    if not _FIRST_DAY <= day <= _LAST_DAY:
-        raise PydanticCustomError("day", "no day of any history")
+    if not is_kept(day):
+        raise PydanticCustomError("day", NO_DAY)
     return day
+
+
+def is_kept(day: date) -> bool:
+    """Whether a history may have this day."""
+    return _FIRST_DAY <= day <= _LAST_DAY
 
 
 Moment = Annotated[datetime, BeforeValidator(mend_plus), AfterValidator(_in_utc)]
@@ -160,13 +167,13 @@ def filter_of(filters: Filters, of: ListOf[R]) -> Filter:
 
     Raises:
         RequestValidationError: the list cannot be sorted so; the cursor belongs to
-            another list or order, or to none.
+            another question, or to none.
     """
     name = filters.sort.removeprefix("-")
     if name not in (lists.BY_TIME, *of.sorts):
         names = ", ".join((lists.BY_TIME, *of.sorts))
         raise _invalid("sort", f"one of {names}, with or without a - before it")
-    return Filter(
+    asked = Filter(
         since=seconds(filters.since),
         until=seconds(filters.until),
         robot=filters.robot,
@@ -174,9 +181,12 @@ def filter_of(filters: Filters, of: ListOf[R]) -> Filter:
         person=filters.person,
         min_probability=filters.min_probability,
         limit=filters.limit or lists.USUAL_ROWS,
-        cursor=_cursor(filters.cursor, of, by_time=name == lists.BY_TIME),
         sort=filters.sort,
     )
+    cursor = _cursor(filters.cursor, of, asked)
+    if cursor is not None and (cursor.group is None) != (name == lists.BY_TIME):
+        raise _invalid("cursor", "not a cursor of this list")
+    return replace(asked, cursor=cursor)
 
 
 def range_of(
@@ -201,15 +211,15 @@ def seconds(moment: datetime | None) -> float | None:
     return None if moment is None else moment.timestamp()
 
 
-def _cursor(text: str | None, of: ListOf[R], *, by_time: bool) -> Cursor | None:
+def _cursor(text: str | None, of: ListOf[R], asked: Filter) -> Cursor | None:
     if text is None:
         return None
     try:
         cursor = cursors.read_cursor(text, of)
     except UnreadableError as error:
         raise _invalid("cursor", "not a cursor of this list") from error
-    if (cursor.group is None) != by_time:
-        raise _invalid("cursor", "a cursor of another order")
+    if cursor.question != lists.question_of(of, asked):
+        raise _invalid("cursor", "a cursor of another list, order or filters")
     return cursor
 
 

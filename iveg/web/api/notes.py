@@ -4,7 +4,7 @@ A note is a line of the log: it is written once, and goes into the incident pack
 moment that it is about.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Annotated, Self
 
 from fastapi import APIRouter, Depends, HTTPException, Query, Response
@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from iveg.adapters.history import listings, lists
 from iveg.adapters.history.queries import Queries
+from iveg.domain.errors import UnknownRobotError
 from iveg.domain.events import LogEvent, Slot
 from iveg.domain.observations import Instant
 from iveg.models.base import Listing
@@ -54,9 +55,19 @@ class NoteRequest(BaseModel):
 
 
 def router(
-    queries: Queries, log: Callable[[LogEvent, Instant], None], clock: Clock
+    queries: Queries,
+    fleet: Collection[str],
+    log: Callable[[LogEvent, Instant], None],
+    clock: Clock,
 ) -> APIRouter:
-    """Read by all, written by operators."""
+    """Read by all, written by operators.
+
+    Args:
+        queries: The history.
+        fleet: Robots of now; notes may also be about those that records name.
+        log: Takes the lines.
+        clock: What a note without a time is about.
+    """
     routes = APIRouter(prefix="/api/v1", tags=["history"], responses=refusals(503))
 
     @routes.get(
@@ -71,7 +82,7 @@ def router(
         page = await queries.page(listings.NOTES, wanted)
         return Json(Listing(items=[Note.of_record(one) for one in page.items]))
 
-    @routes.post("/notes", status_code=201)
+    @routes.post("/notes", status_code=201, responses=refusals(404))
     async def write(
         body: NoteRequest, who: Annotated[Principal, Depends(require("release"))]
     ) -> dict[str, str]:
@@ -80,6 +91,9 @@ def router(
         pinned_at = now.wall if body.at is None else body.at.timestamp()
         if not now.wall - LONGEST_AGO_S <= pinned_at <= now.wall:
             raise HTTPException(422, "A note is about a moment of the last 400 days.")
+        robot = body.robot_id
+        if not (robot is None or robot in fleet or await _is_recorded(queries, robot)):
+            raise UnknownRobotError(robot)
         slots: dict[str, Slot] = {
             "by": who.name,
             "text": body.text,
@@ -88,10 +102,18 @@ def router(
         }
         if body.x is not None:
             slots |= {"x": body.x, "y": body.y}
-        event = LogEvent(
-            "system", KEY, slots, body.robot_id, decision_id=body.decision_id
-        )
-        log(event, now)
+        log(LogEvent("system", KEY, slots, robot, decision_id=body.decision_id), now)
         return {"detail": "It is on the record."}
 
     return routes
+
+
+async def _is_recorded(queries: Queries, robot: str) -> bool:
+    """Whether a decision, an order or an alert names a robot that left the fleet."""
+    wanted = lists.Filter(robot=robot, limit=1)
+    pages = (
+        await queries.page(lists.DECISIONS, wanted),
+        await queries.page(lists.COMMANDS, wanted),
+        await queries.page(lists.ALERTS, wanted),
+    )
+    return any(page.items for page in pages)

@@ -222,8 +222,8 @@ async def test_a_filter_that_a_row_has_no_field_for_asks_nothing(
 
 
 def test_a_cursor_survives_the_url() -> None:
-    number = Cursor(NOON + 0.1234567, 2**53)
-    text = Cursor(NOON, "01HF")
+    number = Cursor(NOON + 0.1234567, 2**53, "a1")
+    text = Cursor(NOON, "01HF", "a1", "AGI")
 
     assert read_cursor(write_cursor(number), listings.DETECTIONS) == number
     assert read_cursor(write_cursor(text), listings.DECISIONS) == text

@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 
 from iveg.domain.exposure import Exposure, Exposures
+from iveg.domain.limits import LIMITS
 from iveg.domain.margins import LeastMargins, SafetyMargin
 from iveg.domain.tracking.person import TrackedPerson
 from tests.builders import at
@@ -228,6 +229,24 @@ def test_two_margins_tell_the_account_of_the_day_what_all_of_them_do(
     assert replace(account).update(telling, now, seen=True) == replace(account).update(
         everything, now, seen=True
     )
+
+
+@pytest.mark.parametrize("goes_on", ["AGI", "AGII"])
+def test_what_froze_does_not_become_the_worst_of_the_day(goes_on: str) -> None:
+    scene, days = met(2.0, linear=1.0), Exposures()
+    for half in range(20):
+        scene.now = half / 2
+        if goes_on == "AGI":
+            scene.drive("AGI", 0.0, linear=1.0)
+        else:
+            scene.look("AGII", person(2.0))
+        days.update(margins(scene).telling(), at(scene.now), seen=True)
+
+    assert days.today is not None
+    worst = days.today.worst
+    assert worst is not None
+    assert worst.margin.age_s <= LIMITS.seen_s
+    assert worst.margin.margin_m > -7.5
 
 
 def test_without_robots_or_people_there_is_no_margin() -> None:

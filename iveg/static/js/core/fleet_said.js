@@ -20,6 +20,8 @@ const MOST_LETTERS = 86;
 const NAMED = 3;
 /** Each of them is told by itself: where somebody is counts more than how many. */
 const ALONE = new Set(["not_slowing", "close"]);
+/** Of a fleet without any other state it is said who waits. */
+const QUIET = new Set(["clear", "waiting"]);
 
 /**
  * The worst of the fleet in one sentence: of several as bad most of the same, in danger
@@ -152,8 +154,9 @@ function quietSaid(fleet, i18n) {
     const said = i18n.t(`situation.fleet.${key}`, slots);
     return { level: "away", said, robotId: null };
   }
+  const wait = fleet.every(({ situation: { state } }) => QUIET.has(state));
   const key = others.length
-    ? `${count ? "some" : "none"}_clear`
+    ? `${count ? "some" : "none"}_clear${wait ? "_waiting" : ""}`
     : `clear_${count === 1 ? "one" : "many"}`;
   return {
     level: "working",

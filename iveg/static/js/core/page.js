@@ -17,7 +17,7 @@ import { createWall } from "../panels/wall.js";
 import { readApi } from "./api.js";
 import { guarded } from "./hub.js";
 import { createInstalling, registerWorker } from "./install.js";
-import { askedMoment, BEFORE_S, pastAddress } from "./moments.js";
+import { askedMoment, BEFORE_S, isUnread, pastAddress } from "./moments.js";
 import { createWakeLock } from "./wakelock.js";
 
 /**
@@ -104,6 +104,7 @@ async function shownBy(app) {
     location.assign(pastAddress(app.line.serverNow() - BEFORE_S)),
   );
   if (asked === null) {
+    setHidden(need("#past-unread"), !isUnread(location.search));
     readApi("recordings").then(({ body }) =>
       setHidden(need("#to-past"), !body?.items?.length),
     );

@@ -28,7 +28,9 @@ export function createAlertsPanel({ store, i18n }, tone) {
     const open = alerts.length;
     const isUnknown = earlierUnknown(store);
     const isCut = isUnheard(store);
-    setText(need("#alerts-count"), isUnknown || isCut ? `${open}?` : String(open));
+    const isHeard = Boolean(store.get("alerts") ?? store.get("snapshot"));
+    const count = isUnknown || isCut ? `${open}?` : String(open);
+    setText(need("#alerts-count"), isHeard ? count : "?");
     setHidden(need("#alerts-earlier"), !isUnknown);
     setHidden(need("#alerts-unheard"), !isCut);
     // A past and unseen alert may be graver than the active ones.

@@ -1,7 +1,8 @@
 /**
  * The map of the live page with its tools.
  *
- * Picking a person opens the decision behind its ring; picking a robot goes to its card.
+ * Picking a person opens the decision behind its ring; picking a robot goes to its card;
+ * of a place that is known it says since when.
  */
 
 import { installPaintHook } from "../core/painthook.js";
@@ -12,6 +13,7 @@ import { createMap } from "../map/map.js";
 import { all, need, setAttribute, setHidden, setText } from "./dom.js";
 import { createGoalMap } from "./goal_map.js";
 import { drawHidden } from "./hidden_layers.js";
+import { createKnownSaid } from "./known_said.js";
 import { createLegend } from "./legend.js";
 import { createMapFacts } from "./map_facts.js";
 import { drawLayers } from "./map_layers.js";
@@ -70,8 +72,9 @@ export function createMapbox(app, decision) {
 
   /** @param {{kind: string, id: string}} picked */
   function onPick({ kind, id }) {
+    sayKnown(kind === "known" ? id : null);
     if (kind === "robot") return goToCard(id);
-    const decisionId = decisionAbout(id);
+    const decisionId = kind === "known" ? null : decisionAbout(id);
     if (decisionId) decision.open(decisionId, canvas);
   }
 
@@ -88,6 +91,7 @@ export function createMapbox(app, decision) {
     return told.findLast(({ decision_id }) => decision_id)?.decision_id ?? null;
   }
 
+  const sayKnown = createKnownSaid(app);
   const drawFacts = createMapFacts(app, map);
   const showHidden = () => drawHidden(map.layers(), i18n);
 

@@ -30,7 +30,12 @@ export function createPeoplePanel({ store, i18n }) {
       setText(need("p", item), rest.join(". "));
       things.write(item, person);
     });
+    const isOpen = store.connection.state === "open";
     setHidden(need("#people-none"), people.length > 0);
+    setText(
+      need("#people-none"),
+      i18n.t(isOpen ? "people.none" : "map.people_no_link"),
+    );
     const acting = people.flatMap((person) => person.acting);
     const slots = {
       now: acting.filter(({ in_sight }) => !in_sight).length,

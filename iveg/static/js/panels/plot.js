@@ -30,11 +30,12 @@ const STEPS = [0.5, 1, 2, 3, 4, 5, 6, 8, 10, 15, 20, 30, 50, 100];
  * @returns {HTMLElement | null} null where no line has a value
  */
 export function makePlot({ title, says, span, lines, shade, late = [] }, i18n) {
-  const range = rangeOf(lines);
+  const drawn = lines.filter(hasValue);
+  const range = rangeOf(drawn);
   if (range === null) return null;
   const figure = make("figure", "plot");
   const caption = make("figcaption", "plot__title");
-  caption.append(make("b", "", title), ...lines.map(makeKey));
+  caption.append(make("b", "", title), ...drawn.map(makeKey));
   if (shade) caption.append(makeKey({ kind: "shade", name: shade.name }));
   if (late.length) caption.append(makeKey({ kind: "late", name: late[0].name }));
   const area = makeSvg("svg", {
@@ -48,7 +49,7 @@ export function makePlot({ title, says, span, lines, shade, late = [] }, i18n) {
   if (shade) area.append(drawShade(shade, span));
   area.append(...late.map((one) => drawShade(one, span, "plot__late")));
   area.append(makeSvg("path", { class: "plot__zero", d: `M0 ${zero}H${WIDTH}` }));
-  for (const line of lines) area.append(drawLine(line, span, range));
+  for (const line of drawn) area.append(drawLine(line, span, range));
   const heights = make("div", "plot__y");
   const decimals = range.top - range.bottom < 2 ? 1 : 0;
   for (const value of [range.top, range.bottom])
@@ -59,6 +60,9 @@ export function makePlot({ title, says, span, lines, shade, late = [] }, i18n) {
   figure.append(caption, heights, area, times, make("small", "plot__says", says));
   return figure;
 }
+
+/** Of a line that is not there the key would speak, too. @param {Line} line */
+const hasValue = ({ samples }) => samples.some(({ value }) => value !== null);
 
 /**
  * From the least to the greatest value, zero included, ends rounded outwards.

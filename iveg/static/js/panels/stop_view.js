@@ -126,11 +126,18 @@ export function viewOfFleet({ connection, isBlind, press, nowMs, robots }) {
 }
 
 /**
+ * Some robot hears: the press is sent, and reaches no robot without contact.
+ *
  * @param {ConnectionState} connection
  * @param {{link: Link, ageS: number}[]} robots
  * @returns {View}
  */
 function viewOfQuietFleet(connection, robots) {
+  const count = robots.filter(({ link }) => isSilent(link)).length;
+  if (connection === "open" && count) {
+    const slots = { count, total: robots.length };
+    return { state: "late", key: "stop.part_fleet", slots };
+  }
   const late = robots.filter(({ link }) => link === "LATE");
   if (connection === "connecting" || late.length) {
     const seconds = Math.max(0, ...late.map(({ ageS }) => ageS));

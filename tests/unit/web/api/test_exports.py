@@ -90,6 +90,8 @@ def test_a_range_is_since_inclusive_and_until_exclusive(
     [
         (["--since", "yesterday"], "--since='yesterday'"),
         (["--since", "2023-11-15", "--until", "2023-11-14"], "before --until"),
+        (["--since", "1926-11-20T09:00:00Z"], "no day of any history"),
+        (["--until", "9001-01-01"], "no day of any history"),
         (["--out", "nowhere/at/all.csv"], "No such file"),
     ],
 )

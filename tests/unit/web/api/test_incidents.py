@@ -87,7 +87,9 @@ class Desk:
         self.app.include_router(router(self.sources))
         self.app.dependency_overrides[require("read")] = lambda: None
         self.clock = FakeClock()
-        self.app.include_router(notes.router(self.queries, self.log, self.clock))
+        self.app.include_router(
+            notes.router(self.queries, ["R1"], self.log, self.clock)
+        )
         problems.install(self.app)
 
     async def fill(self) -> None:
@@ -260,6 +262,17 @@ async def test_a_note_that_is_none_is_refused(
 ) -> None:
     async with client_of(desk) as client:
         assert (await client.post("/api/v1/notes", json=wrong)).status_code == 422
+
+
+async def test_a_note_is_about_a_robot_of_the_fleet_or_of_a_record(desk: Desk) -> None:
+    answers = []
+    async with client_of(desk) as client:
+        for robot in ("R1", alert_record().slots["robot"], "R9"):
+            body = {"text": "a", "robot_id": robot}
+            answers.append(await client.post("/api/v1/notes", json=body))
+
+    assert [one.status_code for one in answers] == [201, 201, 404]
+    assert answers[-1].json()["type"].endswith("unknown-robot")
 
 
 @pytest.mark.parametrize("prints", [True, False])
