@@ -53,14 +53,13 @@ def create_app(dss: Dss) -> FastAPI:
         description="Supervise mixed robot fleets in greenhouses.",
         lifespan=dss.running,
     )
-    app.include_router(
-        routes.router(
-            pages,
-            document=cache(lambda: openapi.describe_api(app)),
-            rule=lambda: dss.pipeline.evaluator.rule,
-            sign_on=dss.sign_on,
-        )
+    of_pages = routes.router(
+        pages,
+        document=cache(lambda: openapi.describe_api(app)),
+        rule=lambda: dss.pipeline.evaluator.rule,
+        sign_on=dss.sign_on,
     )
+    app.router.routes.extend(of_pages.routes)
 
     @app.get("/openapi.json", dependencies=[Depends(require("read"))])
     async def document() -> object:

@@ -11,6 +11,7 @@ with it.  ``iveg demo``, ``iveg experiment`` and all that they start begin anew.
 import atexit
 import contextlib
 import ctypes
+import gc
 import json
 import os
 import select
@@ -110,16 +111,39 @@ def _end(requests: socket.socket, process: subprocess.Popen[bytes]) -> None:
 
 def main() -> None:
     """Fork what is asked for, and say of each how it ended."""
+    ended: list[int] = []
+    # The first that is registered is the last that is called.
+    atexit.register(_leave, ended)
     import iveg.__main__ as program
 
     for part in PARTS:
         import_module(part)
+    # Else each copy looks through all of it, and so comes to own what it would share.
+    gc.collect()
+    gc.freeze()
     # A process that is spawned begins with the main module, as it does in earnest.
     sys.modules["__main__"] = program
     asked = _become_what_is_asked()
     if asked is not None:
         sys.argv = ["iveg", *asked]
-        program.run()
+        try:
+            program.run()
+        except SystemExit as end:
+            if not isinstance(end.code, int):
+                raise
+            ended.append(end.code)
+
+
+def _leave(ended: list[int]) -> None:
+    """After all that a program does at its end: leave its memory to the system.
+
+    To free each object takes 90 ms of a processor.  Programs that do not begin here
+    free them, and their logs are read, too.
+    """
+    if ended:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(ended[0])
 
 
 def _become_what_is_asked() -> list[str] | None:

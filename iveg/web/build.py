@@ -149,7 +149,8 @@ def build_app(
     app.state.authenticator, app.state.orion = face.authenticator, face.orion
     app.router.routes.append(face.orion.route())
     for router in routers:
-        app.include_router(router)
+        # As they are: what is included is made anew at the first request.
+        app.router.routes.extend(router.routes)
     problems.install(app, pages.problem)
     identify, clock = face.authenticator.identify, face.clock
     app.add_middleware(headers.ReadableBodies)

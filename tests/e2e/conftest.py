@@ -9,6 +9,7 @@ import pytest
 from playwright.sync_api import Browser, ConsoleMessage, Page, ViewportSize
 
 from tests.browsers import running_browser
+from tests.e2e.slowly import draw_slowly
 from tests.processes import EMULATOR, Site, site
 
 OpenPage = Callable[..., Page]
@@ -57,13 +58,16 @@ def stack(
 
 
 @pytest.fixture
-def open_page(browser: Browser, stack: Site) -> Iterator[OpenPage]:
+def open_page(
+    browser: Browser, stack: Site, request: pytest.FixtureRequest
+) -> Iterator[OpenPage]:
     """Opens a signed-in page; at the end no page may have complained.
 
     A test that takes the server away opens its page with ``alone=True``: a browser
     then rightly says so.
     """
     complaints: list[str] = []
+    slowly = request.node.get_closest_marker("full_speed") is None
     with ExitStack() as pages:
 
         def open_one(
@@ -77,7 +81,7 @@ def open_page(browser: Browser, stack: Site) -> Iterator[OpenPage]:
             heard = None if alone else complaints
             size = (width, height)
             return pages.enter_context(
-                opened(browser, stack, heard, size, locale, route)
+                opened(browser, stack, heard, size, locale, route, slowly=slowly)
             )
 
         yield open_one
@@ -92,10 +96,14 @@ def opened(
     size: tuple[int, int] = (1440, 900),
     locale: str = "es-ES",
     route: str = "/",
+    *,
+    slowly: bool = False,
 ) -> Iterator[Page]:
     """A signed-in page in a window of its own; what its console says is noted."""
     viewport: ViewportSize = {"width": size[0], "height": size[1]}
     with browser.new_context(viewport=viewport, locale=locale) as context:
+        if slowly:
+            draw_slowly(context)
         page = context.new_page()
         if complaints is not None:
             _listen(page, complaints)

@@ -24,6 +24,7 @@ from tests.e2e.reading import (
     strip_stop,
     visit,
 )
+from tests.e2e.slowly import draw_slowly
 from tests.processes import Program, Site, until
 
 pytestmark = pytest.mark.e2e
@@ -56,6 +57,7 @@ def only(browser: Browser, stack: Site) -> Iterator[Page]:
     """
     context = browser.new_context(locale="es-ES", reduced_motion="reduce")
     context.set_default_timeout(60_000)
+    draw_slowly(context)
     page = context.new_page()
     page.goto(stack.sign_in_link)
     yield page

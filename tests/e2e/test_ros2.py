@@ -11,7 +11,7 @@ from tests.e2e.hands import let_go
 from tests.e2e.reading import card, evaluate, number, strip_stop
 from tests.processes import Site, site, until
 
-pytestmark = pytest.mark.e2e
+pytestmark = [pytest.mark.e2e, pytest.mark.full_speed]
 
 NOTE_PAINTED = """() => {
   window.painted = {};

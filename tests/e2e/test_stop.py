@@ -21,7 +21,7 @@ from tests.e2e.reading import (
 )
 from tests.processes import Site, until
 
-pytestmark = pytest.mark.e2e
+pytestmark = [pytest.mark.e2e, pytest.mark.full_speed]
 
 STANDING = re.compile(r"PARADO \(hace [\d,]+ s\)")
 _NOTE_WHEN = """([selector]) => {

@@ -19,7 +19,7 @@ from tests.e2e.hands import let_go
 from tests.e2e.reading import evaluate, strip_stop, visit
 from tests.processes import Site
 
-pytestmark = pytest.mark.e2e
+pytestmark = [pytest.mark.e2e, pytest.mark.full_speed]
 
 BUDGET_MS = 100.0
 WORK_MS = 50.0

@@ -12,7 +12,7 @@ from tests.e2e.conftest import OpenPage, live_page
 from tests.e2e.reading import card, evaluate, number
 from tests.processes import Site, until
 
-pytestmark = pytest.mark.e2e
+pytestmark = [pytest.mark.e2e, pytest.mark.full_speed]
 
 Json = Mapping[str, Any]
 STOP_ALL = re.compile("PARAR T.DO")

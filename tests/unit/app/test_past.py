@@ -7,7 +7,7 @@ import pickle
 import re
 import shutil
 import zlib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -385,17 +385,23 @@ def test_a_memory_makes_nothing_that_a_module_of_ours_imports(tmp_path: Path) ->
 
 
 @pytest.mark.parametrize(
-    "data",
-    [b"", b"nothing", zlib.compress(b"N" * 1000)[:-9], zlib.compress(bytes(1 << 27))],
+    "make",
+    [
+        lambda: b"",
+        lambda: b"nothing",
+        lambda: zlib.compress(b"N" * 1000)[:-9],
+        # Made where it is read: each worker collects this module.
+        lambda: zlib.compress(bytes(1 << 27)),
+    ],
     ids=["empty", "foreign", "cut off", "too large"],
 )
 def test_a_memory_that_is_no_memory_is_one_clear_problem(
-    tmp_path: Path, data: bytes
+    tmp_path: Path, make: Callable[[], bytes]
 ) -> None:
     memory = Memory(Past(site_of(tmp_path)).parts)
 
     with pytest.raises(UnreadableError, match="memory"):
-        memory.read(data)
+        memory.read(make())
 
 
 async def test_a_viewer_is_a_process_of_its_own_that_ends_when_idle(

@@ -17,11 +17,11 @@ asked by is the same in all faces."""
 
 
 class RoutesWhenAsked:
-    """Includes the routers of a face that may have what is asked for.
+    """Adds the routers of a face that may have what is asked for.
 
     Args:
         app: Answers.
-        face: Where they are included.
+        face: Where they are added.
         makers: What makes each router of now, in order.
     """
 
@@ -35,7 +35,8 @@ class RoutesWhenAsked:
         """Serve one request."""
         if scope["type"] != "lifespan":
             for number in [it for it in self._waiting if _may_answer(it, scope)]:
-                self._face.include_router(self._waiting.pop(number)())
+                # As the product does: FastAPI would make what is included once more.
+                self._face.router.routes.extend(self._waiting.pop(number)().routes)
         await self._app(scope, receive, send)
 
 
