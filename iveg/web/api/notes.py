@@ -112,8 +112,8 @@ async def _is_recorded(queries: Queries, robot: str) -> bool:
     """Whether a decision, an order or an alert names a robot that left the fleet."""
     wanted = lists.Filter(robot=robot, limit=1)
     pages = (
-        await queries.page(lists.DECISIONS, wanted),
-        await queries.page(lists.COMMANDS, wanted),
-        await queries.page(lists.ALERTS, wanted),
+        await queries.page(listings.DECISIONS, wanted),
+        await queries.page(listings.COMMANDS, wanted),
+        await queries.page(listings.ALERTS, wanted),
     )
     return any(page.items for page in pages)
