@@ -39,7 +39,8 @@ _BESIDE_M, _BEHIND_M = 0.3, 0.2
 _LEAST_BEAMS = 3
 EXPLAINED = 0.7
 """Share of the returns that a plan explains to a laser that works."""
-_WALKED_MOST_M = 4.0
+_WALKED_MOST_M = LIMITS.ring_most_m
+"""Beyond, no ring of theirs would cover them."""
 
 
 class LaserSight:
