@@ -24,10 +24,6 @@ from iveg.domain.witness import KnownBody
 from iveg.domain.world import World
 
 CLEAR_S = 1.0
-SWEEP_S = 0.1
-"""Between two sweeps, whenever they began, so that two rules tried side by side sweep
-together; no laser and few cameras tell more often."""
-_ROUNDING = 1e-6
 _EDGE_RAD = math.radians(5.0)
 """So far inside the picture that a person there would be seen whole."""
 _NEAR_M, _RANGE_SHARE = 1.0, 0.75
@@ -60,7 +56,6 @@ class AllClear:
 
     def __init__(self, swept: Swept = lambda *_: _NONE) -> None:
         self._swept = swept
-        self._beat: int | None = None
         self._since: dict[_Look, float] = {}
         self._places: dict[int, tuple[Sighting, Sequence[_Place]]] = {}
         """By chain the sighting, and where to look for who was seen there."""
@@ -68,14 +63,7 @@ class AllClear:
     def sweep(
         self, people: People, world: World, greenhouse: Greenhouse, now: Instant
     ) -> list[TrackedPerson]:
-        """Remove rings whose centre is seen to be empty; returns their persons.
-
-        Asked once more within the same ``SWEEP_S``, it finds none.
-        """
-        beat = math.floor(now.mono / SWEEP_S + _ROUNDING)
-        if beat == self._beat:
-            return []
-        self._beat = beat
+        """Remove rings whose centre is seen to be empty; returns their persons."""
         watched: dict[_Look, float] = {}
         empty: set[int] = set()
         rings = [

@@ -4,17 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.greenhouse import PlacedObstacle
-from iveg.domain.robot_state import RobotState
-from iveg.domain.tracking.sight import AllClear, beside, visible_from
+from iveg.domain.tracking.sight import beside, visible_from
 from tests.builders import at, detection
 from tests.unit.domain.scene import HEDGE, Scene, person
-
-Spots = NDArray[np.float64]
 
 
 def can_see(
@@ -52,25 +48,6 @@ def test_a_spot_looked_at_in_vain_for_a_second_is_clear() -> None:
     assert watched(scene, 0.95) == []
     assert watched(scene, 0.2) == ["P1"]
     assert scene.everyone[0].sightings == ()
-
-
-def test_a_laser_is_asked_ten_times_a_second() -> None:
-    scene, asked = remembered(Scene()), []
-
-    def swept(
-        robot: RobotState, spots: Spots, ages: Spots, *_: object
-    ) -> NDArray[np.intp]:
-        asked.append(scene.now)
-        return np.empty(0, np.intp)
-
-    scene.all_clear = AllClear(swept)
-    for tick in range(40):
-        scene.now = round(1.1 + 0.05 * tick, 6)
-        scene.drive("AGI", 0.0, linear=0.0)
-        scene.sweep()
-
-    moments = sorted(set(asked))
-    assert moments == pytest.approx([1.1 + 0.1 * beat for beat in range(20)])
 
 
 def test_a_look_that_was_interrupted_begins_anew() -> None:
