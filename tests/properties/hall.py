@@ -46,18 +46,11 @@ class Hall(Scene):
 
     def step(self, people: list[Place], x: float, speed: float) -> None:
         """A tenth of a second later; the camera sees everybody who is ahead."""
-        self.step_with(
-            [one for one in people if self.is_in_view(*one, x)], people, x, speed
-        )
-
-    def step_with(
-        self, boxes: list[Place], people: list[Place], x: float, speed: float
-    ) -> None:
-        """The same, with boxes of the camera at these places."""
         self.now = round(self.now + TICK_S, 6)
         self.drive("AGI", x, linear=speed)
+        ahead = [one for one in people if self.is_in_view(*one, x)]
         sure = self.confidences[int(self.now) % 2]
-        self.look("AGI", *(person(*one, probability=sure) for one in boxes))
+        self.look("AGI", *(person(*one, probability=sure) for one in ahead))
         discs = [Disc(*one, 0.25) for one in people]
         pose = Pose2D(x, 0.0, 0.0)
         ranges = sweep(pose, MODEL, Scenery.of(HALL), discs, [], self._rng)

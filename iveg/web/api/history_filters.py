@@ -183,9 +183,7 @@ def filter_of(filters: Filters, of: ListOf[R]) -> Filter:
         limit=filters.limit or lists.USUAL_ROWS,
         sort=filters.sort,
     )
-    cursor = _cursor(filters.cursor, of, asked)
-    if cursor is not None and (cursor.group is None) != (name == lists.BY_TIME):
-        raise _invalid("cursor", "not a cursor of this list")
+    cursor = _cursor(filters.cursor, of, asked, by_time=name == lists.BY_TIME)
     return replace(asked, cursor=cursor)
 
 
@@ -211,7 +209,9 @@ def seconds(moment: datetime | None) -> float | None:
     return None if moment is None else moment.timestamp()
 
 
-def _cursor(text: str | None, of: ListOf[R], asked: Filter) -> Cursor | None:
+def _cursor(
+    text: str | None, of: ListOf[R], asked: Filter, *, by_time: bool
+) -> Cursor | None:
     if text is None:
         return None
     try:
@@ -220,6 +220,8 @@ def _cursor(text: str | None, of: ListOf[R], asked: Filter) -> Cursor | None:
         raise _invalid("cursor", "not a cursor of this list") from error
     if cursor.question != lists.question_of(of, asked):
         raise _invalid("cursor", "a cursor of another list, order or filters")
+    if (cursor.group is None) != by_time:
+        raise _invalid("cursor", "not a cursor of this list")
     return cursor
 
 

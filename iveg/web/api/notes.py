@@ -111,9 +111,8 @@ def router(
 async def _is_recorded(queries: Queries, robot: str) -> bool:
     """Whether a decision, an order or an alert names a robot that left the fleet."""
     wanted = lists.Filter(robot=robot, limit=1)
-    pages = (
-        await queries.page(listings.DECISIONS, wanted),
-        await queries.page(listings.COMMANDS, wanted),
-        await queries.page(listings.ALERTS, wanted),
+    return bool(
+        (await queries.page(listings.DECISIONS, wanted)).items
+        or (await queries.page(listings.COMMANDS, wanted)).items
+        or (await queries.page(listings.ALERTS, wanted)).items
     )
-    return any(page.items for page in pages)

@@ -81,6 +81,7 @@ export const NOTHING = {
   costmap: null,
   coverage: null,
   known: null,
+  tiles: [],
 };
 
 /**

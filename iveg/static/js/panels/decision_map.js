@@ -20,6 +20,7 @@ import * as people from "../map/layers/people.js";
 import * as robots from "../map/layers/robot.js";
 import * as scalebar from "../map/layers/scalebar.js";
 import { readTheme } from "../map/layers/theme.js";
+import { NOTHING } from "../map/scene.js";
 import { createViewport, fitTo } from "../map/viewport.js";
 import { make } from "./dom.js";
 
@@ -52,9 +53,8 @@ export function sceneOf({ position, places, rule, ...told }, map) {
     decisionId: null,
   };
   return {
-    nowMs: 0,
+    ...NOTHING,
     map,
-    isVeiled: false,
     robots: places.map(({ robot_id, ...pose }) => ({
       ...BODY,
       id: robot_id,
@@ -71,12 +71,6 @@ export function sceneOf({ position, places, rule, ...told }, map) {
       encounters: [],
     })),
     people: [person],
-    detections: [],
-    scans: [],
-    costmap: null,
-    coverage: null,
-    known: null,
-    tiles: [],
   };
 }
 
