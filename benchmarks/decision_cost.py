@@ -233,6 +233,7 @@ def cost(robots: int, seconds: float) -> dict[str, list[float]]:
         if one.at - ticked >= TICK_S:
             ticked = one.at
             begin = time.thread_time()
+            evaluator.age(now)
             evaluator.tick(now)
             took.setdefault("(tick)", []).append((time.thread_time() - begin) * 1e3)
     return took
@@ -266,6 +267,7 @@ async def latency(robots: int, seconds: float) -> list[float]:
             took.append((left - start - one.at) * 1e3)
         if now.mono - ticked >= TICK_S:
             ticked = now.mono
+            evaluator.age(now)
             evaluator.tick(now)
     drawing.cancel()
     looking.cancel()

@@ -32,9 +32,10 @@ from iveg.domain.feedback import Feedback
 from iveg.domain.observations import Received
 from iveg.domain.transports import DIRECT, FIWARE
 from iveg.ngsi import codec, names
-from iveg.pipeline.build import Choices, Pipeline, Ports, build
+from iveg.pipeline.build import build
 from iveg.pipeline.loop import reading_apart_s
 from iveg.pipeline.mapping import Mapper
+from iveg.pipeline.parts import Choices, Pipeline, Ports
 from tests.fakes.journal import FakeJournal
 
 RATE_HZ = 30

@@ -247,7 +247,7 @@ def _relay(directory: Path, _: int, __: str) -> Iterator[Place]:
         _program(relay, environment) as server,
     ):
         link = f"http://127.0.0.1:{http}/"
-        until(lambda: _answers(link), 20.0, "the relay")
+        until(lambda: _answers(link), "the relay")
         yield Place(link, mqtt, [broker, server], [])
 
 

@@ -17,7 +17,8 @@ import numpy as np
 import orjson
 
 from benchmarks.process import print_table
-from iveg.app.dss import Dss, open_dss
+from iveg.app.dss import Dss
+from iveg.app.opening import open_dss
 from iveg.asgi import create_app
 from iveg.lab.embedded.orion_numbers import print_value
 from iveg.ngsi.codec import read_notification

@@ -144,7 +144,7 @@ class Result:
 def main() -> None:
     with tempfile.TemporaryDirectory() as directory, site(Path(directory)) as place:
         demo = place.start("demo")
-        place.wait_until_live(deadline_s=60.0)
+        place.wait_until_live()
         result = asyncio.run(_measure(place, demo.pid))
     _report(result)
 

@@ -109,11 +109,11 @@ def _run(how: How) -> tuple[int, float, Gaps]:
         with site(Path(name), **settings) as there:
             there.start("fiware")
             there.start("serve", module="benchmarks.purge_beside")
-            there.wait_until_served(180.0)
+            there.wait_until_served()
             port = there.settings["IVEG_MQTT_URL"].rpartition(":")[2]
             words = "--port", port, "--robots", str(how.robots), "--hz", str(how.hz)
             there.start(*words, module="tests.fleet")
-            there.wait_until_live(how.robots, 180.0)
+            there.wait_until_live(how.robots)
             took_s, gaps = asyncio.run(_listen(there, int(port), how))
         return how.rows - _left(url), took_s, gaps
 

@@ -32,7 +32,8 @@ from cyclonedds.util import duration
 
 from benchmarks.process import Usage, machine, pause, percentile, print_table
 from iveg.adapters.broker_address import BrokerAddress
-from iveg.adapters.dds import Dds, DdsReader, DdsWriter
+from iveg.adapters.dds import Dds
+from iveg.adapters.dds_entities import DdsReader, DdsWriter
 from iveg.adapters.dds_types import announced, write_qos
 from iveg.adapters.mqtt import MqttLink
 from iveg.domain.feedback import CLEAR, Feedback

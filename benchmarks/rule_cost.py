@@ -133,6 +133,7 @@ def cost(
             witness.tick(now)
         if now.mono - ticked >= TICK_S:
             ticked = now.mono
+            evaluator.age(now)
             evaluator.tick(now)
     took_s = time.process_time() - began
     return took_s / len(everything) * 1000, kept.digest

@@ -204,7 +204,7 @@ async def running(
     names = ",".join((*ROBOTS, *CROWD))
     with site(directory, IVEG_ROBOTS=names, IVEG_STOP_DIRECT=direct) as place:
         start(place, broker, parts)
-        place.wait_until_live(len(ROBOTS), 60.0)
+        place.wait_until_live(len(ROBOTS))
         ear = Ear()
         port = urlsplit(place.settings["IVEG_MQTT_URL"]).port or 1883
         topics = {"/iveg/+/cmdexe": 1}

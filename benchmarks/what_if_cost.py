@@ -25,7 +25,7 @@ from iveg.adapters.history.migrate import upgrade
 from iveg.app.what_if import WhatIfs
 from iveg.domain.fleet import FleetDescription
 from iveg.domain.observations import Instant
-from iveg.domain.what_if.crossings import Parameters
+from iveg.domain.what_if.parameters import Parameters
 from iveg.domain.what_if.questions import VALUES, Question
 
 ROBOTS = tuple(f"R{number}" for number in range(1, 6))

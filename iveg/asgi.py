@@ -31,8 +31,8 @@ from iveg.web.api import (
 )
 from iveg.web.api.answers import Json
 from iveg.web.build import build_app, live_routers
-from iveg.web.pages import openapi, routes, service_worker, sign_on
-from iveg.web.security.authentication import require
+from iveg.web.pages import drawing, openapi, routes, service_worker, sign_on
+from iveg.web.security.requirements import require
 from iveg.web.static_files import KeptFiles
 
 _STATIC = Path(__file__).with_name("static")
@@ -41,7 +41,7 @@ _STATIC = Path(__file__).with_name("static")
 def create_app(dss: Dss) -> FastAPI:
     """The web face of a DSS; its lifespan runs the rest."""
     # Whoever has the link needs no admin.
-    pages = routes.Pages(
+    pages = drawing.Pages(
         dss.face.site, lambda: dss.face.site.link or dss.door.people.is_led()
     )
     app = build_app(
@@ -72,7 +72,7 @@ def create_app(dss: Dss) -> FastAPI:
     return app
 
 
-def _past_routers(dss: Dss, pages: routes.Pages) -> Iterator[APIRouter]:
+def _past_routers(dss: Dss, pages: drawing.Pages) -> Iterator[APIRouter]:
     """History, what a browser needs besides, and the laboratory's own."""
     queries, face = dss.stores.queries, dss.face
     views, evaluator, clock = face.views, dss.pipeline.evaluator, face.clock

@@ -11,6 +11,7 @@ from playwright.sync_api import expect
 from xdist.scheduler import LoadScopeScheduling
 
 from iveg.cli.running import tune_garbage_collection
+from tests.patience import PATIENCE_MS
 
 # A helper's failed assertion shows its values as a test's own does.
 pytest.register_assert_rewrite("tests.processes")
@@ -19,7 +20,7 @@ pytest.register_assert_rewrite("tests.processes")
 settings.register_profile("iveg", deadline=None, max_examples=50)
 settings.register_profile("quick", deadline=None, max_examples=15)
 settings.register_profile("thorough", deadline=None, max_examples=2000)
-expect.set_options(timeout=20_000)
+expect.set_options(timeout=PATIENCE_MS)
 settings.load_profile(os.environ.get("IVEG_HYPOTHESIS", "iveg"))
 
 _FOLDERS = ("chaos", "e2e", "integration", "properties", "contract", "unit")

@@ -134,6 +134,12 @@ MUTANTS = (
         ("unit/domain/rule/test_foresight.py",),
     ),
     Mutant(
+        "rule: a box that jumps is a step of any length",
+        "LastStep(to, *of_a_walker(*step))",
+        "LastStep(to, *step)",
+        ("unit/domain/rule/test_foresight.py",),
+    ),
+    Mutant(
         "rule: leaves, and a plan that is off, are people for the laser",
         "PLAN_M = 0.4",
         "PLAN_M = 0.1",
@@ -421,6 +427,18 @@ MUTANTS = (
         "np.array(passed)[np.all(apart > walked, axis=0)]",
         "np.array(passed)",
         ("unit/pipeline/test_laser_sight.py",),
+    ),
+    Mutant(
+        "clear: who is followed may stand beside somebody else",
+        "np.ptp(points[about | near], axis=0)",
+        "np.ptp(points[near], axis=0)",
+        ("unit/domain/tracking/test_following.py",),
+    ),
+    Mutant(
+        "clear: a ring is about somebody whom a laser has just begun to see",
+        "found.place.at - found.since >= _WATCHED_S",
+        "True",
+        ("unit/domain/tracking/test_following.py",),
     ),
     Mutant(
         "clear: a message that names another robot counts for its topic's",

@@ -19,10 +19,13 @@ import httpx
 
 from tests.bonds import bound
 from tests.forge import PROGRAMS, Forked, fork
+from tests.patience import PATIENCE_S
 from tests.ports import free_ports
 
 ROOT = Path(__file__).resolve().parents[1]
 _DIRTY = re.compile(r"^.*(?:\b(?:WARNING|ERROR|CRITICAL)\b|Traceback).*$", re.MULTILINE)
+_BUSY = "answers take"
+"""That Orion or the IoT Agent took over a second is true of a busy machine."""
 _READY = re.compile(r"^ready$", re.MULTILINE)
 _STOP_WITHIN_S = 30.0
 EMULATOR = ("emulator", "--hz", "10")
@@ -36,20 +39,20 @@ time, and somebody asks again and again."""
 T = TypeVar("T")
 
 
-def until(probe: Callable[[], T | None], deadline_s: float, what: str) -> T:
+def until(probe: Callable[[], T | None], what: str, within_s: float = PATIENCE_S) -> T:
     """Ask again and again until there is an answer; the answer.
 
     Raises:
-        AssertionError: none came within ``deadline_s``; says ``what`` was missing.
+        AssertionError: none came within ``within_s``; says ``what`` was missing.
     """
     pause = threading.Event()
-    deadline = time.monotonic() + deadline_s
+    deadline = time.monotonic() + within_s
     while time.monotonic() < deadline:
         answer = probe()
         if answer is not None and answer is not False:
             return answer
         pause.wait(0.05)
-    raise AssertionError(f"not within {deadline_s:g} s: {what}")
+    raise AssertionError(f"not within {within_s:g} s: {what}")
 
 
 @dataclass
@@ -73,18 +76,19 @@ class Program:
         """All it said so far."""
         return self.log.read_text(errors="replace")
 
-    def wait_until_ready(self, deadline_s: float = 60.0) -> None:
+    def wait_until_ready(self) -> None:
         """Until it says so; a program that has ended never will."""
 
         def is_ready() -> bool:
             assert self.process.poll() is None, self.text()
             return _READY.search(self.text()) is not None
 
-        until(is_ready, deadline_s, f"{self.words[0]} is ready")
+        until(is_ready, f"{self.words[0]} is ready")
 
     def complaints(self) -> list[str]:
-        """Lines that a clean run does not have."""
-        return _DIRTY.findall(self.text()[self.log_from :])
+        """Lines that a clean run does not have, on a machine as busy as it may be."""
+        dirty = _DIRTY.findall(self.text()[self.log_from :])
+        return [line for line in dirty if _BUSY not in line]
 
     def forgive(self) -> None:
         """What was logged until now was provoked by the test."""
@@ -194,24 +198,24 @@ class Site:
             verify=NO_TLS,
         )
 
-    def wait_until_served(self, deadline_s: float = 60.0) -> None:
+    def wait_until_served(self) -> None:
         """Until the page answers."""
-        until(lambda: _answers(f"{self.url}/healthz"), deadline_s, "/healthz")
+        until(lambda: _answers(f"{self.url}/healthz"), "/healthz")
 
-    def wait_until_live(self, robots: int = 2, deadline_s: float = 60.0) -> None:
+    def wait_until_live(self, robots: int = 2) -> None:
         """Until that many robots are LIVE."""
-        self.wait_until_served(deadline_s)
+        self.wait_until_served()
         with self.api() as api:
-            until(lambda: _live(api) >= robots, deadline_s, f"{robots} robots LIVE")
+            until(lambda: _live(api) >= robots, f"{robots} robots LIVE")
 
-    def wait_until_whole(self, deadline_s: float = 60.0) -> None:
+    def wait_until_whole(self) -> None:
         """Until a measure of iVeg's own has passed every hop of FIWARE.
 
         The agent makes up an entity for a device that it has not been told of yet.
         """
-        self.wait_until_served(deadline_s)
+        self.wait_until_served()
         with self.api() as api:
-            until(lambda: _is_whole(api), deadline_s, "FIWARE passes measures on")
+            until(lambda: _is_whole(api), "FIWARE passes measures on")
 
     def stop_all(self) -> None:
         """Ctrl-C for what still runs, last started first; a kill where that hangs."""

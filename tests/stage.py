@@ -14,7 +14,7 @@ from iveg.lab.emulator.scenarios import scenario_named
 from iveg.lab.emulator.world import SimulatedWorld
 from iveg.lab.experiment import stage as staging
 from iveg.lab.experiment.staged_robot import STEP_S
-from iveg.pipeline.build import Pipeline
+from iveg.pipeline.parts import Pipeline
 from iveg.pipeline.things import ThingMarks
 from iveg.web.views import Views
 from tests.unit.pipeline.desk import Desk, settle

@@ -53,7 +53,7 @@ STAGED = {
     "lost while moving": (
         facts(link="LOST", age_s=4.0, alert=p1("alert.moving_robot_lost")),
         "danger",
-        ("sin contacto hace 4 s", "aléjese"),
+        ("sin contacto desde hace 4 s", "aléjese"),
         ("no contact for 4 s while moving", "keep away, it should stop"),
     ),
     "STOP not confirmed": (

@@ -16,6 +16,8 @@ from typing import Any
 
 import aiomqtt
 
+from tests.patience import PATIENCE_S
+
 Json = dict[str, Any]
 HZ = 10.0
 APIKEY = "iveg"
@@ -96,11 +98,9 @@ class Field:
             return 1.0
         return float(self.limits.get(robot_id, {"speed_factor": 0.5})["speed_factor"])
 
-    async def until(
-        self, holds: Callable[[], object], what: str, deadline_s: float = 20.0
-    ) -> None:
+    async def until(self, holds: Callable[[], object], what: str) -> None:
         """Wait for something that the fleet is told."""
-        deadline = time.monotonic() + deadline_s
+        deadline = time.monotonic() + PATIENCE_S
         while not holds():
             assert time.monotonic() < deadline, f"{what}: {self.limits} {self.clear}"
             await asyncio.sleep(0.02)

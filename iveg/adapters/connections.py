@@ -15,10 +15,10 @@ import logging
 from collections import Counter, OrderedDict
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from ipaddress import IPv6Address, ip_address
 from typing import Final
 
 from iveg.adapters.connection_caps import ConnectionCaps
+from iveg.adapters.networks import network_of
 
 CONNECTION: Final = "iveg.connection"
 """Key of a :class:`Connection` in the ``state`` of an ASGI scope."""
@@ -248,22 +248,6 @@ _SENTENCES: Final = {
     "packet_too_long": "a packet that is too long is refused",
     "unreadable": "a request that cannot be read is refused",
 }
-
-
-def network_of(address: str) -> str:
-    """Whom an address belongs to: of IPv6 the first 64 bits, which one host may have.
-
-    Anything that is no address stands for itself, cut.
-    """
-    try:
-        read = ip_address(address.partition("%")[0])
-    except ValueError:
-        return address[:64]
-    if not isinstance(read, IPv6Address):
-        return address
-    if read.ipv4_mapped is not None:
-        return str(read.ipv4_mapped)
-    return str(IPv6Address(int(read) >> 64 << 64))
 
 
 def _longest(groups: Iterable[dict[Connection, None]]) -> dict[Connection, None]:

@@ -10,7 +10,7 @@ from pathlib import Path
 from pydantic import TypeAdapter
 
 from iveg.adapters.files import Form, load_lines, save_lines
-from iveg.domain.messages import Contacts
+from iveg.domain.contacts import Contacts
 
 FORM = Form("contacts")
 _READER = TypeAdapter(Contacts)

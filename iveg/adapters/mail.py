@@ -10,16 +10,9 @@ from email.utils import format_datetime, make_msgid
 import aiosmtplib
 
 from iveg.adapters.outbound import OutboundHttp
+from iveg.domain.contacts import Contacts, Email, MailRecipient
 from iveg.domain.errors import OutboundError
-from iveg.domain.messages import (
-    Contacts,
-    Email,
-    Language,
-    MailRecipient,
-    MessageDelivery,
-    MessageText,
-    OutboundMessage,
-)
+from iveg.domain.messages import Language, MessageDelivery, MessageText, OutboundMessage
 from iveg.domain.observations import Instant
 
 Write = Callable[[OutboundMessage, Language], MessageText]

@@ -16,7 +16,7 @@ from cryptography.hazmat.primitives.ciphers.aead import AESGCM
 from cryptography.hazmat.primitives.kdf.hkdf import HKDF
 from cryptography.hazmat.primitives.serialization import Encoding, PublicFormat
 
-from iveg.domain.messages import Push
+from iveg.domain.contacts import Push
 
 _CURVE: Final = ec.SECP256R1()
 

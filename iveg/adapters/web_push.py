@@ -11,14 +11,9 @@ import orjson
 from iveg.adapters.mail import Write
 from iveg.adapters.outbound import OutboundHttp
 from iveg.adapters.push_encryption import decode, encrypted, signed
+from iveg.domain.contacts import Contacts, Push, SubscribedBrowser
 from iveg.domain.errors import OutboundError
-from iveg.domain.messages import (
-    Contacts,
-    MessageDelivery,
-    OutboundMessage,
-    Push,
-    SubscribedBrowser,
-)
+from iveg.domain.messages import MessageDelivery, OutboundMessage
 from iveg.domain.observations import Instant
 
 _LIVES_S = 3600

@@ -5,8 +5,9 @@ from collections.abc import Sequence
 import orjson
 
 from iveg.adapters.outbound import OutboundHttp
+from iveg.domain.contacts import Contacts
 from iveg.domain.errors import OutboundError
-from iveg.domain.messages import Contacts, MessageDelivery, OutboundMessage
+from iveg.domain.messages import MessageDelivery, OutboundMessage
 from iveg.domain.observations import Instant
 from iveg.domain.stamps import format_stamp
 

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 
 from iveg.adapters.history.recorder import Recorder
 from iveg.adapters.mqtt import MqttLink
-from iveg.pipeline.build import Pipeline
+from iveg.pipeline.parts import Pipeline
 from iveg.web.api import metrics
 
 

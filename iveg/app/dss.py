@@ -8,7 +8,6 @@ from collections import Counter
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from functools import partial
-from pathlib import Path
 
 from fastapi import FastAPI
 
@@ -18,7 +17,6 @@ from iveg.adapters.backfill import BackfillReader
 from iveg.adapters.calibration_files import load_calibrations
 from iveg.adapters.direct import DirectReader
 from iveg.adapters.equipment_files import load_equipment
-from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.adapters.ids import new_id
 from iveg.adapters.loop_watch import LoopWatch
@@ -33,7 +31,7 @@ from iveg.app.counts import count_all, read_queues
 from iveg.app.door import open_door
 from iveg.app.laboratory import find_laboratory
 from iveg.app.life import Work, live
-from iveg.app.outside import Outside, open_outside
+from iveg.app.outside import Outside
 from iveg.app.site import Site as PastSite
 from iveg.app.viewers import Viewers
 from iveg.app.what_if import WhatIfs
@@ -46,19 +44,20 @@ from iveg.domain.stop.drills import Drills
 from iveg.domain.transports import DIRECT, FIWARE
 from iveg.pipeline.audit import AuditTrail
 from iveg.pipeline.backfill import PART as BACKFILL
-from iveg.pipeline.build import Choices, Ports, build
+from iveg.pipeline.build import build
 from iveg.pipeline.equipment import PART as EQUIPMENT
 from iveg.pipeline.latency import hours_of
 from iveg.pipeline.memory import Memory
+from iveg.pipeline.parts import Choices, Ports
 from iveg.pipeline.restore import remember
 from iveg.pipeline.retention import PART as RETENTION
 from iveg.pipeline.retention import HistoryUpkeep
 from iveg.pipeline.services import build_services
 from iveg.pipeline.trace import Chronicle, Trace
 from iveg.settings import Settings
-from iveg.web.api import messages
 from iveg.web.build import Face
 from iveg.web.notifications import NotificationEndpoint
+from iveg.web.pages import message_texts
 from iveg.web.pages.contexts import Site
 from iveg.web.security.secrets import NotifySecret
 from iveg.web.views import Views
@@ -106,7 +105,7 @@ class Dss:
         self.notify_secret = NotifySecret(notify_token, previous)
         self._boot, self._demo = secrets.token_hex(8), demo
         self.chronicle = Chronicle(
-            self.stores.inputs.note, __version__, secrets.token_bytes(16)
+            self.stores.inputs, __version__, secrets.token_bytes(16)
         )
         kept = self.stores.kept_choices(settings)
         drills, era = Drills(settings.drill_days), f"-{self._boot[:8]}"
@@ -119,7 +118,7 @@ class Dss:
         if settings.recordings:
             self.chronicle.remember = Memory(self.pipeline).write
         self.services = build_services(
-            self.pipeline, kept, outside.senders(messages.writer()), clock.now
+            self.pipeline, kept, outside.senders(message_texts.writer()), clock.now
         )
         self.door = open_door(self.stores, clock.now)
         self.trail = AuditTrail(self.stores.recorder, new_id)
@@ -377,24 +376,3 @@ class Dss:
         return not self._demo and any(
             robot.link(now) in ("LIVE", "LATE") for robot in robots
         )
-
-
-def open_dss(
-    settings: Settings,
-    data_directory: Path,
-    *,
-    demo: bool = False,
-    make: type[Dss] = Dss,
-) -> Dss:
-    """A server as the settings say.
-
-    Args:
-        settings: An operator's choices.
-        data_directory: Where the database (unless set) and the journals are.
-        demo: Whether the robots are emulated.
-        make: The class.
-    """
-    fleet = load_fleet(settings.fleet, settings.robots)
-    return make(
-        settings, fleet, open_outside(settings, data_directory, fleet), demo=demo
-    )

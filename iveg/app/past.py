@@ -1,12 +1,11 @@
 """The world as it was at any recorded second: the pipeline itself, run once more.
 
 It takes over the memory that was recorded last before a moment, then the inputs since
-then at the very moments at which the live loop took them.  Each second the live process
-recorded a hash of its world; here the same world must come out, else the next memory is
-taken over as well, and whoever asked is told.
+then at the very moments at which the live loop took them.  After each memory the live
+process recorded a hash of its world; here the same world must come out, else the next
+memory is taken over as well, and whoever asked is told.
 """
 
-from base64 import b64decode
 from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -20,7 +19,8 @@ from iveg.adapters.direct import DirectReader
 from iveg.adapters.equipment_files import load_equipment
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
-from iveg.adapters.recordings.incoming import NOTIFICATIONS
+from iveg.adapters.recordings.incoming import MEMORIES, NOTIFICATIONS
+from iveg.adapters.recordings.memories import memory_in
 from iveg.adapters.recordings.timeline import Found, Place, Timeline
 from iveg.app.agreement import Agreement, picture
 from iveg.app.site import Site
@@ -30,21 +30,13 @@ from iveg.domain.errors import NotRecordedError, UnreadableError
 from iveg.domain.observations import Instant
 from iveg.domain.transports import DIRECT, FIWARE
 from iveg.pipeline.memory import Memory
-from iveg.pipeline.trace import (
-    HASHES_S,
-    JUDGED,
-    KEYFRAMES_S,
-    LOOK,
-    WALL_UNITS,
-    CountedIds,
-    digest,
-    in_ns,
-)
+from iveg.pipeline.steps import Step
+from iveg.pipeline.trace import KEYFRAMES_S, WALL_UNITS, CountedIds, digest, in_ns
 from iveg.web.notifications import NotificationEndpoint
 from iveg.web.security.secrets import NotifySecret
 from iveg.web.views import Views
 
-STEPS, MEMORY = "/iveg/steps", "/iveg/memory"
+STEPS, MEMORY = "/iveg/steps", MEMORIES.topic
 _NS = 10**9
 _GAP_NS: Final = 2 * _NS
 """Where the loop told nothing for longer, nothing was recorded."""
@@ -52,7 +44,7 @@ _REACH_NS: Final = 7 * _NS
 """A memory that is older leads nowhere; one may be late where the loop has no time."""
 _PLAY_ON_NS: Final = 2 * round(KEYFRAMES_S * _NS)
 """What is farther on is reached sooner from a memory."""
-_COMPARED_NS: Final = 2 * round(HASHES_S * _NS)
+_COMPARED_NS: Final = round(KEYFRAMES_S * _NS)
 """Of what leads to a moment the newest hashes are compared: one costs a picture."""
 
 
@@ -175,7 +167,7 @@ class Past:
         self._waiting.messages.clear()
         # The one before would wait for the moments that it has heard to come again.
         self._reader = self._new_reader()
-        self._memory.read(b64decode(record["memory"]))
+        self._memory.read(memory_in(record))
         self._ids.seed, self._ids.count = bytes.fromhex(record["seed"]), record["ids"]
         self._pass_to(Instant(record["mono"] / _NS, record["wall"]))
         self.agreement.newest = None
@@ -224,7 +216,7 @@ class Past:
         }
         for mono, wall, kind in tick["steps"]:
             moment = Instant((tick_mono + mono) / _NS, tick_wall + wall / WALL_UNITS)
-            if kind == LOOK:
+            if kind == Step.LOOKED:
                 self._pass_to(moment)
                 self.parts.second_witness.tick(moment)
                 continue
@@ -234,11 +226,16 @@ class Past:
                 heard_wall, self._thinned = known or (guess, False)
                 self._hear(Instant(heard_at / _NS, heard_wall), topic, payload)
             self._pass_to(moment)
-            self.parts.loop.step(
-                self.parts.ingest.drain(), moment, judges=kind == JUDGED
-            )
+            self._step(moment, kind)
         # A press that joined a STOP has drawn one, and was no input.
         self._ids.count = tick["ids"]
+
+    def _step(self, now: Instant, kind: int) -> None:
+        loop, ingest = self.parts.loop, self.parts.ingest
+        if kind == Step.AGED:
+            loop.age(now)
+        else:
+            loop.step(ingest.drain(), now, judges=kind == Step.JUDGED)
 
     def _hear(self, at: Instant, topic: str, payload: bytes) -> None:
         self._heard_at = at

@@ -20,7 +20,8 @@ from iveg.domain.records import DecisionRecord, Record
 from iveg.domain.tracking.calibration import Calibrations
 from iveg.domain.transports import DIRECT, Transport
 from iveg.ngsi import codec
-from iveg.pipeline.build import Choices, Ports, build
+from iveg.pipeline.build import build
+from iveg.pipeline.parts import Choices, Ports
 
 START = Instant(0.0, 1_700_000_000.0)
 

@@ -24,10 +24,10 @@ from iveg.domain.errors import (
     WhatIfRefusedError,
 )
 from iveg.domain.fleet import FleetDescription
-from iveg.domain.what_if.crossings import Parameters
 from iveg.domain.what_if.inputs import Inputs, sightings_of
 from iveg.domain.what_if.judging import Range
 from iveg.domain.what_if.outcome import outcomes_of, recorded
+from iveg.domain.what_if.parameters import Parameters
 from iveg.domain.what_if.questions import Answer, Job, Question
 from iveg.domain.what_if.truth import Nearest
 from iveg.pipeline.ports import Clock, Ids

@@ -20,8 +20,8 @@ from iveg.domain.errors import HopError, SettingsError
 from iveg.domain.records import Record
 from iveg.domain.stamps import parse_stamp
 from iveg.web.api import exports
-from iveg.web.api.history import HistoryList, lists_of
 from iveg.web.api.history_filters import NO_DAY, is_kept
+from iveg.web.api.history_lists import HistoryList, lists_of
 
 _Pages = AsyncIterator[Sequence[Record]]
 _MOMENT = "a moment as ISO-8601, in UTC unless it says otherwise"

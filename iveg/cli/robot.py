@@ -12,7 +12,6 @@ from iveg.adapters import clock
 from iveg.adapters.dds_network import DdsNetwork
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
-from iveg.adapters.mqtt import MqttLink
 from iveg.cli.arguments import CommandCall
 from iveg.cli.nodes import broker_of, node_settings
 from iveg.cli.robot_config import load_config, network_of
@@ -22,39 +21,23 @@ from iveg.cli.running import (
     run_until_stopped,
     tune_garbage_collection,
 )
-from iveg.domain.errors import (
-    HopError,
-    SettingsError,
-    UnreadableError,
-)
+from iveg.domain.errors import HopError, SettingsError
 from iveg.domain.feedback import Feedback
-from iveg.domain.fleet import (
-    UNDESCRIBED_SPEED,
-    FleetDescription,
-    RobotDescription,
-    RobotProfile,
-)
+from iveg.domain.fleet import UNDESCRIBED_SPEED, RobotDescription, RobotProfile
 from iveg.domain.geometry import Twist2D
 from iveg.domain.witness import Outline, Plan
 from iveg.ngsi import names
 from iveg.robot.goals import Navigate
 from iveg.robot.node import RobotNode
 from iveg.robot.node_settings import NodeSettings
-from iveg.robot.ros2.checking import Heard, judge, lines
 from iveg.robot.ros2.config import RobotConfig
-from iveg.robot.ros2.lookout import forms_published
 from iveg.robot.ros2.network import Network
 from iveg.robot.ros2.rig import Ros2Robot
-from iveg.robot.ros2.topics import TOPICS, sensed_topics
-from iveg.robot.ros2.transforms import TransformBuffer
-from iveg.ros2 import cdr, geometry_msgs, std_msgs
-from iveg.ros2.schema import Message
 from iveg.settings import Settings
 
 if TYPE_CHECKING:
-    from iveg.adapters.dds import Dds, DdsReader
-
-_CHECK_S = 3.0
+    pass
+from iveg.cli.robot_check import check
 
 
 def run(call: CommandCall) -> int:
@@ -66,7 +49,7 @@ def run(call: CommandCall) -> int:
     config, classes = load_config(options, call.environment)
     network = network_of(config, call.environment, "iveg robot")
     if options.action == "check":
-        return asyncio.run(_check(options.id, config, network, settings))
+        return asyncio.run(check(options.id, config, network, settings))
     if options.attended and broker_of(settings).host not in LOOPBACK:
         raise SettingsError(
             "--attended", broker_of(settings).host, "used with a broker on loopback"
@@ -92,7 +75,9 @@ async def _ride(
         await refuse_second_gate(dds, config.full_topics["cmd_vel_out"])
         safety = node_settings(settings, data / "robots", _plan(options.greenhouse))
         node = partial(_node, options.id, settings, safety, config)
-        body = _profile(_fleet(settings).of_robot(options.id), config)
+        body = _profile(
+            load_fleet(settings.fleet, settings.robots).of_robot(options.id), config
+        )
         robot = Ros2Robot(
             options.id,
             config,
@@ -122,7 +107,9 @@ def _node(
     return RobotNode(
         robot_id,
         safety,
-        profile=_profile(_fleet(settings).of_robot(robot_id), config),
+        profile=_profile(
+            load_fleet(settings.fleet, settings.robots).of_robot(robot_id), config
+        ),
         drive=drive,
         on_feedback=on_feedback,
         navigate=navigate,
@@ -132,10 +119,6 @@ def _node(
 def _plan(greenhouse: str | None) -> Plan | None:
     """What the laser need not report."""
     return None if greenhouse is None else Plan.of(load_greenhouse(greenhouse))
-
-
-def _fleet(settings: Settings) -> FleetDescription:
-    return load_fleet(settings.fleet, settings.robots)
 
 
 def _profile(robot: RobotDescription, config: RobotConfig) -> RobotProfile:
@@ -181,91 +164,3 @@ async def refuse_second_gate(
 
 
 # --- check -------------------------------------------------------------------------
-
-
-async def _check(
-    robot_id: str, config: RobotConfig, network: DdsNetwork, settings: Settings
-) -> int:
-    """Listen for three seconds without publishing, and print what is missing."""
-    from iveg.adapters.dds import Dds
-
-    heard: dict[str, Heard] = {}
-    transforms = TransformBuffer(config.tf_max_age_s)
-    newest = 0.0
-    with Dds(network) as dds:
-        readers: dict[tuple[str, type[Message]], DdsReader] = {}
-        link = MqttLink(broker_of(settings), f"check of {robot_id}")
-        task = asyncio.create_task(link.run(), name="broker")
-        began = clock.mono()
-        while clock.mono() - began < _CHECK_S:
-            _listen(dds, config, readers)
-            await asyncio.sleep(0.05)
-            for (topic, form), reader in readers.items():
-                for one in reader.take():
-                    newest = max(newest, _hear(topic, form, one, heard, transforms))
-        broker = None if link.connected else _no_broker(settings)
-        task.cancel()
-        await asyncio.gather(task, return_exceptions=True)
-        verdict = judge(
-            config,
-            dds.endpoints(),
-            heard,
-            transforms,
-            seconds=_CHECK_S,
-            stamp=newest,
-            broker=broker,
-            robot_id=robot_id,
-        )
-    known = _fleet(settings).ids
-    missing = verdict.missing
-    if robot_id not in known:
-        fleet = ", ".join(known)
-        missing += (f"{robot_id} is not in the fleet that IVEG_ROBOTS names: {fleet}.",)
-    print("\n".join(lines(replace(verdict, missing=missing))))
-    return 1 if missing else 0
-
-
-def _no_broker(settings: Settings) -> str:
-    address = broker_of(settings)
-    return f"No MQTT broker answers at {address.host}:{address.port} (IVEG_MQTT_URL)."
-
-
-def _listen(
-    dds: "Dds",
-    config: RobotConfig,
-    readers: "dict[tuple[str, type[Message]], DdsReader]",
-) -> None:
-    """Read each topic that is published, in its type."""
-    endpoints = dds.endpoints()
-    for topic, name in sensed_topics(config.full_topics).items():
-        depth = 2 if TOPICS[topic].role == "picture" else 200
-        qos = config.qualities[topic].newest(depth)
-        for form in forms_published(topic, name, endpoints):
-            if (topic, form) not in readers:
-                readers[topic, form] = dds.reader(name, form, qos)
-
-
-def _hear(
-    topic: str,
-    form: type[Message],
-    payload: bytes,
-    heard: dict[str, Heard],
-    transforms: TransformBuffer,
-) -> float:
-    """Count a message; returns its stamp (s) for odometry."""
-    one = heard.setdefault(topic, Heard())
-    one.count += 1
-    try:
-        message = cdr.read(form, payload)
-    except UnreadableError:
-        one.unreadable += 1
-        return 0.0
-    if isinstance(message, geometry_msgs.TFMessage):
-        transforms.add(message, static=topic == "tf_static")
-        return 0.0
-    if not isinstance(message, std_msgs.Stamped):
-        return 0.0
-    header = message.header
-    one.frame = header.frame_id
-    one.age_s = clock.wall() - header.stamp.seconds
-    return header.stamp.seconds if topic == "odometry" else 0.0

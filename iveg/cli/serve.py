@@ -15,7 +15,8 @@ from iveg.adapters.connection_caps import ConnectionCaps, raise_descriptor_limit
 from iveg.adapters.connections import ConnectionTable
 from iveg.adapters.history.engine import history_url
 from iveg.adapters.history.migrate import upgrade
-from iveg.app.dss import Dss, open_dss
+from iveg.app.dss import Dss
+from iveg.app.opening import open_dss
 from iveg.asgi import create_app
 from iveg.cli.arguments import CommandCall
 from iveg.cli.running import (

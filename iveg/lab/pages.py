@@ -8,7 +8,8 @@ from fastapi.responses import HTMLResponse
 from iveg.app.dss import Dss
 from iveg.lab.experiment import api
 from iveg.lab.experiment.runner import ExperimentRunner
-from iveg.web.pages.routes import Pages, add_scripted
+from iveg.web.pages.drawing import Pages
+from iveg.web.pages.routes import add_scripted
 
 
 def routers(dss: Dss, pages: Pages) -> Iterator[APIRouter]:

@@ -102,7 +102,7 @@ class Decision(Model):
             class_=record.class_,
             class_id=record.class_id,
             confidence=record.confidence,
-            position=_position(record),
+            position=Position.of_record(record),
             x=record.x,
             y=record.y,
             z=record.z,
@@ -129,12 +129,6 @@ class Decision(Model):
             sentence=sentence_of(record),
             places=[DecisionPlace.model_validate(one) for one in places],
         )
-
-
-def _position(record: DecisionRecord) -> Position | None:
-    if record.x is None or record.y is None:
-        return None
-    return Position(x=record.x, y=record.y, z=record.z or 0.0)
 
 
 def sentence_of(record: DecisionRecord) -> Sentence:

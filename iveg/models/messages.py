@@ -5,8 +5,9 @@ from urllib.parse import urlsplit
 
 from pydantic import Field
 
-from iveg.domain import messages
-from iveg.domain.messages import Channel, Contacts, MessageDelivery
+from iveg.domain import contacts, messages
+from iveg.domain.contacts import Contacts
+from iveg.domain.messages import Channel, MessageDelivery
 from iveg.domain.stamps import format_stamp
 from iveg.models.alert import Told
 from iveg.models.base import Model
@@ -105,7 +106,7 @@ class MessageTest(Model):
     told: list[Told]
 
 
-def _push(push: messages.Push, public_key: str | None, last: list[Told]) -> PushChannel:
+def _push(push: contacts.Push, public_key: str | None, last: list[Told]) -> PushChannel:
     return PushChannel(
         on=push.on,
         contact=push.contact,
@@ -123,7 +124,7 @@ def _push(push: messages.Push, public_key: str | None, last: list[Told]) -> Push
     )
 
 
-def _email(email: messages.Email, last: list[Told]) -> EmailChannel:
+def _email(email: contacts.Email, last: list[Told]) -> EmailChannel:
     return EmailChannel(
         on=email.on,
         server=email.server,
@@ -141,7 +142,7 @@ def _email(email: messages.Email, last: list[Told]) -> EmailChannel:
     )
 
 
-def _webhook(hook: messages.Webhook, last: list[Told]) -> WebhookChannel:
+def _webhook(hook: contacts.Webhook, last: list[Told]) -> WebhookChannel:
     host = urlsplit(hook.url).hostname if hook.url else None
     return WebhookChannel(
         on=hook.on, who=hook.who, host=host, least=hook.least, last=last

@@ -1,10 +1,9 @@
-"""Places in ``map``: points, boxes, the greenhouse and the costmap (m)."""
+"""Places in ``map``: points, boxes and the greenhouse (m)."""
 
 from dataclasses import asdict
 
-from pydantic import Field
-
 from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.records import DecisionRecord, DetectionRecord
 from iveg.models.base import Model
 
 
@@ -21,6 +20,13 @@ class Position(Model):
     x: float
     y: float
     z: float
+
+    @classmethod
+    def of_record(cls, record: DecisionRecord | DetectionRecord) -> "Position | None":
+        """The place of a row; None where it was not known."""
+        if record.x is None or record.y is None:
+            return None
+        return cls(x=record.x, y=record.y, z=record.z or 0.0)
 
 
 class Area(Model):
@@ -78,50 +84,3 @@ class GreenhouseMap(Model):
                 for one in greenhouse.obstacles
             ],
         )
-
-
-class Scan(Model):
-    """One sweep: points in ``map`` (m)."""
-
-    robot_id: str
-    stamp: str | None
-    frame_id: str = "map"
-    points: list[tuple[float, float]]
-
-
-class Costmap(Model):
-    """Cells from the south-western corner, row by row: 0-100, -1 unknown."""
-
-    resolution: float = Field(description="Metres a cell.")
-    width: int
-    height: int
-    origin: Point
-    data: list[int]
-    age_s: float | None = Field(
-        default=None, description="Since the newest scan in it; null before the first."
-    )
-
-
-class LaneCoverage(Area):
-    """One aisle in cells: rows from the south, each from west to east."""
-
-    label: str
-    columns: int
-    rows: int
-    ages_s: list[int | None] = Field(
-        description="Whole seconds since a camera last covered a cell; null: never."
-    )
-
-
-class Coverage(Model):
-    """When a camera last looked at each cell of the aisles."""
-
-    at: str
-    cameras: int = Field(description="Number of working cameras.")
-    within_s: float
-    share: float | None = Field(
-        description=(
-            "Share of the cells covered within that time (0-1); null without aisles."
-        )
-    )
-    lanes: list[LaneCoverage]

@@ -10,6 +10,7 @@ from iveg.domain.observations import Instant
 from iveg.domain.robot_state import Link, RobotState
 from iveg.domain.stamps import format_stamp
 from iveg.domain.transports import TransportId
+from iveg.models.applied import Applied, Hold
 from iveg.models.base import Model
 from iveg.models.camera_bias import CameraBias
 from iveg.models.command import Command
@@ -20,7 +21,7 @@ from iveg.models.pose import Pose, Twist
 from iveg.models.robot_access import Revoked
 from iveg.models.sensor_reading import READINGS, SensorReading, newest_reading
 from iveg.models.situation import Situation
-from iveg.models.speed_limit import Applied, Encounter, Hold, MissingPremise, SpeedLimit
+from iveg.models.speed_limit import Encounter, MissingPremise, SpeedLimit
 
 Mode = Literal["RUNNING", "SLOW", "STOPPED"]
 

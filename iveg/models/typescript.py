@@ -22,9 +22,9 @@ from iveg.models.climate import ClimateReading
 from iveg.models.decision import Decision
 from iveg.models.experiment import Experiments
 from iveg.models.latency import LatencyTable
+from iveg.models.mapped import Costmap, Coverage, Scan
 from iveg.models.messages import Messages, MessageTest
 from iveg.models.passkeys import PasskeyOfPerson, Proof
-from iveg.models.places import Costmap, Coverage, Scan
 from iveg.models.press import FleetPressed
 from iveg.models.programs import NewToken
 from iveg.models.reading import Reading

@@ -5,7 +5,7 @@ from typing import Literal
 from pydantic import Field
 
 from iveg.domain.stamps import format_stamp
-from iveg.domain.what_if import crossings, outcome
+from iveg.domain.what_if import outcome, parameters
 from iveg.domain.what_if.questions import Job
 from iveg.models.base import Model, rounded
 
@@ -21,7 +21,7 @@ class TriedParameters(Model):
     foresight_s: float = Field(description="0: it does not look ahead.")
 
     @classmethod
-    def of(cls, tried: crossings.Parameters) -> "TriedParameters":
+    def of(cls, tried: parameters.Parameters) -> "TriedParameters":
         """The same."""
         return cls(
             confidence_threshold=tried.threshold,

@@ -5,7 +5,6 @@ from typing import Annotated, Literal, Self
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from iveg.domain.backfill import MOST_MESSAGES
-from iveg.domain.peer_scan import BEAMS, PLACES
 from iveg.ngsi.texts import MAX_TEXT, clean_text
 
 MAX_BEAMS = 4096
@@ -206,107 +205,6 @@ class ClimateValue(Wire):
     temperature: Annotated[float, Field(ge=-60, le=90)] | None = None
     relativeHumidity: Annotated[float, Field(ge=0, le=1)] | None = None  # noqa: N815 - NGSI name
     co2: Annotated[float, Field(ge=0, le=100_000)] | None = None
-
-
-class VelocityValue(Wire):
-    """In ``map`` (m/s)."""
-
-    x: Speed
-    y: Speed
-
-
-class AlertValue(Wire):
-    """One alert inside the feedback."""
-
-    decision_id: Text | None = None
-    class_: Literal["person", "robot"] | None = Field(default=None, alias="class")
-    class_id: Text | None = None
-    conf: Annotated[float, Field(ge=0, le=1)] | None = None
-    position: PointValue | None = None
-    radius_m: Annotated[float, Field(gt=0, le=100)] | None = None
-    stamp: Text | None = None
-    observer: Text | None = None
-    velocity: VelocityValue | None = None
-
-
-class SpeedLimitValue(Wire):
-    """One speed limit inside the feedback."""
-
-    speed_factor: Annotated[float, Field(ge=0, le=1)]
-    reason: Text = "clear"
-    cause: Text | None = None
-    distance_m: Annotated[float, Field(ge=0, le=1e7)] | None = None
-    decision_id: Text | None = None
-    foretold_s: Seconds | None = None
-    over: bool = False
-
-
-SpeedLimitsValue = Annotated[dict[str, SpeedLimitValue], Field(max_length=MAX_ROBOTS)]
-
-
-class FeedbackPose(MotionFields):
-    """Pose of the observer as iVeg knows it."""
-
-    stamp: Text | None = None
-
-
-class FeedbackValue(OriginFields):
-    """``/{robot}/mqtt_feedback``."""
-
-    robot_id: Text
-    alert: AlertValue | None = None
-    alerts: Annotated[list[AlertValue], Field(max_length=MAX_BOXES)] = []
-    robot_pose: FeedbackPose | None = None
-    speed_limits: SpeedLimitsValue = {}
-    clear: Annotated[list[Text], Field(max_length=MAX_ROBOTS)] = []
-    seen: Annotated[dict[str, int], Field(max_length=MAX_ROBOTS)] = {}
-    backlog: object = None
-    foresight: bool = False
-    known_here: object = None
-
-
-class KnownPlaceValue(Wire):
-    """A place where what stands still slows nobody, inside the feedback."""
-
-    x: Metres
-    y: Metres
-    radius_m: Annotated[float, Field(gt=0, le=0.5)]
-    most_out_m: Annotated[float, Field(ge=0, le=0.5)] | None = None
-
-
-class MountValue(Wire):
-    """A laser in ``base_link`` (m, rad): no robot is longer than twice this."""
-
-    x: Annotated[float, Field(ge=-5, le=5)]
-    y: Annotated[float, Field(ge=-5, le=5)]
-    yaw: Radians
-
-
-class PeerPoseValue(Wire):
-    """Where a peer's ``base_link`` was (m, rad)."""
-
-    x: Metres
-    y: Metres
-    yaw: Radians
-    frame_id: Literal["map"]
-
-
-class PeerScanValue(OriginFields):
-    """``/{robot}/iveg/peer_scan``."""
-
-    robot_id: Text
-    robot_pose: PeerPoseValue
-    age_s: Annotated[float, Field(ge=0, le=2)]
-    mount: MountValue
-    range_max: Annotated[float, Field(gt=0, le=1e4)]
-    ranges: Annotated[
-        list[Annotated[float, Field(ge=0, le=1e4)] | None],
-        Field(min_length=BEAMS, max_length=BEAMS),
-    ]
-    places: Annotated[
-        list[Annotated[int, Field(ge=0, lt=PLACES)]],
-        Field(min_length=BEAMS, max_length=BEAMS),
-    ]
 
 
 class BackfillValue(OriginFields):

@@ -1,11 +1,8 @@
 """Composition of the pipeline from its ports, for iVeg and for its tests."""
 
-from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Sequence
 
 from iveg.domain.backfill import Silences
-from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.equipment import Equipment, Tile
 from iveg.domain.events import LogEvent
 from iveg.domain.fleet import FleetDescription
@@ -13,10 +10,8 @@ from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.latency.watch import LatencyWatch
 from iveg.domain.observations import Instant, Received
 from iveg.domain.rule.obstacles import Obstacles
-from iveg.domain.stop.drills import Drills
-from iveg.domain.tracking.calibration import Calibrations
 from iveg.domain.tracking.people import People
-from iveg.domain.transports import FIWARE, Transport
+from iveg.domain.transports import FIWARE
 from iveg.domain.witness import Plan
 from iveg.domain.world import World
 from iveg.pipeline.backfill import PART as BACKFILL
@@ -26,115 +21,20 @@ from iveg.pipeline.equipment import EquipmentMonitor
 from iveg.pipeline.evaluate import Evaluator
 from iveg.pipeline.event_log import EventLog
 from iveg.pipeline.goals import GoalDispatcher
-from iveg.pipeline.health_monitor import HealthMonitor, HopState
+from iveg.pipeline.health_monitor import HealthMonitor
 from iveg.pipeline.ingest import Ingest
 from iveg.pipeline.latency import LatencyMonitor
-from iveg.pipeline.loop import RuleLoop
+from iveg.pipeline.loop import Recorded, RuleLoop
 from iveg.pipeline.margins import MarginTotals
+from iveg.pipeline.parts import Choices, Guard, Pipeline, Ports
 from iveg.pipeline.peer_scans import PeerScans
-from iveg.pipeline.ports import (
-    CommandPort,
-    FleetPort,
-    StopJournal,
-)
 from iveg.pipeline.publish import Hub
-from iveg.pipeline.record import RecordSink
 from iveg.pipeline.scans import ScanReader
 from iveg.pipeline.second_witness import SecondWitness
 from iveg.pipeline.shadow import ShadowRule
 from iveg.pipeline.slow_time import SlowTime
 from iveg.pipeline.supervision import Supervision
 from iveg.pipeline.trace import Trace
-
-Guard = Callable[[str, Callable[..., None]], Callable[..., None]]
-
-
-@dataclass(frozen=True, slots=True)
-class Ports:
-    """Ports of the pipeline to the outside.
-
-    Attributes:
-        fleet: Feedback and desired states of all robots.
-        transports: Ways of an order to a robot.
-        journal: Desired state of each robot, on disk.
-        sink: The history.
-        clock: Reads both clocks.
-        new_id: A new id, sortable by time.
-        history_state: State of the history.
-        ticked: Comfort that records: called with each tick.
-        trace: Comfort, too: told what the pipeline does and when.
-    """
-
-    fleet: FleetPort
-    transports: Mapping[Transport, CommandPort]
-    journal: StopJournal
-    sink: RecordSink
-    clock: Callable[[], Instant]
-    new_id: Callable[[], str]
-    history_state: Callable[[], HopState] = lambda: "ok"
-    ticked: Callable[[Instant], None] = lambda _: None
-    trace: Trace = field(default_factory=Trace)
-
-
-@dataclass(frozen=True, slots=True)
-class Choices:
-    """An operator's choices.
-
-    Attributes:
-        boot: Random, new at each start; identity of our feedback.
-        era: Ends the ids of people, which are unique across starts by it.
-        tiles: Of other equipment.
-        calibrations: How sure a look of a detector makes.
-    """
-
-    rule: DetectionRule = field(default_factory=DetectionRule)
-    drills: Drills = field(default_factory=Drills)
-    boot: str = "iveg-boot"
-    era: str = ""
-    tiles: Sequence[Tile] = ()
-    calibrations: Calibrations = field(default_factory=Calibrations)
-
-    def people(self, greenhouse: Greenhouse) -> People:
-        """Nobody known yet."""
-        return People(greenhouse, self.era, self.calibrations)
-
-
-@dataclass(frozen=True, slots=True)
-class Pipeline:
-    """The parts, each by its name; nothing runs until ``loop.run()``."""
-
-    hub: Hub
-    event_log: EventLog
-    health_monitor: HealthMonitor
-    world: World
-    latency: LatencyMonitor
-    ingest: Ingest
-    evaluator: Evaluator
-    commander: Commander
-    loop: RuleLoop
-    supervision: Supervision
-    margins: MarginTotals
-    slow_time: SlowTime
-    scans: ScanReader
-    goals: GoalDispatcher
-    equipment: EquipmentMonitor
-    peer_scans: PeerScans
-    second_witness: SecondWitness
-    backfill: Backfill
-    shadow: ShadowRule
-
-    def counters(self) -> Counter[str]:
-        """Everything that is counted in it."""
-        total = Counter(self.ingest.counters)
-        total.update(self.world.counters)
-        total.update(self.backfill.counters)
-        total.update(self.commander.counters)
-        total.update(self.supervision.counters)
-        total["live.browsers"] = self.hub.watchers
-        total["nlos.protected"] = self.evaluator.protected_unseen
-        total.update({f"slow_s.{why}": n for why, n in self.slow_time.seconds.items()})
-        total.update({f"near_s.{how}": n for how, n in self.slow_time.near.items()})
-        return total
 
 
 def build(
@@ -175,7 +75,7 @@ def build(
         guard("latency", latency.watch.decided),
         _ticks(guard, ports, latency, totals),
         (guard("goals", goals.heard), guard("goals", goals.tick)),
-        guard("recordings", ports.trace.stepped),
+        _recorded(guard, ports.trace),
     )
     return Pipeline(
         hub,
@@ -240,8 +140,11 @@ def _ticks(
         guard("latency", latency.tick),
         *[guard("totals", one.tick) for one in totals],
         guard("recordings", ports.ticked),
-        guard("recordings", ports.trace.ticked),
     )
+
+
+def _recorded(guard: Guard, trace: Trace) -> Recorded:
+    return guard("recordings", trace.stepped), guard("recordings", trace.ticked)
 
 
 def _equipment(

@@ -4,7 +4,7 @@ A sighting is logged at its start, so that a person who stands before a camera f
 hour does not fill the log.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 
 from iveg.domain.camera_bias import peer_error
 from iveg.domain.detection_rule import DetectionRule
@@ -69,6 +69,12 @@ class DetectionTracking:
     def subjects(self) -> int:
         """Number of persons whose last log line is remembered."""
         return len(self._logged_at)
+
+    def people_of(self, robot_id: str) -> Iterator[str]:
+        """Ids of those whom a robot's newest look found."""
+        for one in self.placed.get(robot_id, ()):
+            if one.person is not None:
+                yield one.person.person_id
 
     def track_frame(
         self,

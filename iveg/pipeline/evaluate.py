@@ -6,7 +6,7 @@ heartbeat to the fleet is sent from here and nowhere else, so that a loop that h
 falls silent and slows the robots.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from iveg.domain.alerts import conditions
 from iveg.domain.decisions import Decisions, SlowdownDecision
@@ -47,7 +47,8 @@ from iveg.pipeline.log_messages import evidence_of, speed_line
 from iveg.pipeline.ports import FleetPort, Ids
 from iveg.pipeline.staleness import Staleness
 
-HEARTBEAT_S = 0.1
+HEARTBEAT_S, _EARLY_S = 0.1, 0.02
+"""Between two heartbeats; so early one goes rather than a whole tick late."""
 
 
 _TOPIC_OF = {
@@ -107,7 +108,7 @@ class Evaluator:
         self.tracking = DetectionTracking(world, self.people, event_log, new_id)
         self.laser_sight = sight = LaserSight(Plan.of(greenhouse), newest_scan)
         self._staleness = Staleness(
-            world, self.people, greenhouse, event_log, sight.swept
+            world, self.people, greenhouse, event_log, sight.all_clear()
         )
         self._feedback_publisher = FeedbackPublisher(
             world,
@@ -174,7 +175,9 @@ class Evaluator:
         observation = received.observation
         if isinstance(observation, DetectionFrame):
             self.tracking.track_frame(observation, received, verdict, self.rule)
-            self.decisions.seen(self._people_of(observation.robot_id), received.at)
+            self.decisions.seen(
+                self.tracking.people_of(observation.robot_id), received.at
+            )
         if verdict != "new":
             return False
         row, robot_id = kind(observation), observation.robot_id
@@ -192,11 +195,6 @@ class Evaluator:
             case DetectionFrame():
                 self._unjudged = _later(self._unjudged, received.at)
         return True
-
-    def _people_of(self, robot_id: str) -> Iterator[str]:
-        for one in self.tracking.placed.get(robot_id, ()):
-            if one.person is not None:
-                yield one.person.person_id
 
     @property
     def is_unjudged(self) -> bool:
@@ -301,8 +299,8 @@ class Evaluator:
 
     # --- time ---------------------------------------------------------------------
 
-    def tick(self, now: Instant, more: Iterable[Condition] = ()) -> None:
-        """Let time pass: silence, ages, overdue links, alerts, heartbeat."""
+    def age(self, now: Instant) -> None:
+        """Let time pass for the world; ``tick`` judges it then."""
         self._started = self._started or now
         self._staleness.tick(now)
         self._log_returned_detectors(now)
@@ -310,8 +308,11 @@ class Evaluator:
         walkers = list(self.obstacles.walkers())
         self.tracking.witness(walkers)
         self.aged(walkers, now)
+
+    def tick(self, now: Instant, more: Iterable[Condition] = ()) -> None:
+        """Judge a world that has aged: limits, heartbeat, decisions, alerts."""
         self._settle(now)
-        if now.mono - self._feedback_publisher.published_at >= HEARTBEAT_S - 1e-3:
+        if now.mono - self._feedback_publisher.published_at >= HEARTBEAT_S - _EARLY_S:
             self.publish(now)
         aged = self.decisions.age(self._heard_s, self.people.known)
         self._event_log.decisions(aged)

@@ -129,7 +129,7 @@ class FeedbackPublisher:
                     person.class_,
                     sighting.class_id,
                     sighting.confidence,
-                    (sighting.x, sighting.y, sighting.z),
+                    (*sighting.place, sighting.z),
                     radius,
                     sighting.observer,
                     (sighting.vx, sighting.vy) if is_seen else None,

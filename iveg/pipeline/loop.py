@@ -25,6 +25,7 @@ from iveg.pipeline.event_log import EventLog
 from iveg.pipeline.health_monitor import HealthMonitor, HopHealth, HopState
 from iveg.pipeline.ingest import Ingest
 from iveg.pipeline.ports import Clock
+from iveg.pipeline.steps import Step
 from iveg.pipeline.supervision import Supervision
 
 TICK_S = 0.05
@@ -37,9 +38,13 @@ JUDGED_APART_S = 10 * APART_S
 A judgement costs as much for one message as for ten, and poses wait behind it.
 """
 _LATEST_APART_S = JUDGED_APART_S + APART_S / 2
+_MOST_TAKINGS = 3
+"""What came meanwhile is taken before a judgement, too, but none waits for ever."""
 _HEALTH_PERIOD_S = 1.0
 _WORTH_S = 0.001
 """A shorter wait costs more than it saves."""
+Recorded = tuple[Callable[[Instant, Step], None], Callable[[Instant], None]]
+"""Called with each step, and after each tick."""
 
 
 def reading_apart_s(robots: int) -> float:
@@ -56,8 +61,8 @@ class RuleLoop:
         decided: Comfort that measures: called with what a judgement was made of.
         ticks: Comfort that lets time pass, called with each tick; all of it guarded.
         goals: Comfort, likewise: called with each new word on a goal; with each tick.
-        stepped: Comfort that records: called with each step before it is taken, and
-            with whether it judges.
+        recorded: Comfort that writes down what was done: called with each step before
+            it is taken, and with its kind; and after each tick.
     """
 
     def __init__(
@@ -75,7 +80,7 @@ class RuleLoop:
             Callable[[GoalAnswer, Instant, TransportId], None],
             Callable[[Instant], None],
         ],
-        stepped: Callable[[Instant, bool], None] = lambda *_: None,
+        recorded: Recorded,
     ) -> None:
         self._ingest = ingest
         self._evaluator = evaluator
@@ -87,8 +92,9 @@ class RuleLoop:
         self._decided = decided
         self._goal_heard, tick_goals = goals
         self._ticks = (tick_goals, *ticks)
-        self._stepped = stepped
+        self._stepped, self._write_down = recorded
         self._ticked = float("-inf")
+        self._is_aged = self._is_unwritten = False
         self._health_at = float("-inf")
         self._taken: list[Received] = []
         """Observations taken since the last judgement."""
@@ -113,18 +119,44 @@ class RuleLoop:
             if self._ingest.waiting:
                 taken_at = now.mono
             judges = now.mono - judged_at >= JUDGED_APART_S * robots - _WORTH_S
-            judges |= self._ticks_at(now)
-            arrived = list(self._ingest.drain())
-            if arrived:
-                self.step(arrived, now, judges=False)
-                # What pages are shown goes to them before the fleet is judged.
-                await asyncio.sleep(0)
-            if judges:
+            ticks = self._ticks_at(now)
+            await self._take()
+            if ticks:
+                self.age(self._clock())
+                await self._take(late=True)
+            if judges or ticks:
                 judged_at = now.mono
-                # With what came meanwhile: the past takes whatever came before a step.
-                self.step(self._ingest.drain(), self._clock())
+                # The past takes whatever came before a step, so this does, too.
+                self.advance(self._ingest.drain(), self._clock())
+                if self._is_unwritten:
+                    await self._take(late=True)
+                    # No message may be heard before this and taken after it.
+                    self.step(self._ingest.drain(), self._clock(), judges=False)
+
+    async def _take(self, *, late: bool = False) -> None:
+        """Take what waits, and let pages be shown it before anything else is done.
+
+        ``late``: after something long, of which readers may have waited for the end.
+        """
+        if late:
+            await asyncio.sleep(0)
+        for _ in range(_MOST_TAKINGS):
+            arrived = list(self._ingest.drain())
+            if not arrived:
+                return
+            self.advance(arrived, self._clock(), judges=False)
+            await asyncio.sleep(0)
 
     def step(
+        self, arrived: Iterable[Received], now: Instant, *, judges: bool = True
+    ) -> None:
+        """Advance, and write down what was done if time has passed since it was."""
+        self.advance(arrived, now, judges=judges)
+        if self._is_unwritten:
+            self._is_unwritten = False
+            self._write_down(now)
+
+    def advance(
         self, arrived: Iterable[Received], now: Instant, *, judges: bool = True
     ) -> None:
         """Take everything that arrived.
@@ -132,10 +164,10 @@ class RuleLoop:
         ``judges``: and judge the fleet, and let time pass if it is due; else the next
         step that judges does.
         """
-        self._stepped(now, judges)
+        self._stepped(now, Step.JUDGED if judges else Step.TAKEN)
         for received in arrived:
             self._hear(received)
-        ticks = judges and self._ticks_at(now)
+        ticks = judges and (self._is_aged or self._ticks_at(now))
         if ticks:
             self._tick(now)
         elif judges:
@@ -147,6 +179,20 @@ class RuleLoop:
             self._watch_chain(now)
             for tick in self._ticks:
                 tick(now)
+            self._is_unwritten = True
+
+    def age(self, now: Instant) -> None:
+        """Let the world grow older before the step that judges it.
+
+        By itself, so that what arrives meanwhile waits for one of the two.
+        """
+        self._stepped(now, Step.AGED)
+        self._grow_older(now)
+
+    def _grow_older(self, now: Instant) -> None:
+        # Ticks are counted from here, however long it takes.
+        self._ticked, self._is_aged = now.mono, True
+        self._evaluator.age(now)
 
     def _ticks_at(self, now: Instant) -> bool:
         return now.mono - self._ticked >= TICK_S - 1e-3
@@ -165,8 +211,10 @@ class RuleLoop:
 
     def _tick(self, now: Instant) -> None:
         """Let time pass for what is vital; the fleet is judged with it."""
-        self._ticked = now.mono
         self._commander.tick(now)
+        if not self._is_aged:
+            self._grow_older(now)
+        self._is_aged = False
         commanded = self._commander.conditions(now)
         supervised = self._supervision.conditions(now)
         self._evaluator.tick(now, chain(commanded, supervised))

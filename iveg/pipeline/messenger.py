@@ -18,13 +18,13 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from iveg.domain.alerts.alert_book import BookedAlert
+from iveg.domain.contacts import Contacts
 from iveg.domain.errors import HopError
 from iveg.domain.events import LogEvent
 from iveg.domain.messages import (
     CHANNELS,
     AlertItem,
     Channel,
-    Contacts,
     MessageDelivery,
     OutboundMessage,
 )

@@ -3,10 +3,11 @@
 from collections.abc import Iterable, Sequence
 from typing import Literal, Protocol, TypeVar
 
+from iveg.domain.contacts import Contacts
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import Feedback
 from iveg.domain.goals import CancelOrder, GoalOrder
-from iveg.domain.messages import Contacts, MessageDelivery, OutboundMessage
+from iveg.domain.messages import MessageDelivery, OutboundMessage
 from iveg.domain.observations import Instant
 from iveg.domain.peer_scan import PeerScan
 from iveg.domain.revocation import BrokerTold

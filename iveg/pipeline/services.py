@@ -4,16 +4,17 @@ import asyncio
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from iveg.domain.contacts import Contacts
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.detector import OutOfService
-from iveg.domain.messages import Channel, Contacts
+from iveg.domain.messages import Channel
 from iveg.domain.revocation import Revocation
 from iveg.domain.rule.trial import Trial
-from iveg.pipeline.build import Pipeline
 from iveg.pipeline.coverage import CoverageMonitor
 from iveg.pipeline.detectors import Detectors
 from iveg.pipeline.mapping import Mapper
 from iveg.pipeline.messenger import Messenger
+from iveg.pipeline.parts import Pipeline
 from iveg.pipeline.ports import (
     BrokerAccess,
     ChoiceStore,
@@ -23,8 +24,8 @@ from iveg.pipeline.ports import (
 )
 from iveg.pipeline.revocations import Pause, Revocations
 from iveg.pipeline.rules import Rules
-from iveg.pipeline.shadow import Trials
 from iveg.pipeline.things import ThingMarks
+from iveg.pipeline.trials import Trials
 
 
 @dataclass(frozen=True, slots=True)

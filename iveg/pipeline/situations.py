@@ -10,7 +10,8 @@ from iveg.domain.margins import SafetyMargin
 from iveg.domain.observations import Instant, SafetyReport
 from iveg.domain.robot_state import RobotState
 from iveg.domain.situation.facts import Near, RobotFacts, Situation
-from iveg.domain.situation.judge import HAZARDS, gravest, situation_of
+from iveg.domain.situation.judge import gravest, situation_of
+from iveg.domain.situation.slowness import HAZARDS
 from iveg.domain.stop.machine import StopMachine
 from iveg.domain.tracking.person import TrackedPerson
 from iveg.pipeline.evaluate import Evaluator

@@ -6,7 +6,7 @@ from iveg.domain.observations import Instant
 from iveg.domain.robot_state import Link, RobotState
 from iveg.domain.tracking.people import People
 from iveg.domain.tracking.person import TrackedPerson
-from iveg.domain.tracking.sight import AllClear, Swept
+from iveg.domain.tracking.sight import AllClear
 from iveg.domain.world import World
 from iveg.pipeline import topics
 from iveg.pipeline.event_log import EventLog
@@ -28,13 +28,13 @@ class Staleness:
         people: People,
         greenhouse: Greenhouse,
         event_log: EventLog,
-        swept: Swept,
+        all_clear: AllClear,
     ) -> None:
         self._world = world
         self._people = people
         self._greenhouse = greenhouse
         self._event_log = event_log
-        self._all_clear = AllClear(swept)
+        self._all_clear = all_clear
         self._links: dict[str, Link] = {}
         self._stages: dict[str, str] = {}
 

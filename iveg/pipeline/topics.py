@@ -20,8 +20,9 @@ from iveg.models.detection import DetectionFrame
 from iveg.models.equipment import Tile
 from iveg.models.health import Health
 from iveg.models.log_entry import LogEntry
+from iveg.models.mapped import Scan
 from iveg.models.people import Person
-from iveg.models.places import GreenhouseMap, Scan
+from iveg.models.places import GreenhouseMap
 from iveg.models.robot import Robot
 from iveg.models.rule import Rule
 

@@ -2,24 +2,25 @@
 
 Inputs are recorded byte for byte elsewhere.  What decides besides them is here: the
 moments of the loop's steps and of the laser's looks on both clocks, every few seconds
-the whole memory, and each second a hash of the world, which whoever plays the recording
+the whole memory, and after each a hash of the world, which whoever plays the recording
 must reach, too.
 """
 
-from base64 import b64encode
 from collections.abc import Callable
 from hashlib import blake2b
-from typing import Final
+from typing import Final, Protocol
 
 import orjson
 
 from iveg.domain.observations import Instant, Received
 from iveg.domain.records import CommandRecord, LogRecord, Record
+from iveg.pipeline.steps import Step
 
-KEYFRAMES_S, HASHES_S = 2.0, 1.0
-"""Between two memories, and between two hashes (s)."""
-JUDGED, TAKEN, LOOK = 1, 0, 2
-"""A step that judges, one that does not, and a look of the second witness."""
+KEYFRAMES_S, HASHED_AFTER_S = 2.0, 0.5
+"""Between two memories, and from each to its hash (s).
+
+Everybody waits while either is made: never for both at once.
+"""
 WALL_UNITS: Final = float(1 << 22)
 """Of a wall clock in one second: what a double of this century holds exactly."""
 _NS = 10**9
@@ -32,8 +33,8 @@ class Trace:
     def arrived(self, received: Received) -> None:
         """A copy of a message is about to be queued."""
 
-    def stepped(self, now: Instant, judges: bool) -> None:
-        """The loop takes what has arrived."""
+    def stepped(self, now: Instant, kind: Step) -> None:
+        """The loop takes a step of a kind."""
 
     def looked(self, now: Instant) -> None:
         """The second witness looks at a scan."""
@@ -45,11 +46,21 @@ class Trace:
         """The loop has let time pass."""
 
 
+class Recording(Protocol):
+    """Where it is written down."""
+
+    def note(self, name: str, payload: bytes, at: Instant) -> None:
+        """JSON, by the name of its sort."""
+
+    def memory(self, about: bytes, memory: bytes, at: Instant) -> None:
+        """A memory, and JSON that tells of it."""
+
+
 class Chronicle(Trace):
     """Writes it down, once a tick.
 
     Args:
-        write: Name of the sort, JSON, and when.
+        recording: Takes it.
         version: Of the program.
         seed: Of ids; random.
 
@@ -59,17 +70,15 @@ class Chronicle(Trace):
         ids: Makes ids; they are the same where the same happens.
     """
 
-    def __init__(
-        self, write: Callable[[str, bytes, Instant], None], version: str, seed: bytes
-    ) -> None:
+    def __init__(self, recording: Recording, version: str, seed: bytes) -> None:
         self.remember: Callable[[], bytes] | None = None
         self.picture: Callable[[Instant], bytes] = lambda _: b""
         self.ids = CountedIds(seed)
-        self._write, self._version = write, version
-        self._steps: list[tuple[Instant, int]] = []
+        self._recording, self._version = recording, version
+        self._steps: list[tuple[Instant, Step]] = []
         self._arrived: dict[float, tuple[float, int]] = {}
-        self._kept_at = self._hashed_at = float("-inf")
-        self._touched = False
+        self._kept_at = float("-inf")
+        self._touched = self._is_hashed = False
 
     def arrived(self, received: Received) -> None:
         """Keep both clocks of it, and whether Orion leaves out others."""
@@ -81,15 +90,12 @@ class Chronicle(Trace):
         """Keep both clocks of what brings no observation, too."""
         self._arrived.setdefault(at.mono, (at.wall, 0))
 
-    def stepped(self, now: Instant, judges: bool) -> None:
-        """Keep the step."""
-        self._note(now, JUDGED if judges else TAKEN)
-
     def looked(self, now: Instant) -> None:
         """Keep the look."""
-        self._note(now, LOOK)
+        self.stepped(now, Step.LOOKED)
 
-    def _note(self, now: Instant, kind: int) -> None:
+    def stepped(self, now: Instant, kind: Step) -> None:
+        """Keep the step."""
         self.ids.now = now
         self._steps.append((now, kind))
 
@@ -105,12 +111,14 @@ class Chronicle(Trace):
     def ticked(self, now: Instant) -> None:
         """Write down what there is."""
         document = self._document(now)
-        if not self._touched and now.mono - self._hashed_at >= HASHES_S - 1e-3:
-            self._hashed_at = now.mono
-            document["hash"] = digest(self.picture(now))
-        self._write("Steps", orjson.dumps(document), now)
         least = _SOON_S if self._touched else KEYFRAMES_S
-        if now.mono - self._kept_at >= least - 1e-3:
+        is_kept = now.mono - self._kept_at >= least - 1e-3
+        is_old = now.mono - self._kept_at >= HASHED_AFTER_S - 1e-3
+        if is_old and not (self._is_hashed or self._touched or is_kept):
+            self._is_hashed = True
+            document["hash"] = digest(self.picture(now))
+        self._recording.note("Steps", orjson.dumps(document), now)
+        if is_kept:
             self._keep(now)
 
     def _document(self, now: Instant) -> dict[str, object]:
@@ -127,7 +135,8 @@ class Chronicle(Trace):
     def _keep(self, now: Instant) -> None:
         if self.remember is None:
             return
-        by_hand, self._touched, self._kept_at = self._touched, False, now.mono
+        by_hand, self._kept_at = self._touched, now.mono
+        self._touched = self._is_hashed = False
         document = {
             "version": self._version,
             "mono": in_ns(now.mono),
@@ -135,9 +144,8 @@ class Chronicle(Trace):
             "by_hand": by_hand,
             "seed": self.ids.seed.hex(),
             "ids": self.ids.count,
-            "memory": b64encode(self.remember()).decode(),
         }
-        self._write("Memory", orjson.dumps(document), now)
+        self._recording.memory(orjson.dumps(document), self.remember(), now)
 
 
 class CountedIds:

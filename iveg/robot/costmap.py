@@ -15,20 +15,15 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from iveg.domain.costmap import (
-    UNKNOWN,
-    Grid,
-    InflatedGrid,
-    Occupancy,
-    inflate,
-    sweep_of,
-    window_round,
-)
+from iveg.domain.costmap import UNKNOWN, InflatedGrid, Occupancy, inflate
 from iveg.domain.errors import UnreadableError
 from iveg.domain.feedback import Feedback
 from iveg.domain.geometry import Pose2D, Rectangle
+from iveg.domain.mapped_area import window_round
 from iveg.domain.observations import Origin
+from iveg.domain.occupancy_grid import Grid
 from iveg.domain.peer_scan import OLDEST_S, PeerScan
+from iveg.domain.sweeps import sweep_of
 from iveg.domain.witness import Outline
 from iveg.ngsi.codec import read_peer_scan
 from iveg.robot.neighbours import Neighbour

@@ -39,7 +39,11 @@ self.ivegIsOfOffline = isOfOffline;
 
 self.addEventListener("install", (event) => {
   event.addRoutes?.([
-    { condition: { urlPattern: { search: "offline" } }, source: "fetch-event" },
+    // The path, too: what is not named is that of this script, and matches nothing.
+    {
+      condition: { urlPattern: { pathname: "/static/*", search: "offline" } },
+      source: "fetch-event",
+    },
     ...NOT_NAVIGATIONS.map((requestMode) => ({
       condition: { requestMode },
       source: "network",

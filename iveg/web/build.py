@@ -13,7 +13,7 @@ from iveg.domain.stop import Press
 from iveg.models.snapshot import Server, Snapshot, User
 from iveg.pipeline import topics
 from iveg.pipeline.audit import AuditTrail
-from iveg.pipeline.build import Pipeline
+from iveg.pipeline.parts import Pipeline
 from iveg.pipeline.ports import Clock, Ids
 from iveg.pipeline.services import Services
 from iveg.web import notifications, problems
@@ -28,6 +28,7 @@ from iveg.web.api import (
     goals,
     health,
     latency,
+    message_desk,
     messages,
     metrics,
     past,
@@ -39,11 +40,13 @@ from iveg.web.api import (
 )
 from iveg.web.api.answers import Apart
 from iveg.web.live import socket
+from iveg.web.live.encoder import Encoder
 from iveg.web.pages.contexts import Site
-from iveg.web.pages.routes import Pages
+from iveg.web.pages.drawing import Pages
 from iveg.web.refusals import DocumentedApp
 from iveg.web.security import audited, connections, headers, rate_limits
-from iveg.web.security.authentication import Authenticator, Principal
+from iveg.web.security.authentication import Authenticator
+from iveg.web.security.roles import Principal
 from iveg.web.security.sign_in_gate import SignInGate
 from iveg.web.security.signin import SignInLink
 from iveg.web.views import Views
@@ -105,7 +108,7 @@ def live_routers(face: Face) -> Iterator[Callable[[], APIRouter]]:
     """What makes the routes of now: all but history, experiments and pages."""
     parts, beside, views, clock = face.pipeline, face.services, face.views, face.clock
     watch, evaluator = parts.latency.watch, parts.evaluator
-    encoder = socket.Encoder(views, parts.hub, clock)
+    encoder = Encoder(views, parts.hub, clock)
     yield partial(
         socket.router, parts.hub, encoder, face.snapshot, clock, face.stop, watch
     )
@@ -122,7 +125,9 @@ def live_routers(face: Face) -> Iterator[Callable[[], APIRouter]]:
     yield partial(detectors.router, beside.detectors, clock)
     yield partial(revocations.router, beside.revocations)
     yield partial(things.router, beside.things, evaluator.obstacles.known_here, clock)
-    yield partial(messages.router, messages.Desk(beside.messenger, face.new_id, clock))
+    yield partial(
+        messages.router, message_desk.Desk(beside.messenger, face.new_id, clock)
+    )
     yield partial(latency.router, watch, clock, face.worker)
     yield partial(recordings.router, face.recordings)
     yield partial(past.router, face.past, clock)

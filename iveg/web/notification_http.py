@@ -9,7 +9,7 @@ that is still being answered) is handled as usual by uvicorn.
 from uvicorn.protocols.http.httptools_impl import STATUS_LINE, HttpToolsProtocol
 
 from iveg.web.notifications import NotificationEndpoint
-from iveg.web.problems import Problem
+from iveg.web.problem import Problem
 from iveg.web.security.headers import NOTIFICATIONS_PATH
 
 _URL = NOTIFICATIONS_PATH.encode()

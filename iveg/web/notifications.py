@@ -16,9 +16,10 @@ from iveg.domain.transports import FIWARE
 from iveg.ngsi.codec import UNREAD, read_notification
 from iveg.pipeline.ingest import Ingest
 from iveg.pipeline.ports import Clock
-from iveg.web.problems import Problem, problem_of
-from iveg.web.security.authentication import Action
+from iveg.web.problem import Problem
+from iveg.web.problems import problem_of
 from iveg.web.security.headers import MAX_BODY, NOTIFICATIONS_PATH, TOO_LONG
+from iveg.web.security.roles import Action
 from iveg.web.security.secrets import NotifySecret
 
 Recorded = Callable[[bytes, Instant, Sequence[Observation]], None]

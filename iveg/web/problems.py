@@ -2,28 +2,16 @@
 
 The answer is ``application/problem+json`` (RFC 9457), or a page where a person's
 browser asked for one.  Answers echo no input and reveal nothing internal.
-
-Errors of this boundary alone, under the tree of ``domain/errors``::
-
-    IvegError
-    ├── NotSignedInError    401
-    ├── ForeignOriginError  403
-    ├── PasskeyAddressError 409
-    ├── PinRefusedError     403, 429
-    ├── ProofNeededError    403
-    └── NotJsonError        415
 """
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from http import HTTPStatus
+from collections.abc import Mapping
 
 from fastapi import FastAPI
 from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
-from starlette.responses import JSONResponse, Response
+from starlette.responses import Response
 
 from iveg.domain.errors import (
     BusyError,
@@ -47,94 +35,17 @@ from iveg.domain.errors import (
     WhatIfRefusedError,
 )
 from iveg.models.base import stamp
-from iveg.ngsi.texts import all_legible
+from iveg.web.errors import (
+    ForeignOriginError,
+    NotJsonError,
+    NotSignedInError,
+    PasskeyAddressError,
+    PinRefusedError,
+    ProofNeededError,
+)
+from iveg.web.problem import Page, Problem
 
 _MOST_COMPLAINTS = 20
-
-
-class NotSignedInError(IvegError):
-    """The request is not authenticated."""
-
-    def __init__(self) -> None:
-        super().__init__("Sign in with the link that iVeg printed, or send a token.")
-
-
-class ForeignOriginError(IvegError):
-    """A browser sent this from another site, or without iVeg's own header."""
-
-    def __init__(self, missing: str) -> None:
-        super().__init__(f"This did not come from iVeg's own page: {missing}.")
-
-
-class ProofNeededError(IvegError):
-    """Somebody is signed in and has to prove anew that it is them."""
-
-    def __init__(self) -> None:
-        super().__init__("Prove again who you are: POST /api/v1/account/proof.")
-
-
-class PinRefusedError(IvegError):
-    """A PIN that is wrong, or comes while its person has to wait.
-
-    Attributes:
-        wait_s: How long it is refused (s); 0: not at all.
-        left: Tries until the next wait; None: it was not looked at.
-    """
-
-    def __init__(self, wait_s: float, left: int | None = None) -> None:
-        super().__init__("The PIN is refused.")
-        self.wait_s, self.left = wait_s, left
-
-
-class PasskeyAddressError(IvegError):
-    """Browsers make no passkeys for an address in numbers."""
-
-    def __init__(self) -> None:
-        super().__init__("Passkeys need an address with a name, such as iveg.example.")
-
-
-class NotJsonError(IvegError):
-    """A body that is not declared as JSON."""
-
-    def __init__(self) -> None:
-        super().__init__("Send the body as application/json.")
-
-
-@dataclass(frozen=True, slots=True)
-class Problem:
-    """One RFC 9457 problem.
-
-    Attributes:
-        code: Stable, for programs; the last part of ``type``.
-        extra: Further members, such as ``why`` of a refused release.
-        headers: What the status asks for, such as ``Allow`` with 405.
-    """
-
-    status: int
-    detail: str
-    code: str = ""
-    extra: Mapping[str, object] = field(default_factory=dict)
-    headers: Mapping[str, str] = field(default_factory=dict)
-
-    def response(self) -> Response:
-        """The problem as a program reads it."""
-        members = {
-            "type": f"urn:iveg:{self.code}" if self.code else "about:blank",
-            "title": HTTPStatus(self.status).phrase,
-            "status": self.status,
-            "detail": self.detail,
-            **self.extra,
-        }
-        return JSONResponse(
-            # A name that somebody asked for may be told back, but turns nothing round.
-            all_legible(members),
-            self.status,
-            headers={"Cache-Control": "no-store", **self.headers},
-            media_type="application/problem+json",
-        )
-
-
-Page = Callable[[Request, Problem], Response]
 
 
 def install(app: FastAPI, page: Page | None = None) -> None:

@@ -12,7 +12,8 @@ from fastapi import FastAPI
 from fastapi.routing import iter_route_contexts
 
 from iveg.web.security.audited import READING
-from iveg.web.security.authentication import Action, declared_action
+from iveg.web.security.requirements import declared_action
+from iveg.web.security.roles import Action
 
 _PROBLEM: Final = {"$ref": "#/components/schemas/Problem"}
 _SHAPE: Final[Mapping[str, Any]] = {

@@ -15,6 +15,7 @@ from iveg.domain.stamps import format_stamp
 from iveg.domain.stop import FollowedCommand, StopMachine
 from iveg.domain.tracking.person import TrackedPerson
 from iveg.models.alert import Alert, Flood
+from iveg.models.applied import Applied, Hold
 from iveg.models.base import moment, rounded
 from iveg.models.climate import Climate
 from iveg.models.command import Command as CommandModel
@@ -22,22 +23,24 @@ from iveg.models.detection import Detection, DetectionFrame
 from iveg.models.device import Device
 from iveg.models.equipment import Tile
 from iveg.models.goal import Goal
-from iveg.models.health import Health, Safety
+from iveg.models.health import Health
 from iveg.models.health import HopHealth as HopModel
 from iveg.models.log_entry import LogEntry
+from iveg.models.mapped import Scan
 from iveg.models.margin import Margin
 from iveg.models.people import Acting, Evidence
 from iveg.models.people import Person as PersonModel
-from iveg.models.places import GreenhouseMap, Position, Scan
+from iveg.models.places import GreenhouseMap, Position
 from iveg.models.pose import Pose, Twist
 from iveg.models.robot import Detector, Mode, Navigation, Profile, Robot
 from iveg.models.robot_access import Revoked
 from iveg.models.rule import Rule
+from iveg.models.safety import Safety
 from iveg.models.situation import Situation
-from iveg.models.speed_limit import Applied, Encounter, Hold, MissingPremise, SpeedLimit
+from iveg.models.speed_limit import Encounter, MissingPremise, SpeedLimit
 from iveg.ngsi.names import ROBOT_DEVICES
-from iveg.pipeline.build import Pipeline
 from iveg.pipeline.health_monitor import HopHealth
+from iveg.pipeline.parts import Pipeline
 from iveg.pipeline.situations import Situations, fresh_report
 
 _FIRST_LINES = 200
@@ -195,6 +198,7 @@ class Views:
         now: Instant,
     ) -> PersonModel:
         newest, rule = person.newest, self._evaluator.rule
+        x, y = newest.place
         rings = self._people.rings(person, rule, now)
         thing = self._people.things.explain(person, now)
         return PersonModel(
@@ -202,7 +206,7 @@ class Views:
             class_=person.class_,
             class_id=newest.class_id,
             stage=person.stage(now),
-            position=Position(x=newest.x, y=newest.y, z=newest.z),
+            position=Position(x=x, y=y, z=newest.z),
             radius_m=max((radius for _, radius in rings), default=None),
             confidence=newest.confidence,
             first_seen=format_stamp(person.first_seen.wall),
@@ -213,7 +217,7 @@ class Views:
             evidence=Evidence.of(newest.looks),
             doubtful=newest.reach_m > 0.0,
             decision_id=max((one.decision_id for one in crossings), default=None),
-            lane=self._greenhouse.lane_at(newest.x, newest.y),
+            lane=self._greenhouse.lane_at(x, y),
             acting=[_acting(one) for one in crossings],
             margin=Margin.of(margins.of_person(person.person_id)),
             thing_id=None if thing is None else thing.thing_id,

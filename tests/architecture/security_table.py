@@ -10,15 +10,16 @@ from fastapi.routing import iter_route_contexts
 
 from iveg.adapters import admission
 from iveg.app import what_if
-from iveg.app.dss import open_dss
+from iveg.app.opening import open_dss
 from iveg.asgi import create_app
 from iveg.domain import messages, passkeys, pins
 from iveg.domain.tracking import things
 from iveg.pipeline import messenger
 from iveg.settings import Settings
 from iveg.web.api import alerts, notes, tokens
-from iveg.web.security.audited import AUDITED, READING, Audited
-from iveg.web.security.authentication import declared_action
+from iveg.web.security.audited import READING
+from iveg.web.security.audited_routes import AUDITED, Audited
+from iveg.web.security.requirements import declared_action
 from iveg.web.security.roles import MAY
 from tests.processes import ROOT
 

@@ -12,13 +12,14 @@ from fastapi import FastAPI
 from fastapi.routing import iter_route_contexts
 from starlette.requests import Request
 
-from iveg.app.dss import open_dss
+from iveg.app.opening import open_dss
 from iveg.asgi import create_app
 from iveg.settings import Settings
-from iveg.web.security.audited import AUDITED, READING
-from iveg.web.security.authentication import Action, declared_action
-from iveg.web.security.roles import MAY
-from iveg.web.security.sessions import IDLE_S
+from iveg.web.security.audited import READING
+from iveg.web.security.audited_routes import AUDITED
+from iveg.web.security.requirements import declared_action
+from iveg.web.security.roles import MAY, Action
+from iveg.web.security.session_life import IDLE_S
 from tests.architecture import documents, security_table
 
 INTERFACES = documents.interfaces()

@@ -11,7 +11,7 @@ from fastapi import FastAPI
 
 from iveg.adapters.history.engine import history_url
 from iveg.adapters.history.migrate import upgrade
-from iveg.app.dss import open_dss
+from iveg.app.opening import open_dss
 from iveg.asgi import create_app
 from iveg.settings import Settings
 

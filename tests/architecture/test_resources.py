@@ -9,10 +9,10 @@ from iveg.models.alert import AcknowledgedAlerts
 from iveg.models.base import Model
 from iveg.models.cost import Cost
 from iveg.models.day import Day
-from iveg.models.detection import DetectionRow, KeptDetection
 from iveg.models.device import Device
 from iveg.models.dictionary import DictionaryColumn
 from iveg.models.equipment import Measurement
+from iveg.models.kept_detection import DetectionRow, KeptDetection
 from iveg.models.note import Note
 from iveg.models.odometry import OdometryRow
 from iveg.models.recordings import Recording
@@ -68,7 +68,8 @@ def test_every_resource_of_the_page_is_a_model() -> None:
 
 def test_every_metric_has_its_row() -> None:
     page = documents.section((documents.INTERFACES / "http.md").read_text(), "Metrics")
-    told = (ROOT / "iveg/web/api/metrics.py").read_text()
-    metrics = {f"iveg_{name}" for name in re.findall(r'_family\("([a-z_]+)"', told)}
+    files = (ROOT / "iveg/web/api").glob("*metrics.py")
+    told = "".join(one.read_text() for one in files)
+    metrics = {f"iveg_{one}" for one in re.findall(r'family\(\s*"([a-z_]+)"', told)}
 
     assert metrics - set(documents.keys(page)) == set()

@@ -4,8 +4,8 @@ import tomllib
 
 from tests.processes import ROOT
 
-_WIRES = {"iveg.pipeline.build", "iveg.pipeline.services"}
-"""Gives comfort to what is vital; holds none of it."""
+_WIRES = {"iveg.pipeline.build", "iveg.pipeline.parts", "iveg.pipeline.services"}
+"""Give comfort to what is vital; hold none of it."""
 
 
 def _contract() -> tuple[set[str], set[str]]:

@@ -54,7 +54,7 @@ class Field:
     def start_all(self) -> None:
         for part in ("broker", "fiware", "serve", "emulator"):
             self.start(part)
-        self.place.wait_until_live(deadline_s=60.0)
+        self.place.wait_until_live()
 
     def start(self, part: str) -> None:
         """Start one part; it may take its time."""
@@ -102,7 +102,7 @@ class Field:
         bridge = _BRIDGE if self.bridged else ""
         conf.write_text((PLAIN + bridge).format(port=self.port, south=self.south))
         self._broker = subprocess.Popen(bound(MOSQUITTO, "-c", str(conf)))
-        until(self._listens, 30.0, "mosquitto listens")
+        until(self._listens, "mosquitto listens")
 
     def _listens(self) -> bool:
         try:

@@ -40,7 +40,7 @@ class Person:
             # The witness hears the same reports, maybe later than iVeg, and would take
             # one from before the release for a hold that came after this.
             with suppress(AssertionError):
-                until(lambda: not robot.held, _LIMIT_S, f"{robot_id} is seen free")
+                until(lambda: not robot.held, f"{robot_id} is seen free", _LIMIT_S)
         self._witness.allow(robot_id)
         return self._post(f"robots/{robot_id}/resume", {}) == 202
 
@@ -56,10 +56,10 @@ class Person:
         robot = self.look(robot_id)
         return "" if robot is None else str(robot["stop_state"])
 
-    def wait_for(self, robot_id: str, state: str, within_s: float) -> None:
-        until(lambda: self.state(robot_id) == state, within_s, f"{robot_id} is {state}")
+    def wait_for(self, robot_id: str, state: str) -> None:
+        until(lambda: self.state(robot_id) == state, f"{robot_id} is {state}")
 
-    def let_go(self, robot_id: str, within_s: float = 20.0) -> None:
+    def let_go(self, robot_id: str) -> None:
         """Release and resume until it drives; a refusal is tried again."""
 
         def step() -> bool:
@@ -69,7 +69,7 @@ class Person:
                 self.release(robot_id)
             return self._witness.of(robot_id).speed > 0.1
 
-        until(step, within_s, f"{robot_id} drives")
+        until(step, f"{robot_id} drives")
 
     def _post(self, path: str, body: object) -> int:
         words = {"holds": body} if isinstance(body, list) else body

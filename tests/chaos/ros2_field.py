@@ -121,7 +121,7 @@ class Ros2Field:
         program.kill()
         return now
 
-    def drive(self, witness: Witness, within_s: float = 30.0) -> None:
+    def drive(self, witness: Witness) -> None:
         """Start what is dead; until the base moves.
 
         A robot that iVeg's silence held more than thrice a minute waits for somebody:
@@ -131,13 +131,13 @@ class Ros2Field:
             if part not in self.parts:
                 self.start(part)
         try:
-            until(lambda: witness.drives, within_s, "the base moves")
+            until(lambda: witness.drives, "the base moves")
         except AssertionError:
             self.kill("robot")
             for file in self.place.directory.rglob(f"{ROBOT}.holds.json"):
                 file.unlink()
             self.start("robot")
-            until(lambda: witness.drives, within_s, "the base moves")
+            until(lambda: witness.drives, "the base moves")
 
 
 @contextmanager

@@ -29,7 +29,6 @@ MINUTE_LATE = Pace(late_s=60.0)
 FROZEN = Pace(frozen=True)
 TOLERANCE_S = 0.2
 RELEASE_WITHIN_S = 5.0
-PATIENCE_S = 30.0
 
 
 class Stack:
@@ -54,7 +53,7 @@ def stack_in(folder: Path, **settings: str) -> Iterator[Stack]:
         field.start("fiware")
         field.start("serve")
         field.start("emulator")
-        place.wait_until_live(deadline_s=60.0)
+        place.wait_until_live()
         witness = ends.enter_context(Witness(field.port))
         stack = Stack(place, backlog, witness)
         ends.callback(stack.person.close)
@@ -148,25 +147,25 @@ def let_go_within(stack: Stack, robot_id: str) -> float:
         stack.person.release(robot_id)
         return not robot.held
 
-    until(released, PATIENCE_S, "the robot is released")
+    until(released, "the robot is released")
     return time.monotonic() - began
 
 
 def test_f49_a_minute_behind_the_agent_every_robot_is_stopped_and_released(
     stock: Stack,
 ) -> None:
-    stock.person.let_go("AGI", PATIENCE_S)
+    stock.person.let_go("AGI")
     stock.backlog.pace = MINUTE_LATE
     stopped = released = 0
     slowest = 0.0
     with Auditor(stock.place) as auditor:
         for _ in range(TIMES):
             assert stock.person.press("AGI")
-            stock.person.wait_for("AGI", "STANDING", PATIENCE_S)
+            stock.person.wait_for("AGI", "STANDING")
             stopped += 1
             slowest = max(slowest, let_go_within(stock, "AGI"))
             released += 1
-            stock.person.let_go("AGI", PATIENCE_S)
+            stock.person.let_go("AGI")
     stock.backlog.pace = PROMPT
 
     assert stock.backlog.waiting > 0
@@ -182,32 +181,32 @@ def test_f50_poses_that_are_seconds_old_are_never_called_live(
     fiware_only: Stack,
 ) -> None:
     robot = fiware_only.witness.of("AGI")
-    fiware_only.person.let_go("AGI", PATIENCE_S)
+    fiware_only.person.let_go("AGI")
 
     with Auditor(fiware_only.place) as auditor:
         fiware_only.backlog.pace = Pace(late_s=6.0)
-        until(lambda: robot.speed == 0.0, PATIENCE_S, "the robot stands by itself")
-        until(lambda: auditor.oldest_s > 6.0, PATIENCE_S, "a pose of 6 s is shown")
+        until(lambda: robot.speed == 0.0, "the robot stands by itself")
+        until(lambda: auditor.oldest_s > 6.0, "a pose of 6 s is shown")
         known = auditor.looks
-        until(lambda: auditor.looks > known + 20, PATIENCE_S, "it is looked at")
+        until(lambda: auditor.looks > known + 20, "it is looked at")
 
     assert auditor.wrong == []
     fiware_only.backlog.pace = PROMPT
-    fiware_only.place.wait_until_live(deadline_s=PATIENCE_S)
+    fiware_only.place.wait_until_live()
 
 
 def test_f51_late_odometry_stops_no_robot_that_stands(odometry_late: Stack) -> None:
     person, backlog = odometry_late.person, odometry_late.backlog
     for _ in range(TIMES):
-        person.let_go("AGI", PATIENCE_S)
+        person.let_go("AGI")
         backlog.pace = Pace(late_s=4.0)
-        until(lambda: person.press("AGI"), PATIENCE_S, "STOP is accepted")
-        person.wait_for("AGI", "STANDING", PATIENCE_S)
+        until(lambda: person.press("AGI"), "STOP is accepted")
+        person.wait_for("AGI", "STANDING")
         backlog.pace = FROZEN
-        until(lambda: backlog.waiting > 300, PATIENCE_S, "messages wait")
+        until(lambda: backlog.waiting > 300, "messages wait")
         backlog.pace = PROMPT
-        until(lambda: backlog.waiting < 30, PATIENCE_S, "all have arrived")
-        person.wait_for("AGI", "STANDING", PATIENCE_S)
+        until(lambda: backlog.waiting < 30, "all have arrived")
+        person.wait_for("AGI", "STANDING")
 
     assert moved(odometry_late.place) == []
     assert odometry_late.witness.unlicensed == 0

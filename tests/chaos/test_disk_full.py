@@ -86,7 +86,7 @@ def test_on_a_full_disk_stop_goes_on_and_the_oldest_recording_goes_first(
         httpx.Client(base_url=field.place.url, headers=head) as program,
     ):
         person = Person(field.place, witness)
-        person.let_go("AGI", WITHIN_S)
+        person.let_go("AGI")
         oldest, newer = _earlier(disk)
         assert oldest.exists()
         _fill(disk / "ballast")
@@ -94,7 +94,7 @@ def test_on_a_full_disk_stop_goes_on_and_the_oldest_recording_goes_first(
 
         pressed = time.time()
         assert person.press("AGI")
-        person.wait_for("AGI", "STANDING", WITHIN_S)
+        person.wait_for("AGI", "STANDING")
 
         # The history cannot always be read meanwhile; the page has its alerts live.
         def told() -> bool:
@@ -102,8 +102,8 @@ def test_on_a_full_disk_stop_goes_on_and_the_oldest_recording_goes_first(
             keys = [(one["priority"], one["key"]) for one in answer.get("items", ())]
             return ("P2", "alert.disk_low") in keys
 
-        until(told, LOOKS_WITHIN_S, "people are told")
-        until(lambda: not oldest.exists(), LOOKS_WITHIN_S, "the oldest recording goes")
+        until(told, "people are told", LOOKS_WITHIN_S)
+        until(lambda: not oldest.exists(), "the oldest recording goes", LOOKS_WITHIN_S)
         assert newer.exists()
         robot = person.look("AGI")
         assert robot is not None
@@ -116,6 +116,6 @@ def test_on_a_full_disk_stop_goes_on_and_the_oldest_recording_goes_first(
             answer = program.get("/api/v1/commands", params=since).json()
             return any(one["state"] == "STANDING" for one in answer.get("items", ()))
 
-        until(kept, WITHIN_S, "what waited for the disk is in the history")
+        until(kept, "what waited for the disk is in the history", WITHIN_S)
         assert witness.unlicensed == 0
         person.close()

@@ -28,8 +28,6 @@ KILLS = int(os.environ.get("IVEG_CHAOS_KILLS", "6"))
 ROBOTS = ("AGI", "AGII")
 VICTIMS = ("serve", "broker", "fiware", "emulator")
 ACTS = ("press", "press_one", "release", "let_go", "let_go", "nothing")
-AGAIN_WITHIN_S = 40.0
-"""Ends a test in which nothing comes any more; ``test_faults`` measures the start."""
 
 
 @dataclass(frozen=True)
@@ -105,18 +103,18 @@ def test_f13_kills_move_nothing_that_nobody_released(
     log = "\n".join(json.dumps(line) for line in lines) + "\n"
     (folder / f"chaos-{SEED}.jsonl").write_text(log)
 
-    until(person.press, AGAIN_WITHIN_S, "STOP ALL is accepted")
+    until(person.press, "STOP ALL is accepted")
     for robot in ROBOTS:
-        person.wait_for(robot, "STANDING", AGAIN_WITHIN_S)
+        person.wait_for(robot, "STANDING")
     assert witness.unlicensed == 0, log
     assert witness.starts > 0, "nothing ever moved, so nothing was proved"
     followed = {
         str((person.look(robot) or {})["stop"]["command_id"]) for robot in ROBOTS
     }
     file = Path(stack.place.directory) / "history.sqlite"
-    until(lambda: left_open(file) <= followed, AGAIN_WITHIN_S, "no other row is open")
+    until(lambda: left_open(file) <= followed, "no other row is open")
     assert set(beginnings(file).values()) == {1}
-    person.let_go("AGI", AGAIN_WITHIN_S)
+    person.let_go("AGI")
 
 
 def left_open(file: Path) -> set[str]:

@@ -20,7 +20,6 @@ TIMES = int(os.environ.get("IVEG_CHAOS_TIMES", "1"))
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(240 + 30 * TIMES)]
 STOPS = 3
 """Of which one loses its first try, and the one in the middle is no exception."""
-PATIENCE_S = 40.0
 
 
 @pytest.fixture(scope="module")
@@ -48,13 +47,13 @@ def stop_through(
     """Stop a robot that drives in this weather; seconds to STANDING, and tries."""
     robot = witness.of("AGI")
     radio.weather = FAIR
-    person.let_go("AGI", PATIENCE_S)
+    person.let_go("AGI")
     radio.weather = weather
-    until(lambda: robot.factor <= 0.5 and robot.speed > 0.1, PATIENCE_S, "it slows")
+    until(lambda: robot.factor <= 0.5 and robot.speed > 0.1, "it slows")
 
     began = time.monotonic()
-    until(lambda: person.press("AGI"), PATIENCE_S, "STOP is accepted")
-    person.wait_for("AGI", "STANDING", PATIENCE_S)
+    until(lambda: person.press("AGI"), "STOP is accepted")
+    person.wait_for("AGI", "STANDING")
     took = time.monotonic() - began
 
     told = person.look("AGI")
@@ -62,7 +61,7 @@ def stop_through(
     words = robot.words
     # Ten reports later the witness has seen what had been under way meanwhile.  Until
     # STOP reaches it a slow robot may stand and start; held, it starts no more.
-    until(lambda: robot.words > words + 10, PATIENCE_S, "more reports")
+    until(lambda: robot.words > words + 10, "more reports")
     assert robot.held
     assert witness.unlicensed == 0, "it moved after it had stood, held"
     assert robot.speed < 0.02

@@ -53,7 +53,7 @@ def test_who_records_is_killed_and_keeps_all_but_the_last_two_seconds(
         spares_writer = number % 2 == 1
         killed_at = _run_and_kill(folder, lived, spares_writer=spares_writer)
         if spares_writer:
-            until(lambda: not _left_open(folder), 30.0, "it is finished")  # noqa: B023
+            until(lambda: not _left_open(folder), "it is finished")  # noqa: B023
         else:
             finish_broken(*_left_open(folder))
         (path,) = folder.iterdir()
@@ -73,9 +73,9 @@ def _run_and_kill(folder: Path, lived: float, *, spares_writer: bool) -> float:
     """Run a recorder for a while; when it was killed (monotonic, s)."""
     command = [sys.executable, "-c", RECORDER, str(folder)]
     with subprocess.Popen(command, cwd=ROOT) as recorder:
-        until(lambda: folder.is_dir() or None, 30.0, "it records")
+        until(lambda: folder.is_dir() or None, "it records")
         ends = time.monotonic() + lived
-        until(lambda: time.monotonic() > ends or None, 30.0, "it has lived")
+        until(lambda: time.monotonic() > ends or None, "it has lived")
         (writer,) = children_of(recorder.pid)
         if not spares_writer:
             os.kill(writer, signal.SIGKILL)

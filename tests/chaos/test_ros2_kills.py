@@ -57,7 +57,6 @@ def test_whoever_dies_the_base_halts_within_its_time_out(
         died = field.kill(victim)
         stood = until(
             lambda died=died: witness.stood_after(died),  # type: ignore[misc]
-            30.0,
             f"the base stands after {victim} died",
         )
         braking = witness.speed_at(died) / built_in().of_robot(ROBOT).profile.braking

@@ -34,8 +34,8 @@ import orjson
 
 from iveg.lab.embedded.http_server import Request, Response, http_server
 from tests.faulty_fiware import faulty_fiware
+from tests.patience import PATIENCE_S
 
-PATIENCE_S = 30.0
 SETTLED_S = 0.15
 
 

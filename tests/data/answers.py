@@ -28,7 +28,7 @@ from iveg.pipeline.record import Waiting
 from iveg.web.api import history, stop_records
 from iveg.web.live.feed import TelemetryFeed
 from iveg.web.live.painting import Painting
-from iveg.web.security.authentication import Principal
+from iveg.web.security.roles import Principal
 from tests.builders import detection, detection_frame, hold, safety_report, scan
 from tests.fakes.records import (
     NOON,

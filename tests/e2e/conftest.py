@@ -10,6 +10,7 @@ from playwright.sync_api import Browser, ConsoleMessage, Page, ViewportSize
 
 from tests.browsers import running_browser
 from tests.e2e.slowly import draw_slowly
+from tests.patience import AGAIN, PATIENCE_MS
 from tests.processes import EMULATOR, Site, site
 
 OpenPage = Callable[..., Page]
@@ -102,13 +103,14 @@ def opened(
     """A signed-in page in a window of its own; what its console says is noted."""
     viewport: ViewportSize = {"width": size[0], "height": size[1]}
     with browser.new_context(viewport=viewport, locale=locale) as context:
+        context.set_default_timeout(PATIENCE_MS)
         if slowly:
             draw_slowly(context)
         page = context.new_page()
         if complaints is not None:
             _listen(page, complaints)
         # As the link does, without the page that it ends on.
-        context.request.get(stack.sign_in_link, max_redirects=0)
+        context.request.get(stack.sign_in_link, max_redirects=0, max_retries=AGAIN)
         page.goto(stack.url + route)
         yield page
 

@@ -5,7 +5,9 @@ and for where things stand on a page.
 """
 
 import base64
+import itertools
 import json
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -26,6 +28,7 @@ from tests.fakes.records import (
     detection_record,
     odometry_record,
 )
+from tests.patience import PATIENCE_MS, PATIENCE_S
 from tests.processes import Site, site
 
 NOW = 1_795_231_880.2
@@ -77,6 +80,7 @@ def frozen_page(
         forced_colors="active" if is_forced else "none",
         color_scheme="dark" if is_forced else "light",
     )
+    context.set_default_timeout(PATIENCE_MS)
     context.add_init_script("localStorage.setItem('iveg.hints', '3')")
     page = context.new_page()
     page.goto(f"{past.sign_in_link}", wait_until="commit")
@@ -124,12 +128,13 @@ def settle(page: Page, ready: str) -> None:
     What it waits for takes real time, so of that more and more passes each round.
     """
     shown = page.locator(ready).first
-    for real_ms in range(0, 400, 4):
+    deadline = time.monotonic() + PATIENCE_S
+    for pause_ms in itertools.count(0, 4):
         page.clock.run_for(5)
         if shown.is_visible():
             break
-        page.wait_for_timeout(real_ms)
-    assert shown.is_visible(), f"never seen: {ready}"
+        assert time.monotonic() < deadline, f"never seen: {ready}"
+        page.wait_for_timeout(pause_ms)
     for _ in range(10):
         page.clock.run_for(20)
         page.evaluate("() => fetch('/healthz')")
@@ -176,6 +181,7 @@ def _history() -> Iterator[Record]:
     )
     yield alert_record(
         raised_at=NOW - 600,
+        last_raised_at=NOW - 600,
         cleared_at=NOW - 480,
         slots={"robot": "AGII", "person": "P1", "distance": 1.4},
     )

@@ -7,6 +7,7 @@ from playwright import sync_api
 from playwright.sync_api import APIResponse, BrowserContext, Locator, Page, expect
 
 from tests.e2e.reading import card
+from tests.patience import AGAIN
 from tests.processes import Site, until
 
 HELD_MS = 2300
@@ -20,9 +21,13 @@ def open_menu(page: Page, robot: str) -> None:
 
     def is_open() -> bool:
         press_open(page, card(page, robot).locator(".card__menu"))
-        return panel.is_visible()
+        if panel.is_visible():
+            return True
+        # Cards changed places, and it is another's: no card moves while it is open.
+        page.keyboard.press("Escape")
+        return False
 
-    until(is_open, 60.0, f"the menu of {robot} opens")
+    until(is_open, f"the menu of {robot} opens")
 
 
 def press_open(page: Page, opener: Locator) -> None:
@@ -41,7 +46,7 @@ def press_open(page: Page, opener: Locator) -> None:
             return True
         return False
 
-    until(is_open, 60.0, "a panel opens")
+    until(is_open, "a panel opens")
 
 
 def begin_hold(page: Page, button: Locator) -> None:
@@ -56,7 +61,7 @@ def begin_hold(page: Page, button: Locator) -> None:
         page.mouse.down()
         return button.get_attribute("data-holding") is not None
 
-    until(is_held, 30.0, "a button is held")
+    until(is_held, "a button is held")
 
 
 def hold(page: Page, button: Locator, done: Locator) -> None:
@@ -73,7 +78,7 @@ def hold(page: Page, button: Locator, done: Locator) -> None:
             return True
         return False
 
-    until(is_done, 60.0, "what is held is done")
+    until(is_done, "what is held is done")
 
 
 def ask(
@@ -81,7 +86,7 @@ def ask(
 ) -> APIResponse:
     """What the page would send, under its own session."""
     url = f"{stack.url}/api/v1/{path}"
-    return who.request.post(url, data=body, headers=_OWN)
+    return who.request.post(url, data=body, headers=_OWN, max_retries=AGAIN)
 
 
 def look(who: Page | BrowserContext, stack: Site, robot: str) -> dict[str, Any]:
@@ -89,9 +94,7 @@ def look(who: Page | BrowserContext, stack: Site, robot: str) -> dict[str, Any]:
     return _get(who, stack, f"robots/{robot}")
 
 
-def let_go(
-    who: Page | BrowserContext, stack: Site, robot: str, within_s: float = 30.0
-) -> None:
+def let_go(who: Page | BrowserContext, stack: Site, robot: str) -> None:
     """Release and resume a robot until nothing stops it; a refusal is tried again.
 
     None is asked for while another is under way, which would outlast this call.
@@ -111,14 +114,15 @@ def let_go(
         else:
             return bool(seen["stop_state"] == "RUNNING")
         if answer.ok:
-            until(lambda: is_over(answer), within_s, f"the order to {robot} is over")
+            until(lambda: is_over(answer), f"the order to {robot} is over")
         return False
 
-    until(is_free, within_s, f"{robot} is free")
+    until(is_free, f"{robot} is free")
 
 
 def _get(who: Page | BrowserContext, stack: Site, path: str) -> dict[str, Any]:
-    found: dict[str, Any] = who.request.get(f"{stack.url}/api/v1/{path}").json()
+    url = f"{stack.url}/api/v1/{path}"
+    found: dict[str, Any] = who.request.get(url, max_retries=AGAIN).json()
     return found
 
 

@@ -24,10 +24,10 @@ def strip_stop(page: Page, who: str) -> Locator:
     return page.locator(f'#stops [data-stop="{who}"]')
 
 
-def wait_for_mode(page: Page, robot: str, *modes: str, seconds: float = 30.0) -> None:
+def wait_for_mode(page: Page, robot: str, *modes: str) -> None:
     """Until a card shows one of these modes."""
     wanted = ", ".join(f'[data-robot="{robot}"][data-mode="{mode}"]' for mode in modes)
-    page.wait_for_selector(wanted, timeout=1000 * seconds)
+    page.wait_for_selector(wanted)
 
 
 def evaluate(page: Page, script: str, *arguments: object) -> Any:
@@ -92,6 +92,21 @@ CUT_HEADER = """() => [...document.querySelectorAll(
   .map((it) => it.innerText)"""
 """The words of the status line, of a fault and of whose tablet it is, and the number
 of alerts, where they are cut."""
+
+TABLET = """() => {
+  const make = (tag, name, ...parts) => {
+    const one = document.createElement(tag);
+    one.className = name;
+    one.append(...parts);
+    return one;
+  };
+  const said = make('b', '', 'Bloqueada');
+  said.id = 'tablet-said';
+  const text = make('span', 'chip-button__text', said, make('small', '', 'Nave 2'));
+  const chip = make('button', 'chip-button tablet', make('i', 'icon'), text);
+  document.querySelector('.header__bar .user').before(chip);
+}"""
+"""The chip of a shared tablet, which says whose it is."""
 
 OVERFLOW = "() => document.documentElement.scrollWidth - innerWidth"
 """By how much the page is wider than the screen (px)."""

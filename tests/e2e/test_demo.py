@@ -16,7 +16,7 @@ pytestmark = pytest.mark.e2e
 def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
     with site(tmp_path_factory.mktemp("demo"), IVEG_RECORDINGS="on") as found:
         found.start("demo")
-        found.wait_until_live(deadline_s=60.0)
+        found.wait_until_live()
         yield found
 
 
@@ -49,7 +49,7 @@ def test_both_robots_drive_without_anybody_touching_them(place: Site) -> None:
             speeds = [abs((robot["twist"] or {}).get("linear", 0)) for robot in robots]
             return len(speeds) == 2 and min(speeds) > 0.05
 
-        until(moving, 60.0, "two robots driving at once")
+        until(moving, "two robots driving at once")
 
 
 def test_a_clean_run_ends_with_ctrl_c_and_leaves_nothing_behind(
@@ -62,7 +62,7 @@ def test_a_clean_run_ends_with_ctrl_c_and_leaves_nothing_behind(
 
     assert status == 0
     assert demo.complaints() == []
-    until(lambda: not any(map(is_alive, family)), 30.0, "all children gone")
+    until(lambda: not any(map(is_alive, family)), "all children gone")
 
 
 def test_a_bad_setting_stops_the_start_with_one_sentence(tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ from playwright.sync_api import (
 
 from tests.e2e.frozen import past_site
 from tests.e2e.reading import strip_stop
+from tests.patience import AGAIN
 from tests.pictures.scenes import IDS
 from tests.processes import Site
 
@@ -45,7 +46,7 @@ def context(browser: Browser, past: Site) -> Iterator[BrowserContext]:
     """A signed-in browser on a phone."""
     size = {"width": 390, "height": 844}
     with browser.new_context(viewport=size, locale="es-ES") as found:  # type: ignore[arg-type]
-        found.request.get(past.sign_in_link, max_redirects=0)
+        found.request.get(past.sign_in_link, max_redirects=0, max_retries=AGAIN)
         yield found
 
 
@@ -219,7 +220,7 @@ def test_stop_all_of_ten_robots_stands_where_it_will_stand(
         past_site(tmp_path, IVEG_ROBOTS=",".join(IDS)) as past,
         browser.new_context(locale="es-ES") as context,
     ):
-        context.request.get(past.sign_in_link, max_redirects=0)
+        context.request.get(past.sign_in_link, max_redirects=0, max_retries=AGAIN)
         late = Late(context.new_page(), past.url)
         page, places = late.page, {}
         for wide, high in SIZES:
@@ -255,3 +256,22 @@ def test_stop_is_sent_from_a_page_whose_modules_failed(
     page.goto(past.url + "/alerts")
     strip_stop(page, "AGI").click()
     expect(strip_stop(page, "AGI")).to_contain_text("El servidor la tiene")
+
+
+def test_a_figure_that_is_not_drawn_yet_says_so(
+    context: BrowserContext, past: Site
+) -> None:
+    page = context.new_page()
+    late = list[Route]()
+    page.route("**/static/js/pages/history.js", lambda route: late.append(route))
+    page.goto(past.url + "/history", wait_until="commit")
+    place = page.locator("#chart-stops")
+    said = "one => getComputedStyle(one, '::before').content"
+
+    assert "Cargando" in place.evaluate(said)
+
+    while not late:
+        page.wait_for_timeout(100)
+    late[0].continue_()
+    page.wait_for_selector("#history:not([data-busy])")
+    assert place.evaluate(said) == "none"

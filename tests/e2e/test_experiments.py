@@ -38,8 +38,7 @@ def test_an_operator_starts_watches_ends_and_opens_an_experiment(
         re.compile(
             r"quick-001: 0 de 8 pasadas hechas; ahora demo-field-iveg-1 "
             r"\(reloj virtual\)\. Quedan unos 2:\d\d\."
-        ),
-        timeout=30_000,
+        )
     )
     expect(row).to_contain_text("En marcha")
     expect(page.locator("#experiment-start")).to_be_disabled()
@@ -49,7 +48,7 @@ def test_an_operator_starts_watches_ends_and_opens_an_experiment(
     page.locator("#experiment-stop").click()
     page.click('[data-language="en"]')
 
-    expect(row).to_contain_text("Broken off: an operator ended it", timeout=30_000)
+    expect(row).to_contain_text("Broken off: an operator ended it")
     expect(says).to_have_text("None is running.")
     expect(page.locator("#experiment-start")).to_be_enabled()
     with page.expect_popup() as opened:

@@ -61,7 +61,7 @@ def test_a_goal_is_tapped_and_driven_and_a_plain_tap_is_none(
     ask_for_a_place(page)
     tap_map(page, PLACE)
     expect(page.locator("#sending")).to_contain_text("on its way to the robot")
-    until(lambda: goal()["state"] == "REACHED" or None, 60.0, "AGI is there")
+    until(lambda: goal()["state"] == "REACHED" or None, "AGI is there")
     pose, given = look(page, stack, "AGI")["pose"], goal()
     # The picture moves a little while it is tapped: lines come and go above the map.
     assert math.dist((given["x"], given["y"]), PLACE.values()) < 0.8
@@ -73,7 +73,7 @@ def test_a_goal_is_tapped_and_driven_and_a_plain_tap_is_none(
     panel = card(page, "AGI").locator("dialog")
     panel.locator('[data-part="goal-aisle"]').select_option(label="Aisle 3")
     panel.locator('[data-goal="aisle"]').click()
-    until(lambda: goal()["kind"] == "aisle" or None, 10.0, "AGI is sent to an aisle")
+    until(lambda: goal()["kind"] == "aisle" or None, "AGI is sent to an aisle", 10.0)
     orders = open_page(locale="en-GB", route="/commands").locator("#orders-rows")
     expect(orders).to_contain_text("Goal: Aisle 3")
     expect(orders).to_contain_text("Is at its goal")

@@ -20,6 +20,7 @@ from tests.e2e.reading import (
     CUT_HEADER,
     OVERFLOW,
     SMALLEST_STOP,
+    TABLET,
     evaluate,
     strip_stop,
 )
@@ -88,7 +89,14 @@ def fleet(
 def test_13_19_nothing_overflows_or_covers_a_stop_and_stops_stand_apart(
     fleet: Fleet,
 ) -> None:
-    wanted = {"overflow": 0, "covered": [], "apart": True, "large": True, "header": []}
+    wanted = {
+        "overflow": 0,
+        "covered": [],
+        "apart": True,
+        "large": True,
+        "header": [],
+        "tags": [],
+    }
     for size in SIZES:
         page = fleet.at(size)
         found = {
@@ -97,6 +105,7 @@ def test_13_19_nothing_overflows_or_covers_a_stop_and_stops_stand_apart(
             "apart": evaluate(page, NEAREST_STOP) >= APART_PX,
             "large": evaluate(page, SMALLEST_STOP) >= 64,
             "header": evaluate(page, COLLISIONS),
+            "tags": evaluate(page, TAGS_ON_WORDS),
         }
         assert found == wanted, size
 
@@ -273,19 +282,25 @@ LONG = (
 
 
 @pytest.mark.parametrize("fleet", [6], indirect=True)
-def test_a_small_card_of_a_desktop_says_whole_what_it_is_because_of(
-    fleet: Fleet,
+@pytest.mark.parametrize(
+    "size", [(1200, 800), (1440, 900), (1024, 768), (390, 844), (360, 740)]
+)
+def test_a_small_card_says_whole_what_it_is_because_of(
+    fleet: Fleet, size: tuple[int, int]
 ) -> None:
     first = frozen()["snapshot"]["robots"][0]
+    card = fleet.at(size).locator('.card[data-robot="AGI"]')
     cut = set()
-    for size in ((1200, 800), (1440, 900)):
-        fleet.at(size)
-        for name in LONG:
-            known = STAGED[name][0]
-            fleet.tell({**first, "situation": staged.told(known), "age_s": known.age_s})
-            fleet.page.clock.run_for(1500)
-            if evaluate(fleet.page, CUT_SAID):
-                cut.add((name, size))
+    for name in LONG:
+        known = STAGED[name][0]
+        told = {**first, "situation": staged.told(known), "age_s": known.age_s}
+        fleet.tell(told)
+        fleet.page.clock.run_for(1000)  # The cards find their order.
+        fleet.tell(told)
+        # Else it would say how late it is.
+        expect(card).to_have_attribute("data-link", "LIVE")
+        if evaluate(fleet.page, CUT_SAID):
+            cut.add(name)
     fleet.tell(first)
 
     assert cut == set()
@@ -595,23 +610,28 @@ def test_a_silent_server_is_told_whole_beside_whose_tablet_it_is(
         page.clock.run_for(4000)
 
         expect(page.locator("#health-sentence")).to_have_text("Servidor no responde")
+        todo = page.locator(".card__todo").first
+        expect(todo).to_have_text("trátelo como en marcha")
         assert evaluate(page, CUT_HEADER) == []
 
 
-TABLET = """() => {
-  const make = (tag, name, ...parts) => {
-    const one = document.createElement(tag);
-    one.className = name;
-    one.append(...parts);
-    return one;
-  };
-  const said = make('b', '', 'Bloqueada');
-  said.id = 'tablet-said';
-  const text = make('span', 'chip-button__text', said, make('small', '', 'Nave 2'));
-  const chip = make('button', 'chip-button tablet', make('i', 'icon'), text);
-  document.querySelector('.header__bar .user').before(chip);
-}"""
-"""The chip of a shared tablet, which says whose it is."""
+def test_a_phone_says_below_the_tap_that_its_browser_allows_no_notifications(
+    browser: Browser, past: Site
+) -> None:
+    with frozen_page(browser, past, (390, 844)) as page:
+        page.goto(past.url + "/settings")
+        page.locator("#messages-section").evaluate("(section) => section.open = true")
+        settle(page, "#push-join:visible")
+        page.locator("#push-join").click()
+
+        said = page.locator("#push-result")
+        expect(said).to_have_text("El navegador no permite notificaciones de iVeg.")
+        expect(said).to_be_in_viewport(ratio=1)
+        tap, answer = page.locator("#push-join").bounding_box(), said.bounding_box()
+        assert tap is not None
+        assert answer is not None
+        assert 0 <= answer["y"] - tap["y"] - tap["height"] < 24
+
 
 CUT_LISTS = """() => [...document.querySelectorAll('.scroll-x')]
   .filter((it) => it.querySelector('.table--list, #machines'))
@@ -658,7 +678,7 @@ def test_the_screen_of_a_wall_looks_and_stops_and_frees_nothing(
 TAGS_ON_WORDS = """() => [...document.querySelectorAll('.card')].filter((card) => {
   const bottom = (part) => card.querySelector(part).getBoundingClientRect().bottom;
   const mode = card.querySelector('.card__mode').getBoundingClientRect();
-  return bottom('.link') > mode.top + 1;
+  return bottom('.link') > mode.top - 1;
 }).map((card) => card.dataset.robot)"""
 """Cards on which the age covers what is said."""
 

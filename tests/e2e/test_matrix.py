@@ -25,6 +25,7 @@ from tests.e2e.reading import (
     visit,
 )
 from tests.e2e.slowly import draw_slowly
+from tests.patience import PATIENCE_MS
 from tests.processes import Program, Site, until
 
 pytestmark = pytest.mark.e2e
@@ -56,7 +57,7 @@ def only(browser: Browser, stack: Site) -> Iterator[Page]:
     would be found over a card.
     """
     context = browser.new_context(locale="es-ES", reduced_motion="reduce")
-    context.set_default_timeout(60_000)
+    context.set_default_timeout(PATIENCE_MS)
     draw_slowly(context)
     page = context.new_page()
     page.goto(stack.sign_in_link)
@@ -86,7 +87,7 @@ def live(only: Page, width: int) -> Page:
 def test_the_log_can_be_reached(live: Page, width: int) -> None:
     live.locator(WAY_TO_LOG[width]).first.click()
 
-    expect(live.locator("#log li").first).to_be_in_viewport(timeout=30_000)
+    expect(live.locator("#log li").first).to_be_in_viewport()
     assert evaluate(live, COVERED_STOPS) == []
     live.reload()
 
@@ -167,7 +168,7 @@ def test_a_ring_on_the_map_opens_its_decision(live: Page, stack: Site) -> None:
             chain.wait_for(timeout=4000)
         return chain.is_visible()
 
-    until(opens, 90.0, "a ring that opens a decision")
+    until(opens, "a ring that opens a decision")
     assert _at_each_width(live, COVERED_STOPS) == [[]] * len(SIZES)
     live.keyboard.press("Escape")
     expect(panel).to_be_hidden()
@@ -184,7 +185,7 @@ def test_every_route_fits_every_screen_and_its_stops_suit_a_glove(
         name = route.strip("/").replace("/", "-") or "live"
         shoot(only, f"{name}-{wide}")
         # Charts hear of a new width a moment later.
-        until(lambda: evaluate(only, OVERFLOW) <= 0, 30.0, f"it fits {wide} px")
+        until(lambda: evaluate(only, OVERFLOW) <= 0, f"it fits {wide} px")
         found[wide] = evaluate(only, COVERED_STOPS)
         assert evaluate(only, SMALLEST_STOP) >= 64
 
@@ -213,7 +214,7 @@ def test_no_message_covers_a_stop_on_any_route(only: Page, stack: Site) -> None:
     _newest(stack, "emulator").kill()
     with stack.api() as api:
         api.post("fleet/stop")
-    expect(only.locator("#p1 .p1__line").first).to_be_visible(timeout=30_000)
+    expect(only.locator("#p1 .p1__line").first).to_be_visible()
 
     covered = {route: _covered(only, route) for route in ROUTES}
     # Dialogs without a message: ``test_no_dialog_covers_a_stop_at_any_width``.
@@ -227,13 +228,13 @@ def test_without_the_server_the_page_says_so_and_draws_a_veil(
 ) -> None:
     visit(only, "/")
     only.locator("#map").scroll_into_view_if_needed()
-    before = until(lambda: _painted(only), 30.0, "a map")
+    before = until(lambda: _painted(only), "a map")
 
     _newest(stack, "serve").kill()
 
-    expect(only.locator("#status")).to_contain_text("Sin conexión", timeout=30_000)
+    expect(only.locator("#status")).to_contain_text("Sin conexión")
     expect(only.locator("body")).to_have_attribute("data-connection", "lost")
-    until(lambda: _changed(before, _pixels(only)) > 0.2, 30.0, "a veil")
+    until(lambda: _changed(before, _pixels(only)) > 0.2, "a veil")
     assert _at_each_width(only, COVERED_STOPS) == [[]] * len(SIZES)
     assert _at_each_width(only, OVERFLOW) == [0] * len(SIZES)
 

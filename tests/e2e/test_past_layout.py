@@ -5,7 +5,7 @@ from datetime import datetime
 from urllib.parse import parse_qs, urlsplit
 
 import pytest
-from playwright.sync_api import Browser, Page, Route
+from playwright.sync_api import Browser, Page, Route, expect
 
 from tests.e2e.frozen import frozen_page, past_site, settle
 from tests.e2e.reading import COVERED_STOPS, OVERFLOW, evaluate
@@ -31,8 +31,8 @@ def past(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
 
 @pytest.fixture(scope="module")
 def page(browser: Browser, past: Site) -> Iterator[Page]:
-    """The page of a moment at which a robot was slow."""
-    told = fleet(10, "slow")
+    """The page of a moment at which a robot did not obey a STOP, as now."""
+    told = fleet(10, "disobeyed")
     with frozen_page(browser, past, SIZES[0], tell=lambda: told) as found:
         prepare(found, "past", told, past.url)
         found.goto(past.url + PAGES["past"])
@@ -51,6 +51,15 @@ def test_the_bar_of_the_past_covers_no_stop_and_no_tool_of_the_map(
     page.evaluate("() => scrollTo(0, 0)")
     assert evaluate(page, UNDER_BAR) == []
     assert evaluate(page, OVERFLOW) == 0
+    expect(page.locator("#p1 .p1__line")).to_be_in_viewport(ratio=1)
+
+
+def test_nobody_is_told_what_to_do_about_a_moment_that_is_past(page: Page) -> None:
+    card = page.locator(".card[data-level=danger]")
+
+    expect(card).to_have_count(1)
+    expect(card.locator(".card__todo")).to_be_empty()
+    expect(page.locator("#status-said")).to_contain_text("use la seta roja")
 
 
 @pytest.mark.parametrize(

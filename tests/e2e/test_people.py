@@ -7,7 +7,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from iveg.domain.records import AuditRecord
-from iveg.web.security.sessions import IDLE_S, STOP_ONLY_S
+from iveg.web.security.session_life import IDLE_S, STOP_ONLY_S
 from tests.e2e.desk import Served, served
 from tests.e2e.reading import serious
 from tests.processes import until
@@ -130,7 +130,7 @@ def test_a_tablet_releases_by_name_until_it_locks_by_itself_and_stops_always(
     expect(page.locator("body")).to_have_attribute("data-role", "operator")
     assert page.evaluate(POST, release) == 202
     # The audit's row follows the answer.
-    until(lambda: released_by(desk) == ["Nave 2", ANA.name], 20.0, "Ana's release")
+    until(lambda: released_by(desk) == ["Nave 2", ANA.name], "Ana's release")
 
     desk.clock.now += 121.0
     page.goto(f"{place.url}/commands")
@@ -153,7 +153,7 @@ def test_a_session_that_is_over_still_stops_and_its_pages_say_so(
 
     page.locator(STOP_FLEET).click()
 
-    until(lambda: len(desk.fleet.stops) > before, 20.0, "STOP by the button")
+    until(lambda: len(desk.fleet.stops) > before, "STOP by the button")
     assert page.evaluate(POST, ["robots/AGI/release", {"holds": [hold]}]) == 403
     page.goto(f"{place.url}/alerts")
     expect(page.locator(STOP_FLEET)).to_be_visible()

@@ -31,8 +31,6 @@ _NOTE_WHEN = """([selector]) => {
   new MutationObserver(note).observe(control, options);
 }"""
 BOTH_STANDING = re.compile(r"PARADO \(2/2\)")
-WITHIN_MS = 30_000
-"""Braking, the window of 1.0 s in which standing is measured, and a busy machine."""
 
 
 class Line:
@@ -83,24 +81,22 @@ def test_a_press_makes_the_robot_stand_says_how_long_it_took_and_lets_others_dri
 ) -> None:
     strip_stop(page, "AGI").click()
 
-    expect(strip_stop(page, "AGI")).to_contain_text(STANDING, timeout=WITHIN_MS)
+    expect(strip_stop(page, "AGI")).to_contain_text(STANDING)
     expect(card(page, "AGI")).to_have_attribute("data-mode", "STOPPED")
     expect(card(page, "AGII")).to_have_attribute(
         "data-mode", re.compile("RUNNING|SLOW")
     )
     # Its speed comes on a longer way than the word that it stands.
-    until(lambda: abs(number(page, "AGI", "v")) < 0.02, 30.0, "AGI shows its rest")
+    until(lambda: abs(number(page, "AGI", "v")) < 0.02, "AGI shows its rest")
     expect(page.locator('#log [data-kind="command"]').first).to_be_visible()
 
 
 def test_a_press_in_the_past_stops_the_robot_of_now(
     page: Page, stack: Site, open_page: OpenPage
 ) -> None:
-    at = until(lambda: _drove_at(page, stack), 90.0, "a moment at which AGI drove")
+    at = until(lambda: _drove_at(page, stack), "a moment at which AGI drove")
     past = open_page(route=f"/?t={at}")
-    expect(card(past, "AGI").locator("[data-field=x]")).not_to_have_text(
-        "—", timeout=60_000
-    )
+    expect(card(past, "AGI").locator("[data-field=x]")).not_to_have_text("—")
     expect(past.locator("#past")).to_contain_text("PASADO")
     expect(past.locator("#status-said")).to_contain_text("no en este mapa")
 
@@ -109,10 +105,8 @@ def test_a_press_in_the_past_stops_the_robot_of_now(
 
     strip_stop(past, "AGI").click()
 
-    expect(card(page, "AGI")).to_have_attribute(
-        "data-mode", "STOPPED", timeout=WITHIN_MS
-    )
-    expect(strip_stop(past, "AGI")).to_contain_text(STANDING, timeout=WITHIN_MS)
+    expect(card(page, "AGI")).to_have_attribute("data-mode", "STOPPED")
+    expect(strip_stop(past, "AGI")).to_contain_text(STANDING)
     expect(card(past, "AGI")).to_have_attribute("data-mode", shown)
     assert evaluate(past, COVERED_STOPS) == []
     past.keyboard.press("Escape")
@@ -133,7 +127,7 @@ def _drove_at(page: Page, stack: Site) -> str | None:
             told = answer.json()
             return told if answer.is_success and told["at_s"] > moment - 0.3 else None
 
-        robots = until(world, 60.0, "the past answers")["robots"]
+        robots = until(world, "the past answers")["robots"]
     # The page goes no nearer to now, as the newest is not recorded yet.
     page.wait_for_timeout(1000 * max(0.0, moment + 4.0 - time.time()))
     (agi,) = (one for one in robots if one["robot_id"] == "AGI")
@@ -143,7 +137,7 @@ def _drove_at(page: Page, stack: Site) -> str | None:
 def test_one_press_stops_the_fleet(page: Page) -> None:
     strip_stop(page, "fleet").click()
 
-    expect(strip_stop(page, "fleet")).to_contain_text(BOTH_STANDING, timeout=WITHIN_MS)
+    expect(strip_stop(page, "fleet")).to_contain_text(BOTH_STANDING)
 
 
 def test_the_keyboard_stops_the_fleet_while_a_field_has_focus(page: Page) -> None:
@@ -152,7 +146,7 @@ def test_the_keyboard_stops_the_fleet_while_a_field_has_focus(page: Page) -> Non
 
     page.keyboard.press("Control+.")
 
-    expect(strip_stop(page, "fleet")).to_contain_text(BOTH_STANDING, timeout=WITHIN_MS)
+    expect(strip_stop(page, "fleet")).to_contain_text(BOTH_STANDING)
 
 
 def test_pointer_click_and_keys_are_one_press(page: Page, stack: Site) -> None:
@@ -160,7 +154,7 @@ def test_pointer_click_and_keys_are_one_press(page: Page, stack: Site) -> None:
     strip_stop(page, "AGI").dblclick()
     page.keyboard.press("Enter")
     page.keyboard.press("Space")
-    expect(strip_stop(page, "AGI")).to_contain_text(STANDING, timeout=WITHIN_MS)
+    expect(strip_stop(page, "AGI")).to_contain_text(STANDING)
 
     with stack.api() as api:
 
@@ -169,7 +163,7 @@ def test_pointer_click_and_keys_are_one_press(page: Page, stack: Site) -> None:
             new = [one for one in found if one["times"]["requested"] >= began]
             return [one["command_id"] for one in new if one["kind"] == "stop"]
 
-        until(stops, 30.0, "the STOP is in the history")
+        until(stops, "the STOP is in the history")
         assert len(stops()) == 1
 
 
@@ -184,7 +178,7 @@ def test_i10_every_browser_shows_a_stop_within_a_second(
 
     strip_stop(page, "AGI").click()
 
-    expect(strip_stop(other, "AGI")).to_contain_text(STANDING, timeout=WITHIN_MS)
+    expect(strip_stop(other, "AGI")).to_contain_text(STANDING)
     pressed, seen = (evaluate(one, "() => window.__changedAt") for one in (page, other))
     assert seen - pressed < 1000.0
 
@@ -197,28 +191,26 @@ def test_i10_a_browser_whose_line_is_dead_shows_itself_stale(
     other.route_web_socket("**/live", line.join)
     other.reload()
     control = strip_stop(other, "AGI")
-    expect(control).to_have_attribute("data-state", "ready", timeout=WITHIN_MS)
+    expect(control).to_have_attribute("data-state", "ready")
     expect(card(other, "AGI")).to_have_attribute("data-link", "LIVE")
 
     line.is_dead = True
 
     # Half-open: nothing closes the socket, it only says nothing any more.
-    expect(control).not_to_have_attribute("data-state", "ready", timeout=WITHIN_MS)
-    expect(card(other, "AGI")).to_have_attribute(
-        "data-link", re.compile("LATE|LOST"), timeout=WITHIN_MS
-    )
-    expect(other.locator("#status")).to_contain_text("Sin conexión", timeout=WITHIN_MS)
+    expect(control).not_to_have_attribute("data-state", "ready")
+    expect(card(other, "AGI")).to_have_attribute("data-link", re.compile("LATE|LOST"))
+    expect(other.locator("#status")).to_contain_text("Sin conexión")
     strip_stop(page, "AGI").click()
-    expect(strip_stop(page, "AGI")).to_contain_text(STANDING, timeout=WITHIN_MS)
+    expect(strip_stop(page, "AGI")).to_contain_text(STANDING)
     expect(control).to_have_attribute("data-state", "lost")
 
 
 def test_only_a_release_that_is_held_and_then_a_resume_drive_again(page: Page) -> None:
     strip_stop(page, "AGI").click()
-    expect(strip_stop(page, "AGI")).to_contain_text(STANDING, timeout=WITHIN_MS)
+    expect(strip_stop(page, "AGI")).to_contain_text(STANDING)
     open_menu(page, "AGI")
     release = page.locator('[data-release="AGI"]')
-    expect(release).to_be_enabled(timeout=WITHIN_MS)
+    expect(release).to_be_enabled()
 
     release.click(delay=1000)
     begin_hold(page, release)
@@ -229,8 +221,8 @@ def test_only_a_release_that_is_held_and_then_a_resume_drive_again(page: Page) -
     expect(card(page, "AGI")).to_have_attribute("data-mode", "STOPPED")
 
     hold(page, release, page.locator('[data-resume="AGI"]'))
-    until(lambda: abs(number(page, "AGI", "v")) < 0.02, 30.0, "AGI shows its rest")
+    until(lambda: abs(number(page, "AGI", "v")) < 0.02, "AGI shows its rest")
 
     page.locator('[data-resume="AGI"]').click()
     wait_for_mode(page, "AGI", "RUNNING", "SLOW")
-    until(lambda: abs(number(page, "AGI", "v")) > 0.1, 30.0, "AGI drives")
+    until(lambda: abs(number(page, "AGI", "v")) > 0.1, "AGI drives")

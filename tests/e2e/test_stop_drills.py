@@ -15,11 +15,11 @@ from tests.e2e.conftest import OpenPage
 from tests.e2e.hands import let_go, look, open_menu
 from tests.e2e.puppet import CRUISE, Puppet, stage
 from tests.e2e.reading import OVERFLOW, card, serious, strip_stop
+from tests.patience import AGAIN
 from tests.processes import Site, until
 
 pytestmark = [pytest.mark.e2e, pytest.mark.slow]
 
-WITHIN_MS = 30_000
 VIEWER = secrets.token_urlsafe(32)
 _TWO_SECONDS = str(2 / 86_400)
 """Drills are due this soon (days)."""
@@ -61,18 +61,16 @@ def test_a_drill_is_one_tap_and_ends_with_its_time_in_the_history(
     open_menu(page, "AGV")
     panel = card(page, "AGV").locator("dialog")
     why = panel.locator('[data-part="drill-why"]')
-    expect(why).to_have_text("Está parado o casi: se puede hacer.", timeout=WITHIN_MS)
+    expect(why).to_have_text("Está parado o casi: se puede hacer.")
     panel.locator('[data-drill="AGV"]').click()
 
     result = panel.locator('[data-part="drill-result"]')
     expect(result).to_have_text(
-        re.compile(r"Superado: parado en \d+ ms\. Sigue parado: rearme y reanude\."),
-        timeout=WITHIN_MS,
+        re.compile(r"Superado: parado en \d+ ms\. Sigue parado: rearme y reanude\.")
     )
     expect(why).to_have_text("Ya tiene una parada: primero rearme y reanude.")
     expect(panel.locator('[data-part="drill-last"]')).to_have_text(
-        re.compile(r"El último: [\d/]+ [\d:]+, por operador\. Superado"),
-        timeout=WITHIN_MS,
+        re.compile(r"El último: [\d/]+ [\d:]+, por operador\. Superado")
     )
     assert agv.holds == [look(page, stack, "AGV")["stop"]["command_id"]]
     with stack.api() as api:
@@ -89,8 +87,7 @@ def test_a_robot_that_drives_is_not_drilled_and_the_control_says_why(
     open_menu(page, "AGV")
 
     expect(card(page, "AGV").locator('[data-part="drill-why"]')).to_have_text(
-        "Va demasiado deprisa: espere a que esté parado o no pase de 0,2 m/s.",
-        timeout=WITHIN_MS,
+        "Va demasiado deprisa: espere a que esté parado o no pase de 0,2 m/s."
     )
     expect(page.locator('[data-drill="AGV"]')).to_be_disabled()
 
@@ -101,16 +98,12 @@ def test_a_robot_that_does_not_brake_fails_its_drill(page: Page, agv: Puppet) ->
     page.locator('[data-drill="AGV"]').click()
 
     result = card(page, "AGV").locator('[data-part="drill-result"]')
-    expect(result).to_contain_text(
-        "Fallido: en 5 s no se comprobó que se parase.", timeout=WITHIN_MS
-    )
+    expect(result).to_contain_text("Fallido: en 5 s no se comprobó que se parase.")
     expect(card(page, "AGV").locator('[data-field="mode"]')).to_have_text(
         "Parada recibida pero se mueve"
     )
     agv.brakes = True
-    expect(strip_stop(page, "AGV")).to_have_attribute(
-        "data-state", "standing", timeout=WITHIN_MS
-    )
+    expect(strip_stop(page, "AGV")).to_have_attribute("data-state", "standing")
 
 
 @pytest.mark.usefixtures("agv")
@@ -120,7 +113,7 @@ def test_the_sheet_of_drills_prints_with_the_honest_sentence_and_a_line_to_sign(
     page.goto(f"{stack.url}/commands")
     line = page.locator('[data-drills-of="AGV"]')
     expect(line).to_contain_text(re.compile(r"Fallido: tardó \d[\d.]* ms"))
-    expect(line).to_contain_text("toca simulacro de parada", timeout=WITHIN_MS)
+    expect(line).to_contain_text("toca simulacro de parada")
     assert serious(page) == []
 
     page.emulate_media(media="print")
@@ -144,20 +137,20 @@ def test_a_viewer_sees_no_drill_to_press_and_may_stop(
     open_menu(viewer, "AGV")
 
     expect(card(viewer, "AGV").locator('[data-part="drill-why"]')).to_have_text(
-        "Solo un operador puede hacer un simulacro.", timeout=WITHIN_MS
+        "Solo un operador puede hacer un simulacro."
     )
     expect(viewer.locator('[data-drill="AGV"]')).to_be_disabled()
     assert viewer.evaluate(OVERFLOW) <= 0
     asked = viewer.request.post(
         f"{stack.url}/api/v1/robots/AGV/drill",
         headers={"X-IVEG": "1", "Sec-Fetch-Site": "same-origin"},
+        max_retries=AGAIN,
     )
     assert asked.status == 403
     viewer.keyboard.press("Escape")
     viewer.locator('[data-stop="AGV"]:visible').first.click()
     until(
         lambda: look(viewer, stack, "AGV")["stop_state"] == "STANDING",
-        30.0,
         "the viewer's STOP stands",
     )
 

@@ -14,7 +14,6 @@ from tests.processes import Program, Site, until
 
 pytestmark = [pytest.mark.e2e, pytest.mark.slow]
 
-WITHIN_MS = 30_000
 HOUR = 3600.0
 
 
@@ -51,14 +50,14 @@ def test_the_open_page_recovers_from_a_kill_by_itself_and_its_stop_stands(
     page: Page, agv: Puppet, stack: Site
 ) -> None:
     _server(stack).kill()
-    expect(page.locator("#status")).to_contain_text("Sin conexión", timeout=WITHIN_MS)
+    expect(page.locator("#status")).to_contain_text("Sin conexión")
     expect(strip_stop(page, "AGV")).to_have_attribute("data-state", "lost")
     _serve_again(stack)
 
     control = strip_stop(page, "AGV")
-    expect(control).to_have_attribute("data-state", "ready", timeout=WITHIN_MS)
+    expect(control).to_have_attribute("data-state", "ready")
     control.click()
-    expect(control).to_contain_text("PARADO (", timeout=WITHIN_MS)
+    expect(control).to_contain_text("PARADO (")
     assert agv.speed == 0.0
 
 
@@ -67,11 +66,11 @@ def test_a_press_while_the_server_is_dead_arrives_when_it_is_back(
 ) -> None:
     _server(stack).kill()
     control = strip_stop(page, "AGV")
-    expect(control).to_have_attribute("data-state", "lost", timeout=WITHIN_MS)
+    expect(control).to_have_attribute("data-state", "lost")
     control.click()
     _serve_again(stack)
 
-    expect(control).to_contain_text("PARADO (", timeout=WITHIN_MS)
+    expect(control).to_contain_text("PARADO (")
     assert agv.speed == 0.0
 
 
@@ -83,18 +82,18 @@ def test_f42_a_page_whose_session_is_over_stops_and_asks_to_sign_in_for_the_rest
     _serve_again(stack)
 
     control = strip_stop(page, "AGV")
-    expect(control).to_contain_text("PARAR AGV (sesión terminada)", timeout=WITHIN_MS)
+    expect(control).to_contain_text("PARAR AGV (sesión terminada)")
     expect(page.locator("#status")).to_contain_text("La sesión ha terminado")
     control.click()
 
     expect(control).to_contain_text("Orden entregada: mire el robot o entre de nuevo")
-    until(lambda: agv.speed == 0.0, 30.0, "the robot stands")
+    until(lambda: agv.speed == 0.0, "the robot stands")
     open_menu(page, "AGV")
     why = card(page, "AGV").locator('[data-part="release-why"]')
     expect(why).to_have_text("La sesión ha terminado: entre de nuevo para rearmar.")
     expect(page.locator('[data-release="AGV"]')).to_be_disabled()
     page.goto(stack.sign_in_link)
-    expect(strip_stop(page, "AGV")).to_contain_text("PARADO", timeout=WITHIN_MS)
+    expect(strip_stop(page, "AGV")).to_contain_text("PARADO")
 
 
 @pytest.mark.usefixtures("agv")
@@ -108,7 +107,7 @@ def test_who_signed_out_can_no_longer_stop_and_no_page_looks_as_if_they_could(
     other.wait_for_url("**/signin")
 
     control = strip_stop(page, "AGV")
-    expect(control).to_have_attribute("data-state", "lost", timeout=WITHIN_MS)
+    expect(control).to_have_attribute("data-state", "lost")
     expect(control).to_contain_text("SIN ENLACE — use la seta roja del robot")
 
 

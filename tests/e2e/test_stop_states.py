@@ -21,7 +21,6 @@ from tests.processes import EMULATOR, Program, Site, site, until
 pytestmark = [pytest.mark.e2e, pytest.mark.slow]
 
 STANDING = re.compile(r"PARADO \(hace [\d,]+ s\)")
-WITHIN_MS = 30_000
 
 _WATCH = """([robot]) => {
   const control = document.querySelector(`#stops [data-stop="${robot}"]`);
@@ -116,7 +115,7 @@ def test_a_late_link_has_amber_and_its_age_and_a_lost_one_is_hatched_and_crossed
     in_english = strip_stop(english, "AGI")
     evaluate(page, _WATCH, "AGI")
     with _frozen(stack, "emulator"):
-        expect(agi).to_have_attribute("data-state", "lost", timeout=WITHIN_MS)
+        expect(agi).to_have_attribute("data-state", "lost")
         late = [(text, outline) for text, outline in _said(page, "late") if "(" in text]
         assert re.search(r"PARAR AGI\s+\(enlace lento [1-3] s\)", late[0][0])
         assert {outline for _, outline in late} == {"block"}
@@ -125,7 +124,7 @@ def test_a_late_link_has_amber_and_its_age_and_a_lost_one_is_hatched_and_crossed
         assert "repeating-linear-gradient" in _style(agi, "backgroundImage", "::before")
         assert "×" in _style(agi.locator(".stop__who"), "content", "::before")
 
-    expect(agi).to_have_attribute("data-state", "ready", timeout=WITHIN_MS)
+    expect(agi).to_have_attribute("data-state", "ready")
 
 
 # --- unconfirmed ---------------------------------------------------------------------
@@ -135,7 +134,7 @@ def test_a_lost_control_still_sends_and_says_loudly_what_nobody_confirms(
     page: Page, agi: Locator, english: Page, stack: Site
 ) -> None:
     with _frozen(stack, "emulator"):
-        expect(agi).to_have_attribute("data-state", "lost", timeout=WITHIN_MS)
+        expect(agi).to_have_attribute("data-state", "lost")
         agi.click()
 
         expect(agi).to_contain_text("PARADA SIN CONFIRMAR — use la seta roja")
@@ -154,14 +153,14 @@ def test_a_lost_control_still_sends_and_says_loudly_what_nobody_confirms(
         assert box is not None
         assert box["width"] > 1300
         first = _numbers(line)
-        until(lambda: _numbers(line)["tries"] > first["tries"] + 1, 30.0, "more tries")
-        until(lambda: _numbers(line)["pressed"] > first["pressed"], 30.0, "it ages")
+        until(lambda: _numbers(line)["tries"] > first["tries"] + 1, "more tries")
+        until(lambda: _numbers(line)["pressed"] > first["pressed"], "it ages")
         later = _numbers(line)
         assert later["pressed"] > first["pressed"]
         assert later["heard"] > first["heard"]
 
     # L1: nobody has to do anything for the truth to come back.
-    expect(agi).to_contain_text(STANDING, timeout=WITHIN_MS)
+    expect(agi).to_contain_text(STANDING)
     expect(page.locator("#p1 .p1__line")).to_have_count(0)
 
 
@@ -173,13 +172,13 @@ def test_a_deaf_robot_drives_on_and_the_page_says_how_far_it_may_be(
     strip_stop(page, "AGV").click()
 
     line = page.locator("#p1 .p1__line")
-    expect(line).to_contain_text("a 0,40 m/s", timeout=WITHIN_MS)
+    expect(line).to_contain_text("a 0,40 m/s")
     expect(line).to_contain_text(re.compile(r"Puede haber avanzado [\d,]+ m"))
     first = _numbers(line)["moved"]
-    until(lambda: _numbers(line)["moved"] > first + 0.5, 30.0, "the doubt grows")
+    until(lambda: _numbers(line)["moved"] > first + 0.5, "the doubt grows")
 
     agv.answers = agv.brakes = agv.speaks = True
-    expect(strip_stop(page, "AGV")).to_contain_text(STANDING, timeout=WITHIN_MS)
+    expect(strip_stop(page, "AGV")).to_contain_text(STANDING)
 
 
 # --- asked, acknowledged, standing ---------------------------------------------------
@@ -192,9 +191,9 @@ def test_asked_acknowledged_and_standing_are_three_different_words(
     evaluate(page, _WATCH, "AGV")
     control = strip_stop(page, "AGV")
     control.click()
-    expect(control).to_contain_text("Confirmado, frenando…", timeout=WITHIN_MS)
+    expect(control).to_contain_text("Confirmado, frenando…")
     agv.brakes = True
-    expect(control).to_contain_text(STANDING, timeout=WITHIN_MS)
+    expect(control).to_contain_text(STANDING)
 
     said: list[list[str]] = page.evaluate("window.__said")
     states = list(dict.fromkeys(state for state, *_ in said if state != "ready"))
@@ -210,13 +209,13 @@ def test_f40_a_robot_that_only_says_that_it_brakes_is_told_on(
     strip_stop(page, "AGV").click()
 
     control = strip_stop(page, "AGV")
-    expect(control).to_contain_text("RECIBIDA PERO SE MUEVE", timeout=WITHIN_MS)
+    expect(control).to_contain_text("RECIBIDA PERO SE MUEVE")
     line = page.locator("#p1 .p1__line")
     expect(line).to_contain_text("AGV: RECIBIDA PERO SE MUEVE: use la seta roja")
     expect(line).to_contain_text("a 0,40 m/s")
 
     agv.brakes = True
-    expect(control).to_contain_text(STANDING, timeout=WITHIN_MS)
+    expect(control).to_contain_text(STANDING)
 
 
 # --- was standing ---------------------------------------------------------------------
@@ -226,7 +225,7 @@ def test_a_standstill_that_is_no_longer_reported_turns_grey_and_counts(
     page: Page, agi: Locator, stack: Site
 ) -> None:
     agi.click()
-    expect(agi).to_contain_text(STANDING, timeout=WITHIN_MS)
+    expect(agi).to_contain_text(STANDING)
     evaluate(page, _WATCH, "AGI")
 
     def has_counted() -> bool:
@@ -237,10 +236,10 @@ def test_a_standstill_that_is_no_longer_reported_turns_grey_and_counts(
         )
 
     with _frozen(stack, "emulator"):
-        expect(agi).to_have_attribute("data-state", "stale", timeout=WITHIN_MS)
-        until(has_counted, 30.0, "it counts the seconds")
+        expect(agi).to_have_attribute("data-state", "stale")
+        until(has_counted, "it counts the seconds")
 
-    expect(agi).to_contain_text(STANDING, timeout=WITHIN_MS)
+    expect(agi).to_contain_text(STANDING)
 
 
 def test_a_held_robot_that_moves_again_is_stopped_under_a_new_id(
@@ -248,16 +247,16 @@ def test_a_held_robot_that_moves_again_is_stopped_under_a_new_id(
 ) -> None:
     control = strip_stop(page, "AGV")
     control.click()
-    expect(control).to_contain_text(STANDING, timeout=WITHIN_MS)
+    expect(control).to_contain_text(STANDING)
     before = look(page, stack, "AGV")["stop"]["command_id"]
     agv.brakes, agv.speed = False, CRUISE
 
-    expect(control).to_contain_text("SE HA MOVIDO", timeout=WITHIN_MS)
+    expect(control).to_contain_text("SE HA MOVIDO")
     expect(page.locator("#p1 .p1__line")).to_contain_text("AGV: SE HA MOVIDO.")
     assert look(page, stack, "AGV")["stop"]["command_id"] != before
 
     agv.brakes = True
-    expect(control).to_contain_text(STANDING, timeout=WITHIN_MS)
+    expect(control).to_contain_text(STANDING)
 
 
 # --- release --------------------------------------------------------------------------
@@ -268,22 +267,22 @@ def test_nothing_is_released_on_old_news(
 ) -> None:
     page = _listening(open_page())
     agi.click()
-    expect(agi).to_contain_text(STANDING, timeout=WITHIN_MS)
+    expect(agi).to_contain_text(STANDING)
     holds = [hold["id"] for hold in look(page, stack, "AGI")["holds"]]
     open_menu(page, "AGI")
     release = page.locator('[data-release="AGI"]')
     expect(release).to_be_enabled()
     with _frozen(stack, "emulator"):
-        expect(release).to_be_disabled(timeout=WITHIN_MS)
+        expect(release).to_be_disabled()
         expect(card(page, "AGI").locator('[data-part="release-why"]')).to_have_text(
             "Sin datos recientes del robot."
         )
         # The page counts the way of a report, too, and may call it old a little sooner.
-        until(lambda: _report_age(page, stack) > 1.5, 30.0, "the server's is old, too")
+        until(lambda: _report_age(page, stack) > 1.5, "the server's is old, too")
         body = {"holds": holds}
         assert ask(page, stack, "robots/AGI/release", body).status == 409
 
-    expect(agi).to_contain_text(STANDING, timeout=WITHIN_MS)
+    expect(agi).to_contain_text(STANDING)
 
 
 def _report_age(page: Page, stack: Site) -> float:
@@ -298,7 +297,7 @@ def test_f37_who_stops_while_another_holds_the_release_wins(
     other = _listening(open_page(alone=True))
     control = strip_stop(other, "AGV")
     control.click()
-    expect(control).to_contain_text(STANDING, timeout=WITHIN_MS)
+    expect(control).to_contain_text(STANDING)
     open_menu(other, "AGV")
     release = other.locator('[data-release="AGV"]')
     expect(release).to_be_enabled()
@@ -309,7 +308,7 @@ def test_f37_who_stops_while_another_holds_the_release_wins(
     assert ask(page, stack, "robots/AGV/stop", {}).ok
     result = card(other, "AGV").locator('[data-part="result"]')
     expect(result).to_have_text(
-        "El robot ha cambiado entretanto. Mire la lista y repita.", timeout=WITHIN_MS
+        "El robot ha cambiado entretanto. Mire la lista y repita."
     )
     other.mouse.up()
 
@@ -333,9 +332,7 @@ def _said(page: Page, state: str) -> list[tuple[str, str]]:
 
 def _make_ready(page: Page, stack: Site, robot: str) -> None:
     let_go(page, stack, robot)
-    expect(strip_stop(page, robot)).to_have_attribute(
-        "data-state", "ready", timeout=WITHIN_MS
-    )
+    expect(strip_stop(page, robot)).to_have_attribute("data-state", "ready")
 
 
 @contextmanager

@@ -179,7 +179,7 @@ def test_on_a_phone_a_stop_is_one_tap_away_and_one_of_ten_two(told: Told) -> Non
     page = told.page
     page.set_viewport_size({"width": 390, "height": 844})
     robots = told.snapshot["snapshot"]["robots"]
-    for route in ("/alerts", "/about", "/"):
+    for route in ("/alerts", "/about", "/settings", "/latency", "/docs", "/"):
         visit(page, route)
         page.clock.run_for(500)
         whole = strip_stop(page, "fleet")
@@ -218,12 +218,21 @@ PLACES = """() => [...document.querySelectorAll(
   })"""
 SPILLED = """() => [...document.querySelectorAll('[data-stop]')]
   .filter((one) => one.checkVisibility())
-  .map((one) => [one, one.getBoundingClientRect(),
-    one.querySelector('.stop__label').getBoundingClientRect()])
-  .filter(([, box, words]) => words.bottom > box.bottom + 1 || words.top < box.top
-    || words.left < box.left || words.right > box.right)
-  .map(([one]) => one.innerText)"""
-"""STOPs whose words do not fit (px)."""
+  .filter((one) => {
+    const {left, top, right, bottom} = one.getBoundingClientRect();
+    const cut = parseFloat(getComputedStyle(one).getPropertyValue('--cut'));
+    const words = document.createRange();
+    words.selectNodeContents(one.querySelector('.stop__label'));
+    return [...words.getClientRects()].some((line) => {
+      // Letters end before their line does, and few stand in its corners.
+      const [high, low] = [line.top + 2 - top, bottom + 2 - line.bottom];
+      const side = Math.min(line.left - left, right - line.right);
+      const end = Math.min(high, low);
+      return side < 0 || end < 0 || side + end < cut - 2;
+    });
+  })
+  .map((one) => `${one.dataset.state} ${one.innerText} ${innerWidth}`)"""
+"""STOPs whose words do not fit, or run over a corner of the octagon (px)."""
 BOTH = """() => [...document.querySelectorAll('.card .stop')].map((one) => {
   const twin = document.querySelector(`#stops [data-stop="${one.dataset.stop}"]`);
   return [one, twin].map((it) =>

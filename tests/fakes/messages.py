@@ -4,8 +4,9 @@ import asyncio
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from iveg.domain.contacts import Contacts
 from iveg.domain.errors import HopError
-from iveg.domain.messages import Channel, Contacts, MessageDelivery, OutboundMessage
+from iveg.domain.messages import Channel, MessageDelivery, OutboundMessage
 from iveg.domain.observations import Instant
 
 

@@ -70,7 +70,7 @@ class PostgreSQL:
                 cwd=self._directory,
                 **_other_user(),
             )
-        until(self._answers, _WAIT_S, "PostgreSQL answers")
+        until(self._answers, "PostgreSQL answers")
 
     def stop(self) -> None:
         """Stop this very server at once, as a crash would."""

@@ -23,6 +23,7 @@ from iveg.domain.observations import (
 )
 from iveg.ngsi import codec
 from tests.brokers import broker_on
+from tests.patience import PATIENCE_S
 from tests.ports import free_ports
 
 T = TypeVar("T")
@@ -36,9 +37,9 @@ async def broker(folder: Path) -> AsyncIterator[BrokerAddress]:
         yield address
 
 
-async def until(true: Callable[[], object], within_s: float = 30.0) -> None:
+async def until(true: Callable[[], object]) -> None:
     """Wait for a fact."""
-    deadline = time.monotonic() + within_s
+    deadline = time.monotonic() + PATIENCE_S
     while not true():
         assert time.monotonic() < deadline, "did not come true in time"
         await asyncio.sleep(0.02)

@@ -68,7 +68,7 @@ def test_a_reader_hears_a_writer_that_offers_what_it_asks(
 ) -> None:
     reader = dds.reader(topic, geometry_msgs.Twist, asked)
 
-    found = until(lambda: heard(reader), 10.0, f"a message on {topic}")
+    found = until(lambda: heard(reader), f"a message on {topic}", 10.0)
 
     assert found == sorted(found)
 
@@ -76,7 +76,7 @@ def test_a_reader_hears_a_writer_that_offers_what_it_asks(
 def test_who_comes_late_gets_what_was_kept(dds: Dds) -> None:
     kept = dds.reader("/kept", geometry_msgs.Twist, KEPT)
 
-    numbers = until(lambda: heard(kept), 30.0, "what was kept")
+    numbers = until(lambda: heard(kept), "what was kept")
 
     assert numbers == [0.0, 1.0, 2.0]
 
@@ -90,7 +90,7 @@ def test_a_reader_that_asks_for_more_than_is_offered_hears_nothing_and_shows_it(
     reader = dds.reader(topic, geometry_msgs.Twist, asked)
     other = dds.reader(topic, geometry_msgs.Twist, BEST_EFFORT)
 
-    until(lambda: heard(other), 10.0, f"a message on {topic}")
+    until(lambda: heard(other), f"a message on {topic}", 10.0)
     offered = next(one for one in dds.endpoints() if one.topic == topic and one.writes)
 
     assert reader.writers == 0
@@ -105,7 +105,7 @@ def test_endpoints_have_the_names_of_ros_and_say_whose_they_are(dds: Dds) -> Non
             one.topic for one in dds.endpoints() if one.writes and not one.own
         }
 
-    until(foreign, 30.0, "the talker's topics")
+    until(foreign, "the talker's topics")
     ours = [one for one in dds.endpoints() if one.own and one.topic == "/ours"]
 
     assert writer.readers == 0
@@ -119,7 +119,7 @@ def test_a_message_of_another_layout_never_arrives(dds: Dds, domain: int) -> Non
     with Dds(loopback(domain)) as other:
         writer = other.writer("/short", geometry_msgs.Twist, RELIABLE)
         reader = dds.reader("/short", geometry_msgs.Twist, RELIABLE)
-        until(lambda: writer.readers == 1 and reader.writers == 1, 30.0, "both met")
+        until(lambda: writer.readers == 1 and reader.writers == 1, "both met")
 
         with pytest.raises(HopError):
             writer.write(cdr.write(geometry_msgs.Vector3()))
@@ -139,16 +139,16 @@ def test_a_detector_is_met_in_its_type_and_tells_its_hash(
         # Tools of ROS may have readers of other types there.
         dds.reader("/boxes", vision_msgs.Detection3DArray, RELIABLE)
         reader = dds.reader("/boxes", message, RELIABLE)
-        until(lambda: writer.readers == 1 and reader.writers == 1, 30.0, "both met")
+        until(lambda: writer.readers == 1 and reader.writers == 1, "both met")
 
         writer.write(said)
 
-        assert until(reader.take, 10.0, "boxes") == [said]
+        assert until(reader.take, "boxes", 10.0) == [said]
         met = [one for one in dds.endpoints() if one.writes and one.topic == "/boxes"]
         assert [(one.type, one.type_hash, one.gate) for one in met] == [
             (message.ROS, type_hash(message), "AGI")
         ]
-    until(lambda: "/boxes" not in _topics(dds), 30.0, "it has gone")
+    until(lambda: "/boxes" not in _topics(dds), "it has gone")
 
 
 def test_a_domain_that_was_opened_otherwise_is_refused(domain: int) -> None:
@@ -166,11 +166,11 @@ def test_a_network_interface_that_does_not_exist_is_named() -> None:
 def test_a_process_that_was_killed_is_gone_within_seconds(
     dds: Dds, talker: subprocess.Popen[bytes]
 ) -> None:
-    until(lambda: bool(_topics(dds)), 30.0, "the talker")
+    until(lambda: bool(_topics(dds)), "the talker")
 
     os.kill(talker.pid, signal.SIGKILL)
 
-    until(lambda: not _topics(dds), 30.0, "its writers are forgotten")
+    until(lambda: not _topics(dds), "its writers are forgotten", 30.0)
 
 
 def _topics(dds: Dds) -> set[str]:

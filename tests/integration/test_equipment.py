@@ -64,16 +64,16 @@ async def test_a_device_of_a_file_is_a_tile_and_loses_its_signal_alone(
             # The same number twice: through the agent it is heard again.
             for _ in range(2):
                 await send(place, pressure=3.2, outlet=55.0)
-            until(lambda: states(api) == ("high", "ok"), 10.0, "both values")
-            until(lambda: "alert.tile_high" in alerts(api), 10.0, "the limit's alert")
-            until(lambda: states(api) == ("silent", "ok"), 10.0, "the silence")
-            until(lambda: "alert.tile_silent" in alerts(api), 10.0, "its alert")
+            until(lambda: states(api) == ("high", "ok"), "both values", 10.0)
+            until(lambda: "alert.tile_high" in alerts(api), "the limit's alert", 10.0)
+            until(lambda: states(api) == ("silent", "ok"), "the silence", 10.0)
+            until(lambda: "alert.tile_silent" in alerts(api), "its alert", 10.0)
             await send(place, pressure=3.2, outlet="hot")
-            until(lambda: states(api)[0] == "high", 10.0, "the same value again")
-            until(lambda: states(api)[1] == "unreadable", 10.0, "a text")
+            until(lambda: states(api)[0] == "high", "the same value again", 10.0)
+            until(lambda: states(api)[1] == "unreadable", "a text", 10.0)
             kept = until(
                 lambda: api.get("measurements?class=outlet").json()["items"],
-                10.0,
                 "a row of the history",
+                10.0,
             )
     assert [(one["value"], one["unit"]) for one in kept] == [(55.0, "°C")]

@@ -55,7 +55,7 @@ def reaches(out: Path, phase: str) -> None:
         told = read(file) if file.exists() else {}
         return (told.get("state"), told.get("phase")) == ("running", phase)
 
-    until(is_there, 60.0, phase)
+    until(is_there, phase)
 
 
 def ended(process: "subprocess.Popen[str]") -> tuple[int, str]:

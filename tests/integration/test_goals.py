@@ -11,7 +11,6 @@ import pytest
 from tests.processes import EMULATOR, Site, site, until
 
 pytestmark = pytest.mark.slow
-SOON_S = 60.0
 TOLD = ["log.goal.sent.here", "log.goal.accepted", "log.goal.reached"]
 THERE = {"kind": "here", "x": 10.0, "y": 7.5}
 
@@ -58,25 +57,24 @@ def test_a_goal_is_driven_to_and_a_stop_deletes_the_next(driving: Site) -> None:
             assert answer.status_code == 202 or answer.json()["why"] == "no_report"
             return answer.status_code == 202
 
-        until(is_given, SOON_S, "the goal is given")
-        there = until(lambda: goal_is("REACHED"), SOON_S, "AGI is at its goal")
+        until(is_given, "the goal is given")
+        there = until(lambda: goal_is("REACHED"), "AGI is at its goal")
         away = (
             (there["pose"]["x"] - 10.0) ** 2 + (there["pose"]["y"] - 7.5) ** 2
         ) ** 0.5
         assert away < 0.6
-        until(lambda: told() == TOLD or None, SOON_S, "the log tells each step")
+        until(lambda: told() == TOLD or None, "the log tells each step")
         counted = page.get("/api/v1/health").json()["counters"]
         assert counted["fiware.GoalAnswer"] >= 2
 
         page.post("/api/v1/robots/AGI/goal", json={**THERE, "y": 16.0})
-        until(lambda: goal_is("DRIVING"), SOON_S, "AGI is on its way")
+        until(lambda: goal_is("DRIVING"), "AGI is on its way")
         assert page.post("/api/v1/robots/AGI/stop").status_code == 202
         until(
             lambda: robot()["goal"]["forgotten_at"] and goal_is("DELETED"),
-            SOON_S,
             "both have deleted the goal",
         )
-        until(lambda: robot()["stop_state"] == "STANDING" or None, SOON_S, "it stands")
+        until(lambda: robot()["stop_state"] == "STANDING" or None, "it stands")
         held = page.post("/api/v1/robots/AGI/goal", json=THERE)
         assert (held.status_code, held.json()["why"]) == (409, "held")
     driving.assert_clean()

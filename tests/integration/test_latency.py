@@ -42,7 +42,7 @@ def test_a_late_radio_is_found_between_robot_and_broker_within_ten_percent(
             rows = {row["data"]: row["hops"] for row in told("AGI")["rows"]}
             return int(rows["odometry"]["robot_orion"]["count"]) >= 40
 
-        until(is_measured, 60.0, "AGI's messages are measured")
+        until(is_measured, "AGI's messages are measured")
         late, well = told("AGI"), told("AGII")
 
     put_in = pytest.approx(LATE_MS, rel=0.10)

@@ -10,7 +10,8 @@ import httpx
 import pytest
 
 from iveg.adapters import clock
-from iveg.app.dss import Dss, open_dss
+from iveg.app.dss import Dss
+from iveg.app.opening import open_dss
 from iveg.asgi import create_app
 from iveg.domain.observations import Received
 from iveg.settings import Settings

@@ -98,8 +98,8 @@ def test_f52_f53_two_robots_settle_into_health_and_orion_fills_in_when_mqtt_is_l
     place, straight = running
     with place.api() as api:
         health = Health(api)
-        until(health.was_late, 60.0, "the agent is behind at first")
-        until(lambda: health.well_for_s() > STAYS_S, SETTLES_WITHIN_S, "it settles")
+        until(health.was_late, "the agent is behind at first")
+        until(lambda: health.well_for_s() > STAYS_S, "it settles", SETTLES_WITHIN_S)
         robots = api.get("robots").raise_for_status().json()["items"]
         assert {one["link"] for one in robots} == {"LIVE"}
         assert {one["transport"] for one in robots} == {"direct"}
@@ -109,6 +109,6 @@ def test_f52_f53_two_robots_settle_into_health_and_orion_fills_in_when_mqtt_is_l
         for kind in ("odometry", "lidar")
         for robot in ("AGI", "AGII")
     }
-    until(lambda: throttled(place) == copies, 60.0, "Orion leaves the copies out")
+    until(lambda: throttled(place) == copies, "Orion leaves the copies out")
     straight.be("shut")
-    until(lambda: not throttled(place), 30.0, "Orion brings every copy again")
+    until(lambda: not throttled(place), "Orion brings every copy again")

@@ -304,7 +304,7 @@ def test_the_command_tells_of_each_topic_what_becomes_of_it(place: Site) -> None
     replaying = place.start("replay", str(bag), "--robot", "D1", "--force")
 
     row = re.compile(r"^/yolact_coordinate +gb_\S+ +20 +detections$", re.MULTILINE)
-    processes.until(lambda: row.search(replaying.text()), 30.0, "the table")
+    processes.until(lambda: row.search(replaying.text()), "the table")
 
 
 def test_a_broken_bag_ends_the_command_with_one_sentence_and_status_two(

@@ -8,7 +8,7 @@ import contextlib
 import itertools
 import time
 from collections import Counter
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -31,6 +31,7 @@ from iveg.ngsi import codec
 from iveg.robot.node import RobotNode
 from iveg.robot.node_settings import NodeSettings
 from tests.brokers import broker_on
+from tests.integration.emulator_cloud import until
 from tests.ports import free_ports
 
 
@@ -44,13 +45,6 @@ def port() -> int:
 async def broker(port: int, tmp_path: Path) -> AsyncIterator[BrokerAddress]:
     async with broker_on(port, tmp_path) as address:
         yield address
-
-
-async def until(true: Callable[[], object], within_s: float = 30.0) -> None:
-    deadline = time.monotonic() + within_s
-    while not true():
-        assert time.monotonic() < deadline, "did not come true in time"
-        await asyncio.sleep(0.005)
 
 
 @dataclass
@@ -270,7 +264,7 @@ async def test_a_drive_is_told_the_same_again_and_again_but_not_twice_at_once(
     cloud, robot = Cloud(broker), make_robot(broker, tmp_path)
     robot.node.release_locally()
     async with running(robot, cloud):
-        await until(lambda: robot.speed == 1.0, within_s=20.0)
+        await until(lambda: robot.speed == 1.0)
         begins = len(robot.driven)
 
         await until(lambda: len(robot.driven) > begins + 30)

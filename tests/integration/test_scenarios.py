@@ -29,7 +29,6 @@ SILENCE_S = 5.0
 """How long nobody hears AGII in ``link-loss``."""
 CRUISE = 0.8
 """Of AGI and AGII where nobody slows them (m/s)."""
-SOON_S = 45.0
 """Nothing here takes longer, on a machine that has other things to do."""
 
 
@@ -65,7 +64,7 @@ class Stage:
 
     def wait(self, probe: Callable[[], T], what: str) -> T:
         """Until something is there: not None, not empty, not false."""
-        return until(lambda: probe() or None, SOON_S, what)
+        return until(lambda: probe() or None, what)
 
     def first(self, found: Callable[[], Sequence[Row]], what: str) -> Row:
         """The first row of a list that is empty for a while."""

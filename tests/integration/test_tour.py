@@ -48,13 +48,13 @@ def _slow_down_and_stop(place: Site) -> None:
             answer = api.get("decisions", params={"limit": 20}).json()
             return any(one["observed_at"] for one in answer["items"])
 
-        until(is_obeyed, 90.0, "a slow-down that was obeyed")
+        until(is_obeyed, "a slow-down that was obeyed")
         api.post("robots/AGI/stop", json={}).raise_for_status()
 
         def stands() -> bool:
             return bool(api.get("robots/AGI").json()["stop_state"] == "STANDING")
 
-        until(stands, 60.0, "AGI stands")
+        until(stands, "AGI stands")
 
 
 def _read(folder: Path) -> Iterator[tuple[str, str]]:

@@ -82,11 +82,11 @@ def test_f60_f61_f62_a_drawing_ends_nothing_and_a_vital_part_not_in_silence(
     fiware.wait_until_served()
     with fiware.api() as api:
         metrics = f"{fiware.url}/metrics"
-        until(lambda: "rejected." in api.get(metrics).text, 30.0, "a refusal")
-        until(lambda: _keys(api) >= {"alert.part_down"}, 30.0, "the alert")
-        until(lambda: api.get("costmap").status_code == 200, 30.0, "the costmap")
+        until(lambda: "rejected." in api.get(metrics).text, "a refusal")
+        until(lambda: _keys(api) >= {"alert.part_down"}, "the alert")
+        until(lambda: api.get("costmap").status_code == 200, "the costmap")
         stopped = api.post("robots/AGII/stop")
-        until(lambda: "AGII" in field.stopped, 30.0, "the STOP of AGII")
+        until(lambda: "AGII" in field.stopped, "the STOP of AGII")
 
     assert server.process.poll() is None
     assert stopped.status_code == 202
@@ -94,7 +94,7 @@ def test_f60_f61_f62_a_drawing_ends_nothing_and_a_vital_part_not_in_silence(
     (fiware.directory / DOOM).touch()
 
     assert server.process.wait(30.0) == 1
-    until(lambda: field.reasons("AGI") == {"unsupervised"}, 5.0, "the last feedback")
+    until(lambda: field.reasons("AGI") == {"unsupervised"}, "the last feedback", 5.0)
 
 
 def _keys(api: httpx.Client) -> set[str]:

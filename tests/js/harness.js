@@ -48,6 +48,15 @@ export function throws(body, kind) {
   throw new Error(`nothing thrown, wanted ${kind.name}`);
 }
 
+/** @param {() => boolean} isSo within two seconds */
+export async function until(isSo) {
+  const deadline = performance.now() + 2000;
+  while (!isSo()) {
+    if (performance.now() > deadline) throw new Error("it never came true");
+    await new Promise((done) => setTimeout(done, 1));
+  }
+}
+
 /** @param {() => void | Promise<void>} body */
 async function failureOf(body) {
   try {

@@ -185,7 +185,14 @@ test("28.6: the moments of an order stand in time from the press; one that is mi
 
 test("a row of the audit tells its details in the reader's words", async () => {
   const i18n = createI18n(async () => ({
-    auditpage: { detail: { ends_at: "hasta", role: "rol:" } },
+    auditpage: {
+      detail: {
+        ends_at: "hasta",
+        role: "rol:",
+        holder: "por",
+        status: "rechazado con",
+      },
+    },
     header: { role: { viewer: "solo ver" } },
   }));
   await i18n.use("es");
@@ -193,4 +200,8 @@ test("a row of the audit tells its details in the reader's words", async () => {
 
   equal(detailsSaid(details, i18n), "hasta 02/12 23:15:45 · rol: solo ver · odd 3");
   equal(detailsSaid({ ends_at: null }, i18n), "—");
+  equal(detailsSaid({ status: 200, holder: "Eva" }, i18n), "por Eva");
+  equal(detailsSaid({ person_id: "01J", holder: "Eva" }, i18n), "por Eva");
+  equal(detailsSaid({ person_id: "01J" }, i18n), "person_id 01J");
+  equal(detailsSaid({ status: 409 }, i18n), "rechazado con 409");
 });

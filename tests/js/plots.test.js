@@ -7,7 +7,12 @@ import {
   spanOf,
 } from "../../iveg/static/js/panels/past.js";
 import { makePlot, pathOf, rangeOf } from "../../iveg/static/js/panels/plot.js";
-import { barsOf, delaysOf } from "../../iveg/static/js/panels/timeline.js";
+import {
+  barsOf,
+  delaysOf,
+  gapsOf,
+  makeTimeline,
+} from "../../iveg/static/js/panels/timeline.js";
 import { equal, near, test } from "./harness.js";
 
 const T0 = Date.parse("2026-11-20T12:00:00.000Z");
@@ -45,6 +50,36 @@ test("28.6: each bar reaches from the moment before to its own, on one scale", (
     { from: 25, to: 100 },
     { from: 75, to: 100 },
   ]);
+});
+
+test("28.6: a wait of minutes is a gap, and the first moments stay apart", () => {
+  const steps = [0, 0.1, 0.4, 143.4, 144].map((s) => ({ at: at(s) }));
+  const bars = barsOf(steps).map((bar) => Math.round(bar?.to ?? -1));
+  equal(bars, [0, 9, 35, 48, 100]);
+  const [gap, ...others] = gapsOf(steps);
+  equal([gap.waitMs, Date.parse(at(143.4)), others], [143_000, gap.at, []]);
+  const said = (/** @type {string} */ key, /** @type {any} */ slots) =>
+    `${key} ${slots.seconds}`;
+  const whole = steps.map((step) => {
+    return { ...step, name: "", verdict: "ok", state: "", took: "", said: "" };
+  });
+  const rows = [...makeTimeline(whole, /** @type {any} */ ({ t: said })).children];
+  equal(
+    rows.map((row) => row.querySelectorAll(".chain__slit").length),
+    [3, 3, 3, 3, 3],
+  );
+  equal(
+    rows.map((row) => row.textContent?.includes("record.gap 143")),
+    [false, false, false, true, false],
+  );
+});
+
+test("28.6: what took seconds, or as long as the rest, is drawn to scale", () => {
+  const moments = [[0, 0.1, 4.9], [0, 2, 20], [0, 143], [7]];
+  equal(
+    moments.map((all) => gapsOf(all.map((s) => ({ at: at(s) }))).length),
+    [0, 0, 0, 0],
+  );
 });
 
 test("28.6: a distance is told between two poses, and nowhere else", () => {

@@ -15,6 +15,7 @@ import {
 } from "../../iveg/static/js/panels/status_line.js";
 import { person, robot, situation } from "./builders.js";
 import { equal, test } from "./harness.js";
+import { all } from "./surfaces.js";
 
 /** @typedef {import("./builders.js").Situation} Situation */
 
@@ -60,6 +61,29 @@ test("silence makes nothing better: a late robot near somebody stays one", () =>
 test("what follows an order has the server's own rules while it is late, not lost", () => {
   equal(situationOf(heard(1.5, STANDING), NOW_MS).state, "standing");
   equal(situationOf(heard(9, STANDING), NOW_MS).state, "lost");
+});
+
+test("a standstill is as old on the card as on STOP: after 1.5 s nobody knows", () => {
+  const { level, state, action } = situationOf(heard(1.6, STANDING), NOW_MS);
+  equal([level, state, action], ["doubt", "stood", "as_moving"]);
+});
+
+test("without the server all but a danger is to be treated as moving", () => {
+  const advice = (/** @type {Situation} */ of, /** @type {number} */ age_s) =>
+    situationOf(heard(age_s, of), NOW_MS, "lost").action;
+  equal(
+    [advice(CLEAR, 0.1), advice(CLEAR, 9), advice(STANDING, 1), advice(STANDING, 9)],
+    ["as_moving", "as_moving", "as_moving", "as_moving"],
+  );
+  const called = situation({ ...NOT_SLOWING, action: "press_stop" });
+  equal(advice(called, 9), "press_stop");
+  equal(situationOf(undefined, NOW_MS, "lost").action, "as_moving");
+});
+
+test("card and fleet page say the same of a robot without the server", async () => {
+  const { robots } = await all([heard(0.1, STANDING)], 9, "", [], "lost");
+  equal(robots[0].row.toLowerCase(), robots[0].line.toLowerCase());
+  equal(robots[0].row.includes("situation.do.as_moving"), true);
 });
 
 test("the seconds of a silence go on", () => {
@@ -178,7 +202,7 @@ test("each cause has its drawing, and a robot at work none", () => {
 
 test("without the server the line says so, in red", () => {
   equal(ofConnection("lost", 6400, false, EN)?.level, "danger");
-  equal(ofConnection("lost", 6400, false, EN)?.said.includes("7 s"), true);
+  equal(ofConnection("lost", 6400, false, EN)?.said.includes("7\u00a0s"), true);
   equal(ofConnection("signed-out", 0, false, EN)?.level, "danger");
   equal(ofConnection("connecting", 100, false, EN)?.level, "away");
   equal(ofConnection("connecting", 9000, false, EN)?.level, "doubt");
@@ -224,9 +248,12 @@ test("people who are not seen are not counted as seen, and without a link nobody
   equal(peopleSaid([now, now], cameras, true, EN).startsWith("2 people · "), true);
   equal(
     peopleSaid([now, before], cameras, true, EN),
-    "1 person · 1 seen lately · 50% of aisles in view",
+    "1 person · 1 more seen lately · 50% of aisles in view",
   );
-  equal(peopleSaid([now, now], blind, true, EN), "2 seen lately · No camera coverage");
+  equal(
+    peopleSaid([now, now], blind, true, EN),
+    "2 people seen lately · No camera coverage",
+  );
   equal(peopleSaid([], blind, true, EN), "No camera coverage");
   equal(peopleSaid([], cameras, true, EN), "Nobody seen · 50% of aisles in view");
   equal(peopleSaid([now], cameras, false, EN), "No link: unknown who is there");

@@ -11,7 +11,7 @@ import { createAlertsPanel } from "../../iveg/static/js/panels/alerts.js";
 import { createHints } from "../../iveg/static/js/panels/hints.js";
 import { faultsSaid } from "../../iveg/static/js/panels/robot_texts.js";
 import { createTone, openWhenTouched } from "../../iveg/static/js/panels/tone.js";
-import { equal, near, test } from "./harness.js";
+import { equal, near, test, until } from "./harness.js";
 
 // Nobody has written a note about any alert.
 window.fetch = async () => Response.json({ items: [] });
@@ -583,15 +583,6 @@ test("13.11 quantiles are told of twenty values or more", () => {
   });
   equal(said, ["tiles.too_few", "tiles.latency_value"]);
 });
-
-/** @param {() => boolean} isSo within two seconds */
-async function until(isSo) {
-  const deadline = performance.now() + 2000;
-  while (!isSo()) {
-    if (performance.now() > deadline) throw new Error("it never came true");
-    await new Promise((done) => setTimeout(done, 1));
-  }
-}
 
 test("a table is read anew while events never end", async () => {
   let reads = 0;

@@ -21,6 +21,7 @@ import { marginSaid } from "../../iveg/static/js/panels/robot_texts.js";
 
 /** @typedef {import("./builders.js").Robot} Robot */
 /** @typedef {import("../../iveg/static/js/core/i18n.js").I18n} I18n */
+/** @typedef {import("../../iveg/static/js/core/store.js").ConnectionState} ConnectionState */
 
 const KEYS = /** @type {I18n} */ (
   /** @type {unknown} */ ({
@@ -45,15 +46,16 @@ async function wordsOf(language) {
  * @param {number} waitedS ago
  * @param {string} language
  * @param {import("./builders.js").Person[]} people
+ * @param {ConnectionState} connection
  */
-export async function all(robots, waitedS, language, people = []) {
+export async function all(robots, waitedS, language, people = [], connection = "open") {
   const i18n = await wordsOf(language);
   const [nowMs, read] = [performance.now(), performance.now];
   performance.now = () => nowMs; // one moment for all surfaces
   try {
     const receivedAtMs = nowMs - waitedS * 1000;
     return {
-      ...surfaces(robots, receivedAtMs, i18n),
+      ...surfaces(robots, receivedAtMs, i18n, connection),
       ...counted(people, receivedAtMs, i18n),
     };
   } finally {
@@ -61,8 +63,11 @@ export async function all(robots, waitedS, language, people = []) {
   }
 }
 
-/** @param {Robot[]} robots @param {number} receivedAtMs @param {I18n} i18n */
-function surfaces(robots, receivedAtMs, i18n) {
+/**
+ * @param {Robot[]} robots @param {number} receivedAtMs @param {I18n} i18n
+ * @param {ConnectionState} connection
+ */
+function surfaces(robots, receivedAtMs, i18n, connection) {
   const fleet = robots.map((robot) => ({ ...robot, receivedAtMs }));
   const { level, said } = fleetSaid(fleet, i18n);
   const chain = judgeDataPath([{ hop: "mqtt", state: "ok" }], heardOf(fleet), true);
@@ -71,7 +76,7 @@ function surfaces(robots, receivedAtMs, i18n) {
     status: said,
     chain: chain.key,
     chip: chain.state,
-    robots: fleet.map((robot) => ofRobot(robot, i18n)),
+    robots: fleet.map((robot) => ofRobot(robot, i18n, connection)),
   };
 }
 
@@ -92,9 +97,9 @@ function counted(people, receivedAtMs, i18n) {
   };
 }
 
-/** @param {Robot} robot @param {I18n} i18n */
-function ofRobot(robot, i18n) {
-  const situation = situationOf(robot);
+/** @param {Robot} robot @param {I18n} i18n @param {ConnectionState} connection */
+function ofRobot(robot, i18n, connection) {
+  const situation = situationOf(robot, performance.now(), connection);
   const link = linkOfRobot(robot);
   const seen = /** @type {any} */ ({ situation, link, ageS: 0, replay: false });
   const labels = /** @type {any} */ ({
@@ -110,7 +115,7 @@ function ofRobot(robot, i18n) {
     level: situation.level,
     said: said.said,
     line: sentenceOf(situation, i18n),
-    row: statusOf(robot, i18n),
+    row: statusOf(robot, i18n, connection),
     margin: marginSaid(robot, i18n),
     factor: readingOf(robot).factor,
     locks: robot.holds.length,

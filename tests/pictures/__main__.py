@@ -107,13 +107,13 @@ def _take(
             page.goto(past.url + PAGES[case["page"]])
             settle(page, READY.get(case["page"], "body"))
             act(page, case["page"])
+            if case["situation"] == "no server" and lines:
+                _lose(page, lines)
+            elif lines:
+                _rest(page, lines[-1], told)
         except (AssertionError, Error) as error:
             # One page that is late, or broken, is no reason to take no more pictures.
             errors.append(str(error).splitlines()[0])
-        if case["situation"] == "no server" and lines:
-            _lose(page, lines)
-        elif lines:
-            _rest(page, lines[-1], told)
         file = folder / f"{n:03} {' '.join(case.values())}.png"
         page.screenshot(path=file)
         return Picture(n, case, file, _high(page), tuple(errors + _found(page)))

@@ -73,7 +73,7 @@ def _signed_in(
         answer = context.request.post(f"{past.url}/signin", data=proof, headers=headers)
         return answer.status == 204
 
-    until(is_in, 90.0, "the admin is signed in")
+    until(is_in, "the admin is signed in")
     if is_tablet:
         _make_tablet(context.request, past.url)
     state = context.storage_state()

@@ -15,7 +15,7 @@ from iveg.domain.tracking.sight import AllClear
 from iveg.domain.witness import Plan
 from iveg.lab.emulator.greenhouse import Disc, Scenery
 from iveg.lab.emulator.lidar import LaserModel, sweep
-from tests.builders import scan
+from tests.builders import at, scan
 from tests.unit.domain.scene import Scene, person
 
 HALL = Greenhouse(
@@ -32,11 +32,11 @@ Place = tuple[float, float]
 class Hall(Scene):
     """AGI stands or drives in the middle; its laser and its camera tell the truth."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, follows: bool = True) -> None:
         super().__init__(greenhouse=HALL)
         self.newest: LaserScan | None = None
-        swept = LaserSight(Plan.of(HALL), self._newest).swept
-        self.all_clear = AllClear(swept)
+        sight = LaserSight(Plan.of(HALL), self._newest)
+        self.all_clear = sight.all_clear() if follows else AllClear(sight.swept)
         self.confidences = 0.85, 0.85
         """Of the camera, in turn with seconds."""
         self._rng = np.random.default_rng(1)
@@ -58,6 +58,14 @@ class Hall(Scene):
         said = replace(said, angle_increment=MODEL.angle_increment)
         self.scan("AGI", said)
         self.newest = said
+
+    def has_ring(self, x: float, y: float) -> bool:
+        """Whether some ring takes a place in."""
+        return any(
+            math.dist(ring.place, (x, y)) <= radius
+            for one in self.everyone
+            for ring, radius in self.people.rings(one, self.rule, at(self.now))
+        )
 
     def is_in_view(self, x: float, y: float, from_x: float) -> bool:
         """Whether AGI's camera sees a place from where AGI stands."""

@@ -52,9 +52,9 @@ def test_no_all_clear_leaves_somebody_who_walks_without_a_ring_and_nobody_is_mad
             if hall.is_in_view(*one, x)
             or any(math.dist(one, spot) < 0.5 for spot in followed)
         }
-        had = [people[one] for one in seen if _has_ring(hall, *people[one])]
+        had = [people[one] for one in seen if hall.has_ring(*people[one])]
         hall.sweep()
-        assert all(_has_ring(hall, *one) for one in had)
+        assert all(hall.has_ring(*one) for one in had)
 
 
 def test_whom_a_laser_sees_is_remembered_as_long_as_the_one_whom_a_camera_saw() -> None:
@@ -76,11 +76,3 @@ def _followed(hall: Hall) -> list[tuple[float, float]]:
     """Where the laser has those who walk, just now."""
     seen = (look for one in hall.everyone for look in one.sightings if look.laser)
     return [(one.x, one.y) for one in seen if one.age_s(at(hall.now)) < TICK_S / 2]
-
-
-def _has_ring(hall: Hall, x: float, y: float) -> bool:
-    return any(
-        math.dist((ring.x, ring.y), (x, y)) <= radius
-        for one in hall.everyone
-        for ring, radius in hall.people.rings(one, hall.rule, at(hall.now))
-    )

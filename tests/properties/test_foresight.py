@@ -1,5 +1,6 @@
 """Foresight only adds (docs/safety.md, "Foresight")."""
 
+import math
 from unittest.mock import patch
 
 from hypothesis import example, given
@@ -10,6 +11,8 @@ from iveg.domain.feedback import CLEAR, Feedback, FeedbackAlert
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import Origin
 from iveg.domain.rule import foresight as rule_foresight
+from iveg.domain.rule import last_steps
+from iveg.domain.rule.speed_limits import SpeedLimits
 from iveg.robot.judgement import Judgement, Limits
 from tests.unit.domain.scene import Scene, person
 from tests.unit.robot.rig import person as alert
@@ -93,13 +96,22 @@ def test_what_is_told_beside_what_slows_changes_no_limit(
             scene.drive("AGI", x, linear=speed)
             scene.drive("AGII", 3.0, 1.0, linear=-speed)
             scene.look("AGI", *(person(*spot) for spot in people))
-            with patch.object(
-                rule_foresight, "_MISSED_S", 2.0 if scene is more else 0.0
+            missed_s, turned = (2.0, 0.5) if scene is more else (0.0, math.inf)
+            with (
+                patch.object(rule_foresight, "_MISSED_S", missed_s),
+                patch.object(last_steps, "_TURNED_M_S", turned),
             ):
                 limits.append(scene.judge())
         assert limits[0] == limits[1]
+        told, before = (one.encounters_shown("AGI") for one in _limits(more, less))
+        assert before.keys() <= told.keys()
+        assert all(told[who].in_s <= one.in_s for who, one in before.items())
         slows = more.speed_limits.foretold.get("AGI", {})
         assert slows.items() <= more.speed_limits.encounters_shown("AGI").items()
+
+
+def _limits(*scenes: Scene) -> list[SpeedLimits]:
+    return [scene.speed_limits for scene in scenes]
 
 
 def _in_s(scene: Scene) -> dict[str, float]:

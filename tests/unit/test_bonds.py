@@ -39,4 +39,4 @@ def test_a_program_ends_with_a_test_that_is_killed(source: str, tmp_path: Path) 
         assert is_alive(child)
 
         parent.kill()
-        until(lambda: not is_alive(child), 30.0, "the child has ended")
+        until(lambda: not is_alive(child), "the child has ended")

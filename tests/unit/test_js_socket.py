@@ -330,7 +330,7 @@ def test_a_frame_that_was_painted_is_said_to_be(page: Page, live: LiveServer) ->
     live.tell(monotonic())
     page.wait_for_function("() => window.store.robots().get('AGI').pose?.x === 1")
 
-    until(lambda: live.heard != [], 30.0, "the page says what it has painted")
+    until(lambda: live.heard != [], "the page says what it has painted")
     (said,) = live.heard
     assert (said["type"], said["frame"]) == ("painted", 1)
 

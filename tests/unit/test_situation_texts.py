@@ -160,7 +160,7 @@ OF_SPEED = {
 def test_alerts_and_the_log_have_the_words_of_the_situation(language: str) -> None:
     said = read_translations(language).sentences
     for key, (state, _) in P1_STATES.items():
-        plain = re.sub(r" \w+ {age:span}", "", said[f"situation.is.{state}"])
+        plain = re.sub(r"(?: desde)? \w+ {age:span}", "", said[f"situation.is.{state}"])
         assert said[key].casefold().startswith(f"{{robot}}: {plain}".casefold())
     for step, state in OF_STOP.items():
         whole = f"{{robot}}: {said[f'situation.is.{state}']}"

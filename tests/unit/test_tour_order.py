@@ -40,9 +40,9 @@ OUTSIDE = {
     "iveg/robot/uplink.py",
     "iveg/web/api/commands.py",
     "iveg/web/live/feed.py",
-    "iveg/web/live/socket.py",
+    "iveg/web/live/line.py",
     "iveg/web/notifications.py",
-    "iveg/web/security/authentication.py",
+    "iveg/web/security/requirements.py",
     "iveg/web/views.py",
 }
 """Parts of other programs, of the web and of the disk, which this stage lacks."""

@@ -24,18 +24,11 @@ from iveg.adapters.history.tables import (
     log,
     odometry,
 )
-from iveg.domain.cost import (
-    MOST_TASKS,
-    NEAR_M,
-    SLOT_S,
-    NearSecond,
-    SlowSlot,
-    SpeedChange,
-    Task,
-)
+from iveg.domain.cost import MOST_TASKS, SLOT_S, SlowSlot, SpeedChange, Task
 from iveg.domain.feedback import FULL_SPEED, HALF_SPEED
 from iveg.domain.goals import OPEN_STATES
 from iveg.domain.limits import LIMITS
+from iveg.domain.near_misses import NEAR_M, NearSecond
 from iveg.pipeline.record import ODOMETRY_PERIOD_S
 
 _BEFORE_S = 3600.0

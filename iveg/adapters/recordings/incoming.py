@@ -4,18 +4,23 @@ An input is a head of fixed size, a name and a payload, so that the loop packs i
 microsecond and nothing is read before it is in the other process.
 """
 
+import re
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from enum import IntEnum
 from typing import NamedTuple
 
 import orjson
 
 from iveg.adapters.recordings.mcap_file import Channel
-from iveg.domain.observations import Instant
+from iveg.adapters.recordings.memories import recorded
+from iveg.domain.observations import Instant, LaserScan, Observation, Overtaken
 
 NOTIFICATIONS = Channel("/ngsi/notifications", "ngsi.Notification")
 TICKS = Channel("/iveg/ticks", "iveg.Tick")
+MEMORIES = Channel("/iveg/memory", "iveg.Memory")
+_NUMBERS = re.compile(rb"\[[-+.,\deE\snul]{100,}\]")
+"""A long list of numbers in JSON."""
 _HEAD = struct.Struct("<BddHI")
 """Sort, both clocks (s), bytes of the name and of the payload."""
 
@@ -29,6 +34,8 @@ class Sort(IntEnum):
     ROW = 3
     """A row of the history or a version of the rule: the name of its schema."""
     TICK = 4
+    MEMORY = 5
+    """What the pipeline has in mind (``memories``)."""
 
 
 class Incoming(NamedTuple):
@@ -49,13 +56,18 @@ class Incoming(NamedTuple):
                 return NOTIFICATIONS
             case Sort.ROW:
                 return Channel(f"/iveg/{self.name.lower()}", f"iveg.{self.name}")
+            case Sort.MEMORY:
+                return MEMORIES
         return TICKS
 
     @property
     def message(self) -> bytes:
-        """What is recorded: of a tick both clocks (s), else the payload."""
-        if self.sort is Sort.TICK:
-            return orjson.dumps({"wall": self.at.wall, "mono": self.at.mono})
+        """What is recorded: of a tick both clocks (s); mostly the payload."""
+        match self.sort:
+            case Sort.TICK:
+                return orjson.dumps({"wall": self.at.wall, "mono": self.at.mono})
+            case Sort.MEMORY:
+                return recorded(self.payload)
         return self.payload
 
 
@@ -64,6 +76,18 @@ def pack(sort: Sort, at: Instant, name: str = "", payload: bytes = b"") -> bytes
     encoded = name.encode()
     head = _HEAD.pack(sort, at.mono, at.wall, len(encoded), len(payload))
     return b"".join((head, encoded, payload))
+
+
+def worth_keeping(body: bytes, observed: Sequence[Observation]) -> bytes:
+    """A notification without numbers that are kept already.
+
+    Of a scan that its twin has overtaken nothing but its identity was read, and nothing
+    else is recorded: its numbers are those of its twin.
+    """
+    are_twins = bool(observed) and all(
+        isinstance(one, Overtaken) and one.kind is LaserScan for one in observed
+    )
+    return _NUMBERS.sub(b"[]", body) if are_twins else body
 
 
 class Unpacking:

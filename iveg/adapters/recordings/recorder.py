@@ -8,7 +8,6 @@ counted; so is what a process that ended had not kept yet.
 
 import asyncio
 import logging
-import re
 from collections import Counter
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -19,15 +18,16 @@ import orjson
 
 from iveg.adapters.recordings.directory import RecordingDirectory
 from iveg.adapters.recordings.excerpt import write_excerpt
-from iveg.adapters.recordings.incoming import Sort, pack
+from iveg.adapters.recordings.incoming import Sort, pack, worth_keeping
 from iveg.adapters.recordings.live_feed import LiveFeed
+from iveg.adapters.recordings.memories import packed
 from iveg.adapters.recordings.repair import finish_broken
 from iveg.adapters.recordings.writer import PRUNE_S, WriterSetup
 from iveg.adapters.recordings.writer_process import WriterProcess
 from iveg.adapters.worker import Worker
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import HopError
-from iveg.domain.observations import Instant, LaserScan, Observation, Overtaken
+from iveg.domain.observations import Instant, Observation
 from iveg.domain.recordings import RecordingFile
 from iveg.domain.records import Record, is_telemetry
 from iveg.pipeline.ports import Clock
@@ -40,8 +40,6 @@ WRITE_S = 0.25
 RESCUE_S = 1800.0
 QUIET_S = 60.0
 """What is dropped is told again where nothing was for so long (s)."""
-_NUMBERS = re.compile(rb"\[[-+.,\deE\snul]{100,}\]")
-"""A long list of numbers in JSON."""
 
 
 class InputRecorder:
@@ -92,16 +90,11 @@ class InputRecorder:
     def notification(
         self, body: bytes, at: Instant, observed: Sequence[Observation]
     ) -> None:
-        """A notification of Orion's, and what was read in it.
-
-        Of a scan that its twin has overtaken nothing but its identity was read, and
-        nothing else is recorded: its numbers are those of its twin.
-        """
+        """A notification of Orion's, and what was read in it."""
         if self._live is not None:
             self._live.notification(body, at)
         if self._is_on:
-            kept = _NUMBERS.sub(b"[]", body) if _are_twins(observed) else body
-            self._queue(pack(Sort.NOTIFICATION, at, "", kept))
+            self._queue(pack(Sort.NOTIFICATION, at, "", worth_keeping(body, observed)))
 
     def row(self, record: Record) -> None:
         """A row of the history; telemetry is here already, as it came."""
@@ -112,6 +105,11 @@ class InputRecorder:
         """What the loop tells of itself, on the channel of its name."""
         if self._is_on:
             self._queue(pack(Sort.ROW, at, name, payload))
+
+    def memory(self, about: bytes, memory: bytes, at: Instant) -> None:
+        """What the pipeline has in mind, and JSON that tells of it."""
+        if self._is_on:
+            self._queue(pack(Sort.MEMORY, at, payload=packed(about, memory)))
 
     def tick(self, at: Instant) -> None:
         """The loop lets time pass."""
@@ -251,10 +249,3 @@ async def _in_thread(work: Callable[[], _T]) -> _T:
         return await asyncio.to_thread(work)
     except OSError as error:
         raise HopError("disk", error.strerror or str(error)) from error
-
-
-def _are_twins(observed: Sequence[Observation]) -> bool:
-    """Whether there is nothing but scans that were overtaken."""
-    return bool(observed) and all(
-        isinstance(one, Overtaken) and one.kind is LaserScan for one in observed
-    )

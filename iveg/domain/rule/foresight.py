@@ -21,6 +21,7 @@ from iveg.domain.feedback import HALF_SPEED
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
 from iveg.domain.robot_state import RobotState
+from iveg.domain.rule.last_steps import LastStep, LastSteps, last_steps, turned
 from iveg.domain.rule.paths import (
     EVERY_S,
     HOLDS_S,
@@ -82,8 +83,9 @@ class Foresight:
     """Keeps what was foretold last.
 
     Attributes:
-        shown: For people to see: what slows, who is out of sight for a moment, and whom
-            a robot that is slow would meet as soon as it is let go.
+        shown: For people to see: what slows, who is out of sight for a moment, who is
+            met if they go on as in their newest step, and whom a robot that is slow
+            would meet as soon as it is let go.
         if_released: What would be foretold of slowed robots at the speed that they had
             before: who would have to slow again at once is better not let go.
     """
@@ -93,6 +95,7 @@ class Foresight:
         self.shown: dict[str, _Ahead] = {}
         self.if_released: Foretold = {}
         self._at = -math.inf
+        self._steps: LastSteps = {}
 
     def is_due(self, now: Instant) -> bool:
         """Whether the last look is old."""
@@ -112,7 +115,8 @@ class Foresight:
         """
         if self.is_due(now):
             self._at = now.mono
-            look = _Look.at(world, people, rule, now)
+            look = _Look.at(world, people, rule, now, self._steps)
+            self._steps = look.steps
             drive = [one for one in world.live_robots() if look.zones and _drives(one)]
             ahead = {one.robot_id: look.first(path_of(one, now)) for one in drive}
             again = {
@@ -162,6 +166,15 @@ def _circle(zone: Zone, world: World, now: Instant) -> tuple[float, ...]:
     return zone.x, zone.y, sighting.vx, sighting.vy, age, radius
 
 
+def _circle_of(zone: Zone, step: LastStep, now: Instant) -> tuple[float, ...]:
+    """The same of who has turned: from where they are taken to be by now."""
+    sighting = zone.sighting
+    assert sighting is not None  # noqa: S101 - who was not seen made no step
+    age = sighting.age_s(now)
+    x, y = sighting.x + sighting.vx * age, sighting.y + sighting.vy * age
+    return x, y, step.vx, step.vy, 0.0, zone.radius_m
+
+
 @dataclass(frozen=True, slots=True)
 class _Look:
     """One look ahead of the fleet.
@@ -169,19 +182,29 @@ class _Look:
     Attributes:
         zones: The rings that slow whoever will reach them, then those that are told of.
         slow: How many of them slow.
+        steps: How everybody went on last.
     """
 
     zones: Sequence[Zone]
     slow: int
     circles: Circles
+    steps: LastSteps
     rule: DetectionRule
     now: Instant
 
     @classmethod
     def at(
-        cls, world: World, people: People, rule: DetectionRule, now: Instant
+        cls,
+        world: World,
+        people: People,
+        rule: DetectionRule,
+        now: Instant,
+        before: LastSteps,
     ) -> "_Look":
-        """The rings of everybody of whom it is known how they go on."""
+        """The rings of everybody of whom it is known how they go on.
+
+        ``before``: how they went on at the look before.
+        """
         every = list(zones_of(world, people, rule, now))
         slow = [zone for zone in every if _is_seen(zone, now)]
         missed = [
@@ -189,8 +212,18 @@ class _Look:
             for zone in every
             if zone.radius_m > rule.radius_m and _is_missed(zone, people, now)
         ]
-        circles = Circles([_circle(zone, world, now) for zone in (*slow, *missed)])
-        return cls([*slow, *missed], len(slow), circles, rule, now)
+        steps = last_steps(slow, before)
+        otherwise = [
+            (zone, step)
+            for zone in slow
+            if zone.radius_m <= rule.radius_m and (step := turned(zone, steps))
+        ]
+        circles = Circles(
+            [_circle(zone, world, now) for zone in (*slow, *missed)]
+            + [_circle_of(zone, step, now) for zone, step in otherwise]
+        )
+        zones = [*slow, *missed, *(zone for zone, _ in otherwise)]
+        return cls(zones, len(slow), circles, steps, rule, now)
 
     def first(self, path: Path) -> tuple[_Ahead, _Ahead]:
         """A path's first encounter with each cause in whose rings it does not begin.

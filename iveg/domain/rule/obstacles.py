@@ -93,14 +93,6 @@ class _Fit:
     explained: float
 
 
-def fault_of(scan: LaserScan, pose: Pose2D, plan: Plan) -> Fault | None:
-    """What is wrong with a laser by one scan, made at ``pose`` in ``map``.
-
-    A wrong mount or pose draws walls where none are; zeros, and a cover, draw none.
-    """
-    return _fault(scan, explained_by(scan, pose, plan))
-
-
 def explained_by(scan: LaserScan, pose: Pose2D, plan: Plan) -> tuple[int, float]:
     """How many beams of a scan come back; the share of them that a plan explains."""
     x, y = scan.points(pose).astype(np.float64).T
@@ -109,6 +101,10 @@ def explained_by(scan: LaserScan, pose: Pose2D, plan: Plan) -> tuple[int, float]
 
 
 def _fault(scan: LaserScan, fit: tuple[int, float]) -> Fault | None:
+    """What is wrong with a laser by one scan, and how it fits the plan.
+
+    A wrong mount or pose draws walls where none are; zeros, and a cover, draw none.
+    """
     returns, explained = fit
     if returns < _LEAST_RETURNS * len(scan.ranges):
         return "blind"

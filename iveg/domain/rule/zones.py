@@ -74,14 +74,15 @@ def _zones_of(
     """The circles round somebody; where one made ``before`` is the same, that one."""
     reason, alert_id, made = person.class_, person.decision_id, iter(before)
     for sighting, radius in people.rings(person, rule, now):
-        recording = world.robot(sighting.observer).recording
+        recording = world.robots[sighting.observer].recording
         same = next(made, None)
         if (
             same is not None
             and same.sighting is sighting
             and same.radius_m == radius
-            and (same.reason, same.recording, same.alert_id)
-            == (reason, recording, alert_id)
+            and same.recording == recording
+            and same.alert_id == alert_id
+            and same.reason == reason
         ):
             yield same
             continue
@@ -89,8 +90,7 @@ def _zones_of(
             reason,
             person.person_id,
             sighting.observer,
-            sighting.x,
-            sighting.y,
+            *sighting.place,
             radius,
             sighting,
             recording,
@@ -157,11 +157,12 @@ class _Made:
 
     Attributes:
         of: Who or what they are round, by which all but their age is known.
-        until: So long they stay as they are (monotonic, s).
+        since: When they were made (monotonic, s); ``until`` then they stay as they are.
     """
 
     of: TrackedPerson | Odometry | None
     zones: Sequence[Zone]
+    since: float
     until: float
 
 
@@ -195,7 +196,9 @@ class ZoneFinder:
             everything = list(zones_of(world, people, rule, now))
             return lambda _: everything
         known = self._known
-        if known is None or not known.hold(world, people, rule, now):
+        if known is not None and known.hold(world, rule, now):
+            known.follow(people, rule, now)
+        else:
             known = self._known = Neighbours.of(world, people, rule, now)
         before, self._made = self._made, {}
         if rule is not self._rule:
@@ -225,34 +228,45 @@ class _Look:
         return made
 
     def _made_of(self, cause: str) -> _Made:
-        before, now = self.before.get(cause), self.now
+        before, now = self.before.get(cause), self.now.mono
         person = self.people.known.get(cause)
         peer = self.world.robots.get(cause) if person is None else None
         of = person if peer is None else peer.odometry
         # What an operator marks as a thing has no ring from then on.
-        is_same = before is not None and before.of is of and now.mono <= before.until
-        if before is not None and is_same and not self.people.things.known:
+        if (
+            before is not None
+            and before.of is of
+            and before.since <= now <= before.until
+            and not self.people.things.known
+        ):
             return before
         last = () if before is None else before.zones
         if person is not None:
-            about = person, self.people, self.world, self.rule, now, last
-            return _Made(of, tuple(_zones_of(*about)), self._ages_at(person))
+            return self._made_round(person, last)
         if peer is not None:
-            return _Made(of, tuple(_circle_of(peer, self.rule, now, last)), -math.inf)
-        return _Made(None, (), -math.inf)
+            zones = tuple(_circle_of(peer, self.rule, self.now, last))
+            return _Made(of, zones, now, -math.inf)
+        return _Made(None, (), now, -math.inf)
 
-    def _ages_at(self, person: TrackedPerson) -> float:
-        """Until when no ring of somebody grows or changes its map (monotonic, s)."""
-        robots, now = self.world.robots, self.now.mono
-        rings = [one for one in person.sightings if now - one.at.mono <= one.lasts_s]
-        if self.people.things.known or any(
-            robots[one.observer].description.kind == "recording" for one in rings
-        ):
+    def _made_round(self, person: TrackedPerson, before: Sequence[Zone]) -> _Made:
+        about = person, self.people, self.world, self.rule, self.now, before
+        zones = tuple(_zones_of(*about))
+        # Whom an operator's mark hides now has a ring again when that is over.
+        hidden = bool(self.people.things.known)
+        until = -math.inf if hidden else min(map(self._stays, zones), default=math.inf)
+        return _Made(person, zones, self.now.mono, until)
+
+    def _stays(self, zone: Zone) -> float:
+        """Until when a ring neither grows nor ends nor changes its map (monotonic, s).
+
+        The ring of a sighting grows from its grace on until it is as wide as rings get.
+        """
+        sighting, observer = zone.sighting, self.world.robots[zone.observer]
+        if sighting is None or observer.description.kind == "recording":
             return -math.inf
-        return min(
-            (one.at.mono + LIMITS.growth_grace_s - _ROUNDING_S for one in rings),
-            default=math.inf,
-        )
+        is_grown = zone.radius_m >= LIMITS.ring_most_m
+        for_s = sighting.lasts_s if is_grown else LIMITS.growth_grace_s
+        return sighting.at.mono + for_s - _ROUNDING_S
 
 
 def _near(
@@ -267,7 +281,7 @@ def _near(
     if not (causes or mine):
         return ()
     found, made = list[Zone](), look.made
-    is_within = mine.keys() <= causes.keys()
+    is_within = not mine or mine.keys() <= causes.keys()
     more = () if is_within else [one for one in mine if one not in causes]
     # Asked of each robot at each judgement: nearly all are made already.
     for cause in (*causes, *more) if more else causes:

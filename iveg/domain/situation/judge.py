@@ -11,16 +11,11 @@ from dataclasses import replace
 from typing import get_args
 
 from iveg.domain.events import Condition, Slot
-from iveg.domain.feedback import FULL_SPEED, HALF_SPEED
-from iveg.domain.limits import LIMITS
-from iveg.domain.observations import SafetyReport
-from iveg.domain.rule.premises import Missing
-from iveg.domain.situation.facts import Action, Level, Near, RobotFacts, Situation
-from iveg.domain.stop.commands import State
+from iveg.domain.situation.facts import Action, Level, RobotFacts, Situation
+from iveg.domain.situation.slowness import because_of, limited
+from iveg.domain.situation.stops_and_holds import OF_STOPS, held, stopping
 
 _WORST_FIRST = get_args(Level)
-HAZARDS = ("person", "robot", "obstacle")
-"""Reasons that are about somebody or something near."""
 
 
 def situation_of(facts: RobotFacts) -> Situation:
@@ -29,7 +24,7 @@ def situation_of(facts: RobotFacts) -> Situation:
     worst = min(
         (*_alerted(facts), *holding), key=lambda one: _WORST_FIRST.index(one.level)
     )
-    if facts.link == "LATE" and worst.state not in _OF_STOPS:
+    if facts.link == "LATE" and worst.state not in OF_STOPS:
         worst = _late(worst, facts)
     return replace(worst, factor=facts.factor)
 
@@ -40,9 +35,9 @@ def _is_silent(facts: RobotFacts) -> bool:
 
 def _heard(facts: RobotFacts) -> Iterator[Situation]:
     """All that holds for a robot that is heard; its work if nothing else does."""
-    yield from _held(facts)
-    yield from _stopping(facts)
-    yield from _limited(facts)
+    yield from held(facts)
+    yield from stopping(facts)
+    yield from limited(facts)
     yield from _too_close(facts)
     yield from _doubted(facts)
     yield _at_work(facts)
@@ -77,7 +72,7 @@ def _alerted(facts: RobotFacts) -> Iterator[Situation]:
         return  # It is heard again; the alert clears with the next tick.
     danger = Situation("danger", state, "alarm", action=action)
     if facts.alert_about is not None:
-        danger = _because(danger, facts.alert_about)
+        danger = because_of(danger, facts.alert_about)
     yield _aged(danger, facts) if state == "lost_moving" else danger
 
 
@@ -108,132 +103,6 @@ def _aged(situation: Situation, facts: RobotFacts) -> Situation:
     return replace(situation, slots={**situation.slots, "age": age_s})
 
 
-# --- STOP and locks -------------------------------------------------------------------
-
-_STOPS: Mapping[State, tuple[Level, str, Action]] = {
-    "REQUESTED": ("caution", "stopping", "as_moving"),
-    "SENT": ("caution", "stopping", "as_moving"),
-    "DELIVERED": ("caution", "braking", "as_moving"),
-    "UNCONFIRMED": ("danger", "unconfirmed", "red_button"),
-    "STILL_MOVING": ("danger", "still_moving", "red_button"),
-    "STANDING": ("locked", "standing", "release"),
-    "STALE": ("doubt", "stood", "as_moving"),
-    "RELEASING": ("caution", "releasing", "as_moving"),
-    "READY": ("locked", "ready", "resume"),
-}
-_OF_STOPS = {state for _, state, _ in _STOPS.values()} | {"resuming"}
-"""States that follow an order of people: they have rules for silence of their own."""
-
-
-def _stopping(facts: RobotFacts) -> Iterator[Situation]:
-    found = _STOPS.get(facts.stop)
-    if found is None:
-        return
-    level, state, action = found
-    if facts.is_resuming and state == "releasing":
-        state = "resuming"
-    yield Situation(level, state, "stop", action=action)
-
-
-_UNLOCKED: Mapping[str, Action] = {
-    "local": "unlock",
-    "remote": "release",
-    "auto": "none",
-}
-"""What lifts a hold; the one that takes most comes first."""
-
-
-def _held(facts: RobotFacts) -> Iterator[Situation]:
-    """Not free to move, by its own report; a STOP of ours says so itself."""
-    report = facts.report
-    if report is None or facts.stop not in ("RUNNING", "READY"):
-        return
-    holds = report.holds
-    if not holds:
-        if _waits_for_resume(report):
-            yield Situation("locked", "ready", "hold", action="resume")
-        return
-    first = min(holds, key=lambda one: list(_UNLOCKED).index(one.ack))
-    action, source = _UNLOCKED[first.ack], f"held_{first.source}"
-    yield Situation("locked", "held", "hold", source, first.id, action)
-
-
-def _waits_for_resume(report: SafetyReport) -> bool:
-    """Whether a robot that nothing holds stays where it is, and does not drive."""
-    return report.reason == "hold" and report.speed_factor <= 0.0
-
-
-# --- speed ----------------------------------------------------------------------------
-
-
-def _limited(facts: RobotFacts) -> Iterator[Situation]:
-    """Slow: by its own report, or because iVeg tells it and it does not say so yet."""
-    report, limit, applied = facts.report, facts.limit, facts.applied
-    held = report is not None and (report.holds or _waits_for_resume(report))
-    if held or facts.stop != "RUNNING":
-        return
-    if limit.speed_factor < applied:
-        yield _slow("told", limit.speed_factor, limit.reason, facts.told_near, facts)
-    elif report is not None and applied < FULL_SPEED:
-        half = "half" if applied == HALF_SPEED else "slow"
-        state = half if applied > 0.0 else "stands"
-        yield _slow(state, applied, report.reason, facts.near, facts)
-
-
-def _slow(
-    state: str, factor: float, reason: str, near: Near | None, facts: RobotFacts
-) -> Situation:
-    level: Level = "caution" if reason in HAZARDS else "doubt"
-    slow = Situation(level, state, reason, slots={"factor": factor})
-    if near is not None and near.kind in HAZARDS:
-        return _because(slow, near)
-    lacks = next((one for one in facts.missing if one.reason == reason), None)
-    if lacks is not None:
-        return _lacking(slow, lacks, facts.robot_id)
-    action: Action = "check_network" if reason == "watchdog" else "none"
-    known = reason if reason in _PLAIN else "other"
-    return replace(slow, why=known, action=action)
-
-
-_PLAIN = ("person", "robot", "obstacle", "stale", "doubt", "watchdog", "unsupervised")
-"""Reasons that have a sentence without a distance."""
-
-
-def _lacking(slow: Situation, lacks: Missing, own_id: str) -> Situation:
-    """A robot that is slow because something is missing, its own or another's."""
-    own = "_own" if lacks.robot_id == own_id and lacks.premise != "pose" else ""
-    action: Action = "check_camera" if lacks.premise == "detector" else "none"
-    return replace(
-        slow,
-        why=f"no_{lacks.premise}{own}",
-        about=lacks.robot_id,
-        action=action,
-        slots={**slow.slots, "about": lacks.robot_id},
-    )
-
-
-def _because(of: Situation, near: Near) -> Situation:
-    """The same because of somebody near."""
-    slots = dict(of.slots)
-    why = near.kind
-    if near.distance_m is not None:
-        slots["distance"] = round(near.distance_m, 1)
-        why = f"{near.kind}_at"
-        if near.foretold_s is not None:
-            slots["seconds"] = round(near.foretold_s, 1)
-            why = f"{near.kind}_ahead"
-        elif near.kind == "person" and near.lane is not None:
-            slots["lane"] = near.lane
-            why = "person_in"
-    if near.kind == "person" and near.unseen_s > LIMITS.seen_s:
-        # A distance to where somebody was is no distance to anybody.
-        slots["unseen"] = round(near.unseen_s)
-        why = "person_unseen" if near.lane is None else "person_was_in"
-    if near.kind == "robot" and near.about is not None:
-        slots["about"] = near.about
-    return replace(of, why=why, cause=near.kind, about=near.about, slots=slots)
-
-
 # --- people, doubts, work -------------------------------------------------------------
 
 
@@ -247,7 +116,7 @@ def _too_close(facts: RobotFacts) -> Iterator[Situation]:
         return
     if margin.band == "inside":
         close = Situation("caution", "close", "margin")
-        close = _because(close, facts.margin_near)
+        close = because_of(close, facts.margin_near)
         slots = {**close.slots, "short": max(0.1, round(-margin.margin_m, 1))}
         yield replace(close, cause="margin", slots=slots)
     elif margin.band == "unknown":

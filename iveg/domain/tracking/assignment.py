@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 _NEVER = 1e9
 """Stands for a pair that cannot be; far above any sum of distances (m)."""
+_PLAINLY = 1e-3
+"""So much cheaper (m) is cheaper, however sums beside ``_NEVER`` are rounded."""
 _FREE = -1
 
 
@@ -38,16 +40,20 @@ def assign(costs: Sequence[Sequence[float]]) -> list[tuple[int, int]]:
 
 
 def _undisputed(costs: Sequence[Sequence[float]]) -> list[tuple[int, int]] | None:
-    """The pairs where no row has a choice and no two want one column; else None.
+    """The pairs where each row has what is plainly its cheapest, no two the same.
 
-    So it is nearly always: each person in a picture is near one place.
+    Else None.  No other pairs are as many and as cheap: a row that had another column,
+    or none, would cost more.  So it is nearly always: each person in a picture is near
+    one place.
     """
     pairs = []
     for row, offers in enumerate(costs):
-        columns = [column for column, cost in enumerate(offers) if cost < _NEVER]
-        if len(columns) > 1:
+        least = min(offers)
+        if least >= _NEVER:
+            continue
+        if sum([cost < least + _PLAINLY for cost in offers]) > 1:
             return None
-        pairs += [(row, column) for column in columns]
+        pairs.append((row, offers.index(least)))
     taken = {column for _, column in pairs}
     return pairs if len(taken) == len(pairs) else None
 

@@ -22,6 +22,8 @@ from iveg.domain.geometry import Pose2D
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant, LaserScan
 from iveg.domain.robot_state import RobotState
+from iveg.domain.tracking.following import Returns
+from iveg.domain.tracking.sight import AllClear
 from iveg.domain.witness import PLAN_M, KnownBody, Plan
 
 ScanOf = Callable[[RobotState], LaserScan | None]
@@ -59,6 +61,10 @@ class LaserSight:
         self._strange: dict[str, tuple[LaserScan, Pose2D, _Floats | None]] = {}
         """By robot a scan, where it was made, and what the plan leaves of it."""
 
+    def all_clear(self) -> AllClear:
+        """What asks it of old rings."""
+        return AllClear(self.swept, self.returns)
+
     def swept(
         self,
         robot: RobotState,
@@ -73,10 +79,21 @@ class LaserSight:
             return _NONE
         if not np.any(np.hypot(*(spots - (pose.x, pose.y)).T) <= _FARTHEST_M):
             return _NONE
-        scan = self._newest(robot)
-        if scan is None or self._is_frozen(scan):
+        scan = self._moving(robot)
+        if scan is None:
             return _NONE
         return swept_by(scan, pose, spots, ages, self._strange_of, bodies)
+
+    def returns(self, robot: RobotState, now: Instant) -> Returns | None:
+        """``following.Unexplained``; none of a scan that is old or makes no sense."""
+        pose, received = robot.scan_pose, robot.scan_received
+        if pose is None or received is None or not _is_believed(robot, now):
+            return None
+        scan = self._moving(robot)
+        strange = None if scan is None else self._strange_of(scan, pose)
+        if scan is None or strange is None:
+            return None
+        return Returns(received.mono, pose.compose(scan.mount), strange)
 
     def _strange_of(self, scan: LaserScan, pose: Pose2D) -> _Floats | None:
         """``unexplained``, once for all rings and ticks that ask the same scan."""
@@ -85,6 +102,11 @@ class LaserSight:
             before = scan, pose, unexplained(scan, pose, self._plan)
             self._strange[scan.robot_id] = before
         return before[2]
+
+    def _moving(self, robot: RobotState) -> LaserScan | None:
+        """A robot's newest scan; None of a laser that is frozen."""
+        scan = self._newest(robot)
+        return None if scan is None or self._is_frozen(scan) else scan
 
     def _is_frozen(self, scan: LaserScan) -> bool:
         """Whether a scan repeats the one before to the bit: no laser is so exact."""

@@ -120,7 +120,8 @@ class _Suspect:
 
     def is_over(self, now: float) -> bool:
         """Whether nothing is left of it."""
-        return now - self.seen_at > FORGOTTEN_S or self.log_odds < 0.0
+        # As ``log_odds`` below even, asked of everybody in each picture.
+        return now - self.seen_at > FORGOTTEN_S or self.odds + self.look < 0.0
 
     def reaches(self, one: FaintPerson, now: float) -> float | None:
         """How far from it a detection is (m); None: too far to be the same."""
@@ -246,17 +247,16 @@ def _who_is(
 def _nearest(
     one: FaintPerson, suspects: Sequence[_Suspect], now: float
 ) -> _Suspect | None:
-    found, least, x = None, math.inf, one.x
+    found, least, x, y = None, math.inf, one.x, one.y
     for suspect in suspects:
         # First what nearly all fail: every box asks other robots' suspects.
         if (
             -_FARTHEST_M <= suspect.x - x <= _FARTHEST_M
             # Of a late picture it may have gone farther.
-            and (abs(suspect.y - one.y) <= _FARTHEST_M or now < suspect.seen_at)
-            and not suspect.is_over(now)
+            and (-_FARTHEST_M <= suspect.y - y <= _FARTHEST_M or now < suspect.seen_at)
         ):
             apart = suspect.reaches(one, now)
-            if apart is not None and apart < least:
+            if apart is not None and apart < least and not suspect.is_over(now):
                 found, least = suspect, apart
     return found
 

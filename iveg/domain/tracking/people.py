@@ -283,9 +283,9 @@ class People:
         """Drop a sighting whose place was seen to be empty."""
         return self._tracker.drop(person_id, sighting)
 
-    def confirm(self, person_id: str, sighting: Sighting, until: float) -> None:
-        """Whom only a laser sees may be somebody who is remembered so long."""
-        self._tracker.confirm(person_id, sighting, until)
+    def exchange(self, person_id: str, old: Sighting, new: Sighting) -> None:
+        """Know more of a sighting than before."""
+        self._tracker.exchange(person_id, old, new)
 
     def is_suspected(
         self, person: TrackedPerson, sighting: Sighting, observer: str

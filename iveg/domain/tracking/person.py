@@ -31,6 +31,20 @@ Stage = Literal["seen", "remembered", "last_seen", "gone"]
 
 
 @dataclass(frozen=True, slots=True)
+class Followed:
+    """Where a laser has had somebody in sight, since its camera lost them.
+
+    Attributes:
+        x: Their middle in ``map`` (m); ``y`` likewise.
+        at: When the laser saw them there last (monotonic, s).
+    """
+
+    x: float
+    y: float
+    at: float
+
+
+@dataclass(frozen=True, slots=True)
 class Sighting:
     """The newest detection of one person by one robot, in ``map``.
 
@@ -50,6 +64,8 @@ class Sighting:
             before it is part of a chain.
         known_until: Of a laser: who is seen may be somebody whom a camera saw, and who
             is remembered so long (monotonic, s).
+        followed: Where they went from there by the observer's laser, which moves the
+            ring and nothing else; None: nobody knows.
     """
 
     observer: str
@@ -69,6 +85,24 @@ class Sighting:
     laser: bool = False
     extent: Extent | None = None
     known_until: float = -math.inf
+    followed: Followed | None = None
+
+    @property
+    def place(self) -> tuple[float, float]:
+        """Middle of its ring, in ``map`` (m)."""
+        followed = self.followed
+        return (self.x, self.y) if followed is None else (followed.x, followed.y)
+
+    def ring_age_s(self, now: Instant) -> float:
+        """For how long its ring may have grown (s).
+
+        Whoever is followed is not foreseen, so theirs is never younger than of somebody
+        who was in sight a second ago.
+        """
+        age_s, followed = self.age_s(now), self.followed
+        if followed is None:
+            return age_s
+        return min(age_s, LIMITS.seen_s + max(0.0, now.mono - followed.at))
 
     @property
     def lasts_s(self) -> float:
@@ -121,6 +155,10 @@ class Sighting:
         """The same, which is remembered at least so long (monotonic, s)."""
         return replace(self, known_until=max(until, self.known_until))
 
+    def followed_to(self, place: Followed) -> "Sighting":
+        """The same of somebody whom a laser has in sight."""
+        return replace(self, followed=place)
+
     def _going_on(self, before: "Sighting") -> tuple[float, float]:
         """The velocity of the chain (m/s), smoothed over 0.4 s, of a walker at most."""
         after_s = self.at.mono - before.at.mono
@@ -129,8 +167,13 @@ class Sighting:
         gain = after_s / (_SMOOTHED_S + after_s)
         vx = before.vx + gain * ((self.x - before.x) / after_s - before.vx)
         vy = before.vy + gain * ((self.y - before.y) / after_s - before.vy)
-        least = min(1.0, LIMITS.walking_m_s / max(math.hypot(vx, vy), 1e-9))
-        return vx * least, vy * least
+        return of_a_walker(vx, vy)
+
+
+def of_a_walker(vx: float, vy: float) -> tuple[float, float]:
+    """A velocity, no faster than anybody walks (m/s)."""
+    least = min(1.0, LIMITS.walking_m_s / max(math.hypot(vx, vy), 1e-9))
+    return vx * least, vy * least
 
 
 @dataclass(frozen=True, slots=True)
@@ -259,4 +302,8 @@ class TrackedPerson:
         for sighting in self.sightings:
             age = sighting.age_s(now)
             if age <= sighting.lasts_s:
-                yield sighting, max(sighting.reach_m, rule.radius_at(age))
+                # Asked thousands of times a second: nearly nobody is followed.
+                if sighting.followed is not None:
+                    age = sighting.ring_age_s(now)
+                radius, reach = rule.radius_at(age), sighting.reach_m
+                yield sighting, radius if radius >= reach else reach

@@ -54,14 +54,22 @@ def chain_cost(
     A sighting that counts by its looks alone replaces none that counts by its box:
     looks add rings, and take none away.
     """
-    if not is_alike(person, one) or bool(earlier.reach_m) != bool(one.sighting.reach_m):
+    here = one.sighting
+    # First what nearly all fail: in a storm this is asked of everybody.
+    is_placed = not (earlier.reach_m or here.reach_m)
+    if is_placed and not (
+        -GATE_CAP_M <= earlier.x - here.x <= GATE_CAP_M
+        and -GATE_CAP_M <= earlier.y - here.y <= GATE_CAP_M
+    ):
+        return math.inf
+    if not is_alike(person, one) or bool(earlier.reach_m) != bool(here.reach_m):
         return math.inf
     # A laser may see another one: what a camera saw stays.
-    if (earlier.possible, earlier.laser) != (one.sighting.possible, one.sighting.laser):
+    if (earlier.possible, earlier.laser) != (here.possible, here.laser):
         return math.inf
     if earlier.reach_m:
         return 0.0
-    distance = distance_between(earlier, one.sighting)
+    distance = distance_between(earlier, here)
     return distance if distance <= _gate(earlier, at) else math.inf
 
 

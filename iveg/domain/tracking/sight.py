@@ -18,6 +18,7 @@ from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
 from iveg.domain.robot_state import RobotState
+from iveg.domain.tracking.following import Following, Unexplained
 from iveg.domain.tracking.people import People
 from iveg.domain.tracking.person import Sighting, TrackedPerson
 from iveg.domain.witness import KnownBody
@@ -52,10 +53,15 @@ class AllClear:
 
     Args:
         swept: Asks a robot's laser; nobody's counts if left out.
+        unexplained: Asks it whom it has in sight; likewise.
     """
 
-    def __init__(self, swept: Swept = lambda *_: _NONE) -> None:
-        self._swept = swept
+    def __init__(
+        self,
+        swept: Swept = lambda *_: _NONE,
+        unexplained: Unexplained = lambda *_: None,
+    ) -> None:
+        self._swept, self._following = swept, Following(unexplained)
         self._since: dict[_Look, float] = {}
         self._places: dict[int, tuple[Sighting, Sequence[_Place]]] = {}
         """By chain the sighting, and where to look for who was seen there."""
@@ -64,6 +70,7 @@ class AllClear:
         self, people: People, world: World, greenhouse: Greenhouse, now: Instant
     ) -> list[TrackedPerson]:
         """Remove rings whose centre is seen to be empty; returns their persons."""
+        self._following.tick(people, world, now)
         watched: dict[_Look, float] = {}
         empty: set[int] = set()
         rings = [
@@ -105,7 +112,7 @@ class AllClear:
     ) -> tuple[Sighting, Sequence[_Place]]:
         """Where to look for somebody, as it was when that was asked first."""
         known = self._places.get(sighting.chain)
-        if known is not None and known[0] is sighting:
+        if known is not None and known[0].at == sighting.at:
             return known
         odometry = world.robot(sighting.observer).odometry
         if odometry is None or sighting.laser:
@@ -212,7 +219,7 @@ def _hand_over(sighting: Sighting, people: People, now: Instant) -> None:
         for one in person.sightings:
             apart = math.dist((one.x, one.y), (sighting.x, sighting.y))
             if one.laser and apart <= reach and one.age_s(now) <= LIMITS.seen_s:
-                people.confirm(person.person_id, one, until)
+                people.exchange(person.person_id, one, one.remembered(until))
 
 
 def _groups(

@@ -91,11 +91,11 @@ class Tracker:
         person = self.known[person_id] = person.seen_as(person.newest, left)
         return person
 
-    def confirm(self, person_id: str, sighting: Sighting, until: float) -> None:
-        """Whom only a laser sees may be somebody who is remembered so long."""
-        person, known = self.known[person_id], sighting.remembered(until)
+    def exchange(self, person_id: str, old: Sighting, new: Sighting) -> None:
+        """Know more of a sighting than before."""
+        person = self.known[person_id]
         every = person.newest, *person.sightings
-        newest, *kept = (known if one is sighting else one for one in every)
+        newest, *kept = (new if one is old else one for one in every)
         self.known[person_id] = person.seen_as(newest, tuple(kept))
 
     def forget(self, now: Instant) -> list[TrackedPerson]:

@@ -1,107 +1,21 @@
 """Where a robot crosses into circles, as arrays: the rule of many moments at once."""
 
 from collections.abc import Collection
-from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
 from iveg.domain.limits import LIMITS, ring_radius
-from iveg.domain.rule.paths import (
-    AHEAD_S,
-    EVERY_S,
-    HOLDS_S,
-    HORIZON_S,
-    MOVES_M_S,
-    slows_within_s,
-)
+from iveg.domain.rule.paths import AHEAD_S, HOLDS_S, MOVES_M_S, slows_within_s
 from iveg.domain.what_if.inputs import Flags, Floats, Indices
+from iveg.domain.what_if.parameters import Parameters, reach_m, widest
+from iveg.domain.what_if.steps import STEP_S, Grid, Rings
 
-STEP_S: Final = EVERY_S
-"""Of the grid: as often as the rule looks ahead."""
 _PATH_STEP_S: Final = float(AHEAD_S[1] - AHEAD_S[0])
 _AT_ONCE: Final = 4_000
 """Paths that are compared at once: what a core keeps near."""
 _COARSE: Final = 5
 """Of so many moments of a path one is looked at first."""
-
-
-@dataclass(frozen=True, slots=True)
-class Parameters:
-    """What may be tried.
-
-    Attributes:
-        threshold: Least confidence of a person; ``robot_threshold`` of a robot.
-        radius_m: Ring of a fresh sighting (m).
-        release_beyond_m: So far outside a robot is let go (m), ``release_after_s`` and
-            so long after (s).
-        factor: Speed inside a ring, as a share.
-        foresight_s: How far ahead it looks (s); 0: not at all.
-    """
-
-    threshold: float = LIMITS.detection_threshold
-    robot_threshold: float = LIMITS.detection_threshold
-    radius_m: float = LIMITS.ring_default_m
-    release_beyond_m: float = LIMITS.release_beyond_m
-    release_after_s: float = LIMITS.release_after_s
-    factor: float = LIMITS.slow_factor
-    foresight_s: float = HORIZON_S
-
-
-@dataclass(frozen=True, slots=True)
-class Grid:
-    """Where a robot is at each step; each of shape (steps,).
-
-    Attributes:
-        age: Of its newest pose (s); inf before the first.
-        fastest: Of the last second (m/s).
-    """
-
-    x: Floats
-    y: Floats
-    yaw: Floats
-    linear: Floats
-    angular: Floats
-    age: Floats
-    fastest: Floats
-
-    @property
-    def top(self) -> float:
-        """Its greatest speed (m/s)."""
-        return float(self.fastest.max(initial=0.0))
-
-    @property
-    def stands(self) -> Flags:
-        """Whether its newest pose shows no motion."""
-        still: Flags = (np.abs(self.linear) < LIMITS.standing_speed) & (
-            np.abs(self.angular) < LIMITS.standing_speed
-        )
-        return still
-
-
-@dataclass(frozen=True, slots=True)
-class Rings:
-    """Circles, each at one step; each of shape (n,), by cause and then by step."""
-
-    step: Indices
-    cause: Indices
-    x: Floats
-    y: Floats
-    vx: Floats
-    vy: Floats
-    age: Floats
-
-    def where(self, wanted: Flags | Indices) -> "Rings":
-        """Some of them."""
-        return Rings(
-            self.step[wanted],
-            self.cause[wanted],
-            self.x[wanted],
-            self.y[wanted],
-            self.vx[wanted],
-            self.vy[wanted],
-            self.age[wanted],
-        )
 
 
 class Crossings:
@@ -261,30 +175,6 @@ class Crossings:
         north = rings.y[:, None] + rings.vy[:, None] * on - y
         apart: Floats = np.sqrt(east * east + north * north) - radius[:, None]
         return apart
-
-
-def widest(tried: Collection[Parameters]) -> Parameters:
-    """One of the same radius that holds robots wherever one of these does."""
-    return replace(
-        next(iter(tried)),
-        foresight_s=max(one.foresight_s for one in tried),
-        release_beyond_m=max(one.release_beyond_m for one in tried),
-    )
-
-
-def reach_m(tried: Parameters, age: Floats, speed: Floats) -> Floats:
-    """How far from its middle a ring may matter to a robot (m).
-
-    Args:
-        tried: Parameters.
-        age: Of rings (s).
-        speed: Of both towards each other, at most (m/s).
-    """
-    radius = ring_radius(tried.radius_m, age, np.minimum, np.maximum)
-    goes_on = tried.foresight_s + np.minimum(age, LIMITS.seen_s)
-    ahead = speed * goes_on * (age <= LIMITS.seen_s)
-    reach: Floats = radius + np.maximum(tried.release_beyond_m, ahead) + 1e-6
-    return reach
 
 
 def _soon(braking: float, speed: Floats) -> Floats:

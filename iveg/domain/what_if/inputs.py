@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from iveg.domain.limits import LIMITS
 from iveg.domain.tracking.calibration import logit
 from iveg.domain.tracking.looks import FAINT_FROM, FORGOTTEN_S, SUREST
+from iveg.domain.tracking.person import of_a_walker
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -214,8 +215,6 @@ def _velocities(at: Floats, x: Floats, y: Floats, of: Floats) -> tuple[Floats, F
         if not is_next:
             vx = vy = 0.0
             continue
-        vx, vy = vx + gain * (to_x - vx), vy + gain * (to_y - vy)
-        least = min(1.0, LIMITS.walking_m_s / max(math.hypot(vx, vy), 1e-9))
-        vx, vy = vx * least, vy * least
+        vx, vy = of_a_walker(vx + gain * (to_x - vx), vy + gain * (to_y - vy))
         found[row] = vx, vy
     return found[:, 0], found[:, 1]

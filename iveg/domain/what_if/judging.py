@@ -11,16 +11,10 @@ from types import MappingProxyType
 import numpy as np
 
 from iveg.domain.limits import LIMITS
-from iveg.domain.what_if.crossings import (
-    STEP_S,
-    Crossings,
-    Grid,
-    Parameters,
-    Rings,
-    reach_m,
-    widest,
-)
+from iveg.domain.what_if.crossings import Crossings
 from iveg.domain.what_if.inputs import Flags, Floats, Indices, Inputs, Poses, Sightings
+from iveg.domain.what_if.parameters import Parameters, reach_m, widest
+from iveg.domain.what_if.steps import STEP_S, Grid, Rings
 from iveg.domain.what_if.truth import Nearest
 
 _Thresholds = tuple[float, float]

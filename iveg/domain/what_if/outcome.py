@@ -10,9 +10,10 @@ import numpy as np
 
 from iveg.domain.day import length
 from iveg.domain.limits import LIMITS
-from iveg.domain.what_if.crossings import STEP_S, Grid, Parameters
 from iveg.domain.what_if.inputs import Flags, Floats
 from iveg.domain.what_if.judging import Range, Stretch
+from iveg.domain.what_if.parameters import Parameters
+from iveg.domain.what_if.steps import STEP_S, Grid
 from iveg.domain.what_if.truth import false_alarms, missed
 
 _REASONS: Final = "person", "robot"

@@ -6,8 +6,8 @@ from types import MappingProxyType
 from typing import Final, Literal
 
 from iveg.domain.observations import Instant
-from iveg.domain.what_if.crossings import Parameters
 from iveg.domain.what_if.outcome import Outcome
+from iveg.domain.what_if.parameters import Parameters
 
 State = Literal["waiting", "running", "done", "failed", "cancelled"]
 Varied = Literal[

@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict
 from iveg.models.experiment import Experiment, Experiments
 from iveg.web.api.answers import Json
 from iveg.web.refusals import refusals
-from iveg.web.security.authentication import require
+from iveg.web.security.requirements import require
 
 Size = Literal["minimal", "quick", "full"]
 Name = Annotated[str, InPath(pattern=r"^(minimal|quick|full)-\d{3}$")]

@@ -7,7 +7,8 @@ from typing import Final, Literal
 
 import numpy as np
 
-from iveg.domain.costmap import Grid, InflatedGrid
+from iveg.domain.costmap import InflatedGrid
+from iveg.domain.occupancy_grid import Grid
 from iveg.domain.records import Json
 from iveg.lab.experiment.scoring import Picture, SeenObject
 

@@ -15,12 +15,12 @@ from iveg.domain.feedback import (
 )
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.known import MOST_TOLD, KnownPlace
-from iveg.ngsi import payloads
+from iveg.ngsi import feedback_payloads
 from iveg.ngsi.codec.fields import read_origin
 from iveg.ngsi.codec.untrusted import first_complaint, load_json
 
-_PLACES: TypeAdapter[list[payloads.KnownPlaceValue]] = TypeAdapter(
-    Annotated[list[payloads.KnownPlaceValue], Field(max_length=MOST_TOLD)]
+_PLACES: TypeAdapter[list[feedback_payloads.KnownPlaceValue]] = TypeAdapter(
+    Annotated[list[feedback_payloads.KnownPlaceValue], Field(max_length=MOST_TOLD)]
 )
 
 
@@ -31,7 +31,7 @@ def read_feedback(payload: bytes) -> Feedback:
         UnreadableError: not a feedback; counts as no feedback (docs/safety.md).
     """
     try:
-        value = payloads.FeedbackValue.model_validate(load_json(payload))
+        value = feedback_payloads.FeedbackValue.model_validate(load_json(payload))
     except ValidationError as error:
         raise UnreadableError("not_feedback", first_complaint(error)) from error
     pose = value.robot_pose
@@ -51,7 +51,7 @@ def read_feedback(payload: bytes) -> Feedback:
     )
 
 
-def _speed_limits(value: payloads.FeedbackValue) -> dict[str, SpeedLimit]:
+def _speed_limits(value: feedback_payloads.FeedbackValue) -> dict[str, SpeedLimit]:
     """Of every robot that is named."""
     return dict.fromkeys(value.clear, CLEAR) | {
         robot_id: SpeedLimit(
@@ -92,7 +92,7 @@ def _known_here(value: object) -> tuple[KnownPlace, ...]:
     )
 
 
-def _alert(value: payloads.AlertValue) -> FeedbackAlert:
+def _alert(value: feedback_payloads.AlertValue) -> FeedbackAlert:
     position, goes = value.position, value.velocity
     return FeedbackAlert(
         value.decision_id or "",

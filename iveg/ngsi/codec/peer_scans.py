@@ -7,7 +7,7 @@ from pydantic import ValidationError
 from iveg.domain.errors import UnreadableError
 from iveg.domain.geometry import Pose2D
 from iveg.domain.peer_scan import PeerScan
-from iveg.ngsi import payloads
+from iveg.ngsi import peer_payloads
 from iveg.ngsi.codec.fields import read_origin, rounded
 from iveg.ngsi.codec.untrusted import first_complaint, load_json
 
@@ -48,7 +48,7 @@ def read_peer_scan(robot_id: str, payload: bytes) -> PeerScan:
     if len(payload) > LARGEST:
         raise UnreadableError("too_large", f"{len(payload)} bytes")
     try:
-        value = payloads.PeerScanValue.model_validate(load_json(payload))
+        value = peer_payloads.PeerScanValue.model_validate(load_json(payload))
     except ValidationError as error:
         raise UnreadableError("not_a_peer_scan", first_complaint(error)) from error
     if value.robot_id != robot_id:

@@ -4,7 +4,6 @@ Without I/O: from a few seconds of observed traffic it derives the report that a
 operator needs before the robot moves.
 """
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -13,6 +12,7 @@ from iveg.robot.ros2.drive import message_of
 from iveg.robot.ros2.lookout import deafness
 from iveg.robot.ros2.topics import TOPICS, sensed_topics
 from iveg.robot.ros2.transforms import NoTransformError, TransformBuffer
+from iveg.robot.ros2.verdict import CheckRow, CheckVerdict
 from iveg.ros2.names import Endpoint, Qos
 from iveg.ros2.type_hash import definition, type_hash
 
@@ -36,32 +36,6 @@ class Heard:
     unreadable: int = 0
     age_s: float | None = None
     frame: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class CheckRow:
-    """One line of the table."""
-
-    topic: str
-    type: str
-    writers: int
-    rate_hz: float
-    age_s: float | None
-    remark: str
-
-
-@dataclass(frozen=True, slots=True)
-class CheckVerdict:
-    """Result of a check; the robot may connect if ``missing`` is empty.
-
-    Attributes:
-        gate: Id of the robot whose gate runs already; empty: none does.
-    """
-
-    rows: tuple[CheckRow, ...]
-    chain: str
-    missing: tuple[str, ...]
-    gate: str = ""
 
 
 def judge(
@@ -255,23 +229,3 @@ def _drive(config: RobotConfig, others: Iterable[Endpoint]) -> list[str]:
     if wishes and all(one.type != given for one in wishes):
         found.append(f"{cmd_vel_in} is {wishes[0].type} there: drive.stamped_in.")
     return found
-
-
-def lines(verdict: CheckVerdict) -> list[str]:
-    """Text lines of the result."""
-    table = [("topic", "type", "writers", "Hz", "age", "")]
-    for row in verdict.rows:
-        known = row.age_s is not None and math.isfinite(row.age_s)
-        age = f"{row.age_s:.2f} s" if known else "-"
-        rate = f"{row.rate_hz:.1f}"
-        table.append((row.topic, row.type, str(row.writers), rate, age, row.remark))
-    widths = [max(len(row[n]) for row in table) for n in range(len(table[0]))]
-    said = [
-        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True))
-        for row in table
-    ]
-    said = [line.rstrip() for line in said]
-    said += ["", f"TF: {verdict.chain}", ""]
-    if verdict.gate:
-        said += [f"The gate of {verdict.gate} is running.", ""]
-    return said + (list(verdict.missing) or ["Nothing is missing."])

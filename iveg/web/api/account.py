@@ -1,8 +1,6 @@
 """One's own account over HTTP: what is known of it, and a new password."""
 
-from typing import Annotated
-
-from fastapi import APIRouter, Depends, HTTPException, Request, Response
+from fastapi import APIRouter, HTTPException, Request, Response
 from pydantic import Field
 
 from iveg.adapters.passwords import LEAST, MOST
@@ -12,12 +10,10 @@ from iveg.models.signing_in import OwnAccount
 from iveg.web.api.answers import Json
 from iveg.web.api.sessions import refuse_walls
 from iveg.web.cookies import keep_language
-from iveg.web.problems import Problem
+from iveg.web.problem import Problem
 from iveg.web.refusals import refusals
-from iveg.web.security.authentication import Principal, authenticator_of, require
 from iveg.web.security.people import People
-
-_Reader = Annotated[Principal, Depends(require("read"))]
+from iveg.web.security.requirements import Reader, authenticator_of
 
 
 class PasswordBody(Body):
@@ -40,7 +36,7 @@ def router(people: People) -> APIRouter:
     )
 
     @routes.get("", response_model=OwnAccount)
-    async def own(who: _Reader) -> Response:
+    async def own(who: Reader) -> Response:
         """Who this is."""
         account = people.find(who.person)
         return Json(
@@ -55,7 +51,7 @@ def router(people: People) -> APIRouter:
         )
 
     @routes.put("/password", status_code=204)
-    async def change(request: Request, body: PasswordBody, who: _Reader) -> Response:
+    async def change(request: Request, body: PasswordBody, who: Reader) -> Response:
         """Change the password; every session ends but this one, which begins anew."""
         change = authenticator_of(request).change_password
         done = await change(request, who, body.old, body.new)
@@ -66,7 +62,7 @@ def router(people: People) -> APIRouter:
         return Problem(403, "The old password is wrong.", "wrong-password").response()
 
     @routes.put("/language", status_code=204)
-    async def choose(body: LanguageBody, who: _Reader) -> Response:
+    async def choose(body: LanguageBody, who: Reader) -> Response:
         """Keep a language for every browser in which the person signs in."""
         refuse_walls(who)
         if not who.has_account:

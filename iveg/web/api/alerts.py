@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, HTTPException, Response
+from fastapi import APIRouter, HTTPException, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from iveg.models.alert import AcknowledgedAlerts, Alert
@@ -10,7 +10,7 @@ from iveg.ngsi.texts import clean_text
 from iveg.pipeline.evaluate import Evaluator
 from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json
-from iveg.web.security.authentication import Principal, require
+from iveg.web.security.requirements import Operator
 
 MOST_TOGETHER = 200
 """More alerts at once nobody has read."""
@@ -41,7 +41,7 @@ def router(evaluator: Evaluator, clock: Clock) -> APIRouter:
     async def acknowledge(
         alert_id: str,
         body: Acknowledgement,
-        who: Annotated[Principal, Depends(require("release"))],
+        who: Operator,
     ) -> Response:
         """Say that somebody has seen it; it stays listed while it is active."""
         note = clean_text(body.note)
@@ -53,7 +53,7 @@ def router(evaluator: Evaluator, clock: Clock) -> APIRouter:
     @routes.post("/alerts/acknowledge", response_model=AcknowledgedAlerts)
     async def acknowledge_together(
         body: AcknowledgementTogether,
-        who: Annotated[Principal, Depends(require("release"))],
+        who: Operator,
     ) -> Response:
         """Say that somebody has seen a list; a P1 is left to be seen by itself."""
         note = clean_text(body.note)

@@ -6,7 +6,7 @@ and resume are refused unless the robot stands and its report is fresh.
 
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Request, Response
+from fastapi import APIRouter, Request, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from iveg.models.press import FleetPressed, Pressed
@@ -15,11 +15,8 @@ from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.presses import DESCRIBED, press_of
 from iveg.web.refusals import refusals
-from iveg.web.security.authentication import Principal, require
+from iveg.web.security.requirements import Operator, Presser, ProvenOperator
 
-Pressing = Annotated[Principal, Depends(require("stop"))]
-Releasing = Annotated[Principal, Depends(require("release"))]
-Proven = Annotated[Principal, Depends(require("release", proven=True))]
 HoldId = Annotated[str, Field(min_length=1, max_length=64)]
 
 
@@ -41,7 +38,7 @@ def router(commander: Commander, clock: Clock) -> APIRouter:
         response_model=Pressed,
         openapi_extra=DESCRIBED,
     )
-    async def stop(request: Request, robot_id: str, who: Pressing) -> Response:
+    async def stop(request: Request, robot_id: str, who: Presser) -> Response:
         """STOP one robot, on every transport at once."""
         press = await press_of(request)
         pressed = await commander.stop([robot_id], who.name, clock(), press)
@@ -53,7 +50,7 @@ def router(commander: Commander, clock: Clock) -> APIRouter:
         response_model=FleetPressed,
         openapi_extra=DESCRIBED,
     )
-    async def stop_fleet(request: Request, who: Pressing) -> Response:
+    async def stop_fleet(request: Request, who: Presser) -> Response:
         """STOP every robot, in parallel."""
         press = await press_of(request)
         pressed = await commander.stop(commander.machines, who.name, clock(), press)
@@ -66,7 +63,7 @@ def router(commander: Commander, clock: Clock) -> APIRouter:
         responses=refusals(409),
         openapi_extra=DESCRIBED,
     )
-    async def drill(request: Request, robot_id: str, who: Releasing) -> Response:
+    async def drill(request: Request, robot_id: str, who: Operator) -> Response:
         """STOP a robot that stands or crawls, to prove that STOP works; 409 else."""
         press = await press_of(request)
         command = await commander.drill(robot_id, who.name, clock(), press)
@@ -78,7 +75,9 @@ def router(commander: Commander, clock: Clock) -> APIRouter:
         response_model=Pressed,
         responses=refusals(409),
     )
-    async def release(robot_id: str, body: ReleaseRequest, who: Proven) -> Response:
+    async def release(
+        robot_id: str, body: ReleaseRequest, who: ProvenOperator
+    ) -> Response:
         """Lift exactly the holds that the person saw; 409 when they have changed."""
         command = await commander.release(robot_id, body.holds, who.name, clock())
         return Json(Pressed.of(command), 202)
@@ -89,7 +88,7 @@ def router(commander: Commander, clock: Clock) -> APIRouter:
         response_model=Pressed,
         responses=refusals(409),
     )
-    async def resume(robot_id: str, who: Releasing) -> Response:
+    async def resume(robot_id: str, who: Operator) -> Response:
         """Let a released robot drive again."""
         command = await commander.resume(robot_id, who.name, clock())
         return Json(Pressed.of(command), 202)

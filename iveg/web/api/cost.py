@@ -10,7 +10,7 @@ from pydantic import AfterValidator, BeforeValidator
 
 from iveg.adapters.history.asking import ask_once
 from iveg.adapters.history.cost import CostRows, cost_rows
-from iveg.domain import cost
+from iveg.domain import cost, near_misses
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.stamps import format_stamp
 from iveg.models.base import rounded, stamp
@@ -21,9 +21,9 @@ from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.api.history_filters import Span, as_kept, mend_plus, range_of
 from iveg.web.pages.contexts import ComparePage
+from iveg.web.pages.drawing import Pages
 from iveg.web.pages.local_time import in_madrid, moment_of, start_of
-from iveg.web.pages.routes import Pages
-from iveg.web.security.authentication import require
+from iveg.web.security.requirements import require
 
 _DAY_S = 86_400.0
 _DAY = timedelta(days=1)
@@ -90,7 +90,7 @@ def _cost_of(
         telemetry_since=stamp(rows.telemetry_since),
         events_since=stamp(rows.events_since),
         **_figures(rows, greenhouse, known),
-        cell_m=cost.CELL_M,
+        cell_m=near_misses.CELL_M,
         map=GreenhouseMap.of(greenhouse),
     )
 
@@ -132,13 +132,13 @@ def _driven(
 def _near(
     rows: CostRows, changes: cost.SpeedChanges, greenhouse: Greenhouse
 ) -> dict[str, Any]:
-    misses = cost.near_misses(rows.near, changes, greenhouse)
+    misses = near_misses.near_misses(rows.near, changes, greenhouse)
     return {
         "near": [_miss(one) for one in misses[: cost.MOST_MISSES]],
         "near_count": len(misses),
         "heat": [
-            Heat(x=x * cost.CELL_M, y=y * cost.CELL_M, seconds=seconds)
-            for (x, y), seconds in sorted(cost.heat(rows.near).items())
+            Heat(x=x * near_misses.CELL_M, y=y * near_misses.CELL_M, seconds=seconds)
+            for (x, y), seconds in sorted(near_misses.heat(rows.near).items())
         ],
     }
 
@@ -156,7 +156,7 @@ def _events(rows: CostRows) -> dict[str, Any]:
     }
 
 
-def _miss(one: cost.NearMiss) -> NearMiss:
+def _miss(one: near_misses.NearMiss) -> NearMiss:
     worst = one.worst
     return NearMiss(
         at=format_stamp(worst.at),

@@ -17,13 +17,13 @@ from PIL import Image
 from iveg.domain.costmap import UNKNOWN, InflatedGrid
 from iveg.domain.rule.zones import zones_of
 from iveg.models.base import write_json
-from iveg.models.places import Costmap as CostmapModel
+from iveg.models.mapped import Costmap as CostmapModel
 from iveg.models.places import Point
 from iveg.pipeline.evaluate import Evaluator
 from iveg.pipeline.mapping import Mapper
 from iveg.pipeline.ports import Clock
 from iveg.web.refusals import refusals
-from iveg.web.security.authentication import require
+from iveg.web.security.requirements import require
 
 _PNG = "image/png"
 _UNKNOWN_GREY = 205

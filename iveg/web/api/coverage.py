@@ -5,11 +5,11 @@ from fastapi import APIRouter, Depends, Response
 from iveg.domain.coverage import RECENT_S
 from iveg.domain.observations import Instant
 from iveg.domain.stamps import format_stamp
-from iveg.models.places import Coverage, LaneCoverage
+from iveg.models.mapped import Coverage, LaneCoverage
 from iveg.pipeline.coverage import CoverageMonitor
 from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json
-from iveg.web.security.authentication import require
+from iveg.web.security.requirements import require
 
 
 def router(monitor: CoverageMonitor, clock: Clock) -> APIRouter:

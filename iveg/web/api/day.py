@@ -34,10 +34,10 @@ from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.api.history_filters import HistoryDay
 from iveg.web.pages.contexts import DayPage
+from iveg.web.pages.drawing import Pages
 from iveg.web.pages.local_time import in_madrid, start_of
-from iveg.web.pages.routes import Pages
 from iveg.web.refusals import refusals
-from iveg.web.security.authentication import require
+from iveg.web.security.requirements import require
 
 _DAY = timedelta(days=1)
 _MOST_PAGES = 20

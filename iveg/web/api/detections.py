@@ -8,19 +8,23 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 from iveg.adapters.history.lists import USUAL_ROWS
 from iveg.domain.records import DetectionRecord
 from iveg.models.base import Listing, write_json
-from iveg.models.detection import DetectionRow
+from iveg.models.kept_detection import DetectionRow
 from iveg.pipeline.newest_detections import NewestDetections
 from iveg.web.api import exports
 from iveg.web.api.answers import FEW_ROWS, Apart
 from iveg.web.api.exports import MEDIA_TYPES, Form
 from iveg.web.api.history_filters import NewestFilters, admitting
-from iveg.web.security.authentication import require
+from iveg.web.refusals import refusals
+from iveg.web.security.requirements import require
 
 
 def router(newest: NewestDetections, worker: Apart) -> APIRouter:
     """Each detection, which the history does not keep; answers are made apart."""
     routes = APIRouter(
-        prefix="/api/v1", tags=["live"], dependencies=[Depends(require("read"))]
+        prefix="/api/v1",
+        tags=["live"],
+        dependencies=[Depends(require("read"))],
+        responses=refusals(503),
     )
 
     @routes.get(

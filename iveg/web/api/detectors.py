@@ -1,8 +1,6 @@
 """Detectors in and out of service over HTTP (docs/interfaces/http.md)."""
 
-from typing import Annotated
-
-from fastapi import APIRouter, Depends, Response
+from fastapi import APIRouter, Response
 
 from iveg.models.base import Body
 from iveg.models.robot import Detector
@@ -10,7 +8,7 @@ from iveg.pipeline.detectors import Detectors
 from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.refusals import refusals
-from iveg.web.security.authentication import Principal, require
+from iveg.web.security.requirements import Operator
 
 
 class ServiceRequest(Body):
@@ -29,7 +27,7 @@ def router(detectors: Detectors, clock: Clock) -> APIRouter:
     async def service(
         robot_id: str,
         body: ServiceRequest,
-        who: Annotated[Principal, Depends(require("release"))],
+        who: Operator,
     ) -> Response:
         """Take a detector out of service until its robot's next boot, or put it back.
 

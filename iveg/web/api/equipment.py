@@ -6,7 +6,7 @@ from iveg.models.base import Listing
 from iveg.models.equipment import Tile
 from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json
-from iveg.web.security.authentication import require
+from iveg.web.security.requirements import require
 from iveg.web.views import Views
 
 

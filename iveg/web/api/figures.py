@@ -20,7 +20,7 @@ from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Apart
 from iveg.web.api.exports import MEDIA_TYPES
 from iveg.web.api.history_filters import Range, Span, range_of
-from iveg.web.pages import charts
+from iveg.web.pages import charts, plotly_library, time_charts
 
 _DAY_S = 86_400.0
 _FOR_GOOD = "public, max-age=31536000, immutable"
@@ -56,7 +56,7 @@ def add_routes(
 
     @routes.get("/vendor/{name}", include_in_schema=False)
     async def vendor(name: str) -> Response:
-        script = await asyncio.to_thread(charts.library)
+        script = await asyncio.to_thread(plotly_library.library)
         if name != script.name:
             raise HTTPException(404, "There is no such file.")
         headers = {"Content-Encoding": "gzip", "Cache-Control": _FOR_GOOD}
@@ -108,9 +108,9 @@ def _draw_charts(
 ) -> bytes:
     return write_json(
         {
-            **charts.library_facts(),
-            "speed": Fragment(charts.speed_figure(speeds, fleet)),
-            "margin": Fragment(charts.margin_figure(speeds)),
+            **plotly_library.library_facts(),
+            "speed": Fragment(time_charts.speed_figure(speeds, fleet)),
+            "margin": Fragment(time_charts.margin_figure(speeds)),
             "detections": Fragment(charts.confidence_figure(counts, threshold)),
             "stops": Fragment(charts.stop_figure(stops)),
         }
@@ -118,14 +118,14 @@ def _draw_charts(
 
 
 def _draw_climate(series: ClimateSeries, since: float, until: float) -> bytes:
-    figures = charts.climate_figures(series)
+    figures = time_charts.climate_figures(series)
     return write_json(
         {
             "since": format_stamp(since),
             "until": format_stamp(until),
             "slice_s": round(series.slice_s, 3),
             "items": _readings(series),
-            **charts.library_facts(),
+            **plotly_library.library_facts(),
             "figures": {kind: Fragment(drawn) for kind, drawn in figures.items()},
         }
     )
@@ -135,14 +135,14 @@ def _draw_equipment(
     series: Mapping[tuple[str, str], MeasurementSeries], since: float, until: float
 ) -> bytes:
     figures = {
-        f"{entity_id}/{attribute}": Fragment(charts.measurement_figure(one))
+        f"{entity_id}/{attribute}": Fragment(time_charts.measurement_figure(one))
         for (entity_id, attribute), one in series.items()
     }
     return write_json(
         {
             "since": format_stamp(since),
             "until": format_stamp(until),
-            **charts.library_facts(),
+            **plotly_library.library_facts(),
             "figures": figures,
         }
     )

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-from fastapi import APIRouter, Depends, Response
+from fastapi import APIRouter, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from iveg.domain.goals import GoalWish
@@ -11,9 +11,8 @@ from iveg.pipeline.goals import GoalDispatcher
 from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.refusals import refusals
-from iveg.web.security.authentication import Principal, require
+from iveg.web.security.requirements import Operator
 
-Sending = Annotated[Principal, Depends(require("release"))]
 _Metres = Annotated[float, Field(ge=-1e6, le=1e6)]
 
 
@@ -64,12 +63,12 @@ def router(goals: GoalDispatcher, clock: Clock) -> APIRouter:
     routes = APIRouter(prefix="/api/v1", tags=["commands"], responses=refusals(409))
 
     @routes.post("/robots/{robot_id}/goal", status_code=202, response_model=Goal)
-    async def give(robot_id: str, body: GoalRequest, who: Sending) -> Response:
+    async def give(robot_id: str, body: GoalRequest, who: Operator) -> Response:
         """Send a robot somewhere; 409 while it is held or the place is not free."""
         return Json(Goal.of(goals.give(robot_id, body.wish(), who.name, clock())), 202)
 
     @routes.delete("/robots/{robot_id}/goal", status_code=202, response_model=Goal)
-    async def cancel(robot_id: str, who: Sending) -> Response:
+    async def cancel(robot_id: str, who: Operator) -> Response:
         """Have a robot forget its goal and stay where it is; 409 without one."""
         return Json(Goal.of(goals.cancel(robot_id, who.name, clock())), 202)
 

@@ -10,7 +10,7 @@ from iveg.domain.observations import Instant
 from iveg.models.health import Health
 from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json
-from iveg.web.security.authentication import require
+from iveg.web.security.requirements import require
 
 _READY: dict[int | str, dict[str, Any]] = {503: {"description": "A hop is not well."}}
 

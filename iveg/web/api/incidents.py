@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Annotated, Any, Protocol
 
 import orjson
-from fastapi import APIRouter, Depends, HTTPException, Query
+from fastapi import APIRouter, HTTPException, Query
 from fastapi.responses import FileResponse
 from pydantic import Field
 from starlette.background import BackgroundTask
@@ -37,7 +37,7 @@ from iveg.web.api.answers import Apart
 from iveg.web.api.history_filters import Span
 from iveg.web.pages.incident_report import write_report
 from iveg.web.refusals import refusals
-from iveg.web.security.authentication import Principal, require
+from iveg.web.security.requirements import Operator
 
 MEDIA_TYPE = "application/zip"
 LONGEST_S, BEFORE_S, AFTER_S = 3600.0, 30.0, 30.0
@@ -93,7 +93,7 @@ def router(sources: Sources) -> APIRouter:
     )
     async def incident(
         asked: Annotated[About, Query()],
-        principal: Annotated[Principal, Depends(require("release"))],
+        principal: Operator,
     ) -> FileResponse:
         """Everything about some minutes as a ZIP, at most an hour."""
         since, until, said = await _range(asked, sources)

@@ -1,6 +1,6 @@
 """Passkeys over HTTP: those of whoever asks, and the challenge of a sign-in."""
 
-from typing import Annotated, Any, Final
+from typing import Any, Final
 
 from fastapi import APIRouter, Depends, HTTPException, Request, Response
 
@@ -11,17 +11,17 @@ from iveg.models.base import Body, Listing
 from iveg.models.passkeys import PasskeyOfPerson
 from iveg.web.api.answers import Json
 from iveg.web.api.users import Name
-from iveg.web.problems import Problem
+from iveg.web.problem import Problem
 from iveg.web.refusals import refusals
 from iveg.web.security.answer import AnswerOfDevice
-from iveg.web.security.authentication import Principal, authenticator_of, require
 from iveg.web.security.passkeys import SIGN_IN, Passkeys, site_of
 from iveg.web.security.people import People
+from iveg.web.security.requirements import Reader, authenticator_of, require
+from iveg.web.security.roles import Principal
 
 _REFUSED: Final = Problem(
     422, "This is no passkey that was asked for here.", "passkey-refused"
 )
-_Reader = Annotated[Principal, Depends(require("read"))]
 
 
 class PasskeyBody(Body):
@@ -54,13 +54,13 @@ def _add_own(routes: APIRouter, people: People, passkeys: Passkeys) -> None:
     own = "/api/v1/account/passkeys"
 
     @routes.get(own, response_model=Listing[PasskeyOfPerson])
-    async def listed(who: _Reader) -> Response:
+    async def listed(who: Reader) -> Response:
         """One's own passkeys, the oldest first."""
         known = passkeys.of(account_of(people, who).account_id)
         return Json(Listing(items=[PasskeyOfPerson.of(one) for one in known]))
 
     @routes.get(f"{own}/options", response_model=dict[str, Any])
-    async def begin(request: Request, who: _Reader) -> Response:
+    async def begin(request: Request, who: Reader) -> Response:
         """Options of a new passkey; its challenge waits for five minutes."""
         account = account_of(people, who)
         if len(passkeys.of(account.account_id)) >= MOST_PASSKEYS:
@@ -70,7 +70,7 @@ def _add_own(routes: APIRouter, people: People, passkeys: Passkeys) -> None:
         return Json(await passkeys.ask_to_register(site_of(request), account))
 
     @routes.post(own, response_model=PasskeyOfPerson, status_code=201)
-    async def register(request: Request, body: PasskeyBody, who: _Reader) -> Response:
+    async def register(request: Request, body: PasskeyBody, who: Reader) -> Response:
         """Keep a passkey that answers the challenge."""
         account, site = account_of(people, who), site_of(request)
         made = await authenticator_of(request).attempts.weigh(
@@ -83,7 +83,7 @@ def _add_own(routes: APIRouter, people: People, passkeys: Passkeys) -> None:
         return (_REFUSED if made.status == 401 else made).response()
 
     @routes.delete(f"{own}/{{passkey_id}}", status_code=204)
-    async def remove(passkey_id: str, who: _Reader) -> None:
+    async def remove(passkey_id: str, who: Reader) -> None:
         """Forget a passkey at once."""
         await passkeys.remove(account_of(people, who), passkey_id, who)
 

@@ -8,7 +8,7 @@ from iveg.models.snapshot import PastWorld
 from iveg.pipeline.ports import Clock
 from iveg.web.api.history_filters import Moment
 from iveg.web.refusals import refusals
-from iveg.web.security.authentication import require
+from iveg.web.security.requirements import require
 
 _VIEWER = r"^[A-Za-z0-9-]{1,64}$"
 

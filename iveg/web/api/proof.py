@@ -3,7 +3,7 @@
 from collections.abc import Awaitable, Callable
 from typing import Annotated, Any, Final
 
-from fastapi import APIRouter, Depends, Request, Response
+from fastapi import APIRouter, Request, Response
 from pydantic import Field
 
 from iveg.adapters.passwords import MOST
@@ -14,17 +14,17 @@ from iveg.models.base import Body
 from iveg.models.passkeys import Proof
 from iveg.web.api.answers import Json
 from iveg.web.api.passkeys import account_of
-from iveg.web.problems import Problem
+from iveg.web.problem import Problem
 from iveg.web.refusals import refusals
 from iveg.web.security.answer import AnswerOfDevice
-from iveg.web.security.authentication import Principal, authenticator_of, require
 from iveg.web.security.passkeys import Passkeys, site_of
 from iveg.web.security.people import People
+from iveg.web.security.requirements import Reader, authenticator_of
+from iveg.web.security.roles import Principal
 from iveg.web.security.tablets import Pins
 
 _WRONG: Final = Problem(403, "This does not prove who you are.", "proof-wrong")
 _PURPOSE: Final = "prove "
-_Reader = Annotated[Principal, Depends(require("read"))]
 
 
 class ByPassword(Body):
@@ -57,7 +57,7 @@ def router(people: People, passkeys: Passkeys, pins: Pins) -> APIRouter:
     )
 
     @routes.get("", response_model=Proof)
-    async def state(request: Request, who: _Reader) -> Response:
+    async def state(request: Request, who: Reader) -> Response:
         """Whether a release would ask for one, and by what it may be given."""
         account = people.account(who.person)
         ways = [] if account is None else _ways(who, account, passkeys)
@@ -69,7 +69,7 @@ def router(people: People, passkeys: Passkeys, pins: Pins) -> APIRouter:
         return Json(Proof.of(until, ways, needed=needed))
 
     @routes.get("/options", response_model=dict[str, Any])
-    async def begin(request: Request, who: _Reader) -> Response:
+    async def begin(request: Request, who: Reader) -> Response:
         """Options of a proof by one of one's own passkeys."""
         own = account_of(people, who).account_id
         known = passkeys.of(own)
@@ -79,7 +79,7 @@ def router(people: People, passkeys: Passkeys, pins: Pins) -> APIRouter:
         return Json(asked)
 
     @routes.post("", status_code=204)
-    async def give(request: Request, body: ProofBody, who: _Reader) -> Response:
+    async def give(request: Request, body: ProofBody, who: Reader) -> Response:
         """Prove who is there; counts as a sign-in does."""
         account = people.account(who.person)
         if account is None:

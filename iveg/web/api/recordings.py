@@ -12,7 +12,7 @@ from iveg.models.base import Listing
 from iveg.models.recordings import Recording
 from iveg.web.api.answers import Json
 from iveg.web.refusals import refusals
-from iveg.web.security.authentication import require
+from iveg.web.security.requirements import require
 
 MEDIA_TYPE = "application/vnd.mcap"
 

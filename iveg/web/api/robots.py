@@ -6,12 +6,13 @@ from iveg.models.base import Listing
 from iveg.models.climate import Climate
 from iveg.models.device import Device
 from iveg.models.health import Health
+from iveg.models.mapped import Scan
 from iveg.models.people import Person
-from iveg.models.places import GreenhouseMap, Scan
+from iveg.models.places import GreenhouseMap
 from iveg.models.robot import Robot
 from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json
-from iveg.web.security.authentication import require
+from iveg.web.security.requirements import require
 from iveg.web.views import Views
 
 

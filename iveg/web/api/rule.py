@@ -19,10 +19,11 @@ from iveg.models.rule import Trial as TrialModel
 from iveg.ngsi.texts import clean_text
 from iveg.pipeline.ports import Clock
 from iveg.pipeline.rules import Rules
-from iveg.pipeline.shadow import Trials
+from iveg.pipeline.trials import Trials
 from iveg.web.api.answers import Json
 from iveg.web.refusals import refusals
-from iveg.web.security.authentication import Principal, require
+from iveg.web.security.requirements import Operator, require
+from iveg.web.security.roles import Principal
 
 T = TypeVar("T")
 _Share = Annotated[float, Field(ge=0.0, le=1.0, allow_inf_nan=False)]
@@ -115,9 +116,7 @@ def router(rules: Rules, clock: Clock) -> APIRouter:
         return Json(Listing(items=items))
 
     @routes.put("/rule", response_model=RuleModel, responses=refusals(409, 428, 503))
-    async def change(
-        body: RuleChange, who: Annotated[Principal, Depends(require("release"))]
-    ) -> Response:
+    async def change(body: RuleChange, who: Operator) -> Response:
         """Put a new version in force at once; parameters that are not named stay."""
         if body.version is None:
             raise VersionMissingError("The rule")

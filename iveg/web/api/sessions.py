@@ -13,13 +13,8 @@ from iveg.domain.stamps import format_stamp
 from iveg.models.base import Listing
 from iveg.models.signing_in import OpenSession, SessionKind, SessionsEnded
 from iveg.web.api.answers import Json
-from iveg.web.security.authentication import (
-    Action,
-    Principal,
-    authenticator_of,
-    require,
-)
-from iveg.web.security.roles import Role
+from iveg.web.security.requirements import authenticator_of, require
+from iveg.web.security.roles import Action, Principal, Role
 from iveg.web.security.sessions import Sessions
 
 _BY_LINK: Final = "link"

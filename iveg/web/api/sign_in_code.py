@@ -11,7 +11,7 @@ from fastapi import APIRouter, Depends, Request, Response
 
 from iveg.models.signing_in import SignInCode
 from iveg.web.api.answers import Json
-from iveg.web.security.authentication import require
+from iveg.web.security.requirements import require
 
 _SCALE = 6
 """Pixels of a module: read from an arm's length."""

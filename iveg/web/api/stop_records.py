@@ -25,7 +25,7 @@ from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.api.history_filters import Range, range_of
 from iveg.web.refusals import refusals
-from iveg.web.security.authentication import require
+from iveg.web.security.requirements import require
 
 DRILL_DEADLINE_MS = 5000.0
 """Press to STANDING, docs/safety.md, "Times of a STOP"."""

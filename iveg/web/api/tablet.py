@@ -3,7 +3,7 @@
 from math import ceil
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, HTTPException, Request, Response
+from fastapi import APIRouter, HTTPException, Request, Response
 from pydantic import AfterValidator, Field
 
 from iveg.domain.pins import MOST_DIGITS, is_pin
@@ -13,17 +13,11 @@ from iveg.web.api.answers import Json
 from iveg.web.api.passkeys import account_of
 from iveg.web.api.users import Name
 from iveg.web.refusals import refusals
-from iveg.web.security.authentication import (
-    Authenticator,
-    Principal,
-    authenticator_of,
-    require,
-)
+from iveg.web.security.authentication import Authenticator
 from iveg.web.security.people import People
+from iveg.web.security.requirements import ProvenOperator, Reader, authenticator_of
+from iveg.web.security.roles import Principal
 from iveg.web.security.tablets import Pins
-
-_Reader = Annotated[Principal, Depends(require("read"))]
-_Operator = Annotated[Principal, Depends(require("release", proven=True))]
 
 
 def _chosen(text: str) -> str:
@@ -60,12 +54,12 @@ def router(people: People, pins: Pins) -> APIRouter:
     )
 
     @routes.get("/tablet", response_model=Tablet)
-    async def state(request: Request, who: _Reader) -> Response:
+    async def state(request: Request, who: Reader) -> Response:
         """Whether it is locked, and who may unlock it; 404 where it is no tablet."""
         return _tablet(authenticator_of(request), pins, who)
 
     @routes.post("/tablet", response_model=Tablet, status_code=201)
-    async def make(request: Request, body: TabletBody, who: _Operator) -> Response:
+    async def make(request: Request, body: TabletBody, who: ProvenOperator) -> Response:
         """Make this browser a tablet; whoever did is signed out of it."""
         if who.session is None or who.is_tablet:
             raise HTTPException(409, "Only a browser of one person becomes a tablet.")
@@ -74,7 +68,7 @@ def router(people: People, pins: Pins) -> APIRouter:
         return _tablet(authenticator, pins, who, 201)
 
     @routes.post("/tablet/unlock", response_model=Tablet)
-    async def unlock(request: Request, body: UnlockBody, who: _Reader) -> Response:
+    async def unlock(request: Request, body: UnlockBody, who: Reader) -> Response:
         """Have the tablet act as somebody, until two minutes after their last act."""
         authenticator = authenticator_of(request)
         _require_tablet(who)
@@ -83,7 +77,7 @@ def router(people: People, pins: Pins) -> APIRouter:
         return _tablet(authenticator, pins, who)
 
     @routes.post("/tablet/lock", response_model=Tablet)
-    async def lock(request: Request, who: _Reader) -> Response:
+    async def lock(request: Request, who: Reader) -> Response:
         """Have the tablet act as nobody at once."""
         authenticator = authenticator_of(request)
         _require_tablet(who)
@@ -96,7 +90,7 @@ def router(people: People, pins: Pins) -> APIRouter:
 
 def _add_pin(routes: APIRouter, people: People, pins: Pins) -> None:
     @routes.put("/account/pin", status_code=204)
-    async def choose(request: Request, body: PinBody, who: _Reader) -> None:
+    async def choose(request: Request, body: PinBody, who: Reader) -> None:
         """Choose the PIN by which tablets are unlocked as oneself."""
         account = account_of(people, who)
         authenticator_of(request).freshness.refuse_stale(who)
@@ -104,7 +98,7 @@ def _add_pin(routes: APIRouter, people: People, pins: Pins) -> None:
         pins.forget(account.account_id)
 
     @routes.delete("/account/pin", status_code=204)
-    async def remove(who: _Reader) -> None:
+    async def remove(who: Reader) -> None:
         """Have no PIN any more; tablets that it has unlocked lock at once."""
         await people.give_pin(who, account_of(people, who), "")
 

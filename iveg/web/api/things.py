@@ -14,10 +14,7 @@ from iveg.pipeline.things import ThingMarks
 from iveg.web.api.answers import Json
 from iveg.web.pages.local_time import in_madrid, start_of
 from iveg.web.refusals import refusals
-from iveg.web.security.authentication import Principal, require
-
-Marking = Annotated[Principal, Depends(require("release"))]
-
+from iveg.web.security.requirements import Operator, require
 
 Name = Annotated[str, Field(min_length=1, max_length=64)]
 
@@ -61,7 +58,7 @@ def router(marks: ThingMarks, known: KnownHere, clock: Clock) -> APIRouter:
     @routes.post(
         "/things", status_code=201, response_model=Thing, responses=refusals(404, 409)
     )
-    async def mark(body: MarkRequest, who: Marking) -> Response:
+    async def mark(body: MarkRequest, who: Operator) -> Response:
         """Mark where a track is, or what a robot's laser sees, until the day's end.
 
         409 for whoever came from elsewhere, moved or was surely seen.
@@ -75,7 +72,7 @@ def router(marks: ThingMarks, known: KnownHere, clock: Clock) -> APIRouter:
         return Json(Thing.of(thing), 201)
 
     @routes.delete("/things/{thing_id}", response_model=Thing)
-    async def unmark(thing_id: str, who: Marking) -> Response:
+    async def unmark(thing_id: str, who: Operator) -> Response:
         """Take a mark back: from now on whoever is there is somebody."""
         return Json(Thing.of(marks.unmark(thing_id, who.name, clock())))
 

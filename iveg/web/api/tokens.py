@@ -3,7 +3,7 @@
 A token leaves by the one answer that made it.
 """
 
-from typing import Annotated, Final
+from typing import Final
 
 from fastapi import APIRouter, Depends, HTTPException, Response
 
@@ -16,11 +16,10 @@ from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.api.users import Days, Name, end_of
 from iveg.web.refusals import refusals
-from iveg.web.security.authentication import Principal, require
 from iveg.web.security.programs import ApiTokens, Programs
+from iveg.web.security.requirements import Admin, require
 
 MOST_TOKENS: Final = 200
-_Admin = Annotated[Principal, Depends(require("admin"))]
 
 
 class TokenBody(Body):
@@ -49,7 +48,7 @@ def router(programs: Programs, clock: Clock) -> APIRouter:
         return Json(Listing(items=[ProgramToken.of(one, now) for one in known]))
 
     @routes.post("", response_model=NewToken, status_code=201)
-    async def give(body: TokenBody, who: _Admin) -> Response:
+    async def give(body: TokenBody, who: Admin) -> Response:
         """Let a program in, and show its token this once."""
         now = clock().wall
         made = (body.name, body.scope, end_of(body.days, now))
@@ -64,7 +63,7 @@ def router(programs: Programs, clock: Clock) -> APIRouter:
         return Json(shown, 201)
 
     @routes.delete("/{token_id}", status_code=204)
-    async def revoke(token_id: str, who: _Admin) -> None:
+    async def revoke(token_id: str, who: Admin) -> None:
         """End a token at once, and the sockets of its program."""
 
         def work(store: ApiTokens) -> None:

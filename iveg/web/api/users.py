@@ -19,10 +19,10 @@ from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.api.sign_in_code import code_of
 from iveg.web.refusals import refusals
-from iveg.web.security.authentication import Principal, require
 from iveg.web.security.people import People
+from iveg.web.security.requirements import Admin, require
+from iveg.web.security.roles import Principal
 
-_Admin = Annotated[Principal, Depends(require("admin"))]
 _Known = Mapping[str, Account]
 _T = TypeVar("_T")
 _Work = Callable[[Admission, _Known], _T]
@@ -68,7 +68,7 @@ def router(people: People, clock: Clock) -> APIRouter:
     )
 
     @routes.get("", response_model=Listing[UserAccount])
-    async def users(who: _Admin) -> Response:
+    async def users(who: Admin) -> Response:
         """Every account, by name."""
         known, now = await people.known(), clock().wall
         items = [
@@ -79,7 +79,7 @@ def router(people: People, clock: Clock) -> APIRouter:
         return Json(Listing(items=items))
 
     @routes.post("", response_model=Invitation, status_code=201)
-    async def invite(request: Request, body: UserBody, who: _Admin) -> Response:
+    async def invite(request: Request, body: UserBody, who: Admin) -> Response:
         """Add an account, and show its invitation this once."""
         now = clock().wall
         ends_at = end_of(body.days, now)
@@ -97,7 +97,7 @@ def router(people: People, clock: Clock) -> APIRouter:
 
 def _add_changes(routes: APIRouter, people: People, clock: Clock) -> None:
     @routes.put("/{user_id}/role", response_model=UserAccount)
-    async def give_role(user_id: str, body: RoleBody, who: _Admin) -> Response:
+    async def give_role(user_id: str, body: RoleBody, who: Admin) -> Response:
         """Change a role; the person signs in anew."""
         changed = await _change(
             people,
@@ -110,7 +110,7 @@ def _add_changes(routes: APIRouter, people: People, clock: Clock) -> None:
         return Json(UserAccount.of(changed, clock().wall))
 
     @routes.post("/{user_id}/reset", response_model=Invitation)
-    async def reset(request: Request, user_id: str, who: _Admin) -> Response:
+    async def reset(request: Request, user_id: str, who: Admin) -> Response:
         """Take a password away, let in who was shut out, and invite again."""
         made = await _change(
             people,
@@ -121,7 +121,7 @@ def _add_changes(routes: APIRouter, people: People, clock: Clock) -> None:
         return _invitation(request, made, clock().wall)
 
     @routes.post("/{user_id}/disable", response_model=UserAccount)
-    async def disable(user_id: str, who: _Admin) -> Response:
+    async def disable(user_id: str, who: Admin) -> Response:
         """Shut somebody out at once, STOP included."""
         off = await _change(
             people,

@@ -11,7 +11,7 @@ from pydantic_core import PydanticCustomError
 
 from iveg.domain.detection_rule import FORESIGHT_MOST_S, DetectionRule
 from iveg.domain.limits import LIMITS
-from iveg.domain.what_if.crossings import Parameters
+from iveg.domain.what_if.parameters import Parameters
 from iveg.domain.what_if.questions import VALUES, Job, Question, Varied
 from iveg.models.base import Listing, write_json
 from iveg.models.what_if import WhatIf
@@ -19,9 +19,10 @@ from iveg.pipeline.ports import Clock
 from iveg.pipeline.rules import Rules
 from iveg.web.api.answers import Apart, Json
 from iveg.web.api.history_filters import Moment
-from iveg.web.pages import charts
+from iveg.web.pages import charts, plotly_library
 from iveg.web.refusals import refusals
-from iveg.web.security.authentication import Principal, require
+from iveg.web.security.requirements import require
+from iveg.web.security.roles import Principal
 
 LONGEST_S: Final = 7 * 86_400.0
 """Places of people are kept for as long, unless settings say otherwise."""
@@ -180,4 +181,4 @@ def draw(found: WhatIf) -> bytes:
         )
         for name, lines in shown.items()
     }
-    return write_json({**charts.library_facts(), "figures": figures})
+    return write_json({**plotly_library.library_facts(), "figures": figures})

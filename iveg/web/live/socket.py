@@ -8,88 +8,30 @@ else passes beside them at once.
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable, Coroutine, Iterable
-from typing import Annotated
+from collections.abc import Callable
 
-from fastapi import APIRouter, Depends, WebSocket, WebSocketDisconnect
-from starlette.websockets import WebSocketState
+from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 
-from iveg.domain.errors import UnknownRobotError, UnreadableError
 from iveg.domain.latency.watch import LatencyWatch
 from iveg.domain.observations import Instant
-from iveg.domain.stop import Press
-from iveg.models.base import write_json
 from iveg.models.snapshot import Snapshot
-from iveg.ngsi.codec import load_json
-from iveg.ngsi.texts import legible
 from iveg.pipeline import topics
 from iveg.pipeline.ports import Clock
-from iveg.pipeline.publish import Hub, Subscriber
+from iveg.pipeline.publish import Hub
+from iveg.web.live.client_messages import ClientMessages, Stop, current_principal
+from iveg.web.live.encoder import Encoder, frame_text
 from iveg.web.live.feed import TelemetryFeed
+from iveg.web.live.line import Line, sent
 from iveg.web.live.pacing import SUBPROTOCOL
 from iveg.web.live.painting import Painting
-from iveg.web.live.telemetry import TelemetryEncoder
-from iveg.web.presses import read_press
-from iveg.web.security.authentication import (
-    NO_SESSION,
-    Action,
-    Authenticator,
-    Principal,
-    require,
-)
-from iveg.web.views import Views
+from iveg.web.security.authentication import NO_SESSION
+from iveg.web.security.requirements import Reader
+from iveg.web.security.roles import Principal
 
 _log = logging.getLogger(__name__)
-TOO_SLOW = 4008
 NO_PROTOCOL = 4406
 """Close code of a program that does not ask for ``iveg.2``."""
-_SEND_LIMIT_S = 10.0
 _CHECK_S = 0.5
-_MAX_MESSAGE = 65536
-
-Stop = Callable[[str | None, Principal, Press], Awaitable[object]]
-
-
-class Encoder:
-    """Turns topics into frames, each version once."""
-
-    def __init__(
-        self,
-        views: Views,
-        hub: Hub,
-        clock: Clock,
-    ) -> None:
-        self._views = views
-        self._hub = hub
-        self._clock = clock
-        self.telemetry = TelemetryEncoder(views, hub)
-        self._frames: dict[str, tuple[int, bytes]] = {}
-
-    def frame(self, topic: str) -> bytes | None:
-        """The newest frame of a topic without pacing; None without data."""
-        version = self._hub.versions[topic]
-        kept = self._frames.get(topic)
-        if kept is not None and kept[0] == version:
-            return kept[1]
-        frame = self._encode(topic)
-        if frame is not None:
-            self._frames[topic] = version, frame
-        return frame
-
-    def _encode(self, topic: str) -> bytes | None:
-        now, row = self._clock(), topics.find(topic)[0]
-        data = None if row.read is None else row.read(self._views, now)
-        return None if data is None else text(topic, data, now)
-
-    def event(self, topic: str, item: object) -> bytes:
-        """The frame of an event, which is never dropped."""
-        now = self._clock()
-        return text(topic, topics.find(topic)[0].tell(self._views, item, now), now)
-
-
-def text(topic: str, data: object, now: Instant) -> bytes:
-    """A JSON frame; ``at`` is when it was true, on the server's monotonic clock."""
-    return write_json({"topic": topic, "data": data, "at": now.mono})
 
 
 def router(
@@ -111,7 +53,7 @@ def router(
     @routes.websocket("/live")
     async def live(
         websocket: WebSocket,
-        principal: Annotated[Principal, Depends(require("read"))],
+        principal: Reader,
     ) -> None:
         """Serve one browser."""
         if SUBPROTOCOL not in websocket.scope.get("subprotocols", ()):
@@ -125,7 +67,9 @@ def router(
         feed = TelemetryFeed(encoder.telemetry, subscriber, Painting(latency))
         try:
             now = clock()
-            await line.say(text(topics.SNAPSHOT.name, snapshot(principal, now), now))
+            await line.say(
+                frame_text(topics.SNAPSHOT.name, snapshot(principal, now), now)
+            )
             async with asyncio.TaskGroup() as tasks:
                 sender = tasks.create_task(line.send(feed), name="live-send")
                 watcher = tasks.create_task(
@@ -146,69 +90,6 @@ def router(
     return routes
 
 
-class Line:
-    """The messages to one browser, one after the other.
-
-    Args:
-        limit_s: How long a browser may take to read one.
-    """
-
-    def __init__(
-        self,
-        websocket: WebSocket,
-        subscriber: Subscriber,
-        encoder: Encoder,
-        clock: Clock,
-        limit_s: float = _SEND_LIMIT_S,
-    ) -> None:
-        self._websocket = websocket
-        self._subscriber = subscriber
-        self._encoder = encoder
-        self._clock = clock
-        self._limit_s = limit_s
-        self._sending_since: float | None = None
-
-    async def say(self, frame: bytes) -> None:
-        """Send JSON."""
-        await _sent(self._websocket.send_text(frame.decode()))
-
-    async def send(self, feed: TelemetryFeed) -> None:
-        """Everything, as fast as the browser reads; telemetry as fast as it paints."""
-        loop = asyncio.get_running_loop()
-        while not self._subscriber.overflowed:
-            self._sending_since = None
-            await self._subscriber.news(feed.wait_s(self._clock().mono))
-            self._sending_since = loop.time()
-            await self._send_frame(feed)
-            await self._send_news()
-            feed.write_ahead(self._clock())
-        await self.close_slow()
-
-    @property
-    def is_stuck(self) -> bool:
-        """Whether the browser has not read for long."""
-        since = self._sending_since
-        now = asyncio.get_running_loop().time()
-        return since is not None and now - since > self._limit_s
-
-    async def close_slow(self) -> None:
-        """Close: the browser reads too slowly."""
-        await _sent(self._websocket.close(TOO_SLOW))
-
-    async def _send_frame(self, feed: TelemetryFeed) -> None:
-        frame = feed.next_frame(self._clock())
-        if frame is not None:
-            await _sent(self._websocket.send_bytes(frame))
-
-    async def _send_news(self) -> None:
-        for topic, item in self._subscriber.drain_events():
-            await self.say(self._encoder.event(topic, item))
-        for topic in self._subscriber.drain_topics():
-            frame = self._encoder.frame(topic)
-            if frame is not None:
-                await self.say(frame)
-
-
 async def _watch(websocket: WebSocket, principal: Principal, line: Line) -> None:
     """Close soon after the session is over, or when the browser reads nothing.
 
@@ -216,94 +97,9 @@ async def _watch(websocket: WebSocket, principal: Principal, line: Line) -> None
     """
     while True:
         await asyncio.sleep(_CHECK_S)
-        if _who_may(websocket, principal, "read") is None:
-            await _sent(websocket.close(NO_SESSION))
+        if current_principal(websocket, principal, "read") is None:
+            await sent(websocket.close(NO_SESSION))
             return
         if line.is_stuck:
             await line.close_slow()
             return
-
-
-async def _sent(sending: Coroutine[object, object, None]) -> None:
-    """Send; of a socket that has closed meanwhile a server says RuntimeError.
-
-    Raises:
-        ConnectionResetError: the browser is gone.
-    """
-    try:
-        await sending
-    except RuntimeError as error:
-        raise ConnectionResetError(str(error)) from error
-
-
-def _who_may(
-    websocket: WebSocket, principal: Principal, action: Action
-) -> Principal | None:
-    """The same session as of now, as a tablet changes hands; None: it may not."""
-    authenticator: Authenticator = websocket.app.state.authenticator
-    current = authenticator.current(principal)
-    return current if current is not None and current.may(action) else None
-
-
-class ClientMessages:
-    """Messages from one browser: pings, presses, painted frames.
-
-    Answers go out with all else, so that a press is read at once also where the way
-    back is full.
-    """
-
-    def __init__(
-        self,
-        websocket: WebSocket,
-        subscriber: Subscriber,
-        clock: Clock,
-        stop: Stop,
-        principal: Principal,
-        feed: TelemetryFeed,
-    ) -> None:
-        self._websocket = websocket
-        self._subscriber = subscriber
-        self._clock = clock
-        self._stop = stop
-        self._principal = principal
-        self._feed = feed
-
-    async def listen(self, others: Iterable[asyncio.Task[None]]) -> None:
-        """Until the browser goes or is sent away; then ``others`` end, too."""
-        line = self._websocket
-        try:
-            while line.application_state is WebSocketState.CONNECTED:
-                await self._hear(await line.receive_text())
-        except WebSocketDisconnect:
-            return
-        finally:
-            for task in others:
-                task.cancel()
-
-    async def _hear(self, raw: str) -> None:
-        try:
-            message = load_json(raw[:_MAX_MESSAGE])
-        except UnreadableError as error:
-            self._subscriber.append(topics.PROBLEM.name, {"reason": error.reason})
-            return
-        if not isinstance(message, dict):
-            return
-        match message.get("type"):
-            case "painted":
-                now = self._clock().mono
-                self._feed.painted(message.get("frame"), now, message)
-            case "ping":
-                t, server = message.get("t"), self._clock().wall
-                self._subscriber.append(topics.PONG.name, {"t": t, "server": server})
-            case "stop":
-                await self._press(message)
-
-    async def _press(self, message: dict[str, object]) -> None:
-        robot_id = message.get("robot_id")
-        who = _who_may(self._websocket, self._principal, "stop")
-        if who is not None and (robot_id is None or isinstance(robot_id, str)):
-            try:
-                await self._stop(robot_id, who, read_press(message))
-            except UnknownRobotError as error:
-                reason = legible(str(error))
-                self._subscriber.append(topics.PROBLEM.name, {"reason": reason})

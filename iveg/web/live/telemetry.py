@@ -8,21 +8,17 @@ the moment of its truth (``at``, the server's monotonic clock).
 from collections.abc import Iterable, Sequence
 from typing import Final, NamedTuple
 
-import numpy as np
 import orjson
 
 from iveg.domain.margins import LeastMargins
-from iveg.domain.observations import Instant, LaserScan, Odometry
+from iveg.domain.observations import Instant, Odometry
 from iveg.models.base import rounded, write_json
 from iveg.models.people import Person
 from iveg.models.robot import Robot
 from iveg.pipeline import topics
 from iveg.pipeline.publish import Hub
+from iveg.web.live.ranges import UNIT_M, write_ranges
 from iveg.web.views import Views
-
-UNIT_M: Final = 0.005
-"""Unit of a range: finer than a map shows, and 327 m fit in 16 bits."""
-NO_RETURN: Final = 0xFFFF
 
 _MOVES: Final = frozenset({"pose", "twist", "stamp", "age_s"})
 """Members of a robot that go by themselves, with each measure."""
@@ -251,12 +247,3 @@ def write_frame(head: bytes, bodies: Iterable[bytes]) -> bytes:
     """``uint32`` length of the JSON, the JSON padded with spaces, the bodies."""
     padded = head + b" " * (-len(head) % 4)
     return b"".join((len(padded).to_bytes(4, "little"), padded, *bodies))
-
-
-def write_ranges(scan: LaserScan) -> bytes:
-    """Ranges as ``uint16`` in ``UNIT_M``, little-endian, padded to four bytes."""
-    ranges = scan.ranges
-    units = np.full(ranges.size + ranges.size % 2, NO_RETURN, "<u2")
-    counts = scan.returns() & (ranges < UNIT_M * NO_RETURN)
-    units[: ranges.size][counts] = np.rint(ranges[counts] / UNIT_M)
-    return units.tobytes()

@@ -21,7 +21,7 @@ from fastapi.openapi.models import (
 )
 
 from iveg.web.refusals import declared_actions
-from iveg.web.security.authentication import Action
+from iveg.web.security.roles import Action
 
 METHODS = ("get", "post", "put", "patch", "delete")
 

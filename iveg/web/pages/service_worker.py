@@ -5,7 +5,7 @@ from importlib.resources import files
 from fastapi import APIRouter, Depends
 from fastapi.responses import FileResponse
 
-from iveg.web.security.authentication import require
+from iveg.web.security.requirements import require
 
 
 def router() -> APIRouter:

@@ -6,8 +6,8 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 
 from iveg.domain.errors import SignOnError
 from iveg.web.pages.contexts import EnteredPage
-from iveg.web.pages.routes import Pages
-from iveg.web.security.authentication import authenticator_of, require
+from iveg.web.pages.drawing import Pages
+from iveg.web.security.requirements import authenticator_of, require
 from iveg.web.security.single_sign_on import CALLBACK, SingleSignOn
 
 _STATUS: Final = {"unreachable": 503, "busy": 429, "outdated": 400}

@@ -13,7 +13,7 @@ from starlette.requests import Request
 from iveg.domain.audit import STRANGER, Actor
 from iveg.pipeline.audit import AuditTrail
 from iveg.pipeline.ports import Clock
-from iveg.web.problems import Problem
+from iveg.web.problem import Problem
 from iveg.web.security.csrf import refuse_forgery, refuse_other_bodies
 from iveg.web.security.rate_limits import REFUSED_ROWS, Allowance, FailedAttempts
 

@@ -1,8 +1,7 @@
 """Authentication and authorisation of people, programs and Orion.
 
 People come with a session cookie, programs with a bearer token, Orion with a shared
-secret.  Every route declares its requirement with ``require``; ``declared_action``
-reads it::
+secret.  What a route asks of them is in ``requirements``::
 
     link with token ──> session cookie ──> operator: read, stop, release, by name
     bearer token ─────────────────────────> program:  read, stop
@@ -12,10 +11,8 @@ STOP outlives the session (SECURITY.md): a person who was signed in once can sti
 """
 
 import logging
-from collections.abc import Awaitable, Callable, Iterator, Mapping
-from typing import Final
+from collections.abc import Awaitable, Callable
 
-from fastapi.dependencies.models import Dependant
 from starlette.exceptions import WebSocketException
 from starlette.requests import HTTPConnection, Request
 from starlette.responses import RedirectResponse, Response
@@ -28,7 +25,8 @@ from iveg.domain.errors import NotAllowedError
 from iveg.pipeline.audit import AuditTrail
 from iveg.pipeline.ports import Clock
 from iveg.web.cookies import keep_language, session_cookie
-from iveg.web.problems import NotSignedInError, Problem
+from iveg.web.errors import NotSignedInError
+from iveg.web.problem import Problem
 from iveg.web.security.attempts import Attempts
 from iveg.web.security.audited import READING
 from iveg.web.security.csrf import is_own, refuse_forgery, refuse_other_bodies
@@ -36,29 +34,9 @@ from iveg.web.security.passkeys import SIGN_IN, Passkeys, site_of
 from iveg.web.security.people import People
 from iveg.web.security.programs import Programs
 from iveg.web.security.proofs import Freshness
-from iveg.web.security.roles import (
-    MAY,
-    NOBODY,
-    PROGRAM,
-    Action,
-    Principal,
-    Role,
-)
+from iveg.web.security.roles import PROGRAM, Action, Principal
 from iveg.web.security.secrets import same_secret
 from iveg.web.security.sessions import Sessions
-
-__all__ = [
-    "FOREIGN_ORIGIN",
-    "MAY",
-    "NO_SESSION",
-    "Action",
-    "Authenticator",
-    "Principal",
-    "Requirement",
-    "Role",
-    "declared_action",
-    "require",
-]
 
 NO_SESSION, FOREIGN_ORIGIN = 4401, 4403
 """Close codes of ``/live``."""
@@ -318,73 +296,3 @@ class Authenticator:
             )
             raise WebSocketException(NO_SESSION)
         return principal
-
-
-# --- what a route asks for ----------------------------------------------------------
-
-
-def authenticator_of(connection: HTTPConnection) -> Authenticator:
-    """What lets people in here; it is put at ``app.state.authenticator``."""
-    authenticator: Authenticator = connection.app.state.authenticator
-    return authenticator
-
-
-class Requirement:
-    """A FastAPI dependency that lets a role in; made by ``require``.
-
-    It serves HTTP and WebSocket routes alike.
-    """
-
-    def __init__(self, action: Action, *, proven: bool = False) -> None:
-        self.action = action
-        self._proven = proven
-
-    async def __call__(self, connection: HTTPConnection) -> Principal:
-        """The authorised principal, or the error that refuses the request."""
-        authenticator = authenticator_of(connection)
-        if self.action == "open":
-            return authenticator.identify(connection) or NOBODY
-        if isinstance(connection, WebSocket):
-            return await authenticator.authorise_websocket(connection)
-        who = authenticator.authorise(Request(connection.scope), self.action)
-        if self._proven:
-            authenticator.freshness.refuse_stale(who)
-        return who
-
-
-_REQUIREMENTS: Final[Mapping[Action, Requirement]] = {
-    action: Requirement(action)
-    for action in ("open", "read", "stop", "release", "admin")
-}
-
-
-def require(action: Action, *, proven: bool = False) -> Requirement:
-    """Requirement of a route: ``Depends(require("stop"))``; ``open`` asks nothing.
-
-    Args:
-        action: What the role has to allow.
-        proven: Whether the proof of who it is must be fresh, too (``Freshness``).
-    """
-    return Requirement(action, proven=True) if proven else _REQUIREMENTS[action]
-
-
-def declared_action(route: object) -> Action | None:
-    """The action that a route, or its FastAPI context, declares; None without one."""
-    dependant = getattr(route, "dependant", None)
-    if not isinstance(dependant, Dependant):
-        # A plain ASGI endpoint says it itself.
-        action: Action | None = getattr(
-            getattr(route, "endpoint", None), "action", None
-        )
-        return action
-    actions = [
-        call.action for call in _calls(dependant) if isinstance(call, Requirement)
-    ]
-    # A router's requirement comes before the route's own, which is stricter.
-    return actions[-1] if actions else None
-
-
-def _calls(dependant: Dependant) -> Iterator[object]:
-    for child in dependant.dependencies:
-        yield child.call
-        yield from _calls(child)

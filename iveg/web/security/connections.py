@@ -11,8 +11,9 @@ from typing import Final
 from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from iveg.adapters.connections import CONNECTION, Connection, network_of
-from iveg.web.problems import Problem
+from iveg.adapters.connections import CONNECTION, Connection
+from iveg.adapters.networks import network_of
+from iveg.web.problem import Problem
 from iveg.web.security.roles import Principal
 
 _TOO_MANY: Final = Problem(

@@ -21,7 +21,7 @@ from iveg.domain.audit import Actor
 from iveg.domain.errors import HopError
 from iveg.domain.passkeys import Challenges, Passkey
 from iveg.pipeline.ports import Clock
-from iveg.web.problems import PasskeyAddressError
+from iveg.web.errors import PasskeyAddressError
 from iveg.web.security.rereading import Rereading
 
 SIGN_IN: Final = "sign in"

@@ -8,7 +8,7 @@ from typing import Final
 
 from iveg.domain.accounts import OF_ACCOUNTS
 from iveg.pipeline.ports import Clock
-from iveg.web.problems import ProofNeededError
+from iveg.web.errors import ProofNeededError
 from iveg.web.security.roles import Principal
 
 _ASKED: Final = OF_ACCOUNTS | {"pin"}

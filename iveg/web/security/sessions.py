@@ -1,17 +1,13 @@
 """Sessions of people: their tokens, and what each still allows.
 
 Only digests of the tokens are kept, in memory and in a store that outlives a restart.
-Ages follow the wall clock, because no other goes on counting while iVeg is down::
-
-    signed in ──12 h idle, or 24 h──> expired: STOP alone ──12 h──> gone
-        └──────── signed out ─────────────────────────────────────> gone
 """
 
 import hashlib
 import secrets
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import replace
-from typing import Any, cast
+from typing import Any
 
 from iveg.adapters.sessions import FileSessions, Session
 from iveg.domain.accounts import (
@@ -23,9 +19,9 @@ from iveg.domain.accounts import (
 )
 from iveg.pipeline.ports import Clock
 from iveg.web.security.roles import Principal, Role
-from iveg.web.security.tablets import TABLET, TABLET_S, left_s, tablet_principal
+from iveg.web.security.session_life import role_at
+from iveg.web.security.tablets import TABLET, left_s, tablet_principal
 
-IDLE_S, ABSOLUTE_S, STOP_ONLY_S = 12 * 3600.0, 24 * 3600.0, 12 * 3600.0
 _MOST_SESSIONS = 1000
 _PEOPLE = frozenset({"viewer", "operator", "admin"})
 _KEEP_SEEN_S = 60.0
@@ -198,7 +194,7 @@ class Sessions:
         if session is None:
             return None
         now = self._clock().wall
-        role = _role_at(session, now)
+        role = role_at(session, now)
         if role is not None and session.method in OF_ACCOUNTS:
             # Without accounts nobody can say whether the person still has one.
             role = self._role_now(session, role) if self._role_now else None
@@ -231,7 +227,7 @@ class Sessions:
             # A clock that was ahead must not have made a session that never ends.
             began, seen = min(session.began, now), min(session.seen, now)
             known = self._named(replace(session, began=began, seen=seen))
-            if session.role in _PEOPLE and _role_at(known, now) is not None:
+            if session.role in _PEOPLE and role_at(known, now) is not None:
                 self._sessions[bytes.fromhex(session.digest)] = known
 
     def _named(self, session: Session) -> Session:
@@ -250,17 +246,6 @@ class Sessions:
         self._kept_at = self._clock().wall
         if self._store is not None:
             self._store.save(self._sessions.values())
-
-
-def _role_at(session: Session, now: float) -> Role | None:
-    """The role that is left at ``now`` (Unix s); None when all is over."""
-    ends = min(session.seen + IDLE_S, session.began + ABSOLUTE_S)
-    if session.method == TABLET:
-        ends = session.began + TABLET_S
-    over = now - (ends if session.until is None else min(ends, session.until))
-    if over <= 0:
-        return cast("Role", session.role)
-    return "expired" if over <= STOP_ONLY_S else None
 
 
 def _digest(token: str) -> bytes:

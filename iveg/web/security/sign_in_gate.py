@@ -9,7 +9,7 @@ from typing import Final
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from iveg.pipeline.ports import Clock
-from iveg.web.problems import Problem
+from iveg.web.problem import Problem
 from iveg.web.security.rate_limits import Allowance
 
 PASS_PER_S: Final = 20.0

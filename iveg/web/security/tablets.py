@@ -16,7 +16,7 @@ from iveg.domain.accounts import Account
 from iveg.domain.errors import BusyError
 from iveg.domain.pins import PinGuard
 from iveg.pipeline.ports import Clock
-from iveg.web.problems import PinRefusedError
+from iveg.web.errors import PinRefusedError
 from iveg.web.security.people import People
 from iveg.web.security.roles import Principal
 

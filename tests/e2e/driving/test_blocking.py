@@ -80,9 +80,7 @@ def stopped(open_page: OpenPage, stack: Site) -> Iterator[Page]:
     """A page without figures, AGI standing after a STOP."""
     page = open_page(route="/about")
     strip_stop(page, "AGI").click()
-    expect(strip_stop(page, "AGI")).to_have_attribute(
-        "data-state", "standing", timeout=30_000
-    )
+    expect(strip_stop(page, "AGI")).to_have_attribute("data-state", "standing")
     yield page
     for robot in ("AGI", "AGII"):
         let_go(page, stack, robot)

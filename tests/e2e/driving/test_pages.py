@@ -18,6 +18,7 @@ from tests.e2e.reading import (
     strip_stop,
     visit,
 )
+from tests.patience import AGAIN
 from tests.processes import Site, until
 
 pytestmark = pytest.mark.e2e
@@ -49,7 +50,7 @@ def shown(stack: Site) -> Site:
             answer = api.get(f"commands/{command_id}")
             return bool(answer.json().get("state") == "STANDING")
 
-        until(is_standing, 30.0, "AGI stands")
+        until(is_standing, "AGI stands")
     return stack
 
 
@@ -79,7 +80,7 @@ def test_nothing_serious_stands_in_the_way_of_assistive_technology(
         return found == []
 
     try:
-        until(has_settled, 30.0, "a page without serious violations")
+        until(has_settled, "a page without serious violations")
     finally:
         assert found == []
 
@@ -101,7 +102,7 @@ def test_the_commands_page_shows_a_stop_with_the_time_of_each_road(
         _, *told = times.all_inner_texts()
         return bool(told) and all(text.strip().isdigit() for text in told)
 
-    until(are_all_there, 30.0, "the time of each transport")
+    until(are_all_there, "the time of each transport")
     expect(page.locator("#took-standing")).to_contain_text("ms")
 
 
@@ -115,7 +116,7 @@ def test_a_new_stop_appears_on_the_commands_page_by_itself(
 
     strip_stop(page, "fleet").click()
 
-    expect(rows.first).to_contain_text("operador", timeout=30_000)
+    expect(rows.first).to_contain_text("operador")
     assert rows.count() > before
     assert evaluate(page, RUN_OVER) == []
 
@@ -144,7 +145,7 @@ def test_every_decision_is_listed_and_leads_to_its_own_page(
 ) -> None:
     page = open_page(390, 844, route="/decisions")
     row = page.locator("#decisions-rows tbody tr").first
-    expect(row).to_contain_text("→ 50", timeout=60_000)
+    expect(row).to_contain_text("→ 50")
     assert evaluate(page, OVERFLOW) <= 0
 
     row.locator("a").click()
@@ -188,7 +189,7 @@ def test_charts_are_whole_on_paper_and_stop_is_alive_after_print_and_export(
             charts = api.get("history/charts").json()
             return all(charts[one]["data"] for one in ("speed", "stops"))
 
-        until(is_kept, 30.0, "speeds and a STOP in the history")
+        until(is_kept, "speeds and a STOP in the history")
     page = open_page(route="/history")
     page.locator("#chart-speed .main-svg").first.wait_for(state="attached")
     page.locator("#chart-stops .main-svg").first.wait_for(state="attached")
@@ -218,7 +219,7 @@ def test_the_fleet_page_draws_the_whole_chain_and_each_device(
 
     for hop in ("robots", "mqtt", "iot_agent", "orion", "notifications", "screen"):
         box = page.locator(f'.hop-box[data-hop="{hop}"]')
-        expect(box).to_have_attribute("data-state", "ok", timeout=30_000)
+        expect(box).to_have_attribute("data-state", "ok")
     expect(page.locator("#data-path-sentence")).to_have_text(
         re.compile("Cada dato llega")
     )
@@ -233,15 +234,15 @@ def test_the_climate_page_shows_what_the_greenhouse_measures_and_remembers_it(
     page = open_page(route="/climate")
 
     expect(page.locator("#climate-temperature")).to_have_text(
-        re.compile(r"^\d+,\d °C$"), timeout=30_000
+        re.compile(r"^\d+,\d °C$")
     )
     expect(page.locator("#climate-sentence")).to_contain_text("al día")
     expect(page.locator("#trend-temperature .main-svg").first).to_be_visible()
     expect(page.locator("#trend-note")).to_contain_text("una por minuto")
     # Its age begins anew with each reading, every ten seconds.
     age = page.locator("#climate-co2-age")
-    expect(age).to_have_text(re.compile(r"^hace [4-9] s$"), timeout=30_000)
-    expect(age).to_have_text(re.compile(r"^hace [0-2] s$"), timeout=30_000)
+    expect(age).to_have_text(re.compile(r"^hace [4-9] s$"))
+    expect(age).to_have_text(re.compile(r"^hace [0-2] s$"))
 
     page.click('[data-language="en"]')
     expect(page.locator("#climate-temperature")).to_have_text(
@@ -321,7 +322,7 @@ def test_the_latency_page_folds_its_tables_behind_the_figures(
     open_page: OpenPage,
 ) -> None:
     page = open_page(390, 844, route="/latency")
-    expect(page.locator("#hops-cdf .main-svg").first).to_be_visible(timeout=60_000)
+    expect(page.locator("#hops-cdf .main-svg").first).to_be_visible()
     table = page.locator("#hops-table tbody")
     expect(table).to_be_hidden()
     assert page.evaluate("document.documentElement.scrollHeight") < 3500
@@ -393,7 +394,7 @@ def test_a_page_says_when_its_list_cannot_be_read(open_page: OpenPage) -> None:
 
 def _heading(page: Page, place: str) -> str | None:
     """What the page of a place is called; None without one."""
-    answer = page.request.get(urljoin(page.url, place))
+    answer = page.request.get(urljoin(page.url, place), max_retries=AGAIN)
     found = re.search(r"<h1[^>]*>\s*(\S[^<]*)", answer.text())
     return found[1] if found and answer.ok else None
 

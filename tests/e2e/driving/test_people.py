@@ -11,6 +11,7 @@ from iveg.adapters.history.accounts import AccountStore
 from iveg.domain.audit import CONSOLE
 from tests.e2e.conftest import OpenPage
 from tests.e2e.reading import COVERED_STOPS, OVERFLOW, evaluate, serious, visit
+from tests.patience import AGAIN
 from tests.processes import Site, until
 
 pytestmark = pytest.mark.e2e
@@ -33,7 +34,7 @@ def chief(open_page: OpenPage, stack: Site) -> Page:
         page.wait_for_timeout(700)
         return _begin(page, stack, invitation) == 204
 
-    until(is_in, 90.0, "the admin is signed in")
+    until(is_in, "the admin is signed in")
     return page
 
 
@@ -65,7 +66,7 @@ def test_what_an_admin_sees_is_accessible_and_who_is_ended_while_watching_is_out
     expect(eva.locator("body")).to_have_attribute("data-connection", "signed-out")
     expect(row).to_have_count(0)
     stopped = eva.context.request.post(
-        f"{stack.url}/api/v1/robots/AGI/stop", headers=_own(stack)
+        f"{stack.url}/api/v1/robots/AGI/stop", headers=_own(stack), max_retries=AGAIN
     )
     assert stopped.status == 401
 
@@ -92,6 +93,6 @@ def _wrong(page: Page, route: str, shoot: Callable[[Page, str], None]) -> list[o
     for size in ({"width": 1440, "height": 900}, {"width": 390, "height": 844}):
         page.set_viewport_size(size)  # type: ignore[arg-type]
         shoot(page, f"{route[1:]}-{size['width']}")
-        until(lambda: evaluate(page, OVERFLOW) <= 0, 30.0, f"{route} fits")
+        until(lambda: evaluate(page, OVERFLOW) <= 0, f"{route} fits")
         found += evaluate(page, COVERED_STOPS)
     return found

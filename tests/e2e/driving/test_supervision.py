@@ -14,6 +14,7 @@ from playwright.sync_api import Page, expect
 from iveg.adapters.broker_address import BrokerAddress
 from tests.e2e.conftest import OpenPage
 from tests.e2e.reading import OVERFLOW, evaluate, serious, strip_stop, visit
+from tests.patience import AGAIN
 from tests.processes import Site, until
 
 pytestmark = pytest.mark.e2e
@@ -64,7 +65,7 @@ def test_a_layer_that_was_switched_off_stays_off(page: Page) -> None:
 def test_filters_of_the_log_are_remembered_and_never_hide_in_silence(
     page: Page,
 ) -> None:
-    page.locator("#log li").first.wait_for(timeout=60_000)
+    page.locator("#log li").first.wait_for()
     more = page.locator("#log-chips .chip--more")
     priority = page.locator('[data-filter="priority:P3"]')
     expect(priority).to_be_hidden()
@@ -94,7 +95,7 @@ def test_the_log_can_be_asked_for_one_rule(page: Page) -> None:
     page.locator('[data-filter="rule:person"]').click()
 
     shown = page.locator("#log li")
-    expect(shown.first).to_contain_text(re.compile("persona"), timeout=90_000)
+    expect(shown.first).to_contain_text(re.compile("persona"))
     kinds = {item.get_attribute("data-kind") for item in shown.all()}
     assert kinds == {"speed"}
 
@@ -107,14 +108,14 @@ def test_people_can_be_read_as_sentences(page: Page, stack: Site) -> None:
         _publish(stack, "AGI", _detection("person"))
         return told.filter(has_text="AGI").count() > 0
 
-    until(is_told, 60.0, "whom AGI sees")
+    until(is_told, "whom AGI sees")
     expect(page.locator("#people-nlos")).to_contain_text("Por alguien que no ven")
 
 
 def test_a_decision_has_an_address_that_opens_and_prints(
     open_page: OpenPage, stack: Site
 ) -> None:
-    decision_id = until(lambda: _newest_decision(stack), 90.0, "a decision")
+    decision_id = until(lambda: _newest_decision(stack), "a decision")
     page = open_page(390, 844, route=f"/decisions/{decision_id}")
     record = page.locator("#decision-record")
 
@@ -159,7 +160,7 @@ def test_the_fleet_page_tells_how_the_fleet_obeys_with_age_and_count(
 
     for tile in ("echo", "negative", "worst"):
         place = page.locator(f"#tile-{tile}")
-        expect(place).to_contain_text(re.compile(r"\d"), timeout=90_000)
+        expect(place).to_contain_text(re.compile(r"\d"))
         expect(page.locator(f"#tile-{tile}-of")).to_contain_text("hace")
     assert evaluate(page, OVERFLOW) <= 0
     assert serious(page) == []
@@ -285,7 +286,7 @@ def test_signing_out_ends_the_session(
 
     page.wait_for_url("**/signin")
     assert page.locator("[data-stop]").count() == 0
-    answer = page.request.get(f"{stack.url}/api/v1/robots")
+    answer = page.request.get(f"{stack.url}/api/v1/robots", max_retries=AGAIN)
     assert answer.status == 401
 
 
@@ -297,7 +298,7 @@ def test_markup_in_a_note_is_text_on_every_page(
         # One that is over goes with its note as soon as it was seen.
         over = page.locator("small", has_text="terminada")
         row = page.locator("#active-alerts > li:not(:has(form[hidden]))", has_not=over)
-        row.first.wait_for(timeout=30_000)
+        row.first.wait_for()
         # It is not the first any more once further alerts have come before it.
         row.first.evaluate("row => { row.id = 'noted'; row.firstChild.open = true; }")
 
@@ -306,7 +307,7 @@ def test_markup_in_a_note_is_text_on_every_page(
 
         page.locator("#active-alerts", has_text=PROBE).wait_for()
     noted = page.locator("#past-rows td", has_text="operador")
-    expect(noted.first).to_be_visible(timeout=30_000)
+    expect(noted.first).to_be_visible()
     assert page.locator("img[src=x]").count() == 0
     assert evaluate(page, "() => window.probed ?? null") is None
 

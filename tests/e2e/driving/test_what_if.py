@@ -10,16 +10,14 @@ from tests.processes import Site, until
 
 pytestmark = pytest.mark.e2e
 
-SLOW_MS = 120_000
-"""The processes that calculate give way to everything else."""
 OVER = re.compile("Calculado|nada de este|No se ha podido")
 
 
 def is_answered(page: Page) -> bool:
     """Ask; whether there is an answer: at first there are no rows yet."""
     with page.expect_response("**/api/v1/what-if"):
-        page.locator("#whatif-ask").click(timeout=SLOW_MS)
-    expect(page.locator("#whatif-result")).to_have_text(OVER, timeout=SLOW_MS)
+        page.locator("#whatif-ask").click()
+    expect(page.locator("#whatif-result")).to_have_text(OVER)
     return page.locator("#whatif-answer").is_visible()
 
 
@@ -38,11 +36,11 @@ def test_a_question_is_answered_by_a_curve_with_the_rule_in_force_marked(
     page.locator("#whatif-hours").select_option("1")
     page.locator("#whatif-vary").select_option("radius_m")
 
-    until(lambda: is_answered(page), 120.0, "there is an answer")
+    until(lambda: is_answered(page), "there is an answer")
 
     expect(page.locator("#whatif-rows tr")).to_have_count(6)
     marked = page.locator("#whatif-minutes .shapelayer path")
-    expect(marked).to_have_count(1, timeout=SLOW_MS)
+    expect(marked).to_have_count(1)
     figure = page.evaluate(
         """() => {
             const {data, layout} = document.querySelector("#whatif-minutes");
@@ -78,7 +76,7 @@ def test_a_question_tells_its_progress_and_is_ended(open_page: OpenPage) -> None
     expect(page.locator("#whatif-progress")).to_be_visible()
     page.locator("#whatif-cancel").click()
 
-    expect(page.locator("#whatif-result")).to_have_text("Detenido.", timeout=SLOW_MS)
+    expect(page.locator("#whatif-result")).to_have_text("Detenido.")
     expect(page.locator("#whatif-cancel")).to_be_hidden()
     expect(page.locator("#whatif-answer")).to_be_hidden()
 
@@ -90,13 +88,13 @@ def test_a_trial_is_begun_shown_and_put_in_force(
     wanted = radius_of(page) + 1
     page.locator("#whatif-radius_m").fill(str(wanted))
     page.locator("#trial-begin").click()
-    expect(page.locator("#trial-found")).to_be_visible(timeout=SLOW_MS)
+    expect(page.locator("#trial-found")).to_be_visible()
     # More is protected, so nothing is asked again.
-    expect(page.locator("#trial-sums")).not_to_be_empty(timeout=SLOW_MS)
+    expect(page.locator("#trial-sums")).not_to_be_empty()
 
     page.locator("#trial-promote").click()
 
-    expect(page.locator("#trial-begin")).to_be_visible(timeout=SLOW_MS)
+    expect(page.locator("#trial-begin")).to_be_visible()
     with stack.api() as api:
         rule = api.get("rule").json()
     assert rule["radius_m"] == wanted

@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 import pytest
 
 from iveg.adapters.connection_caps import ConnectionCaps
-from iveg.adapters.connections import Connection, ConnectionTable, network_of
+from iveg.adapters.connections import Connection, ConnectionTable
+from iveg.adapters.networks import network_of
 
 CAPS = ConnectionCaps(
     connections=8, of_strangers=6, of_an_address=4, head_s=5.0, body_s=30.0

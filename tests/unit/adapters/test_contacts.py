@@ -7,8 +7,7 @@ import pytest
 
 from iveg.adapters.contacts import FileContacts
 from iveg.adapters.push_encryption import new_key
-from iveg.domain.errors import HopError
-from iveg.domain.messages import (
+from iveg.domain.contacts import (
     Contacts,
     Email,
     MailRecipient,
@@ -16,6 +15,7 @@ from iveg.domain.messages import (
     SubscribedBrowser,
     Webhook,
 )
+from iveg.domain.errors import HopError
 
 ALL = Contacts(
     Push(

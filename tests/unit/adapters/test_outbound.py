@@ -17,19 +17,16 @@ from iveg.adapters.public_addresses import is_public, is_public_target
 from iveg.adapters.push_encryption import decode, encode, encrypted, new_key
 from iveg.adapters.web_push import PushSender
 from iveg.adapters.webhook import WebhookSender
-from iveg.domain.errors import OutboundError
-from iveg.domain.messages import (
-    AlertItem,
+from iveg.domain.contacts import (
     Contacts,
     Email,
-    Language,
     MailRecipient,
-    MessageText,
-    OutboundMessage,
     Push,
     SubscribedBrowser,
     Webhook,
 )
+from iveg.domain.errors import OutboundError
+from iveg.domain.messages import AlertItem, Language, MessageText, OutboundMessage
 from tests.builders import START
 from tests.fakes.outbound import HttpsStand, MailStand, loopback, standing
 

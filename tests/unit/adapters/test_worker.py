@@ -65,7 +65,7 @@ async def test_what_a_worker_does_can_be_ended_at_once(
     first = await worker.run(process_id)
     asleep = asyncio.create_task(worker.run(fall_asleep, tmp_path / "asleep"))
     await asyncio.sleep(0)
-    until((tmp_path / "asleep").exists, 10.0, "it is asleep")
+    until((tmp_path / "asleep").exists, "it is asleep", 10.0)
 
     worker.interrupt()
 
@@ -90,7 +90,7 @@ async def test_a_worker_that_died_is_made_anew_and_ends_with_the_server(
 
     assert len({first, second, os.getpid()}) == 3
     assert len(failures) == 2
-    until(lambda: not is_alive(second), 10.0, "the worker ends")
+    until(lambda: not is_alive(second), "the worker ends", 10.0)
 
 
 async def test_a_model_comes_back_as_it_was(worker: Worker) -> None:

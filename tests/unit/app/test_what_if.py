@@ -12,7 +12,7 @@ from iveg.adapters.history.recorder import Recorder, journal_file
 from iveg.adapters.worker import Worker
 from iveg.app.what_if import MOST_WAITING, WhatIfs, judge_part
 from iveg.domain.errors import HopError, UnknownNameError, WhatIfRefusedError
-from iveg.domain.what_if.crossings import Parameters
+from iveg.domain.what_if.parameters import Parameters
 from iveg.domain.what_if.questions import Job, Question
 from tests.builders import START, fleet_of
 from tests.fakes.clock import FakeClock

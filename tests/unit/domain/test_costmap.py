@@ -6,18 +6,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from iveg.domain.costmap import (
-    MAX_CELLS,
-    UNKNOWN,
-    Grid,
-    InflatedGrid,
-    Occupancy,
-    sweep_of,
-    window_round,
-)
+from iveg.domain.costmap import UNKNOWN, InflatedGrid, Occupancy
 from iveg.domain.geometry import Pose2D, Rectangle
+from iveg.domain.mapped_area import window_round
 from iveg.domain.observations import LaserScan
+from iveg.domain.occupancy_grid import MAX_CELLS, Grid
 from iveg.domain.rule.zones import Zone
+from iveg.domain.sweeps import sweep_of
 from tests.builders import scan
 
 ROOM = Grid.over(Rectangle(0, 0, 20, 10))

@@ -14,16 +14,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iveg.domain.records import DecisionRecord, DetectionRecord, OdometryRecord
-from iveg.domain.what_if.crossings import STEP_S, Parameters
-from iveg.domain.what_if.inputs import (
-    Inputs,
-    PoseRow,
-    SeenRow,
-    poses_of,
-    sightings_of,
-)
+from iveg.domain.what_if.inputs import Inputs, PoseRow, SeenRow, poses_of, sightings_of
 from iveg.domain.what_if.judging import Range
 from iveg.domain.what_if.outcome import Outcome, outcomes_of
+from iveg.domain.what_if.parameters import Parameters
+from iveg.domain.what_if.steps import STEP_S
 from iveg.domain.what_if.truth import nearest_of
 from tests.builders import START, detection, odometry
 from tests.unit.pipeline.desk import Desk

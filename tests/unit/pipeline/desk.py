@@ -18,15 +18,10 @@ from iveg.domain.observations import (
 )
 from iveg.domain.stop import FollowedCommand
 from iveg.domain.transports import DIRECT, FIWARE, Transport, TransportId
-from iveg.pipeline.build import Choices, Ports, build
+from iveg.pipeline.build import build
+from iveg.pipeline.parts import Choices, Ports
 from iveg.pipeline.ports import CommandPort
-from tests.builders import (
-    detection_frame,
-    fleet_of,
-    odometry,
-    origin,
-    safety_report,
-)
+from tests.builders import detection_frame, fleet_of, odometry, origin, safety_report
 from tests.fakes.clock import FakeClock
 from tests.fakes.context_broker import FakeContextBroker
 from tests.fakes.fleet import FakeFleet

@@ -87,6 +87,7 @@ def test_13_9_a_slow_down_far_from_anybody_says_how_the_ring_had_grown() -> None
     desk.clock.now += 2.5
     desk.drive("AGI", 0.0)
     desk.drive("AGII", 50.0)
+    desk.evaluator.age(desk.clock())
     desk.evaluator.tick(desk.clock())
     (crossing,) = desk.evaluator.crossings
 

@@ -1,12 +1,21 @@
 """One loop, one order: take what came, then let time pass."""
 
 import asyncio
+import itertools
 from typing import Any
 
 import pytest
 
-from iveg.domain.observations import CommandAnswer, HeartbeatProbe, Origin, Received
+from iveg.domain.observations import (
+    CommandAnswer,
+    HeartbeatProbe,
+    Instant,
+    Origin,
+    Received,
+)
 from iveg.domain.transports import DIRECT, FIWARE
+from iveg.pipeline.evaluate import HEARTBEAT_S
+from iveg.pipeline.loop import TICK_S
 from iveg.pipeline.publish import MAX_PENDING
 from tests.builders import detection, detection_frame, odometry, origin
 from tests.unit.pipeline.desk import Desk, settle
@@ -84,6 +93,129 @@ async def test_what_comes_before_the_fleet_is_judged_is_taken_first(
     assert taken[:1] == [True]
     running.cancel()
     await asyncio.gather(running, return_exceptions=True)
+
+
+async def test_what_comes_while_the_world_ages_is_taken_before_it_is_judged(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    desk, done = Desk(), list[str]()
+    age, tick = desk.evaluator.age, desk.evaluator.tick
+    peer = desk.evaluator.world.robot("AGII")
+    come = Received(odometry("AGII"), desk.clock())
+
+    def aged(now: Instant) -> None:
+        age(now)
+        done.append("aged")
+        asyncio.get_running_loop().call_soon(desk.ingest.enqueue, come)
+
+    def judged(*args: Any) -> None:
+        done.append("judged" if peer.odometry else "judged without it")
+        tick(*args)
+
+    monkeypatch.setattr(desk.evaluator, "age", aged)
+    monkeypatch.setattr(desk.evaluator, "tick", judged)
+    desk.ingest.enqueue(Received(odometry(), desk.clock()))
+    running = asyncio.create_task(desk.loop.run())
+    await settle()
+
+    assert done == ["aged", "judged"]
+    running.cancel()
+    await asyncio.gather(running, return_exceptions=True)
+
+
+async def test_what_comes_while_it_is_judged_is_taken_before_that_is_written_down(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    desk, seen = Desk(), list[bool]()
+    tick, peer = desk.evaluator.tick, desk.evaluator.world.robot("AGII")
+    come = Received(odometry("AGII"), desk.clock())
+
+    def judged(*args: Any) -> None:
+        tick(*args)
+        asyncio.get_running_loop().call_soon(desk.ingest.enqueue, come)
+
+    monkeypatch.setattr(desk.evaluator, "tick", judged)
+    monkeypatch.setattr(
+        desk.loop, "_write_down", lambda _: seen.append(peer.odometry is not None)
+    )
+    desk.ingest.enqueue(Received(odometry(), desk.clock()))
+    running = asyncio.create_task(desk.loop.run())
+    await settle()
+
+    assert seen == [True]
+    running.cancel()
+    await asyncio.gather(running, return_exceptions=True)
+
+
+async def test_what_is_written_down_is_of_the_moment_of_the_last_step(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    desk, told = Desk(), list[Instant]()
+    waiting, moving = list[int](), itertools.count(1)
+
+    def written(now: Instant) -> None:
+        waiting.append(desk.ingest.waiting)
+        assert now == told[-1]
+
+    def stepped(now: Instant, _: object) -> None:
+        told.append(now)
+        # Messages keep coming, and the clock goes on.
+        said = odometry(origin=Origin("b", next(moving)))
+        come = Received(said, desk.clock())
+        asyncio.get_running_loop().call_soon(desk.ingest.enqueue, come)
+        desk.clock.now += 0.001
+
+    monkeypatch.setattr(desk.loop, "_stepped", stepped)
+    monkeypatch.setattr(desk.loop, "_write_down", written)
+    desk.ingest.enqueue(Received(odometry(origin=Origin("b", 0)), desk.clock()))
+    running = asyncio.create_task(desk.loop.run())
+    for _ in range(100):
+        await asyncio.sleep(0)
+
+    assert waiting
+    assert not any(waiting)
+    assert not running.done()
+    running.cancel()
+    await asyncio.gather(running, return_exceptions=True)
+
+
+async def test_the_fleet_is_judged_however_much_comes_all_the_time(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    desk = Desk()
+    enqueue, apply = desk.ingest.enqueue, desk.evaluator.apply
+    shown = desk.hub.join()
+    numbers = itertools.count(1)
+
+    def more(*args: Any) -> bool:
+        said = odometry(origin=Origin("b", next(numbers)))
+        asyncio.get_running_loop().call_soon(enqueue, Received(said, desk.clock()))
+        return apply(*args)
+
+    monkeypatch.setattr(desk.evaluator, "apply", more)
+    enqueue(Received(odometry(origin=Origin("b", 0)), desk.clock()))
+    running = asyncio.create_task(desk.loop.run())
+    for _ in range(100):
+        await asyncio.sleep(0)
+
+    assert "robots/AGI" in shown.drain_telemetry()
+    assert desk.fleet.told
+    running.cancel()
+    await asyncio.gather(running, return_exceptions=True)
+
+
+def test_heartbeats_keep_their_pace_while_ageing_takes_now_more_now_less() -> None:
+    desk = Desk()
+    desk.drive("AGI")
+    began, told = desk.clock().mono, len(desk.fleet.told)
+    for number in range(40):
+        desk.clock.now = began + number * TICK_S
+        desk.loop.age(desk.clock())
+        desk.clock.now += 0.012 * (number % 4 < 2)
+        desk.loop.step([], desk.clock())
+
+    heartbeats = (len(desk.fleet.told) - told) / len(desk.evaluator.world.robots)
+    assert heartbeats == pytest.approx(40 * TICK_S / HEARTBEAT_S, abs=1)
 
 
 def test_time_passes_once_in_a_tick_however_much_arrives() -> None:

@@ -9,17 +9,9 @@ from dataclasses import replace
 import pytest
 
 from iveg.domain.alerts.stored import read_alert
+from iveg.domain.contacts import Contacts, Email, Push, SubscribedBrowser, Webhook
 from iveg.domain.events import Condition
-from iveg.domain.messages import (
-    CHANNELS,
-    AlertItem,
-    Channel,
-    Contacts,
-    Email,
-    Push,
-    SubscribedBrowser,
-    Webhook,
-)
+from iveg.domain.messages import CHANNELS, AlertItem, Channel
 from iveg.domain.records import AlertRecord
 from iveg.models.alert import Alert
 from iveg.pipeline.messenger import MOST_WAITING, TRIES, Messenger

@@ -10,7 +10,7 @@ from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import HopError, OutdatedError, TrialRefusedError
 from iveg.domain.rule.trial import MOST_KEPT, Trial
 from iveg.lab.emulator.orders import FaultOrder
-from iveg.pipeline.build import Pipeline
+from iveg.pipeline.parts import Pipeline
 from tests.builders import detection
 from tests.stage import Stage
 from tests.unit.pipeline.desk import Desk

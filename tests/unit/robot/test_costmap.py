@@ -7,10 +7,11 @@ import numpy as np
 import orjson
 import pytest
 
-from iveg.domain.costmap import MAX_CELLS, InflatedGrid
+from iveg.domain.costmap import InflatedGrid
 from iveg.domain.feedback import Feedback
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.observations import Origin
+from iveg.domain.occupancy_grid import MAX_CELLS
 from iveg.domain.peer_scan import peer_scan_of
 from iveg.domain.witness import Outline
 from iveg.ngsi import codec

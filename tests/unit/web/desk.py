@@ -21,11 +21,12 @@ from iveg.web import notifications
 from iveg.web.api import metrics
 from iveg.web.bounded_http import bounded_http
 from iveg.web.build import Face, build_app, live_routers
-from iveg.web.live import socket
+from iveg.web.live import encoder
 from iveg.web.live.bounded import BoundedSocket
 from iveg.web.pages.contexts import Site
-from iveg.web.pages.routes import Pages
-from iveg.web.security.authentication import Authenticator, Role
+from iveg.web.pages.drawing import Pages
+from iveg.web.security.authentication import Authenticator
+from iveg.web.security.roles import Role
 from iveg.web.security.secrets import NotifySecret
 from iveg.web.views import Views
 from tests.fakes.detector_store import FakeDetectorStore
@@ -73,7 +74,7 @@ class WebDesk(Desk):
         self.rules = self.services.rules
         self.counters = Counter({"some": 1})
         self.views = Views(self.parts, lambda: self.counters)
-        self.encoder = socket.Encoder(self.views, self.hub, self.clock)
+        self.encoder = encoder.Encoder(self.views, self.hub, self.clock)
         self.notifications = notifications.NotificationEndpoint(
             self.ingest,
             NotifySecret(SECRET),

@@ -24,10 +24,13 @@ from iveg.web.api import history
 from iveg.web.live.pacing import SUBPROTOCOL
 from iveg.web.pages import service_worker
 from iveg.web.pages.contexts import Site
+from iveg.web.pages.drawing import Pages
 from iveg.web.pages.openapi import describe_api
-from iveg.web.pages.routes import Pages, router
-from iveg.web.security.authentication import Authenticator, Principal, require
+from iveg.web.pages.routes import router
+from iveg.web.security.authentication import Authenticator
 from iveg.web.security.headers import SecurityHeaders
+from iveg.web.security.requirements import require
+from iveg.web.security.roles import Principal
 from tests.browsers import running_browser
 from tests.builders import START
 from tests.databases import lay_history

@@ -9,12 +9,13 @@ from iveg.models.base import Listing
 from iveg.models.climate import Climate
 from iveg.models.command import Command
 from iveg.models.decision import Decision
-from iveg.models.detection import DetectionRow
 from iveg.models.health import Health
+from iveg.models.kept_detection import DetectionRow
 from iveg.models.latency import LatencyTable
 from iveg.models.log_entry import LogEntry
+from iveg.models.mapped import Scan
 from iveg.models.people import Person
-from iveg.models.places import GreenhouseMap, Scan
+from iveg.models.places import GreenhouseMap
 from iveg.models.robot import Robot
 from iveg.models.rule import Rule
 from iveg.models.stop_latency import Drill, Latency

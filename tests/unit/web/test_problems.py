@@ -21,14 +21,9 @@ from iveg.domain.errors import (
     UnknownRobotError,
     UnreadableError,
 )
-from iveg.web.problems import (
-    ForeignOriginError,
-    NotJsonError,
-    NotSignedInError,
-    Problem,
-    install,
-    problem_of,
-)
+from iveg.web.errors import ForeignOriginError, NotJsonError, NotSignedInError
+from iveg.web.problem import Problem
+from iveg.web.problems import install, problem_of
 
 
 class Threshold(BaseModel):

@@ -21,11 +21,11 @@ from iveg.domain.errors import NotRecordedError
 from iveg.domain.messages import CHANNELS, Channel
 from iveg.domain.records import Record
 from iveg.domain.transports import DIRECT, FIWARE, Transport
-from iveg.pipeline.build import Ports
+from iveg.pipeline.parts import Ports
 from iveg.pipeline.ports import CommandPort, MessageSender
 from iveg.settings import Settings
 from iveg.web.security.roles import MAY
-from iveg.web.security.sessions import IDLE_S
+from iveg.web.security.session_life import IDLE_S
 from tests.databases import lay_history
 from tests.fakes.context_broker import FakeContextBroker
 from tests.fakes.fleet import FakeFleet

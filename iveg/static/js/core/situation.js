@@ -12,6 +12,7 @@
  */
 
 import { ageOf, isSilent, linkOfRobot } from "./clock.js";
+import { LIMITS } from "./limits.js";
 
 /** Worst first, as the server ranks them. */
 export const LEVELS = /** @type {const} */ ([
@@ -50,9 +51,18 @@ export const UNHEARD = {
 /**
  * @param {Robot | undefined} robot
  * @param {number} [nowMs] `performance.now()` (ms)
+ * @param {import("./store.js").ConnectionState} [connection] to the server
  * @returns {Situation}
  */
-export function situationOf(robot, nowMs = performance.now()) {
+export function situationOf(robot, nowMs = performance.now(), connection = "open") {
+  const found = grownOld(robot, nowMs);
+  if (connection !== "lost" || found.level === "danger") return found;
+  // The server's advice is of before it went, and no robot is the one to check.
+  return { ...found, action: "as_moving" };
+}
+
+/** @param {Robot | undefined} robot @param {number} nowMs @returns {Situation} */
+function grownOld(robot, nowMs) {
   if (!robot) return UNHEARD;
   const { situation } = robot;
   const link = linkOfRobot(robot, nowMs);
@@ -65,7 +75,8 @@ export function situationOf(robot, nowMs = performance.now()) {
   }
   if (link === "LIVE" || situation.level === "danger") return situation;
   if (link === "UNKNOWN") return { ...UNHEARD, factor: situation.factor };
-  if (link === "LATE" && OF_ORDERS.has(situation.state)) return situation;
+  if (link === "LATE" && OF_ORDERS.has(situation.state))
+    return isOldStandstill(situation, age) ? stood(situation) : situation;
   return {
     ...UNHEARD,
     // Silence makes nothing better.
@@ -76,6 +87,19 @@ export function situationOf(robot, nowMs = performance.now()) {
     slots: { age },
   };
 }
+
+/** Whether its STOP says already that nobody knows whether it stands.
+ * @param {Situation} situation @param {number} ageS */
+const isOldStandstill = ({ state }, ageS) =>
+  state === "standing" && ageS > LIMITS.report_stale_s;
+
+/** @param {Situation} situation @returns {Situation} as the server would say it */
+const stood = (situation) => ({
+  ...situation,
+  level: "doubt",
+  state: "stood",
+  action: "as_moving",
+});
 
 /**
  * What it does, why, and what to do, each a phrase of its own; empty where there is none.

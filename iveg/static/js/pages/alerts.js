@@ -28,7 +28,8 @@ export function start({ store, i18n, tone }) {
     path: "alerts",
     i18n,
     cells: (alert) => cellsOf(alert, i18n, opened, notes),
-    admits: ({ priority, cleared_at }) => cleared_at !== null && isChosen(priority),
+    belongs: ({ cleared_at }) => cleared_at !== null,
+    admits: ({ priority }) => isChosen(priority),
   });
   const reload = soon(rows.load);
 

@@ -99,13 +99,24 @@ const A_MOMENT = 1e9;
  * @param {Record<string, unknown>} details @param {I18n} i18n
  */
 export function detailsSaid(details, i18n) {
-  const known = Object.entries(details).filter(([, value]) => value !== null);
+  const known = Object.entries(details).filter(
+    ([key, value]) => value !== null && !saysNothing(key, value, details),
+  );
   const parts = known.map(([key, value]) => {
     const name = worded(`auditpage.detail.${key}`, key, i18n);
     return `${name} ${valueSaid(key, value, i18n)}`;
   });
   return parts.join(" · ") || "—";
 }
+
+/**
+ * Whether it is a status that is well, or the id of somebody who is named beside it.
+ *
+ * @param {string} key @param {unknown} value @param {Record<string, unknown>} details
+ */
+const saysNothing = (key, value, details) =>
+  (key === "status" && Number(value) < 400) ||
+  (key === "person_id" && details.holder !== undefined);
 
 /** @param {string} key @param {unknown} value @param {I18n} i18n */
 function valueSaid(key, value, i18n) {

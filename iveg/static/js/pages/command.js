@@ -61,7 +61,7 @@ export function start({ store, i18n }) {
       make("p", "decision__sentence", sentenceOf(order, i18n)),
       make("small", "", askedSaid(order, i18n)),
       ...(plots ? [plots] : []),
-      makeTimeline(stepsOf(order, transports, i18n)),
+      makeTimeline(stepsOf(order, transports, i18n), i18n),
       ...makeSteps(order, i18n, opened),
       makePastLink(zeroOf(order.times), i18n),
       make("small", "", `${i18n.t("decision.id")} ${id}`),

@@ -50,7 +50,7 @@ function chainOf(decision, i18n) {
     make("span", "shape"),
     make("span", "", i18n.t(`decision.verdict.${worst}`)),
   );
-  const cell = make("td");
+  const cell = make("td", "named");
   cell.append(link);
   return cell;
 }

@@ -22,6 +22,7 @@ import { createTiles } from "./tiles.js";
 
 /** @typedef {import("../core/protocol.js").Robot} Robot */
 /** @typedef {import("../core/i18n.js").I18n} I18n */
+/** @typedef {import("../core/store.js").ConnectionState} ConnectionState */
 
 /** @typedef {{device: string, robot_id: string, kind: string, age_s: number | null}} Device */
 
@@ -42,7 +43,7 @@ export function start(page) {
     setText(need("#machines-empty"), i18n.t(isKnown ? "robot.none" : "rows.loading"));
     fillRows(
       "#machines tbody",
-      robots.map((robot) => machineCells(robot, i18n)),
+      robots.map((robot) => machineCells(robot, i18n, store.connection.state)),
     );
     hideEmptyColumns(need("#machines"));
     fillRows(
@@ -144,12 +145,16 @@ function ageSaid(age, i18n) {
   return Number.isFinite(age) ? i18n.t("health.age", { age }) : i18n.t("fleet.never");
 }
 
-/** How it stands with a robot. @param {Robot} robot @param {I18n} i18n */
-export const statusOf = (robot, i18n) =>
-  capitalised(sentenceOf(situationOf(robot), i18n));
+/** How it stands with a robot.
+ * @param {Robot} robot @param {I18n} i18n @param {ConnectionState} connection */
+export const statusOf = (robot, i18n, connection) =>
+  capitalised(sentenceOf(situationOf(robot, performance.now(), connection), i18n));
 
-/** @param {Robot} robot @param {I18n} i18n @returns {(string | Node)[]} */
-function machineCells(robot, i18n) {
+/**
+ * @param {Robot} robot @param {I18n} i18n @param {ConnectionState} connection
+ * @returns {(string | Node)[]}
+ */
+function machineCells(robot, i18n, connection) {
   const link = linkOfRobot(robot);
   const age = aboutAge(robot, ageSaid(ageOf(robot), i18n), i18n);
   const { profile, navigation, clock_offset_s, holds } = robot;
@@ -158,7 +163,7 @@ function machineCells(robot, i18n) {
   return [
     make("b", "", robot.robot_id),
     `${i18n.t(`robot.link.${link}`)} · ${age}`,
-    statusOf(robot, i18n),
+    statusOf(robot, i18n, connection),
     profile && isKnown ? i18n.t("robot.profile", profile) : "—",
     navigation?.task ? taskSaid(navigation.task, i18n) : "—",
     robot.transport && isKnown ? i18n.t(`fleet.transport.${robot.transport}`) : "—",

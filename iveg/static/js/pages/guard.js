@@ -27,48 +27,79 @@ export function createGuard(store, i18n) {
   const undo = /** @type {HTMLButtonElement} */ (need("#rule-undo"));
   /** @type {(isMeant: boolean) => void} */
   let answer = () => {};
-  let preview = new AbortController();
+  /** What is asked about a change ends with the question. */
+  let asking = new AbortController();
 
-  /** @param {Change} change @param {Rule} before */
-  async function isMeant(change, before) {
+  /**
+   * Asks at once: what today and yesterday say of the change is filled in as it comes, as
+   * whoever is sure need not wait, and on a slow server a press would look lost.
+   *
+   * @param {Change} change @param {Rule} before
+   * @returns {boolean | Promise<boolean>}
+   */
+  function isMeant(change, before) {
     const lowerings = loweringsOf(before, change);
     if (!lowerings.length) return true;
+    close(false);
+    asking = new AbortController();
     const told = lowerings.map(({ key, slots }) => i18n.t(key, slots));
-    const counts = await Promise.all([
-      countSaid(change, before),
-      before.foresight && change.foresight === false ? encountersSaid() : "",
-    ]);
-    setText(need("#guard-says"), [...told, ...counts].filter(Boolean).join(" "));
-    setText(need("#guard-yesterday"), "");
-    // It takes seconds: whoever is sure need not wait.
-    const tell = (/** @type {import("./yesterday.js").Said} */ { key, slots }) =>
-      setText(need("#guard-yesterday"), i18n.t(key, slots));
-    preview.abort();
-    preview = new AbortController();
-    askYesterday(before, change, tell, preview.signal);
+    setText(need("#guard-says"), told.join(" "));
+    tellToday(change, before, asking.signal);
+    tellYesterday(change, before, asking.signal);
     setHidden(box, false);
     need("#guard-no").focus();
     return new Promise((resolve) => {
-      answer(false);
       answer = resolve;
     });
   }
 
-  /** @param {Change} change @param {Rule} before */
-  async function countSaid(change, before) {
+  /** @param {Change} change @param {Rule} before @param {AbortSignal} signal */
+  async function tellToday(change, before, signal) {
+    const place = need("#guard-today");
+    const counts = [
+      ...sightingsAsked(change, before, signal),
+      ...(before.foresight && change.foresight === false
+        ? [encountersSaid(signal)]
+        : []),
+    ];
+    setText(place, counts.length ? i18n.t("lowering.counting") : "");
+    const said = await Promise.all(counts);
+    if (!signal.aborted) setText(place, said.join(" "));
+  }
+
+  /** @param {Change} change @param {Rule} before @param {AbortSignal} signal */
+  function tellYesterday(change, before, signal) {
+    const place = need("#guard-yesterday");
+    setText(place, "");
+    const tell = (/** @type {import("./yesterday.js").Said} */ { key, slots }) => {
+      if (!signal.aborted) setText(place, i18n.t(key, slots));
+    };
+    askYesterday(before, change, tell, signal);
+  }
+
+  /**
+   * @param {Change} change @param {Rule} before @param {AbortSignal} signal
+   * @returns {Promise<string>[]} none where people count as before
+   */
+  function sightingsAsked(change, before, signal) {
     const [from, to] = [personShare(before), personShare({ ...before, ...change })];
-    if (to <= from) return "";
+    return to > from ? [sightingsSaid(from, to, signal)] : [];
+  }
+
+  /** @param {number} from @param {number} to (0–1) @param {AbortSignal} signal */
+  async function sightingsSaid(from, to, signal) {
     const day = new Date();
     day.setHours(0, 0, 0, 0);
     const query = `class=person&min_probability=${from}&since=${day.toISOString()}&limit=${SIGHTINGS}`;
-    const { status, body } = await readApi(`detections?${query}`);
+    const { status, body } = await readApi(`detections?${query}`, signal);
     if (status !== 200 || !body?.items.length) return i18n.t("lowering.uncounted");
     return i18n.t("lowering.sightings", sightingsLost(body.items, from, to));
   }
 
-  /** What foresight did today, which a rule without it would not have. */
-  async function encountersSaid() {
-    const { status, body } = await readApi("day");
+  /** What foresight did today, which a rule without it would not have.
+   * @param {AbortSignal} signal */
+  async function encountersSaid(signal) {
+    const { status, body } = await readApi("day", signal);
     const met = status === 200 ? body?.encounters : null;
     return met?.count
       ? i18n.t("lowering.encounters", foreseen(met))
@@ -78,7 +109,7 @@ export function createGuard(store, i18n) {
   /** @param {boolean} isYes */
   function close(isYes) {
     setHidden(box, true);
-    preview.abort();
+    asking.abort();
     answer(isYes);
     answer = () => {};
   }

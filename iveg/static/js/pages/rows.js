@@ -14,10 +14,12 @@ const ROWS = 50;
 /**
  * @param {{name: string, path: string, i18n: import("../core/i18n.js").I18n,
  *   cells: (item: any) => Node[], admits?: (item: any) => boolean,
- *   onItems?: (items: any[]) => void}} options `name` of `_rows.html`; `path` below
- *   `/api/v1/`
+ *   belongs?: (item: any) => boolean, onItems?: (items: any[]) => void}} options
+ *   `name` of `_rows.html`; `path` below `/api/v1/`; `belongs`: whatever the filters
  */
-export function createRows({ name, path, i18n, cells, admits = () => true, onItems }) {
+export function createRows(options) {
+  const { name, path, i18n, cells, onItems } = options;
+  const { admits = () => true, belongs = () => true } = options;
   const body = need(`#${name}-rows tbody`);
   const more = /** @type {HTMLButtonElement} */ (need(`#${name}-more`));
   /** @type {any[]} */
@@ -31,7 +33,8 @@ export function createRows({ name, path, i18n, cells, admits = () => true, onIte
   const asks = () => filters.query() + sorting.query();
 
   function draw() {
-    const shown = items.filter(admits).map(makeRow).filter(filters.admits);
+    const own = items.filter(belongs);
+    const shown = own.filter(admits).map(makeRow).filter(filters.admits);
     body.replaceChildren(...shown);
     const failed = need(`#${name}-error`);
     setHidden(failed, status === 200);
@@ -40,7 +43,7 @@ export function createRows({ name, path, i18n, cells, admits = () => true, onIte
     setHidden(need(`#${name}-scroll`), shown.length === 0);
     const empty = need(`#${name}-empty`);
     setHidden(empty, !isLoaded || shown.length > 0 || status !== 200);
-    const isFiltered = items.length > 0 || filters.isOn();
+    const isFiltered = own.length > 0 || filters.isOn();
     const why = isFiltered ? "logpanel.empty_filter" : `rows.empty.${name}`;
     setText(empty, i18n.t(why));
     setHidden(more, next === null);

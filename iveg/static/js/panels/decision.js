@@ -104,7 +104,7 @@ export function createRecord(place, i18n) {
       ...(picture ? [picture] : []),
       makeFacts(shown, i18n),
       ...(plots ? [plots] : []),
-      makeTimeline(steps),
+      makeTimeline(steps, i18n),
       ...(shown.started_at ? [makePastLink(shown.started_at, i18n)] : []),
       make("small", "", `${i18n.t("decision.id")} ${shown.decision_id}`),
       makeShare(

@@ -115,13 +115,16 @@ export function peopleSaid(people, coverage, isOpen, i18n) {
   const lately = stages.length - seen;
   const parts = [
     seen && i18n.t(seen === 1 ? "map.people_one" : "map.people_count", { count: seen }),
-    lately &&
-      i18n.t(`map.people_lately${lately === 1 ? "_one" : ""}`, { count: lately }),
+    lately && i18n.t(latelyKey(lately, seen), { count: lately }),
     !seen && !lately && !said.isBlind && i18n.t("map.people_none"),
     said.text,
   ];
   return parts.filter(Boolean).join(" · ");
 }
+
+/** @param {number} lately @param {number} seen */
+const latelyKey = (lately, seen) =>
+  seen ? "map.people_also" : `map.people_lately${lately === 1 ? "_one" : ""}`;
 
 /** As the map shows it. @param {Person} person */
 const stageOf = (person) => readPerson(person, performance.now()).stage;

@@ -127,9 +127,10 @@ export class RobotCard {
 
   /** @param {Robot | undefined} robot */
   #drawMode(robot) {
-    const { i18n } = this.#app;
+    const { store, i18n } = this.#app;
     const { why, todo, causes, faults } = this.#parts;
-    const situation = situationOf(robot);
+    const { state } = store.connection;
+    const situation = situationOf(robot, performance.now(), state);
     const phrases = phrasesOf(situation, i18n);
     setAttribute(this.#card, "data-level", situation.level);
     setText(this.#fields.mode, capitalised(phrases.said));
@@ -137,10 +138,11 @@ export class RobotCard {
     if (mark) setAttribute(causes, "data-cause", mark);
     else causes.removeAttribute("data-cause");
     setText(why, phrases.why);
-    setText(todo, phrases.todo);
-    this.#card.toggleAttribute("data-todo", phrases.todo !== "");
-    const said = robot ? faultsSaid(robot, i18n).join(" · ") : "";
-    setText(faults, said);
+    // Nothing is to be done about a moment that is past.
+    const said = document.body.hasAttribute("data-past") ? "" : phrases.todo;
+    setText(todo, said);
+    this.#card.toggleAttribute("data-todo", said !== "");
+    setText(faults, robot ? faultsSaid(robot, i18n).join(" · ") : "");
   }
 
   /** @param {Robot | undefined} robot @param {boolean} isSmall */

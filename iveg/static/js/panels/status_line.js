@@ -25,6 +25,8 @@ const PATIENCE_MS = 1500;
  * everywhere: long names of robots, and a sentence of now over a map of then. */
 const LONG = 64;
 const VERY_LONG = 86;
+/** Smaller than this nobody reads a sentence of danger: the line grows instead (px). */
+const LEAST_PX = 13;
 /** What lasts less than this is not told (ms). */
 export const LASTS_MS = 1000;
 
@@ -70,13 +72,33 @@ export function createStatusLine({ store, i18n }) {
     fit();
   }
 
-  /** Costs a layout, so it is asked of new sentences and of new windows only. */
+  /**
+   * Makes letters smaller, and then the line higher, until nothing is cut: whatever the
+   * window, the words beside it, the reader's smallest letters.  A line that grew stays
+   * so until the window changes: nothing below it moves to and fro.  Costs a layout, so
+   * it is asked of new sentences, and where its place or its letters change.
+   */
   function fit() {
     const text = need("#status-said");
-    const isLong = (text.textContent ?? "").length > LONG;
-    place.toggleAttribute("data-long", isLong);
-    if (text.offsetHeight > place.clientHeight)
-      place.toggleAttribute("data-long", true);
+    const isCut = () => text.offsetHeight > place.clientHeight;
+    text.style.fontSize = "";
+    place.toggleAttribute("data-long", (text.textContent ?? "").length > LONG);
+    if (!isCut()) return;
+    place.toggleAttribute("data-long", true);
+    let px = Number.parseFloat(getComputedStyle(text).fontSize);
+    while (isCut() && px - 1 >= LEAST_PX) {
+      px -= 1;
+      text.style.fontSize = `${px}px`;
+    }
+    if (!isCut()) return;
+    const border = place.offsetHeight - place.clientHeight;
+    const high = `${text.offsetHeight + border}px`;
+    document.documentElement.style.setProperty("--status", high);
+  }
+
+  function fitAnew() {
+    document.documentElement.style.removeProperty("--status");
+    fit();
   }
 
   /** @param {ConnectionState} state */
@@ -97,7 +119,9 @@ export function createStatusLine({ store, i18n }) {
   store.subscribe("connection", draw);
   store.subscribe("snapshot", draw);
   i18n.onChange(draw);
-  addEventListener("resize", fit);
+  addEventListener("resize", fitAnew);
+  const sizes = new ResizeObserver(fit);
+  for (const part of [place, need("#status-said")]) sizes.observe(part);
   setInterval(onBeat, TICK_MS, draw);
   draw();
 }

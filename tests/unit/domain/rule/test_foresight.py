@@ -186,6 +186,60 @@ def test_of_a_slow_robot_it_is_told_whom_it_meets_soon_once_it_is_let_go() -> No
     assert ahead.see((3.0, 0.0)).shown() == ahead.must(), "2.5 s ahead as it drives"
 
 
+def _told_later(ahead: Ahead, *xs: float) -> tuple[Encounter | None, Encounter | None]:
+    """What slows and what is told after more pictures, a tenth of a second apart."""
+    scene, foresight = ahead.scene, Foresight()
+    for x in (None, *xs):
+        if x is not None:
+            scene.now = round(scene.now + 0.1, 6)
+            ahead.see((x, 0.0))
+        slows = foresight.look(scene.world, scene.people, scene.rule, at(scene.now))
+    shown = foresight.shown.get("AGI", {})
+    return slows.get("AGI", {}).get("P1"), shown.get("P1")
+
+
+@pytest.mark.parametrize(
+    ("x", "vx", "then", "in_s"),
+    [
+        (3.0, 1.4, (3.0, 3.0), 1.0 / 0.5),
+        (5.5, 0.0, (5.36, 5.22), 3.22 / 1.9),
+    ],
+    ids=["who walked ahead stops", "who stood comes"],
+)
+def test_by_their_newest_step_an_encounter_is_told_that_slows_nobody_yet(
+    x: float, vx: float, then: tuple[float, ...], in_s: float
+) -> None:
+    ahead = Ahead(Pose2D(0, 0, 0), Twist2D(0.5, 0.0)).walk(x, 0.0, vx, 0.0)
+    slows, shown = _told_later(ahead, *then)
+    assert slows is None
+    assert shown is not None
+    assert shown.in_s == pytest.approx(in_s, abs=MS_10)
+
+
+@pytest.mark.parametrize(
+    ("x", "then"),
+    [
+        (5.03, (5.07, 4.98, 5.05, 5.0)),
+        (1.9, (2.0, 1.9)),
+        (5.5, ()),
+        (5.5, (5.52,)),
+    ],
+    ids=["noise of a detector", "in the ring", "nothing new", "one picture"],
+)
+def test_of_no_step_there_is_nothing_to_tell(x: float, then: tuple[float, ...]) -> None:
+    ahead = Ahead(Pose2D(0, 0, 0), Twist2D(0.5, 0.0)).walk(x, 0.0, 0.0, 0.0)
+    assert _told_later(ahead, *then) == (None, None)
+
+
+def test_no_step_is_longer_than_a_walker_makes() -> None:
+    """A box that jumps by 0.5 m is taken for 0.32 m in 0.2 s."""
+    ahead = Ahead(Pose2D(0, 0, 0), Twist2D(0.5, 0.0)).walk(7.2, 0.0, 0.0, 0.0)
+    slows, shown = _told_later(ahead, 7.2, 6.7)
+    assert slows is None
+    assert shown is not None
+    assert shown.in_s == pytest.approx(4.7 / (0.5 + 1.6), abs=MS_10)
+
+
 def test_what_slows_is_told_as_it_slows() -> None:
     """A ring that has grown is reached sooner than the one that it began as."""
     ahead = Ahead(Pose2D(0, 0, 0), Twist2D(0.8, 0.0)).walk(4.0, 0.0, 0.0, 0.0)

@@ -9,7 +9,7 @@ from iveg.domain.errors import ExperimentRefusedError
 from iveg.lab.experiment import api
 from iveg.lab.pages import page
 from iveg.models.experiment import Experiment, Experiments
-from iveg.web.security.authentication import Role
+from iveg.web.security.roles import Role
 from tests.unit.web.desk import WebDesk
 
 ONE = Experiment(

@@ -5,10 +5,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from iveg.domain.costmap import Grid, InflatedGrid
+from iveg.domain.costmap import InflatedGrid
 from iveg.domain.feedback import Feedback, FeedbackAlert
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.observations import Origin
+from iveg.domain.occupancy_grid import Grid
 from iveg.domain.witness import Outline
 from iveg.lab.experiment.beliefs import (
     Belief,

@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import pytest
 
-from iveg.robot.ros2.checking import CheckVerdict, Heard, judge, lines
+from iveg.robot.ros2.checking import Heard, judge
 from iveg.robot.ros2.config import DriveConfig, RobotConfig
 from iveg.robot.ros2.transforms import TransformBuffer
+from iveg.robot.ros2.verdict import CheckVerdict, lines
 from iveg.ros2 import detector_messages as d
 from iveg.ros2 import geometry_msgs, nav_msgs, sensor_msgs
 from iveg.ros2.names import DEFAULT, SENSOR_DATA, TF, TF_STATIC, Endpoint

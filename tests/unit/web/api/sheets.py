@@ -15,8 +15,8 @@ from iveg.domain.records import Record
 from iveg.pipeline.ports import Clock
 from iveg.pipeline.record import Waiting
 from iveg.web.pages.contexts import Site
+from iveg.web.pages.drawing import Pages
 from iveg.web.pages.local_time import start_of
-from iveg.web.pages.routes import Pages
 from iveg.web.problems import install
 from iveg.web.security.authentication import Authenticator
 

@@ -7,7 +7,7 @@ import pytest
 
 from iveg.domain.detector import OutOfService
 from iveg.domain.records import LogRecord
-from iveg.web.security.authentication import Role
+from iveg.web.security.roles import Role
 from tests.builders import detection, odometry, origin
 from tests.unit.pipeline.desk import conditions_of
 from tests.unit.web.desk import WebDesk

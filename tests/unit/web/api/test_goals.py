@@ -8,7 +8,7 @@ import pytest
 
 from iveg.domain.goals import REASONS
 from iveg.domain.observations import Hold
-from iveg.web.security.authentication import Role
+from iveg.web.security.roles import Role
 from tests.architecture import documents
 from tests.unit.pipeline.desk import settle
 from tests.unit.pipeline.test_goals import free, say

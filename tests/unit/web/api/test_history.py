@@ -25,8 +25,8 @@ from iveg.pipeline.record import Waiting
 from iveg.web import problems
 from iveg.web.api import exports
 from iveg.web.api.history import router
-from iveg.web.pages import charts
-from iveg.web.security.authentication import require
+from iveg.web.pages import plotly_library
+from iveg.web.security.requirements import require
 from tests.databases import lay_history
 from tests.fakes.records import (
     NOON,
@@ -647,7 +647,7 @@ async def test_the_library_names_the_sheets_that_a_strict_page_refuses(
     client: httpx.AsyncClient,
 ) -> None:
     air = (await client.get("/api/v1/history/climate")).json()
-    script = gzip.decompress(charts.library().packed)
+    script = gzip.decompress(plotly_library.library().packed)
 
     assert "plotly.js-style-global" in air["style_ids"]
     made = script.count(b'createElement("style")')
@@ -688,7 +688,7 @@ async def test_the_page_gets_plotly_from_this_server_and_keeps_it(
 
 
 def test_the_browser_draws_with_the_version_that_checks_the_figures() -> None:
-    drawing = gzip.decompress(charts.library().packed)
+    drawing = gzip.decompress(plotly_library.library().packed)
     package = importlib.resources.files("plotly") / "package_data" / "plotly.min.js"
     checking = package.read_bytes()
 

@@ -28,7 +28,8 @@ from iveg.settings import Settings
 from iveg.web import problems
 from iveg.web.api import notes
 from iveg.web.api.incidents import Sources, router
-from iveg.web.security.authentication import Principal, require
+from iveg.web.security.requirements import require
+from iveg.web.security.roles import Principal
 from tests.databases import lay_history
 from tests.fakes.clock import FakeClock
 from tests.fakes.recordings import WriterInPlace

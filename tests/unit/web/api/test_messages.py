@@ -7,8 +7,8 @@ import pytest
 
 from iveg.adapters.push_encryption import encode, new_key, public_key
 from iveg.domain.messages import AlertItem, MessageText, OutboundMessage
-from iveg.web.api.messages import writer
-from iveg.web.security.authentication import Role
+from iveg.web.pages.message_texts import writer
+from iveg.web.security.roles import Role
 from tests.builders import START
 from tests.unit.web.desk import WebDesk
 

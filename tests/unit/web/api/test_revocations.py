@@ -10,7 +10,7 @@ from iveg.domain.records import LogRecord
 from iveg.domain.revocation import Revocation
 from iveg.domain.transports import DIRECT
 from iveg.pipeline.revocations import Revocations
-from iveg.web.security.authentication import Role
+from iveg.web.security.roles import Role
 from tests.builders import hold, notification, odometry, pose_value
 from tests.unit.pipeline.desk import conditions_of
 from tests.unit.web.desk import WebDesk

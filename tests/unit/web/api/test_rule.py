@@ -7,7 +7,7 @@ import httpx
 import pytest
 
 from iveg.domain.records import DecisionRecord
-from iveg.web.security.authentication import Role
+from iveg.web.security.roles import Role
 from tests.builders import detection
 from tests.unit.web.desk import WebDesk
 

@@ -9,7 +9,7 @@ import pytest
 
 from iveg.domain.records import AuditRecord
 from iveg.web.api import sessions
-from iveg.web.security.sessions import IDLE_S
+from iveg.web.security.session_life import IDLE_S
 from tests.unit.web.api.test_account import OwnDesk
 
 ALL, OWN = "/api/v1/sessions", "/api/v1/account/sessions"

@@ -7,7 +7,8 @@ from fastapi import FastAPI
 from iveg.cli.running import reachable_host
 from iveg.web import problems
 from iveg.web.api import sign_in_code
-from iveg.web.security.authentication import Authenticator, Role
+from iveg.web.security.authentication import Authenticator
+from iveg.web.security.roles import Role
 from tests.builders import START
 
 TOKEN = "cd" * 32

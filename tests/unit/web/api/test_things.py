@@ -5,7 +5,7 @@ import pytest
 
 from iveg.domain.geometry import Pose2D
 from iveg.domain.records import LogRecord
-from iveg.web.security.authentication import Role
+from iveg.web.security.roles import Role
 from tests.builders import detection
 from tests.unit.pipeline.desk import conditions_of
 from tests.unit.robot.test_known_here import sees

@@ -11,7 +11,7 @@ import pytest
 from iveg.web.live.feed import PICTURE_S, READ_OUT_S, TelemetryFeed
 from iveg.web.live.pacing import BYTES, FRAMES, GAP_S, ROBOT_GAP_S
 from iveg.web.live.painting import Painting
-from iveg.web.live.telemetry import NO_RETURN, UNIT_M
+from iveg.web.live.ranges import NO_RETURN, UNIT_M
 from tests.builders import detection, scan
 from tests.unit.web.desk import WebDesk
 

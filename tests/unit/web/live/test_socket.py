@@ -15,10 +15,10 @@ from websockets.typing import Subprotocol
 from iveg.domain.observations import Climate
 from iveg.pipeline.publish import MAX_PENDING
 from iveg.web.live.feed import TelemetryFeed
+from iveg.web.live.line import Line
 from iveg.web.live.pacing import SUBPROTOCOL
 from iveg.web.live.painting import Painting
-from iveg.web.live.socket import Line
-from iveg.web.security.authentication import Principal, Role
+from iveg.web.security.roles import Principal, Role
 from tests.builders import detection
 from tests.unit.pipeline.desk import settle
 from tests.unit.web.desk import API_TOKEN, WebDesk

@@ -6,7 +6,7 @@ import orjson
 
 from iveg.adapters.history.series import SpeedSeries
 from iveg.domain.fleet import FleetDescription
-from iveg.web.pages import charts
+from iveg.web.pages import time_charts
 
 
 def test_13_19_each_robot_has_a_strip_whose_slow_downs_are_shaded() -> None:
@@ -23,7 +23,7 @@ def test_13_19_each_robot_has_a_strip_whose_slow_downs_are_shaded() -> None:
     free = replace(slowed, robot_id="AGII", limit=(1.0,) * 4)
     fleet = FleetDescription.undescribed(["AGI", "AGII"])
 
-    figure = orjson.loads(charts.speed_figure([slowed, free], fleet))
+    figure = orjson.loads(time_charts.speed_figure([slowed, free], fleet))
 
     axes = [trace["yaxis"] for trace in figure["data"]]
     assert axes == ["y", "y", "y2", "y2"]
@@ -38,7 +38,7 @@ def test_25_2_what_a_robot_sent_after_a_gap_is_marked() -> None:
     series = SpeedSeries("AGI", at, same, same, same, same, (False, True, True))
     fleet = FleetDescription.undescribed(["AGI"])
 
-    traces = orjson.loads(charts.speed_figure([series], fleet))["data"]
+    traces = orjson.loads(time_charts.speed_figure([series], fleet))["data"]
 
     *_, marks = traces
     assert (marks["meta"]["kind"], marks["mode"]) == ("late", "markers")
@@ -52,7 +52,7 @@ def test_28_6_a_margin_is_drawn_as_long_as_it_was_measured_and_no_longer() -> No
     measured = SpeedSeries("AGI", at, same, same, same, margin, (False,) * len(at))
     unknown = replace(measured, robot_id="AGII", margin=(None,) * len(at))
 
-    (line,) = orjson.loads(charts.margin_figure([measured, unknown]))["data"]
+    (line,) = orjson.loads(time_charts.margin_figure([measured, unknown]))["data"]
 
     assert (line["meta"]["robot"], line["connectgaps"]) == ("AGI", False)
     assert [*zip(line["x"], line["y"], strict=True)] == [

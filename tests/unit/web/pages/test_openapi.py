@@ -8,7 +8,7 @@ from fastapi import APIRouter, Depends, FastAPI, Path, Query
 from pydantic import BaseModel, Field
 
 from iveg.web.pages.openapi import ApiDoc, CallDoc, FieldDoc, describe_api
-from iveg.web.security.authentication import require
+from iveg.web.security.requirements import require
 
 
 class Pose(BaseModel):

@@ -11,7 +11,9 @@ from starlette.requests import Request
 from starlette.responses import RedirectResponse, Response
 
 from iveg.domain.detection_rule import DetectionRule
+from iveg.web.errors import NotSignedInError
 from iveg.web.pages.contexts import Page, Site
+from iveg.web.pages.drawing import Pages
 from iveg.web.pages.openapi import (
     AnswerDoc,
     ApiDoc,
@@ -20,11 +22,11 @@ from iveg.web.pages.openapi import (
     GroupDoc,
     ShapeDoc,
 )
-from iveg.web.pages.routes import Pages, router
+from iveg.web.pages.routes import router
 from iveg.web.pages.translations import read_translations
-from iveg.web.problems import NotSignedInError, install
-from iveg.web.security.authentication import Principal
+from iveg.web.problems import install
 from iveg.web.security.headers import CONTENT_SECURITY_POLICY, SecurityHeaders
+from iveg.web.security.roles import Principal
 
 ROUTES = (
     "/",

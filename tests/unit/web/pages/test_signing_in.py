@@ -8,8 +8,9 @@ from fastapi import FastAPI
 
 from iveg.domain.detection_rule import DetectionRule
 from iveg.web.pages.contexts import Site
+from iveg.web.pages.drawing import Pages
 from iveg.web.pages.openapi import ApiDoc
-from iveg.web.pages.routes import Pages, router
+from iveg.web.pages.routes import router
 from iveg.web.problems import install
 from iveg.web.security.authentication import Authenticator
 from tests.builders import START

@@ -15,14 +15,9 @@ from starlette.types import Message
 
 from iveg.domain.observations import Instant
 from iveg.web import problems
-from iveg.web.security.authentication import (
-    MAY,
-    Action,
-    Authenticator,
-    Principal,
-    declared_action,
-    require,
-)
+from iveg.web.security.authentication import Authenticator
+from iveg.web.security.requirements import declared_action, require
+from iveg.web.security.roles import MAY, Action, Principal
 from iveg.web.security.secrets import NotifySecret
 from iveg.web.security.sessions import Sessions
 from iveg.web.security.signin import SignInLink

@@ -16,8 +16,9 @@ from iveg.domain.single_sign_on import ClaimReading, person_id
 from iveg.web.api import proof
 from iveg.web.pages import sign_on
 from iveg.web.pages.contexts import Site
+from iveg.web.pages.drawing import Pages
 from iveg.web.pages.openapi import ApiDoc
-from iveg.web.pages.routes import Pages, router
+from iveg.web.pages.routes import router
 from iveg.web.security.authentication import Authenticator
 from iveg.web.security.passkeys import Passkeys
 from iveg.web.security.people import People
