@@ -15,6 +15,10 @@ from iveg.adapters.fiware_token import FiwareToken
 from iveg.domain.errors import HopError, NoAnswerError
 
 _NODELAY = [(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)]
+_KEPT_S = 2.0
+"""A connection unused for longer is not used again: Node.js, and so the IoT Agent,
+closes it after 5 s, and a request that crosses the closing on its way has no answer."""
+_MOST_CONNECTIONS = 100
 PAGE_SIZE = 100
 TIMEOUT_S = 6.0
 """A little more than the five seconds that Orion waits for a hung agent."""
@@ -72,7 +76,11 @@ class FiwareHttp:
             headers=headers,
             timeout=TIMEOUT_S,
             transport=httpx.AsyncHTTPTransport(
-                verify=_trusted(), socket_options=_NODELAY
+                verify=_trusted(),
+                limits=httpx.Limits(
+                    max_connections=_MOST_CONNECTIONS, keepalive_expiry=_KEPT_S
+                ),
+                socket_options=_NODELAY,
             ),
         )
 

@@ -4,7 +4,7 @@ from collections.abc import AsyncIterator
 import aiomqtt
 import pytest
 
-from iveg.adapters import clock
+from iveg.adapters import clock, fiware_http
 from iveg.adapters.fleet_provisioning import provision
 from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.orion import OrionClient
@@ -85,6 +85,32 @@ async def test_a_robot_without_odometry_has_no_time(orion: OrionClient) -> None:
     assert await orion.modified_at("AGI") is None
     await put(orion, "AGI")
     assert await orion.modified_at("AGI") is None
+
+
+async def test_a_connection_that_the_other_side_may_be_closing_is_not_used_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(fiware_http, "_KEPT_S", 0.02)
+    ended = asyncio.Semaphore(0)
+
+    async def answer_once(
+        reader: asyncio.StreamReader, writer: asyncio.StreamWriter
+    ) -> None:
+        await reader.readuntil(b"\r\n\r\n")
+        writer.write(b"HTTP/1.1 200 OK\r\nContent-Length: 2\r\n\r\n[]")
+        await reader.read(1)
+        writer.close()
+        await writer.wait_closed()
+        ended.release()
+
+    async with await asyncio.start_server(answer_once, "127.0.0.1", 0) as server:
+        port = server.sockets[0].getsockname()[1]
+        async with OrionClient(f"http://127.0.0.1:{port}", *TENANT) as orion:
+            for _ in range(2):
+                assert await orion.read_robots() == []
+                await asyncio.sleep(0.1)
+        for _ in range(2):
+            await ended.acquire()
 
 
 async def test_an_attribute_is_deleted_once(orion: OrionClient) -> None:
