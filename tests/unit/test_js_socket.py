@@ -51,17 +51,19 @@ class LiveServer:
         heard: What browsers sent, pings left out.
         answers: Whether pings are answered; without it the line falls silent.
         refusal: The code that new connections are closed with; None takes them.
+        slowness_s: How long ``/healthz`` takes, and a snapshot twice.
     """
 
     def __init__(self) -> None:
         self.heard: list[dict[str, Any]] = []
         self.answers = True
         self.refusal: int | None = None
+        self.slowness_s = 0.0
         self.attempts = 0
         self.clock_ahead_s = 0.0
         self._port = 0
         self._connections: list[ServerConnection] = []
-        self._closing = Event()
+        self._pause = Event()
 
     @property
     def url(self) -> str:
@@ -74,7 +76,7 @@ class LiveServer:
             self._talk,
             "127.0.0.1",
             self._port,
-            process_request=_answer_health,
+            process_request=self._answer_health,
             subprotocols=[Subprotocol(SUBPROTOCOL)],
         )
         self._port = self._server.socket.getsockname()[1]
@@ -105,9 +107,18 @@ class LiveServer:
             return
         self._connections.append(connection)
         with suppress(ConnectionClosed):
+            self._pause.wait(2 * self.slowness_s)
             _send(connection, "snapshot", _SNAPSHOT)
             for text in connection:
                 self._take(connection, json.loads(text))
+
+    def _answer_health(
+        self, connection: ServerConnection, request: Request
+    ) -> Response | None:
+        if request.path != "/healthz":
+            return None
+        self._pause.wait(self.slowness_s)
+        return connection.respond(HTTPStatus.OK, "ok\n")
 
     def _take(self, connection: ServerConnection, said: dict[str, Any]) -> None:
         if said["type"] != "ping":
@@ -133,12 +144,6 @@ _SNAPSHOT: dict[str, Any] = {
 
 def _send(connection: ServerConnection, topic: str, data: dict[str, Any]) -> None:
     connection.send(json.dumps({"topic": topic, "data": data}))
-
-
-def _answer_health(connection: ServerConnection, request: Request) -> Response | None:
-    if request.path != "/healthz":
-        return None
-    return connection.respond(HTTPStatus.OK, "ok\n")
 
 
 @pytest.fixture(scope="module")
@@ -204,6 +209,19 @@ def test_a_killed_server_is_noticed_and_found_again_with_a_fresh_snapshot(
 
     _wait_for_state(page, "open")
     assert page.evaluate("() => window.store.get('snapshot') !== window.first")
+
+
+def test_a_server_that_is_slow_to_answer_is_joined_again(
+    page: Page, live: LiveServer
+) -> None:
+    live.slowness_s = 1.4
+    live.stop()
+    _wait_for_state(page, "lost")
+    live.start()
+
+    _wait_for_state(page, "open")
+
+    assert live.attempts == 2  # the line of before, and the first one after it
 
 
 def test_a_line_that_falls_silent_is_lost_within_three_seconds(

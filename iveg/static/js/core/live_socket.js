@@ -27,6 +27,7 @@ export class LiveSocket {
   #pace;
   #isTimed = false;
   #isDropped = false;
+  hasHeard = false;
   heardAtMs = performance.now();
   pingedAtMs = 0;
 
@@ -86,6 +87,7 @@ export class LiveSocket {
    */
   #hear(frame) {
     if (this.#isDropped) return;
+    this.hasHeard = true;
     this.heardAtMs = performance.now();
     const { topic, data, at } = readFrame(frame);
     if (topic === "pong") this.#takePong(/** @type {any} */ (data), at);

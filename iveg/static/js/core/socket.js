@@ -25,10 +25,13 @@ import { UnreadPresses } from "./presses.js";
 const PING_EVERY_MS = 1000;
 const SILENCE_IS_LOSS_MS = 2000;
 const WATCH_EVERY_MS = 250;
+/** A slow server is one all the same: what is too late for an open line is too late here. */
+const PROBE_LIMIT_MS = SILENCE_IS_LOSS_MS;
+/** A probe was answered, so a new line gets more time than one that fell silent. */
+const OPENING_LIMIT_MS = 5000;
 const RETRY_FIRST_MS = 250;
-/** With the longest probe and the jitter below, recovery stays under three seconds. */
-const RETRY_LAST_MS = 2000;
-const PROBE_LIMIT_MS = 900;
+/** With the longest probe, recovery stays under three seconds. */
+const RETRY_LAST_MS = 900;
 /** A page hidden longer than this starts again from a fresh snapshot. */
 const HIDDEN_LIMIT_MS = 1000;
 const CLOSED_SIGNED_OUT = 4401;
@@ -180,8 +183,10 @@ export class LiveLine {
     this.#watchedAtMs = nowMs;
     // After a pause of this page itself, the messages in its queue are read first.
     if (!this.#socket || wasAsleep) return;
-    const { heardAtMs, pingedAtMs } = this.#socket;
-    if (nowMs - heardAtMs > SILENCE_IS_LOSS_MS) this.#lose();
+    const { heardAtMs, pingedAtMs, hasHeard } = this.#socket;
+    const silentMs = nowMs - heardAtMs;
+    if (silentMs > (hasHeard ? SILENCE_IS_LOSS_MS : OPENING_LIMIT_MS)) this.#lose();
+    else if (silentMs > SILENCE_IS_LOSS_MS) this.#store.setConnection("lost", nowMs);
     else if (nowMs - pingedAtMs >= PING_EVERY_MS - WATCH_EVERY_MS / 2)
       this.#socket.ping();
   }
