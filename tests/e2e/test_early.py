@@ -20,7 +20,7 @@ from tests.e2e.frozen import past_site
 from tests.e2e.reading import strip_stop
 from tests.patience import AGAIN
 from tests.pictures.scenes import IDS
-from tests.processes import Site
+from tests.processes import Site, until
 
 pytestmark = pytest.mark.e2e
 
@@ -270,8 +270,10 @@ def test_a_figure_that_is_not_drawn_yet_says_so(
 
     assert "Cargando" in place.evaluate(said)
 
-    while not late:
+    def asked() -> Route | None:
         page.wait_for_timeout(100)
-    late[0].continue_()
+        return late[0] if late else None
+
+    until(asked, "the page asks for its script").continue_()
     page.wait_for_selector("#history:not([data-busy])")
     assert place.evaluate(said) == "none"

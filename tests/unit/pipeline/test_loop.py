@@ -2,6 +2,8 @@
 
 import asyncio
 import itertools
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from typing import Any
 
 import pytest
@@ -21,19 +23,25 @@ from tests.builders import detection, detection_frame, odometry, origin
 from tests.unit.pipeline.desk import Desk, settle
 
 
+@asynccontextmanager
+async def running(desk: Desk) -> AsyncIterator[asyncio.Task[None]]:
+    """The loop of it, for as long as the test looks."""
+    task = asyncio.create_task(desk.loop.run())
+    yield task
+    task.cancel()
+    await asyncio.gather(task, return_exceptions=True)
+
+
 async def test_the_loop_takes_what_waits_without_being_called() -> None:
     desk = Desk()
-    running = asyncio.create_task(desk.loop.run())
-    desk.ingest.enqueue(Received(odometry(), desk.clock()))
+    async with running(desk):
+        desk.ingest.enqueue(Received(odometry(), desk.clock()))
 
-    browser = desk.hub.join()
-    async with asyncio.timeout(30):
-        await browser.news()
+        browser = desk.hub.join()
+        async with asyncio.timeout(30):
+            await browser.news()
 
-    assert "robots/AGI" in browser.drain_telemetry()
-
-    running.cancel()
-    await asyncio.gather(running, return_exceptions=True)
+        assert "robots/AGI" in browser.drain_telemetry()
 
 
 def test_what_is_taken_is_shown_at_once_and_judged_with_the_next_judgement() -> None:
@@ -59,16 +67,13 @@ async def test_pages_are_shown_what_came_before_the_fleet_is_judged() -> None:
     desk = Desk()
     browser = desk.hub.join()
     desk.ingest.enqueue(Received(odometry(), desk.clock()))
-    running = asyncio.create_task(desk.loop.run())
+    async with running(desk):
+        async with asyncio.timeout(30):
+            await browser.news()
+        was_unjudged = desk.evaluator.is_unjudged
+        await settle()
 
-    async with asyncio.timeout(30):
-        await browser.news()
-    was_unjudged = desk.evaluator.is_unjudged
-    await settle()
-
-    assert (was_unjudged, desk.evaluator.is_unjudged) == (True, False)
-    running.cancel()
-    await asyncio.gather(running, return_exceptions=True)
+        assert (was_unjudged, desk.evaluator.is_unjudged) == (True, False)
 
 
 async def test_what_comes_before_the_fleet_is_judged_is_taken_first(
@@ -84,15 +89,13 @@ async def test_what_comes_before_the_fleet_is_judged_is_taken_first(
     monkeypatch.setattr(desk.evaluator, "tick", judged)
     browser = desk.hub.join()
     desk.ingest.enqueue(Received(odometry(), desk.clock()))
-    running = asyncio.create_task(desk.loop.run())
-    async with asyncio.timeout(30):
-        await browser.news()
-    desk.ingest.enqueue(Received(odometry("AGII"), desk.clock()))
-    await settle()
+    async with running(desk):
+        async with asyncio.timeout(30):
+            await browser.news()
+        desk.ingest.enqueue(Received(odometry("AGII"), desk.clock()))
+        await settle()
 
-    assert taken[:1] == [True]
-    running.cancel()
-    await asyncio.gather(running, return_exceptions=True)
+        assert taken[:1] == [True]
 
 
 async def test_what_comes_while_the_world_ages_is_taken_before_it_is_judged(
@@ -115,12 +118,10 @@ async def test_what_comes_while_the_world_ages_is_taken_before_it_is_judged(
     monkeypatch.setattr(desk.evaluator, "age", aged)
     monkeypatch.setattr(desk.evaluator, "tick", judged)
     desk.ingest.enqueue(Received(odometry(), desk.clock()))
-    running = asyncio.create_task(desk.loop.run())
-    await settle()
+    async with running(desk):
+        await settle()
 
-    assert done == ["aged", "judged"]
-    running.cancel()
-    await asyncio.gather(running, return_exceptions=True)
+        assert done == ["aged", "judged"]
 
 
 async def test_what_comes_while_it_is_judged_is_taken_before_that_is_written_down(
@@ -139,12 +140,10 @@ async def test_what_comes_while_it_is_judged_is_taken_before_that_is_written_dow
         desk.loop, "_write_down", lambda _: seen.append(peer.odometry is not None)
     )
     desk.ingest.enqueue(Received(odometry(), desk.clock()))
-    running = asyncio.create_task(desk.loop.run())
-    await settle()
+    async with running(desk):
+        await settle()
 
-    assert seen == [True]
-    running.cancel()
-    await asyncio.gather(running, return_exceptions=True)
+        assert seen == [True]
 
 
 async def test_what_is_written_down_is_of_the_moment_of_the_last_step(
@@ -168,15 +167,13 @@ async def test_what_is_written_down_is_of_the_moment_of_the_last_step(
     monkeypatch.setattr(desk.loop, "_stepped", stepped)
     monkeypatch.setattr(desk.loop, "_write_down", written)
     desk.ingest.enqueue(Received(odometry(origin=Origin("b", 0)), desk.clock()))
-    running = asyncio.create_task(desk.loop.run())
-    for _ in range(100):
-        await asyncio.sleep(0)
+    async with running(desk) as loop:
+        for _ in range(100):
+            await asyncio.sleep(0)
 
-    assert waiting
-    assert not any(waiting)
-    assert not running.done()
-    running.cancel()
-    await asyncio.gather(running, return_exceptions=True)
+        assert waiting
+        assert not any(waiting)
+        assert not loop.done()
 
 
 async def test_the_fleet_is_judged_however_much_comes_all_the_time(
@@ -194,14 +191,12 @@ async def test_the_fleet_is_judged_however_much_comes_all_the_time(
 
     monkeypatch.setattr(desk.evaluator, "apply", more)
     enqueue(Received(odometry(origin=Origin("b", 0)), desk.clock()))
-    running = asyncio.create_task(desk.loop.run())
-    for _ in range(100):
-        await asyncio.sleep(0)
+    async with running(desk):
+        for _ in range(100):
+            await asyncio.sleep(0)
 
-    assert "robots/AGI" in shown.drain_telemetry()
-    assert desk.fleet.told
-    running.cancel()
-    await asyncio.gather(running, return_exceptions=True)
+        assert "robots/AGI" in shown.drain_telemetry()
+        assert desk.fleet.told
 
 
 def test_heartbeats_keep_their_pace_while_ageing_takes_now_more_now_less() -> None:
