@@ -30,6 +30,8 @@ _LEFT_OUT = (
 )
 """Parts that no picture of the world needs."""
 _TASKS = "_tasks"
+_PIECE: Final = 100
+"""Frozen values that are written at a time: a millisecond or two."""
 _PLAIN: Final = {
     "builtins": {"bool", "dict", "float", "frozenset", "int", "list", "set", "str"},
     "collections": {"deque", "defaultdict", "Counter", "OrderedDict"},
@@ -60,16 +62,26 @@ class Memory:
         for name in parts.__dataclass_fields__:
             self._find(name, getattr(parts, name))
 
-    def write(self) -> bytes:
-        """As it is now."""
+    def write(self) -> Iterator[bytes]:
+        """As it is now, in pieces, between which anything may happen.
+
+        What may change is written at once, and of frozen values no more than their
+        numbers; they themselves are written piece by piece.
+        """
         states = {
             path: {name: getattr(self._wired[path], name) for name in names}
             for path, names in self._kept.items()
         }
-        buffer = io.BytesIO()
-        writer = _Writer(buffer, self._wired.values(), self._paths, self._scans.as_read)
-        writer.dump(states)
-        return buffer.getvalue()
+        values: list[object] = []
+        writer = _Writer(self._wired.values(), self._paths, self._scans.as_read, values)
+        return self._pieces(values, writer.written(states))
+
+    def _pieces(self, values: Sequence[object], states: bytes) -> Iterator[bytes]:
+        parts = [values[i : i + _PIECE] for i in range(0, len(values), _PIECE)]
+        writer = _Writer(self._wired.values(), self._paths, self._scans.as_read)
+        yield writer.written(len(parts))
+        yield from map(writer.written, parts)
+        yield states
 
     def read(self, data: bytes) -> None:
         """Take over what :meth:`write` gave.
@@ -78,7 +90,11 @@ class Memory:
             UnreadableError: it is of another build, or nothing of the kind.
         """
         try:
-            states = _Reader(io.BytesIO(data), self._wired).load()
+            stream, values = io.BytesIO(data), list[object]()
+            reader = _Reader(stream, self._wired, values)
+            for _ in range(reader.load()):
+                values += reader.load()
+            states = _Reader(stream, self._wired, values).load()
             if states["world"]["robots"].keys() != self._robots:
                 raise LookupError("recorded with other robots")
             for path, state in states.items():
@@ -143,16 +159,21 @@ def _is_data(value: object) -> bool:
 
 
 class _Writer(pickle.Pickler):
-    """Writes values, and of parts only where they are."""
+    """Writes values, each once, and of parts only where they are.
+
+    Args:
+        values: Takes frozen values, of which only the numbers are written then.
+    """
 
     def __init__(
         self,
-        stream: io.BytesIO,
         wired: Iterable[object],
         paths: Mapping[int, str],
         as_read: Callable[[UnreadScan], LaserScan | None],
+        values: list[object] | None = None,
     ) -> None:
-        super().__init__(stream, protocol=5)
+        self._stream = io.BytesIO()
+        super().__init__(self._stream, protocol=5)
 
         def place(value: object) -> tuple[Any, ...]:
             path = paths.get(id(value))
@@ -162,9 +183,19 @@ class _Writer(pickle.Pickler):
             return reduced
 
         # By type, and not by asking of each value, which takes five times as long.
-        self.dispatch_table = _Reducers({type(one): place for one in wired})
+        reducers = _Reducers({type(one): place for one in wired})
+        self.dispatch_table = (
+            reducers if values is None else _Numbered(reducers, values)
+        )
         # Whoever compares scans by identity must find the same one in all places.
         self.dispatch_table[UnreadScan] = lambda scan: (_same, (as_read(scan),))
+
+    def written(self, value: object) -> bytes:
+        """One value; those that were written before are not written again."""
+        self._stream.seek(0)
+        self._stream.truncate()
+        self.dump(value)
+        return self._stream.getvalue()
 
 
 class _Reducers(dict[type, Callable[[Any], tuple[Any, ...]]]):
@@ -184,6 +215,24 @@ class _Reducers(dict[type, Callable[[Any], tuple[Any, ...]]]):
         return reduced
 
 
+class _Numbered(_Reducers):
+    """Of frozen values the numbers alone; they are put into ``values``."""
+
+    def __init__(self, reducers: _Reducers, values: list[object]) -> None:
+        super().__init__(reducers)
+        self._values = values
+
+    def __missing__(self, of: type) -> Callable[[Any], tuple[Any, ...]]:
+        if not _state_of(of):
+            raise KeyError(of)
+        numbered = self[of] = self._number
+        return numbered
+
+    def _number(self, one: object) -> tuple[Any, ...]:
+        self._values.append(one)
+        return _value, (len(self._values) - 1,)
+
+
 _NEW: Final = object().__reduce_ex__(2)[0]
 """Makes a value of which the state follows."""
 
@@ -200,6 +249,11 @@ def _at(path: str) -> object:
     raise LookupError(path)
 
 
+def _value(number: int) -> object:
+    """Stands for a frozen value; the reader has it."""
+    raise LookupError(number)
+
+
 def _same(scan: LaserScan | None) -> LaserScan | None:
     return scan
 
@@ -207,14 +261,22 @@ def _same(scan: LaserScan | None) -> LaserScan | None:
 class _Reader(pickle.Unpickler):
     """Makes nothing but values of ours: a file may come from anywhere."""
 
-    def __init__(self, stream: io.BytesIO, wired: Mapping[str, object]) -> None:
+    def __init__(
+        self,
+        stream: io.BytesIO,
+        wired: Mapping[str, object],
+        values: Sequence[object],
+    ) -> None:
         super().__init__(stream)
-        self._wired = wired
+        self._own = {
+            _at.__name__: wired.__getitem__,
+            _value.__name__: values.__getitem__,
+            _same.__name__: _same,
+        }
 
     def find_class(self, module: str, name: str) -> Any:
-        own = {_at.__name__: self._wired.__getitem__, _same.__name__: _same}
-        if module == __name__ and name in own:
-            return own[name]
+        if module == __name__ and name in self._own:
+            return self._own[name]
         found = super().find_class(module, name)
         # By where it is from: a module of ours holds what it imports, too.
         is_ours = isinstance(found, type) and found.__module__.startswith(_OURS)

@@ -6,7 +6,7 @@ the whole memory, and after each a hash of the world, which whoever plays the re
 must reach, too.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from hashlib import blake2b
 from typing import Final, Protocol
 
@@ -52,8 +52,8 @@ class Recording(Protocol):
     def note(self, name: str, payload: bytes, at: Instant) -> None:
         """JSON, by the name of its sort."""
 
-    def memory(self, about: bytes, memory: bytes, at: Instant) -> None:
-        """A memory, and JSON that tells of it."""
+    def memory(self, about: bytes, memory: Iterator[bytes], at: Instant) -> None:
+        """A memory in pieces, which are made as they are taken, and JSON of it."""
 
 
 class Chronicle(Trace):
@@ -65,13 +65,13 @@ class Chronicle(Trace):
         seed: Of ids; random.
 
     Attributes:
-        remember: Gives the memory; None until there is a pipeline.
+        remember: Gives the memory in pieces; None until there is a pipeline.
         picture: Gives the world as a page sees it.
         ids: Makes ids; they are the same where the same happens.
     """
 
     def __init__(self, recording: Recording, version: str, seed: bytes) -> None:
-        self.remember: Callable[[], bytes] | None = None
+        self.remember: Callable[[], Iterator[bytes]] | None = None
         self.picture: Callable[[Instant], bytes] = lambda _: b""
         self.ids = CountedIds(seed)
         self._recording, self._version = recording, version

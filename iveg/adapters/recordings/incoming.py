@@ -13,7 +13,7 @@ from typing import NamedTuple
 import orjson
 
 from iveg.adapters.recordings.mcap_file import Channel
-from iveg.adapters.recordings.memories import recorded
+from iveg.adapters.recordings.memories import packed, recorded
 from iveg.domain.observations import Instant, LaserScan, Observation, Overtaken
 
 NOTIFICATIONS = Channel("/ngsi/notifications", "ngsi.Notification")
@@ -76,6 +76,33 @@ def pack(sort: Sort, at: Instant, name: str = "", payload: bytes = b"") -> bytes
     encoded = name.encode()
     head = _HEAD.pack(sort, at.mono, at.wall, len(encoded), len(payload))
     return b"".join((head, encoded, payload))
+
+
+class UnfinishedMemory:
+    """A memory on its way to the writer, of which not all pieces are made yet.
+
+    Args:
+        at: Its moment.
+        about: What is told of it (JSON).
+        pieces: Makes them.
+    """
+
+    def __init__(self, at: Instant, about: bytes, pieces: Iterator[bytes]) -> None:
+        self._at, self._about, self._pieces = at, about, pieces
+        self._made: list[bytes] = []
+
+    def make(self) -> Iterator[None]:
+        """Make its pieces, one at a time; whoever stops may go on later."""
+        for piece in self._pieces:
+            self._made.append(piece)
+            yield
+
+    def finished(self) -> bytes:
+        """All of it, packed as other inputs are."""
+        for _ in self.make():
+            pass
+        whole = packed(self._about, b"".join(self._made))
+        return pack(Sort.MEMORY, self._at, payload=whole)
 
 
 def worth_keeping(body: bytes, observed: Sequence[Observation]) -> bytes:

@@ -1,6 +1,7 @@
 """The memory of a pipeline as it is recorded: JSON, in it zlib and base64.
 
-It is made where recordings are written: the loop hands over bytes as they are.
+It is made where recordings are written: the loop hands over bytes as they are, and
+these in pieces, so that nothing waits for a whole memory.
 """
 
 import zlib

@@ -1,15 +1,16 @@
 """Records what comes in, off the path of everything else: one queue, one process.
 
-The loop packs each input and no more.  Four times a second what waits goes to the
-process that writes (``writer.py``), in pieces that its pipe takes; who waits for the
-pipe is a task of its own.  What does not fit into the queue is not recorded, and
-counted; so is what a process that ended had not kept yet.
+The loop packs each input and no more.  Four times a second memories are written out,
+piece by piece, and what waits goes to the process that writes (``writer.py``), in
+pieces that its pipe takes; who waits for the pipe is a task of its own.  What does not
+fit into the queue is not recorded, and counted; so is what a process that ended had not
+kept yet.
 """
 
 import asyncio
 import logging
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TypeVar
@@ -18,9 +19,13 @@ import orjson
 
 from iveg.adapters.recordings.directory import RecordingDirectory
 from iveg.adapters.recordings.excerpt import write_excerpt
-from iveg.adapters.recordings.incoming import Sort, pack, worth_keeping
+from iveg.adapters.recordings.incoming import (
+    Sort,
+    UnfinishedMemory,
+    pack,
+    worth_keeping,
+)
 from iveg.adapters.recordings.live_feed import LiveFeed
-from iveg.adapters.recordings.memories import packed
 from iveg.adapters.recordings.repair import finish_broken
 from iveg.adapters.recordings.writer import PRUNE_S, WriterSetup
 from iveg.adapters.recordings.writer_process import WriterProcess
@@ -72,7 +77,7 @@ class InputRecorder:
         self._directory = RecordingDirectory(setup.folder)
         # What a crash left takes minutes: not in this process.
         self._apart = Worker(limit_s=RESCUE_S)
-        self._waiting: list[bytes] = []
+        self._waiting: list[bytes | UnfinishedMemory] = []
         self._bytes = 0
         self._dropped_at = float("-inf")
         self._told_rule: DetectionRule | None = None
@@ -106,10 +111,13 @@ class InputRecorder:
         if self._is_on:
             self._queue(pack(Sort.ROW, at, name, payload))
 
-    def memory(self, about: bytes, memory: bytes, at: Instant) -> None:
-        """What the pipeline has in mind, and JSON that tells of it."""
+    def memory(self, about: bytes, memory: Iterator[bytes], at: Instant) -> None:
+        """What the pipeline has in mind, in pieces, and JSON that tells of it.
+
+        It has its place here; its pieces are made before it goes to be written.
+        """
         if self._is_on:
-            self._queue(pack(Sort.MEMORY, at, payload=packed(about, memory)))
+            self._queue(UnfinishedMemory(at, about, memory))
 
     def tick(self, at: Instant) -> None:
         """The loop lets time pass."""
@@ -125,13 +133,14 @@ class InputRecorder:
         payload = orjson.dumps(row, default=dict, option=orjson.OPT_SERIALIZE_NUMPY)
         self._queue(pack(Sort.ROW, self._clock(), name, payload))
 
-    def _queue(self, packed: bytes) -> None:
+    def _queue(self, one: bytes | UnfinishedMemory) -> None:
+        size = len(one) if isinstance(one, bytes) else 0
         is_full = len(self._waiting) >= MOST_WAITING
-        if is_full or self._bytes + len(packed) > MOST_BYTES:
+        if is_full or self._bytes + size > MOST_BYTES:
             self._drop()
             return
-        self._waiting.append(packed)
-        self._bytes += len(packed)
+        self._waiting.append(one)
+        self._bytes += size
 
     def _drop(self) -> None:
         self.counters["recordings_dropped"] += 1
@@ -173,7 +182,20 @@ class InputRecorder:
     async def _feed(self, writer: WriterProcess) -> None:
         while True:
             await asyncio.sleep(WRITE_S)
+            await self._make_memories()
             await writer.feed(self.take_waiting())
+
+    async def _make_memories(self) -> None:
+        """Make those that wait; whatever is due comes between two pieces."""
+        unfinished = [one for one in self._waiting if not isinstance(one, bytes)]
+        for one in unfinished:
+            try:
+                for _ in one.make():
+                    await asyncio.sleep(0)
+            except Exception:
+                self._waiting.remove(one)
+                self.counters["recordings_dropped"] += 1
+                _log.exception("a memory cannot be recorded")
 
     @property
     def waiting(self) -> int:
@@ -188,7 +210,7 @@ class InputRecorder:
     def take_waiting(self) -> Sequence[bytes]:
         """What waits for the process that writes."""
         waiting, self._waiting, self._bytes = self._waiting, [], 0
-        return waiting
+        return [one if isinstance(one, bytes) else one.finished() for one in waiting]
 
     async def close(self) -> None:
         """Write what waits, and finish the file."""

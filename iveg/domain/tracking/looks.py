@@ -135,7 +135,7 @@ class _Suspect:
         return min(SUREST, self.odds + self.look)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class _Suspected:
     """Whom one robot suspects, and the area in ``map`` that they are in (m)."""
 

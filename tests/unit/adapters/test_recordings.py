@@ -15,6 +15,7 @@ from mcap.reader import make_reader
 from iveg.adapters import clock
 from iveg.adapters.recordings.incoming import Sort, Unpacking, pack
 from iveg.adapters.recordings.mcap_file import CHUNK_BYTES, PADDING
+from iveg.adapters.recordings.memories import memory_in
 from iveg.adapters.recordings.reading import is_own, read_messages
 from iveg.adapters.recordings.recorded_sink import RecordedSink
 from iveg.adapters.recordings.recorder import (
@@ -436,6 +437,45 @@ async def test_a_process_that_hangs_and_is_killed_delays_nobody_and_another_goes
         b"1",
         b"2",
     ]
+
+
+async def test_a_memory_is_made_in_pieces_and_keeps_its_place(tmp_path: Path) -> None:
+    running, done = Running(tmp_path), list[object]()
+
+    def pieces() -> Iterator[bytes]:
+        for one in (b"o", b"n", b"e"):
+            asyncio.get_running_loop().call_soon(done.append, "what is due")
+            done.append(one)
+            yield one
+
+    running.hear(1)
+    running.recorder.memory(b"{}", pieces(), clock.now())
+    running.hear(2)
+    written = running.recorder.counters
+    await running.until(lambda: written["recordings_written"] == 3)
+    await running.close()
+
+    assert done == [b"o", "what is due", b"n", "what is due", b"e", "what is due"]
+    (path,) = _inside(tmp_path)
+    first, memory, second = [data for _, _, data in privately(path)]
+    assert (first, second) == (b"1", b"2")
+    assert memory_in(orjson.loads(memory)) == b"one"
+
+
+async def test_a_memory_that_cannot_be_made_is_told_and_hurts_nobody(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    running = Running(tmp_path)
+    running.hear(1)
+    running.recorder.memory(b"{}", (bytes(1 // n) for n in (1, 0)), clock.now())
+    running.hear(2)
+    await running.until(lambda: running.recorder.counters["recordings_written"] == 2)
+    await running.close()
+
+    assert running.recorder.counters["recordings_dropped"] == 1
+    assert "a memory cannot be recorded" in caplog.text
+    (path,) = _inside(tmp_path)
+    assert [data for _, _, data in privately(path)] == [b"1", b"2"]
 
 
 def _inside(folder: Path) -> list[Path]:

@@ -354,9 +354,23 @@ async def test_after_a_memory_a_laser_clears_the_same_places(tmp_path: Path) -> 
 
     before = cleared(live.parts)
     past = Past(site_of(tmp_path)).parts
-    Memory(past).read(memory.write())
+    Memory(past).read(b"".join(memory.write()))
     assert any(before)
     assert cleared(past) == before
+
+
+async def test_a_memory_that_is_written_later_is_of_the_moment_when_it_was_begun(
+    tmp_path: Path,
+) -> None:
+    live = Live(tmp_path / "live")
+    memory = Memory(live.parts)
+    for _ in range(8):
+        await live.run(1)
+        at_once, later = b"".join(memory.write()), memory.write()
+        await live.run(1)
+
+        assert b"".join(later) == at_once
+    await live.close()
 
 
 def test_a_memory_from_elsewhere_runs_nothing(folder: Path) -> None:
