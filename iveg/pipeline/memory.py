@@ -225,12 +225,14 @@ class _Numbered(_Reducers):
     def __missing__(self, of: type) -> Callable[[Any], tuple[Any, ...]]:
         if not _state_of(of):
             raise KeyError(of)
-        numbered = self[of] = self._number
-        return numbered
+        values = self._values
 
-    def _number(self, one: object) -> tuple[Any, ...]:
-        self._values.append(one)
-        return _value, (len(self._values) - 1,)
+        def number(one: object) -> tuple[Any, ...]:
+            values.append(one)
+            return _value, (len(values) - 1,)
+
+        self[of] = number
+        return number
 
 
 _NEW: Final = object().__reduce_ex__(2)[0]

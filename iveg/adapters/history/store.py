@@ -7,6 +7,7 @@ and left out, so that it cannot hold up everything behind it.
 import logging
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import fields
+from functools import cache
 from typing import TypeVar
 
 from sqlalchemy import Connection, Engine, Insert, Table, delete
@@ -147,7 +148,7 @@ def _insert(connection: Connection, rows: Sequence[Waiting]) -> None:
             continue
         values = _values(of_kind, mapping)
         if values:
-            connection.execute(_statement(mapping, connection.dialect.name), values)
+            connection.execute(_statement(kind, connection.dialect.name), values)
             if mapping.keep_s is not None:
                 _forget(connection, mapping.table, values, mapping.keep_s)
 
@@ -180,7 +181,9 @@ def _columns(record: Record) -> _Row:
     return {name: getattr(record, name) for name in _FIELDS[type(record)]}
 
 
-def _statement(mapping: TableMapping, dialect: str) -> Insert:
+@cache
+def _statement(kind: type[Record], dialect: str) -> Insert:
+    mapping = TABLE_MAPPINGS[kind]
     make = postgresql.insert if dialect == "postgresql" else sqlite.insert
     statement = make(mapping.table)
     if not mapping.identity:
