@@ -1,6 +1,7 @@
 """What was recorded, played through the pipeline again, is the world that was."""
 
 import asyncio
+import gc
 import multiprocessing
 import os
 import pickle
@@ -364,13 +365,30 @@ async def test_a_memory_that_is_written_later_is_of_the_moment_when_it_was_begun
 ) -> None:
     live = Live(tmp_path / "live")
     memory = Memory(live.parts)
-    for _ in range(8):
+    for _ in range(3):
         await live.run(1)
         at_once, later = b"".join(memory.write()), memory.write()
         await live.run(1)
 
         assert b"".join(later) == at_once
     await live.close()
+
+
+async def test_of_a_memory_that_is_written_nothing_waits_for_the_garbage_collector(
+    tmp_path: Path,
+) -> None:
+    live = Live(tmp_path / "live")
+    memory = Memory(live.parts)
+    await live.run(2)
+    await live.close()
+
+    gc.disable()
+    try:
+        gc.collect()
+        assert b"".join(memory.write())
+        assert gc.collect() == 0
+    finally:
+        gc.enable()
 
 
 def test_a_memory_from_elsewhere_runs_nothing(folder: Path) -> None:
