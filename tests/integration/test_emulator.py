@@ -193,6 +193,7 @@ async def test_faults_are_done_as_ordered(
         assert done.status_code == 204
         await until(lambda: [h.source for h in cloud.report("AGII").holds] == ["hw"])
         await port.post({"robot": "AGII", "release_locally": True})
+        await until(lambda: not cloud.report("AGII").holds)
         await until(lambda: cloud.speed("AGII") > 0.5)
 
         await port.post({"robot": "AGII", "kill": True})
