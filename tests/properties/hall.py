@@ -1,17 +1,17 @@
 """A bare hall with one robot, whose laser and camera tell the truth about people."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
+from hypothesis import strategies as st
 
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.greenhouse import Greenhouse, StructuralPost
 from iveg.domain.observations import LaserScan
 from iveg.domain.robot_state import RobotState
 from iveg.domain.tracking.laser_sight import LaserSight
-from iveg.domain.tracking.sight import AllClear
 from iveg.domain.witness import Plan
 from iveg.lab.emulator.greenhouse import Disc, Scenery
 from iveg.lab.emulator.lidar import LaserModel, sweep
@@ -27,16 +27,19 @@ MODEL = LaserModel()
 TICK_S = 0.1
 _OFF_M = 0.8
 Place = tuple[float, float]
+Walk = tuple[Place, list[Place]]
+"""Where somebody is, and where they go from there, one place after the other."""
+_PLACES = st.tuples(st.floats(-7.0, 7.0), st.floats(-5.0, 5.0))
+WALKS = st.tuples(_PLACES, st.lists(_PLACES, min_size=1, max_size=4))
 
 
 class Hall(Scene):
     """AGI stands or drives in the middle; its laser and its camera tell the truth."""
 
-    def __init__(self, *, follows: bool = True) -> None:
+    def __init__(self) -> None:
         super().__init__(greenhouse=HALL)
         self.newest: LaserScan | None = None
-        sight = LaserSight(Plan.of(HALL), self._newest)
-        self.all_clear = sight.all_clear() if follows else AllClear(sight.swept)
+        self.all_clear = LaserSight(Plan.of(HALL), self._newest).all_clear()
         self.confidences = 0.85, 0.85
         """Of the camera, in turn with seconds."""
         self._rng = np.random.default_rng(1)
@@ -58,6 +61,21 @@ class Hall(Scene):
         said = replace(said, angle_increment=MODEL.angle_increment)
         self.scan("AGI", said)
         self.newest = said
+
+    def steps(
+        self, walks: Iterable[Walk], pace: float, speed: float, count: int
+    ) -> Iterator[tuple[list[Place], float]]:
+        """So many steps: where people are who walk, and how far AGI is."""
+        x, walking = -2.0, [(place, [*stops]) for place, stops in walks]
+        for _ in range(count):
+            x = _drives_on(x, speed, (place for place, _ in walking))
+            walking = [
+                (_keeps_off(place, goes(place, stops, pace), (x, 0.0)), stops)
+                for place, stops in walking
+            ]
+            people = [place for place, _ in walking]
+            self.step(people, x, speed)
+            yield people, x
 
     def has_ring(self, x: float, y: float) -> bool:
         """Whether some ring takes a place in."""
@@ -87,13 +105,13 @@ def goes(place: Place, stops: list[Place], speed: float) -> Place:
     )
 
 
-def keeps_off(place: Place, there: Place, robot: Place) -> Place:
+def _keeps_off(place: Place, there: Place, robot: Place) -> Place:
     """Where somebody goes who walks into no robot."""
     away = math.dist(there, robot)
     return there if away > _OFF_M or away > math.dist(place, robot) else place
 
 
-def drives_on(x: float, speed: float, people: Iterable[Place]) -> float:
+def _drives_on(x: float, speed: float, people: Iterable[Place]) -> float:
     """Where a robot on y = 0 is a tenth of a second later: it drives into nobody."""
     there = x + speed * TICK_S
     is_free = all(math.dist((there, 0.0), one) > _OFF_M for one in people)

@@ -7,14 +7,11 @@ from hypothesis import strategies as st
 
 from iveg.domain.limits import LIMITS
 from tests.builders import at
-from tests.properties.hall import TICK_S, Hall, drives_on, goes, keeps_off
-
-_PLACES = st.tuples(st.floats(-7.0, 7.0), st.floats(-5.0, 5.0))
-_WALKS = st.tuples(_PLACES, st.lists(_PLACES, min_size=1, max_size=4))
+from tests.properties.hall import TICK_S, WALKS, Hall, Walk, goes
 
 
 @given(
-    st.lists(_WALKS, min_size=1, max_size=2),
+    st.lists(WALKS, min_size=1, max_size=2),
     st.floats(0.4, LIMITS.walking_m_s),
     st.sampled_from((0.0, 0.4)),
     st.sampled_from(((0.85, 0.85), (0.85, 0.6), (0.6, 0.85))),
@@ -26,23 +23,15 @@ _WALKS = st.tuples(_PLACES, st.lists(_PLACES, min_size=1, max_size=4))
     [((0.0, 0.0), [(0.0, 2.0)]), ((0.0, 3.0), [(0.0, 4.0)])], 1.0, 0.4, (0.85,) * 2
 )
 def test_no_all_clear_leaves_somebody_who_walks_without_a_ring_and_nobody_is_made_up(
-    walks: list[tuple[tuple[float, float], list[tuple[float, float]]]],
+    walks: list[Walk],
     pace: float,
     speed: float,
     confidences: tuple[float, float],
 ) -> None:
-    hall, x = Hall(), -2.0
+    hall = Hall()
     hall.confidences = confidences
-    walks = [(place, [*stops]) for place, stops in walks]
     seen = set[int]()
-    for _ in range(60):
-        x = drives_on(x, speed, (place for place, _ in walks))
-        walks = [
-            (keeps_off(place, goes(place, stops, pace), (x, 0.0)), stops)
-            for place, stops in walks
-        ]
-        people = [place for place, _ in walks]
-        hall.step(people, x, speed)
+    for people, x in hall.steps(walks, pace, speed, 60):
         followed = _followed(hall)
         for spot in followed:
             assert min(math.dist(spot, one) for one in people) < 0.5

@@ -8,15 +8,13 @@ from hypothesis import strategies as st
 from iveg.domain.limits import LIMITS
 from iveg.domain.tracking.person import Sighting
 from tests.builders import at
-from tests.properties.hall import Hall, Place, drives_on, goes, keeps_off
+from tests.properties.hall import WALKS, Hall, Place, Walk
 
-_PLACES = st.tuples(st.floats(-7.0, 7.0), st.floats(-5.0, 5.0))
 _FROM, _STANDS = (0.4, 1.0), (-2.2, 1.4)
-_WALKS = st.tuples(_PLACES, st.lists(_PLACES, min_size=1, max_size=4))
 
 
 @given(
-    st.lists(_WALKS, min_size=1, max_size=3),
+    st.lists(WALKS, min_size=1, max_size=3),
     st.floats(0.4, LIMITS.walking_m_s),
     st.sampled_from((0.0, 0.4)),
     st.sampled_from(((0.85, 0.85), (0.85, 0.6), (0.6, 0.85))),
@@ -29,24 +27,16 @@ _WALKS = st.tuples(_PLACES, st.lists(_PLACES, min_size=1, max_size=4))
     (0.85,) * 2,
 )
 def test_whom_a_ring_would_take_in_it_takes_in_where_it_moved(
-    walks: list[tuple[Place, list[Place]]],
+    walks: list[Walk],
     pace: float,
     speed: float,
     confidences: tuple[float, float],
 ) -> None:
     """Also who walks behind somebody else, where the laser does not see them."""
-    hall, x = Hall(), -2.0
+    hall = Hall()
     hall.confidences = confidences
-    walks = [(place, [*stops]) for place, stops in walks]
     places = dict[float, list[Place]]()
-    for _ in range(80):
-        x = drives_on(x, speed, (place for place, _ in walks))
-        walks = [
-            (keeps_off(place, goes(place, stops, pace), (x, 0.0)), stops)
-            for place, stops in walks
-        ]
-        people = [place for place, _ in walks]
-        hall.step(people, x, speed)
+    for people, _ in hall.steps(walks, pace, speed, 80):
         now = at(hall.now)
         places[now.mono] = people
         hall.sweep()
