@@ -33,9 +33,7 @@ from iveg.domain.feedback import Feedback
 from iveg.domain.observations import Instant, Received
 from iveg.domain.peer_scan import PeerScan
 from iveg.domain.records import Record
-from iveg.domain.rule.obstacles import Obstacles
 from iveg.domain.tracking.people import People
-from iveg.domain.witness import Plan
 from iveg.domain.world import World
 from iveg.ngsi import codec
 from iveg.pipeline.evaluate import Evaluator
@@ -43,8 +41,6 @@ from iveg.pipeline.event_log import EventLog
 from iveg.pipeline.mapping import Mapper
 from iveg.pipeline.publish import Hub
 from iveg.pipeline.record import RecordSink
-from iveg.pipeline.scans import ScanReader
-from iveg.pipeline.second_witness import SecondWitness
 from iveg.pipeline.supervision import Supervision
 
 BEAMS = 720
@@ -113,24 +109,20 @@ class Telling:
 
 def assessor_of(
     robots: tuple[str, ...], fleet: Telling, sink: RecordSink | None = None
-) -> tuple[Evaluator, SecondWitness]:
+) -> Evaluator:
     """The rule with everything round it but the network and the disk."""
     numbers = itertools.count()
     start, greenhouse = Instant(0.0, WALL), load_greenhouse("agroconnect")
-    world, people = World(load_fleet(words=robots)), People(greenhouse)
-    obstacles = Obstacles(world, people, Plan.of(greenhouse))
-    evaluator = Evaluator(
-        world,
+    return Evaluator(
+        World(load_fleet(words=robots)),
         greenhouse,
-        people,
+        People(greenhouse),
         DetectionRule(),
         fleet,
         EventLog(Hub(), sink or Sink(), start, Supervision(lambda: start)),
         lambda: f"{next(numbers):026d}",
         "bench",
-        obstacles=obstacles,
     )
-    return evaluator, SecondWitness(world, ScanReader(), obstacles)
 
 
 def record(robots: tuple[str, ...], seconds: float) -> list[Recorded]:
@@ -220,7 +212,7 @@ def read(body: bytes, at: Instant) -> Iterator[Received]:
 def cost(robots: int, seconds: float) -> dict[str, list[float]]:
     """How long each notification took, by kind (ms of CPU), one after the other."""
     names = tuple(f"R{number}" for number in range(robots))
-    evaluator, _ = assessor_of(names, Telling())
+    evaluator = assessor_of(names, Telling())
     took: dict[str, list[float]] = {}
     ticked = 0.0
     for one in record(names, seconds):
@@ -246,10 +238,9 @@ async def latency(robots: int, seconds: float) -> list[float]:
     """
     names = tuple(f"R{number}" for number in range(robots))
     fleet = Telling()
-    evaluator, witness = assessor_of(names, fleet)
+    evaluator = assessor_of(names, fleet)
     mapper = Mapper(evaluator.world, evaluator.greenhouse.bounds)
     drawing = asyncio.create_task(mapper.run(clock.now))
-    looking = asyncio.create_task(witness.run(clock.now))
     recorded, took = record(names, seconds), []
     start = time.perf_counter()
     ticked = float("-inf")
@@ -270,8 +261,7 @@ async def latency(robots: int, seconds: float) -> list[float]:
             evaluator.age(now)
             evaluator.tick(now)
     drawing.cancel()
-    looking.cancel()
-    await asyncio.gather(drawing, looking, return_exceptions=True)
+    await asyncio.gather(drawing, return_exceptions=True)
     return took
 
 

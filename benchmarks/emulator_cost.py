@@ -10,21 +10,19 @@ import time
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.domain.geometry import Twist2D
 from iveg.domain.observations import Instant
-from iveg.lab.emulator.detector_model import DETECTORS
+from iveg.lab.emulator.camera import DETECTORS
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.scenarios import scenario_named
-from iveg.lab.emulator.world import Camera, SimulatedWorld
+from iveg.lab.emulator.world import SimulatedWorld
 from iveg.robot.uplink import Uplink
 
 RATE_HZ = 30.0
 SECONDS = 20
-CASES: tuple[tuple[str, tuple[str, ...], Camera], ...] = (
-    ("mvsim-20x20", ("AGI", "AGII"), "boxes"),
-    ("mvsim-20x20", ("AGI", "AGII"), "grounding"),
-    ("mvsim-20x20", tuple(f"R{n}" for n in range(10)), "boxes"),
-    ("agroconnect", ("AGI", "AGII"), "boxes"),
-    ("agroconnect", ("AGI", "AGII"), "grounding"),
-    ("none", tuple(f"R{n}" for n in range(20)), "boxes"),
+CASES: tuple[tuple[str, tuple[str, ...]], ...] = (
+    ("mvsim-20x20", ("AGI", "AGII")),
+    ("mvsim-20x20", tuple(f"R{n}" for n in range(10))),
+    ("agroconnect", ("AGI", "AGII")),
+    ("none", tuple(f"R{n}" for n in range(20))),
 )
 
 
@@ -62,15 +60,15 @@ def spent(world: SimulatedWorld) -> dict[str, float]:
 
 def main() -> None:
     parts_named = "people    drive    laser   camera   core per robot"
-    print(f"greenhouse   boxes by   robots   {parts_named}")
-    for name, robots, camera in CASES:
+    print(f"greenhouse     robots   {parts_named}")
+    for name, robots in CASES:
         greenhouse = load_greenhouse(name)
         layout = lay_out(scenario_named("demo"), robots, greenhouse)
-        world = SimulatedWorld(greenhouse, layout, DETECTORS["simulation"], 1, camera)
+        world = SimulatedWorld(greenhouse, layout, DETECTORS["simulation"], 1)
         parts = spent(world)
         each = [one / SECONDS / len(robots) for one in parts.values()]
         shares = "".join(f"{share:9.2%}" for share in each)
-        print(f"{name:12} {camera:9} {len(robots):7} {shares} {sum(each):14.2%}")
+        print(f"{name:12} {len(robots):7} {shares} {sum(each):14.2%}")
 
 
 if __name__ == "__main__":

@@ -24,16 +24,15 @@ import orjson
 from benchmarks.decision_cost import Sink, Telling
 from benchmarks.process import machine, percentile, print_table
 from iveg.adapters import clock
+from iveg.adapters.clock import new_id
 from iveg.adapters.direct import DirectReader
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
-from iveg.adapters.ids import new_id
 from iveg.domain.feedback import Feedback
 from iveg.domain.observations import Received
 from iveg.domain.transports import DIRECT, FIWARE
 from iveg.ngsi import codec, names
 from iveg.pipeline.build import build
-from iveg.pipeline.loop import reading_apart_s
 from iveg.pipeline.mapping import Mapper
 from iveg.pipeline.parts import Choices, Pipeline, Ports
 from tests.fakes.journal import FakeJournal
@@ -195,18 +194,13 @@ async def _directly(parts: Pipeline, told: list[Message]) -> dict[Spot, float]:
         parts.ingest.enqueue,
         parts.ingest.reject,
         is_past=parts.ingest.is_past,
-        passed_over=parts.latency.watch.passed_over,
     )
     came: dict[Spot, float] = {}
-    apart_s, read_at = reading_apart_s(len(robots)), 0.0
     measures = [one.measure() for one in told]
     twins = [one.notification() if one.suffix == KINDS[2] else b"" for one in told]
     loop, start = asyncio.get_running_loop(), time.perf_counter() + 0.1
     for one, measure, twin in zip(told, measures, twins, strict=True):
-        if start + one.at > read_at:
-            # It comes after the last reading, and waits for the next.
-            read_at = max(start + one.at, read_at + apart_s)
-            await _until(read_at)
+        await _until(start + one.at)
         if one.shows is not None:
             came[one.shows] = start + one.at
         reader.read(*measure)

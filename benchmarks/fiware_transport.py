@@ -23,8 +23,7 @@ from benchmarks.process import Usage, machine, pause, percentile, print_table
 from iveg.adapters.fleet_provisioning import provision
 from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.orion import OrionClient
-from iveg.adapters.subscriptions import ensure_subscriptions
-from iveg.adapters.wanted_subscriptions import wanted_for
+from iveg.adapters.subscriptions import ensure_subscriptions, wanted_for
 from iveg.lab.embedded.server import embedded_fiware
 
 TENANT = ("agroconnect", "/greenhouse")
@@ -84,7 +83,7 @@ async def _prepare(
         robots = [f"R{index}" for index in range(most)]
         await provision(agent, orion, robots, "iveg", f"http://{HOST}:{orion_port}")
         url = f"http://{HOST}:{notify_port}/ngsi/notifications"
-        await ensure_subscriptions(orion, url, "ab" * 16, wanted_for(robots))
+        await ensure_subscriptions(orion, url, "ab" * 16, wanted_for())
 
 
 def _run(

@@ -23,7 +23,7 @@ from iveg.domain.rule.foresight import path_of
 from iveg.domain.rule.paths import AHEAD_S, HORIZON_S, MOVES_M_S
 from iveg.lab.emulator.world import SimulatedWorld
 from iveg.lab.experiment.protection import NEAR_M
-from iveg.lab.experiment.staged_robot import STEP_S
+from iveg.lab.experiment.stage import STEP_S
 
 HORIZONS_S = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0)
 _EVERY = 4
@@ -91,7 +91,7 @@ def meetings(
 ) -> Iterator[Meeting]:
     """The encounters with people that were foretold just now."""
     for robot_id in iveg.parts.world.robots:
-        for one in iveg.parts.evaluator.foretold(robot_id, now):
+        for one in iveg.parts.evaluator.encounters(robot_id, now):
             name = person_at(places, one.zone.x, one.zone.y)
             apart = 0.0 if name is None else math.dist(places[name], places[robot_id])
             is_new = one.at == now.mono and one.zone.reason == "person"

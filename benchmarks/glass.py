@@ -41,7 +41,6 @@ from tests.processes import ROOT, Site, children_of, site, until
 SIDES = ("relay", "iveg")
 SENSORS, LATE_MS = 3, 100.0
 WARM_UP_S = 10.0
-"""Orion's copies are throttled once the direct ones have been steady for 5 s."""
 APIKEY = "glass"
 
 WATCH = """() => {

@@ -7,10 +7,8 @@ a busy machine measures the same.  The goal is 5 % of a core.
 
 import time
 
-from iveg.domain.age import FeedbackLedger
 from iveg.domain.geometry import Pose2D, Twist2D
-from iveg.domain.latency.account import collect, merge
-from iveg.domain.latency.watch import LatencyWatch
+from iveg.domain.latency import LatencyWatch, collect, merge
 from iveg.domain.observations import (
     FeedbackRef,
     Instant,
@@ -19,6 +17,7 @@ from iveg.domain.observations import (
     Received,
 )
 from iveg.domain.transports import DIRECT
+from iveg.domain.world import FeedbackLedger
 
 ROBOTS, HZ, SECONDS, TICKS = 20, 90, 70, 20
 GOAL_SHARE = 0.05

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from functools import partial
 
 from iveg.adapters.greenhouses import load_greenhouse
-from iveg.lab.emulator.detector_model import DETECTORS
+from iveg.lab.emulator.camera import DETECTORS
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.scenarios import scenario_named
 from iveg.lab.emulator.world import RobotHardware, SimulatedWorld

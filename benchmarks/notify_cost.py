@@ -20,7 +20,6 @@ from benchmarks.process import print_table
 from iveg.app.dss import Dss
 from iveg.app.opening import open_dss
 from iveg.asgi import create_app
-from iveg.lab.embedded.orion_numbers import print_value
 from iveg.ngsi.codec import read_notification
 from iveg.settings import Settings
 
@@ -66,7 +65,7 @@ def body(kind: str, seq: int) -> bytes:
     told = {
         name: {
             "type": "object",
-            "value": orjson.Fragment(print_value(value)),
+            "value": value,
             "metadata": metadata,
         }
         for name, value in attributes(kind, seq).items()
@@ -98,7 +97,6 @@ class Line:
             (b"content-type", b"application/json; charset=utf-8"),
             (b"ngsiv2-attrsformat", b"normalized"),
             (b"x-iveg-notify-token", secret.encode()),
-            (b"fiware-correlator", b"0; cbnotif=1"),
         ]
         self.statuses: set[int] = set()
 

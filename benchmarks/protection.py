@@ -5,12 +5,10 @@ stands, by detector profile; the same seed gives the same numbers on any machine
 
     python -m benchmarks.protection --profiles field,simulation --seeds 11,12,13
     python -m benchmarks.protection --single-boxes
-    python -m benchmarks.protection --no-own-laser   # the server's witness alone
-    python -m benchmarks.protection --plan-off 0.2 --pose-error 3
+    python -m benchmarks.protection --no-own-laser   # cameras alone
 """
 
 import argparse
-from dataclasses import replace
 
 from benchmarks.process import print_table
 from iveg.adapters.fleet_files import load_fleet
@@ -18,20 +16,13 @@ from iveg.adapters.greenhouses import load_greenhouse
 from iveg.app.virtual import VirtualPipeline
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.witness import Plan
-from iveg.lab.emulator.detector_model import DETECTORS
+from iveg.lab.emulator.camera import DETECTORS
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.scenarios import scenario_named
-from iveg.lab.emulator.scripts import EXACT, SiteErrors
-from iveg.lab.emulator.truth import true_picture
-from iveg.lab.emulator.world import SimulatedWorld
-from iveg.lab.experiment import protection_tables
-from iveg.lab.experiment.moments import moments_of
-from iveg.lab.experiment.protection import Protection, whole
-from iveg.lab.experiment.protection_scoring import protection_of
-from iveg.lab.experiment.recording import Row
-from iveg.lab.experiment.stage import Stage
-from iveg.lab.experiment.staged_robot import STEP_S
-from iveg.lab.experiment.virtual_run import foretold_row
+from iveg.lab.emulator.world import SimulatedWorld, true_picture
+from iveg.lab.experiment import tables
+from iveg.lab.experiment.protection import Protection, moments_of, protection_of, whole
+from iveg.lab.experiment.stage import STEP_S, Row, Stage, foretold_row
 
 ROBOTS = ("AGI", "AGII")
 
@@ -42,10 +33,9 @@ def staged(
     rule: DetectionRule,
     laser: bool = True,
     own: bool = True,
-    errors: SiteErrors = EXACT,
 ) -> tuple[Stage, SimulatedWorld, VirtualPipeline]:
     """The demo's greenhouse before its first step."""
-    scenario = replace(scenario_named("demo"), errors=errors)
+    scenario = scenario_named("demo")
     greenhouse = load_greenhouse(scenario.greenhouse)
     layout = lay_out(scenario, ROBOTS, greenhouse)
     iveg = VirtualPipeline(load_fleet(words=ROBOTS), greenhouse, rule)
@@ -73,10 +63,9 @@ def run(
     rule: DetectionRule,
     laser: bool = True,
     own: bool = True,
-    errors: SiteErrors = EXACT,
 ) -> Protection:
     """One run of the demo's greenhouse; ``own``: robots read their own lasers."""
-    stage, world, iveg = staged(profile, seed, rule, laser, own, errors)
+    stage, world, iveg = staged(profile, seed, rule, laser, own)
     truth: list[Row] = []
     told: list[Row] = []
     for _ in range(round(seconds / STEP_S)):
@@ -98,24 +87,21 @@ def main() -> None:
     options.add_argument("--no-laser", action="store_true")
     options.add_argument("--no-own-laser", action="store_true")
     options.add_argument("--no-foresight", action="store_true")
-    options.add_argument("--plan-off", type=float, default=0.0)
-    options.add_argument("--pose-error", type=float, default=1.0)
     asked = options.parse_args()
     rule = DetectionRule(
         possible_people=not asked.single_boxes, foresight=not asked.no_foresight
     )
     seeds = [int(one) for one in asked.seeds.split(",")]
-    errors = SiteErrors(asked.plan_off, asked.pose_error)
     rows = []
     for profile in asked.profiles.split(","):
         lasers = not asked.no_laser, not asked.no_own_laser
-        runs = (run(profile, n, asked.seconds, rule, *lasers, errors) for n in seeds)
+        runs = (run(profile, n, asked.seconds, rule, *lasers) for n in seeds)
         chosen = {"where": "demo", "profile": profile, "rule": "as asked"}
         rows.append({**chosen, **whole(runs).row()})
     result = {"protection": rows}
     for head, cells in (
-        (protection_tables.PROTECTION, protection_tables.protection(result)),
-        (protection_tables.ENTRIES, protection_tables.entries(result)),
+        (tables.PROTECTION, tables.protection(result)),
+        (tables.ENTRIES, tables.entries(result)),
     ):
         told = [[str(one) for one in row] for row in cells]
         print_table(f"Protection, seeds {asked.seeds}", [*head], told)

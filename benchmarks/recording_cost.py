@@ -109,7 +109,7 @@ async def _look(place: Place, robots: int, seconds: float, folder: Path) -> Run:
 
 
 def _size(folder: Path) -> int:
-    return sum(one.stat().st_size for one in folder.glob("*.mcap*"))
+    return sum(one.stat().st_size for one in folder.rglob("*.mcap*"))
 
 
 def main() -> None:

@@ -31,24 +31,15 @@ from cyclonedds.topic import Topic
 from cyclonedds.util import duration
 
 from benchmarks.process import Usage, machine, pause, percentile, print_table
-from iveg.adapters.broker_address import BrokerAddress
-from iveg.adapters.dds import Dds
-from iveg.adapters.dds_entities import DdsReader, DdsWriter
-from iveg.adapters.dds_types import announced, write_qos
-from iveg.adapters.mqtt import MqttLink
+from iveg.adapters.dds import Dds, DdsReader, DdsWriter, struct_of, structure, write_qos
+from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.domain.feedback import CLEAR, Feedback
 from iveg.domain.observations import Origin, SafetyReport
 from iveg.ngsi import codec
-from iveg.ros2 import (
-    cdr,
-    geometry_msgs,
-    names,
-    nav_msgs,
-    sensor_msgs,
-    std_msgs,
-    vision_msgs,
-)
-from iveg.ros2.schema import Message
+from iveg.ros2 import cdr, names
+from iveg.ros2 import messages as ros
+from iveg.ros2.cdr import store_of
+from iveg.ros2.messages import Message
 from tests.brokers import broker_on
 from tests.dds import free_domain, loopback
 from tests.ports import free_ports
@@ -57,12 +48,12 @@ from tests.processes import Site, site
 RATE_HZ, TWISTS_HZ = 30.0, 15.0
 WARM_UP_S, MEASURED_S = 6.0, 40.0
 SENSORS: dict[str, type[Message]] = {
-    "/odom": nav_msgs.Odometry,
-    "/scan": sensor_msgs.LaserScan,
-    "/tf": geometry_msgs.TFMessage,
-    "/detections_3d": vision_msgs.Detection3DArray,
+    "/odom": ros.Odometry,
+    "/scan": ros.LaserScan,
+    "/tf": ros.TFMessage,
+    "/detections_3d": ros.Detection3DArray,
 }
-WISHES: dict[str, type[Message]] = {"/cmd_vel_nav": geometry_msgs.Twist}
+WISHES: dict[str, type[Message]] = {"/cmd_vel_nav": ros.Twist}
 _HEARD = write_qos(names.SENSOR_DATA.newest(50))
 _ANY = SampleState.NotRead | ViewState.Any | InstanceState.Any
 
@@ -70,13 +61,16 @@ _ANY = SampleState.NotRead | ViewState.Any | InstanceState.Any
 # --- the two that are compared with --------------------------------------------------
 
 
+def decoded(message: type[Message]) -> Any:
+    """A type whose samples Cyclone's own Python makes and reads."""
+    return structure(store_of(message), message.ROS, struct_of)
+
+
 def bare(domain: int) -> None:
     """Take and decode every message that the robot is sent, as they come."""
     participant, waitset, readers = _participant(domain)
     for name, message in (SENSORS | WISHES).items():
-        topic = Topic(
-            participant, names.dds_topic(name), announced(message, decodes=True)
-        )
+        topic = Topic(participant, names.dds_topic(name), decoded(message))
         readers.append(DataReader(participant, topic, _HEARD))
     conditions = [ReadCondition(reader, _ANY) for reader in readers]
     for condition in conditions:
@@ -90,7 +84,7 @@ def bare(domain: int) -> None:
 def echo(domain: int) -> None:
     """Answer each twist with itself, decoded and encoded."""
     participant, waitset, _ = _participant(domain)
-    kind = announced(geometry_msgs.Twist, decodes=True)
+    kind = decoded(ros.Twist)
     heard = Topic(participant, names.dds_topic("/echo_in"), kind)
     said = Topic(participant, names.dds_topic("/echo_out"), kind)
     reader = DataReader(participant, heard, _HEARD)
@@ -124,37 +118,33 @@ class Robot:
             name: dds.writer(name, kind, names.DEFAULT)
             for name, kind in SENSORS.items()
         }
-        self._static = dds.writer(
-            "/tf_static", geometry_msgs.TFMessage, names.TF_STATIC
-        )
-        header = std_msgs.Header(std_msgs.Time.of(time.time()), "base_link")
-        mount = geometry_msgs.TransformStamped(header, "laser")
-        self._static.write(cdr.write(geometry_msgs.TFMessage((mount,))))
+        self._static = dds.writer("/tf_static", ros.TFMessage, names.TF_STATIC)
+        header = ros.Header(ros.Time.of(time.time()), "base_link")
+        mount = ros.TransformStamped(header, "laser")
+        self._static.write(cdr.write(ros.TFMessage((mount,))))
         self._ranges = np.linspace(1.0, 20.0, 720, dtype=np.float32)
 
     def say(self) -> None:
         """Everything once."""
-        stamp = std_msgs.Time.of(time.time())
-        in_map, in_odom = std_msgs.Header(stamp, "map"), std_msgs.Header(stamp, "odom")
-        base = std_msgs.Header(stamp, "base_link")
-        sure = vision_msgs.ObjectHypothesisWithPose(
-            vision_msgs.ObjectHypothesis("tomato", 0.9)
-        )
+        stamp = ros.Time.of(time.time())
+        in_map, in_odom = ros.Header(stamp, "map"), ros.Header(stamp, "odom")
+        base = ros.Header(stamp, "base_link")
+        sure = ros.ObjectHypothesisWithPose(ros.ObjectHypothesis("tomato", 0.9))
         said: dict[str, Message] = {
-            "/tf": geometry_msgs.TFMessage(
+            "/tf": ros.TFMessage(
                 (
-                    geometry_msgs.TransformStamped(in_map, "odom"),
-                    geometry_msgs.TransformStamped(in_odom, "base_link"),
+                    ros.TransformStamped(in_map, "odom"),
+                    ros.TransformStamped(in_odom, "base_link"),
                 )
             ),
-            "/odom": nav_msgs.Odometry(in_odom, "base_link"),
-            "/scan": sensor_msgs.LaserScan(
-                std_msgs.Header(stamp, "laser"),
+            "/odom": ros.Odometry(in_odom, "base_link"),
+            "/scan": ros.LaserScan(
+                ros.Header(stamp, "laser"),
                 *(-math.pi, math.pi, math.tau / 720, 0.0, 0.03, 0.1, 25.0),
                 self._ranges,
             ),
-            "/detections_3d": vision_msgs.Detection3DArray(
-                base, tuple(vision_msgs.Detection3D(base, (sure,)) for _ in range(3))
+            "/detections_3d": ros.Detection3DArray(
+                base, tuple(ros.Detection3D(base, (sure,)) for _ in range(3))
             ),
         }
         for name, message in said.items():
@@ -193,7 +183,7 @@ class Times:
 
     def send(self, speed: float) -> None:
         """Ask for this speed."""
-        payload = cdr.write(geometry_msgs.Twist(geometry_msgs.Vector3(speed)))
+        payload = cdr.write(ros.Twist(ros.Vector3(speed)))
         self._sent[speed] = time.perf_counter()
         self._writer.write(payload)
 
@@ -201,7 +191,7 @@ class Times:
         """Take what came back."""
         for one in self._reader.take():
             now = time.perf_counter()
-            speed = cdr.read(geometry_msgs.Twist, one).linear.x
+            speed = cdr.read(ros.Twist, one).linear.x
             if speed in self._sent:
                 self.took.append(now - self._sent.pop(speed))
 
@@ -214,8 +204,8 @@ def measure(dds: Dds, programs: dict[str, int]) -> tuple[dict[str, Times], Any]:
     robot = Robot(dds)
     times = {
         name: Times(
-            dds.reader(out, geometry_msgs.Twist, names.SENSOR_DATA.newest(50)),
-            dds.writer(in_, geometry_msgs.Twist, names.DEFAULT.newest(1)),
+            dds.reader(out, ros.Twist, names.SENSOR_DATA.newest(50)),
+            dds.writer(in_, ros.Twist, names.DEFAULT.newest(1)),
         )
         for name, in_, out in (
             ("iveg robot", "/cmd_vel_nav", "/cmd_vel"),

@@ -35,7 +35,6 @@ from iveg.domain.observations import (
 )
 from iveg.domain.records import Record
 from iveg.domain.transports import FIWARE
-from iveg.pipeline.second_witness import TICK_S as LOOK_S
 
 RATE_HZ = 30
 SECONDS = 8.0
@@ -118,9 +117,9 @@ def cost(
     """CPU seconds per 1,000 messages, and the digest of what was decided."""
     robots = tuple(f"R{number:02d}" for number in range(count))
     kept = Kept()
-    evaluator, witness = assessor_of(robots, kept, kept)
+    evaluator = assessor_of(robots, kept, kept)
     everything = list(story(robots, storm=storm, seconds=seconds))
-    ticked = looked = 0.0
+    ticked = 0.0
     began = time.process_time()
     for start in range(0, len(everything), batch):
         part = everything[start : start + batch]
@@ -128,9 +127,6 @@ def cost(
         for received in part:
             evaluator.apply(received)
         evaluator.settle()
-        while now.mono - looked >= LOOK_S:
-            looked += LOOK_S
-            witness.tick(now)
         if now.mono - ticked >= TICK_S:
             ticked = now.mono
             evaluator.age(now)

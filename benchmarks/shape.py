@@ -1,46 +1,53 @@
-"""How large the product is: statements, lines and files of each folder of ``iveg``.
+"""Size of the project in eight numbers, held by ``shape.toml``.
 
-    python -m benchmarks.shape
+    python -m benchmarks.shape            # prints them, and statements by folder
+    python -m benchmarks.shape --write    # lowers shape.toml to them; raises none
 
-Docstrings are no statements.  Of files the median and the 95th percentile of lines are
-told, and for all of them annotations with ``Any`` and comments ``type: ignore``.
+Vendored files, and pages that say in their first lines that they are generated, are
+left out; so is the growers' guide.
 """
 
 import ast
 import sys
-from collections import defaultdict
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
-from statistics import median
+import tomllib
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
 
-from benchmarks.process import percentile, print_table
+from benchmarks.process import print_table
 from tests.processes import ROOT
 
+LIMITS = ROOT / "shape.toml"
+_GUIDES = {"guide.md", "guia.md"}
 
-@dataclass(frozen=True, slots=True)
-class Shape:
-    """What one file has.
 
-    Attributes:
-        anys: Annotations that name ``Any``.
-        ignores: Comments that tell the type checker to look away.
+def counted(root: Path = ROOT) -> dict[str, int]:
+    """The eight numbers of a checkout, by the names of ``shape.toml``.
+
+    Statements are ``ast.stmt`` without texts that stand alone (docstrings).
     """
+    trees = [*_trees(root / "iveg").values()]
+    return {
+        "statements": sum(statements_of(tree) for tree in trees),
+        "nodes": sum(1 for tree in trees for _ in ast.walk(tree)),
+        "python_files": len(trees),
+        "javascript_lines": _lines(root / "iveg/static", ".js"),
+        "css_lines": _lines(root / "iveg/static", ".css"),
+        "template_lines": _lines(root / "iveg/templates", ".html"),
+        "test_lines": _lines(root / "tests", ".py") + _lines(root / "tests", ".js"),
+        "words": sum(len(page.read_text().split()) for page in _pages(root)),
+    }
 
-    statements: int
-    lines: int
-    anys: int
-    ignores: int
+
+def limits() -> dict[str, int]:
+    """The numbers that none may exceed."""
+    return tomllib.loads(LIMITS.read_text())
 
 
-def shape_of(text: str) -> Shape:
-    """The shape of a module's text."""
-    nodes = list(ast.walk(ast.parse(text)))
-    statements = sum(isinstance(one, ast.stmt) and not _is_text(one) for one in nodes)
-    return Shape(
-        statements,
-        len(text.splitlines()),
-        sum(_names_any(one) for one in _annotations(nodes)),
-        text.count("# type: ignore"),
+def statements_of(tree: ast.AST) -> int:
+    """Number of statements of a module, docstrings left out."""
+    return sum(
+        isinstance(node, ast.stmt) and not _is_text(node) for node in ast.walk(tree)
     )
 
 
@@ -51,54 +58,53 @@ def _is_text(node: ast.AST) -> bool:
     return isinstance(node.value.value, str)
 
 
-def _annotations(nodes: Iterable[ast.AST]) -> Iterator[ast.expr]:
-    for node in nodes:
-        match node:
-            case ast.arg(annotation=ast.expr() as found):
-                yield found
-            case ast.AnnAssign(annotation=found):
-                yield found
-            case ast.FunctionDef(returns=ast.expr() as found):
-                yield found
-            case ast.AsyncFunctionDef(returns=ast.expr() as found):
-                yield found
+def _trees(folder: Path) -> dict[Path, ast.AST]:
+    return {path: ast.parse(path.read_text()) for path in _files(folder, ".py")}
 
 
-def _names_any(annotation: ast.expr) -> bool:
-    return any(
-        isinstance(node, ast.Name) and node.id == "Any" for node in ast.walk(annotation)
+def _files(folder: Path, suffix: str) -> Iterator[Path]:
+    found = sorted(folder.rglob(f"*{suffix}"))
+    return (path for path in found if "vendor" not in path.parts)
+
+
+def _lines(folder: Path, suffix: str) -> int:
+    return sum(len(path.read_text().splitlines()) for path in _files(folder, suffix))
+
+
+def _pages(root: Path) -> Iterator[Path]:
+    for page in [*root.glob("*.md"), *(root / "docs").rglob("*.md")]:
+        head = page.read_text().splitlines()[:5]
+        is_generated = any("generated" in line for line in head)
+        if page.name not in _GUIDES and not is_generated:
+            yield page
+
+
+def written(numbers: dict[str, int]) -> str:
+    """Text of ``shape.toml`` with these numbers."""
+    rows = "".join(f"{name} = {number}\n" for name, number in numbers.items())
+    return (
+        f"# Most that the project may have (benchmarks/shape.py); only lowered.\n{rows}"
     )
 
 
 def main() -> int:
-    """Print a row for each folder, and one for all."""
-    folders: defaultdict[str, list[Shape]] = defaultdict(list)
-    for path in sorted((ROOT / "iveg").rglob("*.py")):
+    """Print the numbers beside their limits, and statements by folder."""
+    numbers, most = counted(), limits()
+    if "--write" in sys.argv:
+        LIMITS.write_text(
+            written({name: min(one, most[name]) for name, one in numbers.items()})
+        )
+    rows = [[name, str(one), str(most[name])] for name, one in numbers.items()]
+    print_table("Shape of the project", ["what", "now", "at most"], rows)
+    folders: Counter[str] = Counter()
+    for path, tree in _trees(ROOT / "iveg").items():
         parts = path.relative_to(ROOT).parts
-        shape = shape_of(path.read_text())
-        folders["/".join(parts[:2] if len(parts) > 2 else parts[:1])].append(shape)
-    everything = [shape for found in folders.values() for shape in found]
-    rows = [_row(name, found) for name, found in sorted(folders.items())]
-    print_table("Shape of iveg", _HEAD, [*rows, _row("all", everything)])
-    anys, ignores = (sum(getattr(one, of) for one in everything) for of in _COUNTED)
-    print(f"Any in annotations: {anys}; type: ignore: {ignores}")
+        folders["/".join(parts[:2] if len(parts) > 2 else parts[:1])] += statements_of(
+            tree
+        )
+    rows = [[name, str(one)] for name, one in sorted(folders.items())]
+    print_table("Statements by folder", ["folder", "statements"], rows)
     return 0
-
-
-_HEAD = ["folder", "statements", "lines", "files", "median", "P95"]
-_COUNTED = "anys", "ignores"
-
-
-def _row(name: str, found: list[Shape]) -> list[str]:
-    lines = sorted(one.lines for one in found)
-    return [
-        name,
-        str(sum(one.statements for one in found)),
-        str(sum(lines)),
-        str(len(found)),
-        f"{median(lines):.0f}",
-        f"{percentile(lines, 0.95):.0f}",
-    ]
 
 
 if __name__ == "__main__":

@@ -25,8 +25,7 @@ import orjson
 
 from benchmarks.process import machine, percentile, print_table
 from benchmarks.stop import ROBOTS, Operator, running, until
-from iveg.adapters.broker_address import BrokerAddress
-from iveg.adapters.mqtt import MqttLink
+from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.adapters.passwords import Passwords
 
 HEAD = ("sign-ins", "stops", "P50 ms", "P95 ms", "max ms")

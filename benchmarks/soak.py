@@ -21,7 +21,7 @@ from pathlib import Path
 import aiomqtt
 
 from benchmarks.process import Usage, machine, print_table
-from iveg.adapters.broker_address import BrokerAddress
+from iveg.adapters.mqtt import BrokerAddress
 from tests.processes import Site, site
 
 KINDS = {

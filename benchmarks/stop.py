@@ -25,8 +25,7 @@ import httpx
 import orjson
 
 from benchmarks.process import machine, percentile, print_table
-from iveg.adapters.broker_address import BrokerAddress
-from iveg.adapters.mqtt import MqttLink
+from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.ngsi import codec
 from tests.brokers import MOSQUITTO
 from tests.chaos.field import Field

@@ -2,36 +2,17 @@
 
 import asyncio
 from collections.abc import Iterator
-from functools import cache
 from pathlib import Path
 
 from fastapi import APIRouter, Depends, FastAPI
 from starlette.routing import Mount
 
 from iveg import __version__
-from iveg.adapters.pdf import find_browser
 from iveg.app.dss import Dss
-from iveg.app.laboratory import find_laboratory
-from iveg.web.api import (
-    account,
-    cost,
-    day,
-    history,
-    incidents,
-    notes,
-    passkeys,
-    proof,
-    sessions,
-    sign_in_code,
-    stop_records,
-    tablet,
-    tokens,
-    users,
-    what_if,
-)
+from iveg.web.api import account, alerts, day, history, incidents
 from iveg.web.api.answers import Json
 from iveg.web.build import build_app, live_routers
-from iveg.web.pages import drawing, openapi, routes, service_worker, sign_on
+from iveg.web.pages import drawing, routes, signing
 from iveg.web.security.requirements import require
 from iveg.web.static_files import KeptFiles
 
@@ -55,7 +36,6 @@ def create_app(dss: Dss) -> FastAPI:
     )
     of_pages = routes.router(
         pages,
-        document=cache(lambda: openapi.describe_api(app)),
         rule=lambda: dss.pipeline.evaluator.rule,
         sign_on=dss.sign_on,
     )
@@ -73,30 +53,20 @@ def create_app(dss: Dss) -> FastAPI:
 
 
 def _past_routers(dss: Dss, pages: drawing.Pages) -> Iterator[APIRouter]:
-    """History, what a browser needs besides, and the laboratory's own."""
+    """History, and what a browser needs besides."""
     queries, face = dss.stores.queries, dss.face
     views, evaluator, clock = face.views, dss.pipeline.evaluator, face.clock
-    yield stop_records.router(queries, clock, views.find_command)
+    yield day.stop_records_router(queries, clock, views.find_command)
     url, greenhouse, worker = queries.url, evaluator.greenhouse, dss.worker
-    run, due = worker.run, dss.settings.drill_days
     yield day.router(
-        lambda *asked: run(day.read_day, url, greenhouse, due, *asked), pages, clock
-    )
-    braking = {
-        robot_id: one.profile.assumed_braking
-        for robot_id, one in dss.fleet.members.items()
-    }
-    yield cost.router(
-        lambda *asked: run(cost.read_cost, url, greenhouse, braking, *asked),
-        pages,
-        clock,
+        lambda *asked: worker.run(day.read_day, url, greenhouse, *asked), pages, clock
     )
     yield history.router(
         queries,
         worker,
-        threshold=lambda: evaluator.rule.threshold,
+        threshold=lambda: evaluator.rule.threshold.every,
         present=evaluator.decision_record,
-        flood=views.flood,
+        alerts=views.alerts,
         fleet=dss.fleet,
     )
     yield incidents.router(
@@ -109,23 +79,17 @@ def _past_routers(dss: Dss, pages: drawing.Pages) -> Iterator[APIRouter]:
             dss.pipeline.event_log.log,
             clock,
             __version__,
-            find_browser(),
         )
     )
-    yield what_if.router(dss.what_ifs, dss.services.rules, clock, worker)
-    yield notes.router(queries, dss.fleet.members, dss.pipeline.event_log.log, clock)
+    yield alerts.notes_router(
+        queries, dss.fleet.members, dss.pipeline.event_log.log, clock
+    )
     if dss.sign_in_token:
-        yield sign_in_code.router(dss.sign_in_token)
+        yield account.sign_in_code_router(dss.sign_in_token)
     yield account.router(dss.door.people)
-    yield sessions.router()
-    yield users.router(dss.door.people, clock)
-    yield tokens.router(dss.door.programs, clock)
-    yield passkeys.router(dss.door.people, dss.door.passkeys)
-    yield proof.router(dss.door.people, dss.door.passkeys, dss.door.pins)
-    yield tablet.router(dss.door.people, dss.door.pins)
+    yield account.sessions_router()
+    yield account.users_router(dss.door.people, clock)
+    yield account.tokens_router(dss.door.people, dss.door.programs, clock)
     if dss.sign_on is not None:
-        yield sign_on.router(pages, dss.sign_on)
-    yield service_worker.router()
-    laboratory = find_laboratory("pages")
-    if laboratory is not None:
-        yield from laboratory.routers(dss, pages)
+        yield signing.router(pages, dss.sign_on)
+    yield routes.service_worker_router()

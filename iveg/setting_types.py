@@ -1,14 +1,15 @@
 """What the values of settings may be: a rule, and behind it the same in words."""
 
 from ipaddress import ip_address
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Any, Literal, get_args
 from urllib.parse import urlsplit
 
 from annotated_types import Interval
 from pydantic import AfterValidator, BeforeValidator, StringConstraints
 
-from iveg.domain.accounts import PersonRole, is_name
+from iveg.domain.accounts import DEFAULT_NAME, PersonRole, is_name, is_reserved
 from iveg.domain.fleet import split_word
+from iveg.domain.parameters import CLASSES, ByClass, Parameter
 
 
 def _address(*schemes: str) -> AfterValidator:
@@ -74,13 +75,12 @@ def _read_robots(text: str) -> tuple[str, ...]:
 
 
 def _read_name(text: str) -> str:
-    if not is_name(text):
+    if not is_name(text) or (is_reserved(text) and text != DEFAULT_NAME):
         raise ValueError(text)
     return text
 
 
 Port = Annotated[int, Interval(ge=1, le=65535), "a port from 1 to 65535"]
-FoxglovePort = Annotated[int, Interval(ge=0, le=65535), "a port, or 0 for none"]
 Switch = Annotated[
     bool,
     BeforeValidator(lambda text: {"on": True, "off": False}.get(text.lower())),
@@ -158,3 +158,30 @@ Days = Annotated[
 Gigabytes = Annotated[
     int, Interval(ge=0, le=10**6), "a whole number of gigabytes from 0, any, to 10^6"
 ]
+
+
+def rule_value(row: Parameter) -> Any:
+    """Type of the setting of a parameter of the rule."""
+    if row.unit == "switch":
+        return Switch
+    if row.class_key is None:
+        return Annotated[float, Interval(ge=row.least, le=row.most)]
+
+    def read(text: str) -> ByClass:
+        every, *others = text.split(",")
+        by_class = {}
+        for one in others:
+            class_, _, value = one.partition("=")
+            own = next((own for own in CLASSES if own == class_.strip()), None)
+            if own is None:
+                raise ValueError(text)
+            by_class[own] = float(value)
+        found = ByClass(float(every), by_class)
+        if len(by_class) < len(others):
+            raise ValueError(text)
+        if not all(row.least <= one <= row.most for one in found.values):
+            raise ValueError(text)
+        return found
+
+    allowed = f"a number from {row.least:g} to {row.most:g}, also by class (2,robot=3)"
+    return Annotated[Any, BeforeValidator(read), allowed]

@@ -6,7 +6,7 @@ Built once from an environment that is handed in; read by ``cli`` and ``app`` al
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, get_args, get_type_hints
@@ -17,6 +17,7 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 from iveg.domain.accounts import DEFAULT_NAME, PersonRole
 from iveg.domain.errors import SettingsError
 from iveg.domain.limits import LIMITS
+from iveg.domain.parameters import PARAMETERS, ByClass, Parameter, Parameters
 from iveg.domain.recordings import RecordingLimits
 from iveg.domain.retention import Retention
 from iveg.setting_types import (
@@ -25,7 +26,6 @@ from iveg.setting_types import (
     Database,
     Days,
     DirectRead,
-    FoxglovePort,
     Gigabytes,
     Hex,
     Hours,
@@ -40,6 +40,7 @@ from iveg.setting_types import (
     Switch,
     Token,
     Url,
+    rule_value,
     split_role,
 )
 
@@ -57,6 +58,19 @@ _SECRETS: Final = frozenset(
         "IVEG_SSO_CLIENT_SECRET",
     }
 )
+
+
+GONE: Final = frozenset(
+    {
+        "IVEG_BROKER_ACCESS_COMMAND",
+        "IVEG_DRILL_DAYS",
+        "IVEG_FOXGLOVE",
+        "IVEG_ORION_THROTTLE",
+        "IVEG_RELEASE_PROOF_MINUTES",
+        "IVEG_TRUTH",
+    }
+)
+"""Settings of earlier versions; docs/upgrading.md says what took their place."""
 
 
 def setting(variable: str, default: Any, help_: str) -> Any:
@@ -90,12 +104,6 @@ class Settings:
         "",
         "File of the own certificate, by which the broker knows who comes. It and its "
         "key are read at each connection, and a new one connects anew.",
-    )
-    broker_access_command: str = setting(
-        "IVEG_BROKER_ACCESS_COMMAND",
-        "",
-        "Program that has the broker follow where a robot is revoked or allowed: "
-        "`--revoke ROBOT` or `--allow ROBOT` is added. Empty: people do so.",
     )
     mqtt_key: str = setting("IVEG_MQTT_KEY", "", "File of the key of `IVEG_MQTT_CERT`.")
     orion_url: Url = setting(
@@ -176,6 +184,12 @@ class Settings:
         "Who is in the fleet, such as `AGI,AGII`; `D1:recording` for a robot that "
         "`iveg replay` plays. Empty: every robot of `IVEG_FLEET`.",
     )
+    refused_robots: Robots = setting(
+        "IVEG_REFUSED_ROBOTS",
+        (),
+        "Robots of the fleet that are not heard, such as `AGI`: lost, sold, or with a "
+        "password in wrong hands. STOP still goes to them.",
+    )
     database_url: Database = setting(
         "IVEG_DATABASE_URL",
         "",
@@ -252,32 +266,9 @@ class Settings:
         12.0,
         "How long a session lasts that began at the provider (h); STOP for longer.",
     )
-    release_proof_minutes: Annotated[float, Interval(ge=0.0, le=1440.0)] = setting(
-        "IVEG_RELEASE_PROOF_MINUTES",
-        15.0,
-        "A release asks whoever has an account to prove anew who they are where they "
-        "last did so longer ago (minutes); 0 never asks. STOP never does.",
-    )
-    confidence_threshold: Annotated[float, Interval(ge=0.0, le=1.0)] = setting(
-        "IVEG_CONFIDENCE_THRESHOLD",
-        LIMITS.detection_threshold,
-        "Least confidence that raises an alert, inclusive.",
-    )
-    safety_radius_m: Annotated[
-        float, Interval(ge=LIMITS.ring_least_m, le=LIMITS.ring_most_m)
-    ] = setting(
-        "IVEG_SAFETY_RADIUS_M",
-        LIMITS.ring_default_m,
-        "Ring round a person or peer, inclusive (m).",
-    )
+    rule: Parameters = field(default_factory=Parameters)
     stop_direct: Switch = setting(
         "IVEG_STOP_DIRECT", True, "STOP, RELEASE and RESUME also straight over MQTT."
-    )
-    orion_throttle: Switch = setting(
-        "IVEG_ORION_THROTTLE",
-        True,
-        "Orion leaves out copies of odometry and scans while they come straight; `off` "
-        "measures every message at every hop, as `iveg experiment` does.",
     )
     direct_read: DirectRead = setting(
         "IVEG_DIRECT_READ",
@@ -303,12 +294,6 @@ class Settings:
         "`IVEG_FEEDBACK_STAND_S`: `stop`, or `slow`, which goes on at half speed while "
         "nobody supervises it.",
     )
-    drill_days: Annotated[float, Interval(ge=0.0, le=3650.0)] = setting(
-        "IVEG_DRILL_DAYS",
-        30.0,
-        "Remind of a STOP drill when a robot's last one is older than this (days); "
-        "0: never. A robot that was never drilled is not reminded of.",
-    )
     keep_positions_days: Days = setting(
         "IVEG_KEEP_POSITIONS_DAYS",
         Retention.positions,
@@ -328,28 +313,28 @@ class Settings:
     keep_audit_days: Days = setting(
         "IVEG_KEEP_AUDIT_DAYS",
         Retention.audit,
-        "The audit, by whole days, and the steps of orders (days; 0: for ever).",
+        "The audit and the steps of orders (days; 0: for ever).",
     )
     recordings: Switch = setting(
         "IVEG_RECORDINGS",
         True,
-        "Keep what comes in, byte for byte (docs/interfaces/recordings.md).",
+        "Keep what comes in, byte for byte, and pictures of what pages are sent "
+        "(docs/interfaces/recordings.md).",
     )
     keep_recordings_days: Days = setting(
         "IVEG_KEEP_RECORDINGS_DAYS",
         RecordingLimits.days,
-        "Recordings of what came in (days with one; 0: for ever).",
+        "Recordings of either sort (days with one; 0: for ever).",
     )
     keep_recordings_gb: Gigabytes = setting(
         "IVEG_KEEP_RECORDINGS_GB",
-        10,
-        "The same (10^9 bytes of all of them; 0: any).",
+        6,
+        "Recordings of what came in (10^9 bytes of all of them; 0: any).",
     )
-    foxglove: FoxglovePort = setting(
-        "IVEG_FOXGLOVE",
-        0,
-        "Port on 127.0.0.1 where Foxglove looks on (docs/interfaces/recordings.md); "
-        "0: none.",
+    keep_pictures_gb: Gigabytes = setting(
+        "IVEG_KEEP_PICTURES_GB",
+        4,
+        "Pictures of the past (the same).",
     )
     uplink: Literal["per-topic", "single"] = setting(
         "IVEG_UPLINK",
@@ -361,6 +346,12 @@ class Settings:
         "mvsim-20x20",
         "`mvsim-20x20`, `agroconnect`, `none` (open field), or a file.",
     )
+    messages: str = setting(
+        "IVEG_MESSAGES_FILE",
+        "",
+        "File of addresses outside the page that receive alerts "
+        '(docs/deployment.md, "Messages"); empty: none.',
+    )
     equipment: str = setting(
         "IVEG_EQUIPMENT", "", "File of docs/equipment.md, or `demo`; empty: none."
     )
@@ -370,12 +361,6 @@ class Settings:
         'File of docs/safety.md, "Calibration", or `paper`; '
         "empty: confidences count as told.",
     )
-    truth: str = setting(
-        "IVEG_TRUTH",
-        "",
-        "File that `iveg emulator --truth` writes: questions about another rule then "
-        "count who was missed and who slowed for nobody; empty: nobody knows.",
-    )
 
     @classmethod
     def from_environment(cls, environment: Mapping[str, str]) -> "Settings":
@@ -384,18 +369,13 @@ class Settings:
         Raises:
             SettingsError: a value that cannot be used.
         """
-        values = {}
-        for name, hint in get_type_hints(cls, include_extras=True).items():
-            variable = cls.__dataclass_fields__[name].metadata["variable"]
-            text = environment.get(variable, "")
-            if not text:
-                continue
-            try:
-                values[name] = TypeAdapter(hint, config=_QUIET).validate_python(text)
-            except ValidationError as error:
-                shown = "(hidden)" if variable in _SECRETS else _without_login(text)
-                raise SettingsError(variable, shown, _allowed(hint)) from error
-        settings = cls(**values)
+        values, rule = dict[str, Any](), dict[str, Any]()
+        for row in _rows():
+            text = environment.get(row.variable, "")
+            if text:
+                into = rule if row.is_of_rule else values
+                into[row.name] = _read(row, text)
+        settings = cls(rule=Parameters(**rule), **values)
         settings._check_together()
         return settings
 
@@ -426,12 +406,9 @@ class Settings:
         """Value of the provider's claim → the role that it gives."""
         return dict(row for one in self.sso_roles if (row := split_role(one)))
 
-    @property
-    def recording_limits(self) -> RecordingLimits:
-        """How many recordings are kept."""
-        return RecordingLimits(
-            self.keep_recordings_days, self.keep_recordings_gb * 10**9
-        )
+    def limits_of_recordings(self, most_gb: int) -> RecordingLimits:
+        """How many recordings of a sort are kept."""
+        return RecordingLimits(self.keep_recordings_days, most_gb * 10**9)
 
     @property
     def retention(self) -> Retention:
@@ -459,9 +436,52 @@ class Settings:
     def to_environment(self) -> dict[str, str]:
         """The environment that gives the same settings to a child process."""
         return {
-            row.metadata["variable"]: _write(getattr(self, row.name))
-            for row in fields(self)
+            row.variable: _write(
+                getattr(self.rule if row.is_of_rule else self, row.name)
+            )
+            for row in _rows()
         }
+
+
+@dataclass(frozen=True, slots=True)
+class _Row:
+    """One setting.
+
+    Attributes:
+        hint: Type, with what its value may be.
+        is_of_rule: A parameter of the rule (``domain/parameters.py``).
+    """
+
+    variable: str
+    name: str
+    hint: Any
+    default: object
+    help: str
+    is_of_rule: bool = False
+
+
+def _rows() -> Iterator[_Row]:
+    """Every setting; those of the rule stand where the table has the rule."""
+    hints = get_type_hints(Settings, include_extras=True)
+    for one in fields(Settings):
+        if one.name == "rule":
+            yield from map(_of_rule, PARAMETERS)
+        else:
+            variable, help_ = one.metadata["variable"], one.metadata["help"]
+            yield _Row(variable, one.name, hints[one.name], one.default, help_)
+
+
+def _of_rule(row: Parameter) -> _Row:
+    hint = rule_value(row)
+    return _Row(row.variable, row.name, hint, row.default, row.says, is_of_rule=True)
+
+
+def _read(row: _Row, text: str) -> Any:
+    try:
+        return TypeAdapter(row.hint, config=_QUIET).validate_python(text)
+    except ValidationError as error:
+        shown = "(hidden)" if row.variable in _SECRETS else _without_login(text)
+        raise SettingsError(row.variable, shown, _allowed(row.hint)) from error
 
 
 def _allowed(hint: Any) -> str:
@@ -482,6 +502,9 @@ def _write(value: object) -> str:
         return "on" if value else "off"
     if isinstance(value, tuple):
         return ",".join(value)
+    if isinstance(value, ByClass):
+        others = (f"{class_}={one}" for class_, one in value.by_class.items())
+        return ",".join((str(value.every), *others))
     return str(value)
 
 
@@ -500,16 +523,9 @@ def describe() -> str:
         "the start with one sentence that names the setting, the value and what is "
         "allowed.",
         "This page is generated: `python -m iveg settings > docs/settings.md`.",
-        "Who is told of alerts by push, mail or webhook is no setting of the start: an "
-        "operator says so on the page Settings.",
         "",
     ]
-    for row in fields(Settings):
+    for row in _rows():
         default = _write(row.default) or "(empty)"
-        lines += [
-            f"## `{row.metadata['variable']}`",
-            "",
-            f"{row.metadata['help']} Default: `{default}`.",
-            "",
-        ]
+        lines += [f"## `{row.variable}`", "", f"{row.help} Default: `{default}`.", ""]
     return "\n".join(lines)

@@ -8,8 +8,8 @@ import time
 from collections.abc import AsyncIterator
 from pathlib import Path
 
-from iveg.adapters.broker_address import BrokerAddress
-from iveg.lab.embedded.mqtt_server import mqtt_broker
+from iveg.adapters.mqtt import BrokerAddress
+from iveg.lab.embedded.mqtt_broker import mqtt_broker
 from tests.bonds import bound
 
 MOSQUITTO = shutil.which("mosquitto", path=f"{os.environ['PATH']}:/usr/sbin")

@@ -168,7 +168,7 @@ def notification(
 
 
 def pose_value(
-    x: float = 0.0, y: float = 0.0, *, seq: int = 1, boot: str = "boot-a"
+    x: float = 0.0, y: float = 0.0, *, seq: int = 1, boot: str | None = "boot-a"
 ) -> dict[str, object]:
     """The value of ``base_pose_ground_truth``."""
     return {

@@ -24,27 +24,29 @@ expect.set_options(timeout=PATIENCE_MS)
 settings.load_profile(os.environ.get("IVEG_HYPOTHESIS", "iveg"))
 
 _FOLDERS = ("chaos", "e2e", "integration", "properties", "contract", "unit")
-_TOGETHER = {"e2e/driving": ("contract", "live", "supervision", "pages", "door")}
+_TOGETHER = {"e2e/driving": ("live", "supervision", "pages")}
 """Folders whose modules share a stack: one worker runs them, one after the other.
 
 At first nothing complains, then somebody asks for what does, at last robots stand.
 """
 _BUSY = (
-    *("e2e/driving", "e2e/test_stop_states", "e2e/test_matrix", "e2e/test_stop"),
+    *("e2e/driving", "e2e/test_layout", "e2e/test_stop_states", "e2e/test_stop"),
     *("e2e/test_pacing", "chaos/test_backlog", "e2e/test_stop_restart"),
-    *("e2e/test_pictures", "e2e/test_faults", "e2e/test_probes"),
-    *("e2e/test_stop_drills", "e2e/test_layout", "e2e/test_ros2", "e2e/test_demo"),
+    *("e2e/test_early", "e2e/test_ros2", "e2e/test_demo"),
 )
 _WAITING = (
-    *("integration/test_faults", "integration/test_overload"),
-    *("integration/test_scenarios", "integration/test_replay"),
+    *(
+        "integration/test_faults",
+        "integration/test_overload",
+        "integration/test_replay",
+    ),
     *("chaos/test_ros2_kills", "integration/test_emulator", "chaos/test_network"),
     *("integration/test_robot_node", "chaos/test_kills", "chaos/test_faults"),
     *("integration/test_deploy", "integration/test_decisions"),
     *("integration/test_ros2_robot", "integration/test_doctor"),
 )
 """The longest modules of both sorts, in falling order."""
-_FIRST = [name for pair in zip(_BUSY, _WAITING, strict=True) for name in pair]
+_FIRST = [name for pair in zip(_BUSY, _WAITING, strict=False) for name in pair]
 """So browsers run beside modules that wait for processes, and no worker ends with a
 long module alone."""
 _MEEK = 5

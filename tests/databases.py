@@ -4,12 +4,17 @@ All migrations take a fifth of a second of processor time, most tests have a dat
 their own, and the migrations have tests of their own.
 """
 
+from dataclasses import asdict
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from iveg.adapters.history.engine import sqlite_file
-from iveg.adapters.history.migrate import upgrade
+from sqlalchemy import insert
+
+from iveg.adapters.history.engine import sqlite_file, upgrade
+from iveg.adapters.history.recorder import Store
+from iveg.adapters.history.tables import accounts, api_tokens
+from iveg.domain.accounts import Account, ApiToken, name_key
 
 
 def lay_history(database_url: str) -> None:
@@ -25,3 +30,14 @@ def _newest() -> bytes:
         file = Path(folder, "history.sqlite")
         upgrade(f"sqlite:///{file}")
         return file.read_bytes()
+
+
+def put_into_tables(url: str, person: Account, program: ApiToken) -> None:
+    """Whom the version before has kept in the database."""
+    named = {"name_key": name_key(person.name)}
+    people = insert(accounts).values(**asdict(person) | named)
+    named = {"name_key": name_key(program.name)}
+    programs = insert(api_tokens).values(**asdict(program) | named)
+    store = Store(url)
+    store.run(lambda one: (one.execute(people), one.execute(programs)))
+    store.close()

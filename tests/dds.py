@@ -11,8 +11,7 @@ import pytest
 
 pytest.importorskip("cyclonedds")
 
-from iveg.adapters.dds import Dds
-from iveg.adapters.dds_entities import DdsReader, DdsWriter
+from iveg.adapters.dds import Dds, DdsReader, DdsWriter
 from iveg.adapters.dds_network import DdsNetwork
 
 __all__ = ["Dds", "DdsNetwork", "DdsReader", "DdsWriter", "free_domain", "loopback"]

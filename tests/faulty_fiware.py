@@ -11,17 +11,17 @@ import sys
 from collections.abc import Mapping
 from contextlib import AbstractAsyncContextManager
 from dataclasses import dataclass
-from typing import Any
 from urllib.parse import urlsplit
 
-import orjson
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.routing import Route
 
 from iveg.cli.running import report_ready, run_until_stopped
 from iveg.lab.embedded.context_broker import ContextBroker
-from iveg.lab.embedded.devices import Tenancy
-from iveg.lab.embedded.http_server import Request, Response
-from iveg.lab.embedded.iot_agent import IotAgent
-from iveg.lab.embedded.iota_api import IotaApi
+from iveg.lab.embedded.entities import Scope
+from iveg.lab.embedded.iot_agent import IotAgent, iota_api
 from iveg.lab.embedded.mqtt_broker import MqttBroker
 from iveg.lab.embedded.server import Running, embedded_fiware, serve_fiware
 from iveg.settings import Settings
@@ -52,7 +52,6 @@ class FaultyAgent(IotAgent):
         self._faults = Faults()
         self._unstuck = asyncio.Event()
         self._unstuck.set()
-        self.heard_late = 0
         super().__init__(broker, mqtt)
 
     def fail(self, faults: Faults) -> None:
@@ -68,44 +67,30 @@ class FaultyAgent(IotAgent):
             return
         if self._faults.slow_s > 0:
             loop = asyncio.get_running_loop()
-            loop.call_later(self._faults.slow_s, self._hear_late, topic, payload)
+            loop.call_later(self._faults.slow_s, super().hear, topic, payload)
         else:
             super().hear(topic, payload)
 
-    def _hear_late(self, topic: str, payload: bytes) -> None:
-        super().hear(topic, payload)
-        self.heard_late += 1
-
     async def command(
-        self, tenancy: Tenancy, name: str, kind: str, values: Mapping[str, Any]
+        self, scope: Scope, name: str, kind: str, values: Mapping[str, object]
     ) -> None:
         await self._unstuck.wait()
         if self._faults.slow_s > 0:
             await asyncio.sleep(self._faults.slow_s)
-        await super().command(tenancy, name, kind, values)
-
-    async def query(
-        self, tenancy: Tenancy, name: str, kind: str, names: list[str]
-    ) -> dict[str, Any]:
-        await self._unstuck.wait()
-        return await super().query(tenancy, name, kind, names)
+        await super().command(scope, name, kind, values)
 
 
-class FaultyApi(IotaApi):
+def faulty_api(agent: IotAgent) -> Starlette:
     """The agent's north port, with one more request."""
-
-    async def handle(self, request: Request) -> Response:
-        if (request.method, request.path) != ("POST", "/test/faults"):
-            return await super().handle(request)
-        told = orjson.loads(request.body)
-        _agent_of(self).fail(Faults(**told))
-        return Response(204)
-
-
-def _agent_of(api: IotaApi) -> FaultyAgent:
-    agent = api.agent
     assert isinstance(agent, FaultyAgent)
-    return agent
+
+    async def take_faults(request: Request) -> Response:
+        agent.fail(Faults(**await request.json()))
+        return Response(status_code=204)
+
+    app = iota_api(agent)
+    app.router.routes.append(Route("/test/faults", take_faults, methods=["POST"]))
+    return app
 
 
 def fail(up: Running, faults: Faults) -> None:
@@ -114,15 +99,9 @@ def fail(up: Running, faults: Faults) -> None:
     up.agent.fail(faults)
 
 
-def heard_late(up: Running) -> int:
-    """Messages that the agent of a faulty FIWARE has handled late."""
-    assert isinstance(up.agent, FaultyAgent)
-    return up.agent.heard_late
-
-
 def faulty_fiware() -> AbstractAsyncContextManager[Running]:
     """On free ports, while the block lasts."""
-    return embedded_fiware(make_agent=FaultyAgent, make_api=FaultyApi)
+    return embedded_fiware(make_agent=FaultyAgent, make_api=faulty_api)
 
 
 def main() -> int:
@@ -137,7 +116,7 @@ def main() -> int:
             iota,
             notify_ready=report_ready,
             make_agent=FaultyAgent,
-            make_api=FaultyApi,
+            make_api=faulty_api,
         )
     )
 

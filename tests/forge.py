@@ -28,7 +28,7 @@ from typing import BinaryIO
 
 PROGRAMS = ("serve", "fiware", "emulator", "robot")
 PARTS = (
-    *("iveg.cli.robot", "iveg.cli.serve", "iveg.lab.pages"),
+    *("iveg.cli.robot", "iveg.cli.serve"),
     *("iveg.lab.commands.emulator", "iveg.lab.commands.fiware"),
     *("anyio._backends._asyncio", "httpcore", "numpy.ma"),
 )

@@ -8,12 +8,12 @@ from iveg.adapters.greenhouses import load_greenhouse
 from iveg.app.virtual import read_direct
 from iveg.domain.observations import Instant
 from iveg.domain.records import DecisionRecord, DetectionRecord
-from iveg.lab.emulator.detector_model import DETECTORS
+from iveg.lab.emulator.camera import DETECTORS
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.scenarios import scenario_named
 from iveg.lab.emulator.world import SimulatedWorld
 from iveg.lab.experiment import stage as staging
-from iveg.lab.experiment.staged_robot import STEP_S
+from iveg.lab.experiment.stage import STEP_S
 from iveg.pipeline.parts import Pipeline
 from iveg.pipeline.things import ThingMarks
 from iveg.web.views import Views
@@ -104,8 +104,8 @@ class Stage:
 
     def mark(self, person_id: str) -> None:
         """An operator says that somebody is no person, for the rest of the day."""
-        evaluator, event_log = self.desk.evaluator, self.desk.parts.event_log
-        marks = ThingMarks(evaluator.people, event_log, evaluator.obstacles.shown)
+        people, event_log = self.desk.evaluator.people, self.desk.parts.event_log
+        marks = ThingMarks(people, event_log)
         marks.mark(person_id, "ana", self.now.wall + 3600.0, self.now)
 
     # --- what iVeg says ---------------------------------------------------------------

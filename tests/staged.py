@@ -5,12 +5,10 @@ from typing import Any
 
 from iveg.domain.events import Condition
 from iveg.domain.feedback import CLEAR, SpeedLimit
-from iveg.domain.margins import SafetyMargin
 from iveg.domain.observations import Hold
-from iveg.domain.rule.premises import Missing
-from iveg.domain.situation.facts import Near, RobotFacts
-from iveg.domain.situation.judge import situation_of
-from iveg.models.situation import Situation
+from iveg.domain.rule.clear import ClearCondition
+from iveg.domain.situation import Near, RobotFacts, situation_of
+from iveg.models.robot import Situation
 from tests.builders import safety_report
 
 
@@ -28,8 +26,8 @@ def facts(**differs: Any) -> RobotFacts:
     return RobotFacts(**{**plain, **differs})
 
 
-def p1(key: str) -> Condition:
-    return Condition.of_robot("P1", key, "AGI")
+def p1(key: str, **slots: Any) -> list[Condition]:
+    return [Condition.of_robot("P1", key, "AGI", **slots)]
 
 
 AISLE_3 = Near("person", "P1", 1.4, "Pasillo 3")
@@ -39,34 +37,37 @@ TOLD = SpeedLimit(0.5, "person", "P1", 1.4)
 LOCKED = safety_report("AGI", Hold("x", "hw", "local"))
 AHEAD = replace(AISLE_3, distance_m=3.4, foretold_s=1.8)
 WALL_OF_CRATES = Near("obstacle", None, 0.9)
-AT_THE_NORTH_END = replace(AISLE_3, lane="Cabecera norte", unseen_s=1.2)
-"""The place with the longest name."""
-MARGIN = SafetyMargin("AGI", "P1", 1.4, 1.3, 0.8, 1.2, 0.1, 0.5)
 
 STAGED = {
     "does not slow": (
-        facts(alert=p1("alert.person_not_slowing"), alert_about=AISLE_3),
+        facts(alerts=p1("alert.person_not_slowing"), alert_about=AISLE_3),
         "danger",
         ("no frena", "persona en el pasillo 3", "pulse PARAR"),
         ("does not slow down", "person in aisle 3", "press STOP"),
     ),
     "lost while moving": (
-        facts(link="LOST", age_s=4.0, alert=p1("alert.moving_robot_lost")),
+        facts(link="LOST", age_s=4.0, alerts=p1("alert.moving_robot_lost")),
         "danger",
-        ("sin contacto desde hace 4 s", "aléjese"),
-        ("no contact for 4 s while moving", "keep away, it should stop"),
+        ("sin contacto desde hace 4 s", "use la seta roja"),
+        ("no contact for 4 s while moving", "use the red button"),
     ),
     "STOP not confirmed": (
-        facts(alert=p1("alert.stop_unconfirmed"), stop="UNCONFIRMED"),
+        facts(alerts=p1("alert.stop_unconfirmed"), stop="UNCONFIRMED"),
         "danger",
         ("parada sin confirmar", "use la seta roja"),
         ("STOP not confirmed", "use the red button"),
     ),
     "STOP not obeyed": (
-        facts(alert=p1("alert.stop_still_moving"), stop="STILL_MOVING"),
+        facts(alerts=p1("alert.stop_still_moving"), stop="STILL_MOVING"),
         "danger",
         ("parada recibida pero se mueve", "use la seta roja"),
         ("STOP received but still moving", "use the red button"),
+    ),
+    "another iVeg": (
+        facts(alerts=p1("alert.another_iveg", boot="b2"), near=AISLE_3, report=HALF),
+        "danger",
+        ("otro iVeg habla a los robots", "apague uno"),
+        ("another iVeg speaks to the robots", "stop one of them"),
     ),
     "half speed": (
         facts(report=HALF, near=AISLE_3, limit=TOLD, told_near=AISLE_3),
@@ -79,18 +80,6 @@ STAGED = {
         "caution",
         ("a media velocidad", "hubo una persona en el pasillo 3", "hace 4 s"),
         ("at half speed", "a person was in aisle 3", "4 s ago"),
-    ),
-    "too close to stop": (
-        facts(margin=MARGIN, margin_near=AISLE_3),
-        "caution",
-        ("faltan 2,3 m para parar a tiempo", "persona en el pasillo 3"),
-        ("2.3 m short of a safe stop", "person in aisle 3"),
-    ),
-    "too close to where somebody was": (
-        facts(margin=MARGIN, margin_near=AT_THE_NORTH_END),
-        "caution",
-        ("faltan 2,3 m", "hubo una persona en la cabecera norte hace 1 s"),
-        ("2.3 m short", "a person was at the north end, 1 s ago"),
     ),
     "a zone ahead": (
         facts(report=HALF, near=AHEAD, limit=TOLD, told_near=AHEAD),
@@ -129,10 +118,37 @@ STAGED = {
         ("a media velocidad", "no le llega nada del servidor", "mire la batería"),
         ("at half speed", "hears nothing from the server", "check battery"),
     ),
+    "a camera is out": (
+        facts(out_of_service_by="Ana"),
+        "doubt",
+        ("sin cámara: fuera de servicio, por Ana", "revise esa cámara"),
+        (
+            "without a camera: taken out of service by Ana",
+            "check that camera",
+        ),
+    ),
+    "a camera is out near somebody": (
+        facts(out_of_service_by="Ana", near=AISLE_3, report=HALF),
+        "caution",
+        ("sin cámara: persona en el pasillo 3 a 1,4 m",),
+        ("without a camera: person in aisle 3 at 1.4 m",),
+    ),
+    "a camera is blind": (
+        facts(alerts=p1("alert.camera_blind", by="AGII")),
+        "doubt",
+        ("su cámara no muestra a nadie donde AGII ve a alguien", "revise esa cámara"),
+        ("its camera shows nobody where AGII sees somebody", "check that camera"),
+    ),
+    "faster than half": (
+        facts(report=HALF, near=AISLE_3, is_slow=False),
+        "caution",
+        ("se le pide ir al 50", "persona en el pasillo 3 a 1,4 m"),
+        ("told to drive at 50%", "person in aisle 3 at 1.4 m"),
+    ),
     "a camera is silent": (
         facts(
             report=safety_report("AGI", speed_factor=0.5, reason="stale"),
-            missing=(Missing("detector", "AGII"),),
+            unmet=(ClearCondition("detector", "AGII"),),
         ),
         "doubt",
         ("a media velocidad", "no se lee la cámara de AGII", "revise esa cámara"),
@@ -167,6 +183,12 @@ STAGED = {
         "locked",
         ("bloqueado por la parada", "rearme con la vía libre"),
         ("locked by STOP", "release it once it is clear"),
+    ),
+    "a low battery": (
+        facts(alerts=p1("alert.battery_low", level=0.18)),
+        "working",
+        ("batería al 18", "llévelo a cargar"),
+        ("battery at 18%", "take it to charge"),
     ),
     "all clear": (
         facts(),

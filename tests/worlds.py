@@ -125,9 +125,9 @@ async def _hold(desk: Desk, robot: str) -> None:
 
 async def _go_on(desk: Desk, seconds: float, speed: float) -> None:
     """Both robots say and see all that they should, and nobody is there."""
-    for _ in range(round(seconds / 0.1)):
+    for step in range(round(seconds / 0.1)):
         for n, robot in enumerate(ROBOTS):
-            desk.drive(robot, 30.0 * n, linear=speed)
+            desk.drive(robot, 30.0 * n + 0.1 * step * speed, linear=speed)
             desk.look(robot)
             desk.report(robot, factor=1.0, reason="clear", linear=speed)
         await desk.wait(0.1)

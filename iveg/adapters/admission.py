@@ -1,20 +1,27 @@
-"""Who is let in: accounts, each change by somebody, from the console or the page.
+"""Admission of people and programs, each change by somebody.
 
-What people are given to come in with is returned once and stored nowhere: of it only a
-digest is kept.
+What people and programs are given to come in with is returned once and stored nowhere:
+of it only a digest is kept.
 """
 
 import secrets
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import replace
-from typing import Final, Protocol
+from typing import Final
 
-from iveg.adapters.ids import new_id
+from iveg.adapters.clock import new_id
 from iveg.domain.accounts import (
+    AccessBook,
+    AccessChange,
     Account,
+    ApiToken,
     PersonRole,
+    TokenScope,
+    another_name,
     digest_of,
     is_name,
+    is_reserved,
+    name_key,
 )
 from iveg.domain.audit import Actor
 from iveg.domain.errors import (
@@ -22,38 +29,31 @@ from iveg.domain.errors import (
     NotANameError,
     ProvidedAccountError,
     SignOnError,
+    UnknownNameError,
 )
+from iveg.domain.records import Json
 from iveg.domain.retention import DAY_S
-from iveg.domain.single_sign_on import another_name
 
 MOST_ACCOUNTS: Final = 1000
 INVITED_S: Final = 3 * DAY_S
 """How long an invitation waits (s)."""
 
 
-class ChangingAccounts(Protocol):
-    """Storage that takes changes of accounts; blocks, raises HopError."""
-
-    def add(self, account: Account, by: Actor) -> None:
-        """Keep a new account. Raises NameTakenError."""
-
-    def change(self, account: Account, action: str, by: Actor) -> None:
-        """Put a new state of an account in the place of the one before."""
-
-
 class Admission:
     """Changes who may come in.
 
     Args:
-        store: Where accounts are kept.
-        by: Who changes them.
+        book: Where that is known.
+        by: Who changes it.
         now: This moment (Unix s).
     """
 
-    def __init__(self, store: ChangingAccounts, by: Actor, now: float) -> None:
-        self._store = store
+    def __init__(self, book: AccessBook, by: Actor, now: float) -> None:
+        self._book = book
         self._by = by
         self._now = now
+
+    # --- people -------------------------------------------------------------------
 
     def add(
         self,
@@ -68,11 +68,10 @@ class Admission:
             NotANameError: nobody may be called so.
             NameTakenError: somebody is called so already.
         """
-        if not is_name(name):
-            raise NotANameError(name)
+        _refuse_name(name)
         account = Account(new_id(), name, role, ends_at=ends_at)
         invitation, invited = self._invited(account, waits_s)
-        self._store.add(invited, self._by)
+        self._add(invited)
         return invitation, invited
 
     def reset(
@@ -82,14 +81,11 @@ class Admission:
 
         Whom the provider vouches for is let in again, and gets no invitation.
         """
+        back = replace(account, disabled=False, since=self._now)
         if account.provider:
-            back = replace(account, disabled=False, since=self._now)
-            self._store.change(back, "account_reset", self._by)
-            return "", back
-        reset = replace(account, password="", pin="", disabled=False, since=self._now)
-        invitation, invited = self._invited(reset, waits_s)
-        self._store.change(invited, "account_reset", self._by)
-        return invitation, invited
+            return "", self._change(back, "account_reset")
+        invitation, invited = self._invited(replace(back, password=""), waits_s)
+        return invitation, self._change(invited, "account_reset")
 
     def give_role(self, account: Account, role: PersonRole) -> Account:
         """Change a role; sessions end.
@@ -100,59 +96,101 @@ class Admission:
         if account.provider:
             raise ProvidedAccountError(account.name)
         changed = replace(account, role=role, since=self._now)
-        self._store.change(changed, "account_role", self._by)
-        return changed
-
-    def give_pin(self, account: Account, pin: str) -> Account:
-        """Put the hash of a PIN in the place of the one before; empty: none."""
-        changed = replace(account, pin=pin)
-        action = "pin_changed" if pin else "pin_removed"
-        self._store.change(changed, action, self._by)
-        return changed
+        return self._change(changed, "account_role")
 
     def disable(self, account: Account) -> Account:
         """Shut somebody out; an invitation that waits is none any more."""
         off = replace(account, disabled=True, invitation="")
-        self._store.change(off, "account_disabled", self._by)
-        return off
+        return self._change(off, "account_disabled")
 
-    def vouched(self, known: Mapping[str, Account], user: Account) -> Account:
+    def give_password(self, account: Account, password: str) -> Account:
+        """Put a hash in the place of another; sessions that began before are over."""
+        changed = replace(account, password=password, since=self._now)
+        return self._change(changed, "password_changed", {})
+
+    def vouched(self, user: Account) -> Account:
         """Let somebody in whom a provider vouches for, under the name that they had.
 
         Another role ends the sessions of the one before.
 
         Args:
-            known: All accounts, by id.
             user: As the provider says.
 
         Raises:
             SignOnError: they are shut out here, or there are too many accounts.
         """
-        account = known.get(user.account_id)
+        account = self._book.accounts.get(user.account_id)
         if account is None:
-            return self._vouched_first(known, user)
+            return self._vouched_first(user)
         if not account.is_open(self._now):
             raise SignOnError("disabled", account.account_id)
         if account.role == user.role:
             return account
         changed = replace(account, role=user.role, since=self._now)
-        self._store.change(changed, "account_role", self._by)
-        return changed
+        return self._change(changed, "account_role")
 
-    def _vouched_first(self, known: Mapping[str, Account], user: Account) -> Account:
-        if len(known) >= MOST_ACCOUNTS:
+    def _vouched_first(self, user: Account) -> Account:
+        if len(self._book.accounts) >= MOST_ACCOUNTS:
             raise SignOnError("busy", f"{MOST_ACCOUNTS} accounts are there already")
+        marked = replace(user, name=another_name(user.name, user.account_id))
         try:
-            self._store.add(user, self._by)
+            return self._add(marked if is_reserved(user.name) else user)
         except NameTakenError:
-            user = replace(user, name=another_name(user.name, user.account_id))
-            self._store.add(user, self._by)
-        return user
+            return self._add(marked)
+
+    def _add(self, account: Account) -> Account:
+        details = {"role": account.role, "ends_at": account.ends_at}
+        return self._change(account, "account_added", details)
+
+    def _change(
+        self, account: Account, action: str, details: Json | None = None
+    ) -> Account:
+        told = {"role": account.role} if details is None else details
+        self._book.apply(AccessChange(self._by, action, account, told))
+        return account
 
     def _invited(self, account: Account, waits_s: float) -> tuple[str, Account]:
         invitation = secrets.token_urlsafe(32)
         digest, until = digest_of(invitation), self._now + waits_s
         return invitation, replace(account, invitation=digest, invited_until=until)
+
+    # --- programs -----------------------------------------------------------------
+
+    def give_token(
+        self, name: str, scope: TokenScope, ends_at: float | None = None
+    ) -> tuple[str, ApiToken]:
+        """Let a program in by a token, which is returned here alone.
+
+        Raises:
+            NotANameError: no program may be called so.
+            NameTakenError: one is called so already.
+        """
+        _refuse_name(name)
+        token = secrets.token_urlsafe(32)
+        made = ApiToken(
+            new_id(), name, scope, digest_of(token), self._now, ends_at=ends_at
+        )
+        details = {"scope": scope, "ends_at": ends_at}
+        self._book.apply(AccessChange(self._by, "token_added", made, details))
+        return token, made
+
+    def revoke(self, name: str) -> None:
+        """Delete a token.
+
+        Raises:
+            UnknownNameError: no program is called so.
+        """
+        for one in self._book.tokens.values():
+            if name_key(one.name) == name_key(name):
+                change = AccessChange(self._by, "token_revoked", one, gone=True)
+                self._book.apply(change)
+                return
+        raise UnknownNameError("token", name)
+
+
+def _refuse_name(name: str) -> None:
+    if not is_name(name) or is_reserved(name):
+        raise NotANameError(name)
 
 
 def has_admin(accounts: Iterable[Account], now: float) -> bool:

@@ -5,8 +5,10 @@ it is, so that no small one unpacks into a large one.
 """
 
 import asyncio
+import socket
 import ssl
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache
 from typing import Final
@@ -14,12 +16,12 @@ from typing import Final
 import httpx
 import orjson
 
-from iveg.adapters.outbound import OutboundHttp
-from iveg.domain.errors import HopError, NoAnswerError, OutboundError
+from iveg.domain.errors import HopError, NoAnswerError
 from iveg.domain.records import Json
 
 TIMEOUT_S: Final = 5.0
 MOST_BYTES: Final = 256 * 1024
+_THREADS: Final = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,8 +54,7 @@ class BoundedJson:
 
     def __init__(self, hop: str, timeout_s: float = TIMEOUT_S) -> None:
         self._hop, self._timeout_s = hop, timeout_s
-        # The server's address is an operator's choice and mostly a private one.
-        self._names = OutboundHttp(lambda _: True, timeout_s=timeout_s)
+        self._names = ThreadPoolExecutor(_THREADS, "names")
         self._client = httpx.AsyncClient(
             transport=_OwnNames(self._names),
             timeout=timeout_s,
@@ -63,7 +64,7 @@ class BoundedJson:
     async def close(self) -> None:
         """Close connections and threads."""
         await self._client.aclose()
-        self._names.close()
+        self._names.shutdown(wait=False, cancel_futures=True)
 
     async def get(
         self,
@@ -98,7 +99,7 @@ class BoundedJson:
         except (TimeoutError, httpx.TimeoutException) as error:
             detail = f"no answer in {self._timeout_s:g} s"
             raise NoAnswerError(self._hop, detail) from error
-        except (httpx.HTTPError, httpx.InvalidURL, OutboundError) as error:
+        except (httpx.HTTPError, httpx.InvalidURL, OSError, UnicodeError) as error:
             # Of the address nothing: its query may hold a token.
             why = type(error).__name__
             raise HopError(self._hop, f"cannot be reached: {why}") from None
@@ -137,14 +138,15 @@ class _OwnNames(httpx.AsyncBaseTransport):
     A name server that hangs would otherwise take the threads of everything else.
     """
 
-    def __init__(self, names: OutboundHttp) -> None:
+    def __init__(self, names: ThreadPoolExecutor) -> None:
         self._names = names
         self._inner = httpx.AsyncHTTPTransport(verify=_believed())
 
     async def handle_async_request(self, request: httpx.Request) -> httpx.Response:
         host = request.url.host
         port = request.url.port or (443 if request.url.scheme == "https" else 80)
-        address = await self._names.resolve(host, port)
+        loop = asyncio.get_running_loop()
+        address = await loop.run_in_executor(self._names, _look_up, host, port)
         # The certificate is checked against the name, and Host keeps it.
         request.extensions["sni_hostname"] = host
         request.url = request.url.copy_with(host=address)
@@ -152,3 +154,9 @@ class _OwnNames(httpx.AsyncBaseTransport):
 
     async def aclose(self) -> None:
         await self._inner.aclose()
+
+
+def _look_up(host: str, port: int) -> str:
+    found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
+    # An address of a link is written with its interface: fe80::1%eth0.
+    return str(found[0][4][0]).partition("%")[0]

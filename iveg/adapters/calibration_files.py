@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from iveg.adapters.toml_files import Table, complaint, read_table, read_text
-from iveg.domain.detection_rule import Class
+from iveg.domain.parameters import Class
 from iveg.domain.tracking.calibration import ANY, Calibration, Calibrations
 
 PAPER = "paper"

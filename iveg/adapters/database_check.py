@@ -4,8 +4,12 @@ from collections.abc import Sequence
 
 from sqlalchemy.exc import DatabaseError
 
-from iveg.adapters.history.engine import reading_engine, sqlite_file
-from iveg.adapters.history.migrate import reason_of, revisions
+from iveg.adapters.history.engine import (
+    reading_engine,
+    reason_of,
+    revisions,
+    sqlite_file,
+)
 from iveg.domain.errors import HopError
 
 

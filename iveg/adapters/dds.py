@@ -1,16 +1,19 @@
 """DDS, the network of ROS 2: a participant and the endpoints on its domain.
 
-Uses Eclipse Cyclone DDS, an optional extra (``iveg[ros2]``); nothing but this module
-and ``dds_entities``, ``dds_types`` and ``dds_watch`` imports it.
+Uses Eclipse Cyclone DDS, an optional extra (``iveg[ros2]``), which nothing but this
+module imports.
 Payloads stay bytes here: DDS checks them against the type, and ``iveg.ros2.cdr`` reads
 the few that are wanted.  None of Cyclone's threads calls iVeg; one thread of ours waits
 for messages that must be answered at once and wakes the event loop.
 """
 
 import asyncio
-from collections.abc import Callable, Sequence
+import threading
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager
+from functools import cache
 from types import TracebackType
+from typing import Any
 
 from cyclonedds.builtin import (
     BuiltinDataReader,
@@ -18,22 +21,311 @@ from cyclonedds.builtin import (
     BuiltinTopicDcpsSubscription,
     DcpsEndpoint,
 )
-from cyclonedds.core import DDSException, InstanceState
+from cyclonedds.core import (
+    DDSException,
+    InstanceState,
+    ReadCondition,
+    SampleState,
+    ViewState,
+    WaitSet,
+)
 from cyclonedds.domain import Domain, DomainParticipant
+from cyclonedds.idl import IdlStruct, make_idl_struct, types
+from cyclonedds.internal import load_cyclonedds
 from cyclonedds.pub import DataWriter
 from cyclonedds.qos import Policy
 from cyclonedds.qos import Qos as DdsQos
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
+from cyclonedds.util import duration
+from rosbags.interfaces import Nodetype
 
-from iveg.adapters.dds_entities import MOST_TAKEN, DdsReader, DdsWriter
-from iveg.adapters.dds_network import DdsNetwork
-from iveg.adapters.dds_types import announced, read_qos, user_data_of, write_qos
-from iveg.adapters.dds_watch import DdsWatch
+from iveg.adapters.dds_network import DdsNetwork, used_of
 from iveg.domain.errors import HopError
-from iveg.ros2.names import Endpoint, Qos, dds_topic, ros_topic, ros_type
-from iveg.ros2.schema import Message
-from iveg.ros2.type_hash import user_data
+from iveg.ros2.cdr import read_user_data, store_of, user_data
+from iveg.ros2.messages import Message
+from iveg.ros2.names import Endpoint, Qos, dds_topic, dds_type, ros_topic, ros_type
+
+# --- types and qualities of service ------------------------------------------------
+#
+# Types and qualities of service of ROS 2 in the words of Cyclone DDS.
+
+_PLAIN = {"bool": bool, "string": str}
+
+
+def _leave_in_bytes(kind: type[IdlStruct]) -> None:
+    """Let samples of a type of ours stay bytes: ``iveg.ros2.cdr`` reads them.
+
+    Cyclone's reader and writer ask a type to deserialize and serialize its samples, and
+    a base of ours would be announced with it.
+    """
+
+    def deserialize(cls: type[IdlStruct], data: bytes, /, **_: object) -> IdlStruct:
+        made = cls()
+        made.payload = data
+        return made
+
+    kind.deserialize = classmethod(deserialize)
+    kind.deserialize_key = classmethod(deserialize)
+    kind.serialize = lambda sample, **_: sample.payload
+
+
+@cache
+def announced(message: type[Message]) -> type[IdlStruct]:
+    """The type that DDS announces for a message."""
+    return structure(store_of(message), message.ROS, _in_bytes)
+
+
+@cache
+def unread(message: type[Message]) -> type[IdlStruct]:
+    """A type of the same name by which DDS passes on all bytes, whatever they are.
+
+    It fits those alone who announce no fields.
+    """
+    return _in_bytes(message.ROS, {"unread": types.uint8})
+
+
+def _in_bytes(ros: str, members: dict[str, object]) -> type[IdlStruct]:
+    kind = struct_of(ros, members, dataclassify=False)
+    _leave_in_bytes(kind)
+    return kind
+
+
+def struct_of(
+    ros: str, members: dict[str, object], *, dataclassify: bool = True
+) -> type[IdlStruct]:
+    """A type in Cyclone's words, by its ROS name."""
+    typename = dds_type(ros).replace("::", ".")
+    name = ros.rpartition("/")[2]
+    kind: type[IdlStruct] = make_idl_struct(
+        name, typename, members, dataclassify=dataclassify
+    )
+    return kind
+
+
+_Make = Callable[[str, dict[str, object]], type[IdlStruct]]
+
+
+@cache
+def structure(store: Any, ros: str, make: _Make) -> type[IdlStruct]:
+    """A type of the store, with all within it; ``make`` is given name and members."""
+
+    def idl(kind: Any) -> Any:
+        match kind:
+            case (Nodetype.NAME, nested):
+                return structure(store, nested, make)
+            case (Nodetype.SEQUENCE, (inner, _)):
+                return types.sequence[idl(inner)]
+            case (Nodetype.ARRAY, (inner, count)):
+                return types.array[idl(inner), count]
+            case (_, (name, _)):
+                return _PLAIN.get(name) or getattr(types, name)
+
+    _, fields = store.fielddefs[ros]
+    return make(ros, {name: idl(kind) for name, kind in fields})
+
+
+def write_qos(qos: Qos) -> DdsQos:
+    """A quality of service in Cyclone's words, and what ROS 2 adds to each."""
+    reliability = (
+        Policy.Reliability.Reliable(duration(milliseconds=100))
+        if qos.reliable
+        else Policy.Reliability.BestEffort
+    )
+    durability = (
+        Policy.Durability.TransientLocal
+        if qos.transient_local
+        else Policy.Durability.Volatile
+    )
+    history = Policy.History.KeepLast(qos.depth)
+    return DdsQos(
+        reliability,
+        durability,
+        history,
+        # A late reader gets as many as an early one could have kept.
+        Policy.DurabilityService(0, history, -1, -1, -1),
+        # ROS 2 sends and takes plain CDR of version 1.
+        Policy.DataRepresentation(use_cdrv0_representation=True),
+        # Its endpoints name the members of a type freely, or give no type.
+        Policy.TypeConsistency.AllowTypeCoercion(ignore_member_names=True),
+    )
+
+
+def read_qos(qos: DdsQos) -> Qos:
+    """The quality of service that another program announces, in our words."""
+    history = qos[Policy.History]
+    return Qos(
+        isinstance(qos[Policy.Reliability], Policy.Reliability.Reliable),
+        qos[Policy.Durability] != Policy.Durability.Volatile,
+        getattr(history, "depth", 0),
+    )
+
+
+def user_data_of(qos: DdsQos) -> tuple[str, str]:
+    """Type hash and gate in an endpoint's user data; empty where it has none."""
+    policy = qos[Policy.Userdata]
+    return read_user_data(b"" if policy is None else bytes(policy.data))
+
+
+# --- endpoints ----------------------------------------------------------------------
+#
+# A subscription and a publication of DDS: raw payloads in and out.
+
+MOST_TAKEN = 200
+_FEW = 8
+"""Cyclone makes room for as many as are asked for, and mostly one waits."""
+
+
+def _count(matched: Callable[[], list[int]]) -> int:
+    """Number of the other side's; Cyclone's Python fails where one joins meanwhile."""
+    try:
+        return len(matched())
+    except IndexError:
+        return _count(matched)
+    except DDSException as error:
+        raise HopError("dds", error.msg) from error
+
+
+class DdsReader:
+    """A subscription."""
+
+    def __init__(self, reader: DataReader) -> None:
+        self._reader: DataReader | None = reader
+
+    def take(self) -> list[bytes]:
+        """Every waiting message, oldest first.
+
+        Raises:
+            HopError: DDS refuses.
+        """
+        found = self._take(_FEW)
+        if len(found) == _FEW:
+            found += self._take(MOST_TAKEN)
+        return [one.payload for one in found if one.sample_info.valid_data]
+
+    def _take(self, most: int) -> list[IdlStruct]:
+        try:
+            found: list[IdlStruct] = self.entity.take(most)
+        except DDSException as error:
+            raise HopError("dds", error.msg) from error
+        return found
+
+    @property
+    def entity(self) -> DataReader:
+        """Cyclone's.
+
+        Raises:
+            HopError: closed.
+        """
+        if self._reader is None:
+            raise HopError("dds", "closed")
+        return self._reader
+
+    @property
+    def writers(self) -> int:
+        """Number of writers that serve it."""
+        return _count(self.entity.get_matched_publications)
+
+    def close(self) -> None:
+        """Let go of Cyclone's entity."""
+        self._reader = None
+
+
+class DdsWriter:
+    """A publication."""
+
+    def __init__(self, writer: DataWriter, topic: Topic) -> None:
+        self._writer: DataWriter | None = writer
+        self._kind: type[IdlStruct] = topic.data_type
+
+    def write(self, payload: bytes) -> None:
+        """Send a message with its encapsulation.
+
+        Raises:
+            HopError: DDS refuses, or closed.
+        """
+        try:
+            self._entity.write(self._kind.deserialize(payload))
+        except DDSException as error:
+            raise HopError("dds", error.msg) from error
+
+    @property
+    def _entity(self) -> DataWriter:
+        if self._writer is None:
+            raise HopError("dds", "closed")
+        return self._writer
+
+    @property
+    def readers(self) -> int:
+        """Number of readers that it serves."""
+        return _count(self._entity.get_matched_subscriptions)
+
+    def close(self) -> None:
+        """Let go of Cyclone's entity."""
+        self._writer = None
+
+
+# --- waiting ------------------------------------------------------------------------
+#
+# A thread that waits for data of DDS and wakes the event loop.
+
+_WAIT_MS = 250
+_REARM_S = 0.002
+
+
+class DdsWatch:
+    """A thread that waits for data and wakes the loop, which takes them."""
+
+    def __init__(
+        self,
+        participant: DomainParticipant,
+        readers: Iterable[DdsReader],
+        loop: asyncio.AbstractEventLoop,
+        on_data: Callable[[], None],
+    ) -> None:
+        self._waitset = WaitSet(participant)
+        mask = SampleState.NotRead | ViewState.Any | InstanceState.Any
+        self._conditions = [ReadCondition(one.entity, mask) for one in readers]
+        for condition in self._conditions:
+            self._waitset.attach(condition)
+        self._loop, self._on_data = loop, on_data
+        self._ended = threading.Event()
+        # Nobody lets go of it: to wait for it is the cheapest rest.
+        self._rest = threading.Lock()
+        self._rest.acquire()
+        self._is_announced = False
+        self._thread = threading.Thread(target=self._wait, name="dds", daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End the thread."""
+        self._ended.set()
+        self._thread.join()
+
+    def _wait(self) -> None:
+        while not self._ended.is_set():
+            if not self._waitset.wait(duration(milliseconds=_WAIT_MS)):
+                continue
+            if not self._is_announced:
+                self._is_announced = True
+                try:
+                    self._loop.call_soon_threadsafe(self._tell)
+                except RuntimeError:  # the loop has closed
+                    return
+            # The loop takes what came meanwhile; a flood wakes it no more often.
+            self._rest.acquire(timeout=_REARM_S)
+
+    def _tell(self) -> None:
+        # First, so that a sample which on_data just misses is announced again.
+        self._is_announced = False
+        if not self._ended.is_set():
+            self._on_data()
+
+
+# --- a participant ------------------------------------------------------------------
+
+_FATAL = 1
+"""The only category of its log that Cyclone still writes, once it runs."""
 
 
 class Dds(AbstractContextManager["Dds"]):
@@ -48,17 +340,19 @@ class Dds(AbstractContextManager["Dds"]):
     """
 
     def __init__(self, network: DdsNetwork, gate: str = "") -> None:
-        self._gate = gate
+        self._gate, self._network = gate, network
         self._watches: list[DdsWatch] = []
-        self._topics: dict[tuple[str, str], Topic] = {}
+        self._topics: dict[tuple[str, type], Topic] = {}
         self._own: list[DdsReader | DdsWriter] = []
         self._endpoints: dict[str, Endpoint] = {}
         try:
-            _configure(network)
+            self._used = _configure(network)
             self._participant = DomainParticipant(network.domain)
         except DDSException as error:
             detail = f"no participant on domain {network.domain}: {error.msg}"
             raise HopError("dds", detail) from error
+        # A peer that is switched off fails a hundred times in two seconds, each a line.
+        load_cyclonedds().dds_set_log_mask(_FATAL)
         self._guid = str(self._participant.guid)
         self._discovery = [
             (BuiltinDataReader(self._participant, topic), writes)
@@ -88,10 +382,13 @@ class Dds(AbstractContextManager["Dds"]):
 
     # --- endpoints of ours --------------------------------------------------------
 
-    def reader(self, name: str, message: type[Message], qos: Qos) -> "DdsReader":
-        """Subscribe to a topic by its full ROS name."""
+    def reader(
+        self, name: str, message: type[Message], qos: Qos, *, raw: bool = False
+    ) -> "DdsReader":
+        """Subscribe to a topic by its full ROS name; ``raw``: whatever its fields."""
         policies = self._policies(message, qos)
-        reader = DataReader(self._participant, self._topic(name, message), policies)
+        topic = self._topic(name, message, raw=raw)
+        reader = DataReader(self._participant, topic, policies)
         made = DdsReader(reader)
         self._own.append(made)
         return made
@@ -108,10 +405,10 @@ class Dds(AbstractContextManager["Dds"]):
         data = Policy.Userdata(user_data(message, self._gate))
         return DdsQos(data, base=write_qos(qos))
 
-    def _topic(self, name: str, message: type[Message]) -> Topic:
-        key = name, message.ROS
+    def _topic(self, name: str, message: type[Message], *, raw: bool = False) -> Topic:
+        kind = unread(message) if raw else announced(message)
+        key = name, kind
         if key not in self._topics:
-            kind = announced(message)
             self._topics[key] = Topic(self._participant, dds_topic(name), kind)
         return self._topics[key]
 
@@ -128,40 +425,60 @@ class Dds(AbstractContextManager["Dds"]):
     # --- endpoints of others ------------------------------------------------------
 
     def endpoints(self) -> tuple[Endpoint, ...]:
-        """All ROS writers and readers on the domain, this participant's among them."""
+        """All ROS writers and readers on the domain, this participant's among them.
+
+        Those that came and went since the last call are told once.
+        """
+        gone: list[Endpoint] = []
         for reader, writes in self._discovery:
             for sample in reader.take(MOST_TAKEN):
-                self._note(sample, writes)
-        return tuple(self._endpoints.values())
+                key, found = str(sample.key), self._endpoint(sample, writes)
+                known = self._endpoints.pop(key, None)
+                if found is None:
+                    continue
+                if sample.sample_info.instance_state == InstanceState.Alive:
+                    self._endpoints[key] = found
+                elif known is None:
+                    gone.append(found)
+        return *self._endpoints.values(), *gone
 
-    def _note(self, sample: DcpsEndpoint, writes: bool) -> None:
-        key = str(sample.key)
-        if sample.sample_info.instance_state != InstanceState.Alive:
-            self._endpoints.pop(key, None)
-            return
-        topic = ros_topic(sample.topic_name)
+    def unheard(self) -> tuple[str, ...]:
+        """Interfaces where nobody is met: too many, or come since the start."""
+        return tuple(
+            name
+            for name, address in self._network.interfaces().items()
+            if self._used.get(name) != address
+        )
+
+    def _endpoint(self, sample: DcpsEndpoint, writes: bool) -> Endpoint | None:
+        # An invalid sample tells the end of an endpoint and nothing about it.
+        topic = ros_topic(sample.topic_name or "")
         if topic is None:
-            return
-        self._endpoints[key] = Endpoint(
+            return None
+        return Endpoint(
             topic,
             ros_type(sample.type_name),
             writes,
             read_qos(sample.qos),
             str(sample.participant_key) == self._guid,
             *user_data_of(sample.qos),
+            sample.type_id is not None,
         )
 
 
 # --- Cyclone's side ----------------------------------------------------------------
 
-_configured: dict[int, tuple[str, Domain]] = {}
+_configured: dict[int, tuple[str, dict[str, str], Domain]] = {}
 """Cyclone takes one configuration a domain and process, at its first participant."""
 
 
-def _configure(network: DdsNetwork) -> None:
+def _configure(network: DdsNetwork) -> dict[str, str]:
+    """Configure the domain; returns the interfaces that it uses."""
     config = network.config()
-    known = _configured.get(network.domain)
-    if known is None:
-        _configured[network.domain] = config, Domain(network.domain, config)
-    elif known[0] != config:
+    if network.domain not in _configured:
+        used = used_of(network.interfaces())
+        _configured[network.domain] = config, used, Domain(network.domain, config)
+    known, used, _ = _configured[network.domain]
+    if known != config:
         raise HopError("dds", f"domain {network.domain} is configured otherwise")
+    return used

@@ -1,23 +1,40 @@
 """The network that DDS runs on, as Cyclone is configured for it."""
 
+import socket
+import struct
+from contextlib import suppress
 from dataclasses import dataclass
+from fcntl import ioctl
+from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
+from iveg.domain.errors import HopError
+
 _LEASE = "3 s"
-"""How long others remember a participant that died without a word."""
-
-
-_MOST_PARTICIPANTS = 60
+"""Time that others remember a participant that died without a word."""
+_ASKED_EVERY = "2 s"
+"""Time between two announcements of ours, and two questions to silent peers."""
+_ASIDE = 'multicast="true" priority="-1"'
+"""For loopback: Cyclone would ask peers on other hosts from its first choice."""
+_MOST_PARTICIPANTS = 119
+"""As many as a domain has ports for on one machine."""
+_MOST_INTERFACES = 4
+"""Cyclone refuses more."""
+_LOOPBACK = "127.0.0.1"
+_SIOCGIFADDR = 0x8915
+_UP = 1
 
 
 @dataclass(frozen=True, slots=True)
 class DdsNetwork:
     """Domain, interface and peers of the network.
 
+    Loopback is always used, and asked one by one like a peer: nodes may be bound to it.
+
     Attributes:
         domain: 0 to 232, as ``ROS_DOMAIN_ID``.
-        interface: Network interface by name or address; empty: Cyclone's choice.
-        peers: Addresses to ask instead of the whole network; none: multicast.
+        interface: The only one beside loopback, by name or address; empty: all.
+        peers: Addresses to ask one by one, where multicast does not pass.
         uri: What ``CYCLONEDDS_URI`` says; counts where nothing above does.
     """
 
@@ -26,26 +43,99 @@ class DdsNetwork:
     peers: tuple[str, ...] = ()
     uri: str = ""
 
+    def interfaces(self) -> dict[str, str]:
+        """Address of each interface that belongs to the network now, by name.
+
+        Empty where ``CYCLONEDDS_URI`` chooses.
+        """
+        if self.interface:
+            return {
+                name: address
+                for name, address in _addresses().items()
+                if self.interface in (name, address) or _is_loopback(address)
+            }
+        return {} if self.uri else _addresses()
+
     def config(self) -> str:
-        """Cyclone's configuration, one fragment after the other."""
+        """Cyclone's configuration, one fragment after the other.
+
+        Raises:
+            HopError: the interface, or an address of a peer, does not exist.
+        """
         return ",".join(part for part in (self.uri, self._own()) if part)
 
     def _own(self) -> str:
         general = discovery = ""
-        if self.interface:
-            key = "address" if self.interface[0].isdigit() else "name"
-            one = f"{key}={quoteattr(self.interface)}"
-            general += f"<Interfaces><NetworkInterface {one}/></Interfaces>"
-        if self.peers:
-            general += "<AllowMulticast>false</AllowMulticast>"
-            peers = "".join(f"<Peer address={quoteattr(one)}/>" for one in self.peers)
+        found = self.interfaces()
+        if self.interface and self.interface not in (*found, *found.values()):
+            there = ", ".join(_addresses())
+            detail = f"no interface {self.interface}; there are {there}"
+            raise HopError("dds", detail)
+        used = "".join(
+            f"<NetworkInterface name={quoteattr(name)}"
+            f" {_ASIDE * _is_loopback(address)}/>"
+            for name, address in used_of(found).items()
+        )
+        if used:
+            general = f"<Interfaces>{used}</Interfaces>"
+        if used or self.peers:
+            general += "<AllowMulticast>spdp</AllowMulticast>"
             discovery = (
                 "<ParticipantIndex>auto</ParticipantIndex>"
                 f"<MaxAutoParticipantIndex>{_MOST_PARTICIPANTS}"
-                f"</MaxAutoParticipantIndex><Peers>{peers}</Peers>"
+                f"</MaxAutoParticipantIndex><Peers>{self._asked()}</Peers>"
             )
-        discovery += f"<LeaseDuration>{_LEASE}</LeaseDuration>"
+        discovery += (
+            f"<LeaseDuration>{_LEASE}</LeaseDuration>"
+            f"<SPDPInterval>{_ASKED_EVERY}</SPDPInterval>"
+        )
         return (
             f'<CycloneDDS><Domain Id="any"><General>{general}</General>'
             f"<Discovery>{discovery}</Discovery></Domain></CycloneDDS>"
         )
+
+    def _asked(self) -> str:
+        """Peers, asked for ever: Cyclone forgets one that is silent for 30 s."""
+        for peer in self.peers:
+            host = peer.partition(":")[0] if peer.count(":") == 1 else peer
+            try:
+                # Cyclone aborts the process for an unknown one.
+                socket.gethostbyname(host)
+            except OSError as error:
+                raise HopError("dds", f"peer {peer}: {error.strerror}") from error
+        return "".join(
+            f'<Peer address={quoteattr(peer)} PruneDelay="inf"/>'
+            for peer in dict.fromkeys((_LOOPBACK, *self.peers))
+        )
+
+
+def used_of(interfaces: dict[str, str]) -> dict[str, str]:
+    """Those that Cyclone uses: loopback, and hardware before bridges and tunnels.
+
+    Loopback is last, as Cyclone asks peers from the first.
+    """
+    here = [name for name in interfaces if _is_loopback(interfaces[name])][:1]
+    others = sorted(
+        (name for name in interfaces if not _is_loopback(interfaces[name])),
+        key=lambda name: not Path("/sys/class/net", name, "device").exists(),
+    )
+    names = others[: _MOST_INTERFACES - len(here)] + here
+    return {name: interfaces[name] for name in names}
+
+
+def _is_loopback(address: str) -> bool:
+    return address.startswith("127.")
+
+
+def _addresses() -> dict[str, str]:
+    """IPv4 address of each interface of this machine that is up and has one."""
+    found: dict[str, str] = {}
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        for _, name in socket.if_nameindex():
+            # An interface may go between two questions.
+            with suppress(OSError):
+                flags = Path("/sys/class/net", name, "flags").read_text("ascii")
+                answer = ioctl(probe, _SIOCGIFADDR, struct.pack("40s", name.encode()))
+                if int(flags, 16) & _UP:
+                    found[name] = socket.inet_ntoa(answer[20:24])
+    return found

@@ -19,7 +19,6 @@ from iveg.domain.observations import (
 from iveg.domain.transports import DIRECT
 from iveg.ngsi import codec, names
 
-PassedOver = Callable[[str, type[Observation], int], None]
 Recorded = Callable[[str, bytes, Instant], None]
 _WIDER: Sequence[Scope] = ("off", "safety", "all")
 
@@ -56,8 +55,6 @@ class DirectReader:
         enqueue: Where observations go; ``reject`` where the unreadable is counted.
         scope: What is read; ``safety`` leaves poses, scans and intent to FIWARE.
         is_past: Tells by its identity what FIWARE has already brought.
-        passed_over: Told of a robot's messages of one kind that reached the broker and
-            were not read, because a newer one was there.
         recorded: Told of each message that is read: topic, payload, and when.
     """
 
@@ -70,14 +67,12 @@ class DirectReader:
         reject: Callable[[str, str, str], None],
         scope: Scope = "all",
         is_past: codec.IsPast | None = None,
-        passed_over: PassedOver = lambda _robot, _kind, _count: None,
         recorded: Recorded = lambda *_: None,
     ) -> None:
         self._clock = clock
         self._enqueue = enqueue
         self._reject = reject
         self._is_past = is_past
-        self._passed_over = passed_over
         self._recorded = recorded
         kinds = _read_in(scope)
         self._kinds = tuple(kind.of for kind in kinds)
@@ -122,11 +117,11 @@ class DirectReader:
             return None
         return source.robot_id, source.kind
 
-    def pass_over(self, topic: str, count: int) -> None:
-        """So many messages of a topic came and were overtaken before they were read."""
+    def refuse_stored(self, topic: str, _: bytes) -> None:
+        """Count a message that the broker had retained: nobody knows how old it is."""
         source = self._sources.get(topic)
-        if source is not None and source.kind is not None:
-            self._passed_over(source.robot_id, source.kind, count)
+        if source is not None:
+            self._reject(source.robot_id, "retained", topic)
 
     def read(self, topic: str, payload: bytes) -> None:
         """Take one message."""
@@ -135,7 +130,6 @@ class DirectReader:
             return
         at = self._clock()
         if self._is_early(source, at.mono):
-            self.pass_over(topic, 1)
             return
         self._recorded(topic, payload, at)
         reading = source.read(payload)

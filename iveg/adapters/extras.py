@@ -1,8 +1,8 @@
 """Libraries that only some commands need: the extras of the package (pyproject.toml).
 
 A site that runs ``iveg serve`` on a real FIWARE installs neither a driver of
-PostgreSQL nor a reader of bags.  A command that needs one asks here first, so that all
-of them say in the same words what is missing.
+PostgreSQL nor DDS.  A command that needs one asks here first, so that all of them say
+in the same words what is missing.
 """
 
 from importlib.util import find_spec
@@ -11,10 +11,6 @@ from typing import Final
 from iveg.domain.errors import MissingExtraError
 
 EXTRAS: Final = {
-    "bags": "rosbags",
-    "foxglove": "foxglove",
-    "parquet": "pyarrow",
-    "passkeys": "webauthn",
     "postgresql": "psycopg",
     "ros2": "cyclonedds",
     "sso": "authlib",

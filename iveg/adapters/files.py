@@ -2,25 +2,74 @@
 
 Each file begins with a line that names its content and version; a file without that
 line is of version 0.  A file of a newer iVeg is refused.
+
+Room on the disk of a directory.
+
+How processes beside the server keep out of its way.
+
+One program for each robot of a machine: a lock that ends with its process.
+
+One value for each robot, in a small file of JSON lines that is replaced as a whole.
+
+A file that cannot be read is put aside, and nothing of it counts: each detector is
+waited for then.
 """
 
 import asyncio
 import contextlib
+import fcntl
 import logging
 import os
-from collections.abc import Callable, Iterable, Iterator
+import shutil
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, TypeVar
+from typing import Generic, TypeVar
 
 import orjson
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from iveg.domain.errors import DataFileError, HopError
+from iveg.domain.retention import DiskSpace
+
+
+def disk_space(directory: Path) -> DiskSpace:
+    """Room on the disk of a directory.
+
+    Raises:
+        OSError: it cannot be read.
+    """
+    usage = shutil.disk_usage(directory)
+    return DiskSpace(usage.free, usage.total)
+
+
+LESS_URGENT = 10
+"""Of a process whose work may be late."""
+_FIRST_TO_GO = "1000"
+
+
+def give_way(less_urgent: int = LESS_URGENT) -> None:
+    """Let this process run where others leave room.
+
+    Its priority is so much lower (nice), and on Linux it is a batch: one that wakes
+    takes no other's place on a processor (sched(7), ``SCHED_BATCH``).  Where memory
+    runs out the kernel ends it, and not the server (proc_pid_oom_score_adj(5)).
+    """
+    os.nice(less_urgent)
+    if hasattr(os, "SCHED_BATCH"):
+        # Some containers allow no change; being late is all that is lost.
+        with contextlib.suppress(OSError):
+            os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
+    with contextlib.suppress(OSError):
+        Path("/proc/self/oom_score_adj").write_text(_FIRST_TO_GO)
+
 
 _log = logging.getLogger(__name__)
 
 _OWNER_ALONE = 0o600
+RESERVE_BYTES = 2**20
+"""Taken from the disk ahead for a file that a full disk must not end."""
 _T = TypeVar("_T")
 
 
@@ -37,14 +86,16 @@ class Form:
         return orjson.dumps({"iveg": self.name, "version": self.version}) + b"\n"
 
 
-def write_lines(path: Path, form: Form, values: Iterable[object]) -> None:
+def write_lines(path: Path, form: Form, values: Iterable[object]) -> os.stat_result:
     """Replace a file; a reader finds the old or the new one, never a part.
+
+    Returns what the file is, as long as nobody else changes it.
 
     Raises:
         OSError: the disk did not take it; the old file stands.
     """
     lines = (orjson.dumps(value) + b"\n" for value in values)
-    write_bytes(path, form.line + b"".join(lines))
+    return write_bytes(path, form.line + b"".join(lines))
 
 
 async def save_lines(path: Path, form: Form, values: Iterable[object]) -> None:
@@ -59,7 +110,7 @@ async def save_lines(path: Path, form: Form, values: Iterable[object]) -> None:
         raise HopError("disk", str(error)) from error
 
 
-def write_bytes(path: Path, content: bytes) -> None:
+def write_bytes(path: Path, content: bytes) -> os.stat_result:
     """The same of any content: written beside, synced, then moved.
 
     Raises:
@@ -68,17 +119,24 @@ def write_bytes(path: Path, content: bytes) -> None:
     beside = path.with_name(path.name + ".new")
     beside.unlink(missing_ok=True)
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL
-    with os.fdopen(os.open(beside, flags, _OWNER_ALONE), "wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
-    beside.replace(path)
+    try:
+        with os.fdopen(os.open(beside, flags, _OWNER_ALONE), "wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+            written = os.fstat(file.fileno())
+        beside.replace(path)
+    except OSError:
+        # A full disk needs each byte.
+        beside.unlink(missing_ok=True)
+        raise
     directory = os.open(path.parent, os.O_RDONLY)
     try:
         # Else the move itself may be lost with the power.
         os.fsync(directory)
     finally:
         os.close(directory)
+    return written
 
 
 def read_lines(path: Path, form: Form) -> Iterator[tuple[int, bytes]]:
@@ -89,7 +147,8 @@ def read_lines(path: Path, form: Form) -> Iterator[tuple[int, bytes]]:
         OSError: it cannot be read.
     """
     try:
-        lines = path.read_bytes().splitlines()
+        # Zeros behind the last line are a reserve (``ReservedFile``).
+        lines = path.read_bytes().rstrip(b"\0").splitlines()
     except FileNotFoundError:
         return
     for number, line in enumerate(lines, 1):
@@ -153,50 +212,140 @@ def make_private(path: Path) -> None:
             path.chmod(_OWNER_ALONE)
 
 
-class AppendedFile:
-    """A file that grows by lines, each on the disk before ``append`` returns."""
+class ReservedFile:
+    """A file that grows by lines, each on the disk before ``append`` returns.
+
+    Room for lines to come is taken from the disk ahead, as zeros behind the last line:
+    a disk that is full later does not end it.
+
+    Attributes:
+        size: Bytes of its lines, once it is open.
+    """
 
     def __init__(self, path: Path, form: Form) -> None:
+        self.size = 0
         self._path = path
         self._form = form
-        self._file: IO[bytes] | None = None
+        self._descriptor: int | None = None
+        self._room = 0
         self._is_torn = False
         """The last line may be half written: the next one must not be glued to it."""
 
-    def append(self, value: object) -> None:
-        """Append one line.
+    def open(self) -> int:
+        """Open it, made where it is missing, and take its reserve from the disk.
 
         Raises:
-            OSError: the disk did not take it.
+            OSError: it cannot be opened; likewise below.
         """
-        line = orjson.dumps(value) + b"\n"
-        file = self._file or self._open()
-        if self._is_torn:
-            line = b"\n" + line
-        self._is_torn = True
-        written = file.write(line)
-        os.fsync(file.fileno())
-        if written != len(line):
-            raise OSError(f"{written} of {len(line)} bytes written")
-        self._is_torn = False
+        if self._descriptor is None:
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            if not self._path.exists():
+                write_bytes(self._path, self._form.line)
+            content = self._path.read_bytes()
+            lines = content.rstrip(b"\0")
+            self._is_torn = lines[-1:] not in (b"", b"\n")
+            self.size, self._room = len(lines), len(content)
+            self._descriptor = os.open(self._path, os.O_RDWR)
+            self._keep_room(self._descriptor)
+        return self._descriptor
 
-    def _open(self) -> IO[bytes]:
-        self._path.parent.mkdir(parents=True, exist_ok=True)
-        if not self._path.exists():
-            write_bytes(self._path, self._form.line)
-        self._file = self._path.open("a+b", buffering=0)
-        self._is_torn = not _ends_a_line(self._file)
-        return self._file
+    def append(self, lines: bytes) -> None:
+        """Append whole lines; after an error none of them is in it."""
+        descriptor = self.open()
+        if self._is_torn:
+            lines = b"\n" + lines
+        try:
+            written = os.pwrite(descriptor, lines, self.size)
+            os.fsync(descriptor)
+            if written != len(lines):
+                raise OSError(f"{written} of {len(lines)} bytes written")
+        except OSError:
+            self.close()
+            raise
+        self.size += len(lines)
+        self._is_torn = False
+        self._keep_room(descriptor)
+
+    def rewrite(self, lines: bytes) -> None:
+        """Replace its lines; after an error the old ones stand."""
+        write_bytes(self._path, self._form.line + lines + bytes(2 * RESERVE_BYTES))
+        if self._descriptor is not None:
+            os.close(self._descriptor)
+            self._descriptor = None
+        self.open()
 
     def close(self) -> None:
-        """Let the file go; the next line opens it again."""
-        if self._file is not None:
-            self._file.close()
-            self._file = None
+        """Let the file go, without its reserve; the next line opens it again."""
+        if self._descriptor is not None:
+            with contextlib.suppress(OSError):
+                os.ftruncate(self._descriptor, self.size)
+            os.close(self._descriptor)
+            self._descriptor = None
+
+    def _keep_room(self, descriptor: int) -> None:
+        self._room = max(self._room, self.size)
+        if self._room - self.size < RESERVE_BYTES:
+            # Zeros are written out: a hole in a sparse file reserves nothing.
+            wanted = bytes(self.size + 2 * RESERVE_BYTES - self._room)
+            with contextlib.suppress(OSError):
+                self._room += os.pwrite(descriptor, wanted, self._room)
 
 
-def _ends_a_line(file: IO[bytes]) -> bool:
-    if file.seek(0, os.SEEK_END) == 0:
-        return True
-    file.seek(-1, os.SEEK_END)
-    return file.read(1) == b"\n"
+@contextmanager
+def lease(file: Path, what: str) -> Iterator[None]:
+    """Hold a lock within ``with``; the kernel frees the lock of a killed process.
+
+    Args:
+        file: Where; its folder is made.
+        what: Who is leased, for the refusal.
+
+    Raises:
+        HopError: somebody holds it.
+    """
+    file.parent.mkdir(parents=True, exist_ok=True)
+    handle = os.open(file, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+    try:
+        _lock(handle, what)
+        os.ftruncate(handle, 0)
+        os.pwrite(handle, str(os.getpid()).encode(), 0)
+        yield
+    finally:
+        os.close(handle)
+
+
+def _lock(handle: int, what: str) -> None:
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        held_by = os.pread(handle, 32, 0).decode(errors="replace").strip()
+        detail = f"{what} is driven already, by process {held_by or '?'}"
+        raise HopError("lease", detail) from error
+
+
+class FileByRobot(Generic[_T]):
+    """Implements ``pipeline.ports.ChoiceStore``.
+
+    Args:
+        path: The file.
+        name: What it holds; stands in its first line.
+        reader: Reads a robot's id and value.
+    """
+
+    def __init__(
+        self, path: Path, name: str, reader: TypeAdapter[tuple[str, _T]]
+    ) -> None:
+        self._path = path
+        self._form = Form(name)
+        self._reader = reader
+
+    def load(self) -> Mapping[str, _T]:
+        """The stored ones, by robot."""
+        return dict(load_lines(self._path, self._form, self._reader.validate_json))
+
+    async def save(self, known: Mapping[str, _T]) -> None:
+        """Replace the stored ones; returns when they are on disk.
+
+        Raises:
+            HopError: the disk did not take them.
+        """
+        await save_lines(self._path, self._form, known.items())

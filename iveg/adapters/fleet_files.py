@@ -14,11 +14,13 @@ from typing import Annotated, Literal, Self
 
 from pydantic import (
     AfterValidator,
+    BeforeValidator,
     Field,
     model_validator,
 )
 
 from iveg.adapters.toml_files import Table, complaint, read_table, read_text
+from iveg.domain.errors import UnreadableError
 from iveg.domain.fleet import (
     CAUTIOUS,
     FleetDescription,
@@ -30,6 +32,7 @@ from iveg.domain.fleet import (
     split_word,
 )
 from iveg.domain.geometry import Pose2D
+from iveg.domain.words import read_classes
 
 
 def load_fleet(file: str = "", words: Sequence[str] = ()) -> FleetDescription:
@@ -86,9 +89,19 @@ def _checked_id(text: str) -> str:
     return text
 
 
+def _classes(text: object) -> object:
+    if not isinstance(text, str):
+        raise ValueError("must be a text with a name on each line")
+    try:
+        return read_classes(text)
+    except UnreadableError as error:
+        raise ValueError(f"{error.reason} has {error.detail}") from error
+
+
 _Place = Annotated[float, Field(ge=-20, le=20)]
 _Angle = Annotated[float, Field(ge=-math.tau, le=math.tau)]
 _Metres = Annotated[float, Field(gt=0, le=20)]
+_FrameName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_]{1,64}$")]
 _Acceleration = Annotated[float, Field(gt=0, le=20)]
 
 
@@ -121,6 +134,7 @@ class _Camera(Table):
     fov_deg: Annotated[float, Field(gt=0, le=360)]
     range_m: Annotated[float, Field(gt=0, le=100)]
     unlabelled_frame: Frame | None = None
+    frame: _FrameName | None = None
 
 
 class _Laser(Table):
@@ -133,6 +147,8 @@ class _Robot(Table):
     id: Annotated[str, AfterValidator(_checked_id)]
     kind: Kind = "live"
     detector: bool = True
+    pose_frame: _FrameName = "map"
+    classes: Annotated[tuple[str, ...], BeforeValidator(_classes)] = ()
     body: _Body | None = None
     drive: _Drive | None = None
     camera: _Camera | None = None
@@ -152,12 +168,19 @@ class _Robot(Table):
                 camera_fov=math.radians(camera.fov_deg),
                 camera_range=camera.range_m,
                 unlabelled_frame=camera.unlabelled_frame,
+                camera_frame=camera.frame,
             )
         laser = self.laser
         profile = replace(profile, laser=Pose2D(laser.x_m, laser.y_m, laser.yaw_rad))
         is_described = body is not None and drive is not None
         return RobotDescription(
-            self.id, self.kind, profile, is_described, self.detector
+            self.id,
+            self.kind,
+            profile,
+            is_described,
+            self.detector,
+            self.pose_frame,
+            self.classes,
         )
 
 

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 
 from iveg.adapters.fiware_http import Document
 from iveg.adapters.iot_agent import IotAgentClient, write_device, write_group
-from iveg.adapters.orion import OrionClient
-from iveg.adapters.orphan_entities import remove_orphans
+from iveg.adapters.orion import OrionClient, remove_orphans
 from iveg.domain.equipment import Tile
 from iveg.domain.errors import HopError
 from iveg.domain.records import Json
@@ -62,7 +61,6 @@ async def provision(
         problems += _thieves(known.values(), robot_id)
     # Last, so that the probe's return says that all the others are there again.
     mended += await _ensure_device(agent, known, _heartbeat_device(apikey))
-    mended += await _remove_doctor(agent, known)
     mended += await remove_orphans(orion, known, robots)
     return Provisioned(tuple(mended), tuple(problems))
 
@@ -82,18 +80,6 @@ async def _ensure_group(
     if known.get("entity_type") == names.ROBOT_TYPE:
         return []
     return [f"Corrected the entity type of the group of API key {apikey}."]
-
-
-async def _remove_doctor(
-    agent: IotAgentClient, known: dict[str, Document]
-) -> list[str]:
-    """The doctor's device, if it is not the doctor's own but made up by the agent."""
-    there = known.get(names.DOCTOR_ID)
-    if there is None or there.get("entity_name") == names.DOCTOR_ID:
-        return []
-    await agent.delete_device(names.DOCTOR_ID)
-    del known[names.DOCTOR_ID]
-    return [f"Removed device {names.DOCTOR_ID}, which the agent had made up."]
 
 
 async def _ensure_robot(

@@ -14,7 +14,13 @@ from pydantic import Field, model_validator
 from iveg.adapters.toml_files import Table, complaint, read_table
 from iveg.domain.errors import DataFileError
 from iveg.domain.geometry import Pose2D, Rectangle
-from iveg.domain.greenhouse import DriveLane, Greenhouse, PlacedObstacle, StructuralPost
+from iveg.domain.greenhouse import (
+    OUTSIDE_M,
+    DriveLane,
+    Greenhouse,
+    PlacedObstacle,
+    StructuralPost,
+)
 
 BUILT_IN = ("mvsim-20x20", "agroconnect", "none")
 _FARTHEST_M = 1e6
@@ -60,6 +66,7 @@ def read_greenhouse(text: str, file: str) -> Greenhouse:
         tuple(StructuralPost(one.x, one.y, one.radius) for one in page.posts),
         tuple(PlacedObstacle(one.kind, one.area()) for one in page.obstacles),
         tuple(Pose2D(one.x, one.y, one.yaw) for one in page.starts),
+        page.outside_m,
     )
 
 
@@ -117,6 +124,7 @@ class _Start(_Point):
 class _FileTable(Table):
     name: _Text
     bounds: _Area
+    outside_m: Annotated[float, Field(ge=0.0, le=_FARTHEST_M)] = OUTSIDE_M
     lanes: list[_Lane] = Field(default_factory=list)
     rows: list[_Area] = Field(default_factory=list)
     posts: list[_Post] = Field(default_factory=list)

@@ -49,12 +49,10 @@ class Attempt:
 
     Attributes:
         back: Where the provider sends the browser (``redirect_uri``).
-        anew: The person must prove who they are once more.
         state, nonce, verifier: Tie answer, ID token and code to it.
     """
 
     back: str
-    anew: bool = False
     state: str = field(default_factory=_random, repr=False)
     nonce: str = field(default_factory=_random, repr=False)
     verifier: str = field(default_factory=_random, repr=False)
@@ -92,10 +90,7 @@ class IdentityProvider(Protocol):
 
 
 class Keyrock:
-    """FIWARE Keyrock, by OAuth 2.0 and its own ``/user``.
-
-    Keyrock tells neither when somebody signed in nor offers a way to ask anew.
-    """
+    """FIWARE Keyrock, by OAuth 2.0 and its own ``/user``."""
 
     def __init__(self, client: Client) -> None:
         self.client = client
@@ -103,8 +98,6 @@ class Keyrock:
 
     async def address(self, attempt: Attempt) -> str:
         """Where a browser goes to sign in."""
-        if attempt.anew:
-            raise SignOnError("not_renewed", "Keyrock cannot be asked to")
         query = code_query(self.client, attempt)
         return f"{self.client.issuer}/oauth2/authorize?{urlencode(query)}"
 

@@ -1,26 +1,122 @@
 """MQTT: one connection that reconnects by itself.
 
-``run`` connects, subscribes and hands every message on; when the broker goes it tries
-again with a growing, jittered pause.  ``publish`` waits for the broker's confirmation
-(QoS 1) and raises; ``enqueue`` keeps only the newest message of each topic, for
-telemetry.
+``run`` connects, subscribes and hands every message on as it is read; when the broker
+goes it tries again with a growing, jittered pause.  ``publish`` waits for the broker's
+confirmation (QoS 1) and raises; ``enqueue`` keeps only the newest message of each
+topic, for telemetry.
 """
 
 import asyncio
 import logging
+import math
 import random
 import socket
+import ssl
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
 
 import aiomqtt
 
-from iveg.adapters.broker_address import BrokerAddress
 from iveg.adapters.log_filter import quiet
-from iveg.adapters.mqtt_inbox import Arrived, Qos1Message
-from iveg.adapters.mqtt_outbox import OutboxClient
-from iveg.adapters.tls import FileState
 from iveg.domain.errors import HopError
+
+# --- certificates -----------------------------------------------------------------
+#
+# TLS to the broker: whom to trust, and the certificate by which a program is known.
+#
+# The files are read at each connection, so that a certificate is renewed by replacing
+# its files; ``MqttLink`` connects anew when they change.
+
+
+@dataclass(frozen=True, slots=True)
+class TlsFiles:
+    """Files in PEM; each may be empty.
+
+    Attributes:
+        authority: Certificates that are trusted; empty: those of the system.
+        certificate: Own certificate with its chain; ``key`` its private key.
+    """
+
+    authority: str = ""
+    certificate: str = ""
+    key: str = ""
+
+    def context(self) -> ssl.SSLContext:
+        """What a connection needs, as the files are now.
+
+        Raises:
+            OSError: a file is missing or is no certificate (``ssl.SSLError``).
+        """
+        context = ssl.create_default_context(cafile=self.authority or None)
+        if self.certificate:
+            context.load_cert_chain(self.certificate, self.key or None)
+        return context
+
+    def state(self) -> "FileState":
+        """Changes when a file is replaced: its time and inode; None: not there."""
+        return tuple(map(_state, filter(None, self._files())))
+
+    def _files(self) -> tuple[str, ...]:
+        return self.authority, self.certificate, self.key
+
+
+NO_FILES = TlsFiles()
+FileState = tuple[tuple[int, int] | None, ...]
+
+
+def _state(file: str) -> tuple[int, int] | None:
+    try:
+        found = Path(file).stat()
+    except OSError:
+        return None
+    return found.st_mtime_ns, found.st_ino
+
+
+# --- the address ------------------------------------------------------------------
+#
+# The address of a broker, and with what a connection to it is made.
+
+
+@dataclass(frozen=True, slots=True)
+class BrokerAddress:
+    """Address of the broker, user and password, and the files of TLS."""
+
+    host: str
+    port: int
+    user: str | None = None
+    password: str | None = None
+    tls: bool = False
+    files: TlsFiles = NO_FILES
+
+    @classmethod
+    def from_url(
+        cls, url: str, user: str = "", password: str = "", files: TlsFiles = NO_FILES
+    ) -> "BrokerAddress":
+        """Read ``mqtt://user:password@host:port``; arguments win over the URL."""
+        parts = urlsplit(url)
+        tls = parts.scheme == "mqtts"
+        return cls(
+            parts.hostname or "127.0.0.1",
+            parts.port or (8883 if tls else 1883),
+            user or unquote(parts.username or "") or None,
+            password or unquote(parts.password or "") or None,
+            tls,
+            files,
+        )
+
+    def context(self) -> ssl.SSLContext | None:
+        """What TLS needs, from the files as they are now; None without TLS.
+
+        Raises:
+            OSError: a file is missing or is no certificate.
+        """
+        return self.files.context() if self.tls else None
+
+
+# --- the connection ---------------------------------------------------------------
 
 _log = logging.getLogger(__name__)
 # aiomqtt's own: it complains of every message that finds no room or no confirmation.
@@ -41,11 +137,6 @@ class MqttLink:
         name: Says in logs whose connection this is; ids stay random.
         subscriptions: Topic filter → QoS, asked for on every connect.
         on_message: Called in the loop with topic and payload; must not block.
-        on_connect: Called after every (re)connect, subscriptions in place.
-        on_loss: Called once when a connection is lost.
-        on_passed_over: Called with a topic and how many of its messages were not
-            handed over because newer ones had come with them; before the newest.
-        apart_s: Least time between two readings (s); 0: whenever something comes.
         look_every_s: Between two looks for another certificate (s).
     """
 
@@ -55,22 +146,15 @@ class MqttLink:
         name: str,
         subscriptions: Mapping[str, int] | None = None,
         on_message: Callable[[str, bytes], None] = lambda _topic, _payload: None,
-        on_connect: Callable[[], None] = lambda: None,
-        on_loss: Callable[[], None] = lambda: None,
-        on_passed_over: Callable[[str, int], None] = lambda _topic, _count: None,
-        apart_s: float = 0.0,
         look_every_s: float = 2.0,
     ) -> None:
         self._address = address
         self._name = name
         self._look_every_s = look_every_s
-        self._apart_s = apart_s
-        self.attach(
-            subscriptions or {}, on_message, on_connect, on_loss, on_passed_over
-        )
-        self._client: OutboxClient | None = None
+        self.attach(subscriptions or {}, on_message)
+        self._client: aiomqtt.Client | None = None
         self._offered: dict[str, tuple[bytes, int]] = {}
-        self._early: deque[Qos1Message] = deque(maxlen=MOST_EARLY)
+        self._early: deque[aiomqtt.Message] = deque(maxlen=MOST_EARLY)
         """Came before all subscriptions were in place, when nothing can be answered."""
         self._wake, self._drained = asyncio.Event(), asyncio.Event()
         self._drained.set()
@@ -86,22 +170,22 @@ class MqttLink:
         on_message: Callable[[str, bytes], None],
         on_connect: Callable[[], None] = lambda: None,
         on_loss: Callable[[], None] = lambda: None,
-        on_passed_over: Callable[[str, int], None] = lambda _topic, _count: None,
+        on_stored: Callable[[str, bytes], None] | None = None,
     ) -> None:
         """Set the readers, before ``run``; they may be built after the link.
 
         Args:
             subscriptions: As above, and so for the others.
             on_message: Called with each message.
-            on_connect: Called after every (re)connect.
+            on_connect: Called after every (re)connect, subscriptions in place.
             on_loss: Called once when a connection is lost.
-            on_passed_over: Called with messages that were not handed over.
+            on_stored: Called with what the broker retained; None: ``on_message`` is.
         """
         self._subscriptions = dict(subscriptions)
         self._on_message = on_message
         self._on_connect = on_connect
         self._on_loss = on_loss
-        self._on_passed_over = on_passed_over
+        self._on_stored = on_stored or on_message
 
     @property
     def offered(self) -> int:
@@ -140,7 +224,7 @@ class MqttLink:
 
     async def _session(self) -> None:
         address, files = self._address, self._address.files.state()
-        async with OutboxClient(
+        async with aiomqtt.Client(
             address.host,
             address.port,
             username=address.user,
@@ -149,8 +233,9 @@ class MqttLink:
             timeout=_ANSWERED_WITHIN_S,
             tls_context=address.context(),
             socket_options=NODELAY,
-            on_arrived=self._hand_over,
-            apart_s=self._apart_s,
+            queue_type=_handing_to(self._take),
+            # A STOP never waits until the broker has confirmed telemetry.
+            max_inflight_messages=0,
         ) as client:
             self._early.clear()
             for topic_filter, qos in self._subscriptions.items():
@@ -165,14 +250,15 @@ class MqttLink:
                 self._send_offered(client), name=f"mqtt-send-{self._name}"
             )
             try:
-                self._hand_qos1(self._early)
+                while self._early:
+                    self._hand_over(self._early.popleft())
                 await self._until_over(client, files)
             finally:
                 sender.cancel()
 
-    async def _until_over(self, client: OutboxClient, files: FileState) -> None:
+    async def _until_over(self, client: aiomqtt.Client, files: FileState) -> None:
         """Until the connection is lost (MqttError), or its certificate is another."""
-        lost = asyncio.ensure_future(client.lost())
+        lost = asyncio.ensure_future(_end_of(client))
         try:
             while True:
                 await asyncio.wait({lost}, timeout=self._look_every_s)
@@ -195,46 +281,56 @@ class MqttLink:
             return False
         return True
 
-    def _hand_over(self, arrived: Arrived) -> None:
+    def _take(self, message: aiomqtt.Message) -> None:
+        """Hand on what was read, or keep it until all subscriptions stand."""
+        if message.qos and self._client is None:
+            self._early.append(message)
+        else:
+            self._hand_over(message)
+
+    def _hand_over(self, message: aiomqtt.Message) -> None:
         """A mistake of ours in here must end ``run``, and not the connection alone."""
+        hear = self._on_stored if message.retain else self._on_message
         try:
-            for topic, count in arrived.passed_over.items():
-                self._on_passed_over(topic, count)
-            for topic, payload in arrived.telemetry.items():
-                self._on_message(topic, payload)
-            if self._client is None:
-                self._early.extend(arrived.qos1)
-            else:
-                self._hand_qos1(arrived.qos1)
+            hear(message.topic.value, message.payload)
         except Exception as error:
             self._mistake = error
             raise
 
-    def _hand_qos1(self, messages: Iterable[Qos1Message]) -> None:
-        for message in messages:
-            self._on_message(message.topic, message.payload)
-
-    async def _send_offered(self, client: OutboxClient) -> None:
+    async def _send_offered(self, client: aiomqtt.Client) -> None:
         while True:
             await self._wake.wait()
             self._wake.clear()
             while self._offered:
                 offered, self._offered = self._offered, {}
-                client.send(_of_qos(0, offered))
-                if confirmed := _of_qos(1, offered):
-                    await self._send_confirmed(client, confirmed)
-                await client.written()
+                await self._send(client, offered)
             self._drained.set()
 
-    async def _send_confirmed(
-        self, client: OutboxClient, messages: list[tuple[str, bytes]]
+    async def _send(
+        self, client: aiomqtt.Client, messages: Mapping[str, tuple[bytes, int]]
     ) -> None:
+        """Return when the socket (QoS 0) or the broker (QoS 1) has these, or late.
+
+        A broker that is slow to confirm may still be there; when it is gone, the
+        session ends and its sender with it.
+        """
+        sending = asyncio.gather(
+            *(
+                client.publish(topic, payload, qos, timeout=math.inf)
+                for topic, (payload, qos) in messages.items()
+            ),
+            return_exceptions=True,
+        )
+        failed: list[BaseException]
         try:
-            await client.confirmed(messages, _ANSWERED_WITHIN_S)
-        except aiomqtt.MqttError:
-            # A broker that is slow to confirm may still be there; when it is gone, the
-            # session ends and this task with it.
-            _log.debug("%s: not all of %d confirmed", self._name, len(messages))
+            # One timer for all: each of aiomqtt's own is a task.
+            async with asyncio.timeout(_ANSWERED_WITHIN_S):
+                failed = list(filter(None, await sending))
+        except TimeoutError as error:
+            failed = [error]
+        if failed:
+            count = len(messages)
+            _log.debug("%s: not all of %d sent: %r", self._name, count, failed[0])
 
     def enqueue(self, topic: str, payload: bytes, qos: int = 0) -> None:
         """Send when possible; a newer message of the topic takes its place."""
@@ -260,24 +356,38 @@ class MqttLink:
         if client is None:
             raise HopError("mqtt", "not connected")
         try:
-            within_s = _CONFIRMED_WITHIN_S
-            if qos:
-                await client.confirmed([(topic, payload)], within_s, retain=retain)
-            else:
-                await client.publish(topic, payload, retain=retain, timeout=within_s)
+            await client.publish(
+                topic, payload, qos, retain, timeout=_CONFIRMED_WITHIN_S
+            )
         except aiomqtt.MqttError as error:
             _heed_cancellation()
             raise HopError("mqtt", str(error)) from error
         _heed_cancellation()
 
 
-def _of_qos(
-    wanted: int, offered: Mapping[str, tuple[bytes, int]]
-) -> list[tuple[str, bytes]]:
-    """The offered topics and payloads of one quality of service."""
-    return [
-        (topic, payload) for topic, (payload, qos) in offered.items() if qos == wanted
-    ]
+def _handing_to(
+    take: Callable[[aiomqtt.Message], None],
+) -> type[asyncio.Queue[aiomqtt.Message]]:
+    """The client's queue that keeps nothing, so that no message grows old in it.
+
+    Its iterator costs a task a message, a third of all that reading one costs.
+    """
+
+    class Intake(asyncio.Queue[aiomqtt.Message]):
+        def put_nowait(self, message: aiomqtt.Message) -> None:
+            take(message)
+
+    return Intake
+
+
+async def _end_of(client: aiomqtt.Client) -> None:
+    """Wait for the end of the connection.
+
+    Raises:
+        MqttError: it has ended.
+    """
+    async for _ in client.messages:
+        """None comes this way."""
 
 
 def _heed_cancellation() -> None:
@@ -289,3 +399,35 @@ def _heed_cancellation() -> None:
     task = asyncio.current_task()
     if task is not None and task.cancelling():
         raise asyncio.CancelledError
+
+
+# --- one message there and back ---------------------------------------------------
+#
+# The MQTT side of ``iveg doctor``: one message to the broker and back.
+#
+# It reports the reason of a failure where a running iVeg tries again.
+
+
+async def publish_and_hear(address: BrokerAddress, topic: str, payload: bytes) -> None:
+    """Publish a message at QoS 1; return when it was heard from the broker.
+
+    Raises:
+        HopError: the broker is away or refuses the user.
+    """
+    client = aiomqtt.Client(
+        address.host,
+        address.port,
+        username=address.user,
+        password=address.password,
+        tls_context=address.context(),
+        socket_options=NODELAY,
+    )
+    try:
+        async with client:
+            await client.subscribe(topic, qos=1)
+            await client.publish(topic, payload, qos=1)
+            async for message in client.messages:
+                if message.payload == payload:
+                    return
+    except (aiomqtt.MqttError, OSError) as error:
+        raise HopError("mqtt", str(error) or type(error).__name__) from error

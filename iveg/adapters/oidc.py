@@ -73,8 +73,6 @@ class OpenIdProvider:
             "code_challenge": create_s256_code_challenge(attempt.verifier),
             "code_challenge_method": "S256",
         }
-        if attempt.anew:
-            query |= {"prompt": "login", "max_age": "0"}
         return _with_query(about["authorization_endpoint"], query)
 
     async def vouch(self, attempt: Attempt, code: str) -> Vouched:

@@ -2,9 +2,16 @@
 
 Orion's 204 to a command proves nothing: it also answers so when the command went
 nowhere (docs/fiware.md).  The evidence is the robot's own answer.
+
+Stray entities that an agent made for unknown devices, and their removal.
+
+A measure of an unknown device makes an entity ``{type}:{device_id}``, such as
+``Robot:AGI_odom``: that happened while an agent with its registry in memory had
+forgotten our devices.
+Our group forbids that now (``autoprovision``); existing strays are removed here.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import datetime
 
 from iveg.adapters.fiware_http import (
@@ -112,35 +119,6 @@ class OrionClient(FiwareHttp):
             {"type": names.HEARTBEAT_TYPE, "attrs": "probe"},
             PROBE_TIMEOUT_S,
         )
-
-    async def read_probe_times(self) -> tuple[float, float]:
-        """When the newest heartbeat probe at Orion left iVeg, and when it came there.
-
-        Returns:
-            Seconds, Unix time, by iVeg's clock and by Orion's.
-
-        Raises:
-            HopError: Orion does not answer, or its probe has no times.
-        """
-        response = await self.ask(
-            "GET",
-            f"/v2/entities/{names.HEARTBEAT_ID}",
-            query={
-                "type": names.HEARTBEAT_TYPE,
-                "attrs": "probe",
-                "metadata": "dateModified",
-            },
-            timeout_s=PROBE_TIMEOUT_S,
-        )
-        entity = self.read_object(response)
-        try:
-            left = datetime.fromisoformat(entity["probe"]["value"]["stamp"])
-        except (KeyError, TypeError, ValueError) as error:
-            raise HopError("orion", "has no probe of iVeg's") from error
-        came = _date_modified(entity, "probe")
-        if came is None:
-            raise HopError("orion", "does not tell when the probe came")
-        return left.timestamp(), came
 
     async def find_entities(self, ids: Sequence[str]) -> list[tuple[str, str]]:
         """Id and type of those of these entities that Orion itself keeps.
@@ -288,3 +266,39 @@ def _date_modified(entity: Document | None, attribute: str) -> float | None:
         return datetime.fromisoformat(text).timestamp()
     except (KeyError, TypeError, ValueError):
         return None
+
+
+_AT_ONCE = 50
+"""Ids in one question: an address has a longest length."""
+
+
+async def remove_orphans(
+    orion: OrionClient, devices: Mapping[str, Document], robots: Iterable[str]
+) -> list[str]:
+    """Remove the entities that no device of ours feeds; says which.
+
+    Args:
+        orion: Where they are.
+        devices: The agent's devices, by id, as they are now.
+        robots: The fleet.
+
+    Raises:
+        HopError: Orion does not answer.
+    """
+    fed = {str(one.get("entity_name")) for one in devices.values()}
+    strays = [one for one in _candidates(robots) if one not in fed]
+    removed = []
+    for start in range(0, len(strays), _AT_ONCE):
+        for entity_id, kind in await orion.find_entities(strays[start:][:_AT_ONCE]):
+            await orion.delete_entity(entity_id, kind)
+            removed.append(
+                f"Removed entity {entity_id}, which no device of ours feeds."
+            )
+    return removed
+
+
+def _candidates(robots: Iterable[str]) -> list[str]:
+    """Every name that an agent could have made up from our devices' ids."""
+    ids = [robot + device.suffix for robot in robots for device in names.ROBOT_DEVICES]
+    ids += [names.CLIMATE_DEVICE, names.HEARTBEAT_ID]
+    return [f"{names.ROBOT_TYPE}:{one}" for one in ids]

@@ -1,4 +1,4 @@
-"""A listener for single POSTs: the doctor's notification, the emulator's orders."""
+"""A listener for single POSTs: notifications, and orders to the emulator."""
 
 import asyncio
 import re

@@ -18,12 +18,9 @@ from iveg.adapters.fleet_provisioning import Provisioned, provision
 from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.mqtt import MqttLink
 from iveg.adapters.orion import OrionClient
-from iveg.adapters.subscriptions import Ensured, ensure_subscriptions
-from iveg.adapters.throttle import Throttle
-from iveg.adapters.wanted_subscriptions import wanted_for
+from iveg.adapters.subscriptions import Ensured, ensure_subscriptions, wanted_for
 from iveg.domain.equipment import Tile
 from iveg.domain.errors import HopError, NoAnswerError
-from iveg.domain.feeds import Feeds
 from iveg.domain.observations import HeartbeatProbe, Instant, Origin, Received
 from iveg.domain.transports import FIWARE
 from iveg.ngsi import codec, names
@@ -44,11 +41,7 @@ class Provisioner:
     """Provisioning, subscriptions, reconciling reads and the heartbeat probe.
 
     Args:
-        feeds: Which transport feeds each robot.
         tiles: Of other equipment.
-
-    Attributes:
-        throttle: Keeps Orion from sending what comes straight from MQTT already.
     """
 
     def __init__(
@@ -58,7 +51,6 @@ class Provisioner:
         link: MqttLink,
         health_monitor: HealthMonitor,
         ingest: Ingest,
-        feeds: Feeds,
         *,
         robots: Sequence[str],
         apikey: str,
@@ -92,20 +84,11 @@ class Provisioner:
         self._former_ids: frozenset[str] = frozenset()
         self._former_secrets: frozenset[str] = frozenset()
         self._is_subscribing = False
-        self.throttle = Throttle(
-            orion,
-            link,
-            feeds,
-            notify_url,
-            notify_token,
-            read_clock,
-            self._read_robots,
-        )
 
     @property
     def subscription_ids(self) -> frozenset[str]:
         """Ids of our subscriptions."""
-        return self._subscription_ids | self.throttle.ids
+        return self._subscription_ids
 
     def is_ours(self, subscription_id: str) -> bool:
         """Whether a notification is one that was asked for.
@@ -116,7 +99,6 @@ class Provisioner:
         """
         return (
             subscription_id in self._subscription_ids
-            or subscription_id in self.throttle.ids
             or subscription_id in self._former_ids
             or self._is_subscribing
             or not self._subscription_ids
@@ -136,7 +118,6 @@ class Provisioner:
             tasks.create_task(self._watch(self._ask_orion), name="watch-orion")
             tasks.create_task(self._watch(self._ask_agent), name="watch-agent")
             tasks.create_task(self._look_after(), name="look-after")
-            tasks.create_task(self.throttle.run(), name="throttle")
 
     # --- the heartbeat probe --------------------------------------------------------
 
@@ -295,12 +276,11 @@ class Provisioner:
         self._devices_at = self._clock().mono + self._devices_wait_s
 
     async def _check_subscriptions(self) -> bool:
-        switches = self.throttle.switches
         work = ensure_subscriptions(
             self._orion,
             self._notify_url,
             self._notify_token,
-            wanted_for(self._robots, self._tiles),
+            wanted_for(self._tiles),
         )
         self._is_subscribing = True
         try:
@@ -314,7 +294,6 @@ class Provisioner:
         self._subscription_ids = done.ids
         self._former_ids |= done.former_ids
         self._former_secrets |= done.former_secrets
-        self.throttle.found(done.copies, switches)
         self._explain(done.mended)
         self._health_monitor.notify_detail = done.failing
         # What is made at the start was never missed.

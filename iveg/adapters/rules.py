@@ -5,39 +5,48 @@ settings themselves change: then these are newer, and a version of their own.  A
 in which looks did not add up yet stays as it was, and the next one has them.  A file
 with a line that cannot be read is put aside, and the strictest rule of what is left of
 it is in force until a person makes another.
+
+The trial of a rule, in a small file that is replaced as a whole.
+
+One that cannot be read is put aside: then nothing is tried, and nothing else changes.
 """
 
 import asyncio
 import logging
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
-from iveg.adapters.files import Form, put_aside, read_lines, write_lines
+from iveg.adapters.files import (
+    Form,
+    load_lines,
+    put_aside,
+    read_lines,
+    save_lines,
+    write_lines,
+)
 from iveg.domain.comparison import Comparison
 from iveg.domain.detection_rule import (
     ALIASES,
-    FORESIGHT_LEAST_S,
-    FORESIGHT_MOST_S,
     RECOVERED,
     UPGRADED,
-    Class,
     DetectionRule,
     strictest,
 )
 from iveg.domain.errors import HopError
-from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
+from iveg.domain.parameters import PARAMETERS, Class, by_names
+from iveg.domain.rule.trial import Difference, Trial
 from iveg.domain.stamps import format_stamp
+from iveg.models.rule import parameter_fields
 
 _log = logging.getLogger(__name__)
 FORM = Form("rules")
 _SETTINGS = "settings"
 _FIRST = DetectionRule()
-_Share = Annotated[float, Field(ge=0.0, le=1.0, allow_inf_nan=False)]
 
 
 class FileRules:
@@ -109,23 +118,38 @@ class FileRules:
 def _with_settings(
     versions: list[DetectionRule], settings: DetectionRule, wall: float
 ) -> list[DetectionRule]:
-    """The versions, and one more where the settings are others than last time."""
-    last = versions[-1]
-    earlier = [
-        (rule.threshold, rule.radius_m) for rule in versions if rule.author == _SETTINGS
-    ]
-    if earlier[-1:] == [(settings.threshold, settings.radius_m)]:
+    """The versions, and one more where a setting is another than last time.
+
+    Of that one only what the settings changed is new: the rest is as people left it.
+    """
+    last, before = versions[-1], _as_set(versions)
+    now = {row.name: getattr(settings, row.name) for row in PARAMETERS}
+    new = {name: one for name, one in now.items() if before.get(name) != one}
+    changed = replace(last, **new)
+    if changed == last:
         return versions
     changed = replace(
-        last,
-        threshold=settings.threshold,
-        radius_m=settings.radius_m,
+        changed,
         version=last.version + 1,
         comparison=None,
         author=_SETTINGS,
         since=wall,
     )
     return [*versions, changed]
+
+
+def _as_set(versions: list[DetectionRule]) -> dict[str, Any]:
+    """The parameters as the settings had them last: each where they changed it last."""
+    found = dict[str, Any]()
+    before: DetectionRule | None = None
+    for rule in versions:
+        for row in PARAMETERS:
+            value = getattr(rule, row.name)
+            is_new = before is None or getattr(before, row.name) != value
+            if rule.author == _SETTINGS and (is_new or row.name not in found):
+                found[row.name] = value
+        before = rule
+    return found
 
 
 def _with_looks(versions: list[DetectionRule], wall: float) -> list[DetectionRule]:
@@ -145,31 +169,37 @@ def _with_looks(versions: list[DetectionRule], wall: float) -> list[DetectionRul
     return [*versions, changed]
 
 
-class StoredRule(BaseModel):
+class _StoredRule(BaseModel):
     """One line of the file; a key that is missing has the rule's default."""
 
     model_config = ConfigDict(strict=True, extra="forbid")
 
     id: str = _FIRST.id
     version: int = Field(1, ge=1)
-    threshold: _Share = LIMITS.detection_threshold
-    class_thresholds: dict[Class, _Share] = Field(default_factory=dict)
-    radius_m: float = Field(
-        LIMITS.ring_default_m, ge=LIMITS.ring_least_m, le=LIMITS.ring_most_m
-    )
     aliases: dict[str, Class] = Field(default_factory=lambda: dict(ALIASES))
     possible_people: bool = False
-    foresight: bool = True
-    foresight_s: float = Field(
-        FORESIGHT_MOST_S, ge=FORESIGHT_LEAST_S, le=FORESIGHT_MOST_S
-    )
     comparison: Comparison | None = None
     author: str = _SETTINGS
     since: float | None = None
 
     def rule(self) -> DetectionRule:
         """The version of this line."""
-        return DetectionRule(**dict(self))
+        told = dict(self)
+        values: dict[str, Any] = {
+            row.name: row.read(told, row.default, row.name) for row in PARAMETERS
+        }
+        own: dict[str, Any] = {name: told[name] for name in _StoredRule.model_fields}
+        return DetectionRule(**values, **own)
+
+
+if TYPE_CHECKING:
+    StoredRule = _StoredRule
+else:
+    StoredRule = create_model(
+        "StoredRule",
+        __base__=_StoredRule,
+        **parameter_fields(lambda row: row.name, "default"),
+    )
 
 
 def _first(error: ValidationError) -> str:
@@ -181,9 +211,55 @@ def _first(error: ValidationError) -> str:
 
 def rule_fields(rule: DetectionRule) -> dict[str, object]:
     """The line of a version."""
-    fields = asdict(rule)
+    own = {name: getattr(rule, name) for name in _StoredRule.model_fields}
+    return {**by_names(rule), **own, "aliases": dict(rule.aliases)}
+
+
+TRIALS_FORM = Form("trial")
+
+
+class FileTrials:
+    """The trial; implements ``pipeline.ports.ChoiceStore``."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+
+    def load(self) -> Trial | None:
+        """The stored one."""
+        return next(iter(load_lines(self._path, TRIALS_FORM, _read)), None)
+
+    async def save(self, trial: Trial | None) -> None:
+        """Replace the stored one; returns when that is on disk.
+
+        Raises:
+            HopError: the disk did not take it.
+        """
+        lines = [] if trial is None else [_fields(trial)]
+        await save_lines(self._path, TRIALS_FORM, lines)
+
+
+class _StoredTrial(BaseModel):
+    """The line of the file."""
+
+    model_config = ConfigDict(strict=True, extra="forbid")
+
+    rule: StoredRule
+    by: str
+    since: float
+    so_far: Comparison | None
+    differences: tuple[Difference, ...]
+
+
+def _read(line: bytes) -> Trial:
+    stored = _StoredTrial.model_validate_json(line)
+    return Trial(**{**dict(stored), "rule": stored.rule.rule()})
+
+
+def _fields(trial: Trial) -> dict[str, object]:
     return {
-        **fields,
-        "class_thresholds": dict(rule.class_thresholds),
-        "aliases": dict(rule.aliases),
+        "rule": rule_fields(trial.rule),
+        "by": trial.by,
+        "since": trial.since,
+        "so_far": trial.so_far,
+        "differences": trial.differences,
     }

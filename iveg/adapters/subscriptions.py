@@ -2,19 +2,87 @@
 
 They are found again after a restart by the beginning of their description, so there is
 always one of each, however often iVeg starts.
+
+The subscriptions that iVeg wants at Orion.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from typing import Protocol
 
 from iveg.adapters.fiware_http import Document
-from iveg.adapters.wanted_subscriptions import (
-    PREFIX,
-    THROTTLING_S,
-    TOKEN_HEADER,
-    WantedSubscription,
+from iveg.domain.equipment import Tile
+from iveg.domain.kinds import MEASURED, Kind
+from iveg.ngsi import names
+
+PREFIX = "iVeg: "
+
+
+TOKEN_HEADER = "X-Iveg-Notify-Token"  # noqa: S105 - a header's name
+
+
+@dataclass(frozen=True, slots=True)
+class WantedSubscription:
+    """One subscription that iVeg wants.
+
+    Attributes:
+        name: After the prefix in its description; never changes.
+        entity: What it is about, as NGSI-v2 says it.
+        attributes: What is sent.
+        condition: What makes Orion send; the attributes where it is empty.
+    """
+
+    name: str
+    entity: tuple[tuple[str, str], ...]
+    attributes: tuple[str, ...]
+    condition: tuple[str, ...] = ()
+
+
+ALL_ROBOTS = (("idPattern", ".*"), ("type", names.ROBOT_TYPE))
+
+
+def _names_of(kind: Kind) -> tuple[str, ...]:
+    return tuple(name for name, _ in kind.attributes)
+
+
+WANTED_OF_ALL = (
+    *(WantedSubscription(one.name, ALL_ROBOTS, _names_of(one)) for one in MEASURED),
+    WantedSubscription(
+        "commands", ALL_ROBOTS, (names.COMMAND_STATUS, names.COMMAND_INFO)
+    ),
+    WantedSubscription("goals", ALL_ROBOTS, (names.GOAL_INFO,)),
+    WantedSubscription(
+        "single uplink",
+        ALL_ROBOTS,
+        tuple(names.ALGORITHM_1),
+        condition=("timestamp", "pose", "class"),
+    ),
+    WantedSubscription(
+        "climate",
+        (("id", names.CLIMATE_ID), ("type", names.CLIMATE_TYPE)),
+        ("temperature", "relativeHumidity", "co2"),
+    ),
+    WantedSubscription(
+        "canary",
+        (("id", names.HEARTBEAT_ID), ("type", names.HEARTBEAT_TYPE)),
+        ("probe",),
+    ),
 )
+
+
+def wanted_for(tiles: Iterable[Tile] = ()) -> tuple[WantedSubscription, ...]:
+    """All subscriptions for robots and for other equipment."""
+    return (*WANTED_OF_ALL, *map(_of_tile, tiles))
+
+
+def _of_tile(tile: Tile) -> WantedSubscription:
+    """One for each attribute: in a common one Orion would send what is silent along.
+
+    Its notifications then prove that this very attribute was measured.
+    """
+    entity = (("id", tile.entity_id), ("type", tile.entity_type))
+    return WantedSubscription(f"tile {tile.key}", entity, (tile.attribute,))
+
 
 _TIMEOUT_MS = 2000
 
@@ -45,7 +113,6 @@ class Ensured:
         ids: The subscriptions that are ours.
         mended: What had to be done, as sentences; empty when all was well.
         failing: Why Orion cannot deliver, in its words; empty when it can.
-        copies: Id of each subscription that may be throttled, and whether it is.
         former_ids: Of those that had our name and are no more.
         former_secrets: That some with our name brought, of an earlier start.
     """
@@ -53,7 +120,6 @@ class Ensured:
     ids: frozenset[str]
     mended: tuple[str, ...]
     failing: str = ""
-    copies: Mapping[WantedSubscription, tuple[str, bool]] = field(default_factory=dict)
     former_ids: frozenset[str] = frozenset()
     former_secrets: frozenset[str] = frozenset()
 
@@ -67,8 +133,8 @@ async def ensure_subscriptions(
     """Create, repair and remove subscriptions at Orion until they are as wanted.
 
     Run it at every start and whenever notifications stay away; it changes only what is
-    wrong.  No throttling (it drops the last value) but of copies, which may or may not
-    have it, and no limit of failures (Orion would fall silent for good).
+    wrong.  No throttling (it drops the last value), and no limit of failures (Orion
+    would fall silent for good).
 
     Args:
         orion: Where subscriptions are kept.
@@ -84,17 +150,14 @@ async def ensure_subscriptions(
         description = str(one.get("description", ""))
         if description.startswith(PREFIX):
             ours.setdefault(description, []).append(one)
-    failing, named = _failing(ours), [one for known in ours.values() for one in known]
-    ids, mended, copies = [], [], {}
+    named = [one for known in ours.values() for one in known]
+    failing, ids, mended = describe_failures(named), list[str](), list[str]()
     for want in wanted:
         document = write_subscription(want, notify_url, token)
         known = ours.pop(document["description"], [])
         subscription_id, done = await _ensure(orion, want, document, known)
         ids.append(subscription_id)
         mended += done
-        if want.copied is not None:
-            kept = any(one["id"] == subscription_id for one in known)
-            copies[want] = subscription_id, kept and is_throttled(known[0])
     for leftover in ours.values():
         for one in leftover:
             await orion.delete_subscription(one["id"])
@@ -103,22 +166,14 @@ async def ensure_subscriptions(
         frozenset(ids),
         tuple(mended),
         failing,
-        copies,
         frozenset(str(one["id"]) for one in named).difference(ids),
         frozenset(map(_secret_of, named)) - {token, ""},
     )
 
 
-def is_throttled(subscription: Document) -> bool:
-    """Whether Orion leaves out notifications of this subscription."""
-    return bool(subscription.get("throttling"))
-
-
-def _failing(ours: Mapping[str, Sequence[Document]]) -> str:
-    """Orion's account of failing deliveries; one sentence for all."""
-    deliveries = [
-        one.get("notification", {}) for known in ours.values() for one in known
-    ]
+def describe_failures(subscriptions: Sequence[Document]) -> str:
+    """Orion's account of failing deliveries, in one sentence; empty for none."""
+    deliveries = [one.get("notification", {}) for one in subscriptions]
     reasons = {
         str(one.get("lastFailureReason", "no reason given"))
         for one in deliveries
@@ -142,7 +197,8 @@ async def _ensure(
         await orion.delete_subscription(spare["id"])
         mended.append(f"Removed a second subscription to {name}.")
     kept = known[0]
-    if limited := _limits(want, kept):
+    limited = [part for part in ("throttling", "expires") if kept.get(part)]
+    if limited:
         # Not every Orion takes these away by a change.
         await orion.delete_subscription(kept["id"])
         made = await orion.create_subscription(document)
@@ -151,14 +207,6 @@ async def _ensure(
         await orion.update_subscription(kept["id"], {**document, "status": "active"})
         mended.append(f"Corrected the subscription to {name}: {wrong}.")
     return str(kept["id"]), mended
-
-
-def _limits(want: WantedSubscription, kept: Document) -> list[str]:
-    """Limits that a subscription must not have; a copy may be throttled our own way."""
-    limits = [part for part in ("throttling", "expires") if kept.get(part)]
-    if want.copied is not None and kept.get("throttling") == THROTTLING_S:
-        limits.remove("throttling")
-    return limits
 
 
 def _differs(kept: Document, wanted: Document) -> str:

@@ -15,7 +15,7 @@ from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
 from typing import ParamSpec, TypeVar
 
-from iveg.adapters.urgency import give_way
+from iveg.adapters.files import give_way
 from iveg.domain.errors import HopError
 
 MOST_WAITING = 16

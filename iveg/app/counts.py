@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from iveg.adapters.history.recorder import Recorder
 from iveg.adapters.mqtt import MqttLink
 from iveg.pipeline.parts import Pipeline
-from iveg.web.api import metrics
+from iveg.web.api import health
 
 
 def count_all(
@@ -21,7 +21,7 @@ def count_all(
 
 def read_queues(
     pipeline: Pipeline, recorder: Recorder, link: MqttLink
-) -> metrics.Queues:
+) -> health.Queues:
     """Depth of each queue, messages dropped from it, and repeated attempts."""
     ingest, kept = pipeline.ingest, recorder.counters
     dropped = {
@@ -35,11 +35,10 @@ def read_queues(
     retries = {
         "broker_connect": max(0, link.connects - 1),
         "stop_send": sum(max(0, one.tries - 1) for one in stops if one is not None),
-        "history_replay": kept["history_replayed"],
     }
     depths = {
         "ingest": ingest.waiting,
         "history": kept["history_waiting"],
         "mqtt_out": link.offered,
     }
-    return metrics.Queues(depths, dropped, retries)
+    return health.Queues(depths, dropped, retries)

@@ -1,95 +1,207 @@
-"""The door of the server: who may come in, read anew beside the requests."""
+"""The door of the server: who may come in, known from memory and kept in a file."""
 
-from dataclasses import dataclass
+import asyncio
+import logging
+from contextlib import suppress
+from pathlib import Path
+from typing import Final
 
+from iveg.adapters.access_file import AccessFile, earlier_sessions
+from iveg.adapters.admission import Admission, has_admin
+from iveg.adapters.history.queries import earlier_access, mark_moved
 from iveg.adapters.identity_provider import IdentityProvider
 from iveg.adapters.passwords import Passwords
-from iveg.adapters.sessions import FileSessions
-from iveg.app.life import Work
-from iveg.app.outside import Stores
-from iveg.domain.single_sign_on import ClaimReading
+from iveg.domain.accounts import (
+    NOBODY,
+    Access,
+    AccessBook,
+    AccessChange,
+    ClaimReading,
+    name_key,
+)
+from iveg.domain.audit import CONSOLE, ITSELF
+from iveg.domain.errors import HopError, NameTakenError
+from iveg.domain.events import Condition, Slot
 from iveg.pipeline.audit import AuditTrail
 from iveg.pipeline.ports import Clock
+from iveg.pipeline.supervision import Supervision
 from iveg.settings import Settings
 from iveg.web.security.authentication import Authenticator
-from iveg.web.security.passkeys import Passkeys
-from iveg.web.security.people import People
-from iveg.web.security.programs import Programs
+from iveg.web.security.people import People, Programs
 from iveg.web.security.single_sign_on import SingleSignOn
-from iveg.web.security.tablets import Pins
+
+PART: Final = "accounts"
+SET_UP_S: Final = 1800.0
+"""Validity of the first invitation of a new server (s)."""
+FIRST_ADMIN: Final = "admin"
+_LOOK_S, _ASK_S = 0.4, 5.0
+_SHOWN_S = 60.0
+_log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, slots=True)
 class Door:
-    """People with accounts, their passkeys and PINs, and programs."""
+    """People with accounts and programs with tokens.
 
-    people: People
-    passkeys: Passkeys
-    programs: Programs
-    pins: Pins
+    Args:
+        file: Remembers them.
+        database_url: Of the history, where earlier versions kept them.
+        trail: Told of each change.
+        supervision: Told of a file that is damaged or cannot be written.
+        clock: Read at each question.
+    """
 
-    def comfort(self) -> dict[str, Work]:
-        """What reads them anew, by name."""
-        return {
-            "accounts": self.people.run,
-            "passkeys": self.passkeys.run,
-            "api-tokens": self.programs.run,
-        }
+    def __init__(
+        self,
+        file: AccessFile,
+        database_url: str,
+        trail: AuditTrail,
+        supervision: Supervision,
+        clock: Clock,
+    ) -> None:
+        self._file, self._url = file, database_url
+        self._trail, self._supervision, self._clock = trail, supervision, clock
+        self._waiting: list[Path] = []
+        """Files to delete once the file of accounts has what they say."""
+        self._told, self._damaged_at = 0, -_SHOWN_S
+        self.book = AccessBook(file.load())
+        if not file.exists:
+            before = file.beside("sessions.jsonl")
+            self.book.add(Access(sessions=earlier_sessions(before)))
+            self._waiting.append(before)
+        self.book.note = self._note
+        self.book.keep = lambda: file.save(self.book.picture())
+        self.people = People(self.book, Passwords(), clock)
+        self.programs = Programs(self.book, clock)
+
+    @property
+    def state(self) -> str:
+        """``ok``, ``damaged`` (somebody has to look) or ``unwritten``."""
+        if self._file.failing:
+            return "unwritten"
+        return "damaged" if self._is_damaged() else "ok"
+
+    def _is_damaged(self) -> bool:
+        age_s = self._clock().mono - self._damaged_at
+        return bool(self._file.aside) or age_s < _SHOWN_S
 
     def ways_in(
         self,
         settings: Settings,
         sign_in_token: str,
-        sessions: FileSessions,
-        trail: AuditTrail,
         provider: IdentityProvider | None,
-        clock: Clock,
     ) -> tuple[Authenticator, SingleSignOn | None]:
         """What lets them in, and the identity provider beside it.
 
         Args:
             settings: An operator's choices.
             sign_in_token: Of the link; empty: there is none.
-            sessions: Where sessions outlive a restart.
-            trail: Told of every sign-in.
             provider: Vouches for people; None: nobody does.
-            clock: Read at each question.
         """
         authenticator = Authenticator(
             sign_in_token=sign_in_token,
             api_token=settings.api_token,
-            clock=clock,
-            store=sessions,
+            clock=self._clock,
+            book=self.book,
             link_name=settings.sign_in_name,
-            trail=trail,
+            trail=self._trail,
             people=self.people,
             programs=self.programs,
-            passkeys=self.passkeys,
-            proven_within_s=settings.release_proof_minutes * 60.0,
         )
         if provider is None:
             return authenticator, None
         reading = ClaimReading(
             settings.sso_role_claim, settings.sso_name_claim, settings.sso_role_map
         )
-        lasts_s = settings.sso_hours * 3600.0
         return authenticator, SingleSignOn(
-            provider, reading, self.people, authenticator, clock, trail, lasts_s
+            provider,
+            reading,
+            self.people,
+            authenticator,
+            self._clock,
+            self._trail,
+            settings.sso_hours * 3600.0,
         )
 
+    def first_invitation(self) -> str | None:
+        """An invitation for the first admin; None where somebody is admin already.
+
+        Raises:
+            HopError: nobody knows yet who was in an earlier version's database.
+        """
+        if not self._file.copied:
+            raise HopError("database", "accounts of earlier versions are not read yet")
+        now = self._clock().wall
+        if has_admin(self.people.known.values(), now):
+            return None
+        admission = Admission(self.book, CONSOLE, now)
+        for one in self.people.known.values():
+            if name_key(one.name) == FIRST_ADMIN:
+                return admission.reset(one, SET_UP_S)[0]
+        return admission.add(FIRST_ADMIN, "admin", waits_s=SET_UP_S)[0]
+
+    # --- beside the requests ------------------------------------------------------
+
+    async def run(self) -> None:
+        """Look after the file until cancelled."""
+        self.book.keep()
+        asked_at = -_ASK_S
+        while True:
+            await self._file.look()
+            self._report()
+            await self._take_changes()
+            now = self._clock().mono
+            if not self._file.copied and now - asked_at >= _ASK_S:
+                asked_at = now
+                with suppress(HopError):
+                    await self.copy_earlier()
+            await asyncio.sleep(_LOOK_S)
+
+    async def copy_earlier(self) -> None:
+        """Copy who was known to an earlier version, once. Raises HopError."""
+        if self._file.copied:
+            return
+        found = await asyncio.to_thread(earlier_access, self._url)
+        self._file.copied = True
+        if found is None:
+            # Somebody took the file away while iVeg was down.
+            self._file.damaged += 1
+        self.book.add(found or NOBODY)
+        if found is not None and await self._file.taken([]):
+            await asyncio.to_thread(mark_moved, self._url, self._clock().wall)
+
+    async def _take_changes(self) -> None:
+        """Have changes of the console count."""
+        for path, change in await asyncio.to_thread(self._file.left):
+            if path in self._waiting:
+                continue
+            self._waiting.append(path)
+            try:
+                self.book.apply(change)
+            except NameTakenError as error:
+                _log.warning("a change of the console is left out: %s", error)
+        if self._waiting and await self._file.taken(self._waiting):
+            self._waiting.clear()
+
+    def _note(self, change: AccessChange) -> None:
+        name, told = change.row.name, change.details
+        self._trail.note(change.by, change.action, name, told, at=self._clock())
+
+    def _report(self) -> None:
+        """Tell people what is wrong with the file; each damage has its row."""
+        now = self._clock()
+        if self._file.damaged > self._told:
+            self._told, self._damaged_at = self._file.damaged, now.mono
+            details = {"aside": self._file.aside[-1:]}
+            self._trail.note(ITSELF, "accounts_damaged", details=details, at=now)
+        wrong: list[Condition] = []
+        if self._is_damaged():
+            slots: dict[str, Slot] = {"file": (self._file.aside or ["–"])[-1]}
+            wrong.append(Condition("P1", "alert.accounts_damaged", PART, None, slots))
+        if self._file.failing:
+            wrong.append(Condition("P2", "alert.accounts_unwritten", PART))
+        self._supervision.report(PART, wrong)
+
     def close(self) -> None:
-        """End their threads."""
+        """Return when the newest is on disk."""
         self.people.close()
-        self.passkeys.close()
-        self.programs.close()
-
-
-def open_door(stores: Stores, clock: Clock) -> Door:
-    """The door with its stores."""
-    people = People(stores.accounts, Passwords(), clock)
-    return Door(
-        people,
-        Passkeys(stores.passkeys, clock),
-        Programs(stores.api_tokens, clock),
-        Pins(people, clock),
-    )
+        self._file.close()

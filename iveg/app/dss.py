@@ -1,7 +1,6 @@
 """The DSS with all its parts, wired; and its life."""
 
 import asyncio
-import contextlib
 import logging
 import secrets
 from collections import Counter
@@ -13,51 +12,43 @@ from fastapi import FastAPI
 
 from iveg import __version__
 from iveg.adapters import clock, log_filter
-from iveg.adapters.backfill import BackfillReader
 from iveg.adapters.calibration_files import load_calibrations
+from iveg.adapters.clock import new_id
 from iveg.adapters.direct import DirectReader
 from iveg.adapters.equipment_files import load_equipment
 from iveg.adapters.greenhouses import load_greenhouse
-from iveg.adapters.ids import new_id
 from iveg.adapters.loop_watch import LoopWatch
+from iveg.adapters.messages import AppriseSender, load_messages
 from iveg.adapters.provisioner import Provisioner
-from iveg.adapters.recordings.recorded_sink import RecordedSink
+from iveg.adapters.recordings.pictures import PictureFiles
 from iveg.adapters.recordings.recorder import PART as RECORDINGS
+from iveg.adapters.recordings.recorder import RecordedSink
 from iveg.adapters.transports import MqttTransport, OrionTransport
-from iveg.adapters.webauthn import has_passkeys
 from iveg.adapters.worker import PACK_LIMIT_S, Worker
-from iveg.app.agreement import picture
 from iveg.app.counts import count_all, read_queues
-from iveg.app.door import open_door
-from iveg.app.laboratory import find_laboratory
+from iveg.app.door import PART as ACCOUNTS
+from iveg.app.door import Door
 from iveg.app.life import Work, live
 from iveg.app.outside import Outside
-from iveg.app.site import Site as PastSite
-from iveg.app.viewers import Viewers
-from iveg.app.what_if import WhatIfs
-from iveg.domain.errors import HopError, VitalPartError
+from iveg.domain.errors import VitalPartError
 from iveg.domain.fleet import FleetDescription
-from iveg.domain.latency.segments import WINDOW_S
 from iveg.domain.observations import Instant
-from iveg.domain.records import Record
-from iveg.domain.stop.drills import Drills
 from iveg.domain.transports import DIRECT, FIWARE
 from iveg.pipeline.audit import AuditTrail
-from iveg.pipeline.backfill import PART as BACKFILL
 from iveg.pipeline.build import build
 from iveg.pipeline.equipment import PART as EQUIPMENT
-from iveg.pipeline.latency import hours_of
-from iveg.pipeline.memory import Memory
+from iveg.pipeline.messenger import Messenger
 from iveg.pipeline.parts import Choices, Ports
 from iveg.pipeline.restore import remember
 from iveg.pipeline.retention import PART as RETENTION
 from iveg.pipeline.retention import HistoryUpkeep
 from iveg.pipeline.services import build_services
-from iveg.pipeline.trace import Chronicle, Trace
 from iveg.settings import Settings
 from iveg.web.build import Face
+from iveg.web.live.encoder import Encoder
+from iveg.web.live.pictures import Past, PictureRecorder
 from iveg.web.notifications import NotificationEndpoint
-from iveg.web.pages import message_texts
+from iveg.web.pages import sentences
 from iveg.web.pages.contexts import Site
 from iveg.web.security.secrets import NotifySecret
 from iveg.web.views import Views
@@ -77,7 +68,6 @@ class Dss:
     Attributes:
         on_failure: Called when a vital part has ended.
         failure: The error that ended it; None while all is well.
-        on_close: Called when it ends, before its own parts do.
         counted: Counters of parts beside the pipeline.
         pipeline: From observations to feedback; ``services`` beside it.
         face: The parts that the web shows.
@@ -95,7 +85,6 @@ class Dss:
         self.stores = outside.stores
         self.on_failure: Callable[[], None] = lambda: None
         self.failure: VitalPartError | None = None
-        self.on_close: list[Work] = []
         # An empty token lets nobody in.
         by_link = settings.sign_in == "link" or demo
         link = settings.sign_in_token or secrets.token_hex(32)
@@ -104,24 +93,25 @@ class Dss:
         previous = settings.notify_token_previous
         self.notify_secret = NotifySecret(notify_token, previous)
         self._boot, self._demo = secrets.token_hex(8), demo
-        self.chronicle = Chronicle(
-            self.stores.inputs, __version__, secrets.token_bytes(16)
-        )
         kept = self.stores.kept_choices(settings)
-        drills, era = Drills(settings.drill_days), f"-{self._boot[:8]}"
+        era = f"-{self._boot[:8]}"
         tiles = load_equipment(settings.equipment, fleet.ids)
         rows = load_calibrations(settings.calibration)
-        choices = Choices(kept.rules[-1], drills, self._boot, era, tiles, rows)
+        refused = settings.refused_robots
+        choices = Choices(kept.rules[-1], self._boot, era, tiles, rows, refused)
         greenhouse = load_greenhouse(settings.greenhouse)
         self.pipeline = build(fleet, greenhouse, self._ports(), choices)
         self.stores.inputs.rule = lambda: self.pipeline.evaluator.rule
-        if settings.recordings:
-            self.chronicle.remember = Memory(self.pipeline).write
-        self.services = build_services(
-            self.pipeline, kept, outside.senders(message_texts.writer()), clock.now
-        )
-        self.door = open_door(self.stores, clock.now)
+        self.services = build_services(self.pipeline, kept, clock.now)
+        self.messenger = self._messenger()
         self.trail = AuditTrail(self.stores.recorder, new_id)
+        self.door = Door(
+            self.stores.access,
+            self.stores.queries.url,
+            self.trail,
+            self.pipeline.supervision,
+            clock.now,
+        )
         self.upkeep = HistoryUpkeep(
             self.stores.retained(),
             settings.retention,
@@ -131,13 +121,10 @@ class Dss:
         )
         self.counted: list[Counter[str]] = [
             log_filter.counted,
-            self.services.messenger.counters,
+            self.messenger.counters,
             self.upkeep.counters,
             self.stores.inputs.counters,
         ]
-        site = PastSite.of(settings, self.stores.inputs.folder)
-        self.past = Viewers(site, clock.now, has_spares=settings.recordings)
-        self.what_ifs = WhatIfs.of(settings, self.stores.queries.url, fleet)
         failed = partial(self.pipeline.supervision.failed, "worker")
         self.worker, self.packer = Worker(failed), Worker(failed, PACK_LIMIT_S)
         self._attach_reader()
@@ -146,6 +133,19 @@ class Dss:
 
     # --- wiring -------------------------------------------------------------------
 
+    def _messenger(self) -> Messenger:
+        plan, parts = load_messages(self.settings.messages), self.pipeline
+        alerts = parts.evaluator.alerts
+        messenger = Messenger(
+            plan,
+            AppriseSender(),
+            sentences.writer(plan.language),
+            lambda: alerts.waiting,
+            clock.now,
+        )
+        alerts.on_raised = parts.supervision.guard("messages", messenger.enqueue_raised)
+        return messenger
+
     def _ports(self) -> Ports:
         mqtt = MqttTransport(self.outside.link, self.settings.apikey)
         direct = DIRECT.switched(on=self.settings.stop_direct)
@@ -153,21 +153,15 @@ class Dss:
             mqtt,
             {direct: mqtt, FIWARE: OrionTransport(self.outside.orion)},
             self.stores.journal,
-            RecordedSink(self.stores.recorder, self._row),
+            RecordedSink(self.stores.recorder, self.stores.inputs.row),
             clock.now,
-            self.chronicle.ids if self.settings.recordings else new_id,
+            new_id,
             self.stores.history_state,
-            self.stores.inputs.tick,
-            self.chronicle if self.settings.recordings else Trace(),
         )
-
-    def _row(self, record: Record) -> None:
-        self.stores.inputs.row(record)
-        self.chronicle.row(record)
 
     def _attach_reader(self) -> None:
         """Have robots' own messages read from the broker."""
-        ingest, watch = self.pipeline.ingest, self.pipeline.latency.watch
+        ingest = self.pipeline.ingest
         reader = DirectReader(
             self.settings.apikey,
             self.fleet.ids,
@@ -176,35 +170,24 @@ class Dss:
             ingest.reject,
             self.settings.direct_read,
             ingest.is_past,
-            self.pipeline.supervision.guard("latency", watch.passed_over),
             self.pipeline.supervision.guard(RECORDINGS, self.stores.inputs.measure),
         )
-        late = BackfillReader(
-            self.fleet.ids,
-            clock.now,
-            self.pipeline.backfill.has_room,
-            self.pipeline.supervision.guard(BACKFILL, self.pipeline.backfill.record),
-            ingest.reject,
-            self.pipeline.supervision.guard(RECORDINGS, self.stores.inputs.measure),
-        )
-        is_wanted = self.settings.direct_read == "all"
         self.outside.link.attach(
-            reader.subscriptions() | (late.subscriptions() if is_wanted else {}),
-            late.beside(reader.read),
+            reader.subscriptions(),
+            reader.read,
             self._broker_back,
             self._broker_lost,
-            reader.pass_over,
+            reader.refuse_stored,
         )
 
     def _provisioner(self) -> Provisioner:
         settings, parts, outside = self.settings, self.pipeline, self.outside
-        provisioner = Provisioner(
+        return Provisioner(
             outside.orion,
             outside.agent,
             outside.link,
             parts.health_monitor,
             parts.ingest,
-            parts.world.feeds,
             robots=self.fleet.ids,
             apikey=settings.apikey,
             context_broker_url=settings.iota_cb_url or settings.orion_url,
@@ -214,18 +197,11 @@ class Dss:
             read_clock=clock.now,
             tiles=parts.equipment.equipment.tiles,
         )
-        provisioner.throttle.allowed = settings.orion_throttle
-        return provisioner
 
     def _face(self) -> Face:
         parts, settings, recorder = self.pipeline, self.settings, self.stores.recorder
         authenticator, self.sign_on = self.door.ways_in(
-            settings,
-            self.sign_in_token,
-            self.stores.sessions,
-            self.trail,
-            self.outside.provider,
-            clock.now,
+            settings, self.sign_in_token, self.outside.provider
         )
         orion = NotificationEndpoint(
             parts.ingest,
@@ -234,7 +210,6 @@ class Dss:
             self.provisioner.is_ours,
             (settings.fiware_service, settings.fiware_servicepath),
             self._notified,
-            self.provisioner.throttle.is_throttled,
             parts.equipment.equipment.entities,
             parts.supervision.guard(EQUIPMENT, parts.equipment.receive),
             parts.supervision.guard(RECORDINGS, self.stores.inputs.notification),
@@ -245,13 +220,10 @@ class Dss:
             self.fleet.ids,
             __version__,
             self._demo,
-            laboratory=find_laboratory("pages") is not None,
             link=bool(self.sign_in_token),
             sso=None if self.outside.provider is None else settings.sso_label,
-            passkeys=has_passkeys(),
         )
         views = Views(parts, partial(count_all, parts, recorder, self.counted))
-        self.chronicle.picture = partial(picture, views)
         return Face(
             pipeline=parts,
             services=self.services,
@@ -266,7 +238,9 @@ class Dss:
             worker=self.worker,
             recordings=self.stores.inputs,
             trail=self.trail,
-            past=self.past,
+            past=Past(PictureFiles(self.stores.inputs.pictures)),
+            encoder=Encoder(views, parts.hub, clock.now),
+            accounts=lambda: self.door.state,
         )
 
     # --- life ---------------------------------------------------------------------
@@ -282,13 +256,11 @@ class Dss:
             living.remove_done_callback(self._ended)
             living.cancel()
             await asyncio.gather(living, return_exceptions=True)
-            for close in self.on_close:
-                await close()
             self.pipeline.evaluator.leave(clock.now())
             parts = self.pipeline.commander, self.pipeline.goals, self.outside
-            for part in (*parts, self.past):
+            for part in parts:
                 await part.close()
-            for one in (self.worker, self.packer, self.what_ifs, self.door):
+            for one in (self.worker, self.packer, self.door):
                 one.close()
 
     async def _live(self) -> None:
@@ -306,7 +278,6 @@ class Dss:
         beside = self.services
         return {
             "costmap": lambda: beside.mapper.run(clock.now),
-            "second-witness": lambda: self.pipeline.second_witness.run(clock.now),
             "peer-scans": lambda: self.pipeline.peer_scans.run(clock.now),
             "coverage": lambda: beside.coverage.run(clock.now),
             "provisioner": self.provisioner.run,
@@ -314,14 +285,20 @@ class Dss:
             EQUIPMENT: lambda: self.pipeline.equipment.run(clock.now),
             RETENTION: lambda: self.upkeep.run(clock.now),
             **self.stores.comfort(),
-            "past": self.past.run,
+            "pictures": self._take_pictures,
             "shadow-rule": beside.trials.run,
-            "what-if": self.what_ifs.run,
-            "messages": beside.messenger.run,
-            **self.door.comfort(),
+            "messages": self.messenger.run,
+            ACCOUNTS: self.door.run,
             "earlier": self._remember,
             "loop-watch": LoopWatch(self.pipeline.supervision.note_turn).run,
         }
+
+    async def _take_pictures(self) -> None:
+        """Write down what pages are sent, where anything is recorded."""
+        face, hub, write = self.face, self.pipeline.hub, self.stores.inputs.picture
+        if self.settings.recordings:
+            taken = PictureRecorder(face.encoder, face.views, hub, clock.now, write)
+            await taken.run()
 
     async def _last_word(self) -> None:
         """Have every robot slow at once: nobody watches any more."""
@@ -341,11 +318,6 @@ class Dss:
             parts.health_monitor,
             clock.now,
         )
-        with contextlib.suppress(HopError):
-            day = clock.wall() - WINDOW_S["24h"]
-            measured = await queries.latency_minutes(day)
-            # A day of twenty robots is half a million rows: not in the loop's thread.
-            parts.latency.watch.remember(await asyncio.to_thread(hours_of, measured))
 
     def _ended(self, task: asyncio.Task[None]) -> None:
         """A vital part has ended: say so and leave; the robots slow down."""
@@ -367,12 +339,3 @@ class Dss:
 
     def _notified(self, at: Instant) -> None:
         self.pipeline.health_monitor.notified_at = at.mono
-        if self.settings.recordings:
-            self.chronicle.heard(at)
-
-    def is_robot_there(self) -> bool:
-        """Whether a robot is connected that is not known to be emulated."""
-        now, robots = clock.now(), self.pipeline.world.live_robots()
-        return not self._demo and any(
-            robot.link(now) in ("LIVE", "LATE") for robot in robots
-        )

@@ -2,7 +2,7 @@
 
 from iveg.adapters import clock
 from iveg.adapters.bounded_json import BoundedJson
-from iveg.adapters.fiware_token import HOP, FiwareToken, TokenGrant
+from iveg.adapters.fiware_http import HOP, FiwareToken, TokenGrant
 from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.orion import OrionClient
 from iveg.settings import Settings

@@ -5,6 +5,7 @@ from pathlib import Path
 from iveg.adapters.fleet_files import load_fleet
 from iveg.app.dss import Dss
 from iveg.app.outside import open_outside
+from iveg.domain.errors import SettingsError
 from iveg.settings import Settings
 
 
@@ -24,6 +25,8 @@ def open_dss(
         make: The class.
     """
     fleet = load_fleet(settings.fleet, settings.robots)
+    if unknown := sorted({*settings.refused_robots} - {*fleet.ids}):
+        raise SettingsError("IVEG_REFUSED_ROBOTS", unknown[0], "robots of the fleet")
     return make(
         settings, fleet, open_outside(settings, data_directory, fleet), demo=demo
     )

@@ -1,5 +1,6 @@
 """Ports of the server to the world outside its process: network and disk."""
 
+import logging
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,50 +8,35 @@ from pathlib import Path
 from pydantic import TypeAdapter
 
 from iveg.adapters import clock
-from iveg.adapters.broker_access import BrokerAccessCommand
-from iveg.adapters.broker_address import BrokerAddress
-from iveg.adapters.by_robot import FileByRobot
-from iveg.adapters.contacts import FileContacts
-from iveg.adapters.history.accounts import AccountStore
-from iveg.adapters.history.api_tokens import ApiTokenStore
+from iveg.adapters.access_file import AccessFile
+from iveg.adapters.files import FileByRobot
 from iveg.adapters.history.engine import history_url, sqlite_file
-from iveg.adapters.history.passkeys import PasskeyStore
 from iveg.adapters.history.queries import Queries
-from iveg.adapters.history.recorder import Recorder, journal_file
+from iveg.adapters.history.recorder import Recorder, spilled_file
 from iveg.adapters.history.upkeep import RecordedHistory
 from iveg.adapters.identity_provider import IdentityProvider
 from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.journal import FileJournal
-from iveg.adapters.mail import MailSender, Write
-from iveg.adapters.mqtt import MqttLink
+from iveg.adapters.mqtt import BrokerAddress, MqttLink, TlsFiles
 from iveg.adapters.orion import OrionClient
-from iveg.adapters.outbound import OutboundHttp
-from iveg.adapters.recordings.live_feed import PART as FOXGLOVE
-from iveg.adapters.recordings.live_feed import DoorSetup, LiveFeed
 from iveg.adapters.recordings.recorder import PART as RECORDINGS
 from iveg.adapters.recordings.recorder import InputRecorder
 from iveg.adapters.recordings.writer import WriterSetup
-from iveg.adapters.rules import FileRules
-from iveg.adapters.sessions import FileSessions
-from iveg.adapters.tls import TlsFiles
-from iveg.adapters.trials import FileTrials
-from iveg.adapters.web_push import PushSender
-from iveg.adapters.webhook import WebhookSender
+from iveg.adapters.rules import FileRules, FileTrials
 from iveg.app.fiware import open_fiware
 from iveg.app.sign_on import open_provider
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.detector import OutOfService
 from iveg.domain.fleet import FleetDescription
-from iveg.domain.messages import Channel
-from iveg.domain.revocation import Revocation
+from iveg.domain.words import WordAnswer
 from iveg.pipeline.health_monitor import HopState
-from iveg.pipeline.loop import reading_apart_s
-from iveg.pipeline.ports import MessageSender
 from iveg.pipeline.services import KeptChoices
 from iveg.settings import Settings
 
+ACCOUNTS = "accounts.jsonl"
+_log = logging.getLogger(__name__)
 _OUT = TypeAdapter(tuple[str, OutOfService])
-_REVOKED = TypeAdapter(tuple[str, Revocation])
+_WORD = TypeAdapter(tuple[str, WordAnswer])
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,16 +52,11 @@ class Stores:
     queries: Queries
     journal: FileJournal
     rules: FileRules
-    contacts: FileContacts
     detectors: FileByRobot[OutOfService]
+    words: FileByRobot[WordAnswer]
     trials: FileTrials
-    revocations: FileByRobot[Revocation]
-    sessions: FileSessions
-    accounts: AccountStore
-    api_tokens: ApiTokenStore
-    passkeys: PasskeyStore
+    access: AccessFile
     inputs: InputRecorder
-    live: LiveFeed | None
 
     def history_state(self) -> HopState:
         """State of the history."""
@@ -92,26 +73,20 @@ class Stores:
 
     def comfort(self) -> dict[str, Callable[[], Awaitable[None]]]:
         """Parts that take in what comes, by name."""
-        live = {} if self.live is None else {FOXGLOVE: self.live.run}
-        return {RECORDINGS: self.inputs.run, **live}
+        return {RECORDINGS: self.inputs.run}
 
     def kept_choices(self, settings: Settings) -> KeptChoices:
         """Choices of earlier runs; the settings have the rule where there is none."""
-        first = DetectionRule(
-            threshold=settings.confidence_threshold, radius_m=settings.safety_radius_m
-        )
+        first = DetectionRule.of(settings.rule)
         return KeptChoices(
             self.rules,
-            self.contacts,
             self.detectors,
+            self.words,
             self.trials,
-            self.revocations,
-            BrokerAccessCommand(settings.broker_access_command),
             self.rules.load(first, clock.now()),
-            self.contacts.load(),
             self.detectors.load(),
+            self.words.load(),
             self.trials.load(),
-            self.revocations.load(),
         )
 
     async def close(self) -> None:
@@ -120,10 +95,6 @@ class Stores:
         await self.recorder.close()
         self.queries.close()
         self.journal.close()
-        self.sessions.close()
-        self.accounts.close()
-        self.api_tokens.close()
-        self.passkeys.close()
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,7 +103,6 @@ class Outside:
 
     Attributes:
         link: Connection to the broker, still without readers.
-        outbound: HTTP to addresses that a person has typed.
         provider: Vouches for people; None: nobody does.
     """
 
@@ -140,23 +110,13 @@ class Outside:
     link: MqttLink
     orion: OrionClient
     agent: IotAgentClient
-    outbound: OutboundHttp
     provider: IdentityProvider | None = None
-
-    def senders(self, write: Write) -> dict[Channel, MessageSender]:
-        """The channels of messages to people."""
-        return {
-            "push": PushSender(self.outbound, write),
-            "email": MailSender(self.outbound, write),
-            "webhook": WebhookSender(self.outbound),
-        }
 
     async def close(self) -> None:
         """Close all but the link, which ends with its task."""
         await self.stores.close()
         await self.orion.close()
         await self.agent.close()
-        self.outbound.close()
         if self.provider is not None:
             await self.provider.close()
 
@@ -174,12 +134,17 @@ def open_outside(
     )
     return Outside(
         open_stores(settings, data_directory, fleet),
-        MqttLink(broker, "iveg", apart_s=reading_apart_s(len(fleet.ids))),
+        MqttLink(broker, "iveg"),
         orion,
         agent,
-        OutboundHttp(),
         open_provider(settings),
     )
+
+
+def files_of(url: str, data_directory: Path) -> Path:
+    """Folder of the files beside a history: beside its own where that is one."""
+    database = sqlite_file(url)
+    return data_directory if database is None else database.parent
 
 
 def open_stores(
@@ -187,35 +152,30 @@ def open_stores(
 ) -> Stores:
     """Open the stores; a missing directory is created."""
     url = history_url(settings.database_url, data_directory)
-    database = sqlite_file(url)
-    directory = data_directory if database is None else database.parent
+    directory = files_of(url, data_directory)
     directory.mkdir(parents=True, exist_ok=True)
-    door = DoorSetup(settings.foxglove, settings.apikey, fleet.ids)
-    live = LiveFeed(door) if settings.foxglove else None
+    if (revoked := directory / "revoked.jsonl").exists():
+        _log.warning("%s counts no more: set IVEG_REFUSED_ROBOTS, delete it", revoked)
+    journal = FileJournal(directory / "commands.jsonl", spilled_file(url, directory))
     return Stores(
         directory,
-        Recorder(url, journal_file(url, directory)),
+        Recorder(url, journal),
         Queries(url),
-        FileJournal(directory / "commands.jsonl"),
+        journal,
         FileRules(directory / "rules.jsonl"),
-        FileContacts(directory / "contacts.jsonl"),
         FileByRobot(directory / "detectors.jsonl", "detectors", _OUT),
+        FileByRobot(directory / "words.jsonl", "words", _WORD),
         FileTrials(directory / "trial.jsonl"),
-        FileByRobot(directory / "revoked.jsonl", "revoked", _REVOKED),
-        FileSessions(directory / "sessions.jsonl"),
-        AccountStore(url),
-        ApiTokenStore(url),
-        PasskeyStore(url),
+        AccessFile(directory / ACCOUNTS),
         InputRecorder(
             WriterSetup(
                 (directory / "recordings").resolve(),
-                settings.recording_limits,
-                settings.apikey,
-                fleet.ids,
+                limits=settings.limits_of_recordings(settings.keep_recordings_gb),
+                pictures=settings.limits_of_recordings(settings.keep_pictures_gb),
+                apikey=settings.apikey,
+                robots=fleet.ids,
             ),
             clock.now,
             is_on=settings.recordings,
-            live=live,
         ),
-        live,
     )

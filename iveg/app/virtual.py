@@ -4,21 +4,18 @@ The same messages at the same times give the same decisions on any machine, so t
 rule can be tried on what was recorded or simulated.
 """
 
-import asyncio
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import count
 from typing import Literal
 
 from iveg.domain.detection_rule import DetectionRule
-from iveg.domain.equipment import Tile
 from iveg.domain.feedback import Feedback
 from iveg.domain.fleet import FleetDescription
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import Instant, Received
 from iveg.domain.peer_scan import PeerScan
 from iveg.domain.records import DecisionRecord, Record
-from iveg.domain.tracking.calibration import Calibrations
-from iveg.domain.transports import DIRECT, Transport
+from iveg.domain.transports import DIRECT
 from iveg.ngsi import codec
 from iveg.pipeline.build import build
 from iveg.pipeline.parts import Choices, Ports
@@ -31,14 +28,12 @@ class VirtualPipeline:
 
     Args:
         fleet, greenhouse, rule: As iVeg is started with.
-        transports: Ways of an order to a robot; on these no order ever gets anywhere.
-        new_id: Makes ids; unless told, by counting.
 
     Implements ``pipeline.ports.FleetPort``, ``StopJournal`` and ``RecordSink``.
 
     Attributes:
         now: Its time.
-        feedback: Feedback to robots, oldest first; ``peer_scans`` likewise.
+        feedback: Feedback to robots, oldest first.
         decisions: All decisions as they stand, by id.
         parts: The pipeline.
     """
@@ -48,37 +43,24 @@ class VirtualPipeline:
         fleet: FleetDescription,
         greenhouse: Greenhouse,
         rule: DetectionRule,
-        *,
-        tiles: Sequence[Tile] = (),
-        calibrations: Calibrations | None = None,
-        transports: Iterable[Transport] = (),
-        new_id: Callable[[], str] | None = None,
     ) -> None:
         ids = count(1)
         self.now = START
         self.feedback: list[Feedback] = []
-        self.peer_scans: list[PeerScan] = []
         self.decisions: dict[str, DecisionRecord] = {}
         ports = Ports(
             self,
-            dict.fromkeys(transports, Nowhere()),
+            {},
             self,
             self,
             lambda: self.now,
-            new_id or (lambda: f"{next(ids):026d}"),
+            lambda: f"{next(ids):026d}",
         )
-        self.parts = build(
-            fleet,
-            greenhouse,
-            ports,
-            Choices(rule, tiles=tiles, calibrations=calibrations or Calibrations()),
-        )
+        self.parts = build(fleet, greenhouse, ports, Choices(rule))
 
     def move(self, seconds: float) -> Instant:
         """Set the clock to ``seconds`` after the start."""
         self.now = START.later(seconds)
-        while self.parts.second_witness.tick(self.now):
-            pass
         return self.now
 
     def hear(self, topic: str, payload: bytes) -> None:
@@ -93,8 +75,7 @@ class VirtualPipeline:
         self.feedback.append(feedback)
 
     def publish_peer_scan(self, scan: PeerScan) -> None:
-        """Keep the scan for peers."""
-        self.peer_scans.append(scan)
+        """Ignore; no robot draws a costmap here."""
 
     def enqueue(self, record: Record) -> None:
         """Keep a decision; ignore other records."""
@@ -129,19 +110,6 @@ class VirtualPipeline:
         at: Instant,
     ) -> None:
         """Ignore; no robot is released here."""
-
-
-class Nowhere:
-    """A transport that takes orders and never says what became of them.
-
-    Implements ``pipeline.ports.CommandPort``.
-    """
-
-    async def stop(self, *_: object, **__: object) -> None:
-        """Wait for ever."""
-        await asyncio.Event().wait()
-
-    release = resume = goal = stop
 
 
 def read_direct(topic: str, payload: bytes, now: Instant) -> Iterator[Received]:

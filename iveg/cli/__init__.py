@@ -3,7 +3,7 @@
 import logging
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
 
@@ -11,10 +11,8 @@ from iveg.app.laboratory import find_laboratory
 from iveg.cli.arguments import (
     CommandCall,
     CommandWord,
-    add_audit,
     add_db,
     add_export,
-    add_incident,
     add_replay,
     add_robot,
     add_serve,
@@ -27,8 +25,9 @@ from iveg.domain.errors import (
     MissingExtraError,
     SettingsError,
 )
-from iveg.settings import Settings, default_data_directory
+from iveg.settings import GONE, Settings, default_data_directory
 
+_log = logging.getLogger(__name__)
 UNUSABLE = 2
 """Exit code for a setting or a file that cannot be used."""
 
@@ -45,6 +44,7 @@ def main(arguments: Sequence[str]) -> int:
         logging.getLogger(noisy).setLevel(logging.WARNING)
     try:
         settings = Settings.from_environment(os.environ)
+        _warn_of_gone(os.environ)
         data = settings.data_directory or default_data_directory(
             os.environ, Path.home()
         )
@@ -57,6 +57,13 @@ def main(arguments: Sequence[str]) -> int:
         print(f"iveg: {error}", file=sys.stderr)
         return 1
     return code
+
+
+def _warn_of_gone(environment: Mapping[str, str]) -> None:
+    """Name settings that no version has any more, in one warning."""
+    gone = sorted(one for one in GONE if environment.get(one))
+    if gone:
+        _log.warning("%s: no longer a setting (docs/upgrading.md)", ", ".join(gone))
 
 
 def _commands() -> Sequence[CommandWord]:
@@ -78,9 +85,5 @@ COMMANDS = (
     CommandWord(
         "export", "a list of the history as a file", "iveg.cli.export", add_export
     ),
-    CommandWord(
-        "incident", "verify an incident pack", "iveg.cli.incident", add_incident
-    ),
     CommandWord("user", "who may sign in", "iveg.cli.user", add_user),
-    CommandWord("audit", "whether the audit is whole", "iveg.cli.audit", add_audit),
 )

@@ -77,16 +77,6 @@ def add_db(database: argparse.ArgumentParser) -> None:
     actions = database.add_subparsers(dest="action", required=True)
     actions.add_parser("upgrade", help="to the newest schema")
     actions.add_parser("stats", help="rows, bytes and ages of each table")
-    purge = actions.add_parser("purge", help="delete now what is kept no longer")
-    purge.add_argument("--dry-run", action="store_true", help="count it alone")
-    actions.add_parser("vacuum", help="give the room of deleted rows back")
-
-
-def add_incident(incident: argparse.ArgumentParser) -> None:
-    """Arguments of ``iveg incident``."""
-    actions = incident.add_subparsers(dest="action", required=True)
-    verify = actions.add_parser("verify", help="whether a pack is as it was made")
-    verify.add_argument("file", type=Path, metavar="FILE")
 
 
 def add_export(export: argparse.ArgumentParser) -> None:
@@ -95,7 +85,7 @@ def add_export(export: argparse.ArgumentParser) -> None:
     for end in ("since", "until"):
         export.add_argument(f"--{end}", metavar="MOMENT", help="ISO-8601")
     export.add_argument("--robot", metavar="ID", help="of this robot alone")
-    export.add_argument("--format", choices=("csv", "ndjson", "parquet"), default="csv")
+    export.add_argument("--format", choices=("csv", "ndjson"), default="csv")
     export.add_argument("--out", type=Path, metavar="FILE", help="else to the output")
 
 
@@ -122,13 +112,6 @@ def add_user(user: argparse.ArgumentParser) -> None:
         if action in ("add", "token"):
             ends = "how long it is good for"
             one.add_argument("--days", type=int, metavar="N", help=ends)
-
-
-def add_audit(audit: argparse.ArgumentParser) -> None:
-    """Arguments of ``iveg audit``."""
-    actions = audit.add_subparsers(dest="action", required=True)
-    actions.add_parser("verify", help="whether a row was changed or is missing")
-    actions.add_parser("end", help="number and hash of the newest row, to keep outside")
 
 
 def add_replay(replay: argparse.ArgumentParser) -> None:
@@ -202,7 +185,10 @@ def add_network(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--ros-domain", type=int, metavar="N", help="0 to 232")
     parser.add_argument("--ros-interface", metavar="NAME", help="or its address")
     parser.add_argument(
-        "--ros-peer", nargs="+", metavar="ADDRESS", help="where multicast does not pass"
+        "--ros-peer",
+        nargs="+",
+        metavar="ADDRESS",
+        help="asked as well, where multicast does not pass",
     )
 
 

@@ -1,334 +1,212 @@
 """``iveg doctor``: tests every hop of the data path by using it once.
 
-A probe device of its own is created, measured, commanded and removed again; no robot's
-device, entity or topic is touched, so it may run while robots drive.  It ends within
-twenty seconds, with the findings until then::
-
-    broker, Orion, agent, database, page      all at once
-    the lag that a running iVeg reports       overload is known before load is added
-    device → measure → notification → command → answer → direct command
-    a missing measure                         awaited, while there is time
-    removal
+Devices and registrations are repaired as ``iveg provision`` does; then one heartbeat
+probe takes the path of a measure.  No robot's topic is written, so it may run while
+robots drive.
 """
 
 import asyncio
-import contextlib
 import secrets
 from collections.abc import Awaitable, Callable, Mapping
 from contextlib import AsyncExitStack
-from functools import partial
-from http import HTTPStatus
+from dataclasses import dataclass
 from pathlib import Path
-from urllib.parse import urlsplit
-
-import orjson
 
 from iveg.adapters import clock
 from iveg.adapters.database_check import check_database
-from iveg.adapters.doctor import ProbeDevice, TopicListener, probe_device
+from iveg.adapters.equipment_files import load_equipment
 from iveg.adapters.fiware_http import FiwareHttp
-from iveg.adapters.history.engine import describe, history_url
-from iveg.adapters.post_listener import post_listener
+from iveg.adapters.fleet_files import load_fleet
+from iveg.adapters.fleet_provisioning import provision
+from iveg.adapters.history.engine import history_url
+from iveg.adapters.mqtt import publish_and_hear
+from iveg.adapters.subscriptions import PREFIX, describe_failures
 from iveg.app.fiware import open_fiware
 from iveg.cli.arguments import CommandCall
-from iveg.cli.diagnosis import exit_code, judge, missing, table
-from iveg.cli.doctor_addresses import bind_to, in_url, page_url_of
-from iveg.cli.findings import Finding, Lag, Stack
 from iveg.cli.nodes import broker_of
-from iveg.cli.probe import Probe
-from iveg.cli.running import run_until_stopped
+from iveg.cli.running import page_address, run_until_stopped
 from iveg.domain.errors import HopError, IvegError
-from iveg.domain.hops import Check, Hop
-from iveg.domain.probe import SLOW_S
-from iveg.domain.records import Json
-from iveg.ngsi import names
+from iveg.domain.observations import HeartbeatProbe, Origin
+from iveg.domain.probe import SLOW_S, Hop, lag_in_words
+from iveg.ngsi import codec, names
 from iveg.settings import Settings
 
-PATIENCE_S, LIMIT_S = 5.0, 20.0
-_REMOVAL_S = 4.0
-"""Part of the limit that is reserved for the removal (s)."""
-_WAITS = 3
-"""Longest wait for a measure, in multiples of ``patience_s``."""
+PATIENCE_S = 10.0
+"""Time limit of each hop (s)."""
 _LOOK_EVERY_S = 0.05
-_FRESH_S = 10.0
-"""Age from which the probe of a running iVeg is ignored (s)."""
+_NEEDS: Mapping[Hop, tuple[Hop, ...]] = {
+    Hop.AGENT: (Hop.MQTT, Hop.ORION),
+    Hop.NOTIFICATIONS: (Hop.ORION, Hop.PAGE),
+}
+"""Hops without which another is not tried."""
+_ADVICE: Mapping[Hop, str] = {
+    Hop.MQTT: "look whether the broker runs, at its access list and password file, and "
+    "at IVEG_MQTT_URL, IVEG_MQTT_USER and IVEG_MQTT_PASSWORD",
+    Hop.AGENT: "look at the agent's processor time and log, at its connections to the "
+    "broker and Orion, and at IVEG_IOTA_URL and IVEG_IOTA_CB_URL",
+    Hop.ORION: "look whether Orion and its MongoDB run, and at IVEG_ORION_URL; behind "
+    "a proxy, at IVEG_FIWARE_TOKEN_URL and the roles there",
+    Hop.NOTIFICATIONS: "look whether Orion's machine reaches iVeg (firewall, container "
+    "network), and at IVEG_NOTIFY_URL",
+    Hop.DATABASE: "look whether the server runs, and at IVEG_DATABASE_URL; STOP and "
+    "the live map go on without",
+    Hop.PAGE: "look whether `iveg serve` runs, and at IVEG_HOST and IVEG_PORT",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """Result of one tested hop; ``said`` is a reason, or a remark about a good one."""
+
+    is_ok: bool
+    said: str = ""
+
+
+Findings = dict[Hop, Finding]
 
 
 def run(call: CommandCall) -> int:
-    """Examine, print the table, remove the probe; returns the exit code."""
-    examination = Examination(call.settings, call.data)
-    run_until_stopped(examination.run())
-    rows = judge(examination.findings, examination.stack)
-    print(table(rows))
-    for sentence in examination.left_behind:
-        print(sentence)
-    return exit_code(rows)
+    """Examine and print a line for each hop; returns the exit code."""
+    findings: Findings = {}
+    run_until_stopped(examine(call.settings, call.data, findings))
+    for hop in Hop:
+        print(write_line(hop, findings))
+    return int(not all(hop in findings and findings[hop].is_ok for hop in Hop))
+
+
+def write_line(hop: Hop, findings: Findings) -> str:
+    """Hop, verdict and one sentence of what to do."""
+    found = findings.get(hop)
+    if found is None:
+        verdict, sentence = "not tried", "repair the failed hops first"
+    elif found.is_ok:
+        verdict, sentence = "ok", found.said
+    else:
+        verdict, sentence = "failed", f"{found.said}; {_ADVICE[hop]}"
+    return f"{hop:<13}  {verdict:<9}  {sentence}".rstrip()
+
+
+async def examine(
+    settings: Settings, data: Path, findings: Findings, patience_s: float = PATIENCE_S
+) -> None:
+    """Test every hop, one after the other.
+
+    Args:
+        settings: Addresses of the parts.
+        data: Directory of the history unless the settings name another.
+        findings: Filled hop by hop; the ones that depend on a failed one stay out.
+        patience_s: Time limit of each hop (s).
+    """
+    database = history_url(settings.database_url, data)
+    async with AsyncExitStack() as stack:
+        path = await stack.enter_async_context(_Path(settings))
+        steps: tuple[tuple[Hop, Callable[[], Awaitable[str]]], ...] = (
+            (Hop.MQTT, path.ask_broker),
+            (Hop.ORION, path.ask_orion),
+            (Hop.AGENT, path.send_measure),
+            (Hop.PAGE, path.ask_page),
+            (Hop.NOTIFICATIONS, path.look_at_subscriptions),
+            (Hop.DATABASE, lambda: asyncio.to_thread(_check_database, database)),
+        )
+        for hop, step in steps:
+            needs = (findings.get(need) for need in _NEEDS.get(hop, ()))
+            if all(need is not None and need.is_ok for need in needs):
+                findings[hop] = await _try(step, patience_s)
+
+
+async def _try(step: Callable[[], Awaitable[str]], patience_s: float) -> Finding:
+    try:
+        async with asyncio.timeout(patience_s):
+            return Finding(True, await step())
+    except TimeoutError:
+        return Finding(False, f"nothing came in {patience_s:g} s")
+    except HopError as error:
+        return Finding(False, error.detail)
+    except (IvegError, OSError) as error:
+        return Finding(False, str(error))
+
+
+def _check_database(database_url: str) -> str:
+    check_database(database_url)
+    return ""
 
 
 class _Page(FiwareHttp):
     HOP = Hop.PAGE
 
 
-class Examination:
-    """One examination: every hop tested once, everything removed afterwards.
+class _Path:
+    """Uses of the hops of the data path; each returns a remark or raises HopError."""
 
-    Args:
-        settings: Addresses of the parts.
-        data: Directory of the history unless the settings name another.
-        patience_s: Time limit of each hop (s).
-        limit_s: Time limit of the examination, removal included (s).
-
-    Attributes:
-        findings: Findings so far.
-        lag: Delay of measures, where that is the cause.
-    """
-
-    def __init__(
-        self,
-        settings: Settings,
-        data: Path,
-        patience_s: float = PATIENCE_S,
-        limit_s: float = LIMIT_S,
-    ) -> None:
-        service = settings.fiware_service, settings.fiware_servicepath
+    def __init__(self, settings: Settings) -> None:
         self._settings = settings
-        self._patience_s = patience_s
-        self._address = broker_of(settings)
-        self._database = history_url(settings.database_url, data)
         self._orion, self._agent = open_fiware(settings)
-        self._page = _Page(page_url_of(settings), *service, bearer=settings.api_token)
-        self._probe = Probe(self._orion, self._agent, settings.apikey)
-        self._device: ProbeDevice | None = None
-        self._listening_at = ""
-        self._mark = ""
-        self._began: dict[Check, float] = {}
-        self._ends = clock.mono() + limit_s - _REMOVAL_S
-        self._measure_mark = ""
-        self._measured_at = 0.0
-        self._waited_s = 0.0
-        self.findings: dict[Check, Finding] = {}
-        self.lag: Lag | None = None
+        self._page = _Page(page_address(settings), "", "")
 
-    @property
-    def stack(self) -> Stack:
-        """Addresses for the sentences."""
-        address, settings = self._address, self._settings
-        return Stack(
-            broker=f"{address.host}:{address.port}",
-            user=address.user or "",
-            orion=settings.orion_url,
-            agent=settings.iota_url,
-            listener=self._listening_at,
-            database=describe(self._database),
-            page=page_url_of(settings),
-            topics=self._probe.topic(""),
-            token=settings.fiware_token_url,
-            lag=self.lag,
-            waited_s=self._waited_s,
-        )
+    async def __aenter__(self) -> "_Path":
+        return self
 
-    @property
-    def left_behind(self) -> list[str]:
-        """Parts of the probe that could not be removed, as sentences."""
-        return self._probe.left_behind
+    async def __aexit__(self, *_: object) -> None:
+        for client in (self._orion, self._agent, self._page):
+            await client.close()
 
-    async def run(self) -> None:
-        """Test every hop; clean up also when cancelled."""
-        look_at_database = partial(asyncio.to_thread, check_database, self._database)
-        look_at_page = partial(
-            self._page.ask, "GET", "/healthz", timeout_s=self._patience_s
-        )
-        async with AsyncExitStack() as stack:
-            for client in (self._orion, self._agent, self._page):
-                stack.push_async_callback(client.close)
-            stack.push_async_callback(self._probe.remove, _REMOVAL_S)
-            async with asyncio.TaskGroup() as tasks:
-                for check, step in (
-                    (Check.BROKER, lambda: self._connect(stack)),
-                    (Check.ORION, self._orion.version),
-                    (Check.AGENT, self._agent.version),
-                    (Check.DATABASE, look_at_database),
-                    (Check.PAGE, look_at_page),
-                ):
-                    tasks.create_task(self._try(check, step), name=check.name)
-            lag = await self._ask_iveg()
-            if lag is None or lag.lag_s < self._patience_s:
-                await self._use_the_agent()
-            else:
-                self.lag = lag
-                self.findings[Check.MEASURE] = Finding(
-                    Check.MEASURE, lag.lag_s, "nothing was added to it"
-                )
-            await self._try(Check.NOTIFICATION, self._be_notified)
-            await self._try(Check.DIRECT, self._command_straight)
-            await self._wait_for_the_measure()
+    async def ask_orion(self) -> str:
+        await self._orion.version()
+        return ""
 
-    async def _use_the_agent(self) -> None:
-        await self._try(Check.DEVICE, self._make_device)
-        await self._try(Check.MEASURE, self._measure)
-        await self._try(Check.COMMAND, self._command)
-        await self._try(Check.ANSWER, self._answer)
+    async def ask_page(self) -> str:
+        await self._page.ask("GET", "/healthz")
+        return ""
 
-    async def _try(self, check: Check, step: Callable[[], Awaitable[object]]) -> None:
-        if missing(check, self.findings) or clock.mono() >= self._ends:
-            return
-        trouble = None
-        began = clock.mono()
-        try:
-            # The limit allows for two waits, or for Orion's wait for the agent.
-            async with asyncio.timeout(min(2 * self._patience_s, self._left_s)):
-                await step()
-        except TimeoutError:
-            trouble = ""
-        except HopError as error:
-            trouble = error.detail
-        except (IvegError, OSError) as error:
-            trouble = str(error)
-        took_s = clock.mono() - self._began.get(check, began)
-        self.findings[check] = Finding(check, took_s, trouble)
+    async def ask_broker(self) -> str:
+        await self._publish_probe()
+        return ""
 
-    @property
-    def _left_s(self) -> float:
-        return max(0.0, self._ends - clock.mono())
+    async def _publish_probe(self) -> str:
+        """Publish a probe and hear it from the broker; returns its stamp."""
+        stamp = codec.format_stamp(clock.wall())
+        payload = codec.write_heartbeat(Origin(secrets.token_hex(4), 1, stamp))
+        topic = names.measure_topic(self._settings.apikey, names.HEARTBEAT_ID)
+        await publish_and_hear(broker_of(self._settings), topic, payload)
+        return stamp
 
-    # --- lag ----------------------------------------------------------------------
-
-    async def _ask_iveg(self) -> Lag | None:
-        """Lag that a running iVeg reports to holders of its token."""
-        if not self._settings.api_token or missing(Check.PAGE, self.findings):
-            return None
-        with contextlib.suppress(HopError):
-            path, within_s = "/api/v1/health", self._patience_s
-            answer = await self._page.ask("GET", path, timeout_s=within_s)
-            return _lag_told(self._page.read_object(answer))
-        return None
-
-    async def _wait_for_the_measure(self) -> None:
-        """Wait for a late measure, which gives the lag or a lower bound of it."""
-        finding = self.findings.get(Check.MEASURE)
-        if finding is None or finding.trouble is None or not self._measured_at:
-            return
-        until = self._measured_at + _WAITS * self._patience_s
-        left_s = min(until, self._ends) - clock.mono()
-        with contextlib.suppress(TimeoutError, HopError):
-            await self._seen("probe", self._measure_mark, left_s)
-            took_s = clock.mono() - self._measured_at
-            self.lag = Lag(took_s)
-        self._waited_s = took_s = clock.mono() - self._measured_at
-        self.findings[Check.MEASURE] = Finding(
-            Check.MEASURE, took_s, f"nothing came in {self._patience_s:.1f} s"
-        )
-        if self.lag is None:
-            self.lag = await self._lag_of_the_heartbeat()
-        if self.lag is None and self._agent_is_slow:
-            self.lag = Lag(took_s, at_least=True)
-
-    async def _lag_of_the_heartbeat(self) -> Lag | None:
-        """Lag of a running iVeg's own probe, between sending and arrival at Orion."""
-        with contextlib.suppress(HopError):
-            left, came = await self._orion.read_probe_times()
-            fresh = clock.wall() - came < _FRESH_S
-            if fresh and came - left > SLOW_S:
-                return Lag(came - left, told_by=", as the running iVeg's probe shows")
-        return None
-
-    @property
-    def _agent_is_slow(self) -> bool:
-        """Whether the agent also answered other requests late."""
-        asked = (Check.AGENT, Check.DEVICE, Check.COMMAND)
-        found = [self.findings[check] for check in asked if check in self.findings]
-        return any(one.took_s > SLOW_S for one in found)
-
-    # --- hops ---------------------------------------------------------------------
-
-    async def _connect(self, stack: AsyncExitStack) -> None:
-        echo, command = self._probe.topic("echo"), self._probe.topic(names.COMMAND)
-        connection = probe_device(self._address, (echo, command), self._patience_s)
-        self._device = device = await stack.enter_async_context(connection)
-        mark = device.ear.mark()
-        await device.publish(echo, mark.encode(), self._patience_s)
-        try:
-            await device.ear.heard(mark, self._patience_s)
-        except TimeoutError as error:
-            raise HopError(Hop.MQTT, "gives no echo of what we publish") from error
-
-    async def _make_device(self) -> None:
+    async def send_measure(self) -> str:
+        """Repair the devices, then send a probe and wait until Orion has it."""
         settings = self._settings
-        await self._probe.make_device(settings.iota_cb_url or settings.orion_url)
+        robots = load_fleet(settings.fleet, settings.robots).ids
+        await self._agent.version()
+        await provision(
+            self._agent,
+            self._orion,
+            robots=robots,
+            apikey=settings.apikey,
+            cbroker_url=settings.iota_cb_url or settings.orion_url,
+            tiles=load_equipment(settings.equipment, robots),
+        )
+        began, stamp = clock.mono(), await self._publish_probe()
+        # Orion is polled: notifications are tested by another hop.
+        while not await self._has_probe(stamp):  # noqa: ASYNC110
+            await asyncio.sleep(_LOOK_EVERY_S)
+        took_s = clock.mono() - began
+        return lag_in_words(took_s) if took_s > SLOW_S else ""
 
-    async def _measure(self) -> None:
-        self._measure_mark = mark = secrets.token_hex(8)
-        self._measured_at = clock.mono()
-        await self._publish("attrs", {"probe": {"mark": mark}})
-        await self._seen("probe", mark, self._patience_s)
+    async def _has_probe(self, stamp: str) -> bool:
+        """Whether Orion has this probe, or a later one of a running iVeg."""
+        read = codec.read_entity(await self._orion.read_probe() or {})
+        return any(
+            isinstance(one, HeartbeatProbe) and (one.origin.stamp or "") >= stamp
+            for one in read.observations
+        )
 
-    async def _be_notified(self) -> None:
-        """Be notified of a change made at Orion itself, without the agent."""
-        ear = TopicListener()
-
-        # As an iVeg with these settings names itself to Orion.
-        settings = self._settings
-        host = urlsplit(settings.notify_address).hostname or settings.host
-
-        def hear(body: bytes) -> tuple[HTTPStatus, str]:
-            ear.hear(body)
-            return HTTPStatus.NO_CONTENT, ""
-
-        async with post_listener(hear, bind_to(host)) as port:
-            self._listening_at = f"http://{in_url(host)}:{port}/"
-            subscription = await self._probe.subscribe(self._listening_at)
-            mark = ear.mark()
-            # The steps so far are preparation; the hop begins here.
-            self._began[Check.NOTIFICATION] = clock.mono()
-            await self._probe.change(mark)
-            try:
-                await ear.heard(mark, self._patience_s)
-            except TimeoutError as error:
-                reason = await self._probe.why_not_notified(subscription)
-                raise HopError(Hop.ORION, reason) from error
-
-    async def _command(self) -> None:
-        device = self._connected
-        self._mark = device.ear.mark()
-        await self._probe.command(self._mark)
-        await device.ear.heard(self._mark, self._patience_s)
-
-    async def _answer(self) -> None:
-        await self._publish("cmdexe", {names.COMMAND: {"probe": self._mark}})
-        await self._seen(names.COMMAND_INFO, self._mark, self._patience_s)
-
-    async def _command_straight(self) -> None:
-        mark = self._connected.ear.mark()
-        await self._publish(names.COMMAND, {names.COMMAND: {"probe": mark}})
-        await self._connected.ear.heard(mark, self._patience_s)
-
-    # --- what hops do -------------------------------------------------------------
-
-    @property
-    def _connected(self) -> ProbeDevice:
-        if self._device is None:
-            raise HopError(Hop.MQTT, "not connected")
-        return self._device
-
-    async def _publish(self, last: str, payload: Mapping[str, object]) -> None:
-        body = orjson.dumps(payload)
-        topic = self._probe.topic(last)
-        await self._connected.publish(topic, body, self._patience_s)
-
-    async def _seen(self, attribute: str, mark: str, within_s: float) -> None:
-        """Wait until an attribute of the probe at Orion contains the mark."""
-        async with asyncio.timeout(max(0.0, within_s)):
-            # Orion is polled: notifications are tested by another hop.
-            while not await self._probe.holds(attribute, mark):  # noqa: ASYNC110
-                await asyncio.sleep(_LOOK_EVERY_S)
-
-
-def _lag_told(health: Json) -> Lag | None:
-    """Lag in ``GET /api/v1/health``; None if healthy or not reported."""
-    try:
-        agent = next(one for one in health["hops"] if one["hop"] == Hop.AGENT)
-        lag_s, growing = float(agent["lag_s"]), bool(agent["growing"])
-    except (KeyError, TypeError, ValueError, StopIteration):
-        return None
-    told_by = ", as the running iVeg says"
-    return Lag(lag_s, growing=growing, told_by=told_by) if lag_s > SLOW_S else None
+    async def look_at_subscriptions(self) -> str:
+        """Read at Orion whether iVeg's subscriptions are there and deliver."""
+        ours = [
+            one
+            for one in await self._orion.read_subscriptions()
+            if str(one.get("description", "")).startswith(PREFIX)
+        ]
+        if failing := describe_failures(ours):
+            raise HopError(Hop.NOTIFICATIONS, failing)
+        if not ours:
+            raise HopError(Hop.NOTIFICATIONS, "Orion has no subscription of iVeg")
+        return ""

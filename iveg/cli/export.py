@@ -10,18 +10,16 @@ from datetime import UTC, datetime
 from typing import Any
 
 from iveg.adapters.database_check import check_database
-from iveg.adapters.extras import require_extra
 from iveg.adapters.history.engine import history_url
 from iveg.adapters.history.lists import MOST_ROWS, Filter
 from iveg.adapters.history.queries import Queries
-from iveg.adapters.parquet import ParquetTable
 from iveg.cli.arguments import CommandCall
 from iveg.domain.errors import HopError, SettingsError
 from iveg.domain.records import Record
 from iveg.domain.stamps import parse_stamp
 from iveg.web.api import exports
+from iveg.web.api.history import HistoryList, lists_of
 from iveg.web.api.history_filters import NO_DAY, is_kept
-from iveg.web.api.history_lists import HistoryList, lists_of
 
 _Pages = AsyncIterator[Sequence[Record]]
 _MOMENT = "a moment as ISO-8601, in UTC unless it says otherwise"
@@ -34,8 +32,6 @@ def run(call: CommandCall) -> int:
         IvegError: it cannot be done.  Then there is no file.
     """
     options = call.options
-    if options.format == "parquet":
-        require_extra("parquet", "iveg export --format parquet")
     url = history_url(call.settings.database_url, call.data)
     since = _moment("--since", options.since)
     until = _moment("--until", options.until)
@@ -116,8 +112,8 @@ async def _export(
 ) -> None:
     first = await queries.page(one.of, asked)
     pages = queries.pages(one.of, first, asked)
-    writers = {"csv": _csv, "ndjson": _ndjson, "parquet": _parquet}
-    async for piece in writers[form](one, pages):
+    writer = _csv if form == "csv" else _ndjson
+    async for piece in writer(one, pages):
         write(piece)
 
 
@@ -130,10 +126,3 @@ async def _csv(one: HistoryList[Any], pages: _Pages) -> AsyncIterator[bytes]:
 async def _ndjson(one: HistoryList[Any], pages: _Pages) -> AsyncIterator[bytes]:
     async for records in pages:
         yield exports.ndjson_rows(one.model, await one.rows(records))
-
-
-async def _parquet(one: HistoryList[Any], pages: _Pages) -> AsyncIterator[bytes]:
-    table = ParquetTable(one.path)
-    async for records in pages:
-        yield table.add(records)
-    yield table.end()

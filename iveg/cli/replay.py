@@ -1,13 +1,15 @@
-"""Recorded logs as robots, as a process."""
+"""``iveg replay``: recorded logs as robots, whose names no live robot may have."""
 
 import argparse
+from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from iveg.adapters import clock
 from iveg.adapters.fleet_files import load_fleet
+from iveg.app.fiware import open_fiware
 from iveg.cli.arguments import CommandCall
-from iveg.cli.live_robots import live_robot
 from iveg.cli.nodes import broker_of, node_settings
 from iveg.cli.running import LOOPBACK, run_until_stopped
 from iveg.domain.errors import DataFileError
@@ -15,6 +17,23 @@ from iveg.domain.fleet import FleetDescription
 from iveg.robot.replay.bags import BagOptions
 from iveg.robot.replay.replay import ReplaySettings, run_replay
 from iveg.settings import Settings
+
+_LIVE_S = 10.0
+
+
+async def live_robot(settings: Settings, robots: Iterable[str]) -> str | None:
+    """The first of these robots that Orion had data of in the last 10 s.
+
+    Raises:
+        HopError: Orion does not answer.
+    """
+    orion, agent = open_fiware(settings)
+    async with orion, agent:
+        for robot_id in robots:
+            heard = await orion.modified_at(robot_id)
+            if heard is not None and clock.wall() - heard < _LIVE_S:
+                return robot_id
+    return None
 
 
 def run(call: CommandCall) -> int:

@@ -2,6 +2,7 @@
 
 import argparse
 import asyncio
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -12,32 +13,114 @@ from iveg.adapters import clock
 from iveg.adapters.dds_network import DdsNetwork
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
+from iveg.adapters.mqtt import MqttLink
 from iveg.cli.arguments import CommandCall
-from iveg.cli.nodes import broker_of, node_settings
-from iveg.cli.robot_config import load_config, network_of
+from iveg.cli.nodes import broker_of, load_config, network_of, node_settings
 from iveg.cli.running import (
     LOOPBACK,
     report_ready,
     run_until_stopped,
     tune_garbage_collection,
 )
-from iveg.domain.errors import HopError, SettingsError
+from iveg.domain.errors import HopError, SettingsError, UnreadableError
 from iveg.domain.feedback import Feedback
 from iveg.domain.fleet import UNDESCRIBED_SPEED, RobotDescription, RobotProfile
 from iveg.domain.geometry import Twist2D
 from iveg.domain.witness import Outline, Plan
 from iveg.ngsi import names
 from iveg.robot.goals import Navigate
-from iveg.robot.node import RobotNode
-from iveg.robot.node_settings import NodeSettings
+from iveg.robot.node import NodeSettings, RobotNode
+from iveg.robot.ros2.checking import CheckRow, Traffic, forms_published, judge, lines
 from iveg.robot.ros2.config import RobotConfig
-from iveg.robot.ros2.network import Network
+from iveg.robot.ros2.inputs import SensorInputs
+from iveg.robot.ros2.outputs import Network
 from iveg.robot.ros2.rig import Ros2Robot
+from iveg.robot.ros2.topics import TOPICS, sensed_topics
+from iveg.ros2 import cdr
+from iveg.ros2.messages import Message
 from iveg.settings import Settings
 
 if TYPE_CHECKING:
-    pass
-from iveg.cli.robot_check import check
+    from iveg.adapters.dds import Dds, DdsReader
+
+_CHECK_S = 4.0
+
+
+async def check(
+    robot_id: str,
+    config: RobotConfig,
+    inputs: SensorInputs,
+    network: DdsNetwork,
+    settings: Settings,
+) -> int:
+    """Listen without publishing, and print what is wrong; 1 where anything is."""
+    from iveg.adapters.dds import Dds
+
+    counts: Counter[str] = Counter()
+    frames: dict[str, str] = {}
+    fleet = load_fleet(settings.fleet, settings.robots)
+    with Dds(network) as dds:
+        readers: dict[tuple[str, type[Message], bool], DdsReader] = {}
+        link = MqttLink(broker_of(settings), f"check of {robot_id}")
+        task = asyncio.create_task(link.run(), name="broker")
+        began = clock.mono()
+        while clock.mono() - began < _CHECK_S:
+            _listen(dds, config, readers)
+            await asyncio.sleep(0.03)
+            now = clock.now()
+            for (topic, kind, _), reader in readers.items():
+                if waited := reader.take():
+                    form = TOPICS[topic].form(kind.ROS) or kind
+                    counts[topic] += len(waited)
+                    frames[topic] = _frame(form, waited[-1])
+                    inputs.hear(topic, waited, now.mono, form=form)
+            inputs.tick(now)
+        broker = link.connected
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+        rows = judge(
+            config,
+            dds.endpoints(),
+            {key: Traffic(n / _CHECK_S, frames[key]) for key, n in counts.items()},
+            inputs.input_faults.faults(clock.mono()),
+            robot_id=robot_id,
+            has_detector=fleet.of_robot(robot_id).has_detector,
+            unheard=dds.unheard(),
+        )
+    if not broker:
+        address = broker_of(settings)
+        at = f"{address.host}:{address.port}"
+        rows += (CheckRow("MQTT broker", verdict=f"none at {at} (IVEG_MQTT_URL)"),)
+    if robot_id not in fleet.ids:
+        known = f"not in the fleet of IVEG_ROBOTS: {', '.join(fleet.ids)}"
+        rows += (CheckRow(robot_id, verdict=known),)
+    missing = any(row.verdict for row in rows)
+    print("\n".join([*lines(rows), "" if missing else "Nothing is missing."]))
+    return 1 if missing else 0
+
+
+def _frame(form: type[Message], payload: bytes) -> str:
+    """Frame of a message; empty where it has none, or cannot be read."""
+    try:
+        header = getattr(cdr.read(form, payload), "header", None)
+    except UnreadableError:
+        return ""
+    return "" if header is None else str(header.frame_id)
+
+
+def _listen(
+    dds: "Dds",
+    config: RobotConfig,
+    readers: "dict[tuple[str, type[Message], bool], DdsReader]",
+) -> None:
+    """Read each topic that is published, in its type."""
+    endpoints = dds.endpoints()
+    for topic, name in sensed_topics(config.full_topics).items():
+        depth = 2 if TOPICS[topic].role == "picture" else 200
+        qos = config.qualities[topic].newest(depth)
+        for form, raw in forms_published(topic, name, endpoints):
+            if (topic, form, raw) not in readers:
+                readers[topic, form, raw] = dds.reader(name, form, qos, raw=raw)
 
 
 def run(call: CommandCall) -> int:
@@ -49,12 +132,13 @@ def run(call: CommandCall) -> int:
     config, classes = load_config(options, call.environment)
     network = network_of(config, call.environment, "iveg robot")
     if options.action == "check":
-        return asyncio.run(check(options.id, config, network, settings))
+        inputs = SensorInputs(config, classes, sim_time=options.sim_time)
+        return asyncio.run(check(options.id, config, inputs, network, settings))
     if options.attended and broker_of(settings).host not in LOOPBACK:
         raise SettingsError(
             "--attended", broker_of(settings).host, "used with a broker on loopback"
         )
-    from iveg.adapters.lease import lease
+    from iveg.adapters.files import lease
 
     with lease(call.data / "robots" / f"{options.id}.lease", options.id):
         work = _ride(options, settings, call.data, config, classes, network)
@@ -133,7 +217,7 @@ def _profile(robot: RobotDescription, config: RobotConfig) -> RobotProfile:
 
 
 async def refuse_second_gate(
-    dds: Network, topic: str, discovery_s: float = 1.0, ghost_s: float = 6.0
+    dds: Network, topic: str, discovery_s: float = 2.0, ghost_s: float = 6.0
 ) -> None:
     """Refuse a drive topic that another program publishes on.
 
@@ -158,9 +242,3 @@ async def refuse_second_gate(
             )
             raise HopError("dds", detail)
         await asyncio.sleep(0.1)
-
-
-# --- configuration -----------------------------------------------------------------
-
-
-# --- check -------------------------------------------------------------------------

@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import logging
+import os
 import socket
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -10,11 +11,7 @@ from pathlib import Path
 import uvicorn
 from fastapi import FastAPI
 
-from iveg.adapters import clock
-from iveg.adapters.connection_caps import ConnectionCaps, raise_descriptor_limit
-from iveg.adapters.connections import ConnectionTable
-from iveg.adapters.history.engine import history_url
-from iveg.adapters.history.migrate import upgrade
+from iveg.adapters.history.engine import history_url, upgrade
 from iveg.app.dss import Dss
 from iveg.app.opening import open_dss
 from iveg.asgi import create_app
@@ -22,16 +19,16 @@ from iveg.cli.arguments import CommandCall
 from iveg.cli.running import (
     page_address,
     print_sign_in_link,
+    raise_descriptor_limit,
     report_ready,
     run_until_stopped,
     tune_garbage_collection,
 )
-from iveg.cli.user import invitation_link, set_up
+from iveg.cli.user import invitation_link
 from iveg.domain.errors import HopError
 from iveg.settings import Settings
 from iveg.web.bounded_http import bounded_http
 from iveg.web.live.bounded import BoundedSocket
-from iveg.web.security.connections import proxies
 
 _log = logging.getLogger(__name__)
 _WS_MAX_BYTES = 65536
@@ -56,6 +53,8 @@ class _Server(uvicorn.Server):
 
 def run(call: CommandCall) -> int:
     """Run ``iveg serve``; returns the exit code."""
+    # Recordings, journals and databases show people: nobody else on the machine reads.
+    os.umask(0o077)
     call.data.mkdir(parents=True, exist_ok=True)
     work = serve(call.settings, call.data, demo=call.options.demo)
     return run_until_stopped(work, until_eof=call.options.until_eof)
@@ -72,15 +71,10 @@ async def serve(
     await _upgrade_history(settings, data)
     raise_descriptor_limit()
     dss = open_dss(settings, data, demo=demo, make=make)
+    with contextlib.suppress(HopError):
+        await dss.door.copy_earlier()
     app = create_app(dss)
     config = _config(settings, app)
-    table = ConnectionTable(
-        clock.mono,
-        ConnectionCaps.for_this_process(),
-        proxies(config.forwarded_allow_ips),
-    )
-    config.http = bounded_http(app.state.orion, table)
-    dss.counted.append(table.counters)
     server = _Server(
         config,
         on_start=report_ready if demo else lambda: _print_way_in(settings, dss),
@@ -88,14 +82,11 @@ async def serve(
     tune_garbage_collection()
     dss.on_failure = lambda: setattr(server, "should_exit", True)
     serving = asyncio.create_task(server.serve(), name="http")
-    ending = asyncio.create_task(table.run(), name="http-late-requests")
     try:
         await asyncio.shield(serving)
     except asyncio.CancelledError:
         server.should_exit = True
         await serving
-    finally:
-        ending.cancel()
     if dss.failure is not None:
         raise dss.failure
 
@@ -106,7 +97,7 @@ def _print_way_in(settings: Settings, dss: Dss) -> None:
         print_sign_in_link(settings, dss.sign_in_token)
         return
     try:
-        invitation = set_up(dss.stores.accounts, clock.wall())
+        invitation = dss.door.first_invitation()
     except HopError as error:
         _log.warning("nobody can be made admin: %s", error)
         return
@@ -123,6 +114,7 @@ def _config(settings: Settings, app: FastAPI) -> uvicorn.Config:
         port=settings.port,
         log_config=None,
         access_log=False,
+        http=bounded_http(),
         ws=BoundedSocket,
         ws_max_size=_WS_MAX_BYTES,
         ws_ping_interval=10.0,

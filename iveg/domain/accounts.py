@@ -2,17 +2,32 @@
 
 A name travels with each STOP through Orion, which refuses some characters with the
 whole update they stand in; such a name would stop nothing by that transport.
+
+Access of people and programs, held in memory: the truth while iVeg runs.
+
+Each question is answered from here, so neither a disk nor a database that is away,
+slow or damaged changes who may stop.  Whoever keeps it is told of every change.
+
+What an identity provider's claims mean here: a person, a name, a role.
+
+A claim's path fits the shapes of the providers (docs/deployment.md, "Single sign-on"):
+``realm_access.roles`` (Keycloak), ``roles`` or ``groups`` (Entra), ``roles[].name``
+(Keyrock).  Lists on the way are gone through, with or without ``[]``.
 """
 
 import hashlib
 import unicodedata
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from typing import Final, Literal
 
-SignInMethod = Literal["link", "password", "passkey", "pin", "sso", "tablet", "token"]
-"""Proof of an identity: ``sso`` is the identity provider's, ``token`` a program's,
-``tablet`` a shared browser's."""
-OF_ACCOUNTS: Final = frozenset({"password", "passkey", "sso"})
+from iveg.domain.audit import Actor
+from iveg.domain.errors import NameTakenError
+from iveg.domain.records import Json
+
+SignInMethod = Literal["link", "password", "sso", "token"]
+"""Proof of an identity: ``sso`` is the identity provider's, ``token`` a program's."""
+OF_ACCOUNTS: Final = frozenset({"password", "sso"})
 """Methods of people with an account, which decides over their sessions."""
 PersonRole = Literal["viewer", "operator", "admin"]
 Language = Literal["es", "en"]
@@ -27,6 +42,9 @@ DEFAULT_NAME: Final = "operator"
 """The name of that person where the settings give none."""
 MOST_NAME: Final = 64
 _REFUSED: Final = frozenset("<>\"'=;()")
+_RESERVED: Final = frozenset(
+    {"console", "iveg", "link", "nobody", "program", DEFAULT_NAME}
+)
 
 
 def is_name(text: str) -> bool:
@@ -37,6 +55,11 @@ def is_name(text: str) -> bool:
         and _REFUSED.isdisjoint(text)
         and not any(unicodedata.category(one)[0] == "C" for one in text)
     )
+
+
+def is_reserved(name: str) -> bool:
+    """Whether the record calls somebody so who has no account, as iVeg itself."""
+    return name_key(name) in _RESERVED
 
 
 def name_key(name: str) -> str:
@@ -62,7 +85,6 @@ class Account:
         since: Sessions that began before are over (Unix s): a new role or password.
         provider: Issuer that vouches for the person and gives the role; empty: none.
         language: What the person reads; empty: whatever their browser asks for.
-        pin: Hash of what unlocks a shared tablet; empty: nothing does.
     """
 
     account_id: str
@@ -76,7 +98,6 @@ class Account:
     since: float = 0.0
     provider: str = ""
     language: Language | Literal[""] = ""
-    pin: str = ""
 
     def is_open(self, now: float) -> bool:
         """Whether the person may be here at this moment (Unix s)."""
@@ -114,3 +135,266 @@ class ApiToken:
     def is_open(self, now: float) -> bool:
         """Whether it lets the program in at this moment (Unix s)."""
         return self.ends_at is None or now < self.ends_at
+
+
+@dataclass(frozen=True, slots=True)
+class Session:
+    """A signed-in person.
+
+    Attributes:
+        digest: SHA-256 of the token (hex).
+        role: What they were when they came.
+        began: Unix time of the sign-in (s); ``seen`` of the last sign of life.
+        person: Id of the account; empty in sessions of earlier versions.
+        method: How they signed in.
+        until: When it is over at the latest (Unix s); None: no earlier than others.
+        wall: It was left to a screen that everybody passes.
+    """
+
+    digest: str
+    name: str
+    role: PersonRole
+    began: float
+    seen: float
+    person: str = ""
+    method: SignInMethod = "link"
+    until: float | None = None
+    wall: bool = False
+
+    @property
+    def session_id(self) -> str:
+        """Names it to people; tells nobody the digest, and lets nobody in."""
+        return digest_of(f"id:{self.digest}")[:16]
+
+
+@dataclass(frozen=True, slots=True)
+class Access:
+    """All who may come in, at one moment."""
+
+    accounts: tuple[Account, ...] = ()
+    tokens: tuple[ApiToken, ...] = ()
+    sessions: tuple[Session, ...] = ()
+
+
+NOBODY: Final = Access()
+
+
+MOST_SESSIONS: Final = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class AccessChange:
+    """A change of somebody's rights, as the audit tells it.
+
+    Attributes:
+        row: What is kept from now on.
+        gone: It is kept no longer.
+    """
+
+    by: Actor
+    action: str
+    row: Account | ApiToken
+    details: Json = field(default_factory=dict)
+    gone: bool = False
+
+
+class AccessBook:
+    """Accounts by id, tokens by digest (hex), sessions by digest.
+
+    Args:
+        most: How many sessions there may be; the one that was idle longest ends.
+
+    Attributes:
+        note: Told of each change of rights, once it counts.
+        keep: Called when something is to be remembered; returns at once.
+    """
+
+    def __init__(self, kept: Access = NOBODY, most: int = MOST_SESSIONS) -> None:
+        self.accounts = {one.account_id: one for one in kept.accounts}
+        self.tokens = {one.digest: one for one in kept.tokens}
+        self.sessions = {bytes.fromhex(one.digest): one for one in kept.sessions}
+        self.note: Callable[[AccessChange], None] = lambda _: None
+        self.keep: Callable[[], None] = lambda: None
+        self._most = most
+
+    def picture(self) -> Access:
+        """All of it at this moment."""
+        return Access(
+            tuple(self.accounts.values()),
+            tuple(self.tokens.values()),
+            tuple(self.sessions.values()),
+        )
+
+    def add(self, earlier: Access) -> None:
+        """Take in what is not known yet."""
+        for account in earlier.accounts:
+            self.accounts.setdefault(account.account_id, account)
+        for token in earlier.tokens:
+            self.tokens.setdefault(token.digest, token)
+        for session in earlier.sessions:
+            self.sessions.setdefault(bytes.fromhex(session.digest), session)
+        self.keep()
+
+    def apply(self, change: AccessChange) -> None:
+        """Have a change count, in every session, too.
+
+        Raises:
+            NameTakenError: somebody or some program else is called so.
+        """
+        row = change.row
+        if isinstance(row, ApiToken):
+            _refuse_taken(row.name, row.token_id, self.tokens.values())
+            self.tokens.pop(row.digest, None)
+            if not change.gone:
+                self.tokens[row.digest] = row
+        else:
+            _refuse_taken(row.name, row.account_id, self.accounts.values())
+            self.accounts[row.account_id] = row
+            self._end_sessions_of(row)
+        self.note(change)
+        self.keep()
+
+    def put(self, account: Account) -> None:
+        """Keep a new state of an account, which is no change of rights."""
+        self.accounts[account.account_id] = account
+        self._end_sessions_of(account)
+        self.keep()
+
+    def _end_sessions_of(self, account: Account) -> None:
+        """Forget sessions that a change has ended, so that no file holds them."""
+        over = [
+            digest
+            for digest, one in self.sessions.items()
+            if one.person == account.account_id
+            and (account.disabled or one.began < account.since)
+        ]
+        for digest in over:
+            del self.sessions[digest]
+
+    def open(self, session: Session) -> None:
+        """Let a session begin."""
+        known = self.sessions
+        if len(known) >= self._most:
+            del known[min(known, key=lambda one: known[one].seen)]
+        self.sessions[bytes.fromhex(session.digest)] = session
+        self.keep()
+
+
+def _refuse_taken(name: str, own: str, known: Iterable[Account | ApiToken]) -> None:
+    key = name_key(name)
+    for one in known:
+        other = one.token_id if isinstance(one, ApiToken) else one.account_id
+        if other != own and name_key(one.name) == key:
+            raise NameTakenError(name)
+
+
+SignOnFailure = Literal[
+    "unreachable",
+    "refused",
+    "outdated",
+    "untrusted",
+    "no_role",
+    "disabled",
+    "busy",
+]
+"""Why a sign-in at the provider let nobody in: it did not answer, or said no; the
+answer belongs to no sign-in that waits, or proves nothing; the person has no role here,
+or is disabled here; too many sign in at once."""
+
+_RANKS: Final[tuple[PersonRole, ...]] = ("viewer", "operator", "admin")
+_MOST_VALUES: Final = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class ProvenIdentity:
+    """A person as the provider vouches for them.
+
+    Attributes:
+        person: Stable id of the account, made from issuer and subject.
+        role: The highest that the claims give; None: none.
+    """
+
+    person: str
+    name: str
+    role: PersonRole | None
+
+
+@dataclass(frozen=True, slots=True)
+class ClaimReading:
+    """Where name and role stand in a provider's claims.
+
+    Attributes:
+        roles: Value of a claim → the role that it gives.
+    """
+
+    role_claim: str
+    name_claim: str
+    roles: Mapping[str, PersonRole]
+
+    def read(self, issuer: str, subject: str, claims: Json) -> ProvenIdentity:
+        """The person whom claims are about.
+
+        Args:
+            issuer: Whose claims they are.
+            subject: Id of the person there.
+            claims: What is told; of it nothing but strings and numbers counts.
+        """
+        person = person_id(issuer, subject)
+        claimed = next(values_at(claims, self.name_claim), "")
+        return ProvenIdentity(
+            person,
+            name_of(claimed, person),
+            highest_role(values_at(claims, self.role_claim), self.roles),
+        )
+
+
+def person_id(issuer: str, subject: str) -> str:
+    """Id of a person of a provider: neither their name nor the provider's address."""
+    digest = hashlib.sha256(f"{issuer}\0{subject}".encode()).hexdigest()
+    return f"sso-{digest[:32]}"
+
+
+def name_of(claim: str, person: str) -> str:
+    """A name that somebody may have, close to what is told; else part of the id."""
+    kept = unicodedata.normalize("NFC", claim[: 4 * MOST_NAME])
+    kept = "".join(one for one in kept if is_name(f"x{one}x")).strip()[:MOST_NAME]
+    return kept if is_name(kept := kept.strip()) else person[:12]
+
+
+def another_name(name: str, person: str) -> str:
+    """The name of somebody whose own is taken: with a part of the id behind it."""
+    mark = f" {person.removeprefix('sso-')[:6]}"
+    return f"{name[: MOST_NAME - len(mark)].rstrip()}{mark}"
+
+
+def highest_role(
+    values: Iterable[str], roles: Mapping[str, PersonRole]
+) -> PersonRole | None:
+    """The highest role among those that some values give; None: none."""
+    given = {roles[value] for value in values if value in roles}
+    return max(given, key=_RANKS.index, default=None)
+
+
+def values_at(claims: Json, path: str) -> Iterator[str]:
+    """Strings at a path, such as ``realm_access.roles`` or ``roles[].name``.
+
+    A claim whose own name is the path, dots and all, comes first.
+    """
+    if path in claims:
+        found = _walk(claims[path], ())
+    else:
+        found = _walk(claims, tuple(path.replace("[]", "").split(".")))
+    for _, value in zip(range(_MOST_VALUES), found, strict=False):
+        yield value
+
+
+def _walk(value: object, path: tuple[str, ...]) -> Iterator[str]:
+    if isinstance(value, list):
+        for one in value:
+            # Of a list inside a list nothing is read: no provider has one.
+            if not isinstance(one, list):
+                yield from _walk(one, path)
+    elif path and isinstance(value, dict):
+        yield from _walk(value.get(path[0]), path[1:])
+    elif not path and isinstance(value, str):
+        yield value

@@ -1,6 +1,6 @@
 """The decision record: from the detection to the observed slow-down, link by link.
 
-A ``SlowdownDecision`` opens when a robot enters a ring and closes when it is let go.
+A ``SlowdownDecision`` opens when a robot enters a zone and closes when it is let go.
 Every link has a time and a verdict; a link that does not come in time raises an alert
 (docs/dashboard.md, "Decisions")::
 
@@ -8,17 +8,26 @@ Every link has a time and a verdict; a link that does not come in time raises an
 
 A link is ``open`` while it may still come and never for longer: it comes, is missing,
 or iVeg itself is interrupted and its end is ``unknown``.
+
+Notices: when iVeg was notified of each person; acknowledgement is timed from there.
+
+A robot judges the feedback by its own pose and is often ahead of iVeg: its report that
+it slows for an alert comes before iVeg finds it inside the ring.  It is timed all the
+same, from the newest frame that robots had received by then::
+
+    frame notified ──> feedback ──> robot slows, reports ──> (iVeg finds it inside)
+         └────────────── timed ──────────────┘
 """
 
+from collections import deque
 from collections.abc import Callable, Container, Iterable
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import dataclass, field, replace
+from typing import Literal, NamedTuple
 
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import HALF_SPEED
-from iveg.domain.first_reports import FirstReports
-from iveg.domain.observations import Instant, Odometry, SafetyReport
-from iveg.domain.rule.crossings import Crossing
+from iveg.domain.observations import Instant, SafetyReport
+from iveg.domain.rule.zones import ZoneEntry
 
 LinkVerdict = Literal["ok", "late", "missing", "n/a", "open", "unknown"]
 LinkName = Literal[
@@ -32,10 +41,6 @@ LinkName = Literal[
     "interrupted",
 ]
 
-OBSERVED_SHARE = 0.55
-"""The slow-down counts when the speed is at most this share of what it was."""
-JUDGED_ABOVE = 0.2
-"""Slower than this (m/s) there is no slow-down to observe."""
 LATE_S, MISSING_S = 1.0, 2.0
 
 
@@ -65,17 +70,17 @@ class SlowdownDecision:
 
     Attributes:
         feedback: When the speed limit was first published; ``applied`` when the robot
-            said so; ``observed`` when its odometry showed it.
+            said so; ``observed`` when its motion showed it.
         speed_after: Speed at ``observed`` (m/s).
         waited_out: Whether every link has come or is missing.
         interrupted: iVeg went away while it was open; ``ended`` is when that was.
-        noticed: Arrival of the look that it rests on (monotonic, s); None for a ring
+        noticed: Arrival of the look that it rests on (monotonic, s); None for a zone
             that was known before.
         answered: When a robot that was ahead said that it slows (monotonic, s).
         places: Where the robot that is slowed and the observer were.
     """
 
-    crossing: Crossing
+    entry: ZoneEntry
     rule: DetectionRule
     feedback: Instant | None = None
     applied: Instant | None = None
@@ -93,7 +98,7 @@ class SlowdownDecision:
         """When the robot said that it slows for it (monotonic, s); None: never."""
         if self.answered is not None:
             return self.answered
-        if self.applied is None or self.crossing.ahead:
+        if self.applied is None or self.entry.told_before:
             return None
         return self.applied.mono
 
@@ -108,14 +113,7 @@ class SlowdownDecision:
     @property
     def decision_id(self) -> str:
         """Names the decision everywhere: feedback, log, record."""
-        return self.crossing.decision_id
-
-    @property
-    def judged(self) -> bool:
-        """Whether the robot drove fast and evenly enough for a slow-down to be seen."""
-        crossing = self.crossing
-        hidden = crossing.already_slow or crossing.speeding_up
-        return crossing.speed_before > JUDGED_ABOVE and not hidden
+        return self.entry.decision_id
 
     def published(self, at: Instant) -> "SlowdownDecision":
         """The speed limit was published."""
@@ -128,12 +126,11 @@ class SlowdownDecision:
             return self
         return replace(self, applied=at)
 
-    def moved(self, speed: float, at: Instant) -> "SlowdownDecision":
-        """Odometry came in with this speed (m/s)."""
-        limit = OBSERVED_SHARE * self.crossing.speed_before
-        if self.observed is not None or not self.judged or abs(speed) > limit:
+    def slowed(self, speed: float, at: Instant) -> "SlowdownDecision":
+        """The robot was measured to be slow, at this speed (m/s)."""
+        if self.observed is not None:
             return self
-        return replace(self, observed=at, speed_after=abs(speed))
+        return replace(self, observed=at, speed_after=speed)
 
     def closed(self, at: Instant) -> "SlowdownDecision":
         """The robot was let go."""
@@ -154,20 +151,13 @@ class SlowdownDecision:
         """Close the decision unfinished: iVeg stops, and its end stays unknown."""
         return replace(self, ended=at, interrupted=True)
 
-    @property
-    def is_overdue(self) -> bool:
-        """Whether the slow-down should have been seen by now and was not."""
-        if self.ended is not None or not self.waited_out:
-            return False
-        return self.applied is None or (self.judged and self.observed is None)
-
     def links(self) -> tuple[Link, ...]:
         """The chain as it stands."""
-        crossing, rule = self.crossing, self.rule
-        sighting = crossing.zone.sighting
-        entered = crossing.entered.wall
+        entry, rule = self.entry, self.rule
+        sighting = entry.zone.sighting
+        entered = entry.entered.wall
         seen = (
-            _unseen(crossing)
+            Link("detection", "n/a", None, "odometry")
             if sighting is None
             else Link("detection", "ok", sighting.at.wall, sighting.class_id)
         )
@@ -179,13 +169,11 @@ class SlowdownDecision:
         return (
             seen,
             passed,
-            Link("geometry", "ok", entered, crossing.entered_m),
+            Link("geometry", "ok", entered, entry.entered_m),
             Link("rule", "ok", entered, f"{rule.id} {rule.version}"),
             self._step("feedback", self.feedback, None),
             self._step("applied", self.applied, HALF_SPEED),
-            self._step("observed", self.observed, self.speed_after)
-            if self.judged
-            else Link("observed", "n/a", None, crossing.speed_before),
+            self._step("observed", self.observed, self.speed_after),
             *self._interruption(),
         )
 
@@ -194,7 +182,7 @@ class SlowdownDecision:
             yield Link("interrupted", "unknown", self.ended.wall)
 
     def _step(self, name: LinkName, at: Instant | None, value: float | None) -> Link:
-        start = self.crossing.entered.mono
+        start = self.entry.entered.mono
         if at is not None:
             took = at.mono - start
             return Link(name, "ok" if took <= LATE_S else "late", at.wall, value)
@@ -203,13 +191,6 @@ class SlowdownDecision:
         if self.ended is None:
             return Link(name, "open")
         return Link(name, "unknown" if self.interrupted else "missing")
-
-
-def _unseen(crossing: Crossing) -> Link:
-    """The first link of whom no camera saw: a laser, or a peer's own word."""
-    if crossing.zone.obstacle is None:
-        return Link("detection", "n/a", None, "odometry")
-    return Link("detection", "ok", crossing.entered.wall, "laser")
 
 
 class Decisions:
@@ -238,13 +219,13 @@ class Decisions:
         return [one for one in self._all.values() if one.ended is None]
 
     def begin(
-        self, crossing: Crossing, rule: DetectionRule, places: Iterable[Place] = ()
+        self, entry: ZoneEntry, rule: DetectionRule, places: Iterable[Place] = ()
     ) -> SlowdownDecision:
-        """Open the decision of a crossing; the oldest ended ones make room."""
-        notice = self._first_reports.of(crossing)
+        """Open the decision of an entry; the oldest ended ones make room."""
+        notice = self._first_reports.of(entry)
         noticed, answered = (None, None) if notice is None else notice
         decision = SlowdownDecision(
-            crossing,
+            entry,
             rule,
             noticed=noticed,
             answered=answered,
@@ -266,12 +247,12 @@ class Decisions:
         for person_id in people:
             self._first_reports.seen(person_id, at)
 
-    def moved(self, odometry: Odometry, at: Instant) -> list[SlowdownDecision]:
-        """A robot drives."""
-        speed = odometry.twist.linear_x
-        return self._change(
-            self._open_of(odometry.robot_id), lambda one: one.moved(speed, at)
-        )
+    def moved(
+        self, robot_id: str, speed: float, at: Instant, *, is_slow: bool
+    ) -> list[SlowdownDecision]:
+        """A robot drives, at this measured speed (m/s)."""
+        some = self._open_of(robot_id) if is_slow else ()
+        return self._change(some, lambda one: one.slowed(speed, at))
 
     def reported(
         self, report: SafetyReport, published_at: float, at: Instant
@@ -287,21 +268,21 @@ class Decisions:
         return self._change(self.open, lambda one: one.published(at))
 
     def age(
-        self, heard_s: Callable[[Crossing], float], known: Container[str]
+        self, heard_s: Callable[[ZoneEntry], float], known: Container[str]
     ) -> list[SlowdownDecision]:
         """Time passes; notices of persons who are no longer known are forgotten.
 
-        ``heard_s``: how long a crossing's robot has been heard since it began (s).
+        ``heard_s``: how long an entry's robot has been heard since it began (s).
         """
         self._first_reports.forget(known)
-        return self._change(self.open, lambda one: one.aged(heard_s(one.crossing)))
+        return self._change(self.open, lambda one: one.aged(heard_s(one.entry)))
 
     def break_off(self, at: Instant) -> list[SlowdownDecision]:
         """End every open one: iVeg stops."""
         return self._change(self.open, lambda one: one.broken_off(at))
 
     def _open_of(self, robot_id: str) -> list[SlowdownDecision]:
-        return [one for one in self.open if one.crossing.robot_id == robot_id]
+        return [one for one in self.open if one.entry.robot_id == robot_id]
 
     def _change(
         self,
@@ -311,3 +292,73 @@ class Decisions:
         changed = [after for one in some if (after := step(one)) is not one]
         self._all.update({one.decision_id: one for one in changed})
         return changed
+
+
+FRESH_S = 0.25
+"""Without a newer frame a ring was known: a robot that enters it is not timed."""
+_KEPT = 16
+_UNTIMED = "", 0.0, 0.0
+
+
+class FirstReport(NamedTuple):
+    """The notification that an acknowledgement is timed from.
+
+    Attributes:
+        at: Arrival of its notification (monotonic, s).
+        answered: When the robot said that it slows (monotonic, s); None where that is
+            still to come.
+    """
+
+    at: float
+    answered: float | None = None
+
+
+@dataclass(slots=True)
+class FirstReports:
+    """Notifications by person, and robots that slowed for an alert by themselves."""
+
+    _detections: dict[str, deque[float]] = field(default_factory=dict)
+    _ahead: dict[str, tuple[str, float, float]] = field(default_factory=dict)
+    """Slow robot → alert, when it first said so, when feedback had gone out before."""
+
+    def seen(self, person_id: str, at: Instant) -> None:
+        """Note the notification of a frame that shows this person."""
+        frames = self._detections.setdefault(person_id, deque(maxlen=_KEPT))
+        frames.append(at.mono)
+
+    def reported(self, report: SafetyReport, published_at: float, at: Instant) -> None:
+        """Note a safety report; feedback last went out at ``published_at``."""
+        robot_id, alert = report.robot_id, report.decision_id or ""
+        if report.speed_factor > HALF_SPEED:
+            self._ahead.pop(robot_id, None)
+        elif robot_id not in self._ahead:
+            self._ahead[robot_id] = alert, at.mono, published_at
+        elif self._ahead[robot_id][0] != alert:
+            # Slow for something else already: that it names this too times nothing.
+            self._ahead[robot_id] = _UNTIMED
+
+    def of(self, entry: ZoneEntry) -> FirstReport | None:
+        """The notice of an entry; None where there is none."""
+        zone = entry.zone
+        if zone.sighting is None:
+            return None
+        if not entry.told_before:
+            return self._notice(zone.cause, entry.entered.mono)
+        alert, answered, published_at = self._ahead.get(entry.robot_id, _UNTIMED)
+        if alert != zone.alert_id:
+            return None
+        return self._notice(zone.cause, published_at, answered)
+
+    def _notice(
+        self, person_id: str, before: float, answered: float | None = None
+    ) -> FirstReport | None:
+        frames = [at for at in self._detections.get(person_id, ()) if at <= before]
+        now = before if answered is None else answered
+        if not frames or now - frames[-1] > FRESH_S:
+            return None
+        return FirstReport(frames[-1], answered)
+
+    def forget(self, known: Container[str]) -> None:
+        """Keep only persons who are still known."""
+        for person_id in [one for one in self._detections if one not in known]:
+            del self._detections[person_id]

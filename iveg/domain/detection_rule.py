@@ -1,23 +1,20 @@
-"""The alert rule (Algorithm 2) and the ring that it draws.
+"""The alert rule (Algorithm 2) and the zone that it draws.
 
 A detection with confidence at or above the threshold and of class person or robot is
 an alert; below the threshold it is faint; any other confident class is a time stamp.
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
-from typing import Final, Literal
+from dataclasses import dataclass, field, replace
+from typing import Any, Final, Literal
 
 from iveg.domain.comparison import Comparison
-from iveg.domain.limits import LIMITS, ring_radius
+from iveg.domain.limits import LIMITS, grown_radius
+from iveg.domain.parameters import PARAMETERS, Class, Parameters
+from iveg.domain.words import meaning_of, plain
 
-Class = Literal["person", "robot"]
 Kind = Literal["alert", "faint", "other"]
 
-FORESIGHT_LEAST_S: Final = 0.5
-"""The shortest horizon of foresight (s)."""
-FORESIGHT_MOST_S: Final = 3.0
-"""The farthest (s): so far it was measured how much comes true."""
 RECOVERED: Final = "recovered"
 """Author of a version that was made from what could be read of a damaged file."""
 UPGRADED: Final = "upgrade"
@@ -49,49 +46,55 @@ class RuleVerdict:
     class_: Class | None
 
 
-@dataclass(frozen=True, slots=True)
-class DetectionRule:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DetectionRule(Parameters):
     """One version of the rule; part of every decision that it makes.
 
     Attributes:
-        threshold: Least confidence, inclusive; ``class_thresholds`` by canonical class.
-        radius_m: Ring of a fresh sighting, inclusive (m).
         aliases: Class as a detector names it, in lower case → canonical class.
         possible_people: Whether looks add up.  False only in versions that were stored
             before every one had it; no rule in force lacks it.
-        foresight: Whether a robot slows before it reaches a ring, to be slow there.
-        foresight_s: How far ahead that looks (s).
         comparison: What came of the trial that it was before; None: it was none.
         author: Who made this version; ``since`` when (Unix s), None for the first.
     """
 
     id: str = "fleet-alert"
     version: int = 1
-    threshold: float = LIMITS.detection_threshold
-    class_thresholds: Mapping[Class, float] = field(default_factory=dict)
-    radius_m: float = LIMITS.ring_default_m
     aliases: Mapping[str, Class] = field(default_factory=lambda: ALIASES)
     possible_people: bool = True
-    foresight: bool = True
-    foresight_s: float = FORESIGHT_MOST_S
     comparison: Comparison | None = None
     author: str = "settings"
     since: float | None = None
 
-    def threshold_of(self, class_: Class | None) -> float:
-        """Least confidence of a canonical class; None stands for any other class."""
-        if class_ is None:
-            return self.threshold
-        return self.class_thresholds.get(class_, self.threshold)
+    @classmethod
+    def of(cls, parameters: Parameters) -> "DetectionRule":
+        """The first version with these parameters."""
+        values: dict[str, Any] = {
+            row.name: getattr(parameters, row.name) for row in PARAMETERS
+        }
+        return cls(**values)
 
     def class_of(self, class_id: str | None) -> Class | None:
-        """The canonical class of a detector's word; None for any other."""
-        return None if class_id is None else self.aliases.get(class_id.strip().lower())
+        """The canonical class of a detector's word; None for any other.
+
+        No table takes away what a word means to everybody: it may only add.
+        """
+        if class_id is None:
+            return None
+        aliases = self.aliases
+        named = aliases.get(class_id.strip().lower()) or aliases.get(plain(class_id))
+        meaning = named or meaning_of(class_id)
+        return None if meaning == "harmless" else meaning
+
+    def also_naming(self, people: Iterable[str]) -> "DetectionRule":
+        """The same rule, to which these plain words are people, too."""
+        named: dict[str, Class] = dict.fromkeys(people, "person")
+        return replace(self, aliases={**self.aliases, **named}) if named else self
 
     def judge(self, class_id: str, confidence: float) -> RuleVerdict:
         """Judge one detection (Algorithm 2, lines 4-10)."""
         class_ = self.class_of(class_id)
-        if confidence < self.threshold_of(class_):
+        if confidence < self.threshold.of(class_):
             return RuleVerdict("faint", class_)
         return RuleVerdict("other" if class_ is None else "alert", class_)
 
@@ -100,19 +103,20 @@ class DetectionRule:
         # Moments are sums of steps.
         return in_s <= self.foresight_s + 1e-6
 
-    def radius_at(self, age_s: float) -> float:
-        """The ring of a sighting that is ``age_s`` old (m)."""
+    def radius_at(self, age_s: float, class_: Class) -> float:
+        """The zone of a sighting of this class that is ``age_s`` old (m)."""
+        radius_m = self.radius_m.of(class_)
         if age_s <= LIMITS.growth_grace_s:
-            # Of most, and asked thousands of times a second.
-            return self.radius_m
-        return ring_radius(self.radius_m, age_s)
+            # Fast path: most are fresh; this runs thousands of times a second.
+            return radius_m
+        return grown_radius(radius_m, age_s)
 
 
 def strictest(rules: Iterable[DetectionRule], since: float) -> DetectionRule:
     """The next version, which slows wherever one of these would.
 
-    The least threshold of any class, the widest ring, every alias, and a word that
-    stands for a person in one of them does so here.
+    Of each parameter the value that protects most, of any class; every alias, and a
+    word that stands for a person in one of them does so here.
 
     Args:
         rules: At least one, oldest first.
@@ -124,16 +128,15 @@ def strictest(rules: Iterable[DetectionRule], since: float) -> DetectionRule:
         aliases.update(rule.aliases)
     for rule in every:
         aliases.update({w: "person" for w, c in rule.aliases.items() if c == "person"})
+    strict: dict[str, Any] = {
+        row.name: row.strictest(getattr(rule, row.name) for rule in every)
+        for row in PARAMETERS
+    }
     return DetectionRule(
+        **strict,
         id=every[-1].id,
         version=max(rule.version for rule in every) + 1,
-        threshold=min(
-            min((rule.threshold, *rule.class_thresholds.values())) for rule in every
-        ),
-        radius_m=max(rule.radius_m for rule in every),
         aliases=aliases,
-        foresight=any(rule.foresight for rule in every),
-        foresight_s=max(rule.foresight_s for rule in every),
         author=RECOVERED,
         since=since,
     )

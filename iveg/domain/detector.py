@@ -9,25 +9,27 @@ Until then it is *missing* (docs/safety.md, "Clear"), unless an operator took it
 service.
 """
 
+import math
 from dataclasses import dataclass, field, replace
 from operator import is_
 from typing import Literal
 
-from iveg.domain.camera_bias import PeerLooks
-from iveg.domain.carried import CarriedThings
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Detection, DetectionFrame, Instant
+from iveg.domain.words import HeardWords
 
 CLASS_NAMES = 200
 """So many different classes of one robot have a name; every further one is "other"."""
 OTHER = "other"
+_MOST_NAMES = 4
 FRAMES_HZ = 45.0
 """Of one robot, in the mean of a second; the contract's rate is 30 Hz."""
 
-Flaw = Literal["unreadable", "overload", "unplaced"]
+Flaw = Literal["unreadable", "overload", "unplaced", "strange", "blind"]
 """Why a frame was not read whole: it or a box of a person or robot was refused, more
-came than can be judged, or the robot's pose has never been told."""
+came than can be judged, the robot's pose has never been told, its detector says nothing
+that anybody understands, or it shows nobody where another one surely sees somebody."""
 
 
 def flaw_of(
@@ -63,12 +65,14 @@ class OutOfService:
 
     Attributes:
         by: Who said so; ``since`` when (Unix s).
+        reason: Why; empty in what an earlier iVeg kept.
         boot: Of the robot at that moment; another one ends it.  None before the first.
     """
 
     by: str
     since: float
     boot: str | None = None
+    reason: str = ""
 
 
 @dataclass(slots=True)
@@ -81,20 +85,27 @@ class DetectorEvidence:
         flawed_at: When a frame was last not read whole, by flaw.
         worked: Whether it was ever proven to work.
         out_of_service: None: it is required.
+        words: What it says, by its name: of the four that came last.
+        blind_by: The robot that sees somebody whom its camera does not show.
         class_names: Names that it gave to what is neither a person nor a robot.
-        peer_looks: How far off it places other robots.
-        carried: What it takes for a person and goes with the robot.
     """
 
     whole_at: float | None = None
     flawed_at: dict[Flaw, float] = field(default_factory=dict)
     worked: bool = False
     out_of_service: OutOfService | None = None
+    words: dict[str, HeardWords] = field(default_factory=dict)
+    blind_by: str | None = None
     class_names: set[str] = field(default_factory=set)
-    peer_looks: PeerLooks = field(default_factory=PeerLooks)
-    carried: CarriedThings = field(default_factory=CarriedThings)
     _allowance: float = FRAMES_HZ
     _counted_at: float | None = None
+
+    def words_of(self, name: str) -> HeardWords:
+        """What was heard of a detector of this name, which is now the newest."""
+        self.words[name] = self.words.pop(name, HeardWords())
+        if len(self.words) > _MOST_NAMES:
+            del self.words[next(iter(self.words))]
+        return self.words[name]
 
     def admits_frame(self, now: Instant) -> bool:
         """Whether one more frame may be judged; counts it if so."""
@@ -134,12 +145,15 @@ class DetectorEvidence:
         """Note a frame that was not."""
         self.flawed_at[flaw] = now.mono
 
-    def is_flawed(self, now: Instant) -> bool:
-        """Whether a frame was not read whole within the silence limit."""
+    def is_flawed(self, now: Instant, *, but: Flaw | None = None) -> bool:
+        """Whether a frame was not read whole within the silence limit.
+
+        ``but``: for any other reason than this.
+        """
         if not self.flawed_at:
             return False
-        newest = max(self.flawed_at.values())
-        return now.mono - newest <= LIMITS.silence_s
+        newest = [at for flaw, at in self.flawed_at.items() if flaw != but]
+        return now.mono - max(newest, default=-math.inf) <= LIMITS.silence_s
 
     def is_missing(self, now: Instant) -> bool:
         """Whether nothing proves that it works; one out of service is not waited for.

@@ -14,8 +14,7 @@ from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
-from iveg.domain.events import Condition, Slot
-from iveg.domain.messages import Priority
+from iveg.domain.events import Condition, Priority, Slot
 from iveg.domain.observations import Instant
 
 UNITS = (

@@ -11,8 +11,6 @@ IvegError
 ├── CommandRefusedError     a release or resume that must not happen (HTTP 409)
 ├── OutdatedError           a change of something that has changed since (HTTP 409)
 ├── VersionMissingError     a change that does not say of what (HTTP 428)
-├── ExperimentRefusedError  an experiment that may not start now (HTTP 409)
-├── OutboundError           an address outside iVeg that took no message
 ├── BusyError               more sign-ins wait than are served soon (HTTP 429)
 ├── NotAllowedError         somebody without the role (HTTP 403)
 ├── SignOnError             a sign-in at the identity provider that let nobody in
@@ -96,7 +94,10 @@ class NotANameError(IvegError):
     """Nobody may be called so."""
 
     def __init__(self, name: str) -> None:
-        said = "1 to 64 visible characters, none of < > \" ' = ; ( )"
+        said = (
+            "1 to 64 visible characters, none of < > \" ' = ; ( ), and nobody "
+            "else's, such as console, program or operator"
+        )
         super().__init__(f"{name!r} cannot be a name: it must be {said}.")
 
 
@@ -147,18 +148,6 @@ class VersionMissingError(IvegError):
         super().__init__(f"{what} is changed by naming the version that was seen.")
 
 
-class ExperimentRefusedError(IvegError):
-    """No experiment may be started now.
-
-    Attributes:
-        why: ``running`` or ``live_robot``.
-    """
-
-    def __init__(self, why: str) -> None:
-        super().__init__(f"No experiment may be started now: {why}.")
-        self.why = why
-
-
 class TrialRefusedError(IvegError):
     """No trial of a rule may begin, end or be promoted now.
 
@@ -168,30 +157,6 @@ class TrialRefusedError(IvegError):
 
     def __init__(self, why: str) -> None:
         super().__init__(f"That is not possible with the trial of a rule: {why}.")
-        self.why = why
-
-
-class WhatIfRefusedError(IvegError):
-    """No further question about another rule is taken now.
-
-    Attributes:
-        why: ``yours`` (one of the same person is not over) or ``full``.
-    """
-
-    def __init__(self, why: str) -> None:
-        super().__init__(f"No further question is taken now: {why}.")
-        self.why = why
-
-
-class OutboundError(IvegError):
-    """An address outside iVeg took no message.
-
-    Attributes:
-        why: A stable code that people are shown a sentence for, such as ``not_public``.
-    """
-
-    def __init__(self, why: str) -> None:
-        super().__init__(f"The message was not taken: {why}.")
         self.why = why
 
 
@@ -248,13 +213,6 @@ class HopError(IvegError):
         super().__init__(f"{hop}: {detail}")
         self.hop = hop
         self.detail = detail
-
-
-class TooManyLookError(HopError):
-    """As many look at the past at once as there are processes for."""
-
-    def __init__(self) -> None:
-        super().__init__("past", "too many look at the past at once")
 
 
 class NoAnswerError(HopError):

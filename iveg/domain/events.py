@@ -1,10 +1,62 @@
-"""Log lines and conditions of alerts: a template's name and what fills its holes."""
+"""Log lines and conditions of alerts: a template's name and what fills its holes.
+
+Messages to people outside the page: addresses, and what a message is about.
+
+A message says how grave it is and when, never where or about whom: it passes through
+other people's servers (docs/interfaces/http.md, "Messages").
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from iveg.domain.messages import Priority
+from iveg.domain.observations import Instant
+
+Language = Literal["es", "en"]
+Level = Literal["P1", "P2"]
+Priority = Literal["P1", "P2", "P3"]
+
+
+@dataclass(frozen=True, slots=True)
+class Address:
+    """An address of apprise, under a name that may be logged.
+
+    Attributes:
+        url: Mostly a secret.
+        least: The least priority that is sent.
+        escalates: Reached only where nobody acknowledges.
+    """
+
+    name: str
+    url: str = field(repr=False)
+    least: Level = "P1"
+    escalates: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class MessagePlan:
+    """All addresses outside the page; none at first."""
+
+    addresses: tuple[Address, ...] = ()
+    escalate_after_s: float = 600.0
+    language: Language = "es"
+
+
+@dataclass(frozen=True, slots=True)
+class AlertItem:
+    """One occurrence of an alert, in a message."""
+
+    priority: Priority
+    raised: Instant
+
+
+@dataclass(frozen=True, slots=True)
+class MessageText:
+    """A message in one language."""
+
+    title: str
+    body: str
+
 
 Slot = str | float | bool | None
 EventKind = Literal["detection", "speed", "command", "link", "alert", "system"]

@@ -8,14 +8,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from iveg.domain.geometry import Pose2D, Twist2D
-from iveg.domain.known import KnownPlace
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Origin
+from iveg.domain.parameters import Class, Sent
 
 FULL_SPEED = 1.0
 LONGEST_BACKLOG_S = 60.0
 HALF_SPEED = LIMITS.slow_factor
-"""The factor inside a ring; a constant of the paper, not a setting."""
+"""The factor inside a zone; a constant of the paper, not a setting."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,14 +24,14 @@ class FeedbackAlert:
 
     Attributes:
         position: In ``map`` (m).
-        radius_m: The ring at ``stamp``, grown with the age of the sighting.
+        radius_m: The zone at ``stamp``, grown with the age of the sighting.
         velocity: How it goes on in ``map`` (m/s); None: it was not seen for a second,
             so nobody knows.
     """
 
     decision_id: str
     stamp: str
-    class_: str | None = None
+    class_: Class | None = None
     class_id: str | None = None
     confidence: float | None = None
     position: tuple[float, float, float] | None = None
@@ -50,7 +50,7 @@ class SpeedLimit:
             or ``unsupervised``.
         cause: The person or robot that it is for; None of what only a laser sees.
         distance_m: From ``base_link`` to the centre of the cause (m).
-        foretold_s: When it will reach the ring of the cause (s); None: it is inside.
+        foretold_s: When it will reach the zone of the cause (s); None: it is inside.
         over: Its reason has ended: it is lifted a second after that, and so is what the
             robot judges itself.
     """
@@ -82,8 +82,8 @@ class Feedback:
         seen: Newest safety-report ``seq`` that iVeg has of each robot.
         backlog_s: How far Orion is behind (s), at most ``LONGEST_BACKLOG_S``; None
             where nobody knows.
-        foresight: Robots slow before they reach a ring, too: the rule asks for it.
-        known_here: Places near this robot where what stands still slows nobody.
+        foresight: Robots slow before they reach a zone, too: the rule asks for it.
+        rule: Values of the rule that robots judge by themselves.
     """
 
     robot_id: str
@@ -97,4 +97,4 @@ class Feedback:
     seen: Mapping[str, int] = field(default_factory=dict)
     backlog_s: float | None = None
     foresight: bool = False
-    known_here: tuple[KnownPlace, ...] = ()
+    rule: Sent = field(default_factory=dict)

@@ -19,7 +19,7 @@ Frame = Literal["map", "base_link", "camera_link", "camera_optical_frame"]
 
 ROBOT_ID = re.compile(r"[A-Za-z0-9-]{1,64}")
 _NUMBER = re.compile(r"(\d+)")
-RESERVED_IDS = frozenset({"climate", "iveg-canary", "iveg-doctor"})
+RESERVED_IDS = frozenset({"climate", "iveg-canary"})
 """Ids of devices that are no robots (docs/interfaces/README.md)."""
 
 
@@ -46,6 +46,7 @@ class RobotProfile:
             is never taken for empty.
         camera_range: How far it may see (m).
         unlabelled_frame: The frame of boxes that come without one; None: nobody knows.
+        camera_frame: Whole name of the camera's frame; None: a usual one.
         laser: Pose of the laser in ``base_link``.
     """
 
@@ -63,6 +64,7 @@ class RobotProfile:
     camera_fov: float = 0.0
     camera_range: float = 15.0
     unlabelled_frame: Frame | None = None
+    camera_frame: str | None = None
     laser: Pose2D = Pose2D(0.0, 0.0, 0.0)
 
     @property
@@ -85,6 +87,8 @@ class RobotDescription:
         has_detector: Whether its detection frames are waited for: while they are
             missing, nobody in its reach is clear.
         is_described: Whether somebody said what it is; else the profile is cautious.
+        classes: Names of its detector's classes by number; none: it says words.
+        pose_frame: Frame in which its odometry tells where it is in the greenhouse.
     """
 
     robot_id: str
@@ -92,6 +96,8 @@ class RobotDescription:
     profile: RobotProfile = CAUTIOUS
     is_described: bool = False
     has_detector: bool = True
+    pose_frame: str = "map"
+    classes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,8 +17,13 @@ _NAMED: dict[str, Frame] = {
     "map": "map",
     "base_link": "base_link",
     "camera_link": "camera_link",
+    **{
+        f"camera{kind}_optical{end}": "camera_optical_frame"
+        for kind in ("", "_link", "_color", "_rgb", "_depth")
+        for end in ("", "_frame")
+    },
 }
-_OPTICAL = ("_optical", "_optical_frame")
+_NOT_ON_ROBOTS = frozenset({"map", "odom", "world", "earth"})
 _EITHER: tuple[Frame, ...] = ("base_link", "camera_link")
 
 
@@ -52,27 +57,56 @@ def _frames_of(
     frame_id: str | None, robot: RobotDescription
 ) -> tuple[Frame | None, ...]:
     if frame_id is not None:
-        return (frame_named(frame_id, robot.robot_id),)
+        if is_pose_frame(frame_id, robot):
+            return ("map",)
+        camera = robot.profile.camera_frame
+        return (frame_named(frame_id, robot.robot_id, camera),)
     described = robot.profile.unlabelled_frame
     return _EITHER if described is None else (described,)
 
 
 @lru_cache(maxsize=256)
-def frame_named(name: str, robot_id: str) -> Frame | None:
+def frame_named(name: str, robot_id: str, camera: str | None = None) -> Frame | None:
     """The frame that a robot means by a name of TF; None for a name that is unknown.
 
-    Leading slashes and the robot's own prefix are left out: ``/map``,
-    ``AGI/base_link``, ``agi_camera_link``.  The prefix of another robot is unknown.
+    Args:
+        name: Counts whole but for leading slashes and the robot's own prefix:
+            ``/map``, ``AGI/base_link``, ``agi_camera_link``.  The prefix of another
+            robot is unknown.
+        robot_id: The robot.
+        camera: Name of its camera's frame, where that is another.
+    """
+    whole = _whole_names(name, robot_id)
+    if camera is not None and camera in whole:
+        is_optical = camera.endswith(("_optical", "_optical_frame"))
+        return "camera_optical_frame" if is_optical else "camera_link"
+    return next((_NAMED[one] for one in whole if one in _NAMED), None)
+
+
+def is_pose_frame(name: str, robot: RobotDescription) -> bool:
+    """Whether odometry in a frame of this name tells where a robot is in ``map``."""
+    return robot.pose_frame in _whole_names(name, robot.robot_id)
+
+
+def may_be_laser_frame(name: str, robot_id: str) -> bool:
+    """Whether a scan may be in a frame of this name: a level one on the robot."""
+    whole = _whole_names(name, robot_id)
+    is_elsewhere = not _NOT_ON_ROBOTS.isdisjoint(whole)
+    return bool(whole) and not is_elsewhere and "optical" not in name
+
+
+def _whole_names(name: str, robot_id: str) -> tuple[str, ...]:
+    """A frame's name without slashes and prefix of the robot; none: of another robot.
+
+    A robot may be called as a frame begins, so both readings of such a name count.
     """
     *prefix, last = name.strip("/").split("/")
     own = robot_id.lower().replace("-", "_")
     if prefix and prefix[-1].lower() not in (own, robot_id.lower()):
-        return None
-    if last.endswith(_OPTICAL):
-        return "camera_optical_frame"
+        return ()
     if last.lower().startswith(f"{own}_"):
-        return _NAMED.get(last) or _NAMED.get(last[len(own) + 1 :])
-    return _NAMED.get(last)
+        return last, last[len(own) + 1 :]
+    return (last,)
 
 
 def _in_known_frame(

@@ -81,6 +81,16 @@ class Box3D:
             (self.zmin + self.zmax) / 2,
         )
 
+    @property
+    def shorter_side(self) -> float:
+        """The shorter of both horizontal sides (m), where z is up."""
+        return min(self.xmax - self.xmin, self.ymax - self.ymin)
+
+    @property
+    def longer_side(self) -> float:
+        """The longer of both (m)."""
+        return max(self.xmax - self.xmin, self.ymax - self.ymin)
+
 
 PERSON_RADIUS_M, PERSON_HEIGHT_M = 0.25, 1.75
 

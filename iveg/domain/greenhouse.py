@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 from iveg.domain.geometry import Pose2D, Rectangle
 
+OUTSIDE_M = 2.0
+
 
 @dataclass(frozen=True, slots=True)
 class DriveLane:
@@ -38,6 +40,7 @@ class Greenhouse:
         bounds: The outer wall.
         lanes: Where robots and people go.
         rows: Crop; hides what is behind it from cameras and lasers.
+        outside_m: How far outside robots may be, on a yard or for the walls' error (m).
         starts: Where each robot of a scenario may begin, in order.
     """
 
@@ -48,6 +51,15 @@ class Greenhouse:
     posts: tuple[StructuralPost, ...] = ()
     obstacles: tuple[PlacedObstacle, ...] = ()
     starts: tuple[Pose2D, ...] = ()
+    outside_m: float = OUTSIDE_M
+
+    @property
+    def robots_within(self) -> Rectangle:
+        """Where robots may be."""
+        out, bounds = self.outside_m, self.bounds
+        return Rectangle(
+            bounds.xmin - out, bounds.ymin - out, bounds.xmax + out, bounds.ymax + out
+        )
 
     def in_sight(self, ax: float, ay: float, bx: float, by: float) -> bool:
         """Whether no crop row stands between two points."""

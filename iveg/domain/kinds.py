@@ -81,8 +81,6 @@ class Kind:
             the last object.
         speaks_alone: Whether its device may also speak to iVeg alone, past the agent.
         floor_hz: Least rate through the agent while Orion is behind; None: its own.
-        is_copied: Orion has a subscription of it for each robot, which is throttled
-            while the direct copy is fresh.
         ordered: By the robot's own count, or by arrival.
         may_drop: Whether the oldest gives way when more comes than can be taken.
         lands: Member of ``RobotState`` or ``World`` that keeps the newest; None for an
@@ -102,7 +100,6 @@ class Kind:
     attributes: tuple[tuple[str, str], ...] = ()
     speaks_alone: bool = False
     floor_hz: float | None = None
-    is_copied: bool = False
     ordered: Literal["counted", "by arrival"] = "counted"
     may_drop: bool = True
     lands: str | None = None
@@ -136,7 +133,6 @@ KINDS = (
         (("base_pose_ground_truth", "object"),),
         speaks_alone=True,
         floor_hz=5.3,
-        is_copied=True,
         lands="odometry",
         changes="robot",
         direct="all",
@@ -149,7 +145,6 @@ KINDS = (
         (("lidar_points", "array"), ("lidar_header", "object")),
         speaks_alone=True,
         floor_hz=1.05,
-        is_copied=True,
         lands="scan",
         changes="scan",
         direct="all",

@@ -97,6 +97,12 @@ class SafetyLimits:
     standing_speed: float = _limit(
         0.02, "m/s, rad/s", "chosen: noise at rest", "below this a robot stands"
     )
+    standing_moved: float = _limit(
+        0.1,
+        "m, rad",
+        "chosen: noise of poses",
+        "nor does one that moves so in a second",
+    )
     standing_samples: int = _limit(5, "reports", "chosen", "so many at rest")
     standing_for_s: float = _limit(1.0, "s", "chosen", "over so long are a standstill")
     standing_gap_s: float = _limit(
@@ -123,7 +129,7 @@ class SafetyLimits:
         1.0, "s", "chosen", "without a robot's word a STOP is UNCONFIRMED"
     )
     report_fresh_s: float = _limit(
-        1.0, "s", "chosen", "oldest report that a release or a drill may rest on"
+        1.0, "s", "chosen", "oldest report that a release may rest on"
     )
     report_stale_s: float = _limit(
         1.5, "s", "0.5 s one way", "a standstill reported longer ago may be over"
@@ -140,9 +146,6 @@ class SafetyLimits:
     most_holds: int = _limit(
         3, "holds", "chosen", "of iVeg's at one robot; no further one beside them"
     )
-    drill_speed_m_s: float = _limit(
-        0.2, "m/s", "chosen", "fastest that a robot may be stopped for a drill"
-    )
 
     reaction_s: float = _limit(
         0.79, "s", "sum of P95s", "camera to brakes on the other robot"
@@ -154,13 +157,19 @@ class SafetyLimits:
         0.40, "m", "detection 0.30, pose 0.10", "added to a protective distance"
     )
     person_radius_m: float = _limit(0.30, "m", "chosen", "a person's footprint")
+    person_widest_m: float = _limit(
+        1.2, "m", "chosen: arms half out", "a wider box of a person is not read whole"
+    )
+    person_highest_m: float = _limit(
+        3.0, "m", "chosen: on a trolley", "nor is a higher one"
+    )
     margin_clear_m: float = _limit(1.0, "m", "chosen", "a margin from here on is clear")
 
 
 LIMITS = SafetyLimits()
 
 
-def ring_radius(
+def grown_radius(
     radius_m: float,
     age_s: _OneOrMany,
     least: Callable[..., Any] = min,

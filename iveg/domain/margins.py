@@ -138,29 +138,6 @@ class LeastMargins:
         lists = rank[rows, columns].tolist(), rows.tolist(), columns.tolist()
         return list(zip(*lists, strict=True))
 
-    def telling(self) -> list[SafetyMargin]:
-        """The least of all pairs that are known now, and one that is not, if any.
-
-        They say of this moment what all pairs do (``domain/exposure``).
-        """
-        if not self._robots or not self._columns:
-            return []
-        nearest = np.array(
-            [
-                np.array(columns)[self._pairs.rank[:, columns].argmin(axis=1)]
-                for columns in self._columns.values()
-            ]
-        )
-        rows = np.arange(len(self._robots))
-        margins = self._pairs.rank[rows, nearest]
-        known = (margins > -_UNKNOWN_M / 2) | (margins < -_INSIDE_M / 2)
-        seen = known & (self._pairs.age[rows, nearest] <= LIMITS.seen_s)
-        places = [np.where(seen, margins, np.inf).argmin(), seen.argmin()]
-        return [
-            self._pair(place % len(self._robots), int(nearest.flat[place]))
-            for place in map(int, places)
-        ]
-
     def _pair(self, row: int, column: int) -> SafetyMargin:
         pairs, robot = self._pairs, self._robots[row][0]
         parts = pairs.gap, pairs.walks, pairs.reaction, pairs.braking, pairs.age
@@ -221,5 +198,5 @@ class _Pairs:
 
 def _facts(robot: RobotState, odometry: Odometry, age_s: float) -> tuple[float, ...]:
     """x, y (m), speed (m/s), braking (m/s²), half the length (m), age (s)."""
-    place, speed, profile = odometry.pose, abs(odometry.twist.linear_x), robot.profile
+    place, speed, profile = odometry.pose, robot.track.motion.speed, robot.profile
     return place.x, place.y, speed, profile.assumed_braking, profile.length / 2, age_s

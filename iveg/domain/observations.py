@@ -51,6 +51,7 @@ class Origin:
         mono: The robot's monotonic seconds since this boot, one axis for all topics.
         acknowledgements: The sender tells what it has heard; its age can be proven.
         heard: The newest feedback that it had heard; None before the first.
+        heard_also: The newest of every other author that it hears.
         replay: A recording is played: the name of the map frame that it is in, so that
             only recordings of one frame meet.  None: a live robot says this.
     """
@@ -62,7 +63,13 @@ class Origin:
     mono: float | None = None
     acknowledgements: bool = False
     heard: FeedbackRef | None = None
+    heard_also: tuple[FeedbackRef, ...] = ()
     replay: str | None = None
+
+    @property
+    def echoes(self) -> tuple[FeedbackRef, ...]:
+        """The newest feedback of each author that the sender had heard."""
+        return () if self.heard is None else (self.heard, *self.heard_also)
 
     @property
     def own_s(self) -> float | None:
@@ -92,10 +99,15 @@ class Observation:
 
 @dataclass(frozen=True, slots=True)
 class Odometry(Observation):
-    """Pose of ``base_link`` in ``map`` and the twist in ``base_link``."""
+    """Pose of ``base_link`` in ``map`` and the twist in ``base_link``.
+
+    Attributes:
+        frame_id: Of the pose, as sent; None: without one, which is ``map``.
+    """
 
     pose: Pose2D
     twist: Twist2D
+    frame_id: str | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -126,6 +138,10 @@ class LaserScan(Observation):
             & (ranges >= self.range_min)
             & (ranges <= self.range_max)
         )
+
+    def speaks(self) -> NDArray[np.bool_]:
+        """Which beams say something: they ended in range, or found nothing in it."""
+        return self.returns() | np.isposinf(self.ranges)
 
     def points(self, pose: Pose2D) -> NDArray[np.float32]:
         """Returns that count, in the frame that ``pose`` is in; shape (m, 2), (m)."""
@@ -212,6 +228,22 @@ class Unplaced(Observation):
 
 
 @dataclass(frozen=True, slots=True)
+class ReportedObstacle:
+    """Something that a robot's laser sees near it and nothing explains.
+
+    Attributes:
+        x: Its middle in ``map`` (m); ``y`` likewise.
+        width_m: From its first return to its last (m).
+        moved: It walks, or has walked since the laser saw it first.
+    """
+
+    x: float
+    y: float
+    width_m: float
+    moved: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class SafetyReport(Observation):
     """The speed factor that the robot applies and its reasons, as it reports them.
 
@@ -223,6 +255,7 @@ class SafetyReport(Observation):
         feedback_age_s: How old the newest feedback is that the robot acts on (s).
         faults: What it finds wrong with its own data.
         peer_scans: It asks for scans of its peers.
+        obstacle: What its laser sees near it, whatever it is slow for.
     """
 
     speed_factor: float
@@ -237,6 +270,7 @@ class SafetyReport(Observation):
     feedback_age_s: float | None = None
     faults: tuple[RobotFault, ...] = ()
     peer_scans: bool = False
+    obstacle: ReportedObstacle | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -374,13 +408,14 @@ class Received:
 
     Attributes:
         asked: It is Orion's answer to a question, so nobody knows how old it is.
-        thinned: Orion was told to leave most of its kind out.
         sparse: Its topic has two safety reports a second; else ten while a robot holds.
+        alone: It is the only one of its boot so far, and came through FIWARE: a broker
+            may have kept it for an agent that has just started.
     """
 
     observation: Observation
     at: Instant
     transport: TransportId = FIWARE.id
     asked: bool = False
-    thinned: bool = False
     sparse: bool = True
+    alone: bool = False

@@ -131,6 +131,4 @@ def _nearest_rays(scan: LaserScan, bearing: NDArray[np.float64]) -> NDArray[np.i
 
 def _lengths(scan: LaserScan) -> _Floats:
     """How far each ray went (m); 0 where it says nothing."""
-    ranges = scan.ranges
-    went = np.where(ranges > scan.range_max, np.float32(np.inf), ranges)
-    return np.where(ranges >= scan.range_min, went, SAYS_NOTHING)
+    return np.where(scan.speaks(), scan.ranges, SAYS_NOTHING)

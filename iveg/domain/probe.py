@@ -9,12 +9,38 @@ one::
     back    +1.0 +1.5                →  now, 4 s after 3 left: 4.0 s behind, growing
 
 A probe that a later one has overtaken no longer counts: it may be lost for ever.
+
+The hops of the data path.
+
+One vocabulary for both judges: the running health monitor judges hops by the heartbeat
+probe that passes them all, ``iveg doctor`` by using each once.
 """
 
 from collections import deque
 from dataclasses import dataclass, field
+from enum import StrEnum
 
 from iveg.domain.observations import Instant, Origin
+
+
+class Hop(StrEnum):
+    """One hop, in the order in which a datum passes them.
+
+    The value is its id in JSON, metrics, errors and translations.
+    """
+
+    MQTT = "mqtt"
+    AGENT = "iot_agent"
+    ORION = "orion"
+    NOTIFICATIONS = "notifications"
+    DATABASE = "database"
+    PAGE = "server"
+
+    @property
+    def label(self) -> str:
+        """Key of its name in the translations."""
+        return f"hop.{self.value}"
+
 
 _KEPT = 600
 """Probes remembered: twenty minutes of them, at one in two seconds."""
@@ -97,11 +123,10 @@ class ProbeLag:
         return self._back[0][1] if self._back else 0.0
 
 
-def lag_in_words(lag_s: float, *, growing: bool = False, at_least: bool = False) -> str:
+def lag_in_words(lag_s: float, *, growing: bool = False) -> str:
     """A lag as the log, programs and ``iveg doctor`` say it."""
     late = f"{lag_s:.0f}" if lag_s >= 10.0 else f"{lag_s:.1f}"
-    least, more = "at least " if at_least else "", ", growing" if growing else ""
-    return f"measures reach Orion {least}{late} s late{more}"
+    return f"measures reach Orion {late} s late" + (", growing" if growing else "")
 
 
 def stopped_in_words(lag_s: float | None) -> str:

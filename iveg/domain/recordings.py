@@ -37,7 +37,7 @@ class RecordingLimits:
     """
 
     days: int = 7
-    most_bytes: int = 10 * 10**9
+    most_bytes: int = 5 * 10**9
 
 
 def superfluous(

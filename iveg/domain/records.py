@@ -23,8 +23,7 @@ class DecisionRecord:
     """Cause and consequences of an alert or speed limit (docs/dashboard.md).
 
     Attributes:
-        kind: ``alert`` (somebody was confirmed), ``mandate`` (a robot was told) or
-            ``late`` (made afterwards of what a robot kept in a gap; nothing acted).
+        kind: ``alert`` (somebody was confirmed) or ``mandate`` (a robot was told).
         robot_id: The robot that was told; for an alert its observer.
         class_: Canonical (``person``, ``robot``); ``class_id`` as the detector said.
         confidence: 0 to 1.
@@ -34,13 +33,13 @@ class DecisionRecord:
         in_sight: Whether the robot itself could see the cause; None when unknown.
         started_at: When the rule fired; ``ended_at`` when it let go.
         observed_at: When the speed had come down.
-        speed_before: Greatest of the second before ``started_at`` (m/s);
+        speed_before: Measured at ``started_at`` (m/s);
             ``speed_after`` at ``observed_at``.
         links: Each ``{"link", "at", "value", "verdict"}``.
     """
 
     decision_id: str
-    kind: Literal["alert", "mandate", "late"]
+    kind: Literal["alert", "mandate"]
     robot_id: str
     started_at: float
     person_id: str | None = None
@@ -79,8 +78,6 @@ class DetectionRecord:
         confident: Whether it reached the threshold.
         transport: Id of the transport whose copy was first.
         box: The box with its ``frame_id``; None when it was not kept.
-        late: The robot kept it during a gap and sent it afterwards: nothing acted on
-            it, and ``at`` is when it was measured.
     """
 
     at: float
@@ -96,7 +93,6 @@ class DetectionRecord:
     class_: str | None = None
     person_id: str | None = None
     box: Json | None = None
-    late: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -114,7 +110,6 @@ class CommandRecord:
         tries: How often it was sent.
         reason: A code for what is shown beside the state.
         pressed_at: When a finger pressed, by the browser's corrected clock (Unix s).
-        drill: Whether it was pressed to prove that STOP works.
         goal: Of a goal its ``{"kind", "x", "y", "aisle"}``, in ``map`` (m).
     """
 
@@ -131,7 +126,6 @@ class CommandRecord:
     tries: int = 0
     reason: str | None = None
     pressed_at: float | None = None
-    drill: bool = False
     goal: Json | None = None
 
 
@@ -155,7 +149,6 @@ class AlertRecord:
         key: Template of its sentence; ``slots`` fill it.
         raised_at: The first time; ``last_raised_at`` the newest.
         count: How often it was raised while it lived.
-        members: The newest times, each with its priority and life.
     """
 
     alert_id: str
@@ -170,7 +163,6 @@ class AlertRecord:
     acknowledged_by: str | None = None
     note: str | None = None
     count: int = 1
-    members: Sequence[Json] = field(default_factory=list)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -202,7 +194,6 @@ class OdometryRecord:
         link: ``LIVE``, ``LATE`` or ``LOST``.
         margin_m: Least margin to anybody who is seen, while it moves (m; at most a
             second old); None where it is unknown or there is none.
-        late: As of a detection; ``limit_factor`` is then that of an unheard robot.
     """
 
     at: float
@@ -216,7 +207,6 @@ class OdometryRecord:
     applied_factor: float | None = None
     link: str | None = None
     margin_m: float | None = None
-    late: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -231,30 +221,6 @@ class ClimateRecord:
     temperature: float | None = None
     relative_humidity: float | None = None
     co2: float | None = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LatencyRecord:
-    """A minute of one hop, for one kind of data of one robot; kept for a day.
-
-    Attributes:
-        at: When the minute began.
-        data: ``odometry``, ``detections`` or ``lidar``.
-        hop: A segment (``domain.latency.segments``).
-        count: Messages that were measured.
-        total_s: Sum of their durations; ``least_s`` and ``most_s`` their extremes.
-        bins: Text of ``latency.sketch.write_bins``.
-    """
-
-    at: float
-    robot_id: str
-    data: str
-    hop: str
-    count: int
-    total_s: float
-    least_s: float
-    most_s: float
-    bins: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -293,14 +259,12 @@ class AuditRecord:
 
     Attributes:
         audit_id: Its own; a row that is offered twice is stored once.
-        at: When it happened; ``stored_at`` when it got its place in the chain.
+        at: When it happened.
         person: Id of the account; ``name``, ``role`` and ``method`` (of signing in)
             as they were then.
         action: Such as ``stop`` or ``sign_in_refused``.
         subject: What it was done to, such as a robot's id.
-        details: Canonical JSON.
-        seq: Place in the chain, from 1 without a gap; 0 until it has one.
-        previous_hash: Of the row before; ``hash`` its own (hex).
+        details: JSON.
     """
 
     audit_id: str
@@ -312,10 +276,6 @@ class AuditRecord:
     action: str
     subject: str = ""
     details: str = "{}"
-    seq: int = 0
-    stored_at: float = 0.0
-    previous_hash: str = ""
-    hash: str = ""
 
 
 Record = (
@@ -327,7 +287,6 @@ Record = (
     | LogRecord
     | OdometryRecord
     | ClimateRecord
-    | LatencyRecord
     | ReadingRecord
     | MeasurementRecord
     | AuditRecord
@@ -341,7 +300,6 @@ RECORD_TYPES: tuple[type[Record], ...] = (
     LogRecord,
     OdometryRecord,
     ClimateRecord,
-    LatencyRecord,
     ReadingRecord,
     MeasurementRecord,
     AuditRecord,
@@ -349,13 +307,17 @@ RECORD_TYPES: tuple[type[Record], ...] = (
 
 
 def is_telemetry(record: Record) -> bool:
-    """Whether a record may be dropped under pressure; the others never are."""
+    """Whether a record is dropped first under pressure."""
     return isinstance(
         record,
         OdometryRecord
         | DetectionRecord
         | ClimateRecord
-        | LatencyRecord
         | ReadingRecord
         | MeasurementRecord,
     )
+
+
+def is_order(record: Record) -> bool:
+    """Whether a record is of an order: in the journal, and never dropped."""
+    return isinstance(record, CommandRecord | CommandEventRecord)

@@ -3,17 +3,56 @@
 Horizons are counted by the days that iVeg recorded, not by the clock alone.  A gap
 between two of them counts for three days at most: a clock that is wrong by years takes
 three days of what is kept and no more (docs/decisions/0006-days-that-were-recorded.md).
+
+Room on a disk: when people are told that it runs out, and when it is well again.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
+
+from iveg.domain.events import Condition
+
+LEAST_BYTES, LEAST_SHARE = 10**9, 0.05
+"""Below the lesser of these the disk is low."""
+WELL_AGAIN = 1.2
+"""It is low until there is so many times that room."""
+
+
+@dataclass(frozen=True, slots=True)
+class DiskSpace:
+    """Room on the disk that holds the data (bytes).
+
+    Attributes:
+        free: For iVeg's user.
+        total: Of the file system.
+    """
+
+    free: int
+    total: int
+
+    @property
+    def least(self) -> float:
+        """Below this the disk is low (bytes)."""
+        return min(LEAST_BYTES, LEAST_SHARE * self.total)
+
+    def is_low(self, *, was_low: bool) -> bool:
+        """Whether it is low now; what was low is so until it is well again."""
+        return self.free < self.least * (WELL_AGAIN if was_low else 1.0)
+
+    def conditions(self, *, was_low: bool) -> Iterable[Condition]:
+        """A P2 while it is low."""
+        if self.is_low(was_low=was_low):
+            slots = {
+                "free_mb": self.free // 10**6,
+                "least_mb": int(self.least) // 10**6,
+            }
+            yield Condition("P2", "alert.disk_low", "disk", None, slots)
+
 
 DAY_S = 86400.0
 GAP_DAYS = 3
 """A longer gap between two recorded days counts as this: a weekend counts in full."""
-SPARED_DAYS = GAP_DAYS + 1
-"""A full disk takes no telemetry of the newest days, so many of them."""
 
 RetentionKind = Literal["positions", "telemetry", "decisions", "audit"]
 Cutoffs = Mapping[RetentionKind, float]
@@ -55,7 +94,7 @@ class Retention:
         positions: Until people's places go from detections, decisions and log.
         telemetry: Of odometry, detections, climate, readings and measurements.
         decisions: Of decisions, commands, alerts and log.
-        audit: Of the audit, by whole days, and of the steps of commands.
+        audit: Of the audit and of the steps of commands.
     """
 
     positions: int = 7
@@ -106,20 +145,3 @@ def cutoff(days: int, now: float, recorded: Sequence[int]) -> float:
         first, left = day, left - counts
     # Before the oldest line nobody knows which days were recorded: all of them.
     return min(now - days * DAY_S, (first - left) * DAY_S)
-
-
-def squeezed(
-    cutoffs: Cutoffs, oldest: float | None, now: float, recorded: Sequence[int]
-) -> Cutoffs:
-    """The same where the disk is full: the oldest day of telemetry may go, too.
-
-    Args:
-        cutoffs: Of the retention alone.
-        oldest: The oldest row of telemetry (Unix s); None where there is none.
-        now: The wall clock (Unix s).
-        recorded: As for ``Retention.cutoffs``.
-    """
-    if oldest is None or not recorded:
-        return cutoffs
-    may_go = min(oldest + DAY_S, cutoff(SPARED_DAYS, now, recorded))
-    return {**cutoffs, "telemetry": max(may_go, cutoffs.get("telemetry", may_go))}

@@ -8,11 +8,13 @@ plan draws what stands there only the robot's own path counts, or every row woul
 it.
 
 A witness only adds: it lifts no limit, and finds no spot empty.
+
+Something near a robot that its laser sees and nobody explains.
 """
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,10 +22,131 @@ from numpy.typing import NDArray
 from iveg.domain.fleet import CAUTIOUS
 from iveg.domain.geometry import Pose2D, Rectangle, Twist2D
 from iveg.domain.greenhouse import Greenhouse
-from iveg.domain.known import KnownPlace, is_known
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import LaserScan
-from iveg.domain.obstacle import Body, Obstacle
+
+LASTS_S = 0.2
+"""What is shorter is noise, or an insect."""
+_LARGEST_M = 1.0
+"""Two people side by side; what is larger is counted once it moves."""
+_MOVED_M = 0.4
+_SMOOTHED_S = 0.4
+_WALKED_M, _WALKED_S, _PASSED_M = 0.5, 0.5, 0.3
+"""Who walks goes so far, for so long, and so far as seen from the robot: not so what it
+tows, nor the part of a wall that it sees as it passes."""
+_WALKS_M_S = (0.3, 2.5)
+_STANDS_S = 10.0
+"""Who walked and stands since is still somebody, for as long as a ring lasts."""
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """Neighbouring returns of one scan that nobody explained.
+
+    Attributes:
+        x: Their middle in ``map`` (m); ``y`` likewise.
+        size_m: From the first to the last.
+        gap_m: From the robot's outline to the nearest.
+        beside: Their middle in the robot's ``base_link`` (m).
+    """
+
+    x: float
+    y: float
+    size_m: float
+    gap_m: float
+    beside: tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Obstacle:
+    """Something of a person's size near a robot that nobody explained.
+
+    Attributes:
+        x: Its middle in ``map`` (m); ``y`` likewise.
+        first_x: Where it was when it was seen first; ``first_y`` likewise.
+        size_m: From its first return to its last.
+        gap_m: From the robot's outline to its nearest return.
+        first_seen: Where that was in the robot's ``base_link`` (m).
+        since: When it was seen first; ``at`` newest (monotonic, s).
+        vx: How it goes in ``map`` (m/s), smoothed over 0.4 s; ``vy`` likewise.
+        passed_m: How far from where the robot saw it first, as seen from the robot (m).
+        walked_at: When it last moved like somebody who walks (monotonic, s).
+    """
+
+    x: float
+    y: float
+    first_x: float
+    first_y: float
+    size_m: float
+    gap_m: float
+    since: float
+    at: float
+    first_seen: tuple[float, float]
+    vx: float = 0.0
+    vy: float = 0.0
+    passed_m: float = 0.0
+    walked_at: float = -math.inf
+
+    @classmethod
+    def new(cls, body: Body, now: float) -> "Obstacle":
+        """Something that is seen for the first time."""
+        x, y = body.x, body.y
+        return cls(x, y, x, y, body.size_m, body.gap_m, now, now, body.beside)
+
+    @property
+    def way_m(self) -> float:
+        """How far it is from where it was first (m)."""
+        return math.hypot(self.x - self.first_x, self.y - self.first_y)
+
+    @property
+    def has_moved(self) -> bool:
+        """Whether it went farther than noise does."""
+        return self.way_m > _MOVED_M
+
+    @property
+    def is_somebody(self) -> bool:
+        """Whether it walks, or walked just now."""
+        return self.at - self.walked_at <= _STANDS_S
+
+    @property
+    def walks(self) -> bool:
+        """Whether it moves like somebody who walks."""
+        least, most = _WALKS_M_S
+        return (
+            self.size_m <= _LARGEST_M
+            and self.at - self.since >= _WALKED_S - 1e-6
+            and self.way_m >= _WALKED_M
+            and self.passed_m >= _PASSED_M
+            and least <= math.hypot(self.vx, self.vy) <= most
+        )
+
+    def seen_again(self, body: Body, now: float) -> "Obstacle":
+        """The same, seen again."""
+        gain = (now - self.at) / (_SMOOTHED_S + now - self.at)
+        after_s = max(now - self.at, 1e-3)
+        seen = replace(
+            self,
+            x=body.x,
+            y=body.y,
+            size_m=body.size_m,
+            gap_m=body.gap_m,
+            at=now,
+            vx=self.vx + gain * ((body.x - self.x) / after_s - self.vx),
+            vy=self.vy + gain * ((body.y - self.y) / after_s - self.vy),
+            passed_m=math.dist(body.beside, self.first_seen),
+        )
+        return replace(seen, walked_at=now) if seen.walks else seen
+
+    @property
+    def fits(self) -> bool:
+        """Whether it is or moves like somebody."""
+        return self.size_m <= _LARGEST_M or self.has_moved
+
+    @property
+    def counts(self) -> bool:
+        """Whether it is there for long enough, too."""
+        return self.fits and self.at - self.since >= LASTS_S - 1e-6
+
 
 _Floats = NDArray[np.float64]
 GONE_S = 0.5
@@ -33,17 +156,16 @@ PLAN_M = 0.4
 _TURN_S = 0.05
 """A scan and the pose that it is placed by are so far apart."""
 _PEER_M = 1.0
-"""About a peer's ``base_link``: half of its body, and how far it went since it told."""
+"""About the ``base_link`` of a peer that drives, who slows everybody near it anyway:
+half of its body, and how far it went since it told."""
+_BESIDE_PEER_M = 0.3
+"""About the body of one that stands: errors of both poses."""
 _APART_M = 0.3
 """Returns of one body are not farther apart."""
-_FOLLOWED_M = 0.6
-"""About the middle of who is followed: where a scan may have them by noise."""
-_ONE_M = 0.7
-"""Two people beside each other are larger."""
-_ROUNDING_M = 0.01
 _LEAST_RETURNS = 2
 _BESIDE_M = 0.2
 """Of the robot's own path, where there is no plan."""
+_TURN_OF_ONE_S = 0.1
 _EVERY_S = 0.09
 """Ten sweeps a second are enough, and leave the robot's processor alone."""
 
@@ -134,17 +256,11 @@ class Outline:
 
 
 @dataclass(frozen=True, slots=True)
-class KnownBody:
-    """Somebody who is known, in ``map``: what a return there is explained by (m)."""
+class KnownPeer:
+    """A peer where it told that it is, in ``map``; its body is taken for the same."""
 
-    x: float
-    y: float
-    radius: float
-
-    @classmethod
-    def of_peer(cls, pose: Pose2D) -> "KnownBody":
-        """A peer, where it told that it is."""
-        return cls(pose.x, pose.y, _PEER_M)
+    pose: Pose2D
+    stands: bool
 
 
 class Witness:
@@ -153,91 +269,56 @@ class Witness:
     Args:
         outline: The robot's body.
         plan: None: nobody drew the place.
-        ahead_s: It looks farther by how far the robot drives in this time (s).
-        follow_m: So far from itself it goes on seeing who walked beside it (m).
     """
 
-    def __init__(
-        self,
-        outline: Outline,
-        plan: Plan | None,
-        ahead_s: float = 0.0,
-        follow_m: float = 0.0,
-    ) -> None:
+    def __init__(self, outline: Outline, plan: Plan | None) -> None:
         self._outline = outline
         self._plan = plan
-        self._ahead_s = ahead_s
-        self._follow_m = follow_m
         self._known: tuple[Obstacle, ...] = ()
-        self.walkers: tuple[Obstacle, ...] = ()
-        """Of the last scan, those who walk, or walked just now."""
-        self.newest: tuple[Obstacle, ...] = ()
-        """Everything of the last scan that neither the plan nor somebody explains."""
-        self._places: tuple[KnownPlace, ...] = ()
         self._looked_at = -math.inf
-        self._reach_m = LIMITS.ring_default_m
 
     def look(
         self,
         scan: LaserScan,
         pose: Pose2D,
         twist: Twist2D,
-        known: Iterable[KnownBody],
+        known: Iterable[KnownPeer],
         now: float,
-        places: Iterable[KnownPlace] = (),
     ) -> None:
-        """Take a scan, made at ``pose`` in ``map`` (monotonic, s).
-
-        What never left one of the ``places`` and does not move slows nobody.
-        """
+        """Take a scan, made at ``pose`` in ``map`` (monotonic, s)."""
         if now - self._looked_at < _EVERY_S:
             return
         self._looked_at = now
-        self._places = tuple(places)
-        self._reach_m = LIMITS.ring_default_m + self._ahead_s * abs(twist.linear_x)
-        followed = [one for one in self._known if self._is_followed(one, now)]
-        bodies = _bodies(self._unexplained(scan, pose, twist, known, followed, now))
-        if followed:
-            bodies = self._told_apart(bodies, pose, followed, now)
+        bodies = _bodies(self._unexplained(scan, pose, twist, known))
         if self._plan is None or not self._plan.is_drawn:
             bodies = [one for one in bodies if self._is_ahead(one, pose, twist)]
         earlier = [one for one in self._known if now - one.at <= GONE_S]
         seen = [self._joined(body, earlier, pose, now) for body in bodies]
         self._known = (*seen, *earlier)
-        self.newest = tuple(seen)
-        self.walkers = tuple(one for one in seen if one.is_somebody)
-
-    @property
-    def is_unsure(self) -> bool:
-        """Whether the next look may make something count."""
-        return any(one.fits and not one.counts for one in self._known)
 
     def present(self, now: float) -> list[Obstacle]:
         """What counts and was there within the last half second."""
-        counts = (one for one in self._known if one.counts and now - one.at <= GONE_S)
-        return [one for one in counts if not is_known(one, self._places)]
+        return [one for one in self._known if one.counts and now - one.at <= GONE_S]
 
     def obstacle(self, now: float) -> Obstacle | None:
-        """The oldest of them."""
-        return min(self.present(now), key=lambda one: one.since, default=None)
+        """Those who walk, in turn, so that nobody is left out; else the nearest."""
+        present = self.present(now)
+        walking = [one for one in present if one.is_somebody]
+        if walking:
+            return walking[int(now / _TURN_OF_ONE_S) % len(walking)]
+        return min(present, key=lambda one: one.gap_m, default=None)
 
     def _unexplained(
         self,
         scan: LaserScan,
         pose: Pose2D,
         twist: Twist2D,
-        known: Iterable[KnownBody],
-        followed: Iterable[Obstacle],
-        now: float,
+        known: Iterable[KnownPeer],
     ) -> _Floats:
         """Returns near the robot that nothing explains; shape (n, 2), in ``map``."""
         x, y = scan.points(Pose2D(0.0, 0.0, 0.0)).astype(np.float64).T
         gap = self._outline.gap_to(x, y)
-        near = (gap > 0.0) & (gap <= self._reach_m)
-        for who in followed:
-            ahead, aside = pose.inverse(who.x, who.y)
-            theirs = np.hypot(x - ahead, y - aside) <= _about(who, now)
-            near |= theirs & (gap > 0.0) & (gap <= self._follow_m)
+        near = (gap > 0.0) & (gap <= LIMITS.ring_default_m)
         away = np.hypot(x, y)[near]
         farthest = float(away.max(initial=0.0))
         x, y = _moved(x[near], y[near], pose)
@@ -247,39 +328,12 @@ class Witness:
             plan = self._plan.about(pose, farthest + 2 * PLAN_M)
             left = plan.distance_to(x, y) > blurred
         for one in known:
-            if pose.distance_to(one.x, one.y) <= farthest + one.radius + _ROUNDING_M:
-                left &= np.hypot(x - one.x, y - one.y) > one.radius
+            ahead, aside = _seen_from(one.pose, np.column_stack((x, y)))
+            if one.stands:
+                left &= self._outline.gap_to(ahead, aside) > _BESIDE_PEER_M
+            else:
+                left &= np.hypot(ahead, aside) > _PEER_M
         return np.column_stack((x[left], y[left]))
-
-    def _is_followed(self, one: Obstacle, now: float) -> bool:
-        """Whether it goes on seeing who walked beside the robot."""
-        is_new = self._follow_m > 0.0 and now - one.at <= GONE_S
-        return is_new and one.is_somebody
-
-    def _told_apart(
-        self,
-        bodies: Sequence[_Floats],
-        pose: Pose2D,
-        followed: Sequence[Obstacle],
-        now: float,
-    ) -> Sequence[_Floats]:
-        """Bodies; beyond reach only where it is plain who each is.
-
-        Where two may be who is followed, neither is, and whoever was is remembered.
-        """
-        kept = [one for one in bodies if self._gap_to(one, pose) <= self._reach_m]
-        for who in followed:
-            may_be = [
-                one
-                for one in bodies
-                if math.dist(one.mean(0), (who.x, who.y)) <= _about(who, now)
-            ]
-            if len(may_be) == 1 and np.hypot(*np.ptp(may_be[0], axis=0)) <= _ONE_M:
-                kept += [one for one in may_be if not any(one is x for x in kept)]
-        return kept
-
-    def _gap_to(self, body: _Floats, pose: Pose2D) -> float:
-        return float(self._outline.gap_to(*_seen_from(pose, body)).min())
 
     def _is_ahead(self, body: _Floats, pose: Pose2D, twist: Twist2D) -> bool:
         """Whether a part of a body lies where the robot is driving."""
@@ -308,25 +362,14 @@ class Witness:
 
     def _measured(self, body: _Floats, pose: Pose2D) -> Body:
         x, y = (float(one) for one in body.mean(0))
-        (xmin, ymin), (xmax, ymax) = body.min(0).tolist(), body.max(0).tolist()
         ahead, aside = _seen_from(pose, body)
-        plan, out_m = self._plan, math.inf
-        if plan is not None and plan.is_drawn:
-            out_m = float(plan.distance_to(body[:, 0], body[:, 1]).max())
         return Body(
             x,
             y,
             float(np.hypot(*np.ptp(body, axis=0))),
             float(self._outline.gap_to(ahead, aside).min()),
             (float(ahead.mean()), float(aside.mean())),
-            Rectangle(xmin, ymin, xmax, ymax),
-            out_m,
         )
-
-
-def _about(one: Obstacle, now: float) -> float:
-    """How far who is followed may be from where they were seen last (m)."""
-    return _FOLLOWED_M + LIMITS.walking_m_s * (now - one.at)
 
 
 def _moved(x: _Floats, y: _Floats, frame: Pose2D) -> tuple[_Floats, _Floats]:

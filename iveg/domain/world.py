@@ -2,43 +2,327 @@
 
 ``World.apply`` takes one observation; older ones and twins change nothing and are
 counted.  Nothing here reads a clock: ages come from the ``now`` that is handed in.
+
+Upper bound of the age of a robot's message, proven by the feedback that it echoes.
+
+Robots name in every message the newest feedback that they have received.  What was
+measured after that feedback arrived was measured after it left iVeg, so the message is
+at most as old as the feedback is now, on iVeg's own monotonic clock.  No clock of the
+robot enters and no delay is guessed (docs/safety.md, "Age").
+
+Transport that feeds each robot with odometry and scans.
+
+They come twice, straight from MQTT (``direct``) and through Orion (``fiware``).  Any
+other way counts as direct.
+
+Whether what a robot says can be true: by physics, and by what it said before.
+
+Each finding is a code, a contradiction of ``Doubts`` of a robot's state; what
+cannot be true of any robot is refused before it comes here (``ngsi.payloads``).  Only
+news is compared, and the longer of the robot's time and ours counts, so that lateness
+and reordering are no contradictions.  docs/safety.md, "Doubt", has the table.
+
+Other servers that robots hear, found in what robots echo of feedback.
+
+Two authors steer one fleet where a robot hears feedback that this iVeg never sent, and
+goes on hearing more of it.  An earlier run of this iVeg says nothing more, so it is
+none.  One robot's word is enough, as it slows nobody and frees nobody.
 """
 
-from collections import Counter
-from collections.abc import Iterable
+from bisect import bisect_right
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
 from math import inf
+from typing import Literal
 
-from iveg.domain.age import FeedbackLedger
 from iveg.domain.errors import UnknownRobotError
-from iveg.domain.feeds import Feeds
-from iveg.domain.fleet import FleetDescription
-from iveg.domain.geometry import Rectangle
+from iveg.domain.fleet import FleetDescription, RobotDescription
+from iveg.domain.frames import is_pose_frame
+from iveg.domain.geometry import Rectangle, Twist2D
 from iveg.domain.limits import LIMITS
+from iveg.domain.motion import LASTED_S
 from iveg.domain.observations import (
     Climate,
     DetectionFrame,
+    FeedbackRef,
     HeartbeatProbe,
     Instant,
     LaserScan,
     Observation,
     Odometry,
     Origin,
-    Overtaken,
     Received,
     RefusedFrame,
     SafetyReport,
     kind_of,
 )
-from iveg.domain.plausibility import Plausibility
 from iveg.domain.probe import ProbeLag
-from iveg.domain.robot_state import RobotState
-from iveg.domain.robot_updates import apply_newest, dated, learn_kind
+from iveg.domain.robot_state import RobotState, apply_newest, dated, learn_kind
 from iveg.domain.stream_order import OrderVerdict
-from iveg.domain.transports import FIWARE
+from iveg.domain.transports import DIRECT, FIWARE, TransportId
+from iveg.domain.words import WordAnswers
+
+_APART_S = 0.05
+"""Moments closer than this share the earlier one, so that ages come out older."""
+_LATELY_S = 60.0
+_LONG_AGO_APART_S = 1.0
+"""The same of what left iVeg longer ago than ``_LATELY_S``: whether an age is sixty
+seconds or sixty-one changes nothing."""
+_KEPT_S = 900.0
+_MOST = 4_000
+"""Moments at which those of long ago are thinned out: 2,100 of them stay at most."""
+
+
+class FeedbackLedger:
+    """Remembers when each feedback message was composed."""
+
+    def __init__(self) -> None:
+        self._boot: str | None = None
+        self._firsts: list[int] = []
+        self._moments: list[float] = []
+        self._last = -1
+
+    def composed(self, boot: str, first: int, last: int, now: float) -> None:
+        """Record that feedback ``first`` to ``last`` is composed now (monotonic, s)."""
+        self._boot, self._last = boot, last
+        if self._moments and now - self._moments[-1] < _APART_S:
+            return
+        self._firsts.append(first)
+        self._moments.append(now)
+        if len(self._moments) > _MOST:
+            self._thin_out(now)
+
+    def _thin_out(self, now: float) -> None:
+        kept: list[tuple[int, float]] = []
+        for first, moment in zip(self._firsts, self._moments, strict=True):
+            is_near = bool(kept) and moment - kept[-1][1] < _LONG_AGO_APART_S
+            is_spare = now - moment > _LATELY_S and is_near
+            # The earliest stays, so that ages come out older.
+            if now - moment <= _KEPT_S and not is_spare:
+                kept.append((first, moment))
+        self._firsts = [first for first, _ in kept]
+        self._moments = [moment for _, moment in kept]
+
+    def is_sent(self, echo: FeedbackRef) -> bool:
+        """Whether this boot has sent that feedback."""
+        return echo.boot == self._boot and echo.seq <= self._last
+
+    def composed_at(self, *echoes: FeedbackRef) -> float | None:
+        """The moment when the newest of these was composed, or earlier (monotonic, s).
+
+        None where nothing is proven: all are of other authors, were never sent, or are
+        forgotten.
+        """
+        sent = [one.seq for one in echoes if self.is_sent(one)]
+        index = bisect_right(self._firsts, max(sent, default=-1)) - 1
+        return None if index < 0 else self._moments[index]
+
+
+SILENT_S = 1.0
+"""A direct copy older than this is missed."""
+OVERTAKES_S = 0.2
+"""What comes through FIWARE that much after the last direct message is no twin."""
+
+
+@dataclass(slots=True)
+class Feed:
+    """One kind of telemetry of one robot, on both transports (monotonic s).
+
+    Attributes:
+        direct_at: Arrival of the newest direct message; ``fiware_at`` of Orion's.
+    """
+
+    direct_at: float = float("-inf")
+    fiware_at: float = float("-inf")
+    _direct: TransportId = DIRECT.id
+
+    def heard(self, transport: TransportId, at: float) -> None:
+        """A message came."""
+        if transport == FIWARE.id:
+            self.fiware_at = at
+        else:
+            self.direct_at, self._direct = at, transport
+
+    def is_direct(self, now: float) -> bool:
+        """Whether the direct copy is fresh."""
+        return now - self.direct_at <= SILENT_S
+
+    def transport(self, now: float) -> TransportId:
+        """Which one brings what counts; of a silent robot, which one did."""
+        has_fallen_back = (
+            not self.is_direct(now) and self.fiware_at > self.direct_at + OVERTAKES_S
+        )
+        is_unheard = self.direct_at == float("-inf")
+        return FIWARE.id if is_unheard or has_fallen_back else self._direct
+
+
+@dataclass(slots=True)
+class Feeds:
+    """The feeds of a fleet, by robot and kind."""
+
+    _known: defaultdict[tuple[str, type[Observation]], Feed] = field(
+        default_factory=lambda: defaultdict(Feed)
+    )
+
+    def of(self, robot_id: str, kind: type[Observation] = Odometry) -> Feed:
+        """One feed."""
+        return self._known[robot_id, kind]
+
+
+Code = Literal["pose_outside", "too_fast", "jumped"]
+"""Beside those of :mod:`~iveg.domain.motion`."""
+
+ANY_ROBOT_M_S, ANY_ROBOT_RAD_S = 10.0, 10.0
+"""Faster than any robot in a greenhouse: the bound of one that nobody described."""
+_SPEED_SHARE, _SPEED_M_S = 1.25, 0.25
+"""A drive may overshoot its greatest speed by this, and odometry is noisy (1, m/s)."""
+_TURN_SHARE, _TURN_RAD_S = 1.5, 0.5
+_JUMP_M = 0.5
+"""Corrections of a localisation are smaller (m)."""
+_ANCHOR_S = 1.0
+"""Poses are compared over so long, so that many small steps add up."""
+_LATE_S = 10.0
+"""A message may be so much later than the next one; a clock that tells more leapt."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Anchor:
+    """A pose that later ones are compared with; ``at`` when it came (monotonic, s)."""
+
+    said: Odometry
+    at: float
+
+    def passed_s(self, later: Origin, now: float) -> float:
+        """How long ago it was measured at most, when ``later`` was (s)."""
+        earlier, arrived = self.said.origin, now - self.at
+        if earlier.seq is None or later.seq is None:
+            return arrived + _LATE_S  # whoever does not count may come in any order
+        own = _own_s_between(earlier, later)
+        return arrived if own is None else max(arrived, min(own, arrived + _LATE_S))
+
+
+class Plausibility:
+    """Judges what the robots of a fleet say.
+
+    Args:
+        bounds: Of the greenhouse and what around it robots may use; None: nobody knows
+            where its robots may be.
+    """
+
+    def __init__(self, bounds: Rectangle | None) -> None:
+        self._bounds = bounds
+        self._anchors: dict[str, _Anchor] = {}
+
+    def contradictions(self, robot: RobotState, received: Received) -> Iterator[Code]:
+        """Codes of what news contradicts in the robot's state before this message."""
+        description = robot.description
+        match received.observation:
+            case Odometry() as said:
+                bounds, pose = self._bounds, said.pose
+                if bounds is not None and not bounds.contains(pose.x, pose.y):
+                    yield "pose_outside"
+                if _is_too_fast(description, said.twist):
+                    yield "too_fast"
+                if self._has_jumped(description, said, received.at.mono):
+                    yield "jumped"
+            case SafetyReport(linear=linear, angular=angular):
+                if _is_too_fast(description, Twist2D(linear, angular)):
+                    yield "too_fast"
+
+    def _has_jumped(self, robot: RobotDescription, said: Odometry, at: float) -> bool:
+        """Whether it cannot have come here since an earlier pose of the same boot."""
+        anchor = self._anchors.get(said.robot_id)
+        if anchor is None or anchor.said.origin.boot != said.origin.boot:
+            self._anchors[said.robot_id] = _Anchor(said, at)
+            return False
+        reach = _most_speed(robot) * anchor.passed_s(said.origin, at) + _JUMP_M
+        jumped = anchor.said.pose.distance_to(said.pose.x, said.pose.y) > reach
+        if jumped or at - anchor.at >= _ANCHOR_S:
+            self._anchors[said.robot_id] = _Anchor(said, at)
+        return jumped
+
+
+def _is_too_fast(robot: RobotDescription, twist: Twist2D) -> bool:
+    turn = ANY_ROBOT_RAD_S
+    if robot.is_described:
+        turn = _TURN_SHARE * robot.profile.max_turn + _TURN_RAD_S
+    return abs(twist.linear_x) > _most_speed(robot) or abs(twist.angular_z) > turn
+
+
+def _most_speed(robot: RobotDescription) -> float:
+    """Speed above which no such robot drives, noise included (m/s)."""
+    if not robot.is_described:
+        return ANY_ROBOT_M_S
+    return _SPEED_SHARE * robot.profile.max_speed + _SPEED_M_S
+
+
+def _own_s_between(earlier: Origin, later: Origin) -> float | None:
+    """Seconds between two messages on the robot's own clock; None where unknown."""
+    if (earlier.mono is None) != (later.mono is None):
+        return None
+    then, now = earlier.own_s, later.own_s
+    return None if then is None or now is None else now - then
+
+
+SPOKEN_FOR_S = 3.0
+"""An earlier run may end that much after this one began."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Heard:
+    """What one robot hears of others: the newest, and its first and last news.
+
+    Attributes:
+        news: When it first heard of them (monotonic, s), and last anything new.
+    """
+
+    others: dict[str, int]
+    news: tuple[float, float]
+
+
+class OtherAuthors:
+    """Authors of feedback beside this iVeg; ``ledger`` knows what it sent itself."""
+
+    def __init__(self, ledger: FeedbackLedger) -> None:
+        self._ledger = ledger
+        self._heard: dict[str, _Heard] = {}
+
+    def note(
+        self, robot_id: str, origin: Origin, at: Instant, *, is_direct: bool
+    ) -> None:
+        """Take what a robot echoes; what may be from before our start is left out."""
+        proven_at = self._ledger.composed_at(*origin.echoes)
+        if not is_direct and (proven_at is None or at.mono - proven_at > LIMITS.late_s):
+            return
+        sent = [one for one in origin.echoes if self._ledger.is_sent(one)]
+        # A second count in our own name is another's.
+        ours = max(sent, key=lambda one: one.seq, default=None)
+        others = {one.boot: one.seq for one in origin.echoes if one != ours}
+        before = self._heard.get(robot_id)
+        if not others:
+            self._heard.pop(robot_id, None)
+        elif before is None:
+            self._heard[robot_id] = _Heard(others, (at.mono, at.mono))
+        elif any(seq > before.others.get(boot, -1) for boot, seq in others.items()):
+            self._heard[robot_id] = _Heard(others, (before.news[0], at.mono))
+
+    def speaking(self, now: Instant) -> list[str]:
+        """Boots of those that have gone on for 3 s and spoke within the last ten."""
+        return sorted(
+            {
+                boot
+                for one in self._heard.values()
+                if one.news[1] - one.news[0] >= SPOKEN_FOR_S
+                and now.mono - one.news[1] <= LIMITS.ring_lasts_s
+                for boot in one.others
+            }
+        )
+
 
 _NO_MESSAGE = Climate, HeartbeatProbe, RefusedFrame
 """What is in no robot's stream of messages."""
-_ASKED_AGE_S, _THINNED_AGE_S = LIMITS.late_s + 0.1, LIMITS.live_s + 0.1
+_ASKED_AGE_S = LIMITS.late_s + 0.1
 
 
 class World:
@@ -47,11 +331,13 @@ class World:
     Args:
         fleet: Its robots; ids alone are robots without a description.
         probe: Lag of FIWARE; without one FIWARE's lag is not used.
-        bounds: Of the greenhouse; without them a robot may be anywhere.
+        bounds: Where robots may be; without them anywhere.
 
     Attributes:
         returned_detectors: Whose detector a boot has put back in service, until read.
+        word_answers: What operators said of words of detectors.
         ledger: When iVeg's own feedback was composed, which robots echo.
+        other_authors: Other servers whose feedback robots echo.
     """
 
     def __init__(
@@ -68,12 +354,14 @@ class World:
             robot_id: RobotState(robot_id, one)
             for robot_id, one in fleet.members.items()
         }
-        self._plausibility = Plausibility(bounds, self.ledger, self.robots)
+        self._plausibility = Plausibility(bounds)
+        self.other_authors = OtherAuthors(self.ledger)
         self.climate: Climate | None = None
         self.climate_received: Instant | None = None
         self.counters: Counter[str] = Counter()
         self.feeds = Feeds()
         self.returned_detectors: list[str] = []
+        self.word_answers = WordAnswers()
 
     def robot(self, robot_id: str) -> RobotState:
         """One robot.
@@ -93,10 +381,19 @@ class World:
         robot = self.robots.get(robot_id)
         return robot is not None and robot.is_past(kind, boot, seq)
 
-    def is_revoked(self, robot_id: str) -> bool:
-        """Whether a robot is heard no more."""
+    def is_refused(self, robot_id: str) -> bool:
+        """Whether a setting says that a robot is not heard."""
         robot = self.robots.get(robot_id)
-        return robot is not None and robot.revoked is not None
+        return robot is not None and robot.refused
+
+    def misplaced(self, observation: Observation) -> str | None:
+        """Name of the frame that odometry is in, if that is not its robot's."""
+        frame = observation.frame_id if isinstance(observation, Odometry) else None
+        if frame is None or is_pose_frame(
+            frame, self.robot(observation.robot_id).description
+        ):
+            return None
+        return frame
 
     def apply(self, received: Received) -> OrderVerdict:
         """Take one observation in.
@@ -117,11 +414,11 @@ class World:
             robot.refused_at = robot.refused_at if received.asked else at.mono
             self.counters[f"{kind_of(observation).__name__}.refused"] += 1
             return "refused"
+        if received.alone:
+            robot.sighted_at = at
+            return "late"
         learn_kind(robot, received, origin)
-        verdict = robot.judge(received, origin, self.ledger.composed_at(origin.heard))
-        if isinstance(observation, Overtaken) and verdict == "new":
-            # Its stream was past it, and has since met sixteen other boots.
-            verdict = "late"
+        verdict = robot.judge(received, origin, self.ledger.composed_at(*origin.echoes))
         if not received.asked:
             verdict = self._fed(robot, received, origin, verdict)
         self.counters[f"{kind_of(observation).__name__}.{verdict}"] += 1
@@ -138,7 +435,9 @@ class World:
             robot.sighted_at = dated(at, seen_at)
         if verdict == "new":
             self._doubt(robot, received)
+            self._note_authors(received)
             apply_newest(robot, received, self._measured_at(origin, received, likely))
+            self._doubt_motion(robot, received)
         return verdict
 
     def _doubt(self, robot: RobotState, received: Received) -> None:
@@ -147,6 +446,23 @@ class World:
             return
         for code in self._plausibility.contradictions(robot, received):
             robot.doubts.contradicted(code, received.at)
+            self.counters[f"contradicted.{code}"] += 1
+
+    def _note_authors(self, received: Received) -> None:
+        """Note whose feedback a robot hears beside ours."""
+        if not received.asked:
+            said, is_direct = received.observation, received.transport != FIWARE.id
+            self.other_authors.note(
+                said.robot_id, said.origin, received.at, is_direct=is_direct
+            )
+
+    def _doubt_motion(self, robot: RobotState, received: Received) -> None:
+        """Note what a robot's odometry contradicts in itself, which takes a while."""
+        if robot.is_replay or received.asked:
+            return
+        code = robot.motion(received.at).contradiction
+        if code is not None and isinstance(received.observation, Odometry):
+            robot.doubts.contradicted(code, received.at, LASTED_S)
             self.counters[f"contradicted.{code}"] += 1
 
     def _hear(self, robot: RobotState, origin: Origin, at: Instant) -> None:
@@ -203,11 +519,10 @@ class World:
         now = received.at.mono
         moment = None if likely is None else now - likely
         if origin.acknowledgements:
-            moment = self.ledger.composed_at(origin.heard)
+            moment = self.ledger.composed_at(*origin.echoes)
         if moment is None:
             return None
-        least = _THINNED_AGE_S if received.thinned else 0.0
-        return min(moment, now - (_ASKED_AGE_S if received.asked else least))
+        return min(moment, now - (_ASKED_AGE_S if received.asked else 0.0))
 
     def age_then(self, received: Received) -> float:
         """How old the newest of its kind was at most when it came (s).
@@ -261,9 +576,7 @@ class World:
         at, counted = received.at.mono, origin.seq is not None
         if received.transport == FIWARE.id and not counted and feed.is_direct(at):
             verdict = "duplicate"
-        is_direct = received.transport != FIWARE.id
-        abreast = is_direct and robot.is_newest(kind, origin)
-        feed.heard(received.transport, at, news=verdict == "new" or abreast)
+        feed.heard(received.transport, at)
         return verdict
 
     def live_robots(self) -> Iterable[RobotState]:

@@ -1,66 +1,45 @@
-"""Alerts (ISA-18.2)."""
+"""Alerts (ISA-18.2).
 
+A line of the log.
+
+A person's note, pinned to a time and a place.
+
+Rows of the audit: who did what.
+"""
+
+import json
 from typing import cast
 
-from pydantic import Field
+from pydantic import Field, JsonValue
 
-from iveg.domain.alerts import alert_book, flood
-from iveg.domain.alerts.stored import write_alert, write_delivery
-from iveg.domain.messages import Channel, MessageDelivery, Priority
-from iveg.domain.records import AlertRecord, Json
+from iveg.domain import alerts
+from iveg.domain.alerts import write_alert
+from iveg.domain.events import Priority
+from iveg.domain.records import AlertRecord, AuditRecord, LogRecord
 from iveg.domain.stamps import format_stamp
-from iveg.models.base import Listing, Model, Slots, moment, stamp
-
-
-class Told(Model):
-    """A recipient of an alert outside iVeg; ``failed`` is the reason of a failure."""
-
-    channel: Channel
-    to: str
-    at: str
-    failed: str | None
-
-    @classmethod
-    def of(cls, one: MessageDelivery) -> "Told":
-        """One that is in memory."""
-        return cls.of_record(write_delivery(one))
-
-    @classmethod
-    def of_record(cls, one: Json) -> "Told":
-        """One as an alert's record has it."""
-        at = format_stamp(one["at"])
-        return cls(
-            channel=one["channel"], to=one["to"], at=at, failed=one.get("failed")
-        )
-
-
-class Occurrence(Model):
-    """One time that an alert was raised."""
-
-    priority: Priority
-    raised_at: str
-    cleared_at: str | None
-    acknowledged_at: str | None
-    acknowledged_by: str | None
-    note: str | None
-    told: list[Told] = Field(description="Recipients outside iVeg.")
-
-    @classmethod
-    def of_record(cls, one: Json) -> "Occurrence":
-        """One as an alert's record has it."""
-        return cls(
-            priority=one["priority"],
-            raised_at=format_stamp(one["raised_at"]),
-            cleared_at=stamp(one.get("cleared_at")),
-            acknowledged_at=stamp(one.get("acknowledged_at")),
-            acknowledged_by=one.get("acknowledged_by"),
-            note=one.get("note") or None,
-            told=[Told.of_record(row) for row in one.get("told", ())],
-        )
+from iveg.models.base import Model, Slots, stamp
 
 
 class Alert(Model):
-    """An alert to people: all occurrences of one kind and subject as one."""
+    """An alert to people: all occurrences of one kind and subject as one.
+
+    A notice to people (ISA-18.2). One condition (kind and subject) that is back within
+    10 minutes is the same alert, once more; each time it sounds and asks to be
+    acknowledged anew. A condition that gets graver is raised anew at once.
+
+    Attributes:
+        alert_id: The alert.
+        priority: The gravest of what holds and of what nobody has acknowledged.
+        key: Template of its sentence.
+        slots: Values of its sentence.
+        robot_id: Whom it is about.
+        last_raised_at: First and newest time.
+        cleared_at: Of the newest time.
+        acknowledged_at: Of the newest time.
+        acknowledged_by: Of the newest time.
+        note: Of the newest time.
+        count: How often it was raised.
+    """
 
     alert_id: str
     priority: Priority
@@ -74,22 +53,15 @@ class Alert(Model):
     acknowledged_by: str | None
     note: str | None
     count: int
-    told: list[Told] = Field(
-        description="Recipients of the newest occurrence outside iVeg."
-    )
-    members: list[Occurrence] = Field(
-        description="The newest occurrences, oldest first."
-    )
 
     @classmethod
-    def of(cls, alert: alert_book.BookedAlert) -> "Alert":
-        """One alert with its newest occurrences."""
+    def of(cls, alert: alerts.BookedAlert) -> "Alert":
+        """One alert as it is now."""
         return cls.of_record(write_alert(alert))
 
     @classmethod
     def of_record(cls, record: AlertRecord) -> "Alert":
         """One alert as it is remembered."""
-        members = [Occurrence.of_record(one) for one in record.members]
         return cls(
             alert_id=record.alert_id,
             priority=cast("Priority", record.priority),
@@ -103,40 +75,140 @@ class Alert(Model):
             acknowledged_by=record.acknowledged_by,
             note=record.note,
             count=record.count,
-            told=members[-1].told if members else [],
-            members=members,
         )
-
-
-class Flood(Model):
-    """Number of alerts within the window; ``since`` null: no flood."""
-
-    count: int
-    limit: int
-    window_s: float
-    since: str | None
-
-    @classmethod
-    def of(cls, of: flood.FloodState) -> "Flood":
-        """The present rate of alerts."""
-        return cls(
-            count=of.count,
-            limit=flood.FLOOD_LIMIT,
-            window_s=flood.FLOOD_WINDOW_S,
-            since=moment(of.since),
-        )
-
-
-class AlertListing(Listing[Alert]):
-    """One page of alerts, and how fast they come now."""
-
-    flood: Flood
 
 
 class AcknowledgedAlerts(Model):
-    """What became of alerts that somebody acknowledged together."""
+    """What became of alerts that somebody acknowledged together.
+
+    Attributes:
+        items: Those that this acknowledged.
+    """
 
     items: list[Alert]
     left: list[str] = Field(
         description="Ids that were left: P1s, seen ones, and what is no longer there."
     )
+
+
+class LogEntry(Model):
+    """One line of the action and inference log.
+
+    Attributes:
+        id: Rises.
+        at: When.
+        kind: ``detection``, ``speed``, ``command``, ``link``, ``alert`` or ``system``.
+        robot_id: Whom it is about.
+        key: Template of its sentence.
+        slots: Values of its sentence.
+        class_: Canonical class.
+        decision_id: The decision behind it.
+    """
+
+    id: int
+    at: str
+    kind: str
+    robot_id: str | None
+    key: str
+    slots: Slots
+    class_: str | None = Field(validation_alias="class", serialization_alias="class")
+    decision_id: str | None
+
+    @classmethod
+    def of_record(cls, record: LogRecord) -> "LogEntry":
+        """One line, live and remembered."""
+        return cls(
+            id=record.id,
+            at=format_stamp(record.at),
+            kind=record.kind,
+            robot_id=record.robot_id,
+            key=record.key,
+            slots=dict(record.slots),
+            class_=record.class_,
+            decision_id=record.decision_id,
+        )
+
+
+class Note(Model):
+    """What somebody wrote about a moment; nobody can change it.
+
+    Attributes:
+        note_id: Number of its line in the log.
+        at: Moment that it is about.
+        written_at: When it was written.
+        by: Who.
+        text: What.
+        x: Place in ``map``, if it has one (m).
+        y: Place in ``map``, if it has one (m).
+        robot_id: Robot.
+        decision_id: Decision.
+    """
+
+    note_id: int
+    at: str | None
+    written_at: str | None
+    by: str
+    text: str
+    x: float | None
+    y: float | None
+    robot_id: str | None
+    decision_id: str | None
+
+    @classmethod
+    def of_record(cls, line: LogRecord) -> "Note":
+        """Of its line in the log."""
+        slots = line.slots
+        return cls(
+            note_id=line.id,
+            at=stamp(slots.get("pinned_at", line.at)),
+            written_at=stamp(line.at),
+            by=slots.get("by", ""),
+            text=slots.get("text", ""),
+            x=slots.get("x"),
+            y=slots.get("y"),
+            robot_id=line.robot_id,
+            decision_id=line.decision_id,
+        )
+
+
+class AuditEntry(Model):
+    """One row.
+
+    Attributes:
+        audit_id: Its own.
+        at: When it happened.
+        person: Id of the account.
+        name: Of the account, as it was then.
+        role: As it was then.
+        method: Way of signing in.
+        action: Such as ``stop``, ``release``, ``rule``, ``sign_in_refused``,
+            ``export``.
+        subject: What it was done to, such as a robot's id; may be empty.
+        details: ``status`` of the answer, and what was asked; of a rule
+            ``version_seen`` and the new ``version``.
+    """
+
+    audit_id: str
+    at: str
+    person: str
+    name: str
+    role: str
+    method: str
+    action: str
+    subject: str
+    details: dict[str, JsonValue]
+
+    @classmethod
+    def of_record(cls, record: AuditRecord) -> "AuditEntry":
+        """As it was kept."""
+        return cls(
+            audit_id=record.audit_id,
+            at=format_stamp(record.at),
+            person=record.person,
+            name=record.name,
+            role=record.role,
+            method=record.method,
+            action=record.action,
+            subject=record.subject,
+            details=json.loads(record.details),
+        )

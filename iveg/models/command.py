@@ -1,20 +1,25 @@
-"""STOP, release and resume as people follow them, live and remembered."""
+"""STOP, release and resume as people follow them, live and remembered.
 
-from collections.abc import Sequence
+The answer to a press of STOP, release or resume.
+
+Times of the newest STOPs.
+"""
+
+from collections.abc import Iterable, Sequence
 from math import isfinite
 from typing import Any, Literal
 
 from pydantic import Field, ValidationError
 
 from iveg.domain import stop
+from iveg.domain.alerts import nearest_rank
 from iveg.domain.goals import GoalKind
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
 from iveg.domain.records import ByTransport, CommandEventRecord, CommandRecord, Json
 from iveg.domain.stamps import format_stamp
 from iveg.domain.stop import StopMachine
-from iveg.domain.stop.commands import Times
-from iveg.domain.stop.outcome import Outcome, outcome_of, was_loud
+from iveg.domain.stop.commands import Outcome, Times, outcome_of, was_loud
 from iveg.domain.transports import DIRECT, TRANSPORTS, TransportId
 from iveg.models.base import Model, Slots, rounded, stamp
 
@@ -23,7 +28,14 @@ AGENT_LATE_S = 1.0
 
 
 class CommandTimes(Model):
-    """When each step came to be known; null where it has not yet."""
+    """When each step came to be known; null where it has not yet.
+
+    When each step came to be known (ISO-8601); null where it has not. ``sent`` is when
+    the order left for that transport, not when that took it.
+
+    Attributes:
+        requested: Accepted by the server.
+    """
 
     pressed: str | None = Field(
         description=(
@@ -74,7 +86,13 @@ class CommandTimes(Model):
 
 
 class CommandRobot(Model):
-    """The robot's last word, while a command is open."""
+    """The robot's last word, while a command is open.
+
+    Attributes:
+        v: Speed (m/s).
+        report_age_s: At most, its way included; null while nobody knows (s).
+        moved_m: How far it may have driven since (m).
+    """
 
     v: float
     report_age_s: float | None
@@ -82,7 +100,13 @@ class CommandRobot(Model):
 
 
 class CommandStep(Model):
-    """One line of the audit trail of a command."""
+    """One line of the audit trail of a command.
+
+    Attributes:
+        at: When.
+        state: State from then on.
+        why: What led to it.
+    """
 
     at: str
     state: str
@@ -90,14 +114,26 @@ class CommandStep(Model):
 
 
 class Sentence(Model):
-    """The name of a template and what fills its holes."""
+    """The name of a template and what fills its holes.
+
+    Attributes:
+        key: Template.
+        slots: Values.
+    """
 
     key: str
     slots: Slots
 
 
 class CommandGoal(Model):
-    """Where a goal sends a robot, in ``map`` (m)."""
+    """Where a goal sends a robot, in ``map`` (m).
+
+    Attributes:
+        kind: What was asked for.
+        x: The place in ``map`` (m).
+        y: The place in ``map`` (m).
+        aisle: Label of the lane, of ``aisle``.
+    """
 
     kind: GoalKind
     x: float
@@ -109,12 +145,59 @@ class Command(Model):
     """One STOP, release, resume or goal.
 
     What only a command that goes on has is null, empty or false in the history.
+
+    A STOP ends as ``RUNNING``. ``REPLACED``: another command took over. ``EXPIRED``:
+    the robot never confirmed a release or resume, or a crash of the server left the
+    command open.
+
+    A transport is ``ok`` when the robot's answer has come back on it, and ``direct`` of
+    a STOP when the broker has it (PUBACK). It is ``pending`` when the order was handed
+    over and nothing more is known: Orion's 204 is no evidence. It is ``unknown`` when
+    Orion took the order while the agent or the broker is known to be cut off;
+    ``failed`` when the order was not taken; ``off`` by ``IVEG_STOP_DIRECT``. The keys
+    are the ids of ``iveg/domain/transports.py``; another transport is one more key.
+
+    Attributes:
+        command_id: ULID.
+        robot_id: Whom it is for.
+        kind: What was asked.
+        drill: A proof of STOP, not a need.
+        state: One of the nine states of [safety.md](../safety.md), ``RUNNING``,
+            ``REPLACED`` or ``EXPIRED``, see below; of a goal that of [Goal](#goal).
+        requested_by: Who pressed first.
+        times: When each step came to be known.
+        requested_at: Likewise; this and the five below iVeg's clock (ISO-8601 UTC, ms).
+        sent_fiware_at: When it left by each transport that took it (ISO-8601 UTC, ms).
+        sent_direct_at: When it left by each transport that took it (ISO-8601 UTC, ms).
+        answer_fiware_at: When the robot first said by it that it has it (ISO-8601 UTC,
+            ms).
+        answer_direct_at: When the robot first said by it that it has it (ISO-8601 UTC,
+            ms).
+        standing_at: The first standing sample (ISO-8601 UTC, ms).
+        standstill_ms: First standing sample less the press; null while unknown (ms).
+        tries: How often it was sent before the robot stood, all transports at once
+            counted once.
+        reason: Null, ``moved``, ``reasserted``, ``restarted`` (the server was; the
+            audit row names the id that took over), ``release_unconfirmed``, or the
+            robot's code.
+        requesters: All who pressed.
+        hold_id: What a STOP is called at the robot: its own ``command_id`` unless it
+            keeps an earlier hold; null for others.
+        pressed_doubted: The page told a time that cannot be.
+        age_s: Since it was requested (s).
+        transports: By transport: ``ok``, ``failed``, ``off``, ``pending`` or
+            ``unknown``, see below.
+        agent_lag_s: How late the IoT Agent was when it was last sent; null if unknown
+            (s).
+        note: The sentence of that; null where the agent keeps up or nobody knows.
+        robot: The robot's last word while it is open.
+        challenge_fresh: A release may be composed now.
+        was_loud: It was UNCONFIRMED or STILL_MOVING at any time.
     """
 
     command_id: str
     robot_id: str
     kind: Literal["stop", "release", "resume", "goal"]
-    drill: bool
     state: str
     requested_by: str
     times: CommandTimes
@@ -166,7 +249,6 @@ class Command(Model):
             command_id=of.command_id,
             robot_id=of.robot_id,
             kind=of.kind,
-            drill=of.drill,
             state=of.state,
             requested_by=of.requesters[0],
             times=times,
@@ -202,7 +284,6 @@ class Command(Model):
             command_id=record.command_id,
             robot_id=record.robot_id,
             kind=record.kind,
-            drill=record.drill,
             state=record.state,
             requested_by=record.requested_by,
             times=times,
@@ -257,3 +338,101 @@ def _note(of: stop.FollowedCommand) -> Sentence | None:
     direct = of.transports[DIRECT.id] not in ("off", "failed")
     key = "stop.note.direct" if direct else "stop.note.fiware"
     return Sentence(key=key, slots={"lag": round(lag, 1)})
+
+
+class Pressed(Model):
+    """A STOP, release or resume that was accepted.
+
+    Attributes:
+        robot_id: What was asked of whom.
+        command_id: What was asked of whom.
+        state: ``REQUESTED``, or how it stands.
+    """
+
+    robot_id: str
+    command_id: str
+    state: str
+
+    @classmethod
+    def of(cls, command: stop.FollowedCommand) -> "Pressed":
+        """As it stands just after the press."""
+        return cls(
+            robot_id=command.robot_id,
+            command_id=command.command_id,
+            state=command.state,
+        )
+
+
+class FleetPressed(Model):
+    """A fleet STOP: one command a robot.
+
+    Attributes:
+        commands: One for each robot.
+    """
+
+    commands: list[Pressed]
+
+
+class LatencySpread(Model):
+    """Times of one step (ms); null where nothing was measured.
+
+    Attributes:
+        count: Samples.
+        p50_ms: Null where nothing was measured (ms).
+        p95_ms: Null where nothing was measured (ms).
+        max_ms: Null where nothing was measured (ms).
+    """
+
+    count: int
+    p50_ms: float | None
+    p95_ms: float | None
+    max_ms: float | None
+
+    @classmethod
+    def of(cls, values: Iterable[float | None]) -> "LatencySpread":
+        """Of measured times, to a tenth of a millisecond; missing ones do not count."""
+        known = sorted(value for value in values if value is not None)
+        return cls(
+            count=len(known),
+            p50_ms=rounded(nearest_rank(known, 0.50), 1),
+            p95_ms=rounded(nearest_rank(known, 0.95), 1),
+            max_ms=rounded(nearest_rank(known, 1.0), 1),
+        )
+
+
+class RobotLatency(Model):
+    """One robot's STOPs: how many, and each step from the press on.
+
+    Attributes:
+        robot_id: The robot.
+        stops: How many.
+        accepted: Times of the step.
+        answer: By transport, until it left and until the robot answered.
+        standing: Times of the step.
+    """
+
+    robot_id: str
+    stops: int
+    accepted: LatencySpread
+    sent: dict[TransportId, LatencySpread] = Field(
+        description=(
+            "By transport, until it left; ``answer`` until the robot said that it has"
+            " it."
+        )
+    )
+    answer: dict[TransportId, LatencySpread]
+    standing: LatencySpread
+
+
+class Latency(Model):
+    """Times of the newest STOPs of a range.
+
+    Attributes:
+        since: The range.
+        until: The range.
+        robots: One for each robot.
+    """
+
+    since: str
+    until: str
+    robots: list[RobotLatency]

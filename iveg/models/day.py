@@ -4,13 +4,17 @@ from typing import Literal
 
 from pydantic import Field
 
-from iveg.models.base import Model
+from iveg.models.base import GreenhouseMap, Model, Point
 from iveg.models.command import Command
-from iveg.models.places import GreenhouseMap, Point
 
 
 class Worked(Model):
-    """Minutes that one robot drove in one aisle."""
+    """Minutes that one robot drove in one aisle.
+
+    Attributes:
+        lane: Where and who.
+        robot_id: Where and who.
+    """
 
     lane: str
     robot_id: str
@@ -20,13 +24,20 @@ class Worked(Model):
 class Slowed(Model):
     """Minutes of robots slowed, by what slowed them and the aisle that it was in."""
 
-    cause: str = Field(description="``person`` or ``robot``; of a cost any reason.")
+    cause: str = Field(description="``person`` or ``robot``.")
     lane: str | None = Field(description="Null: outside the aisles, or unknown.")
     minutes: float
 
 
 class Encounters(Model):
-    """How often a robot came to the ring of a person."""
+    """How often a robot came to the ring of a person.
+
+    How often a robot came to the ring of a person on that day, by the decisions of the
+    history.
+
+    Attributes:
+        count: Encounters.
+    """
 
     count: int
     slowed: int = Field(description="Of which the robot said that it was slow.")
@@ -35,7 +46,16 @@ class Encounters(Model):
 
 
 class Pass(Model):
-    """A moving robot near a person; positions are means over a second."""
+    """A moving robot near a person; positions are means over a second.
+
+    Attributes:
+        at: When.
+        robot_id: Who.
+        speed: Of the robot (m/s).
+        robot: Where (m).
+        person: Where (m).
+        lane: Aisle.
+    """
 
     at: str
     robot_id: str
@@ -47,7 +67,19 @@ class Pass(Model):
 
 
 class Day(Model):
-    """Summary of one day of the fleet, Europe/Madrid, and what is due on the next."""
+    """Summary of one day of the fleet, Europe/Madrid, and what is due on the next.
+
+    What the fleet did on one day (Europe/Madrid), and what is due on the next. Poses
+    are means over a second.
+
+    Attributes:
+        since: Its range; ``until`` is now while it goes on.
+        robots: Who took part.
+        worked: Minutes in each aisle.
+        slowed: Minutes of limited speed.
+        encounters: How often a robot came to the ring of a person.
+        map: The greenhouse.
+    """
 
     day: str = Field(description="ISO date.")
     since: str
@@ -59,10 +91,7 @@ class Day(Model):
     slowed: list[Slowed]
     encounters: Encounters
     passes: list[Pass] = Field(description="The nearest, nearest first.")
-    stops: list[Command] = Field(description="STOPs and drills, oldest first.")
-    drills_due: list[str] = Field(
-        description="Robots whose STOP drill is due by the end of the next day."
-    )
+    stops: list[Command] = Field(description="STOPs, oldest first.")
     unseen: int = Field(description="P1s that nobody has acknowledged.")
     lost: list[Literal["places", "telemetry"]] = Field(
         description=(

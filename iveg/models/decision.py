@@ -6,13 +6,20 @@ from pydantic import Field, JsonValue
 
 from iveg.domain.records import DecisionRecord, Json
 from iveg.domain.stamps import format_stamp
-from iveg.models.base import Model, stamp
+from iveg.models.base import Model, Position, stamp
 from iveg.models.command import Sentence
-from iveg.models.places import Position
 
 
 class DecisionRule(Model):
-    """The rule that fired, as it was at that moment."""
+    """The rule that fired, as it was at that moment.
+
+    Attributes:
+        id: The rule.
+        version: The rule.
+        parameters: Its values; ``obstacle``, of older decisions for which only a laser
+            saw why: ``size_m``, ``gap_m`` (from the outline, m), ``moved``, ``over_s``
+            (for how long it was seen), else null.
+    """
 
     id: str | None
     version: str | None
@@ -20,7 +27,20 @@ class DecisionRule(Model):
 
 
 class DecisionLink(Model):
-    """One link of the chain of evidence."""
+    """One link of the chain of evidence.
+
+    ``late`` is over 1 s, ``missing`` not within 2 s. An ``open`` link may still come,
+    for 2 s at most, in the history too. ``unknown``: iVeg was interrupted while the
+    link was open.
+
+    Attributes:
+        link: Its name; a last link ``interrupted`` says that iVeg was interrupted, with
+            the time when that was found.
+        at: When.
+        value: What was measured.
+        verdict: ``ok``, ``late``, ``missing``, ``n/a``, ``open`` or ``unknown``, see
+            below.
+    """
 
     link: str
     at: str | None
@@ -29,7 +49,14 @@ class DecisionLink(Model):
 
 
 class DecisionPlace(Model):
-    """Pose of a robot when a decision began, in ``map`` (m, rad)."""
+    """Pose of a robot when a decision began, in ``map`` (m, rad).
+
+    Attributes:
+        robot_id: The robot.
+        x: In ``map`` (m).
+        y: In ``map`` (m).
+        yaw: Heading (rad).
+    """
 
     robot_id: str
     x: float
@@ -38,12 +65,44 @@ class DecisionPlace(Model):
 
 
 class Decision(Model):
-    """One decision: detection, observer, rule, and the robot's reaction."""
+    """One decision: detection, observer, rule, and the robot's reaction.
+
+    Why one robot was slowed: who was seen by whom, which rule fired, when the robot
+    obeyed.
+
+    Attributes:
+        decision_id: ULID.
+        robot_id: The robot that was limited.
+        person_id: The track.
+        observer: Robot that saw it.
+        class_: Canonical class and the detector's word.
+        class_id: Canonical class and the detector's word.
+        confidence: Of the detection; null where none is behind it, as of whom only a
+            laser saw (0–1).
+        position: In ``map``; not in the CSV (m).
+        y: The same, under the names of the CSV (m).
+        z: The same, under the names of the CSV (m).
+        speed_factor: The limit (0–1).
+        reason: ``person``, ``robot``, ``stale``.
+        rule: The rule that fired; not in the CSV.
+        rule_version: The same, under the names of the CSV.
+        in_sight: Whether the robot could see them itself.
+        started_at: Decided.
+        feedback_at: Published, reported by the robot, seen in its speed, over; null:
+            not yet.
+        applied_at: Published, reported by the robot, seen in its speed, over; null: not
+            yet.
+        observed_at: Published, reported by the robot, seen in its speed, over; null:
+            not yet.
+        ended_at: Published, reported by the robot, seen in its speed, over; null: not
+            yet.
+        speed_after: Measured at ``started_at``; at ``observed_at`` (m/s).
+        links: The chain of evidence.
+        sentence: The sentence that the log used.
+    """
 
     decision_id: str
-    kind: Literal["alert", "mandate", "late"] = Field(
-        description="`late`: made afterwards of what a robot kept during a gap."
-    )
+    kind: Literal["alert", "mandate"]
     robot_id: str
     person_id: str | None
     observer: str | None
@@ -75,9 +134,7 @@ class Decision(Model):
     applied_at: str | None
     observed_at: str | None
     ended_at: str | None
-    speed_before: float | None = Field(
-        description="m/s, the greatest of the second before ``started_at``."
-    )
+    speed_before: float | None = Field(description="m/s, measured at ``started_at``.")
     speed_after: float | None
     links: list[DecisionLink]
     sentence: Sentence
@@ -137,8 +194,6 @@ def sentence_of(record: DecisionRecord) -> Sentence:
     reason = "walker" if is_walker else record.reason or "default"
     if record.kind == "alert":
         key = "log.person_seen"
-    elif record.kind == "late":
-        key = "decision.late"
     elif record.in_sight is False:
         key = f"log.speed_down.{reason}_nlos"
     else:

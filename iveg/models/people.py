@@ -1,17 +1,37 @@
-"""People, and the robots that are slowed for them."""
+"""People, and the robots that are slowed for them.
 
-from pydantic import Field
+Things that an operator marked as "not a person here".
 
-from iveg.domain.detection_rule import Class
+Detections as they are remembered: one box of one frame.
+
+Detections of robots' cameras as they come in.
+"""
+
+from typing import Literal
+
+from pydantic import Field, ValidationError
+
+from iveg.domain.geometry import Box3D
+from iveg.domain.parameters import Class
+from iveg.domain.records import DetectionRecord, Json
+from iveg.domain.stamps import format_stamp
+from iveg.domain.tracking import person
 from iveg.domain.tracking.looks import Looks
+from iveg.domain.tracking.people import Placed
 from iveg.domain.tracking.person import Stage
-from iveg.models.base import Model
-from iveg.models.margin import Margin
-from iveg.models.places import Position
+from iveg.domain.transports import TransportId
+from iveg.models.base import Model, Position
+from iveg.models.robot import Margin
 
 
 class Acting(Model):
-    """A robot that is slowed for somebody."""
+    """A robot that is slowed for somebody.
+
+    Attributes:
+        robot_id: The robot.
+        distance_m: To the centre of the ring (m).
+        in_sight: Whether the robot could see them itself.
+    """
 
     robot_id: str
     distance_m: float
@@ -19,7 +39,16 @@ class Acting(Model):
 
 
 class Evidence(Model):
-    """All looks at somebody, and what they come to."""
+    """All looks at somebody, and what they come to.
+
+    All looks at somebody, by every robot, and what they come to
+    ([safety.md](../safety.md), "The rule").
+
+    Attributes:
+        looks: Number of looks; 0.3 s of pictures of a robot are one.
+        most: Confidence of the faintest and the surest (0–1).
+        probability: That it is a person (0–1).
+    """
 
     looks: int
     least: float = Field(description="Confidence of the faintest look (0 to 1).")
@@ -42,7 +71,28 @@ class Evidence(Model):
 
 
 class Person(Model):
-    """A person, or a robot outside the fleet."""
+    """A person, or a robot outside the fleet.
+
+    A person, or a robot that does not belong to the fleet; one track.
+
+    Attributes:
+        person_id: The track: ``P`` (person) or ``R`` (robot), a number that starts anew
+            each day (UTC), and a suffix that is new each day and at each start of iVeg,
+            so that no id comes twice.
+        class_: Canonical class.
+        stage: ``seen`` ≤ 1 s, ``remembered`` ≤ 10 s, ``last_seen`` ≤ 10 min, or 1 min,
+            and no longer than until the place was seen to be empty, of somebody who was
+            never seen for 2.5 s at a time.
+        position: In ``map`` (m).
+        confidence: Of the newest detection; 0.5 of whom only a laser saw (0–1).
+        first_seen: First and newest detection.
+        last_seen: First and newest detection.
+        age_s: Since the newest detection (s).
+        observers: Robots that saw it.
+        lane: Aisle in which it is.
+        acting: Robots that are slowed for it.
+        margin: The least margin of any robot to it.
+    """
 
     person_id: str
     class_: Class = Field(validation_alias="class", serialization_alias="class")
@@ -71,3 +121,213 @@ class Person(Model):
     thing_id: str | None = Field(
         description="The mark by which it is no person and has no ring."
     )
+
+
+class Thing(Model):
+    """One mark: who is born inside its circle and stays there slows nobody.
+
+    Attributes:
+        thing_id: The mark.
+        kind: Always ``person``.
+        y: Its middle in ``map`` (m).
+        radius_m: 0.5, a constant (m).
+        by: Who marked it.
+        since: When.
+    """
+
+    thing_id: str
+    kind: Literal["person"] = "person"
+    x: float = Field(description="Of its middle in ``map``.")
+    y: float
+    radius_m: float
+    by: str
+    since: str
+    until: str = Field(description="When it ends at the latest.")
+
+    @classmethod
+    def of(cls, thing: person.Thing) -> "Thing":
+        """One mark."""
+        return cls(
+            thing_id=thing.thing_id,
+            x=round(thing.x, 3),
+            y=round(thing.y, 3),
+            radius_m=person.RADIUS_M,
+            by=thing.by,
+            since=format_stamp(thing.since.wall),
+            until=format_stamp(thing.until.wall),
+        )
+
+
+class DetectionBox(Model):
+    """A 3D box (m) in ``frame_id``.
+
+    Attributes:
+        xmin: Sides (m).
+        xmax: Sides (m).
+        ymin: Sides (m).
+        ymax: Sides (m).
+        zmin: Sides (m).
+        zmax: Sides (m).
+        frame_id: ``map`` or ``base_link``.
+    """
+
+    xmin: float
+    xmax: float
+    ymin: float
+    ymax: float
+    zmin: float
+    zmax: float
+    frame_id: str
+
+    @classmethod
+    def of(cls, box: Box3D, frame_id: str) -> "DetectionBox":
+        """As the detector reported it."""
+        return cls(
+            xmin=box.xmin,
+            xmax=box.xmax,
+            ymin=box.ymin,
+            ymax=box.ymax,
+            zmin=box.zmin,
+            zmax=box.zmax,
+            frame_id=frame_id,
+        )
+
+
+class KeptDetection(Model):
+    """One box of one detection frame, as it is remembered.
+
+    A [Detection](#detection) of the history. People's places are kept for
+    ``IVEG_KEEP_POSITIONS_DAYS`` ([deployment.md](../deployment.md), "How long the
+    history keeps what"); then ``position`` and ``box`` are null.
+
+    Attributes:
+        robot_id: The observer.
+        stamp: As the robot sent it.
+        class_: Canonical class; null for others.
+        class_id: The detector's word.
+        probability: Confidence (0–1).
+        box: As sent; null where it is no longer kept.
+        confident: The rule counts it.
+        person_id: The track.
+    """
+
+    robot_id: str
+    stamp: str | None
+    received_at: str | None = Field(
+        default=None,
+        description=(
+            "When it reached iVeg; null on ``/live``, where its frame has an age."
+        ),
+    )
+    class_: str | None = Field(validation_alias="class", serialization_alias="class")
+    class_id: str
+    probability: float
+    position: Position | None = Field(
+        description="Null in the history, where it is no longer kept."
+    )
+    box: DetectionBox | None
+    confident: bool
+    person_id: str | None
+    peer: str | None = Field(
+        default=None, description="The robot of the fleet that was seen."
+    )
+    transport: TransportId = Field(description="Transport of the copy that was first.")
+
+    @classmethod
+    def of_record(cls, record: DetectionRecord) -> "KeptDetection":
+        """One detection as it is remembered."""
+        return cls(
+            robot_id=record.robot_id,
+            stamp=record.stamp,
+            received_at=format_stamp(record.at),
+            class_=record.class_,
+            class_id=record.class_id,
+            probability=record.probability,
+            position=Position.of_record(record),
+            box=_box(record.box),
+            confident=record.confident,
+            person_id=record.person_id,
+            transport=TransportId(record.transport),
+        )
+
+
+class DetectionRow(KeptDetection):
+    """One detection of the history; what a CSV has beside the rest stands here too.
+
+    A [KeptDetection](#keptdetection) with the names of the CSV, whose columns are all
+    here: a script reads either.
+
+    Attributes:
+        x: Centre in ``map``; null where it is no longer kept (m).
+        y: Centre in ``map``; null where it is no longer kept (m).
+        z: Centre in ``map``; null where it is no longer kept (m).
+    """
+
+    at: str = Field(description="As ``received_at``, under the name of the CSV.")
+    x: float | None
+    y: float | None
+    z: float | None
+
+    @classmethod
+    def of_row(cls, record: DetectionRecord) -> "DetectionRow":
+        """One detection as it is remembered."""
+        kept = dict(KeptDetection.of_record(record))
+        at = format_stamp(record.at)
+        x, y, z = record.x, record.y, record.z
+        return cls(**kept, at=at, x=x, y=y, z=z)
+
+
+def _box(found: Json | None) -> DetectionBox | None:
+    """A remembered box; None where a row holds none that is whole."""
+    try:
+        return None if found is None else DetectionBox.model_validate(found)
+    except ValidationError:
+        return None
+
+
+class Detection(KeptDetection):
+    """One box of one detection frame, placed in ``map``.
+
+    Attributes:
+        position: Centre in ``map`` (m).
+    """
+
+    position: Position
+
+    @classmethod
+    def of(
+        cls, one: Placed, robot_id: str, stamp: str | None, transport: TransportId
+    ) -> "Detection":
+        """One detection of a robot's newest frame."""
+        x, y, z = one.position
+        return cls(
+            robot_id=robot_id,
+            stamp=stamp,
+            class_=one.class_,
+            class_id=one.detection.class_id,
+            probability=one.detection.probability,
+            position=Position(x=x, y=y, z=z),
+            box=DetectionBox.of(one.framed.box, one.framed.frame_id),
+            confident=one.kind != "faint",
+            person_id=None if one.person is None else one.person.person_id,
+            peer=one.peer,
+            transport=transport,
+        )
+
+
+class DetectionFrame(Model):
+    """Everything that one robot saw at one moment, faint detections included.
+
+    Attributes:
+        robot_id: The observer.
+        stamp: As the robot sent it.
+        transport: ``fiware`` or ``direct``, of the copy that was first.
+        age_s: Of the frame (s).
+        items: The detections.
+    """
+
+    robot_id: str
+    stamp: str | None
+    transport: TransportId
+    age_s: float
+    items: list[Detection]

@@ -1,39 +1,516 @@
-"""A robot of the fleet, with the age of everything that is said of it."""
+"""A robot of the fleet, with the age of everything that is said of it.
 
-from typing import TYPE_CHECKING, Literal
+Stored poses and speeds of robots.
+
+Devices of a robot at the IoT Agent, with the time of their last message.
+
+The newest readings of a robot's small sensors.
+
+The gap between a robot and a person, less what stopping takes (ISO 13855).
+
+How it stands with a robot, as every surface says it.
+
+What holds or slows a robot, and why.
+
+A robot's newest goal: who gave it, and what the robot itself said of it.
+
+What a robot says that it applies: factor, holds, faults.
+"""
+
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any, Literal, get_type_hints
 
 from pydantic import Field, create_model
 
+from iveg.domain import feedback, goals, margins, observations, situation
 from iveg.domain.fleet import RobotProfile
-from iveg.domain.kinds import SENSED
-from iveg.domain.observations import Instant
+from iveg.domain.kinds import SENSED, Kind
+from iveg.domain.limits import LIMITS
+from iveg.domain.observations import Instant, Observation
+from iveg.domain.quantities import quantities_of, value_of
+from iveg.domain.records import OdometryRecord
 from iveg.domain.robot_state import Link, RobotState
+from iveg.domain.rule import foresight
 from iveg.domain.stamps import format_stamp
 from iveg.domain.transports import TransportId
-from iveg.models.applied import Applied, Hold
-from iveg.models.base import Model
-from iveg.models.camera_bias import CameraBias
+from iveg.models.base import Model, Point, Pose, Slots, Twist, moment, rounded
 from iveg.models.command import Command
-from iveg.models.goal import Goal
-from iveg.models.margin import Margin
-from iveg.models.places import Point
-from iveg.models.pose import Pose, Twist
-from iveg.models.robot_access import Revoked
-from iveg.models.sensor_reading import READINGS, SensorReading, newest_reading
-from iveg.models.situation import Situation
-from iveg.models.speed_limit import Encounter, MissingPremise, SpeedLimit
+
+
+class OdometryRow(Model):
+    """Pose in ``map`` (m, rad), speed (m/s, rad/s), speed limit, margin of a robot.
+
+    Attributes:
+        at: IVeg's clock when the rule judged the pose, at most two ticks after its
+            arrival (ISO-8601 UTC, ms).
+        robot_id: The robot.
+        x: Position of ``base_link`` in ``map`` (m).
+        y: Position of ``base_link`` in ``map`` (m).
+        yaw: Heading (rad).
+        linear: Forward speed (m/s).
+        angular: Turn rate (rad/s).
+        limit_factor: IVeg's speed limit: 0, 0.5 or 1.
+        applied_factor: Factor that the robot last said it applies.
+        link: ``LIVE``, ``LATE`` or ``LOST``.
+        margin_m: The robot's least [margin](../safety.md#margins) to anybody who is
+            seen, at most a second old; null: unknown, nobody is seen, or it stands (m).
+        late: Whether the robot kept it during a gap and sent it afterwards
+            ([mqtt.md](mqtt.md#backfill)); nothing acted on it, and ``at`` is when it
+            was measured. ``limit_factor`` is then 0.5, to which a robot keeps that iVeg
+            does not hear, and ``link`` is ``LOST``.
+    """
+
+    at: str
+    robot_id: str
+    x: float
+    y: float
+    yaw: float
+    linear: float
+    angular: float
+    limit_factor: float
+    applied_factor: float | None
+    link: str | None
+    margin_m: float | None
+
+    @classmethod
+    def of_record(cls, record: OdometryRecord) -> "OdometryRow":
+        """As it was kept."""
+        return cls(**asdict(record) | {"at": format_stamp(record.at)})
+
+
+class Device(Model):
+    """One device of a robot.
+
+    Attributes:
+        device: Device id.
+        robot_id: Whose.
+    """
+
+    device: str
+    robot_id: str
+    kind: str = Field(
+        description="``robot`` for the device of all orders, else what it measures."
+    )
+    age_s: float | None = Field(description="Since something came of it; null: never.")
+
+    @classmethod
+    def of(
+        cls,
+        robot: RobotState,
+        suffix: str,
+        kind: type[Observation] | None,
+        now: Instant,
+    ) -> "Device":
+        """The device of a robot with a suffix; without a kind, that of all orders."""
+        heard_at = robot.heard_at
+        if kind is not None:
+            received = robot.received_at(kind)
+            heard_at = None if received is None else received.mono
+        return cls(
+            device=robot.robot_id + suffix,
+            robot_id=robot.robot_id,
+            kind=suffix[1:] or "robot",
+            age_s=None if heard_at is None else round(max(0.0, now.mono - heard_at), 3),
+        )
+
+
+class SensorReading(Model):
+    """The newest reading of a small sensor; its quantities by name."""
+
+    age_s: float | None
+
+
+def _reading_model(kind: Kind) -> type[SensorReading]:
+    """The model of a small sensor: the quantities of its observation, and its age."""
+    types = get_type_hints(kind.of)
+    members: dict[str, Any] = {
+        name: (types[name], Field(description=f"{one.meaning} ({one.unit})"))
+        for name, one in quantities_of(kind.of).items()
+    }
+    return create_model(
+        kind.of.__name__, __base__=SensorReading, __doc__=kind.of.__doc__, **members
+    )
+
+
+READINGS = {kind.name: _reading_model(kind) for kind in SENSED}
+
+
+def newest_reading(robot: RobotState, kind: Kind, now: Instant) -> SensorReading | None:
+    """What a small sensor said last; None before the first."""
+    read = robot.sensed.get(kind.of)
+    if read is None:
+        return None
+    age_s = None if read.at is None else round(now.mono - read.at.mono, 1)
+    return READINGS[kind.name](**value_of(read.observation), age_s=age_s)
+
+
+class MarginParts(Model):
+    """Terms of the protective distance (m).
+
+    Attributes:
+        person_walks_m: While the robot reacts and brakes (m).
+        reaction_m: Driven before braking (m).
+        braking_m: Driven while braking (m).
+        uncertainty_m: Of detection and pose (m).
+    """
+
+    person_walks_m: float
+    reaction_m: float
+    braking_m: float
+    uncertainty_m: float
+
+
+class Margin(Model):
+    """The gap to a person less what stopping takes; shown, never acted on.
+
+    The gap to a person less what stopping takes (S_p of ISO 13855). It is the least of
+    a robot or person; it is shown and never acted on.
+
+    ``band`` is ``unknown`` when the pose is older than 1.5 s, or when the detection is
+    and the person may be nearer than 1 m by now. Of a person who is farther away,
+    ``margin_m`` is the least that is left.
+
+    Attributes:
+        robot_id: The pair.
+        person_id: The pair.
+        needs_m: S_p (m).
+        margin_m: Gap less S_p (m).
+        band: ``clear`` from 1 m, ``tight`` from 0, ``inside`` below 0; ``unknown``, see
+            below.
+        parts: S_p term by term (m).
+    """
+
+    robot_id: str
+    person_id: str
+    gap_m: float = Field(description="Between surfaces.")
+    needs_m: float
+    margin_m: float
+    band: margins.Band
+    parts: MarginParts
+    age_s: float = Field(description="Age of the older position.")
+    braking: float = Field(description="Counted on (m/s²).")
+    walking_speed: float = Field(description="Counted on (m/s).")
+
+    @classmethod
+    def of(cls, margin: margins.SafetyMargin | None) -> "Margin | None":
+        """Margin between a robot and a person; None where there is no pair."""
+        if margin is None:
+            return None
+        return cls(
+            robot_id=margin.robot_id,
+            person_id=margin.person_id,
+            gap_m=round(margin.gap_m, 2),
+            needs_m=round(margin.needs_m, 2),
+            margin_m=round(margin.margin_m, 2),
+            band=margin.band,
+            parts=MarginParts(
+                person_walks_m=round(margin.walks_m, 2),
+                reaction_m=round(margin.reaction_m, 2),
+                braking_m=round(margin.braking_m, 2),
+                uncertainty_m=LIMITS.uncertainty_m,
+            ),
+            age_s=round(margin.age_s, 3),
+            braking=margin.braking,
+            walking_speed=LIMITS.walking_m_s,
+        )
+
+
+class Situation(Model):
+    """The worst that holds for a robot now, and what a person can do.
+
+    What holds for a robot now, and what a person can do
+    ([dashboard.md](../dashboard.md#situation)). Everything that says how a robot is
+    takes it from here.
+
+    Sentences are in ``iveg/static/i18n``. Who shows it later lets it grow old: a robot
+    that has not been heard for a second is ``late``, after three ``lost``, and never
+    again ``working`` or ``locked``.
+
+    Attributes:
+        slots: Values of the sentences: ``distance`` (m), ``lane``, ``factor``,
+            ``seconds``, ``age`` (s), ``about``, ``code``, ``by``, ``boot``, ``level``
+            (0–1).
+    """
+
+    level: situation.Level = Field(description="Of the gravest that holds for it.")
+    kind: situation.Kind = Field(
+        description="What is told: the first of all that holds."
+    )
+    state: str = Field(description="Its sentence is `situation.is.{state}`.")
+    cause: str = Field(description="The reason that is applied.")
+    why: str | None = Field(description="Its sentence is `situation.why.{why}`.")
+    about: str | None = Field(description="The person, robot or hold of the cause.")
+    action: situation.Action = Field(
+        description="Its sentence is `situation.do.{action}`."
+    )
+    factor: float | None = Field(description="The strictest speed factor in force.")
+    slots: Slots
+
+    @classmethod
+    def of(cls, found: situation.Situation) -> "Situation":
+        """As the domain found it."""
+        return cls(
+            level=found.level,
+            kind=found.kind,
+            state=found.state,
+            cause=found.cause,
+            why=found.why,
+            about=found.about,
+            action=found.action,
+            factor=found.factor,
+            slots=dict(found.slots),
+        )
+
+
+class SpeedLimit(Model):
+    """Greatest speed factor of a robot, and its reason.
+
+    Attributes:
+        speed_factor: The limit (0–1).
+        reason: ``clear``, ``person``, ``robot``, ``doubt``, ``stale`` or
+            ``unsupervised``.
+        cause: Id of the person or robot.
+        distance_m: From the robot to the centre of the ring (m).
+        decision_id: The decision behind it.
+    """
+
+    speed_factor: float
+    reason: str
+    cause: str | None
+    distance_m: float | None
+    decision_id: str | None
+    foretold_s: float | None = Field(
+        description="Until it reaches the ring of the cause; null: it is inside."
+    )
+
+    @classmethod
+    def of(cls, limit: feedback.SpeedLimit) -> "SpeedLimit":
+        """The speed limit in force."""
+        return cls(
+            speed_factor=limit.speed_factor,
+            reason=limit.reason,
+            cause=limit.cause,
+            distance_m=rounded(limit.distance_m),
+            decision_id=limit.decision_id,
+            foretold_s=rounded(limit.foretold_s),
+        )
+
+
+class Encounter(Model):
+    """A zone that the robot will reach (docs/safety.md, "Foresight").
+
+    A zone that the robot will reach, as it and the person or peer go now, or within two
+    seconds once it is let go, if it is slow ([safety.md](../safety.md), "Foresight").
+    Nothing has happened yet; a forecast older than a second is left out.
+
+    Attributes:
+        cause: Id of the person or robot.
+        reason: ``person`` or ``robot``.
+        in_s: How soon (s).
+        radius_m: Radius of the zone (m).
+    """
+
+    cause: str
+    reason: str
+    in_s: float
+    probability: float = Field(
+        description="Share of encounters foretold so far ahead that came true."
+    )
+    place: Point = Field(description="Where the robot will be.")
+    centre: Point = Field(description="Where the zone's centre will be.")
+    radius_m: float
+
+    @classmethod
+    def of(cls, foretold: foresight.Encounter, now: Instant) -> "Encounter":
+        """At this moment."""
+        left_s = foretold.left_s(now)
+        return cls(
+            cause=foretold.zone.cause,
+            reason=foretold.zone.reason,
+            in_s=round(left_s, 1),
+            probability=round(foresight.probability(left_s), 2),
+            place=Point(x=round(foretold.x, 2), y=round(foretold.y, 2)),
+            centre=Point(x=round(foretold.centre_x, 2), y=round(foretold.centre_y, 2)),
+            radius_m=round(foretold.zone.radius_m, 2),
+        )
+
+
+class MissingPremise(Model):
+    """One thing without which a robot is not clear (docs/safety.md, "Clear").
+
+    Attributes:
+        premise: What is missing.
+    """
+
+    premise: Literal["pose", "doubt", "detector"]
+    robot_id: str = Field(description="Whose pose, word or detector it is.")
+
+
+class Goal(Model):
+    """A goal, in ``map`` (m).
+
+    A goal that a person gave to a robot ([safety.md](../safety.md#goals)).
+
+    ``UNCONFIRMED`` is a goal, or its cancellation, without an answer for 10 s; a late
+    word of the robot still counts. ``DELETED`` was a STOP or another hold.
+
+    Attributes:
+        goal_id: ULID.
+        robot_id: Whose.
+        kind: What was asked for.
+        x: The place in ``map`` (m).
+        y: The place in ``map`` (m).
+        aisle: Label of the lane, of ``aisle``.
+        by: Who gave it.
+        state: Below.
+        why: Code of the robot's refusal or of what ended it.
+        sent_at: When it was given.
+        answered_at: The robot's first word of it.
+        ended_at: When it came to its last state.
+        forgotten_at: When the robot itself first said that it drives there no longer.
+    """
+
+    goal_id: str
+    robot_id: str
+    kind: goals.GoalKind
+    x: float
+    y: float
+    aisle: str | None
+    by: str
+    state: goals.GoalState
+    why: str | None
+    sent_at: str
+    answered_at: str | None
+    ended_at: str | None
+    forgotten_at: str | None
+
+    @classmethod
+    def of(cls, one: goals.FollowedGoal) -> "Goal":
+        """At its newest step."""
+        return cls(
+            goal_id=one.goal.goal_id,
+            robot_id=one.robot_id,
+            kind=one.goal.kind,
+            x=one.goal.x,
+            y=one.goal.y,
+            aisle=one.aisle,
+            by=one.by,
+            state=one.state,
+            why=one.why,
+            sent_at=moment(one.sent) or "",
+            answered_at=moment(one.answered),
+            ended_at=moment(one.ended),
+            forgotten_at=moment(one.forgotten),
+        )
+
+
+class Hold(Model):
+    """A reason why a robot may not move.
+
+    Attributes:
+        id: ULID of a STOP, or the robot's own.
+        source: ``iveg``, ``boot``, ``hw``, ``bumper``, ``link``.
+        ack: Who may lift it: ``remote``, ``local``, ``auto``.
+    """
+
+    id: str
+    source: str
+    ack: str
+
+    @classmethod
+    def of(cls, hold: observations.Hold) -> "Hold":
+        """As the robot reported it."""
+        return cls(id=hold.id, source=hold.source, ack=hold.ack)
+
+
+class Fault(Model):
+    """A fault of a robot's own data, as the robot reports it.
+
+    Attributes:
+        code: Such as ``no_transform``.
+        about: Such as ``map → odom``.
+        for_s: How long (s).
+    """
+
+    code: str
+    about: str
+    for_s: float | None
+
+
+class SeenObstacle(Model):
+    """What a robot's laser sees near it and nothing explains, in ``map`` (m).
+
+    Attributes:
+        x: Its middle in ``map`` (m).
+        y: Its middle in ``map`` (m).
+        width_m: From its first return to its last (m).
+        moved: It walks, or has walked since it was seen first.
+    """
+
+    x: float
+    y: float
+    width_m: float
+    moved: bool
+
+
+class Applied(Model):
+    """Limit that the robot reports to apply.
+
+    Attributes:
+        reason: ``clear``, ``person``, ``robot``, ``stale``, ``doubt``,
+            ``unsupervised``, ``hold``, ``watchdog``, ``obstacle``.
+        cause: Id of the person, robot or hold.
+        age_s: Of the report (s).
+        feedback_age_s: Of the feedback that the robot had (s).
+        faults: What the robot finds wrong with its data.
+        obstacle: What its laser sees near it and nothing explains.
+    """
+
+    reason: str
+    cause: str | None
+    age_s: float
+    feedback_age_s: float | None
+    faults: list[Fault]
+    obstacle: SeenObstacle | None
+
+    @classmethod
+    def of(cls, robot: RobotState, now: Instant) -> "Applied | None":
+        """From its newest report; None before the first."""
+        report, received = robot.safety, robot.safety_received
+        if report is None or received is None:
+            return None
+        return cls(
+            reason=report.reason,
+            cause=report.cause,
+            age_s=round(now.mono - received.mono, 3),
+            feedback_age_s=report.feedback_age_s,
+            faults=[
+                Fault(code=one.code, about=one.about, for_s=one.for_s)
+                for one in report.faults
+            ],
+            obstacle=None
+            if report.obstacle is None
+            else SeenObstacle(**asdict(report.obstacle)),
+        )
+
 
 Mode = Literal["RUNNING", "SLOW", "STOPPED"]
 
 
 class Detector(Model):
-    """Whether the robot's pictures are read whole, and waited for."""
+    """Whether the robot's pictures are read whole, and waited for.
+
+    Attributes:
+        missing: Nothing proves now that it works.
+        out_since: When.
+        out_reason: Why.
+    """
 
     required: bool = Field(description="By the fleet file, and not out of service.")
     missing: bool
     out_by: str | None = Field(description="Who took it out of service.")
     out_since: str | None
-    bias: CameraBias | None
+    out_reason: str | None
 
     @classmethod
     def of(cls, robot: RobotState, now: Instant) -> "Detector":
@@ -44,12 +521,18 @@ class Detector(Model):
             missing=robot.detector.is_missing(now),
             out_by=None if out is None else out.by,
             out_since=None if out is None else format_stamp(out.since),
-            bias=CameraBias.of(robot.detector.peer_looks, now),
+            out_reason=None if out is None else out.reason,
         )
 
 
 class Navigation(Model):
-    """The robot's intent, in ``map`` (m)."""
+    """The robot's intent, in ``map`` (m).
+
+    Attributes:
+        task: Name of the task.
+        goal: Where it goes (m).
+        path: Planned path (m).
+    """
 
     task: str
     goal: Point | None
@@ -70,7 +553,15 @@ class Navigation(Model):
 
 
 class Profile(Model):
-    """Known properties of the robot (m, m/s)."""
+    """Known properties of the robot (m, m/s).
+
+    Attributes:
+        drive: ``differential`` or ``ackermann``.
+        length: Footprint (m).
+        width: Footprint (m).
+        max_speed: Greatest speed (m/s).
+        turning_radius: Least turning radius (m).
+    """
 
     drive: str
     length: float
@@ -91,7 +582,33 @@ class Profile(Model):
 
 
 class _Robot(Model):
-    """One robot with the age of what is said of it."""
+    """One robot with the age of what is said of it.
+
+    ``mode`` is ``STOPPED`` when the robot says so (a hold or factor 0 in a report of at
+    most 1.5 s ago) or it is STANDING, never because it was asked to stop. Without such
+    a report ``mode`` is what the robot was told.
+
+    Attributes:
+        robot_id: The robot; also its entity at Orion.
+        link: Age of the pose ([safety.md](../safety.md), "Age").
+        situation: How it stands with it, in one truth.
+        pose: Of ``base_link`` in ``map`` (m, rad).
+        twist: Measured speed (m/s, rad/s).
+        received_at: When iVeg took it.
+        age_estimated: The robot echoes no feedback, so its age is an estimate (≈).
+        applied: The robot's newest safety report.
+        speed_limit: The speed limit that iVeg tells the robot.
+        detector: Whether its pictures are read, and waited for.
+        holds: Why it may not move.
+        stop: The STOP that is open. It is told again at each try: ``tries`` and
+            ``transports`` count on while the robot is silent.
+        stop_state: ``RUNNING``, or one of the nine states of [safety.md](../safety.md).
+        navigation: Its intent.
+        replay: It plays a recording.
+        clock_offset_s: Robot's clock less the server's; for display (s).
+        profile: What is known of its body.
+        margin: Its least margin to a person.
+    """
 
     robot_id: str
     link: Link
@@ -100,6 +617,7 @@ class _Robot(Model):
         description="The robot's recent report; without one, the speed limit."
     )
     pose: Pose | None
+    lane: str | None = Field(description="The aisle that it is in.")
     twist: Twist | None
     stamp: str | None = Field(description="As the robot sent it.")
     received_at: str | None
@@ -117,7 +635,7 @@ class _Robot(Model):
         description='What "clear" lacks, its reason first.'
     )
     detector: Detector
-    revoked: Revoked | None = Field(description="Null: it is heard.")
+    refused: bool = Field(description="A setting says that it is not heard.")
     holds: list[Hold]
     stop: Command | None
     stop_state: str

@@ -2,23 +2,23 @@
 
 from pydantic import Field
 
-from iveg.models.alert import Alert, Flood
-from iveg.models.base import Model
-from iveg.models.climate import Climate
+from iveg.models.alert import Alert, LogEntry
+from iveg.models.base import GreenhouseMap, Model, Scan
 from iveg.models.command import Command
-from iveg.models.detection import DetectionFrame
-from iveg.models.equipment import Tile
+from iveg.models.equipment import Climate, Tile
 from iveg.models.health import Health
-from iveg.models.log_entry import LogEntry
-from iveg.models.mapped import Scan
-from iveg.models.people import Person
-from iveg.models.places import GreenhouseMap
+from iveg.models.people import DetectionFrame, Person
 from iveg.models.robot import Robot
 from iveg.models.rule import Rule
 
 
 class Server(Model):
-    """Which iVeg speaks."""
+    """Which iVeg speaks.
+
+    Attributes:
+        version: Of iVeg.
+        demo: Started by ``iveg demo``.
+    """
 
     boot: str = Field(description="Random, new at each start.")
     version: str
@@ -34,7 +34,19 @@ class User(Model):
 
 
 class World(Model):
-    """Everything that is known of the fleet and about it."""
+    """Everything that is known of the fleet and about it.
+
+    Attributes:
+        rule: As ``GET /rule``.
+        map: As ``GET /map``.
+        robots: All robots.
+        people: All people.
+        detections: By robot id.
+        alerts: As the topic.
+        health: As the topic.
+        climate: As the topic.
+        equipment: As the topic.
+    """
 
     rule: Rule
     map: GreenhouseMap
@@ -43,7 +55,6 @@ class World(Model):
     detections: dict[str, DetectionFrame]
     commands: list[Command] = Field(description="Those that go on.")
     alerts: list[Alert]
-    flood: Flood
     log: list[LogEntry] = Field(description="The newest 200, oldest first.")
     health: Health
     climate: Climate | None
@@ -51,7 +62,13 @@ class World(Model):
 
 
 class Snapshot(World):
-    """The first frame of ``/live``."""
+    """The first frame of ``/live``.
+
+    Attributes:
+        t: When.
+        server: Who answers.
+        user: Who asks.
+    """
 
     t: str
     server: Server
@@ -59,17 +76,24 @@ class Snapshot(World):
 
 
 class PastWorld(World):
-    """The world as it was at a recorded moment; ages are of that moment."""
+    """The world as it was at a recorded moment; ages are of that moment.
+
+    The world as it was at a recorded moment: the keys of the [Snapshot](#snapshot), as
+    pages were told of them then. Ages are of that moment.
+
+    Attributes:
+        scans: Newest of each robot.
+    """
 
     at: str = Field(
         description="The moment that is shown: the newest by the one asked."
     )
     at_s: float = Field(description="The same (Unix s).")
-    verified: bool | None = Field(
-        description="Whether it has the hash that iVeg had then; null: none was passed."
-    )
     recorded_twice: bool = Field(
         description="Whether another recording has this moment, too: the server's clock"
         " was set back."
+    )
+    left_out: list[str] = Field(
+        description="Topics of the recording that this version does not know."
     )
     scans: list[Scan]

@@ -1,8 +1,8 @@
 """What the page has from Python: ``python -m iveg.models.typescript``.
 
-The output, the types of the models (``static/js/types.d.ts``) and the small sensors
-(``static/js/core/sensors.js``), is checked in; a test fails when it is stale, so that a
-field has one name, one type and one meaning on both sides.
+The output, the types of the models (``static/js/types.d.ts``), the small sensors and
+the order of situations (``static/js/core``), is checked in; a test fails when it is
+stale, so that a field has one name, one type and one meaning on both sides.
 """
 
 import json
@@ -15,27 +15,17 @@ from pydantic.json_schema import models_json_schema
 from iveg.domain.kinds import SENSED, Kind, Sensor
 from iveg.domain.quantities import flags_of, quantities_of
 from iveg.domain.records import Json
-from iveg.models.alert import AlertListing
-from iveg.models.audit import AuditEntry
-from iveg.models.base import Model
-from iveg.models.climate import ClimateReading
+from iveg.domain.situation import ORDER
+from iveg.models.access import Invitation, NewToken, OpenSession, OwnAccount, SignInCode
+from iveg.models.alert import AuditEntry
+from iveg.models.base import Costmap, Coverage, Model, Reading, Scan
+from iveg.models.command import FleetPressed, Latency
 from iveg.models.decision import Decision
-from iveg.models.experiment import Experiments
-from iveg.models.latency import LatencyTable
-from iveg.models.mapped import Costmap, Coverage, Scan
-from iveg.models.messages import Messages, MessageTest
-from iveg.models.passkeys import PasskeyOfPerson, Proof
-from iveg.models.press import FleetPressed
-from iveg.models.programs import NewToken
-from iveg.models.reading import Reading
-from iveg.models.robot_access import RobotAccess
+from iveg.models.equipment import ClimateReading
+from iveg.models.health import LatencyTable
+from iveg.models.people import Thing
 from iveg.models.rule import Trial
-from iveg.models.signing_in import Invitation, OpenSession, OwnAccount, SignInCode
 from iveg.models.snapshot import PastWorld, Snapshot
-from iveg.models.stop_latency import Drill, Latency
-from iveg.models.tablets import Tablet
-from iveg.models.thing import KnownSpot, Thing
-from iveg.models.what_if import WhatIf
 
 TOLD: tuple[type[Model], ...] = (
     Snapshot,
@@ -44,30 +34,19 @@ TOLD: tuple[type[Model], ...] = (
     Costmap,
     Coverage,
     Decision,
-    Drill,
     Latency,
     LatencyTable,
-    Experiments,
     FleetPressed,
-    AlertListing,
     AuditEntry,
     ClimateReading,
     Reading,
-    Messages,
-    MessageTest,
     SignInCode,
     Invitation,
-    PasskeyOfPerson,
-    Proof,
     NewToken,
     OpenSession,
-    Tablet,
     OwnAccount,
-    RobotAccess,
-    KnownSpot,
     Thing,
     Trial,
-    WhatIf,
 )
 """All that a page reads; what they are made of comes with them."""
 _PLAIN = {
@@ -90,6 +69,13 @@ _SENSORS_HEAD = """\
  */
 
 export const SENSORS = /** @type {const} */ ([
+"""
+_ORDER_HEAD = """\
+/**
+ * What can hold for a robot, in the order in which it is told, and how grave it is;
+ * written by `python -m iveg.models.typescript` from `iveg/domain/situation.py`.
+ */
+
 """
 _Schema = Json
 
@@ -166,8 +152,15 @@ def _shown(kind: Kind, sensor: Sensor) -> dict[str, object]:
     }
 
 
+def write_order() -> str:
+    """The order in which situations are told."""
+    rows = "".join(f'  {kind}: "{level}",\n' for kind, level in ORDER.items())
+    return f"{_ORDER_HEAD}export const ORDER = /** @type {{const}} */ ({{\n{rows}}});\n"
+
+
 WRITTEN: Mapping[str, Callable[[], str]] = {
     "types.d.ts": write_types,
+    "core/order.js": write_order,
     "core/sensors.js": write_sensors,
 }
 """Files below ``static/js``."""

@@ -53,12 +53,9 @@ DESIRED_TOPIC = "/{robot_id}/iveg/desired"
 PEER_SCAN_TOPIC = "/{robot_id}/iveg/peer_scan"
 PEER_SCAN_FILTER = "/+/iveg/peer_scan"
 PEER_SCAN_END = PEER_SCAN_FILTER.removeprefix("/+")
-BACKFILL_TOPIC = "/{robot_id}/iveg/backfill"
 
 _ROBOT_ID = re.compile(r"[A-Za-z0-9-]{1,64}")
-DOCTOR_ID = "iveg-doctor"
-"""Device and entity of ``iveg doctor``, while it looks."""
-_RESERVED = frozenset({CLIMATE_DEVICE, HEARTBEAT_ID, DOCTOR_ID})
+_RESERVED = frozenset({CLIMATE_DEVICE, HEARTBEAT_ID})
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,10 +86,6 @@ ROBOT_DEVICES = (
 )
 """The command device sorts before its sensors, and is provisioned last where the agent
 keeps its registry in memory, so that either registry picks it (docs/fiware.md)."""
-
-DIRECT_SUFFIXES = tuple(
-    one.suffix for one in MEASURED if one.suffix and one.speaks_alone
-)
 
 
 @lru_cache(maxsize=1024)

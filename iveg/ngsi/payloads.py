@@ -1,17 +1,65 @@
-"""The shapes on the wire, strict: no coercion, no NaN, all bounded."""
+"""The shapes on the wire, strict: no coercion, no NaN, all bounded.
 
+Texts from the wire: which are safe to keep and to show.
+
+The shapes of what iVeg and peers send to robots, as strict as the others.
+
+The shapes of what peers' lasers saw, as robots are sent it.
+"""
+
+import unicodedata
 from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
-from iveg.domain.backfill import MOST_MESSAGES
-from iveg.ngsi.texts import MAX_TEXT, clean_text
+from iveg.domain.peer_scan import BEAMS, PLACES
+
+MAX_TEXT = 64
+
+
+FORBIDDEN = frozenset("<>\"'=;()")
+"""Characters that Orion refuses, with the whole update they stand in."""
+
+
+def clean_text(text: str) -> str:
+    """Text that is safe to keep and show: NFC, no control or format marks, short."""
+    if text.isascii() and text.isprintable():
+        # Nearly all is plain, and plain text needs no look at each character.
+        return text[:MAX_TEXT]
+    kept = "".join(
+        c
+        for c in unicodedata.normalize("NFC", text[: 4 * MAX_TEXT])
+        if unicodedata.category(c)[0] != "C"
+    )
+    return kept[:MAX_TEXT]
+
+
+def legible(text: str) -> str:
+    """Text without characters that are unseen or turn others round (Cc, Cf, Cs …).
+
+    Line ends stay.
+    """
+    return "".join(c for c in text if c == "\n" or unicodedata.category(c)[0] != "C")
+
+
+def all_legible(value: object) -> object:
+    """JSON with every text in it legible."""
+    match value:
+        case str():
+            return legible(value)
+        case list():
+            return [all_legible(one) for one in value]
+        case dict():
+            return {legible(name): all_legible(one) for name, one in value.items()}
+    return value
+
 
 MAX_BEAMS = 4096
 MAX_RANGE_M = 1e6
 MAX_BOXES = 256
 MAX_ROBOTS = 256
 MAX_PATH = 1024
+MOST_HEARD_ALSO = 3
 
 
 Text = Annotated[str, AfterValidator(clean_text)]
@@ -49,6 +97,7 @@ class OriginFields(Wire):
     stamp: Text | None = None
     mono: Seconds | None = None
     heard: FeedbackRefValue | None = None
+    heard_also: list[FeedbackRefValue] = Field([], max_length=MOST_HEARD_ALSO)
     replay: Text | None = None
 
 
@@ -71,8 +120,16 @@ class MotionFields(Wire):
 class OdometryValue(MotionFields, OriginFields):
     """``base_pose_ground_truth``; Algorithm 1's ``pose`` has the same fields."""
 
+    frame_id: Text | None = None
 
-class LidarHeaderValue(OriginFields):
+
+class ScanLabelValue(OriginFields):
+    """Identity and frame of ``lidar_header``."""
+
+    frame_id: Text | None = None
+
+
+class LidarHeaderValue(ScanLabelValue):
     """``lidar_header``."""
 
     angle_min: Radians
@@ -110,7 +167,7 @@ class PositionValue(Wire):
 class BoxValue(Wire):
     """One element of ``bounding_boxes``."""
 
-    class_id: Text
+    class_id: Text | int
     probability: Annotated[float, Field(ge=0, le=1)]
     position: PositionValue
     frame_id: Text | None = None
@@ -131,6 +188,15 @@ class FaultValue(Wire):
     code: Text
     about: Text = ""
     for_s: Seconds | None = None
+
+
+class ObstacleValue(Wire):
+    """``obstacle``, in ``map`` (m)."""
+
+    x: Metres
+    y: Metres
+    width_m: Annotated[float, Field(ge=0, le=100)]
+    moved: bool
 
 
 class SafetyValue(OriginFields):
@@ -158,6 +224,7 @@ class SafetyValue(OriginFields):
     feedback_age_s: Seconds | None = None
     faults: Annotated[list[FaultValue], Field(max_length=MAX_TEXT)] = []
     peer_scans: object = None
+    obstacle: object = None
 
 
 class PointValue(Wire):
@@ -207,15 +274,100 @@ class ClimateValue(Wire):
     co2: Annotated[float, Field(ge=0, le=100_000)] | None = None
 
 
-class BackfillValue(OriginFields):
-    """``/{robot}/iveg/backfill``; its messages are read one by one."""
-
-    robot_id: Text
-    messages: Annotated[list[dict[str, object]], Field(max_length=MOST_MESSAGES)]
-
-
 class NotificationValue(Wire):
     """A notification of Orion; entities are read attribute by attribute."""
 
     subscriptionId: Text  # noqa: N815 - NGSI name
     data: Annotated[list[dict[str, object]], Field(max_length=1000)]
+
+
+class VelocityValue(Wire):
+    """In ``map`` (m/s)."""
+
+    x: Speed
+    y: Speed
+
+
+class AlertValue(Wire):
+    """One alert inside the feedback."""
+
+    decision_id: Text | None = None
+    class_: Literal["person", "robot"] | None = Field(default=None, alias="class")
+    class_id: Text | None = None
+    conf: Annotated[float, Field(ge=0, le=1)] | None = None
+    position: PointValue | None = None
+    radius_m: Annotated[float, Field(gt=0, le=100)] | None = None
+    stamp: Text | None = None
+    observer: Text | None = None
+    velocity: VelocityValue | None = None
+
+
+class SpeedLimitValue(Wire):
+    """One speed limit inside the feedback."""
+
+    speed_factor: Annotated[float, Field(ge=0, le=1)]
+    reason: Text = "clear"
+    cause: Text | None = None
+    distance_m: Annotated[float, Field(ge=0, le=1e7)] | None = None
+    decision_id: Text | None = None
+    foretold_s: Seconds | None = None
+    over: bool = False
+
+
+SpeedLimitsValue = Annotated[dict[str, SpeedLimitValue], Field(max_length=MAX_ROBOTS)]
+
+
+class FeedbackPose(MotionFields):
+    """Pose of the observer as iVeg knows it."""
+
+    stamp: Text | None = None
+
+
+class FeedbackValue(OriginFields):
+    """``/{robot}/mqtt_feedback``."""
+
+    robot_id: Text
+    alert: AlertValue | None = None
+    alerts: list[AlertValue] = Field([], max_length=MAX_BOXES)
+    robot_pose: FeedbackPose | None = None
+    speed_limits: SpeedLimitsValue = Field({})
+    clear: list[Text] = Field([], max_length=MAX_ROBOTS)
+    seen: dict[str, int] = Field({}, max_length=MAX_ROBOTS)
+    backlog: object = None
+    foresight: bool = False
+    rule: object = None
+
+
+class MountValue(Wire):
+    """A laser in ``base_link`` (m, rad): no robot is longer than twice this."""
+
+    x: Annotated[float, Field(ge=-5, le=5)]
+    y: Annotated[float, Field(ge=-5, le=5)]
+    yaw: Radians
+
+
+class PeerPoseValue(Wire):
+    """Where a peer's ``base_link`` was (m, rad)."""
+
+    x: Metres
+    y: Metres
+    yaw: Radians
+    frame_id: Literal["map"]
+
+
+class PeerScanValue(OriginFields):
+    """``/{robot}/iveg/peer_scan``."""
+
+    robot_id: Text
+    robot_pose: PeerPoseValue
+    age_s: Annotated[float, Field(ge=0, le=2)]
+    mount: MountValue
+    range_max: Annotated[float, Field(gt=0, le=1e4)]
+    ranges: Annotated[
+        list[Annotated[float, Field(ge=0, le=1e4)] | None],
+        Field(min_length=BEAMS, max_length=BEAMS),
+    ]
+    places: Annotated[
+        list[Annotated[int, Field(ge=0, lt=PLACES)]],
+        Field(min_length=BEAMS, max_length=BEAMS),
+    ]

@@ -1,15 +1,13 @@
-"""Alerts: raised, cleared, acknowledged, logged, and how fast they come."""
+"""Alerts: raised, cleared, acknowledged, logged."""
 
 from collections.abc import Callable, Iterable, Sequence
 
-from iveg.domain.alerts.alert_book import AlertBook, BookedAlert
-from iveg.domain.alerts.flood import FloodGauge, FloodState
+from iveg.domain.alerts import AlertBook, BookedAlert
 from iveg.domain.events import Condition, LogEvent, Slot
-from iveg.domain.messages import MessageDelivery
 from iveg.domain.observations import Instant
 from iveg.pipeline import topics
 from iveg.pipeline.event_log import EventLog
-from iveg.pipeline.log_messages import alert_line, flood_line
+from iveg.pipeline.log_messages import alert_line
 from iveg.pipeline.ports import Ids
 
 
@@ -25,17 +23,11 @@ class Alerting:
         self._event_log = event_log
         self._new_id = new_id
         self._book = AlertBook()
-        self._gauge = FloodGauge()
 
     @property
     def waiting(self) -> list[BookedAlert]:
         """Active alerts, and each P1 that cleared before anybody saw it."""
         return self._book.waiting
-
-    @property
-    def flood(self) -> FloodState:
-        """Rate of alerts at present."""
-        return self._gauge.flood
 
     def knows(self, alert_id: str) -> bool:
         """Whether an alert is of this run, active or recently cleared."""
@@ -58,15 +50,6 @@ class Alerting:
         raised = [one for one in changed if one.cleared is None]
         if raised:
             self.on_raised(raised)
-        self._watch_flood(len(raised), now)
-
-    def record_deliveries(
-        self, alert_id: str, raised: Instant, deliveries: Iterable[MessageDelivery]
-    ) -> None:
-        """Record the recipients of an alert outside iVeg."""
-        alert = self._book.record_deliveries(alert_id, raised, deliveries)
-        if alert is not None:
-            self._event_log.alert(alert)
 
     def acknowledge(
         self, alert_id: str, by: str, note: str, now: Instant
@@ -87,7 +70,7 @@ class Alerting:
     def acknowledge_together(
         self, alert_ids: Iterable[str], by: str, note: str, now: Instant
     ) -> list[BookedAlert]:
-        """A person acknowledges all of a flood but its P1s; those that are now.
+        """A person acknowledges a list but its P1s; those that are now.
 
         Each P1 is about somebody in danger: it sounds until it was read by itself.
         """
@@ -99,13 +82,3 @@ class Alerting:
         ]
         seen = (self.acknowledge(one, by, note, now) for one in lesser)
         return [one for one in seen if one is not None]
-
-    def _watch_flood(self, raised: int, now: Instant) -> None:
-        before = self.flood
-        after = self._gauge.count(raised, now)
-        if after == before:
-            return
-        self._event_log.changed(topics.FLOOD.name)
-        line = flood_line(before, after)
-        if line is not None:
-            self._event_log.log(line, now)

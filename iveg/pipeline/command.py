@@ -8,11 +8,11 @@ import asyncio
 import logging
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
 from typing import Literal
 
 from iveg.domain.errors import UnknownRobotError
 from iveg.domain.events import Condition, LogEvent, Slot
+from iveg.domain.motion import UNMOVED, Motion
 from iveg.domain.observations import (
     CommandAnswer,
     Instant,
@@ -34,8 +34,7 @@ from iveg.domain.stop import (
     SetDesiredState,
     StopMachine,
 )
-from iveg.domain.stop import conditions as stop_conditions
-from iveg.domain.stop.drills import Drills
+from iveg.domain.stop import machine as stop_conditions
 from iveg.domain.transports import Transport
 from iveg.pipeline import topics
 from iveg.pipeline.event_log import EventLog
@@ -68,10 +67,8 @@ class Commander:
         event_log: Tells people and the history.
         new_id: Makes ULIDs.
         clock: Reads both clocks.
-        drills: When each robot's STOP was last proved.
         agent_lag_s: How far the IoT Agent is behind (s); None where nobody knows.
         is_cut: Whether what lies behind a transport is known to pass nothing on.
-        sent: Told each time that a send came back.
     """
 
     def __init__(
@@ -84,16 +81,13 @@ class Commander:
         new_id: Ids,
         clock: Clock,
         *,
-        drills: Drills,
         agent_lag_s: Callable[[Instant], float | None],
         is_cut: IsCut,
-        sent: Callable[[], None] = lambda: None,
     ) -> None:
         self.machines: Mapping[str, StopMachine] = {
             robot_id: StopMachine(robot_id, ports) for robot_id in robots
         }
         self.commands: dict[str, FollowedCommand] = {}
-        self.drills = drills
         self.counters: Counter[str] = Counter()
         self._mistakes: dict[str, OffTable] = {}
         """Robots whose machine once had no step: shown until iVeg starts again."""
@@ -102,7 +96,7 @@ class Commander:
         self._sender = OrderSender(
             by_id, fleet, journal, event_log, clock, self._came_back, is_cut
         )
-        self._agent_lag_s, self._sent = agent_lag_s, sent
+        self._agent_lag_s = agent_lag_s
         self._journal = journal
         self._event_log = event_log
         self._new_id = new_id
@@ -163,21 +157,6 @@ class Commander:
         )
         return [self.commands.get(one.command_id, one) for one in pressed]
 
-    async def drill(
-        self, robot_id: str, by: str, at: Instant, press: Press = _PLAIN
-    ) -> FollowedCommand:
-        """Prove that STOP works: a real STOP, of a robot that hardly moves.
-
-        Raises:
-            CommandRefusedError: stopped already, faster than a crawl, or unheard.
-        """
-        machine = self.machine(robot_id)
-        press = replace(press, drill=True)
-        self._perform(machine, machine.drill(by, at, self._new_id(), press), at)
-        assert machine.stop is not None  # noqa: S101 - a drill begins an episode
-        (drilled,) = await self._write_down([machine.stop], by, at)
-        return drilled
-
     async def release(
         self, robot_id: str, seen: Iterable[str], by: str, at: Instant
     ) -> FollowedCommand:
@@ -208,11 +187,15 @@ class Commander:
 
     # --- what comes back ----------------------------------------------------------
 
-    def apply(self, received: Received, age_s: float = 0.0) -> None:
+    def apply(
+        self, received: Received, age_s: float = 0.0, motion: Motion = UNMOVED
+    ) -> None:
         """Apply a new observation to the machine of its robot.
 
-        The observation was at most ``age_s`` old when it came; infinite where that is
-        unknown.
+        Args:
+            received: What is new.
+            age_s: How old it was at most when it came (s); infinite where unknown.
+            motion: Of the robot by all that is known.
         """
         observation, at = received.observation, received.at
         machine = self.machines.get(observation.robot_id)
@@ -234,14 +217,8 @@ class Commander:
                     observation, at, received.transport, self._new_id()
                 )
             case Odometry():
-                twist = observation.twist
                 effects = machine.odometry(
-                    twist.linear_x,
-                    twist.angular_z,
-                    at,
-                    self._new_id(),
-                    observation.origin,
-                    age_s,
+                    observation, at, self._new_id(), age_s, motion
                 )
         self._perform(machine, effects, at)
 
@@ -281,7 +258,6 @@ class Commander:
 
     def conditions(self, now: Instant) -> Iterable[Condition]:
         """Alert conditions of STOP."""
-        yield from self.drills.conditions(now)
         yield from stop_conditions.of_machines(self.machines.values(), now)
         yield from stop_conditions.of_mistakes(self._mistakes.values())
 
@@ -329,7 +305,6 @@ class Commander:
         """A transport took the order or failed: the command's display changes."""
         self._perform(machine, effects, at)
         self._show(machine)
-        self._sent()
 
     def _show(self, machine: StopMachine) -> None:
         self._event_log.changed(topics.ROBOT.of(machine.robot_id))
@@ -343,8 +318,6 @@ class Commander:
         command = self.commands.get(changed.command_id)
         if command is not None:
             self._event_log.command(command, changed, at)
-            if command.drill and changed.key == "standing":
-                self.drills.passed(command.robot_id, command.times.requested.wall)
             if changed.key in ("ready", "running"):
                 self._note_end(command, at)
         desired = _JOURNALLED.get(changed.key)

@@ -4,19 +4,21 @@ A sighting is logged at its start, so that a person who stands before a camera f
 hour does not fill the log.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 
-from iveg.domain.camera_bias import peer_error
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.detector import flaw_of
 from iveg.domain.events import LogEvent, Slot
-from iveg.domain.geometry import Pose2D
+from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS
-from iveg.domain.observations import DetectionFrame, Instant, Received
-from iveg.domain.rule.obstacles import Walkers
+from iveg.domain.observations import DetectionFrame, Instant, Received, SafetyReport
+from iveg.domain.robot_state import RobotState
 from iveg.domain.stream_order import OrderVerdict
+from iveg.domain.tracking.blind import BlindCameras
 from iveg.domain.tracking.people import People, Placed
 from iveg.domain.tracking.person import TrackedPerson
+from iveg.domain.tracking.sight import Look, OwnSight
+from iveg.domain.words import HeardWords, meaning_of, name_numbers, plain
 from iveg.domain.world import World
 from iveg.pipeline import topics
 from iveg.pipeline.event_log import EventLog
@@ -41,7 +43,9 @@ class DetectionTracking:
     Attributes:
         placed: What each robot's newest look found, faint ones included.
         other: When the newest confident object of another class came, by robot.
-        taken: Comfort, called with each frame that is judged and its source moment.
+        taken: Comfort, called with each frame that is judged, its source moment, and
+            when it came.
+        witnessed: The same with each report of an obstacle.
         kept: Chooses the detections that become rows.
         newest: Each detection of the last moments.
     """
@@ -50,16 +54,20 @@ class DetectionTracking:
         self,
         world: World,
         people: People,
+        greenhouse: Greenhouse,
         event_log: EventLog,
         new_id: Ids,
     ) -> None:
         self.placed: dict[str, list[Placed]] = {}
         self.other: dict[str, Instant] = {}
-        self.taken: Callable[[DetectionFrame, Instant], None] = lambda *_: None
+        self.taken: Callable[[DetectionFrame, Instant, Instant], None] = lambda *_: None
+        self.witnessed: Callable[[SafetyReport, Instant], None] = lambda *_: None
         self.kept = KeptDetections(event_log)
         self.newest = NewestDetections()
         self._world = world
         self._people = people
+        self._greenhouse = greenhouse
+        self._own_sight, self._blind = OwnSight(greenhouse), BlindCameras(greenhouse)
         self._event_log = event_log
         self._new_id = new_id
         self._logged_at: dict[tuple[str, str], float] = {}
@@ -85,7 +93,7 @@ class DetectionTracking:
     ) -> None:
         """Track who is in a frame; a late one may still protect, Orion's answer not.
 
-        A frame that is later than a ring lives protects nobody, and would only show
+        A frame that is later than a zone lives protects nobody, and would only show
         ghosts.
         """
         robot_id, robot = frame.robot_id, self._world.robot(frame.robot_id)
@@ -99,8 +107,11 @@ class DetectionTracking:
             self._world.counters["pictures.not_judged"] += 1
             detector.note_flaw("overload", received.at)
             return
-        self.taken(frame, seen_at)
+        frame = name_numbers(frame, robot.description.classes)
+        name = frame.detector or robot_id
+        rule = rule.also_naming(self._world.word_answers.persons(name))
         frame = detector.bounded(frame, rule)
+        words = self._hear_words(frame, name, rule)
         placed = self._look(frame, received, rule, seen_at)
         turned_away, unplaced = self._people.turned_away, self._people.unplaced
         if turned_away:
@@ -108,13 +119,62 @@ class DetectionTracking:
         if unplaced:
             self._world.counters["people.unplaced"] += unplaced
         flaw = flaw_of(frame, rule, turned_away, unplaced, has_pose=has_pose)
+        if flaw is None and words.is_strange:
+            flaw = "strange"
         if flaw is not None:
             detector.note_flaw(flaw, received.at)
         elif verdict == "new":
             detector.note_whole(robot.detections_at)
+        self._compare(robot, frame, placed, received.at)
+        self.taken(frame, seen_at, received.at)
         if verdict == "new":
             self.placed[robot_id] = placed
             self._event_log.changed(topics.DETECTIONS.of(robot_id))
+
+    def _compare(
+        self,
+        robot: RobotState,
+        frame: DetectionFrame,
+        placed: list[Placed],
+        at: Instant,
+    ) -> None:
+        """Hold a frame against known people: somebody is gone, or it is blind."""
+        look = Look.of_frame(robot, frame, placed, at)
+        if robot.description.has_detector and not robot.is_replay:
+            self._blind.take(look, self._people, self._world)
+        for person in self._own_sight.take(look, self._people):
+            self._log_clear(person, at)
+
+    def _hear_words(
+        self, frame: DetectionFrame, name: str, rule: DetectionRule
+    ) -> HeardWords:
+        """Note which words of a frame anybody understands, and ask of the others."""
+        robot, answers = self._world.robot(frame.robot_id), self._world.word_answers
+        listed = robot.description.classes
+
+        def is_known(word: str) -> bool:
+            return (
+                rule.class_of(word) is not None
+                or meaning_of(word) is not None
+                or word in self._world.robots
+                or answers.is_person(name, word) is not None
+            )
+
+        lists_people = any(rule.class_of(one) == "person" for one in listed)
+        said = [(one.class_id, one.probability) for one in frame.detections]
+        said += [(one, 1.0) for one in frame.unread if one is not None]
+        heard = robot.detector.words_of(name)
+        heard.hear(
+            [lists_people, *(is_known(word) for word, _ in said)],
+            [
+                plain(word)
+                for word, probability in said
+                if probability >= rule.threshold.every
+                and not is_known(word)
+                and not (lists_people and word in listed)
+            ],
+        )
+        return heard
 
     def _look(
         self,
@@ -126,37 +186,11 @@ class DetectionTracking:
         placed = self._people.sight(frame, self._world, rule, seen_at, self._new_id())
         for name in self._people.unknown_frames:
             self._name_unknown_frame(frame.robot_id, name, received.at)
-        pose = self._world.robot(frame.robot_id).pose_at_stamp(frame.origin.own_s)
         for one in placed:
             self._describe(one, frame, received)
-            self._note_peer(one, frame.robot_id, pose, seen_at)
-        if pose is not None:
-            self._note_carried(placed, frame.robot_id, pose, seen_at)
         if any(one.person is not None for one in placed):
             self._event_log.changed(topics.PEOPLE.name)
         return placed
-
-    def _note_peer(
-        self, one: Placed, robot_id: str, pose: Pose2D | None, at: Instant
-    ) -> None:
-        """Compare the place of a peer with its own pose at that moment."""
-        if one.peer is None or pose is None:
-            return
-        peer = self._world.robot(one.peer)
-        offset_s = peer.clock.offset_s(at) or 0.0
-        itself = peer.pose_at_stamp(at.wall - offset_s)
-        if itself is not None and peer.link(at) == "LIVE":
-            seen, half = one.position[:2], peer.profile.length / 2
-            error = peer_error(seen, pose, itself, half)
-            self._world.robot(robot_id).detector.peer_looks.note(at.mono, error)
-
-    def _note_carried(
-        self, placed: list[Placed], robot_id: str, pose: Pose2D, at: Instant
-    ) -> None:
-        """Ask of everybody who has a ring whether they go with the robot."""
-        people = [one for one in placed if one.person and one.class_ == "person"]
-        places = [pose.inverse(*one.position[:2]) for one in people]
-        self._world.robot(robot_id).detector.carried.note(pose, places, at.mono)
 
     def _name_unknown_frame(self, robot_id: str, frame_id: str, at: Instant) -> None:
         """Count a frame that nobody described; log it once for each robot."""
@@ -184,14 +218,29 @@ class DetectionTracking:
         if last is None or at.mono - last >= 2 * _LOGGED_S:
             self._event_log.log(_line(one, robot_id, subject), at)
 
-    def witness(self, seen: Iterable[Walkers]) -> None:
-        """Track who walks near robots by their lasers alone."""
-        for robot_id, at, spots in seen:
-            robot = self._world.robot(robot_id)
-            for one in self._people.witness(robot, spots, at, self._new_id()):
-                if one.first_seen == at:
-                    self._event_log.log(_walker_line(one, robot_id), at)
+    def witness(self, report: SafetyReport, at: Instant) -> bool:
+        """Track who walks near a robot of today by its own laser; whether one does."""
+        if report.obstacle is None or self._world.robot(report.robot_id).is_replay:
+            return False
+        one = self._people.witness(report, at, self._new_id())
+        self.witnessed(report, at)
+        if one is not None:
             self._event_log.changed(topics.PEOPLE.name)
+            if one.first_seen == at:
+                self._event_log.log(_walker_line(one, report.robot_id), at)
+        return one is not None
+
+    def _log_clear(self, person: TrackedPerson, now: Instant) -> None:
+        self._event_log.changed(topics.PEOPLE.name)
+        newest = person.newest
+        if person.sightings or person.stage(now) == "seen":
+            return
+        slots: dict[str, Slot] = {
+            "person": person.person_id,
+            "lane": self._greenhouse.lane_at(newest.x, newest.y) or "",
+        }
+        line = LogEvent("detection", "log.person_cleared", slots, None, person.class_)
+        self._event_log.log(line, now)
 
     def forget(self, now: Instant) -> None:
         """Forget log lines and rows about persons who are gone."""

@@ -8,7 +8,7 @@ falls silent and slows the robots.
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
-from iveg.domain.alerts import conditions
+from iveg.domain import alerts
 from iveg.domain.decisions import Decisions, SlowdownDecision
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.events import Condition, LogEvent, Slot
@@ -26,16 +26,13 @@ from iveg.domain.observations import (
     Received,
     SafetyReport,
 )
-from iveg.domain.plausibility import ignores_limit
 from iveg.domain.records import AlertRecord, DecisionRecord
-from iveg.domain.rule.crossings import Crossing, LimitChange
+from iveg.domain.robot_state import Obedience, slow_below
+from iveg.domain.rule.clear import ClearCondition
 from iveg.domain.rule.foresight import Encounter
-from iveg.domain.rule.obstacles import Obstacles, Walkers
-from iveg.domain.rule.premises import Missing
-from iveg.domain.rule.speed_limits import SpeedLimits
-from iveg.domain.tracking.laser_sight import LaserSight, ScanOf
+from iveg.domain.rule.judge import SpeedLimits
+from iveg.domain.rule.zones import LimitChange, ZoneEntry
 from iveg.domain.tracking.people import People
-from iveg.domain.witness import Plan
 from iveg.domain.world import World
 from iveg.pipeline import topics
 from iveg.pipeline.alerting import Alerting
@@ -63,13 +60,10 @@ class Evaluator:
 
     Args:
         boot: Random, new at each start: identity of our feedback.
-        newest_scan: Reads a robot's newest scan.
-        obstacles: What lasers see that nobody explains; None: nobody looks.
 
     Attributes:
         rule: The version in force; a new one counts from the next judgement on.
-        laser_sight: What lasers find empty; a memory finds only parts that have names.
-        aged: Comfort, called with each tick and with who was seen to walk by lasers.
+        aged: Comfort, called with each tick.
         judged: The same with each judgement: the rule, limits, changes, and when.
     """
 
@@ -84,13 +78,11 @@ class Evaluator:
         new_id: Ids,
         boot: str,
         backlog: Callable[[Instant], float | None] = lambda _: None,
-        newest_scan: ScanOf = lambda _: None,
-        obstacles: Obstacles | None = None,
     ) -> None:
         self.world = world
         self.greenhouse = greenhouse
         self.rule = rule
-        self.aged: Callable[[Sequence[Walkers], Instant], None] = lambda *_: None
+        self.aged: Callable[[Instant], None] = lambda _: None
         self.judged: Callable[
             [DetectionRule, Mapping[str, SpeedLimit], Sequence[LimitChange], Instant],
             None,
@@ -103,13 +95,9 @@ class Evaluator:
         )
         self.protected_unseen = 0
         """How often a robot slowed for a person or peer out of its own sight."""
-        self.obstacles = obstacles or Obstacles(world, people, Plan.of(greenhouse))
-        self._speed_limits = SpeedLimits(greenhouse, self.obstacles.seen)
-        self.tracking = DetectionTracking(world, self.people, event_log, new_id)
-        self.laser_sight = sight = LaserSight(Plan.of(greenhouse), newest_scan)
-        self._staleness = Staleness(
-            world, self.people, greenhouse, event_log, sight.all_clear()
-        )
+        self._speed_limits = SpeedLimits(greenhouse)
+        self.tracking = DetectionTracking(world, people, greenhouse, event_log, new_id)
+        self._staleness = Staleness(world, people, greenhouse, event_log)
         self._feedback_publisher = FeedbackPublisher(
             world,
             self.people,
@@ -117,14 +105,15 @@ class Evaluator:
             fleet,
             boot,
             backlog,
-            self.obstacles.known_here.near,
         )
         self._event_log = event_log
         self._new_id = new_id
         self._applied: dict[str, float] = {}
         self._low = LowValues()
+        self._obedience = Obedience()
         self._moved: dict[str, Odometry] = {}
         self._unjudged: Instant | None = None
+        self._is_urgent = False
         self._started: Instant | None = None
         self._untold = False
 
@@ -133,19 +122,19 @@ class Evaluator:
         return self.people.copy(), self._speed_limits.copy()
 
     @property
-    def crossings(self) -> Iterable[Crossing]:
-        """Every robot that is inside a ring now, with the ring."""
-        return self._speed_limits.crossings
+    def entries(self) -> Iterable[ZoneEntry]:
+        """Every robot that is inside a zone now, with the zone."""
+        return self._speed_limits.entries
 
-    def foretold(self, robot_id: str, now: Instant) -> Sequence[Encounter]:
+    def encounters(self, robot_id: str, now: Instant) -> Sequence[Encounter]:
         """Rings that a robot will reach, the soonest first; forecasts grow old, too."""
-        ahead = self._speed_limits.encounters_shown(robot_id).values()
+        ahead = self._speed_limits.encounters_told(robot_id).values()
         young = (one for one in ahead if now.mono - one.at <= LIMITS.silence_s)
         return sorted(young, key=lambda one: one.in_s)
 
-    def missing(self, robot_id: str) -> Sequence[Missing]:
+    def unmet(self, robot_id: str) -> Sequence[ClearCondition]:
         """What the claim "clear" lacks for a robot now, the reason first."""
-        return self._speed_limits.missing.get(robot_id, ())
+        return self._speed_limits.unmet.get(robot_id, ())
 
     def decision_record(self, decision_id: str) -> DecisionRecord | None:
         """A decision that is still in memory."""
@@ -158,7 +147,7 @@ class Evaluator:
         return (
             one
             for one in self.decisions.known
-            if not robots[one.crossing.robot_id].is_replay
+            if not robots[one.entry.robot_id].is_replay
         )
 
     # --- what arrives -------------------------------------------------------------
@@ -193,7 +182,7 @@ class Evaluator:
             case SafetyReport():
                 self._reported(observation, received.at, is_kept=received.asked)
             case DetectionFrame():
-                self._unjudged = _later(self._unjudged, received.at)
+                self._await_judgement(received.at, is_urgent=True)
         return True
 
     @property
@@ -201,13 +190,23 @@ class Evaluator:
         """Whether something was taken that :meth:`settle` has not judged yet."""
         return self._unjudged is not None
 
+    @property
+    def is_urgent(self) -> bool:
+        """Whether something new of people or obstacles is among it."""
+        return self._is_urgent
+
+    def _await_judgement(self, at: Instant, *, is_urgent: bool) -> None:
+        if self._unjudged is None or at.mono >= self._unjudged.mono:
+            self._unjudged = at
+        self._is_urgent |= is_urgent
+
     def settle(self) -> None:
         """Judge the fleet once for everything that was taken since the last time."""
         if self._unjudged is not None:
             self._settle(self._unjudged)
 
     def _settle(self, now: Instant) -> None:
-        self._unjudged = None
+        self._unjudged, self._is_urgent = None, False
         self._judge(now)
         for robot_id, odometry in self._moved.items():
             robot, speed_limit = self.world.robot(robot_id), self.speed_limits[robot_id]
@@ -217,8 +216,11 @@ class Evaluator:
         self._moved.clear()
 
     def _drove(self, odometry: Odometry, at: Instant) -> None:
-        self._event_log.decisions(self.decisions.moved(odometry, at))
-        self._unjudged = _later(self._unjudged, at)
+        robot = self.world.robot(odometry.robot_id)
+        speed, slow = robot.motion(at).speed, slow_below(robot.profile)
+        moved = self.decisions.moved(robot.robot_id, speed, at, is_slow=speed <= slow)
+        self._event_log.decisions(moved)
+        self._await_judgement(at, is_urgent=False)
         self._moved[odometry.robot_id] = odometry
 
     def _reported(self, report: SafetyReport, at: Instant, *, is_kept: bool) -> None:
@@ -226,21 +228,14 @@ class Evaluator:
         published_at = self._feedback_publisher.published_at
         changed = self.decisions.reported(report, published_at, at)
         self._event_log.decisions(changed)
-        self._doubt_ignored_limit(report, at)
         if is_kept:
             return
+        measured_at = self.world.robot(report.robot_id).safety_received
+        if self.tracking.witness(report, measured_at or at):
+            self._await_judgement(at, is_urgent=True)
         if report.speed_factor != self._applied.get(report.robot_id):
             self._applied[report.robot_id] = report.speed_factor
             self._log_speed(report, at)
-
-    def _doubt_ignored_limit(self, report: SafetyReport, at: Instant) -> None:
-        """Doubt a robot that drives on above a limit long after it was told."""
-        robot = self.world.robot(report.robot_id)
-        limited_at = self._speed_limits.limited_since.get(robot.robot_id)
-        if limited_at is None or robot.safety_received is None or robot.is_replay:
-            return
-        if ignores_limit(report, robot.safety_received.mono, limited_at):
-            robot.doubts.contradicted("limit_ignored", at)
 
     # --- judgement ----------------------------------------------------------------
 
@@ -277,24 +272,23 @@ class Evaluator:
         self.judged(self.rule, speed_limits, changes, now)
 
     def _crossed(self, change: LimitChange, now: Instant) -> None:
-        crossing = change.crossing
+        entry = change.entry
         if not change.began:
-            ended = self.decisions.end(crossing.decision_id, now)
+            ended = self.decisions.end(entry.decision_id, now)
             self._event_log.decisions(ended)
             return
-        self.protected_unseen += not crossing.in_sight
-        if crossing.zone.sighting is not None:
-            self.tracking.kept.keep_evidence(
-                crossing.zone.cause, crossing.zone.sighting
-            )
-        places = places_of(crossing, self.world)
-        begun = self.decisions.begin(crossing, self.rule, places)
+        self.protected_unseen += not entry.in_sight
+        if entry.zone.sighting is not None:
+            self.tracking.kept.keep_evidence(entry.zone.cause, entry.zone.sighting)
+        places = places_of(entry, self.world)
+        begun = self.decisions.begin(entry, self.rule, places)
         self._event_log.decisions([begun])
 
     def publish(self, now: Instant) -> None:
         """Publish feedback to the fleet (Algorithm 2, line 13)."""
         self._untold = False
         self._feedback_publisher.publish(self.speed_limits, self.rule, now)
+        self._obedience.published(self.speed_limits, now)
         self._event_log.decisions(self.decisions.published(now))
 
     # --- time ---------------------------------------------------------------------
@@ -305,9 +299,7 @@ class Evaluator:
         self._staleness.tick(now)
         self._log_returned_detectors(now)
         self.tracking.forget(now)
-        walkers = list(self.obstacles.walkers())
-        self.tracking.witness(walkers)
-        self.aged(walkers, now)
+        self.aged(now)
 
     def tick(self, now: Instant, more: Iterable[Condition] = ()) -> None:
         """Judge a world that has aged: limits, heartbeat, decisions, alerts."""
@@ -327,23 +319,24 @@ class Evaluator:
         returned.clear()
 
     def _conditions(self, now: Instant) -> Iterable[Condition]:
-        for decision in self.decisions.open:
-            yield from conditions.of_decision(decision)
         for robot in self.world.live_robots():
-            yield from conditions.of_robot(robot, now)
-            fault = self.obstacles.fault(robot.robot_id, now)
-            yield from conditions.of_laser(robot.robot_id, fault)
-            yield from conditions.of_detector(robot, now, started=self._started or now)
+            ignored = self._obedience.ignored(robot, now)
+            yield from alerts.of_ignored(robot.robot_id, ignored)
+            yield from alerts.of_robot(robot, now)
+            yield from alerts.of_detector(robot, now, started=self._started or now)
             yield from self._low.conditions(robot)
-            yield from conditions.of_kind(robot, now)
-        yield from conditions.of_fleet(self.world.live_robots(), now)
-        yield from conditions.of_overload(self.world.robots.values(), now)
-        yield from conditions.of_rule(self.rule)
-        yield from conditions.of_things(self.people.things.all)
+            yield from alerts.of_kind(robot, now)
+        yield from alerts.of_fleet(self.world.live_robots(), now)
+        yield from alerts.of_overload(self.world.robots.values(), now)
+        yield from alerts.of_other_authors(self.world.other_authors.speaking(now))
+        yield from alerts.of_rule(self.rule)
+        yield from alerts.of_things(self.people.things.known.values())
+        answers = self.world.word_answers.known.values()
+        yield from alerts.of_words(self.world.live_robots(), answers)
 
-    def _heard_s(self, crossing: Crossing) -> float:
-        robot = self.world.robot(crossing.robot_id)
-        return robot.heard_for_s(crossing.entered.mono)
+    def _heard_s(self, entry: ZoneEntry) -> float:
+        robot = self.world.robot(entry.robot_id)
+        return robot.heard_for_s(entry.entered.mono)
 
     def close_earlier(
         self,
@@ -374,9 +367,9 @@ class Evaluator:
 
     def _log_speed(self, report: SafetyReport, at: Instant) -> None:
         known = self.decisions, self.people, self.world, self.greenhouse
-        missing = self.missing(report.robot_id)
+        unmet = self.unmet(report.robot_id)
         self._event_log.write(
-            lambda: speed_line(report, evidence_of(report, *known), missing), at
+            lambda: speed_line(report, evidence_of(report, *known), unmet), at
         )
 
     def _log_speed_limit(
@@ -394,7 +387,3 @@ class Evaluator:
             after.decision_id,
         )
         self._log_speed(report, at)
-
-
-def _later(first: Instant | None, second: Instant) -> Instant:
-    return second if first is None or second.mono >= first.mono else first

@@ -10,8 +10,7 @@ from dataclasses import fields, replace
 from functools import wraps
 from typing import Concatenate, ParamSpec
 
-from iveg.domain.alerts.alert_book import BookedAlert
-from iveg.domain.alerts.stored import cleared_behind, write_alert
+from iveg.domain.alerts import BookedAlert, cleared_behind, write_alert
 from iveg.domain.decisions import SlowdownDecision
 from iveg.domain.events import LogEvent
 from iveg.domain.geometry import Box3D
@@ -201,7 +200,6 @@ class EventLog:
                 tries=command.tries,
                 reason=command.reason,
                 pressed_at=times.pressed,
-                drill=command.drill,
             )
         )
         if changed is not None:
@@ -262,7 +260,7 @@ class EventLog:
 
     @_guarded
     def rule(self, event: LogEvent, at: Instant) -> None:
-        """Log a new version of the rule; its rings change, too."""
+        """Log a new version of the rule; its zones change, too."""
         self.log(event, at)
         for topic in (topics.RULE, topics.PEOPLE):
             self.changed(topic.name)

@@ -4,10 +4,9 @@ from collections.abc import Callable, Iterable, Mapping
 
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import Feedback, FeedbackAlert, SpeedLimit
-from iveg.domain.geometry import Pose2D
-from iveg.domain.known import KnownPlace
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant, Origin
+from iveg.domain.parameters import sent_to_robots
 from iveg.domain.robot_state import RobotState
 from iveg.domain.stamps import format_stamp
 from iveg.domain.tracking.people import People
@@ -18,8 +17,6 @@ USED_HZ, BURST = 20.0, 8.0
 """Greatest mean rate of feedback that slows nobody, and size of a burst (1/s, 1)."""
 MOST_ALERTS = 256
 """A robot refuses feedback with more."""
-KnownNear = Callable[[str, Pose2D, Instant], tuple[KnownPlace, ...]]
-"""Robot, its pose, now → what is known to stand near it."""
 
 
 class FeedbackPublisher:
@@ -32,7 +29,6 @@ class FeedbackPublisher:
         other: When each robot's newest confident object of another class came.
         boot: Random, new at each start: identity of our feedback.
         backlog: How far Orion is behind (s); None where nobody knows.
-        known: Places near a robot where something static is known to stand.
     """
 
     def __init__(
@@ -43,7 +39,6 @@ class FeedbackPublisher:
         fleet: FleetPort,
         boot: str,
         backlog: Callable[[Instant], float | None] = lambda _: None,
-        known: KnownNear = lambda *_: (),
     ) -> None:
         self.published_at = float("-inf")
         self._world = world
@@ -52,7 +47,6 @@ class FeedbackPublisher:
         self._fleet = fleet
         self._boot = boot
         self._backlog = backlog
-        self._known = known
         self._seq = 0
         self._left = BURST
 
@@ -113,12 +107,12 @@ class FeedbackPublisher:
             seen,
             self._backlog(now),
             rule.foresight,
-            () if odometry is None else self._known(robot.robot_id, odometry.pose, now),
+            sent_to_robots(rule),
         )
 
     def _alerts(self, rule: DetectionRule, now: Instant) -> Iterable[FeedbackAlert]:
         for person in self._people.known.values():
-            for sighting, radius in self._people.rings(person, rule, now):
+            for sighting, radius in self._people.zone_radii(person, rule, now):
                 # What a recording saw long ago must not slow a robot of today.
                 if self._world.robots[sighting.observer].is_replay:
                     continue
@@ -129,7 +123,7 @@ class FeedbackPublisher:
                     person.class_,
                     sighting.class_id,
                     sighting.confidence,
-                    (*sighting.place, sighting.z),
+                    (sighting.x, sighting.y, sighting.z),
                     radius,
                     sighting.observer,
                     (sighting.vx, sighting.vy) if is_seen else None,

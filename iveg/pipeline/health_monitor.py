@@ -15,9 +15,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
-from iveg.domain.hops import Hop
 from iveg.domain.observations import Instant, Origin
-from iveg.domain.probe import SLOW_S, ProbeLag, lag_in_words, stopped_in_words
+from iveg.domain.probe import SLOW_S, Hop, ProbeLag, lag_in_words, stopped_in_words
 
 HopState = Literal["ok", "late", "down", "unknown"]
 Earlier = Literal["known", "reading", "unknown"]

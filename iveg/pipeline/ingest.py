@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 from iveg.domain.errors import UnknownRobotError
-from iveg.domain.kinds import KIND_OF
+from iveg.domain.kinds import KIND_OF, KINDS
 from iveg.domain.observations import (
     DetectionFrame,
     Observation,
@@ -28,6 +28,10 @@ from iveg.pipeline.waiting import wait_set
 _log = logging.getLogger(__name__)
 
 MAX_QUEUED = 2000
+_LINKED = tuple(kind.of for kind in KINDS if kind.speaks_alone)
+_GOES_ON = -1
+"""Below every count."""
+_MOST_BOOTS = 1000
 _MOST_LOGGED = 500
 """Kinds of rejections that are logged of one robot, or of all strangers together."""
 
@@ -40,7 +44,8 @@ class Ingest:
         rejected: Called once for each new kind of rejection, with source and reason.
         is_past: Whether a message is too old to be read.
         passed: Called with each copy of a message of the fleet, before it is queued.
-        is_revoked: Whether a robot is heard no more.
+        is_refused_robot: Whether a setting says that a robot is not heard.
+        misplaced: Name of the frame that odometry is in, if that is not its robot's.
     """
 
     def __init__(
@@ -49,9 +54,11 @@ class Ingest:
         rejected: Callable[[str, str], None] = lambda _source, _reason: None,
         is_past: Callable[[str, type[Observation], str, int], bool] = lambda *_: False,
         passed: Callable[[Received], None] = lambda _: None,
-        is_revoked: Callable[[str], bool] = lambda _: False,
+        is_refused_robot: Callable[[str], bool] = lambda _: False,
+        misplaced: Callable[[Observation], str | None] = lambda _: None,
     ) -> None:
-        self._is_revoked = is_revoked
+        self._is_refused_robot = is_refused_robot
+        self._misplaced = misplaced
         self._known = known
         self._passed = passed
         self._is_past = is_past
@@ -63,6 +70,8 @@ class Ingest:
         """Of what waits and was counted by its sender."""
         self._waiting: Counter[_Stream] = Counter()
         """How much waits, by robot and kind."""
+        self._first: dict[tuple[str, type[Observation], str | None], int] = {}
+        """By robot, kind and boot: the count of the first, until another came."""
         self._wake = asyncio.Event()
         self._named: set[tuple[str, str]] = set()
         self._logged: Counter[str | None] = Counter()
@@ -74,14 +83,21 @@ class Ingest:
         if robot_id and not self._known(robot_id):
             self.reject(robot_id, "unknown_robot", str(UnknownRobotError(robot_id)))
             return
-        if self._is_revoked(robot_id):
-            self.reject(robot_id, "revoked", "is heard no more")
+        if self._is_refused_robot(robot_id):
+            self.reject(robot_id, "refused_robot", "is not heard, by a setting")
+            return
+        if (frame := self._misplaced(received.observation)) is not None:
+            self.reject(robot_id, "unknown_frame", f"odometry: {frame}")
             return
         name = kind_of(received.observation).__name__
         # What we asked for is no message: it would hide that one was lost.
         way = "asked" if received.asked else received.transport
         self.counters[f"{way}.{name}"] += 1
-        if not isinstance(received.observation, RefusedFrame):
+        if received.alone:
+            self.counters[f"alone.{name}"] += 1
+            if not isinstance(received.observation, DetectionFrame):
+                return
+        elif not isinstance(received.observation, RefusedFrame):
             self._passed(received)
         if _is_twin_of_a_picture(received.observation):
             self.counters[f"{name}.duplicate"] += 1
@@ -94,6 +110,35 @@ class Ingest:
             self._identities.add(_identity(received.observation))
         self._waiting[stream] += 1
         self._wake.set()
+
+    def enqueue_copy(self, received: Received) -> None:
+        """Queue what FIWARE brought, from the second of a boot on.
+
+        An agent that starts is given what the broker kept, and tells nobody so: one
+        message is a claim, and two that count on are a link.  Boxes slow at once.
+        """
+        identity = _identity(received.observation)
+        is_alone = identity[1] in _LINKED and self._is_alone(*identity)
+        self.enqueue(replace(received, alone=True) if is_alone else received)
+
+    def _is_alone(
+        self,
+        robot_id: str,
+        kind: type[Observation],
+        boot: str | None,
+        seq: int | None,
+    ) -> bool:
+        """Whether it is the first of its boot, or that again."""
+        stream = robot_id, kind, None if seq is None else boot
+        first = self._first.get(stream)
+        if first is None:
+            if len(self._first) >= _MOST_BOOTS:
+                del self._first[next(iter(self._first))]
+            self._first[stream] = _GOES_ON if seq is None else seq
+            return True
+        if (seq or 0) > first:
+            self._first[stream] = _GOES_ON
+        return (seq or 0) <= first
 
     def is_past(
         self, robot_id: str, kind: type[Observation], boot: str, seq: int

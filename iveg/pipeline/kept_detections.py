@@ -35,7 +35,7 @@ class KeptDetections:
     """Chooses the detections that become rows.
 
     A look is remembered while it is the newest of a chain of sightings, because a robot
-    may enter the ring of a person seconds after they were seen.
+    may enter the zone of a person seconds after they were seen.
     """
 
     def __init__(self, event_log: EventLog) -> None:

@@ -3,8 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from iveg.domain.alerts.alert_book import BookedAlert
-from iveg.domain.alerts.flood import FLOOD_LIMIT, FLOOD_WINDOW_S, FloodState
+from iveg.domain.alerts import BookedAlert
 from iveg.domain.decisions import Decisions
 from iveg.domain.events import LogEvent, Slot
 from iveg.domain.feedback import FULL_SPEED
@@ -12,8 +11,8 @@ from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import SafetyReport
 from iveg.domain.robot_state import RobotState
-from iveg.domain.rule.crossings import Crossing
-from iveg.domain.rule.premises import Missing
+from iveg.domain.rule.clear import ClearCondition
+from iveg.domain.rule.zones import ZoneEntry
 from iveg.domain.tracking.people import People
 from iveg.domain.world import World
 
@@ -24,7 +23,7 @@ class SlowdownCauses:
 
     Attributes:
         decision_id: The decision that opens; None where the robot was ahead of ours.
-        radius_m: Of the ring that it came into, where it had grown: the cause was not
+        radius_m: Of the zone that it came into, where it had grown: the cause was not
             in view for ``unseen_s`` seconds.
     """
 
@@ -51,13 +50,11 @@ def evidence_of(
     A robot judges alerts by its own pose, too, and may be ahead of our decision; it
     then names the alert, and that person's data are the evidence.
     """
-    if report.reason not in ("person", "robot", "obstacle"):
+    if report.reason not in ("person", "robot"):
         return None
     decision = decisions.get(report.decision_id or "")
     if decision is not None:
-        return _of_crossing(decision.crossing)
-    if report.reason == "obstacle":
-        return None
+        return _of_entry(decision.entry)
     robot = world.robots[report.robot_id]
     found = _without_decision(report, robot, people, world, greenhouse)
     if found is None:
@@ -65,8 +62,7 @@ def evidence_of(
     ours = (
         one.decision_id
         for one in decisions.open
-        if (one.crossing.robot_id, one.crossing.zone.cause)
-        == (robot.robot_id, found.cause)
+        if (one.entry.robot_id, one.entry.zone.cause) == (robot.robot_id, found.cause)
     )
     return replace(found, decision_id=next(ours, None))
 
@@ -92,21 +88,21 @@ def _without_decision(
     return _seen_by(robot, greenhouse, name, "robot", pose.x, pose.y, name)
 
 
-def _of_crossing(crossing: Crossing) -> SlowdownCauses:
-    zone, sighting = crossing.zone, crossing.zone.sighting
+def _of_entry(entry: ZoneEntry) -> SlowdownCauses:
+    zone, sighting = entry.zone, entry.zone.sighting
     confidence = None
     if sighting is not None and not sighting.laser:
         confidence = sighting.confidence
-    unseen = None if sighting is None else sighting.age_s(crossing.entered)
+    unseen = None if sighting is None else sighting.age_s(entry.entered)
     grown = unseen is not None and unseen > LIMITS.growth_grace_s
     return SlowdownCauses(
         zone.cause,
         zone.reason,
         zone.observer,
-        crossing.entered_m,
-        crossing.in_sight,
+        entry.entered_m,
+        entry.in_sight,
         confidence,
-        crossing.decision_id,
+        entry.decision_id,
         zone.radius_m if grown else None,
         unseen if grown else None,
     )
@@ -131,22 +127,25 @@ def _seen_by(
     return SlowdownCauses(cause, class_, observer, distance_m, sees, confidence)
 
 
-def _first_of(missing: Iterable[Missing], report: SafetyReport) -> Missing | None:
-    """The premise whose lack a robot reports as its reason."""
+def _first_of(
+    unmet: Iterable[ClearCondition], report: SafetyReport
+) -> ClearCondition | None:
+    """The unmet condition that a robot reports as its reason."""
     reported = report.reason, report.cause
     return next(
-        (one for one in missing if (one.reason, one.robot_id) == reported), None
+        (one for one in unmet if (one.limit_reason, one.robot_id) == reported), None
     )
 
 
 def speed_line(
     report: SafetyReport,
     evidence: SlowdownCauses | None,
-    missing: Iterable[Missing] = (),
+    unmet: Iterable[ClearCondition] = (),
 ) -> LogEvent:
     """A robot applies another factor than before, and why.
 
-    ``missing``: what it lacks to be clear; an old pose reads like any old data.
+    ``unmet``: conditions of "clear" that do not hold; an old pose is like
+    any old data.
     """
     slots: dict[str, Slot] = {
         "robot": report.robot_id,
@@ -157,9 +156,9 @@ def speed_line(
     key = "log.speed_up"
     if report.speed_factor < FULL_SPEED:
         key = f"log.speed_down.{report.reason}"
-        lacks = _first_of(missing, report)
-        if lacks is not None and lacks.premise != "pose":
-            key = f"log.speed_down.{lacks.premise}"
+        lacks = _first_of(unmet, report)
+        if lacks is not None and lacks.reason != "pose":
+            key = f"log.speed_down.{lacks.reason}"
             slots["observer"] = lacks.robot_id
         if evidence is not None:
             if evidence.class_ == "person" and evidence.confidence is None:
@@ -184,19 +183,6 @@ def speed_line(
         None if evidence is None else evidence.class_,
         None if evidence is None else evidence.decision_id,
     )
-
-
-def flood_line(before: FloodState, after: FloodState) -> LogEvent | None:
-    """A flood of alerts began or ended; None for neither."""
-    if (before.since is None) == (after.since is None):
-        return None
-    key = "log.flood.over" if after.since is None else "log.flood.began"
-    slots: dict[str, Slot] = {
-        "count": after.count,
-        "minutes": FLOOD_WINDOW_S / 60,
-        "limit": FLOOD_LIMIT,
-    }
-    return LogEvent("alert", key, slots)
 
 
 def alert_line(alert: BookedAlert) -> LogEvent:

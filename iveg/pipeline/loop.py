@@ -9,6 +9,7 @@ from itertools import chain
 
 from iveg.domain.events import LogEvent
 from iveg.domain.kinds import kind
+from iveg.domain.motion import UNMOVED
 from iveg.domain.observations import (
     CommandAnswer,
     GoalAnswer,
@@ -25,32 +26,17 @@ from iveg.pipeline.event_log import EventLog
 from iveg.pipeline.health_monitor import HealthMonitor, HopHealth, HopState
 from iveg.pipeline.ingest import Ingest
 from iveg.pipeline.ports import Clock
-from iveg.pipeline.steps import Step
 from iveg.pipeline.supervision import Supervision
 
 TICK_S = 0.05
+"""Time passes, and the fleet is judged, at least so often (s)."""
+POSES_S = 0.02
+"""After poses alone the fleet is judged at most so often (s)."""
+URGENT_S = 0.01
+"""The same after a detection frame or a robot's obstacle (s)."""
+_EARLY_S = 0.001
 _ANSWERS = (CommandAnswer, GoalAnswer)
-APART_S = 0.0001
-"""Least time between two takings for each robot of the fleet: 2 ms with twenty."""
-JUDGED_APART_S = 10 * APART_S
-"""The same between two judgements: 2 ms with two robots, 10 ms with ten.
-
-A judgement costs as much for one message as for ten, and poses wait behind it.
-"""
-_LATEST_APART_S = JUDGED_APART_S + APART_S / 2
-_MOST_TAKINGS = 3
-"""What came meanwhile is taken before a judgement, too, but none waits for ever."""
 _HEALTH_PERIOD_S = 1.0
-_WORTH_S = 0.001
-"""A shorter wait costs more than it saves."""
-Recorded = tuple[Callable[[Instant, Step], None], Callable[[Instant], None]]
-"""Called with each step, and after each tick."""
-
-
-def reading_apart_s(robots: int) -> float:
-    """Least time between two readings of the broker (s): taken is what was read."""
-    apart_s = APART_S * robots
-    return apart_s if apart_s > _WORTH_S else 0.0
 
 
 class RuleLoop:
@@ -61,8 +47,6 @@ class RuleLoop:
         decided: Comfort that measures: called with what a judgement was made of.
         ticks: Comfort that lets time pass, called with each tick; all of it guarded.
         goals: Comfort, likewise: called with each new word on a goal; with each tick.
-        recorded: Comfort that writes down what was done: called with each step before
-            it is taken, and with its kind; and after each tick.
     """
 
     def __init__(
@@ -80,7 +64,6 @@ class RuleLoop:
             Callable[[GoalAnswer, Instant, TransportId], None],
             Callable[[Instant], None],
         ],
-        recorded: Recorded,
     ) -> None:
         self._ingest = ingest
         self._evaluator = evaluator
@@ -92,9 +75,7 @@ class RuleLoop:
         self._decided = decided
         self._goal_heard, tick_goals = goals
         self._ticks = (tick_goals, *ticks)
-        self._stepped, self._write_down = recorded
-        self._ticked = float("-inf")
-        self._is_aged = self._is_unwritten = False
+        self._ticked = self._judged = float("-inf")
         self._health_at = float("-inf")
         self._taken: list[Received] = []
         """Observations taken since the last judgement."""
@@ -102,100 +83,51 @@ class RuleLoop:
         self._broken: set[str] = set()
 
     async def run(self) -> None:
-        """Until cancelled."""
-        taken_at = judged_at = float("-inf")
-        robots = len(self._evaluator.world.robots)
+        """Until cancelled; the only loop."""
         while True:
-            waits_s = TICK_S
-            if self._evaluator.is_unjudged:
-                # The next taking judges; by itself only what none comes after.
-                waits_s = judged_at + _LATEST_APART_S * robots - self._clock().mono
-            await self._ingest.wait(max(0.0, waits_s))
-            # What comes close together is taken together.
-            early = taken_at + APART_S * robots - self._clock().mono
-            if early > _WORTH_S:
-                await asyncio.sleep(early)
+            await self._ingest.wait(max(0.0, self._due_at - self._clock().mono))
+            self.take(self._ingest.drain())
+            # Pages are sent what was taken before the fleet is judged by it.
+            await asyncio.sleep(0)
             now = self._clock()
-            if self._ingest.waiting:
-                taken_at = now.mono
-            judges = now.mono - judged_at >= JUDGED_APART_S * robots - _WORTH_S
-            ticks = self._ticks_at(now)
-            await self._take()
-            if ticks:
-                self.age(self._clock())
-                await self._take(late=True)
-            if judges or ticks:
-                judged_at = now.mono
-                # The past takes whatever came before a step, so this does, too.
-                self.advance(self._ingest.drain(), self._clock())
-                if self._is_unwritten:
-                    await self._take(late=True)
-                    # No message may be heard before this and taken after it.
-                    self.step(self._ingest.drain(), self._clock(), judges=False)
+            if now.mono >= self._due_at:
+                self.judge(now)
 
-    async def _take(self, *, late: bool = False) -> None:
-        """Take what waits, and let pages be shown it before anything else is done.
+    @property
+    def _due_at(self) -> float:
+        """When the fleet is judged next (monotonic, s)."""
+        ticks_at = self._ticked + TICK_S - _EARLY_S
+        if not self._evaluator.is_unjudged:
+            return ticks_at
+        apart_s = URGENT_S if self._evaluator.is_urgent else POSES_S
+        return min(ticks_at, self._judged + apart_s)
 
-        ``late``: after something long, of which readers may have waited for the end.
-        """
-        if late:
-            await asyncio.sleep(0)
-        for _ in range(_MOST_TAKINGS):
-            arrived = list(self._ingest.drain())
-            if not arrived:
-                return
-            self.advance(arrived, self._clock(), judges=False)
-            await asyncio.sleep(0)
+    def step(self, arrived: Iterable[Received], now: Instant) -> None:
+        """Take everything that arrived, and judge the fleet."""
+        self.take(arrived)
+        self.judge(now)
 
-    def step(
-        self, arrived: Iterable[Received], now: Instant, *, judges: bool = True
-    ) -> None:
-        """Advance, and write down what was done if time has passed since it was."""
-        self.advance(arrived, now, judges=judges)
-        if self._is_unwritten:
-            self._is_unwritten = False
-            self._write_down(now)
-
-    def advance(
-        self, arrived: Iterable[Received], now: Instant, *, judges: bool = True
-    ) -> None:
-        """Take everything that arrived.
-
-        ``judges``: and judge the fleet, and let time pass if it is due; else the next
-        step that judges does.
-        """
-        self._stepped(now, Step.JUDGED if judges else Step.TAKEN)
+    def take(self, arrived: Iterable[Received]) -> None:
+        """Take facts; the next judgement draws what follows from them."""
         for received in arrived:
             self._hear(received)
-        ticks = judges and (self._is_aged or self._ticks_at(now))
+
+    def judge(self, now: Instant) -> None:
+        """Judge the fleet once for all that was taken; let time pass if it is due."""
+        self._judged = now.mono
+        ticks = now.mono - self._ticked >= TICK_S - _EARLY_S
         if ticks:
+            self._ticked = now.mono
             self._tick(now)
-        elif judges:
+        else:
             self._evaluator.settle()
-        if self._taken and not self._evaluator.is_unjudged:
+        if self._taken:
             self._decided(self._taken, self._clock())
             self._taken.clear()
         if ticks:
             self._watch_chain(now)
             for tick in self._ticks:
                 tick(now)
-            self._is_unwritten = True
-
-    def age(self, now: Instant) -> None:
-        """Let the world grow older before the step that judges it.
-
-        By itself, so that what arrives meanwhile waits for one of the two.
-        """
-        self._stepped(now, Step.AGED)
-        self._grow_older(now)
-
-    def _grow_older(self, now: Instant) -> None:
-        # Ticks are counted from here, however long it takes.
-        self._ticked, self._is_aged = now.mono, True
-        self._evaluator.age(now)
-
-    def _ticks_at(self, now: Instant) -> bool:
-        return now.mono - self._ticked >= TICK_S - 1e-3
 
     def _hear(self, received: Received) -> None:
         fresh = self._apply(received)
@@ -212,9 +144,7 @@ class RuleLoop:
     def _tick(self, now: Instant) -> None:
         """Let time pass for what is vital; the fleet is judged with it."""
         self._commander.tick(now)
-        if not self._is_aged:
-            self._grow_older(now)
-        self._is_aged = False
+        self._evaluator.age(now)
         commanded = self._commander.conditions(now)
         supervised = self._supervision.conditions(now)
         self._evaluator.tick(now, chain(commanded, supervised))
@@ -225,8 +155,10 @@ class RuleLoop:
         if isinstance(observation, GoalAnswer):
             self._goal_heard(observation, received.at, received.transport)
         else:
-            age_s = self._evaluator.world.age_then(received)
-            self._commander.apply(received, age_s)
+            world = self._evaluator.world
+            robot = world.robots.get(observation.robot_id)
+            motion = UNMOVED if robot is None else robot.motion(received.at)
+            self._commander.apply(received, world.age_then(received), motion)
 
     def _apply(self, received: Received) -> bool:
         """Whether it became part of the state.

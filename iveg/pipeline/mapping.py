@@ -8,14 +8,18 @@ longest, and a fleet that sends more is drawn less often.
 import asyncio
 from collections.abc import Iterable
 
-from iveg.domain.costmap import InflatedGrid, Occupancy
+from iveg.domain.costmap import (
+    Grid,
+    InflatedGrid,
+    Occupancy,
+    Sweep,
+    sweep_of,
+    window_round,
+)
 from iveg.domain.geometry import Rectangle
-from iveg.domain.mapped_area import window_round
 from iveg.domain.observations import Instant, LaserScan, UnreadScan
-from iveg.domain.occupancy_grid import Grid
 from iveg.domain.robot_state import RobotState
 from iveg.domain.rule.zones import Zone
-from iveg.domain.sweeps import Sweep, sweep_of
 from iveg.domain.world import World
 from iveg.pipeline.ports import Clock
 from iveg.pipeline.scans import ScanReader

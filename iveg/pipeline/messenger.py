@@ -1,171 +1,139 @@
-"""Tells people outside iVeg of alerts: beside everything, in the way of nothing.
+"""Messages to people outside iVeg: beside everything, in the way of nothing.
 
-``enqueue_raised`` is called where alerts are raised and only fills a bounded queue;
-each channel has a task of its own that waits, sends, and rests::
-
-    raised ──> queue of the channel ──> everything that waits, as one message ──> rest
-                    ^                                  │ nobody was reached, twice more
-                    └──────────────────────────────────┘
-
-What fails is counted and shown, beside the alert and on the Settings page.
+``enqueue_raised`` is called where alerts are raised and only fills bounded queues.
+Each address has a task of its own, which sends what waits as one message and rests.
+What was not taken waits on: the message says since when.
 """
 
 import asyncio
-import contextlib
 import logging
-from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
+from collections import Counter, deque
+from collections.abc import Callable, Iterable, Sequence
+from typing import Final
 
-from iveg.domain.alerts.alert_book import BookedAlert
-from iveg.domain.contacts import Contacts
-from iveg.domain.errors import HopError
-from iveg.domain.events import LogEvent
-from iveg.domain.messages import (
-    CHANNELS,
-    AlertItem,
-    Channel,
-    MessageDelivery,
-    OutboundMessage,
-)
-from iveg.pipeline.alerting import Alerting
-from iveg.pipeline.event_log import EventLog
-from iveg.pipeline.ports import ChoiceStore, Clock, MessageSender
+from iveg.domain.alerts import BookedAlert
+from iveg.domain.events import Address, AlertItem, MessagePlan, MessageText
+from iveg.pipeline.ports import Clock, MessageSender
 
 _log = logging.getLogger(__name__)
 
-MOST_WAITING = 100
-"""Alerts that wait for one channel; the oldest gives way and is counted."""
-REST_S = 30.0
-"""Between two messages of one channel: a flood of alerts is two messages a minute."""
-TRIES = 3
-LIMIT_S = 15.0
-"""For one message to everybody of a channel, however slowly a server answers."""
+Write = Callable[[Sequence[AlertItem], bool], MessageText]
+
+MOST_WAITING: Final = 100
+"""Alerts that wait for one address; the oldest gives way and is counted."""
+REST_S: Final = 30.0
+"""Between two messages to one address: a flood of alerts is two messages a minute."""
+LIMIT_S: Final = 60.0
+"""A message that takes longer is told as failed, while its end is awaited."""
+_LOOK_S: Final = 5.0
+
+
+class _Line:
+    """What waits for one address."""
+
+    def __init__(self, address: Address) -> None:
+        self.address = address
+        self.items: deque[AlertItem] = deque(maxlen=MOST_WAITING)
+        self.filled = asyncio.Event()
 
 
 class Messenger:
-    """Sends alerts to people outside iVeg; holds recipients and pending messages.
+    """Sends alerts to the addresses of a plan.
+
+    Args:
+        waiting: Active alerts, and each P1 that nobody has acknowledged.
 
     Attributes:
-        contacts: Whom, as an operator wants it.
-        last: What came of the newest message of each channel.
-        counters: Sent, failed and dropped.
+        counters: Messages that were taken and not, alerts that were dropped.
     """
 
     def __init__(
         self,
-        contacts: Contacts,
-        store: ChoiceStore[Contacts],
-        senders: Mapping[Channel, MessageSender],
-        alerts: Alerting,
-        event_log: EventLog,
+        plan: MessagePlan,
+        sender: MessageSender,
+        write: Write,
+        waiting: Callable[[], Sequence[BookedAlert]],
         clock: Clock,
         rest_s: float = REST_S,
         limit_s: float = LIMIT_S,
     ) -> None:
-        self.contacts = contacts
-        self.last: dict[Channel, Sequence[MessageDelivery]] = {}
         self.counters: Counter[str] = Counter()
-        self._store = store
-        self._senders = senders
-        self._alerts = alerts
-        self._event_log = event_log
-        self._clock = clock
-        self._rest_s = rest_s
-        self._limit_s = limit_s
-        self._changing = asyncio.Lock()
-        self._waiting: dict[Channel, asyncio.Queue[AlertItem]] = {
-            name: asyncio.Queue(MOST_WAITING) for name in CHANNELS
-        }
+        self._lines = [_Line(one) for one in plan.addresses]
+        self._escalate_after_s = plan.escalate_after_s
+        self._sender, self._write = sender, write
+        self._waiting, self._clock = waiting, clock
+        self._rest_s, self._limit_s = rest_s, limit_s
+        self._since: dict[str, float] = {}
+        self._escalated: set[str] = set()
+        self._logged: set[tuple[str, str]] = set()
 
     def enqueue_raised(self, raised: Iterable[BookedAlert]) -> None:
-        """Queue alerts that were raised for every channel that wants them."""
+        """Queue alerts that were raised for every address that wants them."""
         for alert in raised:
-            last, key = alert.last, alert.condition.key
-            item = AlertItem(alert.alert_id, last.priority, key, last.raised)
-            for channel in CHANNELS:
-                if self.contacts.wants(channel, item.priority):
-                    self._wait(channel, item)
+            self._enqueue(AlertItem(alert.last.priority, alert.last.raised))
+
+    def escalate(self) -> None:
+        """Queue for the second list whatever nobody has acknowledged for too long."""
+        now = self._clock().mono
+        unseen = {one.alert_id: one for one in self._waiting() if one.unseen}
+        self._since = {name: self._since.get(name, now) for name in unseen}
+        self._escalated &= unseen.keys()
+        for name, since in self._since.items():
+            alert, is_late = unseen[name], now - since >= self._escalate_after_s
+            if is_late and name not in self._escalated and alert.unseen:
+                self._escalated.add(name)
+                self._enqueue(AlertItem(alert.unseen, alert.raised), escalates=True)
 
     async def run(self) -> None:
-        """Send for ever, each channel by itself."""
+        """Send for ever, to each address by itself."""
         async with asyncio.TaskGroup() as tasks:
-            for channel in CHANNELS:
-                tasks.create_task(self._serve(channel), name=f"message-{channel}")
+            for line in self._lines:
+                tasks.create_task(self._serve(line))
+            while True:
+                self.escalate()
+                await asyncio.sleep(_LOOK_S)
 
-    async def test(self, channel: Channel) -> Sequence[MessageDelivery]:
-        """Try a channel now, whether or not it is on."""
-        return await self._send(channel, OutboundMessage())
+    def _enqueue(self, item: AlertItem, *, escalates: bool = False) -> None:
+        for line in self._lines:
+            to = line.address
+            if to.escalates == escalates and item.priority <= to.least:
+                self.counters["messages.dropped"] += len(line.items) == MOST_WAITING
+                line.items.append(item)
+                line.filled.set()
 
-    async def change(
-        self, update: Callable[[Contacts], Contacts], channel: Channel, by: str
-    ) -> None:
-        """Tell others, or otherwise, from now on.
-
-        Raises:
-            HopError: it could not be written down; all stays as it was.
-        """
-        await self._change(update)
-        line = LogEvent("system", f"log.messages_changed.{channel}", {"by": by})
-        self._event_log.log(line, self._clock())
-
-    async def _change(self, update: Callable[[Contacts], Contacts]) -> None:
-        async with self._changing:
-            changed = update(self.contacts)
-            await self._store.save(changed)
-            self.contacts = changed
-
-    def _wait(self, channel: Channel, item: AlertItem) -> None:
-        waiting = self._waiting[channel]
-        if waiting.full():
-            waiting.get_nowait()
-            self.counters["messages.dropped"] += 1
-        waiting.put_nowait(item)
-
-    async def _serve(self, channel: Channel) -> None:
+    async def _serve(self, line: _Line) -> None:
         while True:
-            waiting = self._waiting[channel]
-            items = [await waiting.get()]
-            while not waiting.empty():
-                items.append(waiting.get_nowait())
-            try:
-                await self._deliver(channel, items)
-            except Exception:
-                # A message must never end what supervises robots.
-                _log.exception("what came of a message by %s is not known", channel)
+            await line.filled.wait()
+            items = list(line.items)
+            line.items.clear()
+            line.filled.clear()
+            if not await self._is_taken(line.address, items):
+                line.items.extendleft(reversed(items))
+                line.filled.set()
             await asyncio.sleep(self._rest_s)
 
-    async def _deliver(self, channel: Channel, items: Sequence[AlertItem]) -> None:
-        deliveries = await self._send(channel, OutboundMessage(tuple(items)))
-        for item in items:
-            self._alerts.record_deliveries(item.alert_id, item.raised, deliveries)
-        if deliveries and all(one.failed for one in deliveries):
-            for item in items:
-                if item.tries + 1 < TRIES:
-                    self._wait(channel, replace(item, tries=item.tries + 1))
+    async def _is_taken(self, to: Address, items: Sequence[AlertItem]) -> bool:
+        sending = asyncio.ensure_future(self._send(to, items))
+        done, _ = await asyncio.wait([sending], timeout=self._limit_s)
+        if not done:
+            self._failed(to, "no answer")
+        failed = await sending
+        if failed is not None:
+            self._failed(to, failed)
+            return False
+        self.counters["messages.sent"] += 1
+        self._logged = {one for one in self._logged if one[0] != to.name}
+        return True
 
-    async def _send(
-        self, channel: Channel, message: OutboundMessage
-    ) -> Sequence[MessageDelivery]:
-        now, sender = self._clock(), self._senders[channel]
+    async def _send(self, to: Address, items: Sequence[AlertItem]) -> str | None:
         try:
-            async with asyncio.timeout(self._limit_s):
-                deliveries = await sender.send(self.contacts, message, now)
-        except TimeoutError:
-            deliveries = [MessageDelivery(channel, "", now, "no_answer")]
-        except Exception:
-            _log.exception("a message by %s failed", channel)
-            deliveries = [MessageDelivery(channel, "", now, "internal")]
-        self.last[channel] = deliveries
-        for one in deliveries:
-            outcome = "failed" if one.failed else "sent"
-            self.counters[f"messages.{outcome}.{channel}"] += 1
-        await self._forget_gone(deliveries)
-        return deliveries
+            return await self._sender.send(to, self._write(items, to.escalates))
+        except Exception as error:
+            # Of the error nothing more: it may name the address.
+            return type(error).__name__
 
-    async def _forget_gone(self, deliveries: Sequence[MessageDelivery]) -> None:
-        """A browser that its push service no longer knows has left."""
-        gone = {one.device_id or "" for one in deliveries if one.failed == "gone"}
-        if gone:
-            with contextlib.suppress(HopError):
-                await self._change(lambda contacts: contacts.without(gone))
+    def _failed(self, to: Address, why: str) -> None:
+        self.counters["messages.failed"] += 1
+        if (to.name, why) not in self._logged:
+            self._logged.add((to.name, why))
+            _log.warning("messages to %s fail: %s", to.name, why)

@@ -7,13 +7,12 @@ from dataclasses import dataclass, field
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.equipment import Tile
 from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.latency import LatencyWatch
 from iveg.domain.observations import Instant
-from iveg.domain.stop.drills import Drills
 from iveg.domain.tracking.calibration import Calibrations
 from iveg.domain.tracking.people import People
 from iveg.domain.transports import Transport
 from iveg.domain.world import World
-from iveg.pipeline.backfill import Backfill
 from iveg.pipeline.command import Commander
 from iveg.pipeline.equipment import EquipmentMonitor
 from iveg.pipeline.evaluate import Evaluator
@@ -21,21 +20,15 @@ from iveg.pipeline.event_log import EventLog
 from iveg.pipeline.goals import GoalDispatcher
 from iveg.pipeline.health_monitor import HealthMonitor, HopState
 from iveg.pipeline.ingest import Ingest
-from iveg.pipeline.latency import LatencyMonitor
 from iveg.pipeline.loop import RuleLoop
-from iveg.pipeline.margins import MarginTotals
+from iveg.pipeline.margins import NewestMargins
 from iveg.pipeline.peer_scans import PeerScans
 from iveg.pipeline.ports import CommandPort, FleetPort, StopJournal
 from iveg.pipeline.publish import Hub
 from iveg.pipeline.record import RecordSink
 from iveg.pipeline.scans import ScanReader
-from iveg.pipeline.second_witness import SecondWitness
 from iveg.pipeline.shadow import ShadowRule
-from iveg.pipeline.slow_time import SlowTime
 from iveg.pipeline.supervision import Supervision
-from iveg.pipeline.trace import Trace
-
-Guard = Callable[[str, Callable[..., None]], Callable[..., None]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,8 +43,6 @@ class Ports:
         clock: Reads both clocks.
         new_id: A new id, sortable by time.
         history_state: State of the history.
-        ticked: Comfort that records: called with each tick.
-        trace: Comfort, too: told what the pipeline does and when.
     """
 
     fleet: FleetPort
@@ -61,8 +52,6 @@ class Ports:
     clock: Callable[[], Instant]
     new_id: Callable[[], str]
     history_state: Callable[[], HopState] = lambda: "ok"
-    ticked: Callable[[Instant], None] = lambda _: None
-    trace: Trace = field(default_factory=Trace)
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,14 +63,15 @@ class Choices:
         era: Ends the ids of people, which are unique across starts by it.
         tiles: Of other equipment.
         calibrations: How sure a look of a detector makes.
+        refused: Robots of the fleet that are not heard.
     """
 
     rule: DetectionRule = field(default_factory=DetectionRule)
-    drills: Drills = field(default_factory=Drills)
     boot: str = "iveg-boot"
     era: str = ""
     tiles: Sequence[Tile] = ()
     calibrations: Calibrations = field(default_factory=Calibrations)
+    refused: Sequence[str] = ()
 
     def people(self, greenhouse: Greenhouse) -> People:
         """Nobody known yet."""
@@ -96,31 +86,25 @@ class Pipeline:
     event_log: EventLog
     health_monitor: HealthMonitor
     world: World
-    latency: LatencyMonitor
+    latency: LatencyWatch
     ingest: Ingest
     evaluator: Evaluator
     commander: Commander
     loop: RuleLoop
     supervision: Supervision
-    margins: MarginTotals
-    slow_time: SlowTime
+    margins: NewestMargins
     scans: ScanReader
     goals: GoalDispatcher
     equipment: EquipmentMonitor
     peer_scans: PeerScans
-    second_witness: SecondWitness
-    backfill: Backfill
     shadow: ShadowRule
 
     def counters(self) -> Counter[str]:
         """Everything that is counted in it."""
         total = Counter(self.ingest.counters)
         total.update(self.world.counters)
-        total.update(self.backfill.counters)
         total.update(self.commander.counters)
         total.update(self.supervision.counters)
         total["live.browsers"] = self.hub.watchers
         total["nlos.protected"] = self.evaluator.protected_unseen
-        total.update({f"slow_s.{why}": n for why, n in self.slow_time.seconds.items()})
-        total.update({f"near_s.{how}": n for how, n in self.slow_time.near.items()})
         return total

@@ -3,14 +3,12 @@
 from collections.abc import Iterable, Sequence
 from typing import Literal, Protocol, TypeVar
 
-from iveg.domain.contacts import Contacts
 from iveg.domain.detection_rule import DetectionRule
+from iveg.domain.events import Address, MessageText
 from iveg.domain.feedback import Feedback
 from iveg.domain.goals import CancelOrder, GoalOrder
-from iveg.domain.messages import MessageDelivery, OutboundMessage
 from iveg.domain.observations import Instant
 from iveg.domain.peer_scan import PeerScan
-from iveg.domain.revocation import BrokerTold
 
 _Kept = TypeVar("_Kept", contravariant=True)
 
@@ -117,20 +115,11 @@ class ChoiceStore(Protocol[_Kept]):
         """Put it in the place of what was before; returns on disk. Raises HopError."""
 
 
-class BrokerAccess(Protocol):
-    """Who decides at the broker which robots come in."""
-
-    async def change(self, robot_id: str, *, admitted: bool) -> BrokerTold:
-        """Have a robot let in no more, or again. Raises HopError."""
-
-
 class MessageSender(Protocol):
-    """One channel to people who are not before a page."""
+    """Way to people who are not before a page."""
 
-    async def send(
-        self, contacts: Contacts, message: OutboundMessage, now: Instant
-    ) -> Sequence[MessageDelivery]:
-        """Send to each that the channel reaches; says of each what came of it."""
+    async def send(self, to: Address, text: MessageText) -> str | None:
+        """Why an address did not take a message; None where it did."""
 
 
 class Ids(Protocol):

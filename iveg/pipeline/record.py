@@ -1,14 +1,15 @@
 """Records on their way to the history, and which of them give way under pressure.
 
-Odometry is thinned before it is offered.  The queue is bounded, and its overflow is a
-decision: the oldest telemetry gives way and is counted, everything else stays.
+Odometry is thinned before it is offered.  The queue is bounded: the oldest telemetry
+gives way first, then the oldest of all but orders, and is counted.
 """
 
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from iveg.domain.records import OdometryRecord, Record, is_telemetry
+from iveg.domain.records import OdometryRecord, Record, is_order, is_telemetry
 
 CAPACITY = 20_000
 ODOMETRY_PERIOD_S = 0.5
@@ -67,56 +68,53 @@ class Waiting:
 
 
 class RecordQueue:
-    """A bounded queue in which telemetry alone gives way.
+    """A bounded queue in which all but orders give way, telemetry first.
 
-    Two lanes share one capacity, so that making room costs the same for the first and
-    for the twenty-thousandth record.
+    Three lanes share one capacity, so that making room costs the same for the first
+    and for the twenty-thousandth record.
     """
 
     def __init__(self, capacity: int = CAPACITY) -> None:
         self._capacity = capacity
+        self._orders: deque[Waiting] = deque()
         self._kept: deque[Waiting] = deque()
         self._telemetry: deque[Waiting] = deque()
+        self._lanes = (self._orders, self._kept, self._telemetry)
         self.dropped = 0
-        """Telemetry that gave way."""
+        """Records that gave way."""
 
     def __len__(self) -> int:
-        return len(self._kept) + len(self._telemetry)
+        return sum(map(len, self._lanes))
 
     def enqueue(self, waiting: Waiting) -> None:
-        """Append a record; a full queue lets go of its oldest telemetry.
-
-        A queue full of records that may not be dropped grows: losing one of those is
-        worse than the few hundred bytes that it takes.
-        """
-        lane = self._telemetry if is_telemetry(waiting.record) else self._kept
-        lane.append(waiting)
+        """Append a record; a full queue lets go of its oldest."""
+        self._lane(waiting).append(waiting)
         self._make_room()
 
     def dequeue(self, most: int) -> list[Waiting]:
-        """Remove the next records, those that may not be lost first."""
-        batch = self.dequeue_kept(most)
-        while self._telemetry and len(batch) < most:
-            batch.append(self._telemetry.popleft())
+        """Remove the next records: orders first, telemetry last."""
+        batch: list[Waiting] = []
+        for lane in self._lanes:
+            while lane and len(batch) < most:
+                batch.append(lane.popleft())
         return batch
 
-    def dequeue_kept(self, most: int) -> list[Waiting]:
-        """Remove only records that may not be lost."""
-        return [self._kept.popleft() for _ in range(min(most, len(self._kept)))]
-
-    def put_back(self, batch: list[Waiting]) -> None:
+    def put_back(self, batch: Sequence[Waiting]) -> None:
         """Return what was taken and could not be stored, to where it stood."""
         for waiting in reversed(batch):
-            lane = self._telemetry if is_telemetry(waiting.record) else self._kept
-            lane.appendleft(waiting)
+            self._lane(waiting).appendleft(waiting)
         self._make_room()
 
     def oldest_since(self) -> float | None:
         """When the record that has waited longest was offered; None when empty."""
-        heads = [lane[0].since for lane in (self._kept, self._telemetry) if lane]
-        return min(heads, default=None)
+        return min((lane[0].since for lane in self._lanes if lane), default=None)
+
+    def _lane(self, waiting: Waiting) -> deque[Waiting]:
+        if is_order(waiting.record):
+            return self._orders
+        return self._telemetry if is_telemetry(waiting.record) else self._kept
 
     def _make_room(self) -> None:
-        while len(self) > self._capacity and self._telemetry:
-            self._telemetry.popleft()
+        while len(self) > self._capacity and (self._telemetry or self._kept):
+            (self._telemetry or self._kept).popleft()
             self.dropped += 1

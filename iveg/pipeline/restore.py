@@ -9,8 +9,7 @@ import asyncio
 from collections.abc import Sequence
 from typing import Protocol
 
-from iveg.domain.alerts.alert_book import MOST_KEPT
-from iveg.domain.alerts.stored import read_alert
+from iveg.domain.alerts import MOST_KEPT, read_alert
 from iveg.domain.errors import HopError
 from iveg.domain.records import (
     AlertRecord,
@@ -45,9 +44,6 @@ class History(Protocol):
     async def unseen_alerts(self, most: int) -> Sequence[AlertRecord]:
         """The newest P1s that nobody acknowledged."""
 
-    async def last_drills(self) -> dict[str, float]:
-        """Robot → its last drill (Unix s)."""
-
     async def newest_lines(self, most: int) -> Sequence[LogRecord]:
         """The newest lines of the log."""
 
@@ -68,7 +64,6 @@ async def remember(
             decisions = await history.open_decisions()
             alerted = await history.open_alerts()
             unseen = await history.unseen_alerts(MOST_KEPT)
-            drilled = await history.last_drills()
             lines = await history.newest_lines(LINES)
         except HopError:
             await asyncio.sleep(_AGAIN_S)
@@ -76,7 +71,6 @@ async def remember(
         now = read_clock()
         commander.close_earlier(left_open, now)
         goals.close_earlier(left_open, now)
-        commander.drills.remember(drilled)
         evaluator.close_earlier(decisions, alerted, now)
         evaluator.alerts.remember(read_alert(one, now) for one in unseen)
         event_log.recall(lines)

@@ -1,13 +1,14 @@
 """Changes of the rule: a new version, on disk first, in force at once, logged."""
 
 import asyncio
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import OutdatedError
 from iveg.domain.events import LogEvent, Slot
 from iveg.domain.observations import Instant
+from iveg.domain.parameters import CLASSES, PARAMETERS, for_class
 from iveg.pipeline.evaluate import Evaluator
 from iveg.pipeline.event_log import EventLog
 from iveg.pipeline.ports import RuleStore
@@ -67,17 +68,26 @@ class Rules:
             await self._store.append(rule)
             self._evaluator.rule = rule
             self.versions.append(rule)
-        self._event_log.rule(_line(before, rule), at)
+        for line in _lines(before, rule):
+            self._event_log.rule(line, at)
         return rule
 
 
-def _line(before: DetectionRule, rule: DetectionRule) -> LogEvent:
-    slots: dict[str, Slot] = {
-        "by": rule.author,
-        "version": rule.version,
-        "threshold": rule.threshold,
-        "radius": rule.radius_m,
-        "threshold_before": before.threshold,
-        "radius_before": before.radius_m,
-    }
-    return LogEvent("system", "log.rule_changed", slots)
+def _lines(before: DetectionRule, rule: DetectionRule) -> Iterator[LogEvent]:
+    """The change, then each value of a class that is another now."""
+    slots: dict[str, Slot] = {"by": rule.author, "version": rule.version}
+    yield LogEvent("system", "log.rule_changed", slots)
+    for class_ in CLASSES:
+        earlier = for_class(before, class_)
+        for row in PARAMETERS:
+            value = for_class(rule, class_)[row.name]
+            one_for_all = row.class_key is None and class_ != CLASSES[0]
+            if value == earlier[row.name] or one_for_all:
+                continue
+            changed: dict[str, Slot] = {
+                "parameter": row.word,
+                "class": "every" if row.class_key is None else class_,
+                "from": float(earlier[row.name]),
+                "to": float(value),
+            }
+            yield LogEvent("system", f"log.rule.{row.unit}", changed)

@@ -34,16 +34,6 @@ class ScanReader:
             known = self._read[robot.robot_id] = scan, self._of(scan)
         return known[1]
 
-    def as_read(self, scan: UnreadScan) -> LaserScan | None:
-        """The very scan that others were given; who has none yet changes nothing."""
-        unread, known = self._read.get(scan.robot_id, (None, None))
-        if unread is scan:
-            return known
-        try:
-            return scan.read()
-        except UnreadableError:
-            return None
-
     def undrawable(self, robot_id: str, error: Exception) -> None:
         """Refuse a scan that was read and cannot be drawn."""
         self.reject(robot_id, "undrawable_scan", repr(error))

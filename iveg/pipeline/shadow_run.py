@@ -1,4 +1,4 @@
-"""One trial of a rule as it runs, with people and crossings of its own."""
+"""One trial of a rule as it runs, with people and entries of its own."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -7,13 +7,12 @@ from typing import Final
 
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.greenhouse import Greenhouse
-from iveg.domain.observations import DetectionFrame, Instant
-from iveg.domain.rule.crossings import LimitChange
-from iveg.domain.rule.obstacles import Walkers
-from iveg.domain.rule.speed_limits import SpeedLimits
+from iveg.domain.observations import DetectionFrame, Instant, SafetyReport
+from iveg.domain.rule.judge import SpeedLimits
 from iveg.domain.rule.trial import Account, Limits, Trial
+from iveg.domain.rule.zones import LimitChange
 from iveg.domain.tracking.people import People
-from iveg.domain.tracking.sight import AllClear
+from iveg.domain.tracking.sight import Look, OwnSight
 from iveg.domain.world import World
 
 _SETTLES_S: Final = 2.0
@@ -21,7 +20,7 @@ _SETTLES_S: Final = 2.0
 
 
 class ShadowRun:
-    """One trial, with people and crossings of its own."""
+    """One trial, with people and entries of its own."""
 
     def __init__(
         self,
@@ -30,27 +29,30 @@ class ShadowRun:
         trial: Trial,
         people: People,
         limits: SpeedLimits,
-        all_clear: AllClear,
         now: Instant,
     ) -> None:
         self.account = Account(trial)
-        self._world, self._greenhouse = world, greenhouse
+        self._world, self._own_sight = world, OwnSight(greenhouse)
         self._trial, self._rule = trial, trial.rule
-        self._people, self._limits, self._all_clear = people, limits, all_clear
+        self._people, self._limits = people, limits
         self._counts_from = now.mono + _SETTLES_S
         self._ids = count()
 
-    def looked(self, frame: DetectionFrame, seen_at: Instant) -> None:
-        """A picture of some robot."""
-        self._people.sight(frame, self._world, self._rule, seen_at, self._new_id())
+    def looked(self, frame: DetectionFrame, seen_at: Instant, at: Instant) -> None:
+        """A picture of some robot, and when it came."""
+        known, robot = self._people, self._world.robot(frame.robot_id)
+        answered = self._world.word_answers.persons(frame.detector or frame.robot_id)
+        rule = self._rule.also_naming(answered)
+        placed = known.sight(frame, self._world, rule, seen_at, self._new_id())
+        self._own_sight.take(Look.of_frame(robot, frame, placed, at), known)
 
-    def aged(self, walkers: Iterable[Walkers], now: Instant) -> None:
-        """A tick: people age, and lasers see who walks."""
-        self._all_clear.sweep(self._people, self._world, self._greenhouse, now)
+    def witnessed(self, report: SafetyReport, at: Instant) -> None:
+        """What some robot's laser sees walk."""
+        self._people.witness(report, at, self._new_id())
+
+    def aged(self, now: Instant) -> None:
+        """A tick: people age."""
         self._people.forget(now)
-        for robot_id, at, spots in walkers:
-            robot = self._world.robot(robot_id)
-            self._people.witness(robot, spots, at, self._new_id())
 
     def judged(
         self,
@@ -78,7 +80,7 @@ class ShadowRun:
         """What concerns robots of today."""
         live = {robot.robot_id for robot in self._world.live_robots()}
         of_live = {name: one for name, one in limits.items() if name in live}
-        return of_live, [one for one in changes if one.crossing.robot_id in live]
+        return of_live, [one for one in changes if one.entry.robot_id in live]
 
     def _new_id(self) -> str:
         return f"shadow-{next(self._ids)}"

@@ -6,7 +6,6 @@ from iveg.domain.observations import Instant
 from iveg.domain.robot_state import Link, RobotState
 from iveg.domain.tracking.people import People
 from iveg.domain.tracking.person import TrackedPerson
-from iveg.domain.tracking.sight import AllClear
 from iveg.domain.world import World
 from iveg.pipeline import topics
 from iveg.pipeline.event_log import EventLog
@@ -28,13 +27,11 @@ class Staleness:
         people: People,
         greenhouse: Greenhouse,
         event_log: EventLog,
-        all_clear: AllClear,
     ) -> None:
         self._world = world
         self._people = people
         self._greenhouse = greenhouse
         self._event_log = event_log
-        self._all_clear = all_clear
         self._links: dict[str, Link] = {}
         self._stages: dict[str, str] = {}
 
@@ -45,11 +42,8 @@ class Staleness:
         people = self._people
         for person in people.known.values():
             self._log_stage(person, now)
-        empty = self._all_clear.sweep(people, self._world, self._greenhouse, now)
-        for person in empty:
-            self._log_clear(person, now)
         for thing in people.things.end(now):
-            self._event_log.log(thing_line("over", thing, thing.by), now)
+            self._event_log.log(thing_line("log.thing_over", thing, thing.by), now)
             self._event_log.changed(topics.PEOPLE.name)
         for person in people.forget(now):
             self._stages.pop(person.person_id, None)
@@ -91,18 +85,4 @@ class Staleness:
         }
         self._event_log.log(
             LogEvent("detection", key, slots, newest.observer, person.class_), now
-        )
-
-    def _log_clear(self, person: TrackedPerson, now: Instant) -> None:
-        self._event_log.changed(topics.PEOPLE.name)
-        newest = person.newest
-        if person.sightings or person.stage(now) == "seen":
-            return
-        slots: dict[str, Slot] = {
-            "person": person.person_id,
-            "lane": self._greenhouse.lane_at(newest.x, newest.y) or "",
-        }
-        self._event_log.log(
-            LogEvent("detection", "log.person_cleared", slots, None, person.class_),
-            now,
         )

@@ -16,7 +16,7 @@ from functools import wraps
 from itertools import chain
 from typing import ParamSpec
 
-from iveg.domain.alerts.conditions import SHOWN_S
+from iveg.domain.alerts import SHOWN_S
 from iveg.domain.events import Condition, Slot
 from iveg.domain.observations import Instant
 from iveg.pipeline.ports import Clock

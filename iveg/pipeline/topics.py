@@ -13,16 +13,12 @@ from typing import Any, Literal, Protocol
 from iveg.domain.observations import Instant
 from iveg.domain.records import LogRecord
 from iveg.domain.stop import FollowedCommand as StopCommand
-from iveg.models.alert import Alert, Flood
-from iveg.models.climate import Climate
+from iveg.models.alert import Alert, LogEntry
+from iveg.models.base import GreenhouseMap, Scan
 from iveg.models.command import Command
-from iveg.models.detection import DetectionFrame
-from iveg.models.equipment import Tile
+from iveg.models.equipment import Climate, Tile
 from iveg.models.health import Health
-from iveg.models.log_entry import LogEntry
-from iveg.models.mapped import Scan
-from iveg.models.people import Person
-from iveg.models.places import GreenhouseMap
+from iveg.models.people import DetectionFrame, Person
 from iveg.models.robot import Robot
 from iveg.models.rule import Rule
 
@@ -50,9 +46,6 @@ class StateReader(Protocol):
 
     def alerts(self) -> list[Alert]:
         """All alerts that people should see now."""
-
-    def flood(self) -> Flood:
-        """How fast alerts come."""
 
     def log(self, lines: Iterable[LogRecord]) -> list[LogEntry]:
         """Lines of the log."""
@@ -139,12 +132,6 @@ ALERTS = Topic(
     member="alerts",
     read=lambda reader, _: reader.alerts(),
 )
-FLOOD = Topic(
-    "flood",
-    Flood,
-    member="flood",
-    read=lambda reader, _: reader.flood(),
-)
 RULE = Topic(
     "rule",
     Rule,
@@ -193,7 +180,6 @@ TOPICS = (
     DETECTIONS,
     COMMAND,
     ALERTS,
-    FLOOD,
     RULE,
     MAP,
     LOG,

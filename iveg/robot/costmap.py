@@ -1,32 +1,144 @@
-"""The fleet's picture on the robot: what peers' lasers and iVeg's feedback tell.
-
-The paper's shared costmap.  What a peer's laser met and bodies of people and peers are
-lethal, rings about them dear; what nobody speaks of is unknown, and becomes so again.
-The robot's own laser is left out: its navigation has that first-hand, and here it would
-only come late.
-"""
+"""Neighbours of a robot, and the fleet's picture for its navigation."""
 
 import logging
 import math
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from iveg.domain.costmap import UNKNOWN, InflatedGrid, Occupancy, inflate
+from iveg.domain.costmap import (
+    UNKNOWN,
+    Grid,
+    InflatedGrid,
+    Occupancy,
+    inflate,
+    sweep_of,
+    window_round,
+)
 from iveg.domain.errors import UnreadableError
 from iveg.domain.feedback import Feedback
 from iveg.domain.geometry import Pose2D, Rectangle
-from iveg.domain.mapped_area import window_round
+from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Origin
-from iveg.domain.occupancy_grid import Grid
+from iveg.domain.parameters import Class
 from iveg.domain.peer_scan import OLDEST_S, PeerScan
-from iveg.domain.sweeps import sweep_of
 from iveg.domain.witness import Outline
 from iveg.ngsi.codec import read_peer_scan
-from iveg.robot.neighbours import Neighbour
+
+# --- neighbours -------------------------------------------------------------------
+#
+# People and robots nearby, as reported by peers.
+
+SILENT_S = LIMITS.feedback_stand_s
+"""Age from which feedback gives no positions (s)."""
+PERSON_M, PEER_M = 0.35, 0.75
+_MYSELF_M = 1.0
+_MOST = 256
+
+
+@dataclass(frozen=True, slots=True)
+class Neighbour:
+    """A person or robot in ``map`` (m).
+
+    Attributes:
+        kind: ``person`` or ``robot``.
+        radius: Radius of the body (m).
+        zone_m: Radius of the rule (m).
+    """
+
+    kind: str
+    name: str
+    x: float
+    y: float
+    radius: float
+    zone_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Heard:
+    """Newest feedback of a topic.
+
+    Attributes:
+        at: When it came (monotonic, s).
+        posed: When its pose was news: a peer that is gone keeps the stamp of its last.
+    """
+
+    feedback: Feedback
+    at: float
+    posed: float
+
+
+class Neighbours:
+    """Newest feedback of each topic; times are monotonic seconds.
+
+    Args:
+        robot_id: This robot, which is left out.
+    """
+
+    def __init__(self, robot_id: str) -> None:
+        self._me = robot_id
+        self._heard: dict[tuple[str, str | None], _Heard] = {}
+
+    def note(self, peer: str, feedback: Feedback, now: float) -> None:
+        """Store the content of ``/{peer}/mqtt_feedback``, of each author apart."""
+        key = peer, feedback.origin.boot
+        before, stamp = self._heard.get(key), feedback.pose_stamp
+        is_old = before is not None and stamp and before.feedback.pose_stamp == stamp
+        posed = before.posed if before is not None and is_old else now
+        self._heard[key] = _Heard(feedback, now, posed)
+        while len(self._heard) > _MOST:
+            del self._heard[next(iter(self._heard))]
+
+    def present(self, own: Pose2D | None, now: float) -> list[Neighbour]:
+        """All but this robot; one reported on two topics is listed once.
+
+        A peer whose pose stays the same message for ``ring_lasts_s`` is left out:
+        nobody knows any more where it is, or that it is there at all.
+        """
+        live = [one for one in self._heard.values() if now - one.at <= SILENT_S]
+        found: dict[object, Neighbour] = {}
+        for heard in live:
+            feedback = heard.feedback
+            for one in self._people(feedback, own):
+                found[one.kind, round(one.x, 1), round(one.y, 1)] = one
+            peer = feedback.pose if now - heard.posed <= LIMITS.ring_lasts_s else None
+            if feedback.robot_id != self._me and peer is not None:
+                name = feedback.robot_id
+                zone_m = _radius_of(feedback, "robot")
+                found[name] = Neighbour("robot", name, peer.x, peer.y, PEER_M, zone_m)
+        return list(found.values())[:_MOST]
+
+    def _people(self, feedback: Feedback, own: Pose2D | None) -> Iterator[Neighbour]:
+        for alert in feedback.alerts:
+            if alert.position is None or alert.class_ is None:
+                continue
+            x, y, _ = alert.position
+            near = own is not None and own.distance_to(x, y) <= _MYSELF_M
+            if alert.class_ == "robot" and (alert.class_id == self._me or near):
+                continue
+            radius = PERSON_M if alert.class_ == "person" else PEER_M
+            name = alert.class_id or alert.class_
+            zone_m = alert.radius_m or _radius_of(feedback, alert.class_)
+            yield Neighbour(alert.class_, name, x, y, radius, zone_m)
+
+
+def _radius_of(feedback: Feedback, class_: Class) -> float:
+    """Radius of the rule for a fresh zone of this class (m)."""
+    return feedback.rule.get("radius_m", {}).get(class_, LIMITS.ring_default_m)
+
+
+# --- costmap ----------------------------------------------------------------------
+#
+# The fleet's picture on the robot: what peers' lasers and iVeg's feedback tell.
+#
+# The paper's shared costmap. What a peer's laser met and bodies of people and peers are
+# lethal, zones about them dear; what nobody speaks of is unknown, and becomes so again.
+# The robot's own laser is left out: its navigation has that first-hand, and here it
+# would only come late.
 
 _log = logging.getLogger(__name__)
 HALF_LIFE_S = 5.0
@@ -37,7 +149,7 @@ _TAKEN = 18
 _WIDEST_M = 1000.0
 """Longer than any greenhouse: an open field, mapped in a window."""
 _BESIDE_M = 0.5
-"""What a peer met so near to this robot is this robot."""
+"""A peer's laser point so near to this robot is this robot (m)."""
 _MOST_PEERS = 64
 
 
@@ -162,8 +274,8 @@ def _is_open(area: Rectangle) -> bool:
 
 
 def _lay(cost: NDArray[np.int8], grid: Grid, one: Neighbour) -> None:
-    """Lay a body, which is lethal, and its ring over the costs."""
-    inflate(cost, grid, one.x, one.y, one.ring)
+    """Lay a body, which is lethal, and its zone over the costs."""
+    inflate(cost, grid, one.x, one.y, one.zone_m)
     cells = grid.window(one.x, one.y, one.radius + grid.resolution)
     dx, dy = grid.offsets(cells, one.x, one.y)
     # A cell that the edge of the body runs through is taken, too.

@@ -1,12 +1,184 @@
-"""The gate before the drive: upstream commands, capped, ramped or replaced by zero.
-
-After a resume upstream must request zero for half a second, so that a command issued
-during the hold cannot jerk the robot (neutral interlock, docs/safety.md).
-"""
+"""Speed caps of a robot, its own foresight, and the gate before the drive."""
 
 import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
 
-from iveg.domain.geometry import REST, Twist2D
+from iveg.domain.feedback import FULL_SPEED, HALF_SPEED
+from iveg.domain.geometry import REST, Pose2D, Twist2D
+from iveg.domain.limits import LIMITS
+from iveg.domain.rule.paths import (
+    EVERY_S,
+    HOLDS_S,
+    HORIZON_S,
+    MOVES_M_S,
+    PLAN_LASTS_S,
+    MovingZones,
+    Plan,
+    path_ahead,
+    slows_within_s,
+    sped_up,
+)
+
+# --- caps -------------------------------------------------------------------------
+#
+# Speed caps of a robot: the lowest applies, at once when lower, delayed when higher.
+#
+# Factors are 0, 0.5 or 1 and are never multiplied (docs/safety.md): two overlapping
+# zones still halve the speed. A raw cap that falls applies immediately; one that rises
+# must stay up for one second first, and a lower cap within that second counts. A cap
+# that is told to be over, and is lifted by itself a second later, waits for no second
+# one.
+
+_REASONS = (
+    *("clear", "unsupervised", "stale", "doubt", "watchdog"),
+    *("obstacle", "robot", "person"),
+)
+"""Reasons of a cap in a report; at equal factors the later one is reported."""
+
+
+@dataclass(frozen=True, slots=True)
+class Cap:
+    """One reason not to drive faster than ``factor``.
+
+    Attributes:
+        waits: Whether it is lifted a second after it is heard no more; else its reason
+            has ended, and that second is counted while it is still heard.
+    """
+
+    factor: float
+    reason: str
+    cause: str | None = None
+    decision_id: str | None = None
+    waits: bool = field(default=True, compare=False)
+
+    def _order(self) -> tuple[float, int, bool, bool]:
+        reason = -_REASONS.index(self.reason)
+        return self.factor, reason, self.cause is None, self.decision_id is None
+
+
+FREE = Cap(FULL_SPEED, "clear")
+
+
+def quantised(factor: float) -> float:
+    """Largest allowed factor that is not above the given one."""
+    if factor >= FULL_SPEED:
+        return FULL_SPEED
+    return HALF_SPEED if factor >= HALF_SPEED else 0.0
+
+
+def known_reason(reason: str) -> str:
+    """Reason that a report may carry; an unknown one is reported as ``stale``."""
+    return reason if reason in _REASONS and reason != "clear" else "stale"
+
+
+def lowest(caps: Iterable[Cap]) -> Cap:
+    """The effective cap: lowest factor; if equal, people, then robots, then silence."""
+    asked = [cap for cap in caps if cap is not FREE]
+    return min((*asked, FREE), key=Cap._order) if asked else FREE
+
+
+@dataclass(frozen=True, slots=True)
+class AppliedCap:
+    """The cap in force and a pending higher one.
+
+    Attributes:
+        waiting: Lowest raw cap since ``since``, all above ``cap``; None: no change.
+    """
+
+    cap: Cap
+    waiting: Cap | None = None
+    since: float = 0.0
+
+    def settle(self, raw: Cap, now: float) -> "AppliedCap":
+        """Apply the present raw cap: a lower one at once, a higher one after 1.0 s."""
+        if raw is self.cap and self.waiting is None:
+            return self
+        if raw.factor <= self.cap.factor:
+            return AppliedCap(raw)
+        if self.waiting is None:
+            return AppliedCap(self.cap, raw, now)
+        waiting = lowest((self.waiting, raw))
+        if now - self.since < LIMITS.release_after_s:
+            return AppliedCap(self.cap, waiting, self.since)
+        return AppliedCap(waiting).settle(raw, now)
+
+
+# --- lookahead --------------------------------------------------------------------
+#
+# Foresight on the robot itself, by its own odometry and plan: it needs no network.
+#
+# The same arithmetic as the server's (``iveg.domain.rule.paths``), for the people and
+# peers that feedback told; it only adds a cap (docs/safety.md, "Foresight").
+
+Ahead = tuple[tuple[float, ...], Cap]
+"""A zone as ``MovingZones`` has it, and the cap that it asks for inside."""
+
+
+class Lookahead:
+    """Foresight of one robot.
+
+    Args:
+        braking: What its brakes can do (m/s²).
+    """
+
+    def __init__(self, braking: float) -> None:
+        self._braking = braking
+        self._plan: Plan | None = None
+        self._plan_at = self._at = -math.inf
+        self._caps: tuple[Cap, ...] = ()
+        self._speed_before = 0.0
+
+    def note_path(self, path: Plan, now: float) -> None:
+        """Note the robot's own plan (monotonic, s); one that is no number is none."""
+        is_read = all(math.isfinite(one) for point in path for one in point)
+        self._plan, self._plan_at = path if is_read else None, now
+
+    def is_due(self, now: float) -> bool:
+        """Whether the last look is old (monotonic, s)."""
+        return not 0.0 <= now - self._at < EVERY_S
+
+    def look(
+        self, pose: Pose2D, twist: Twist2D, ahead: Sequence[Ahead], now: float
+    ) -> None:
+        """Find the zones that it is about to reach, to be slow there."""
+        self._at = now
+        if abs(twist.linear_x) < MOVES_M_S or not ahead:
+            self._caps = ()
+            return
+        plan = self._plan if now - self._plan_at <= PLAN_LASTS_S else None
+        zones, speed = MovingZones([row for row, _ in ahead]), abs(twist.linear_x)
+        self._speed_before = max(self._speed_before, speed) if self._caps else speed
+
+        def met(speed: float, within_s: float) -> set[Cap]:
+            """Caps of the zones that it reaches so soon at this speed (m/s)."""
+            _, meetings = zones.met_by(path_ahead(pose, sped_up(twist, speed), plan))
+            return {ahead[one.zone][1] for one in meetings if one.in_s <= within_s}
+
+        due, held = met(speed, slows_within_s(self._braking, speed)), set[Cap]()
+        if self._caps:
+            # What lies ahead again at the speed of before is no reason to speed up.
+            held = met(speed, HOLDS_S) | met(self._speed_before, HORIZON_S)
+        self._caps = tuple(
+            cap for _, cap in ahead if cap in due or (cap in held and cap in self._caps)
+        )
+
+    def forget(self) -> None:
+        """Drop what was foreseen: nobody knows where the robot is."""
+        self._caps, self._at = (), -math.inf
+
+    @property
+    def cap(self) -> Cap:
+        """Half speed for whom it is about to reach."""
+        return lowest(self._caps)
+
+
+# --- gate -------------------------------------------------------------------------
+#
+# The gate before the drive: upstream commands, capped, ramped or replaced by zero.
+#
+# After a resume upstream must request zero for half a second, so that a command issued
+# during the hold cannot jerk the robot (neutral interlock, docs/safety.md).
 
 NEUTRAL_S = 0.5
 TWIST_VALID_S = 0.5

@@ -11,11 +11,16 @@ and every hold makes the robot forget it.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
+from pydantic import Field, ValidationError
+
+from iveg.domain.errors import UnreadableError
 from iveg.domain.geometry import Pose2D
-from iveg.domain.goals import CancelOrder, Goal, GoalOrder
+from iveg.domain.goals import CancelOrder, Goal, GoalKind, GoalOrder
 from iveg.domain.observations import GoalAnswer, Origin
+from iveg.ngsi import names, payloads
+from iveg.ngsi.codec import load_json
 
 Navigate = Callable[[Goal | None], bool]
 """Takes a goal, or None to give it up; whether it knows a way there."""
@@ -26,7 +31,7 @@ _REMEMBERED = 64
 
 @dataclass(frozen=True, slots=True)
 class Facts:
-    """What the robot knows of itself at this moment.
+    """The robot's knowledge of itself at this moment.
 
     Attributes:
         runs: It may drive: no hold, and resumed.
@@ -129,3 +134,49 @@ class RobotGoals:
 
     def _answer(self, goal_id: str, result: str, why: str | None = None) -> GoalAnswer:
         return GoalAnswer(self._id, Origin(), goal_id, result, why)
+
+
+# --- goal orders ------------------------------------------------------------------
+#
+# Messages about goals, as robots receive them.
+
+
+class _Named(payloads.Wire, extra="forbid"):
+    id: Annotated[payloads.Text, Field(min_length=1)]
+
+
+class _Set(_Named):
+    kind: GoalKind
+    x: payloads.Metres
+    y: payloads.Metres
+    ch: Annotated[str, Field(min_length=1)]
+    until: float
+
+
+class _Value(payloads.Wire, extra="forbid"):
+    set: _Set | None = None
+    cancel: _Named | None = None
+
+
+def read_goal(payload: bytes) -> GoalOrder | CancelOrder | None:
+    """Read a message of ``/{apikey}/{robot}/cmd`` that is about a goal.
+
+    Returns:
+        None for anything else, and for whatever might be a STOP.
+    """
+    if b"stop" in payload.lower():
+        return None
+    try:
+        message = load_json(payload)
+        if not isinstance(message, dict) or message.keys() != {names.GOAL}:
+            return None
+        value = _Value.model_validate(message[names.GOAL])
+    except (UnreadableError, ValidationError):
+        return None
+    if value.cancel is not None and value.set is None:
+        return CancelOrder(value.cancel.id)
+    if value.set is None or value.cancel is not None:
+        return None
+    order = value.set
+    goal = Goal(order.id, order.kind, order.x, order.y)
+    return GoalOrder(goal, order.ch, order.until)

@@ -1,17 +1,28 @@
-"""The set of holds that keeps a robot from moving, and the ids already released.
-
-A robot drives only with an empty set. Every hold has an id; a release must name the ids
-that it lifts, and a released id never holds again (docs/safety.md).
-"""
+"""The holds that keep a robot from moving, and their file."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from pathlib import Path
 
+import orjson
+from pydantic import Field, ValidationError
+
+from iveg.adapters.files import write_bytes
+from iveg.domain.errors import UnreadableError
 from iveg.domain.observations import Hold
+from iveg.ngsi.codec import fields, load_json
+from iveg.ngsi.payloads import HoldValue, Wire
+
+# --- holds ------------------------------------------------------------------------
+#
+# The set of holds that keeps a robot from moving, and the ids already released.
+#
+# A robot drives only with an empty set. Every hold has an id; a release must name the
+# ids that it lifts, and a released id never holds again (docs/safety.md).
 
 RELEASED_KEPT = 64
 MAX_HOLDS = 48
-"""Of the 64 that a report may carry; the others are reserved for local holds."""
+"""A report may carry 64; the others are reserved for local holds."""
 
 _SURVIVES_REBOOT = frozenset({"iveg", "hw", "bumper"})
 
@@ -84,3 +95,41 @@ class HoldSet:
         """The set that a new start inherits: STOPs and local holds, no boot hold."""
         kept = tuple(hold for hold in self.holds if hold.source in _SURVIVES_REBOOT)
         return replace(self, holds=kept)
+
+
+# --- hold file --------------------------------------------------------------------
+#
+# The robot's hold set on disk, written atomically.
+#
+# The file is written under another name, flushed and renamed, so a loss of power leaves
+# the old set or the new one.  An unreadable file is not treated as an empty set.
+
+
+class _StoredHolds(Wire):
+    """The file; those of older versions lack ``joined``."""
+
+    holds: list[HoldValue]
+    released: list[str]
+    joined: list[str] = Field(default_factory=list)
+
+
+def read_holds(file: Path) -> HoldSet | None:
+    """The stored set; an empty one before the first start; None when unreadable."""
+    try:
+        stored = _StoredHolds.model_validate(load_json(file.read_bytes()))
+    except FileNotFoundError:
+        return HoldSet()
+    except (OSError, UnreadableError, ValidationError):
+        return None
+    holds = fields.read_holds(stored.holds)
+    return HoldSet(holds, tuple(stored.released), tuple(stored.joined))
+
+
+def write_holds(file: Path, holds: HoldSet) -> None:
+    """Store the set; on return it survives a loss of power.
+
+    Raises:
+        OSError: the disk refused; the file is as it was.
+    """
+    file.parent.mkdir(parents=True, exist_ok=True)
+    write_bytes(file, orjson.dumps(holds))

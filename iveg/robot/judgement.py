@@ -13,13 +13,11 @@ from iveg.domain.feedback import HALF_SPEED, Feedback
 from iveg.domain.fleet import CAUTIOUS
 from iveg.domain.geometry import REST, Pose2D, Twist2D
 from iveg.domain.limits import LIMITS
-from iveg.domain.observations import LaserScan
-from iveg.domain.witness import KnownBody, Outline, Plan, Witness
-from iveg.robot.caps import FREE, AppliedCap, Cap, lowest
-from iveg.robot.known_here import KnownHere
-from iveg.robot.lookahead import Lookahead
-from iveg.robot.peer_feedback import PeerFeedback
-from iveg.robot.watchdog import Watchdog
+from iveg.domain.motion import MotionTrack
+from iveg.domain.observations import LaserScan, ReportedObstacle
+from iveg.domain.witness import Outline, Plan, Witness
+from iveg.robot.feedback import Authors, Watchdog
+from iveg.robot.gate import FREE, AppliedCap, Cap, Lookahead, lowest
 
 OnLinkLoss = Literal["stop", "slow"]
 
@@ -54,7 +52,7 @@ DEFAULT_LIMITS = Limits()
 
 
 @dataclass(frozen=True, slots=True)
-class Motion:
+class Placed:
     """Newest odometry; ``at`` monotonic (s); ``pose`` None: not in ``map``."""
 
     pose: Pose2D | None
@@ -74,15 +72,15 @@ class Judgement:
     def __init__(self, robot_id: str, boot_at: float, limits: Limits) -> None:
         self._id = robot_id
         self._limits = limits
-        self._peer_feedback = PeerFeedback(robot_id)
-        self._motion: Motion | None = None
+        self.authors = Authors(robot_id, limits.slow_s)
+        self._motion: Placed | None = None
+        self._track = MotionTrack()
         self._witness = Witness(limits.outline, limits.plan)
         self._lookahead = Lookahead(limits.braking)
         self._waited = AppliedCap(Cap(0.0, "watchdog"))
         self.cap = self._waited.cap
         """In force since the last ``settle``."""
         self.watchdog = Watchdog(boot_at, limits.slow_s)
-        self._known_here = KnownHere(robot_id)
         self.local = FREE
         """Cap requested by the robot's own software, independent of iVeg."""
 
@@ -91,7 +89,7 @@ class Judgement:
         """The measured twist, however old; zero before the first."""
         return REST if self._motion is None else self._motion.twist
 
-    def motion(self, now: float) -> Motion | None:
+    def motion(self, now: float) -> Placed | None:
         """Newest odometry; None when it is older than 0.5 s."""
         motion = self._motion
         if motion is None or now - motion.at > LIMITS.pose_stand_s:
@@ -99,14 +97,8 @@ class Judgement:
         return motion
 
     def stands(self, now: float) -> bool:
-        """Whether fresh odometry shows the robot at rest."""
-        motion = self.motion(now)
-        if motion is None:
-            return False
-        return (
-            abs(motion.twist.linear_x) < LIMITS.standing_speed
-            and abs(motion.twist.angular_z) < LIMITS.standing_speed
-        )
+        """Whether fresh odometry shows the robot at rest, in its pose and its twist."""
+        return self.motion(now) is not None and not self._track.motion.moves
 
     def note_odometry(self, pose: Pose2D | None, twist: Twist2D, now: float) -> None:
         """Note odometry; one with a number that is not finite is ignored.
@@ -116,31 +108,39 @@ class Judgement:
         """
         place = () if pose is None else (pose.x, pose.y, pose.yaw)
         if all(map(math.isfinite, (*place, twist.linear_x, twist.angular_z))):
-            self._motion = Motion(pose, twist, now)
+            self._motion = Placed(pose, twist, now)
+            self._track.note_odometry(pose, twist, now)
 
     def note_feedback(self, topic: str, feedback: Feedback, now: float) -> None:
         """Note a message of ``/{topic}/mqtt_feedback``."""
-        if self._peer_feedback.apply(topic, feedback, self._own(now), now):
-            self.watchdog.heard(feedback.seen.get(self._id), now)
-            self._known_here.note(topic, feedback)
+        seen = feedback.seen.get(self._id)
+        seen_at = self.watchdog.sent_at(seen)
+        if self.authors.apply(topic, feedback, self._own(now), seen_at, now):
+            self.watchdog.heard(seen, now)
 
     def note_scan(self, scan: LaserScan, now: float) -> None:
         """Note what the laser sees; nothing of it without a young pose."""
         motion = self.motion(now)
         if motion is not None and motion.pose is not None:
-            peers = map(KnownBody.of_peer, self._peer_feedback.peers(now))
-            known = self._known_here.places(self.watchdog.age(now))
-            self._witness.look(scan, motion.pose, motion.twist, peers, now, known)
+            known = self.authors.peers(now)
+            self._witness.look(scan, motion.pose, motion.twist, known, now)
 
     def note_path(self, path: Sequence[tuple[float, float]], now: float) -> None:
         """Note where the robot's own navigation will drive, in ``map`` (m)."""
         self._lookahead.note_path(path, now)
 
+    def obstacle(self, now: float) -> ReportedObstacle | None:
+        """Obstacles of the laser that nothing explains, whoever walks first."""
+        seen = self._witness.obstacle(now)
+        if seen is None:
+            return None
+        return ReportedObstacle(seen.x, seen.y, seen.size_m, seen.is_somebody)
+
     def settle(self, now: float) -> None:
         """Evaluate this moment."""
         self.watchdog.tick(now)
         slowed = self.cap.reason in ("person", "robot")
-        peer_caps = [*self._peer_feedback.caps(self._own(now), slowed, now)]
+        peer_caps = [*self.authors.caps(self._own(now), slowed, now)]
         raw = lowest(
             (
                 self.local,
@@ -173,16 +173,16 @@ class Judgement:
         )
 
     def _obstacle_cap(self, now: float) -> Cap:
-        seen = self._witness.obstacle(now)
-        return FREE if seen is None else Cap(HALF_SPEED, "obstacle")
+        return FREE if self.obstacle(now) is None else Cap(HALF_SPEED, "obstacle")
 
     def _foreseen_cap(self, now: float) -> Cap:
         motion = self.motion(now)
         if motion is None or motion.pose is None:
             self._lookahead.forget()
         elif self._lookahead.is_due(now):
-            ahead = list(self._peer_feedback.ahead(now))
-            self._lookahead.look(motion.pose, motion.twist, ahead, now)
+            ahead = list(self.authors.ahead(now))
+            goes_on = self._track.motion.ahead(motion.pose, motion.twist)
+            self._lookahead.look(*goes_on, ahead, now)
         return self._lookahead.cap
 
     def _silence_cap(self, now: float) -> Cap:

@@ -1,21 +1,18 @@
-"""Safety software of one robot: executes the effects of the safety machine.
-
-It is the only publisher to the drive.  Effects are executed where they arise, the zero
-command first; disk and broker have a queue of their own and are never waited for.
-"""
+"""One robot: its settings, its periods, and the node between machine and broker."""
 
 import asyncio
+import itertools
 import logging
 import math
 import secrets
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Literal
 
 from iveg.adapters import clock
-from iveg.adapters.mqtt import MqttLink
+from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.domain.errors import UnreadableError
 from iveg.domain.feedback import Feedback
 from iveg.domain.fleet import RobotProfile
@@ -24,6 +21,7 @@ from iveg.domain.goals import Goal
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import (
     CommandAnswer,
+    FeedbackRef,
     GoalAnswer,
     Hold,
     Instant,
@@ -35,21 +33,83 @@ from iveg.domain.observations import (
     SafetyReport,
     Unplaced,
 )
-from iveg.domain.witness import Outline
+from iveg.domain.witness import Outline, Plan
 from iveg.ngsi import names
 from iveg.ngsi.codec import read_feedback
-from iveg.robot.caps import FREE, Cap
-from iveg.robot.echo import Echo
-from iveg.robot.effects import Drive, Effect, Persist, Report, SendAnswer
-from iveg.robot.goal_orders import read_goal
-from iveg.robot.goals import Facts, Navigate, RobotGoals
-from iveg.robot.hold_file import read_holds, write_holds
-from iveg.robot.judgement import Limits
-from iveg.robot.keepsake import Keepsake
-from iveg.robot.lane import SafetyLane
-from iveg.robot.node_settings import NodeSettings
+from iveg.robot.gate import FREE, Cap
+from iveg.robot.goals import Facts, Navigate, RobotGoals, read_goal
+from iveg.robot.holds import read_holds, write_holds
+from iveg.robot.judgement import Limits, OnLinkLoss
+from iveg.robot.orders import Drive, Effect, Persist, Report, SendAnswer
 from iveg.robot.safety import SafetyMachine, State
-from iveg.robot.uplink import Uplink
+from iveg.robot.uplink import Form, SafetyLane, Uplink
+
+# --- pacing -----------------------------------------------------------------------
+#
+# Periodic calls.
+
+SLOTS = 3
+"""A robot's period has one each for drive and odometry, laser, camera."""
+LONGEST_STEP_S = 0.1
+"""Longest time step (s), so that a suspended machine moves no robot by a jump."""
+
+
+async def every(period: float, work: Callable[[float], None]) -> None:
+    """Call ``work`` with the time since its last call, once a period (s), for ever.
+
+    A call more than a period late moves the later ones: missed calls are not repeated.
+    """
+    last = due = clock.mono()
+    while True:
+        now = clock.mono()
+        work(now - last)
+        last = now
+        due = max(due + period, now)
+        await asyncio.sleep(max(0.0, due - clock.mono()))
+
+
+async def in_slots(period: float, work: Sequence[Callable[[float], None]]) -> None:
+    """Call each of ``work`` once a period (s), evenly spaced, for ever."""
+    slots = itertools.cycle(work)
+    await every(period / len(work), lambda dt: next(slots)(dt))
+
+
+# --- node settings ----------------------------------------------------------------
+#
+# Settings that the safety nodes of a run share.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NodeSettings:
+    """Settings shared by the safety nodes of a run.
+
+    Attributes:
+        address: The broker.
+        apikey: First part of the measure topics.
+        directory: Where the holds of each robot survive a loss of power.
+        slow_s: Feedback older than this halves the speed (s).
+        stand_s: Feedback older than this stops the robot (s).
+        on_link_loss: ``slow``: it goes on at half speed instead.
+        uplink: One message a topic, or Algorithm 1's single payload.
+        plan: What stands in the greenhouse; None: nobody drew it.
+    """
+
+    address: BrokerAddress
+    apikey: str
+    directory: Path
+    slow_s: float = LIMITS.feedback_slow_s
+    stand_s: float = LIMITS.feedback_stand_s
+    on_link_loss: OnLinkLoss = "stop"
+    uplink: Form = "per-topic"
+    plan: Plan | None = None
+
+
+# --- node -------------------------------------------------------------------------
+#
+# Safety software of one robot: executes the effects of the safety machine.
+#
+# It is the only publisher to the drive. Effects are executed where they arise, the zero
+# command first; disk and broker have a queue of their own and are never waited for.
 
 _log = logging.getLogger(__name__)
 _GATE_EVERY_S = 0.04
@@ -87,12 +147,13 @@ class RobotNode:
         on_feedback: Callable[[str, Feedback], None] | None = None,
         navigate: Navigate | None = None,
         read_clock: Callable[[], Instant] = clock.now,
+        open_link: Callable[[BrokerAddress, str], MqttLink] = MqttLink,
     ) -> None:
         self._read_clock = read_clock
         self.boot = secrets.token_hex(4)
         self._id, self._drive = robot_id, drive
         self._started = self._read_clock().mono
-        self._echo, self._on_feedback_read = Echo(), on_feedback
+        self._on_feedback_read = on_feedback
         self._faults: tuple[RobotFault, ...] = ()
         self._on_peer_scan: Callable[[str, bytes], None] | None = None
         self._is_replay = replay is not None
@@ -100,18 +161,14 @@ class RobotNode:
         self._loop: asyncio.AbstractEventLoop | None = None
         self._commanded: tuple[Twist2D, float] = REST, 0.0
         self._goals = RobotGoals(robot_id, navigate)
-        self._placed: tuple[Pose2D | None, Twist2D, float] = None, REST, 0.0
-        """Newest pose and twist, and when they came (monotonic, s)."""
+        self._placed: tuple[Pose2D | None, float] = None, 0.0
+        """Newest pose, and when it came (monotonic, s)."""
         self._broken: asyncio.Future[None] | None = None
         self._next_tick: asyncio.TimerHandle | None = None
         self._command_topic = names.command_topic(settings.apikey, robot_id)
         self._desired_topic = names.DESIRED_TOPIC.format(robot_id=robot_id)
-        self._link = MqttLink(
-            settings.address,
-            f"robot {robot_id}",
-            self._subscriptions(),
-            self._on_message,
-        )
+        self._link = open_link(settings.address, f"robot {robot_id}")
+        self._attach(self._subscriptions())
         hold_file = settings.directory / f"{robot_id}.holds.json"
         self._lane = SafetyLane(
             partial(write_holds, hold_file), partial(self._link.publish, qos=1)
@@ -128,7 +185,6 @@ class RobotNode:
             profile.braking,
         )
         self._machine = self._new_machine(hold_file, limits)
-        self._keepsake = Keepsake(robot_id, self.boot, is_on=not self._is_replay)
         self._heard_at = -math.inf
 
     def _new_uplink(self, settings: NodeSettings, replay: str | None) -> Uplink:
@@ -139,9 +195,15 @@ class RobotNode:
             self._link.enqueue,
             form=settings.uplink,
             first_report=1 + secrets.randbelow(2**31),
-            echo=self._echo if replay is None else None,
+            echoes=self._echoes if replay is None else None,
             replay=replay,
         )
+
+    def _echoes(self) -> tuple[FeedbackRef, ...]:
+        return self._machine.authors.echoes(self._read_clock().mono)
+
+    def _attach(self, topics: dict[str, int]) -> None:
+        self._link.attach(topics, self._on_message, on_stored=self._on_stored)
 
     def _subscriptions(self) -> dict[str, int]:
         own = self._command_topic, self._desired_topic
@@ -200,7 +262,7 @@ class RobotNode:
 
     async def run(self) -> None:
         """Run until cancelled; the drive is left at rest."""
-        self._nobody_there, publish = False, self._link.publish
+        self._nobody_there = False
         try:
             async with asyncio.TaskGroup() as tasks:
                 for name, work in (
@@ -208,10 +270,6 @@ class RobotNode:
                     ("link", self._link.run()),
                     ("keep", self._lane.keep_forever()),
                     ("send", self._lane.send_forever()),
-                    (
-                        "backfill",
-                        self._keepsake.send_forever(self._late_batch, publish),
-                    ),
                 ):
                     tasks.create_task(work, name=f"robot-{self._id}-{name}")
         finally:
@@ -226,7 +284,7 @@ class RobotNode:
         mono = now.mono
         for one in observations:
             if isinstance(one, Odometry):
-                self._placed = one.pose, one.twist, mono
+                self._placed = one.pose, mono
                 self._perform(self._machine.odometry(one.pose, one.twist, mono), mono)
             elif isinstance(one, LaserScan) and not self._is_replay:
                 self._perform(self._machine.scan(one, mono), mono)
@@ -234,18 +292,10 @@ class RobotNode:
                 self._machine.note_path(one.path, mono)
             elif isinstance(one, Unplaced) and one.twist is not None:
                 self._perform(self._machine.odometry(None, one.twist, mono), mono)
-        own = self._own(now)
-        for one in observations:
-            self._keepsake.keep(one, own)
-            if self._link.connected:
+        if self._link.connected:
+            own = self._own(now)
+            for one in observations:
                 self._uplink.send(one, own)
-
-    def _late_batch(self) -> bytes | None:
-        """What was kept and may be sent now: never before what is live."""
-        now, is_free = self._read_clock(), not self._link.offered
-        silent_s = now.mono - self._heard_at if self._link.connected else math.inf
-        batch = self._keepsake.next_batch(self._own(now), self.holds, silent_s)
-        return batch if is_free else None
 
     def request_twist(self, twist: Twist2D) -> None:
         """Take upstream navigation's ``cmd_vel``; it expires after 0.5 s."""
@@ -266,8 +316,7 @@ class RobotNode:
     def hear_peer_scans(self, on_scan: Callable[[str, bytes], None]) -> None:
         """Hand on scans of peers as they come, by topic; call it before ``run``."""
         self._on_peer_scan = on_scan
-        topics = {**self._subscriptions(), names.PEER_SCAN_FILTER: 0}
-        self._link.attach(topics, self._on_message)
+        self._attach({**self._subscriptions(), names.PEER_SCAN_FILTER: 0})
 
     def ask_for_peer_scans(self, wanted: bool) -> None:
         """Have the next reports ask iVeg for scans of peers, or no longer."""
@@ -324,16 +373,20 @@ class RobotNode:
         else:
             self._on_feedback(topic, payload, now)
 
+    def _on_stored(self, topic: str, payload: bytes) -> None:
+        """Take orders that the broker retained; feedback of the past is none."""
+        if topic in (self._command_topic, self._desired_topic):
+            self._on_message(topic, payload)
+
     def _on_feedback(self, topic: str, payload: bytes, now: float) -> None:
         try:
             feedback = read_feedback(payload)
         except UnreadableError:
             return  # Counts as no feedback: the watchdog does the rest.
-        self._echo.note(feedback.origin)
         self._heard_at = now
-        self._uplink.rates.note_backlog(feedback.backlog_s, now)
         peer = topic.removeprefix("/").partition("/")[0]
         self._perform(self._machine.feedback(peer, feedback, now), now)
+        self._uplink.rates.note_backlog(self._machine.authors.backlog_s(), now)
         if self._on_feedback_read is not None:
             self._on_feedback_read(peer, feedback)
 
@@ -354,13 +407,13 @@ class RobotNode:
             self._tell_goal(self._goals.settle(self._facts(now)))
 
     def _facts(self, now: float) -> Facts:
-        pose, twist, at = self._placed
+        pose, at = self._placed
         return Facts(
             self._machine.state(now) == "RUNNING",
             self._machine.challenge,
             now - self._started,
             pose if now - at <= LIMITS.pose_stand_s else None,
-            max(abs(twist.linear_x), abs(twist.angular_z)) < LIMITS.standing_speed,
+            self._machine.stands(now),
         )
 
     def _tell_goal(self, answers: list[GoalAnswer]) -> None:
@@ -389,7 +442,6 @@ class RobotNode:
         now, wish = self._read_clock(), self._asks_for_scans
         report = replace(report, faults=self._faults, peer_scans=wish)
         own = self._own(now)
-        self._keepsake.keep(report, own)
         seq, messages = self._uplink.report(report, own, is_measure=is_measure)
         self._machine.reported(seq, now.mono)
         for message in messages:

@@ -1,17 +1,23 @@
-"""Orders from a robot's ``cmd`` topic: tolerant towards STOP, strict elsewhere.
+"""Orders to the safety machine, the effects that it asks for, and its answers."""
 
-Any payload that mentions a STOP is one; a release or resume must match the contract
-exactly, or it is refused with a reason (docs/safety.md).
-"""
-
-from dataclasses import dataclass
-from typing import Annotated
+from dataclasses import dataclass, field
+from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, ValidationError
 
 from iveg.domain.errors import UnreadableError
-from iveg.ngsi import names, payloads, texts
+from iveg.domain.geometry import Twist2D
+from iveg.domain.observations import CommandAnswer, SafetyReport
+from iveg.ngsi import names, payloads
 from iveg.ngsi.codec import load_json
+from iveg.robot.holds import HoldSet
+
+# --- orders -----------------------------------------------------------------------
+#
+# Orders from a robot's ``cmd`` topic: tolerant towards STOP, strict elsewhere.
+#
+# Any payload that mentions a STOP is one; a release or resume must match the contract
+# exactly, or it is refused with a reason (docs/safety.md).
 
 _STOP = "stop"
 _MAX_NAMED = 128
@@ -122,9 +128,9 @@ def _member(value: object, name: str) -> object:
 
 
 def _usable_id(value: object) -> str | None:
-    if not isinstance(value, str) or not value or texts.FORBIDDEN & set(value):
+    if not isinstance(value, str) or not value or payloads.FORBIDDEN & set(value):
         return None
-    return value if texts.clean_text(value) == value else None
+    return value if payloads.clean_text(value) == value else None
 
 
 def _release_or_resume(message: object) -> Order:
@@ -136,3 +142,80 @@ def _release_or_resume(message: object) -> Order:
         return _STRICT[name].model_validate(asked)
     except (KeyError, ValidationError):
         return Unusable("malformed")
+
+
+# --- effects ----------------------------------------------------------------------
+#
+# Effects that the safety machine requests, as frozen values in the order of execution.
+#
+# The zero command comes first, then the hold set on disk, then the answer, then the
+# report.
+
+AnswerCode = Literal["LATCHED", "RELEASED", "RESUMED", "REFUSED"]
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """Send this command to the drive at once."""
+
+    twist: Twist2D
+
+
+@dataclass(frozen=True, slots=True)
+class Persist:
+    """Store this hold set so that it survives a loss of power."""
+
+    holds: HoldSet
+
+
+@dataclass(frozen=True, slots=True)
+class SendAnswer:
+    """Answer a command on ``cmdexe``; the uplink fills in the origin."""
+
+    answer: CommandAnswer
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """Publish a safety report; the uplink fills in the origin and returns its ``seq``.
+
+    Attributes:
+        is_measure: Also for the IoT Agent, which gets changes and two a second.
+    """
+
+    report: SafetyReport
+    is_measure: bool = True
+
+
+Effect = Drive | Persist | SendAnswer | Report
+
+
+# --- verdicts ---------------------------------------------------------------------
+#
+# Answers of a robot to each attempt of a release or resume.
+#
+# Every copy of an order gets the answer of the first, even when the robot's state has
+# changed: a refused order stays refused.
+
+ATTEMPTS_KEPT = 64
+"""The challenge of one that is forgotten is spent, so no copy of it can succeed."""
+
+Verdict = tuple[str | None, AnswerCode, str | None]
+"""On a release or resume: the hold that the answer names, and why it was refused."""
+
+
+@dataclass(slots=True)
+class Verdicts:
+    """By attempt, oldest first."""
+
+    _of: dict[str, Verdict] = field(default_factory=dict)
+
+    def on(self, attempt: str) -> Verdict | None:
+        """The answer given; None: the attempt is new."""
+        return self._of.get(attempt)
+
+    def keep(self, attempt: str, verdict: Verdict) -> None:
+        """Remember an answer; the oldest gives way."""
+        self._of[attempt] = verdict
+        if len(self._of) > ATTEMPTS_KEPT:
+            del self._of[next(iter(self._of))]

@@ -1,7 +1,7 @@
 """Alerts of peers as last received, and which of them count for a robot."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 from iveg.domain.feedback import (
@@ -13,13 +13,12 @@ from iveg.domain.feedback import (
     SpeedLimit,
 )
 from iveg.domain.geometry import Pose2D
-from iveg.domain.limits import LIMITS, ring_radius
-from iveg.domain.observations import Origin
-from iveg.robot.caps import FREE, Cap, known_reason
-from iveg.robot.lookahead import Ahead
+from iveg.domain.limits import LIMITS, grown_radius
+from iveg.domain.motion import MotionTrack
+from iveg.domain.parameters import Class
+from iveg.robot.gate import FREE, Ahead, Cap, known_reason
 
 MOVED_ON_S = 1.0
-_MAX_BOOTS = 32
 
 AlertKey = tuple[str, str | None, str | None, int]
 """Decision, observer, class, and which of those that share them."""
@@ -47,44 +46,92 @@ class PeerObserver:
     Attributes:
         stamp: As received; while it stays the same, the pose grows old.
         at: When this stamp was first received (monotonic, s).
-        speed: Forwards (m/s).
+        speed: Along the pose's heading (m/s).
     """
 
     pose: Pose2D
+    speed: float
     stands: bool
     stamp: str | None
     at: float
-    speed: float = 0.0
 
-    def cap(self, name: str, own: Pose2D, beyond: float, now: float) -> Cap:
-        """Cap that the peer requires of a robot at ``own``."""
+    def cap(
+        self, name: str, own: Pose2D, radius_m: float, beyond: float, now: float
+    ) -> Cap:
+        """Cap that the peer requires of a robot at ``own``.
+
+        Args:
+            name: The peer's topic.
+            own: In ``map``.
+            radius_m: Zone of a peer whose pose is fresh (m).
+            beyond: How much farther it counts, of a robot that is slow already (m).
+            now: Monotonic (s).
+        """
         age = now - self.at
         if age > LIMITS.ring_lasts_s or (self.stands and age <= LIMITS.silence_s):
             return FREE
-        ring = ring_radius(LIMITS.ring_default_m, age) + beyond
-        near = own.distance_to(self.pose.x, self.pose.y) <= ring
+        zone_m = grown_radius(radius_m, age) + beyond
+        near = own.distance_to(self.pose.x, self.pose.y) <= zone_m
         return Cap(HALF_SPEED, "robot", name) if near else FREE
 
-    def ahead(self, name: str, now: float) -> Iterator[Ahead]:
-        """Its circle as it goes on, while its pose is young."""
+    def ahead(self, name: str, radius_m: float, now: float) -> Iterator[Ahead]:
+        """Its zone as it goes on, while its pose is young."""
         age, pose = now - self.at, self.pose
         if age <= LIMITS.silence_s:
             goes = self.speed * math.cos(pose.yaw), self.speed * math.sin(pose.yaw)
-            row = pose.x, pose.y, *goes, age, LIMITS.ring_default_m
+            row = pose.x, pose.y, *goes, age, radius_m
             yield row, Cap(HALF_SPEED, "robot", name)
+
+
+class RuleRadii:
+    """Radii of the rule as iVeg told them: of each class the largest of the last 10 s.
+
+    So a robot that is told a smaller radius keeps the greater one for as long as a
+    sighting that was made under it has a zone.
+    """
+
+    def __init__(self) -> None:
+        self._told: dict[Class, list[tuple[float, float]]] = {}
+        """By class: when it was told (monotonic, s) and how much (m), largest first."""
+
+    def note(self, radii: Mapping[Class, float], now: float) -> None:
+        """Note what one message told."""
+        for class_, radius_m in radii.items():
+            told = self._told.get(class_, [])
+            larger = [one for one in told if one[1] > radius_m and _counts(one, now)]
+            self._told[class_] = [*larger, (now, radius_m)]
+
+    @property
+    def is_told(self) -> bool:
+        """Whether iVeg told any."""
+        return bool(self._told)
+
+    def of(self, class_: Class, now: float) -> float:
+        """The radius of a fresh zone of this class (m); unless told that of the paper.
+
+        What was told last counts until something else is told.
+        """
+        told = self._told.get(class_)
+        if not told:
+            return LIMITS.ring_default_m
+        return next((one[1] for one in told if _counts(one, now)), told[-1][1])
+
+
+def _counts(told: tuple[float, float], now: float) -> bool:
+    return now - told[0] <= LIMITS.ring_lasts_s
 
 
 @dataclass(slots=True)
 class PeerTopic:
-    """Newest state of one topic; ``boots`` are all seen so far, newest last."""
+    """Newest state of one topic; ``at`` is when it came (monotonic, s)."""
 
-    origin: Origin
     at: float
-    boots: list[str | None]
+    seq: int = -1
     peer: PeerObserver | None = None
     speed_limit: SpeedLimit = UNSUPERVISED
     alerts: dict[AlertKey, KeptAlert] = field(default_factory=dict)
     foresight: bool = False
+    track: MotionTrack = field(default_factory=MotionTrack)
 
 
 def is_alive(kept: KeptAlert, topic: PeerTopic, now: float) -> bool:
@@ -92,18 +139,6 @@ def is_alive(kept: KeptAlert, topic: PeerTopic, now: float) -> bool:
     missing = kept.missing_since
     moved_on = missing is not None and topic.at - missing >= MOVED_ON_S
     return not moved_on and now - kept.at <= LIMITS.ring_lasts_s
-
-
-def is_newer(origin: Origin, topic: PeerTopic) -> bool:
-    """Whether a message counts: of an unknown boot, or with a higher ``seq``."""
-    if origin.boot != topic.origin.boot:
-        if origin.boot in topic.boots:
-            return False
-        topic.boots = [*topic.boots, origin.boot][-_MAX_BOOTS:]
-        return True
-    if origin.seq is None or topic.origin.seq is None:
-        return True
-    return origin.seq > topic.origin.seq
 
 
 def alerts_of(feedback: Feedback) -> dict[AlertKey, FeedbackAlert]:
@@ -135,14 +170,21 @@ def limited_free(speed_limit: SpeedLimit, alert: FeedbackAlert) -> bool:
     )
 
 
-def ring_of(alert: FeedbackAlert, silence: float) -> float:
-    """The radius of an alert after so long a silence (m)."""
-    radius_m = LIMITS.ring_default_m if alert.radius_m is None else alert.radius_m
-    return ring_radius(radius_m, silence)
+def zone_radius(
+    alert: FeedbackAlert, radii: RuleRadii, silence: float, now: float
+) -> float:
+    """The radius of an alert after so long a silence, at least the rule's (m)."""
+    told_m = radii.of(alert.class_ or "person", now)
+    if alert.radius_m is not None:
+        told_m = max(alert.radius_m, told_m) if radii.is_told else alert.radius_m
+    return grown_radius(told_m, silence)
 
 
 def is_inside(
-    alert: FeedbackAlert, observer: PeerObserver | None, own: Pose2D | None, ring: float
+    alert: FeedbackAlert,
+    observer: PeerObserver | None,
+    own: Pose2D | None,
+    zone_m: float,
 ) -> bool:
     """Whether ``own`` is inside the radius, about the observer if no place is known."""
     if alert.position is not None:
@@ -151,15 +193,16 @@ def is_inside(
         place = (observer.pose.x, observer.pose.y)
     else:
         return True
-    return own is None or own.distance_to(*place) <= ring
+    return own is None or own.distance_to(*place) <= zone_m
 
 
-def alert_ahead(kept: KeptAlert, now: float) -> Iterator[Ahead]:
+def alert_ahead(kept: KeptAlert, radii: RuleRadii, now: float) -> Iterator[Ahead]:
     """The alert as something that the robot may drive into; nothing without a place."""
     alert = kept.alert
     if alert.position is not None and alert.velocity is not None:
         (x, y, _), goes = alert.position, alert.velocity
-        yield (x, y, *goes, now - kept.at, ring_of(alert, 0.0)), alerted(alert)
+        radius_m = zone_radius(alert, radii, 0.0, now)
+        yield (x, y, *goes, now - kept.at, radius_m), alerted(alert)
 
 
 def alerted(alert: FeedbackAlert, *, waits: bool = True) -> Cap:

@@ -8,8 +8,8 @@ r"""The safety machine of one robot, pure: facts and times in, frozen effects ou
                         │                                             \       │ resume
                      BRAKING <────────────────────────────────── RUNNING <────┘
     RUNNING: upstream at zero for 0.5 s first, then the ramp;  factor = min(caps)
-             feedback older than 1.0 s, or a person or peer near  -> cap 0.5
-             feedback older than 3.0 s -> hold `link`, which clears itself when
+             an author's feedback older than 1.0 s, or a person or peer near  -> cap 0.5
+             all feedback older than 3.0 s -> hold `link`, which clears itself when
              feedback was fresh for 2.0 s, three times a minute, if no other hold came
 
 The state is never stored: it follows from the holds, the measured speed and whether
@@ -29,26 +29,33 @@ from iveg.domain.observations import (
     Origin,
     SafetyReport,
 )
-from iveg.robot.caps import Cap
-from iveg.robot.effects import AnswerCode, Drive, Effect, Persist, Report, SendAnswer
-from iveg.robot.gate import Gate
+from iveg.robot.feedback import Authors
+from iveg.robot.gate import Cap, Gate
 from iveg.robot.holds import HoldSet
 from iveg.robot.judgement import DEFAULT_LIMITS, Judgement, Limits
 from iveg.robot.orders import (
+    AnswerCode,
+    Drive,
+    Effect,
+    Persist,
     ReleaseOrder,
+    Report,
     ResumeOrder,
+    SendAnswer,
     StopOrder,
+    Verdict,
+    Verdicts,
     read_desired_state,
     read_order,
 )
-from iveg.robot.verdicts import Verdict, Verdicts
 
 State = Literal["HELD", "BRAKING", "STANDING", "READY", "RUNNING"]
 
 CHALLENGE_LIVES_S = 5.0
 REPORT_EVERY_S, REPORT_HELD_EVERY_S = 0.4, 0.075
 """Below the contract's 0.5 s and 0.1 s, so that a late timer still keeps them.  The
-second is for iVeg alone: ten a second would be most of what one agent can carry."""
+second, while held or while somebody walks beside it, is for iVeg alone: ten a second
+would be most of what one agent can carry."""
 
 
 class SafetyMachine:
@@ -87,8 +94,8 @@ class SafetyMachine:
         self._verdicts = Verdicts()
         self._holds = (stored or HoldSet()).after_reboot()
         self._persisted: HoldSet | None = None
-        self._said: tuple[Cap, HoldSet, str] | None = None
-        """What the newest report rests on, but speeds and ages: a change is news."""
+        self._said: tuple[Cap, HoldSet, str, bool] | None = None
+        """Grounds of the newest report, but speeds and ages: a change is news."""
         self._reported_at = self._measured_at = now
         if stored is None:
             self._latch(self._nameless_stop(), now)
@@ -104,6 +111,10 @@ class SafetyMachine:
             return "HELD"
         return "STANDING" if self._judgement.stands(now) else "BRAKING"
 
+    def stands(self, now: float) -> bool:
+        """Whether fresh odometry shows the robot at rest."""
+        return self._judgement.stands(now)
+
     @property
     def holds(self) -> HoldSet:
         """Current holds and those already released."""
@@ -113,6 +124,11 @@ class SafetyMachine:
     def challenge(self) -> str:
         """Text that a release or resume must echo."""
         return self._challenge
+
+    @property
+    def authors(self) -> Authors:
+        """Everybody who sends this robot feedback."""
+        return self._judgement.authors
 
     @property
     def may_drive(self) -> bool:
@@ -362,9 +378,12 @@ class SafetyMachine:
             self._persisted = self._holds
             effects.append(Persist(self._holds))
         effects += [SendAnswer(answer) for answer in answers]
-        applied = self._limit, self._holds, self._challenge
+        obstacle = self._judgement.obstacle(now)
+        walks = obstacle is not None and obstacle.moved
+        applied = self._limit, self._holds, self._challenge, walks
         is_news = applied != self._said
-        every = REPORT_HELD_EVERY_S if self._holds.holds else REPORT_EVERY_S
+        is_often = walks or self._holds.holds
+        every = REPORT_HELD_EVERY_S if is_often else REPORT_EVERY_S
         if is_news or now - self._reported_at >= every:
             self._said, self._reported_at = applied, now
             is_measure = is_news or now - self._measured_at >= REPORT_EVERY_S
@@ -396,4 +415,5 @@ class SafetyMachine:
             twist.linear_x,
             twist.angular_z,
             self._judgement.watchdog.age(now),
+            obstacle=self._judgement.obstacle(now),
         )

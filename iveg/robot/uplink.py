@@ -1,23 +1,24 @@
-"""Algorithm 1: the robot's observations on their way to iVeg.
+"""All that a robot sends: safety messages in a lane of their own, and Algorithm 1."""
 
-Every observation gets its origin here (boot, count of its topic, the robot's clock) and
-becomes a measure.  Telemetry goes at QoS 0 and only the newest of a topic is pending;
-a message that the broker could not take is not sent later, because it is outdated by
-then.  While Orion is behind, measures withheld from the agent go to iVeg directly
-(``rates``).
-"""
-
-from collections import Counter
-from collections.abc import Callable
-from dataclasses import fields, replace
+import asyncio
+import logging
+from collections import Counter, deque
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass, field, fields, replace
 from functools import lru_cache
-from operator import attrgetter
+from operator import attrgetter, itemgetter
 from typing import Any, Literal
 
-from iveg.domain.kinds import KIND_OF, SENSED
+import orjson
+
+from iveg.domain.errors import HopError
+from iveg.domain.geometry import Pose2D
+from iveg.domain.kinds import KIND_OF, MEASURED, SENSED
 from iveg.domain.observations import (
     CommandAnswer,
+    Detection,
     DetectionFrame,
+    FeedbackRef,
     GoalAnswer,
     Instant,
     LaserScan,
@@ -29,13 +30,304 @@ from iveg.domain.observations import (
     Unplaced,
 )
 from iveg.ngsi import codec, names
-from iveg.robot.echo import Echo
-from iveg.robot.lane import LaneMessage
-from iveg.robot.rates import UplinkRates
-from iveg.robot.single import SinglePayload
+from iveg.ngsi.codec.fields import write_lidar_header, write_motion, write_origin
+from iveg.ngsi.codec.reports import write_unread
+from iveg.robot.holds import HoldSet
+
+# --- rates ------------------------------------------------------------------------
+#
+# Rates of telemetry that a robot sends through the IoT Agent.
+#
+# One agent carries about 150 measures a second; two robots at 30 Hz send 180.  iVeg
+# reports Orion's backlog, and a robot that learns of one sends less, scans first::
+#
+#     level  0 ───────────── 1 ───────────── 2 ───────────── 3
+#     scans  all ──> 1 Hz    1 Hz            1 Hz            1 Hz
+#     camera all             all ──> 3 Hz    3 Hz            3 Hz
+#     poses  all             all             all ──> 5 Hz    5 Hz
+#
+# The level rises while the backlog lasts and falls slowly afterwards; after each fall
+# that was too early the next one waits twice as long. No reported backlog can raise a
+# rate above the sensor's own or lower it below these floors. Safety reports are never
+# fewer, nor are the single payloads of Algorithm 1, which hold all in one message.
+# Messages held back still go to iVeg directly.
+
+TOP_HZ = 30.0
+FLOOR_HZ = dict(
+    sorted(
+        ((one.suffix or "", one.floor_hz) for one in MEASURED if one.floor_hz),
+        key=itemgetter(1),
+    )
+)
+"""Least rates by device; who can be rarest gives way first."""
+LEVELS = float(len(FLOOR_HZ))
+
+BEHIND_S, WELL_S = 0.5, 0.25
+"""Lag (s) that counts as a backlog, and as none; between the two the level stays."""
+FAR_BEHIND_S = 3.0
+RISE_PER_S, RISE_FAR_PER_S, SINK_PER_S = 0.5, 1.0, 0.02
+PATIENCE_S, LONGEST_PATIENCE_S = 10.0, 600.0
+_LONGEST_STEP_S = 0.5
+
+
+@dataclass(slots=True)
+class UplinkRates:
+    """Decides which message is a measure; every other is sent to iVeg alone.
+
+    All moments are monotonic (s).
+
+    Attributes:
+        level: 0: every message is a measure; 3: all rates are at their floors.
+    """
+
+    level: float = 0.0
+    _told_at: float | None = None
+    _well_since: float | None = None
+    _patience_s: float = PATIENCE_S
+    _sank: bool = False
+    _due: dict[str, float] = field(default_factory=dict)
+
+    def note_backlog(self, backlog_s: float | None, now: float) -> None:
+        """Take Orion's reported lag; None, when unknown, changes nothing."""
+        before, self._told_at = self._told_at, now
+        if backlog_s is None or before is None:
+            return
+        step = min(max(0.0, now - before), _LONGEST_STEP_S)
+        if backlog_s >= BEHIND_S:
+            self._rise(backlog_s, step)
+        elif backlog_s > WELL_S:
+            self._well_since = None
+        else:
+            self._sink(now, step)
+
+    def _rise(self, backlog_s: float, step: float) -> None:
+        if self._sank:
+            self._patience_s = min(2.0 * self._patience_s, LONGEST_PATIENCE_S)
+        self._sank, self._well_since = False, None
+        speed = RISE_FAR_PER_S if backlog_s >= FAR_BEHIND_S else RISE_PER_S
+        self.level = min(LEVELS, self.level + speed * step)
+
+    def _sink(self, now: float, step: float) -> None:
+        if self._well_since is None:
+            self._well_since = now
+        if self.level == 0.0:
+            self._sank, self._patience_s = False, PATIENCE_S
+        elif now - self._well_since >= self._patience_s:
+            self._sank = True
+            self.level = max(0.0, self.level - SINK_PER_S * step)
+
+    def is_measure(self, suffix: str, now: float, *, news: bool = False) -> bool:
+        """Whether a device's message also goes to the agent; changes always do."""
+        interval = self._interval_s(suffix)
+        due = self._due.get(suffix, now)
+        if now < due and not news:
+            return False
+        # A late message is compensated, so that the mean rate is kept, not exceeded.
+        self._due[suffix] = max(due, now - interval) + interval
+        return True
+
+    def _interval_s(self, suffix: str) -> float:
+        """Least time between two measures of a device (s); 0: every message is one."""
+        if self.level == 0.0:
+            return 0.0
+        for place, (device, floor_hz) in enumerate(FLOOR_HZ.items()):
+            # From the sensor's own rate (0) to its floor (1).
+            share = min(1.0, self.level - place)
+            if device == suffix and share > 0.0:
+                return float((TOP_HZ / floor_hz) ** share / TOP_HZ)
+        return 0.0
+
+
+# --- single -----------------------------------------------------------------------
+#
+# Algorithm 1's single payload, as the paper writes it: one message per robot and tick.
+#
+# The payload has room for one detection, so those of one frame take turns, the most
+# probable first; a scan is sent once; an empty frame, which the paper cannot express,
+# is an empty ``bounding_boxes`` beside it. ``pose`` and ``lidar_header`` carry the
+# origin.
+
+
+class SinglePayload:
+    """Collects observations until odometry triggers a message.
+
+    Args:
+        robot_id: This robot.
+    """
+
+    def __init__(self, robot_id: str) -> None:
+        self._id = robot_id
+        self.scan: LaserScan | None = None
+        """The sweep that has not been sent yet."""
+        self._detections: list[Detection] = []
+        self._saw_nothing = False
+        self._unread: tuple[str | None, ...] = ()
+
+    def replace_frame(self, frame: DetectionFrame) -> None:
+        """Note a detection frame; it replaces what is left of the one before."""
+        self._detections = sorted(frame.detections, key=lambda one: one.probability)
+        self._saw_nothing = not frame.detections and not frame.unread
+        self._unread = frame.unread
+
+    def write(self, odometry: Odometry) -> bytes:
+        """Payload of ``/{apikey}/{robot}/attrs`` for this odometry tick."""
+        origin = write_origin(odometry.origin)
+        payload: dict[str, object] = {
+            "pose": {**write_motion(odometry.pose, odometry.twist), **origin},
+            "timestamp": odometry.origin.stamp,
+            "TimeInstant": odometry.origin.stamp,
+        }
+        if self._detections:
+            payload |= _detected(self._detections.pop(), odometry.pose)
+        elif self._unread:
+            nowhere, self._unread = write_unread(self._unread), ()
+            payload |= {names.BOXES: nowhere, names.BOXES_HEADER: origin}
+        elif self._saw_nothing:
+            self._saw_nothing = False
+            payload |= {names.BOXES: [], names.BOXES_HEADER: origin}
+        if self.scan is not None:
+            payload["laser_scan"] = self.scan.ranges
+            payload[names.LIDAR_HEADER] = write_lidar_header(self.scan, origin)
+            self.scan = None
+        return orjson.dumps(payload, option=orjson.OPT_SERIALIZE_NUMPY)
+
+
+def _detected(detection: Detection, pose: Pose2D) -> dict[str, object]:
+    x, y, z = detection.box.centre
+    if detection.frame_id != "map":
+        x, y = pose.transform(x, y)
+    return {
+        "class": detection.class_id,
+        "conf": round(detection.probability, 4),
+        "position_3D": {"x": round(x, 4), "y": round(y, 4), "z": round(z, 4)},
+    }
+
+
+# --- lane -------------------------------------------------------------------------
+#
+# Outgoing safety messages: disk before answer, answers in order, newest report wins.
+#
+# Telemetry has its own slots in the MQTT link, so no amount of pending telemetry delays
+# or drops a safety message.
+
+_log = logging.getLogger(__name__)
+_MAX_ANSWERS = 256
+_UNDER_WAY = 16
+"""Messages without a confirmation of the broker.  One at a time would be one report a
+second over a radio that takes half a second each way, and no standstill is measured
+from those."""
+
+
+@dataclass(frozen=True, slots=True)
+class LaneMessage:
+    """Bytes for one topic, at QoS 1."""
+
+    topic: str
+    payload: bytes
+
+
+class SafetyLane:
+    """Keeps the hold set and sends answers and reports, in that order.
+
+    Args:
+        keep: Writes a hold set to disk; called in a thread, may raise OSError.
+        publish: Sends at QoS 1; raises HopError while the broker is away.
+    """
+
+    def __init__(
+        self,
+        keep: Callable[[HoldSet], None],
+        publish: Callable[[str, bytes], Awaitable[None]],
+    ) -> None:
+        self._keep = keep
+        self._publish = publish
+        self._to_keep: HoldSet | None = None
+        self._answers: deque[LaneMessage] = deque(maxlen=_MAX_ANSWERS)
+        self._kept_answers: deque[LaneMessage] = deque(maxlen=_MAX_ANSWERS)
+        self._reports: dict[str, LaneMessage] = {}
+        self._keep_wake, self._send_wake = asyncio.Event(), asyncio.Event()
+        self._room = asyncio.Semaphore(_UNDER_WAY)
+        self._disk_fails = False
+
+    def persist(self, holds: HoldSet) -> None:
+        """Store this set; only the newest is pending, since it replaces all before."""
+        self._to_keep = holds
+        self._keep_wake.set()
+
+    def answer(self, message: LaneMessage) -> None:
+        """Send once the hold set that it refers to is on disk; drops the oldest."""
+        self._answers.append(message)
+        self._keep_wake.set()
+
+    def report(self, message: LaneMessage) -> None:
+        """Send when possible; a newer report of the same topic replaces it."""
+        self._reports[message.topic] = message
+        self._send_wake.set()
+
+    async def keep_forever(self) -> None:
+        """Write sets and release answers until cancelled."""
+        while True:
+            await self._keep_wake.wait()
+            self._keep_wake.clear()
+            holds, self._to_keep = self._to_keep, None
+            answers = list(self._answers)
+            self._answers.clear()
+            if holds is not None:
+                await asyncio.to_thread(self._keep_once, holds)
+            self._kept_answers.extend(answers)
+            self._send_wake.set()
+
+    def _keep_once(self, holds: HoldSet) -> None:
+        # A full disk must not silence the robot: it is held in memory all the same,
+        # and it will boot held whatever the file says.
+        try:
+            self._keep(holds)
+        except OSError as error:
+            if not self._disk_fails:
+                _log.warning("the hold file cannot be written: %s", error)
+            self._disk_fails = True
+        else:
+            if self._disk_fails:
+                _log.warning("the hold file can be written again")
+            self._disk_fails = False
+
+    async def send_forever(self) -> None:
+        """Publish answers, then the newest report, until cancelled."""
+        async with asyncio.TaskGroup() as sending:
+            while True:
+                await self._send_wake.wait()
+                self._send_wake.clear()
+                while self._kept_answers or self._reports:
+                    await self._room.acquire()
+                    # Tasks begin in this order, and each is on its way at once.
+                    sending.create_task(self._send(self._next()))
+
+    def _next(self) -> LaneMessage:
+        if self._kept_answers:
+            return self._kept_answers.popleft()
+        return self._reports.pop(next(iter(self._reports)))
+
+    async def _send(self, message: LaneMessage) -> None:
+        try:
+            await self._publish(message.topic, message.payload)
+        except HopError:
+            pass  # lost without a broker; the next report has the state
+        finally:
+            self._room.release()
+
+
+# --- uplink -----------------------------------------------------------------------
+#
+# Algorithm 1: the robot's observations on their way to iVeg.
+#
+# Every observation gets its origin here (boot, count of its topic, the robot's clock)
+# and becomes a measure. Telemetry goes at QoS 0 and only the newest of a topic is
+# pending; a message that the broker could not take is not sent later, because it is
+# outdated by then. While Orion is behind, measures withheld from the agent go to iVeg
+# directly (``rates``).
 
 _IN_ONE = Odometry, LaserScan, DetectionFrame
-"""What the single payload of Algorithm 1 holds."""
+"""Kinds in the single payload of Algorithm 1."""
 Form = Literal["per-topic", "single"]
 
 _WRITERS: dict[type, Callable[[Any], bytes]] = {
@@ -67,7 +359,8 @@ class Uplink:
         form: One message a topic, or Algorithm 1's single payload.
         first_report: ``seq`` of the first safety report; random, so that a number from
             an earlier boot is not taken for one of this.
-        echo: Newest feedback received; None for recordings, which prove no age.
+        echoes: Returns the newest feedback of each author, of the one met first at
+            first; None for recordings, which prove no age.
         replay: The map frame of a recording, by which its messages are marked.
 
     Moments are the robot's own: monotonic seconds since its boot, and its wall clock.
@@ -82,14 +375,14 @@ class Uplink:
         *,
         form: Form = "per-topic",
         first_report: int = 1,
-        echo: Echo | None = None,
+        echoes: Callable[[], tuple[FeedbackRef, ...]] | None = None,
         replay: str | None = None,
     ) -> None:
         self._id = robot_id
         self._apikey = apikey
         self._boot = boot
         self._enqueue = enqueue
-        self._echo = echo
+        self._echoes = echoes
         self._replay = replay
         self._single = SinglePayload(robot_id) if form == "single" else None
         self._next: Counter[str] = Counter({_SAFETY: first_report - 1})
@@ -169,15 +462,16 @@ class Uplink:
 
     def _origin(self, suffix: str, at: Instant) -> Origin:
         self._next[suffix] += 1
-        echo = self._echo
+        echoes = None if self._echoes is None else self._echoes()
         return Origin(
             self._boot,
             self._next[suffix],
             _stamp_of(at.wall),
             at.wall,
             at.mono,
-            acknowledgements=echo is not None,
-            heard=None if echo is None else echo.heard,
+            acknowledgements=echoes is not None,
+            heard=echoes[0] if echoes else None,
+            heard_also=echoes[1:] if echoes else (),
             replay=self._replay,
         )
 
@@ -197,7 +491,7 @@ def _seen(frame: DetectionFrame) -> tuple[tuple[str, int], ...]:
 
 
 def _suffix_of(observation: Observation) -> str:
-    """Of the device that the observation is a measure of."""
+    """Suffix of the device that the observation is a measure of."""
     kind = type(observation)
     if isinstance(observation, Unplaced):
         kind = _UNPLACED[observation.kind]

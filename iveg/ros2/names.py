@@ -34,7 +34,7 @@ class Qos:
         )
 
     def newest(self, depth: int = 1) -> "Qos":
-        """The same with another depth."""
+        """This quality of service with another depth."""
         return replace(self, depth=depth)
 
 
@@ -50,6 +50,7 @@ class Endpoint:
         own: It is of this process.
         type_hash: As announced, ``RIHS01_…``; empty before ROS 2 Iron.
         gate: Id of the robot whose gate has it; empty: no gate of iVeg.
+        typed: It announces the fields of its type; nodes of ROS 2 do not.
     """
 
     topic: str
@@ -59,13 +60,14 @@ class Endpoint:
     own: bool
     type_hash: str = ""
     gate: str = ""
+    typed: bool = False
 
 
 DEFAULT = Qos()
 SENSOR_DATA = Qos(reliable=False, depth=5)
 TF = Qos(depth=100)
 LATCHED = Qos(transient_local=True, depth=1)
-"""Of maps: whoever listens late gets the newest."""
+"""For maps: a late reader gets the newest."""
 TF_STATIC = Qos(transient_local=True, depth=100)
 
 

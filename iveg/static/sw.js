@@ -13,7 +13,7 @@ const OFFLINE = "/static/offline.html";
 /** What the offline page alone asks for in this way: answered from the cache. */
 const OF_OFFLINE = "?offline";
 const PARTS = ["css/tokens.css", "css/offline.css", "js/offline.js"];
-const NEVER = ["/api/", "/live", "/signin", "/signout", "/ngsi/", "/static/", "/docs"];
+const NEVER = ["/api/", "/live", "/signin", "/signout", "/ngsi/", "/static/"];
 const NOT_NAVIGATIONS = ["cors", "no-cors", "same-origin"];
 
 /** Whether a request may be answered by the offline page. @param {Request} request */
@@ -70,25 +70,3 @@ self.addEventListener("fetch", (event) => {
     event.respondWith(fetch(request).catch(() => caches.match(OFFLINE)));
   }
 });
-
-self.addEventListener("push", (event) => {
-  const { title = "iVeg", body = "" } = event.data?.json() ?? {};
-  event.waitUntil(
-    self.registration.showNotification(title, {
-      body,
-      icon: "/static/icons/192.png",
-      requireInteraction: true,
-    }),
-  );
-});
-
-self.addEventListener("notificationclick", (event) => {
-  event.notification.close();
-  event.waitUntil(openAlerts());
-});
-
-/** An open page comes to the front as it is: a person may be at its STOP. */
-async function openAlerts() {
-  const pages = await self.clients.matchAll({ type: "window" });
-  return pages.length ? pages[0].focus() : self.clients.openWindow("/alerts");
-}

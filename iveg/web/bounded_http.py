@@ -1,159 +1,116 @@
-"""HTTP protocol of the server with bounds: size and time of a head, connections.
+"""HTTP of the server: the newest connection comes in, the oldest idle one goes.
 
-The parser holds a header until its end, and the server every connection: an endless
-header would take all memory, and half-sent requests every place (SECURITY.md).
+So a STOP gets through while somebody holds a thousand half-sent requests open.  All
+other limits are a proxy's (docs/deployment.md, "TLS").  An open WebSocket is never
+displaced: it is not counted.
 """
 
 import asyncio
 import logging
 from typing import Final
 
-from uvicorn.protocols.http.httptools_impl import STATUS_LINE
+from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
-from iveg.adapters.connections import CONNECTION, Connection, ConnectionTable
-from iveg.web.notification_http import NotificationHttp
-from iveg.web.notifications import NotificationEndpoint
+MOST: Final = 512
+HEAD_S: Final = 5.0
+MOST_HELD: Final = 65_536
+"""Bytes of a head, a trailer or the size of a chunk, which the parser holds."""
 
-_PIECE: Final = 16384
-_TOO_LONG: Final = b"".join(
-    (STATUS_LINE[431], b"content-length: 0\r\nconnection: close\r\n\r\n")
-)
-
-
-# It says so for each; here the first of an address is logged and all are counted.
+# It says so for each; the answer says it, too.
 logging.getLogger("uvicorn.error").addFilter(
     lambda record: record.getMessage() != "Invalid HTTP request received."
 )
 
 
-def bounded_http(
-    endpoint: NotificationEndpoint, table: ConnectionTable
-) -> type["BoundedHttp"]:
-    """The protocol of a server.
-
-    Args:
-        endpoint: Where its notifications go.
-        table: Its connections.
-    """
-
-    class BoundHttp(BoundedHttp):
-        """Of this server."""
-
-    BoundHttp.endpoint, BoundHttp.table = endpoint, table
-    return BoundHttp
-
-
-class _HeadTooLongError(Exception):
-    """Leaves the parser, which passes it on as a request that cannot be read."""
-
-
-class BoundedHttp(NotificationHttp):
-    """One connection of anybody's.
+class BoundedHttp(HttpToolsProtocol):
+    """One connection of anybody's; ``bounded_http`` makes the class of a server.
 
     Attributes:
-        table: Of the connection's server.
+        table: All of the server, the one that was quiet longest first.
+        most: How many there may be.
+        head_s: Time in which a head has to be here (s).
     """
 
-    table: ConnectionTable
-    _connection: Connection | None = None
-    _most = 0
-    """Bytes that a head may have."""
-    _is_too_long = False
-    _unparsed = 0
-    """Bytes since the parser last finished a head, a part of a body, or a request."""
+    table: dict["BoundedHttp", None]
+    most = MOST
+    head_s = HEAD_S
+    _timer: asyncio.TimerHandle | None = None
+    _held = 0
 
     def connection_made(  # type: ignore[override]
         self, transport: asyncio.Transport
     ) -> None:
         """Somebody has connected."""
         super().connection_made(transport)
-        self._most = self.table.caps.head_bytes
-        peer = "" if self.client is None else self.client[0]
-        self._connection = self.table.admit(peer, transport.abort)
-        if self._connection is None:
-            transport.abort()
-            return
-        self.app_state = {**self.app_state, CONNECTION: self._connection}
+        self._await_head()
+        if len(self.table) > self.most:
+            idle = (one for one in self.table if one.is_idle and one is not self)
+            next(idle, next(iter(self.table))).give_way()
 
     def connection_lost(self, exc: Exception | None) -> None:
         """The connection is closed."""
+        self._leave()
         super().connection_lost(exc)
-        if self._connection is not None:
-            self._connection.leave()
 
     def data_received(self, data: bytes) -> None:
         """Bytes have come."""
-        if len(data) <= _PIECE:
-            self._feed(data)
-            return
-        for start in range(0, len(data), _PIECE):
-            self._feed(data[start : start + _PIECE])
-
-    def _feed(self, data: bytes) -> None:
-        """Give bytes to the parser, and end a head that it still looks for the end of.
-
-        How much of these the parser has used nobody knows, so they are few.
-        """
-        connection = self._connection
-        if connection is None or self.transport.is_closing():
-            return
-        if connection.is_idle:
-            # Also for blank lines, which the parser passes over.
-            connection.await_head()
-        self._unparsed += len(data)
+        self._held += len(data)
         super().data_received(data)
-        if self._unparsed > self._most and not self.transport.is_closing():
-            self._is_too_long = True
-            self.send_400_response("")
-
-    def send_400_response(self, msg: str) -> None:
-        """Refuse what cannot be read; 431 where it is the length of the head."""
-        address = "" if self._connection is None else self._connection.address
-        if not self._is_too_long:
-            self.table.refused(address, "unreadable")
-            super().send_400_response(msg)
-            return
-        self.table.refused(address, "head_too_long")
-        self.transport.write(_TOO_LONG)
-        self.transport.close()
-
-    # --- what the parser finds ----------------------------------------------------
+        if self._held > MOST_HELD:
+            self.give_way()
 
     def on_message_begin(self) -> None:
         """A request begins."""
-        connection = self._connection
-        if connection is not None and connection.is_busy:
-            # It came behind one that is still being answered.
-            connection.await_head()
         super().on_message_begin()
+        self._await_head()
 
     def on_headers_complete(self) -> None:
         """The head is here."""
-        self._unparsed = 0
-        size = sum([len(name) + len(value) for name, value in self.headers])
-        if size + len(self.url) > self._most:
-            self._is_too_long = True
-            raise _HeadTooLongError
-        if self._connection is not None:
-            self._connection.await_body()
+        self._held = 0
+        self._end_timer()
         super().on_headers_complete()
-        if self._connection is not None and self.is_notification:
-            self._connection.vouch()
 
     def on_body(self, body: bytes) -> None:
         """A part of a body."""
-        self._unparsed = 0
+        self._held = 0
         super().on_body(body)
 
     def on_message_complete(self) -> None:
         """The request is whole."""
-        self._unparsed = 0
-        if self._connection is not None:
-            self._connection.serve()
+        self._held = 0
         super().on_message_complete()
 
-    def on_response_complete(self) -> None:
-        """The answer is out."""
-        super().on_response_complete()
-        if self._connection is not None and not self.pipeline:
-            self._connection.rest()
+    def handle_websocket_upgrade(self) -> None:
+        """It speaks WebSocket from now on."""
+        self._leave()
+        super().handle_websocket_upgrade()
+
+    @property
+    def is_idle(self) -> bool:
+        """Whether no whole request is being answered."""
+        cycle = self.cycle
+        return cycle is None or cycle.response_complete or cycle.more_body
+
+    def give_way(self) -> None:
+        """End it without waiting for anything."""
+        self._leave()
+        self.transport.abort()
+
+    def _await_head(self) -> None:
+        self._leave()
+        self.table[self] = None
+        self._timer = self.loop.call_later(self.head_s, self.give_way)
+
+    def _leave(self) -> None:
+        self.table.pop(self, None)
+        self._end_timer()
+
+    def _end_timer(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+
+
+def bounded_http(most: int = MOST, head_s: float = HEAD_S) -> type[BoundedHttp]:
+    """The protocol of a server, with connections of its own."""
+    own = {"table": {}, "most": most, "head_s": head_s}
+    return type("BoundHttp", (BoundedHttp,), own)

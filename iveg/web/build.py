@@ -20,34 +20,25 @@ from iveg.web import notifications, problems
 from iveg.web.api import (
     alerts,
     commands,
-    costmap,
-    coverage,
     detections,
-    detectors,
-    equipment,
     goals,
     health,
     latency,
-    message_desk,
-    messages,
-    metrics,
     past,
-    recordings,
-    revocations,
     robots,
     rule,
-    things,
 )
 from iveg.web.api.answers import Apart
 from iveg.web.live import socket
 from iveg.web.live.encoder import Encoder
+from iveg.web.live.pictures import Past
 from iveg.web.pages.contexts import Site
 from iveg.web.pages.drawing import Pages
 from iveg.web.refusals import DocumentedApp
-from iveg.web.security import audited, connections, headers, rate_limits
+from iveg.web.security import audited, headers, rate_limits
 from iveg.web.security.authentication import Authenticator
+from iveg.web.security.rate_limits import SignInGate
 from iveg.web.security.roles import Principal
-from iveg.web.security.sign_in_gate import SignInGate
 from iveg.web.security.signin import SignInLink
 from iveg.web.views import Views
 
@@ -61,8 +52,11 @@ class Face:
         boot: Random, new at each start.
         queues: How full the queues are.
         worker: Where long work is done.
-        recordings: What came in, as files; ``past`` as the world that it made.
+        encoder: Encodes for pages.
+        recordings: What came in, as files.
+        past: What pages were told, by its moment.
         trail: Takes what people and programs do.
+        accounts: State of their file.
     """
 
     pipeline: Pipeline
@@ -72,13 +66,15 @@ class Face:
     orion: notifications.NotificationEndpoint
     site: Site
     boot: str
-    queues: Callable[[], metrics.Queues]
+    queues: Callable[[], health.Queues]
     clock: Clock
     new_id: Ids
     worker: Apart
-    recordings: recordings.Recordings
+    recordings: past.Recordings
     trail: AuditTrail
-    past: past.Past
+    past: Past
+    encoder: Encoder
+    accounts: Callable[[], str] = lambda: "ok"
 
     def snapshot(self, principal: Principal, now: Instant) -> Snapshot:
         """Everything that is known, for a browser that has just come."""
@@ -105,35 +101,31 @@ class Face:
 
 
 def live_routers(face: Face) -> Iterator[Callable[[], APIRouter]]:
-    """What makes the routes of now: all but history, experiments and pages."""
+    """What makes the routes of now: all but history and pages."""
     parts, beside, views, clock = face.pipeline, face.services, face.views, face.clock
-    watch, evaluator = parts.latency.watch, parts.evaluator
-    encoder = Encoder(views, parts.hub, clock)
+    watch, evaluator = parts.latency, parts.evaluator
     yield partial(
-        socket.router, parts.hub, encoder, face.snapshot, clock, face.stop, watch
+        socket.router, parts.hub, face.encoder, face.snapshot, clock, face.stop, watch
     )
     yield partial(robots.router, views, clock)
-    yield partial(equipment.router, views, clock)
-    yield partial(costmap.router, beside.mapper, evaluator, clock)
-    yield partial(coverage.router, beside.coverage, clock)
+    yield partial(robots.equipment_router, views, clock)
+    yield partial(robots.costmap_router, beside.mapper, evaluator, clock)
+    yield partial(robots.coverage_router, beside.coverage, clock)
     yield partial(commands.router, parts.commander, clock)
     yield partial(goals.router, parts.goals, clock)
     yield partial(alerts.router, evaluator, clock)
     yield partial(rule.router, beside.rules, clock)
     yield partial(rule.trial_router, beside.trials, beside.rules, clock)
     yield partial(detections.router, evaluator.tracking.newest, face.worker)
-    yield partial(detectors.router, beside.detectors, clock)
-    yield partial(revocations.router, beside.revocations)
-    yield partial(things.router, beside.things, evaluator.obstacles.known_here, clock)
-    yield partial(
-        messages.router, message_desk.Desk(beside.messenger, face.new_id, clock)
-    )
+    yield partial(detections.detectors_router, beside.detectors, clock)
+    yield partial(detections.words_router, beside.detectors, clock)
+    yield partial(detections.things_router, beside.things, clock)
     yield partial(latency.router, watch, clock, face.worker)
-    yield partial(recordings.router, face.recordings)
+    yield partial(past.recordings_router, face.recordings)
     yield partial(past.router, face.past, clock)
-    yield partial(health.router, clock, views.health)
+    yield partial(health.router, clock, views.health, face.accounts)
     turns = parts.supervision.longest_turn_s
-    yield partial(metrics.router, clock, views.health, watch, face.queues, turns)
+    yield partial(health.metrics_router, clock, views.health, watch, face.queues, turns)
 
 
 def build_app(
@@ -167,7 +159,6 @@ def build_app(
     app.add_middleware(
         SignInLink, authenticator=face.authenticator, refusal=pages.refused_link
     )
-    app.add_middleware(connections.KnownConnections, identify=identify)
     app.add_middleware(SignInGate, clock=clock)
     # Last is outermost: a refusal carries the headers, too.
     app.add_middleware(headers.SecurityHeaders)

@@ -7,6 +7,8 @@ its own limit and secret.  Refusals look like those of the rest of the applicati
 from collections.abc import Callable, Container, Mapping, Sequence
 from typing import Final
 
+from starlette.requests import ClientDisconnect, Request
+from starlette.responses import Response
 from starlette.routing import Route
 from starlette.types import ASGIApp, Receive, Scope, Send
 
@@ -16,17 +18,12 @@ from iveg.domain.transports import FIWARE
 from iveg.ngsi.codec import UNREAD, read_notification
 from iveg.pipeline.ingest import Ingest
 from iveg.pipeline.ports import Clock
-from iveg.web.problem import Problem
-from iveg.web.problems import problem_of
+from iveg.web.problems import Problem, problem_of
 from iveg.web.security.headers import MAX_BODY, NOTIFICATIONS_PATH, TOO_LONG
 from iveg.web.security.roles import Action
 from iveg.web.security.secrets import NotifySecret
 
 Recorded = Callable[[bytes, Instant, Sequence[Observation]], None]
-_TAKEN = (
-    {"type": "http.response.start", "status": 204, "headers": []},
-    {"type": "http.response.body", "body": b""},
-)
 _FORGED = Problem(401, "The notification secret is wrong.")
 
 
@@ -40,7 +37,6 @@ class NotificationEndpoint:
         is_ours: Whether a subscription id is one that iVeg made.
         tenant: The Fiware service and path that count.
         heard: Told of each notification of Orion's.
-        is_thinned: Whether Orion leaves out most of what a subscription is about.
         equipment: Id and type of the entities that ``measured`` is told of.
         measured: Told of other equipment; must neither wait nor fail.
         recorded: Told of each body that is read and what is observed in it; likewise.
@@ -58,7 +54,6 @@ class NotificationEndpoint:
         is_ours: Callable[[str], bool],
         tenant: tuple[str, str],
         heard: Callable[[Instant], None],
-        is_thinned: Callable[[str], bool],
         equipment: Container[tuple[str, str]] = frozenset(),
         measured: Callable[[EntityReading, Instant], None] = lambda *_: None,
         recorded: Recorded = lambda *_: None,
@@ -70,7 +65,6 @@ class NotificationEndpoint:
         self._is_ours = is_ours
         self._tenant = tenant
         self._heard = heard
-        self._is_thinned = is_thinned
         self._equipment = equipment
         self._measured = measured
         self._recorded = recorded
@@ -84,41 +78,18 @@ class NotificationEndpoint:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request."""
-        at = self._clock()
         # Of a header that is there twice the first counts, as everywhere in Starlette.
         headers = dict(reversed(scope["headers"]))
         problem = self._refusal(scope, headers)
         if problem is None and not self._is_foreign(headers):
             try:
-                body = await _body(receive)
-            except _GoneError:
+                body = await _body(Request(scope, receive))
+            except ClientDisconnect:
                 return
-            problem = (
-                Problem(413, TOO_LONG) if body is None else self._receive(body, at)
-            )
-        if problem is None:
-            for message in _TAKEN:
-                await send(message)
-        else:
-            await problem.response()(scope, receive, send)
-
-    def fits_at_once(self, headers: Mapping[bytes, bytes]) -> bool:
-        """Whether nothing but the body can be wrong; names are in lower case.
-
-        A body of undeclared length takes the slow path, which counts bytes.
-        """
-        length = headers.get(b"content-length", b"")
-        return (
-            length.isdigit()
-            and int(length) <= MAX_BODY
-            and b"transfer-encoding" not in headers
-            and _tenant_of(headers) == self._tenant
-            and self._is_admitted(headers)
-        )
-
-    def receive(self, body: bytes) -> Problem | None:
-        """Take a body that has just come; what is wrong with it, or None."""
-        return self._receive(body, self._clock())
+            is_too_long = len(body) > MAX_BODY
+            problem = Problem(413, TOO_LONG) if is_too_long else self.receive(body)
+        answer = Response(status_code=204) if problem is None else problem.response()
+        await answer(scope, receive, send)
 
     def _refusal(self, scope: Scope, headers: Mapping[bytes, bytes]) -> Problem | None:
         """The reason not to read the body at all; None to read it."""
@@ -126,9 +97,9 @@ class NotificationEndpoint:
         if declared.isdigit() and int(declared) > MAX_BODY:
             # The unread body would be taken for the next request.
             return Problem(413, TOO_LONG, headers={"Connection": "close"})
-        if self._is_admitted(headers):
+        given = headers.get(b"x-iveg-notify-token", b"").decode("latin-1")
+        if self._secret.admits(given):
             return None
-        given = _secret_of(headers)
         if given and self._is_former(given):
             # Our own subscriptions until they are mended: no reason to suspect anybody.
             self._ingest.counters["rejected.former_secret"] += 1
@@ -137,9 +108,6 @@ class NotificationEndpoint:
         self._ingest.reject(client[0] if client else "?", "forged_notification")
         return _FORGED
 
-    def _is_admitted(self, headers: Mapping[bytes, bytes]) -> bool:
-        return self._secret.admits(_secret_of(headers))
-
     def _is_foreign(self, headers: Mapping[bytes, bytes]) -> bool:
         """Whether it is of another tenant: taken, counted and ignored."""
         if _tenant_of(headers) == self._tenant:
@@ -147,7 +115,9 @@ class NotificationEndpoint:
         self._ingest.reject(_tenant_of(headers)[0] or "?", "foreign_tenant")
         return True
 
-    def _receive(self, body: bytes, at: Instant) -> Problem | None:
+    def receive(self, body: bytes) -> Problem | None:
+        """Take a body that has just come; what is wrong with it, or None."""
+        at = self._clock()
         try:
             subscription_id, reading = read_notification(
                 body, self._ingest.is_past, UNREAD, self._equipment
@@ -163,9 +133,8 @@ class NotificationEndpoint:
             self._ingest.reject(problem.source, problem.reason, problem.detail)
         for entity in reading.equipment:
             self._measured(entity, at)
-        thinned = self._is_thinned(subscription_id)
         for observation in reading.observations:
-            self._ingest.enqueue(Received(observation, at, FIWARE.id, thinned=thinned))
+            self._ingest.enqueue_copy(Received(observation, at, FIWARE.id))
         return None
 
 
@@ -191,32 +160,16 @@ class NotificationsFirst:
             await self._app(scope, receive, send)
 
 
-def _secret_of(headers: Mapping[bytes, bytes]) -> str:
-    """The secret that a notification brings; empty for none."""
-    return headers.get(b"x-iveg-notify-token", b"").decode("latin-1")
-
-
 def _tenant_of(headers: Mapping[bytes, bytes]) -> tuple[str, str]:
     service = headers.get(b"fiware-service", b"").decode("latin-1")
     return service, headers.get(b"fiware-servicepath", b"").decode("latin-1")
 
 
-class _GoneError(Exception):
-    """The sender hung up before its body was here."""
-
-
-async def _body(receive: Receive) -> bytes | None:
-    """The whole body; None where it is longer than a body may be."""
-    parts: list[bytes] = []
-    size = 0
-    while True:
-        message = await receive()
-        if message["type"] == "http.disconnect":
-            raise _GoneError
-        part = message.get("body", b"")
-        size += len(part)
-        if size > MAX_BODY:
-            return None
-        parts.append(part)
-        if not message.get("more_body", False):
-            return b"".join(parts) if len(parts) > 1 else part
+async def _body(request: Request) -> bytes:
+    """The whole body; of one that is too long no more than shows it."""
+    body = b""
+    async for part in request.stream():
+        body += part
+        if len(body) > MAX_BODY:
+            break
+    return body

@@ -2,21 +2,32 @@
 
 The answer is ``application/problem+json`` (RFC 9457), or a page where a person's
 browser asked for one.  Answers echo no input and reveal nothing internal.
+
+Errors of HTTP's boundary alone.
+
+Under the tree of ``domain/errors``::
+
+    IvegError
+    ├── NotSignedInError    401
+    ├── ForeignOriginError  403
+    └── NotJsonError        415
+
+One RFC 9457 problem, and the page that shows it to a person.
 """
 
-import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from http import HTTPStatus
 
 from fastapi import FastAPI
 from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
-from starlette.responses import Response
+from starlette.responses import JSONResponse, Response
 
 from iveg.domain.errors import (
     BusyError,
     CommandRefusedError,
-    ExperimentRefusedError,
     HopError,
     IvegError,
     MarkRefusedError,
@@ -26,24 +37,73 @@ from iveg.domain.errors import (
     NotRecordedError,
     OutdatedError,
     ProvidedAccountError,
-    TooManyLookError,
     TrialRefusedError,
     UnknownNameError,
     UnknownRobotError,
     UnreadableError,
     VersionMissingError,
-    WhatIfRefusedError,
 )
 from iveg.models.base import stamp
-from iveg.web.errors import (
-    ForeignOriginError,
-    NotJsonError,
-    NotSignedInError,
-    PasskeyAddressError,
-    PinRefusedError,
-    ProofNeededError,
-)
-from iveg.web.problem import Page, Problem
+from iveg.ngsi.payloads import all_legible
+
+
+class NotSignedInError(IvegError):
+    """The request is not authenticated."""
+
+    def __init__(self) -> None:
+        super().__init__("Sign in with the link that iVeg printed, or send a token.")
+
+
+class ForeignOriginError(IvegError):
+    """A browser sent this from another site, or without iVeg's own header."""
+
+    def __init__(self, missing: str) -> None:
+        super().__init__(f"This did not come from iVeg's own page: {missing}.")
+
+
+class NotJsonError(IvegError):
+    """A body that is not declared as JSON."""
+
+    def __init__(self) -> None:
+        super().__init__("Send the body as application/json.")
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """One RFC 9457 problem.
+
+    Attributes:
+        code: Stable, for programs; the last part of ``type``.
+        extra: Further members, such as ``why`` of a refused release.
+        headers: What the status asks for, such as ``Allow`` with 405.
+    """
+
+    status: int
+    detail: str
+    code: str = ""
+    extra: Mapping[str, object] = field(default_factory=dict)
+    headers: Mapping[str, str] = field(default_factory=dict)
+
+    def response(self) -> Response:
+        """The problem as a program reads it."""
+        members = {
+            "type": f"urn:iveg:{self.code}" if self.code else "about:blank",
+            "title": HTTPStatus(self.status).phrase,
+            "status": self.status,
+            "detail": self.detail,
+            **self.extra,
+        }
+        return JSONResponse(
+            # A name that somebody asked for may be told back, but turns nothing round.
+            all_legible(members),
+            self.status,
+            headers={"Cache-Control": "no-store", **self.headers},
+            media_type="application/problem+json",
+        )
+
+
+Page = Callable[[Request, Problem], Response]
+
 
 _MOST_COMPLAINTS = 20
 
@@ -75,18 +135,10 @@ def problem_of(error: Exception) -> Problem:
             return Problem(
                 error.status_code, str(error.detail), headers=error.headers or {}
             )
-        case (
-            CommandRefusedError()
-            | ExperimentRefusedError()
-            | MarkRefusedError()
-            | TrialRefusedError()
-            | WhatIfRefusedError()
-        ):
+        case CommandRefusedError() | MarkRefusedError() | TrialRefusedError():
             return Problem(409, str(error), _REFUSED[type(error)], {"why": error.why})
         case UnreadableError():
             return Problem(400, str(error), "unreadable", {"reason": error.reason})
-        case PinRefusedError():
-            return _refused_pin(error)
         case NotRecordedError():
             ends = {"before": stamp(error.before), "after": stamp(error.after)}
             return Problem(404, str(error), "not-recorded", ends)
@@ -102,28 +154,14 @@ def problem_of(error: Exception) -> Problem:
 
 def _broken_hop(error: HopError) -> Problem:
     extra = {"hop": error.hop}
-    if isinstance(error, TooManyLookError):
-        said = "Too many look at the past at once."
-        return Problem(503, said, "hop", {**extra, "why": "viewers"})
     # Addresses and drivers' words stay inside.
     return Problem(503, f"{error.hop} did not answer.", "hop", extra)
 
 
-def _refused_pin(error: PinRefusedError) -> Problem:
-    wait_s = math.ceil(error.wait_s)
-    members = {"blocked_s": wait_s}
-    if error.left is None:
-        wait = {"Retry-After": str(wait_s)}
-        return Problem(429, str(error), "pin-blocked", members, wait)
-    return Problem(403, str(error), "pin-wrong", {**members, "left": error.left})
-
-
 _REFUSED: Mapping[type[IvegError], str] = {
     CommandRefusedError: "command-refused",
-    ExperimentRefusedError: "experiment-refused",
     MarkRefusedError: "mark-refused",
     TrialRefusedError: "trial-refused",
-    WhatIfRefusedError: "what-if-refused",
 }
 _PLAIN: tuple[tuple[type[IvegError], int, str], ...] = (
     (NotSignedInError, 401, "not-signed-in"),
@@ -135,8 +173,6 @@ _PLAIN: tuple[tuple[type[IvegError], int, str], ...] = (
     (OutdatedError, 409, "outdated"),
     (ProvidedAccountError, 409, "provided-account"),
     (VersionMissingError, 428, "version-missing"),
-    (ProofNeededError, 403, "proof-needed"),
-    (PasskeyAddressError, 409, "passkey-address"),
     (MissingExtraError, 501, "missing-extra"),
     (ForeignOriginError, 403, "foreign-origin"),
     (NotJsonError, 415, "not-json"),

@@ -2,42 +2,44 @@
 
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable
+from itertools import islice, takewhile
 
 from iveg.domain import margins as margins_
-from iveg.domain.acknowledgements import acknowledgements_of
-from iveg.domain.alerts.alert_book import BookedAlert
+from iveg.domain.alerts import BookedAlert, acknowledgements_of
+from iveg.domain.geometry import Pose2D
 from iveg.domain.margins import LeastMargins
 from iveg.domain.observations import Instant
 from iveg.domain.records import LogRecord
 from iveg.domain.robot_state import RobotState
-from iveg.domain.rule.crossings import Crossing
+from iveg.domain.rule.zones import ZoneEntry
 from iveg.domain.stamps import format_stamp
 from iveg.domain.stop import FollowedCommand, StopMachine
 from iveg.domain.tracking.person import TrackedPerson
-from iveg.models.alert import Alert, Flood
-from iveg.models.applied import Applied, Hold
-from iveg.models.base import moment, rounded
-from iveg.models.climate import Climate
+from iveg.models.alert import Alert, LogEntry
+from iveg.models.base import GreenhouseMap, Pose, Position, Scan, Twist, moment, rounded
 from iveg.models.command import Command as CommandModel
-from iveg.models.detection import Detection, DetectionFrame
-from iveg.models.device import Device
-from iveg.models.equipment import Tile
-from iveg.models.goal import Goal
-from iveg.models.health import Health
+from iveg.models.equipment import Climate, Tile
+from iveg.models.health import Health, Safety
 from iveg.models.health import HopHealth as HopModel
-from iveg.models.log_entry import LogEntry
-from iveg.models.mapped import Scan
-from iveg.models.margin import Margin
-from iveg.models.people import Acting, Evidence
+from iveg.models.people import Acting, Detection, DetectionFrame, Evidence
 from iveg.models.people import Person as PersonModel
-from iveg.models.places import GreenhouseMap, Position
-from iveg.models.pose import Pose, Twist
-from iveg.models.robot import Detector, Mode, Navigation, Profile, Robot
-from iveg.models.robot_access import Revoked
+from iveg.models.robot import (
+    Applied,
+    Detector,
+    Device,
+    Encounter,
+    Goal,
+    Hold,
+    Margin,
+    MissingPremise,
+    Mode,
+    Navigation,
+    Profile,
+    Robot,
+    Situation,
+    SpeedLimit,
+)
 from iveg.models.rule import Rule
-from iveg.models.safety import Safety
-from iveg.models.situation import Situation
-from iveg.models.speed_limit import Encounter, MissingPremise, SpeedLimit
 from iveg.ngsi.names import ROBOT_DEVICES
 from iveg.pipeline.health_monitor import HopHealth
 from iveg.pipeline.parts import Pipeline
@@ -58,7 +60,7 @@ class Views:
         self, parts: Pipeline, counters: Callable[[], Counter[str]] | None = None
     ) -> None:
         self._evaluator, self._commander = parts.evaluator, parts.commander
-        self._margins, self._goals = parts.margins, parts.goals
+        self._goals = parts.goals
         self._situations = Situations(parts.evaluator)
         self.scans = parts.scans
         self._world, self._people = parts.world, parts.evaluator.people
@@ -71,6 +73,11 @@ class Views:
         """Made for the last list, and of what: in a flood few of many have changed."""
 
     # --- robots -------------------------------------------------------------------
+
+    @property
+    def robot_ids(self) -> Iterable[str]:
+        """The fleet, in its order."""
+        return self._world.robots
 
     def robots(self, now: Instant) -> list[Robot]:
         """The whole fleet."""
@@ -87,14 +94,14 @@ class Views:
         robot = self._world.robot(robot_id)
         machine = self._commander.machine(robot_id)
         odometry, safety, age = robot.odometry, robot.safety, robot.age_s(now)
-        margin = self._margin(robot, margins, now)
         goal = self._goals.newest(robot_id, now)
         return Robot(
             robot_id=robot_id,
             link=robot.link(now),
-            situation=Situation.of(self._situations.of(robot, machine, margin, now)),
+            situation=Situation.of(self._situations.of(robot, machine, now)),
             mode=self._mode(robot, machine, now),
             pose=None if odometry is None else Pose.of(odometry.pose),
+            lane=None if odometry is None else self._lane(odometry.pose),
             twist=None if odometry is None else Twist.of(odometry.twist),
             stamp=None if odometry is None else odometry.origin.stamp,
             received_at=moment(robot.odometry_received),
@@ -105,14 +112,14 @@ class Views:
             speed_limit=SpeedLimit.of(self._evaluator.speed_limits[robot_id]),
             encounters=[
                 Encounter.of(one, now)
-                for one in self._evaluator.foretold(robot_id, now)
+                for one in self._evaluator.encounters(robot_id, now)
             ],
             missing=[
-                MissingPremise(premise=one.premise, robot_id=one.robot_id)
-                for one in self._evaluator.missing(robot_id)
+                MissingPremise(premise=one.reason, robot_id=one.robot_id)
+                for one in self._evaluator.unmet(robot_id)
             ],
             detector=Detector.of(robot, now),
-            revoked=Revoked.of(robot),
+            refused=robot.refused,
             holds=[] if safety is None else [Hold.of(one) for one in safety.holds],
             stop=None if machine.stop is None else self.command(machine.stop, now),
             stop_state=machine.state,
@@ -122,10 +129,13 @@ class Views:
             clock_offset_s=rounded(robot.clock.offset_s(now)),
             transport=self._world.feeds.of(robot_id).transport(now.mono),
             profile=Profile.of(robot.profile),
-            margin=Margin.of(margin),
+            margin=Margin.of(self._margin(robot, margins, now)),
             cmd_status=robot.command_status,
             **Robot.sensed(robot, now),
         )
+
+    def _lane(self, place: Pose2D) -> str | None:
+        return self._greenhouse.lane_at(place.x, place.y)
 
     def _margin(
         self, robot: RobotState, margins: LeastMargins | None, now: Instant
@@ -182,24 +192,24 @@ class Views:
     ) -> list[PersonModel]:
         """Every known person."""
         margins = margins or self.margins(now)
-        crossings = defaultdict[str, list[Crossing]](list)
-        for one in self._evaluator.crossings:
-            crossings[one.zone.cause].append(one)
+        entries = defaultdict[str, list[ZoneEntry]](list)
+        for one in self._evaluator.entries:
+            entries[one.zone.cause].append(one)
         return [
-            self._person(person, crossings[person.person_id], margins, now)
+            self._person(person, entries[person.person_id], margins, now)
             for person in self._people.known.values()
         ]
 
     def _person(
         self,
         person: TrackedPerson,
-        crossings: Iterable[Crossing],
+        entries: Iterable[ZoneEntry],
         margins: LeastMargins,
         now: Instant,
     ) -> PersonModel:
         newest, rule = person.newest, self._evaluator.rule
-        x, y = newest.place
-        rings = self._people.rings(person, rule, now)
+        x, y = newest.x, newest.y
+        rings = self._people.zone_radii(person, rule, now)
         thing = self._people.things.explain(person, now)
         return PersonModel(
             person_id=person.person_id,
@@ -216,9 +226,9 @@ class Views:
             possible=newest.possible or newest.laser,
             evidence=Evidence.of(newest.looks),
             doubtful=newest.reach_m > 0.0,
-            decision_id=max((one.decision_id for one in crossings), default=None),
+            decision_id=max((one.decision_id for one in entries), default=None),
             lane=self._greenhouse.lane_at(x, y),
-            acting=[_acting(one) for one in crossings],
+            acting=[_acting(one) for one in entries],
             margin=Margin.of(margins.of_person(person.person_id)),
             thing_id=None if thing is None else thing.thing_id,
         )
@@ -276,13 +286,14 @@ class Views:
             self._alerts[one.alert_id] = kept
         return [alert for _, alert in self._alerts.values()]
 
-    def flood(self) -> Flood:
-        """How fast alerts come."""
-        return Flood.of(self._evaluator.alerts.flood)
-
     def log(self, lines: Iterable[LogRecord]) -> list[LogEntry]:
         """Lines of the log."""
         return [LogEntry.of_record(line) for line in lines]
+
+    def log_since(self, line_id: int) -> list[LogEntry]:
+        """The lines after one, oldest first; of many the newest."""
+        newest = islice(reversed(self._event_log.lines), _FIRST_LINES)
+        return self.log(takewhile(lambda one: one.id > line_id, newest))[::-1]
 
     def newest_log(self) -> list[LogEntry]:
         """The lines that a page begins with, oldest first."""
@@ -300,9 +311,8 @@ class Views:
         )
 
     def safety(self, now: Instant) -> Safety:
-        """How soon the fleet obeys, and how close it comes to people."""
-        acknowledgements = acknowledgements_of(self._evaluator.live_decisions(), now)
-        return Safety.of(acknowledgements, self._margins.exposures.today, now)
+        """How soon the fleet obeys."""
+        return Safety.of(acknowledgements_of(self._evaluator.live_decisions(), now))
 
     def climate(self, now: Instant) -> Climate | None:
         """The newest reading of the air."""
@@ -340,9 +350,9 @@ def _hop(hop: HopHealth) -> HopModel:
     )
 
 
-def _acting(crossing: Crossing) -> Acting:
+def _acting(entry: ZoneEntry) -> Acting:
     return Acting(
-        robot_id=crossing.robot_id,
-        distance_m=round(crossing.distance_m, 3),
-        in_sight=crossing.in_sight,
+        robot_id=entry.robot_id,
+        distance_m=round(entry.distance_m, 3),
+        in_sight=entry.in_sight,
     )

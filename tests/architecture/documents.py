@@ -1,9 +1,8 @@
 """The pages of ``docs/`` as tests read them: headings, sections, tables."""
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 from tests.processes import ROOT
 
@@ -11,8 +10,6 @@ DOCS = ROOT / "docs"
 INTERFACES = DOCS / "interfaces"
 PLACE = re.compile(r"`((?:iveg|tests|docs)/[\w./-]+)(?:::([\w.]+))?`")
 """A file in a cell, with the name in it that is meant."""
-_FEW = 3
-"""A value of more kinds than that may be any scalar."""
 
 
 def interfaces() -> str:
@@ -51,39 +48,6 @@ def keys(text: str) -> list[str]:
     """Names in code in the first cells of all tables, in their order."""
     rows = re.findall(r"^\| (.+?) \|", text, re.M)
     return [name for cell in rows for name in re.findall(r"`(.+?)`", cell)]
-
-
-def types(text: str) -> Iterator[tuple[str, str]]:
-    """Each name in code in the first cells of all tables, with its second cell."""
-    for names, kind in re.findall(r"^\| (`.+?) \| (.+?) \|", text, re.M):
-        for name in re.findall(r"`(.+?)`", names):
-            yield name, kind
-
-
-def type_of(schema: Mapping[str, Any], shapes: Mapping[str, Any]) -> str:
-    """A JSON schema as the page of resources writes it."""
-    match schema:
-        case {"$ref": str(ref)}:
-            name = ref.rpartition("/")[2]
-            is_shape = "properties" in shapes[name]
-            return f"[{name}](#{name.lower()})" if is_shape else _named(shapes[name])
-        case {"anyOf": [*kinds]} if len(kinds) > _FEW:
-            return "scalar"
-        case {"anyOf": [*kinds]}:
-            return " or ".join(type_of(kind, shapes) for kind in kinds)
-        case {"prefixItems": [*kinds]}:
-            return f"[{', '.join(type_of(kind, shapes) for kind in kinds)}]"
-        case {"items": kind}:
-            return f"array of {type_of(kind, shapes)}"
-        case {"additionalProperties": dict(kind)}:
-            return f"object of {type_of(kind, shapes)}"
-    return _named(schema)
-
-
-def _named(schema: Mapping[str, Any]) -> str:
-    if "enum" in schema:
-        return " or ".join(f"`{value}`" for value in schema["enum"])
-    return str(schema.get("type", "any JSON"))
 
 
 def pages() -> list[Path]:

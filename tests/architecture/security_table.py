@@ -9,16 +9,12 @@ from fastapi import FastAPI
 from fastapi.routing import iter_route_contexts
 
 from iveg.adapters import admission
-from iveg.app import what_if
 from iveg.app.opening import open_dss
 from iveg.asgi import create_app
-from iveg.domain import messages, passkeys, pins
-from iveg.domain.tracking import things
-from iveg.pipeline import messenger
+from iveg.domain.tracking import person
 from iveg.settings import Settings
-from iveg.web.api import alerts, notes, tokens
-from iveg.web.security.audited import READING
-from iveg.web.security.audited_routes import AUDITED, Audited
+from iveg.web.api import account, alerts
+from iveg.web.security.audited import AUDITED, READING, Audited
 from iveg.web.security.requirements import declared_action
 from iveg.web.security.roles import MAY
 from tests.processes import ROOT
@@ -29,31 +25,20 @@ _HEAD = ("| route | who | audit | limit |", "|---|---|---|---|")
 _BY_ITSELF = "`sign_in`, `sign_in_refused`"
 _API = "/api/v1"
 _WRONG = "wrong ones as at sign-in"
-_MINUTES = round(Settings().release_proof_minutes)
-_FRESH = f"with an account a proof of the last {_MINUTES} min"
 _LIMITS = {
-    "POST /signin": "20 a second; of an address five wrong, then one a minute",
-    f"POST {_API}/robots/{{robot_id}}/release": f"the holds that were seen; {_FRESH}",
+    "POST /signin": "20 a second; of an address five wrong, then one a minute; "
+    "of an account a wait of 10 s at most",
+    f"POST {_API}/robots/{{robot_id}}/release": "the holds that were seen",
     f"POST {_API}/robots/{{robot_id}}/goal": "one of a robot, the newest",
     f"PUT {_API}/rule": "upon the version that was seen",
     f"POST {_API}/rule/trial": "one at a time",
     f"POST {_API}/rule/trial/promote": "upon the version that was seen",
-    f"POST {_API}/what-if": f"one of each, {what_if.MOST_WAITING} in line",
-    f"POST {_API}/experiments": "one at a time, in a process of its own",
-    f"POST {_API}/notes": f"{notes.MOST_TEXT} characters",
+    f"POST {_API}/notes": f"{alerts.MOST_TEXT} characters",
     f"POST {_API}/alerts/acknowledge": f"{alerts.MOST_TOGETHER} alerts",
-    f"POST {_API}/things": f"{things.MOST_THINGS}",
-    f"PUT {_API}/messages/email": f"{messages.MOST_RECIPIENTS} recipients",
-    f"POST {_API}/messages/devices": f"{messages.MOST_DEVICES} devices",
-    f"POST {_API}/messages/{{channel}}/test": f"{messenger.MOST_WAITING} waiting",
+    f"POST {_API}/things": f"{person.MOST_THINGS}",
     f"POST {_API}/users": f"{admission.MOST_ACCOUNTS} accounts",
-    f"POST {_API}/tokens": f"{tokens.MOST_TOKENS} tokens",
-    f"POST {_API}/account/passkeys": f"{passkeys.MOST_PASSKEYS} of each; {_FRESH}",
-    f"POST {_API}/account/proof": _WRONG,
+    f"POST {_API}/tokens": f"{account.MOST_TOKENS} tokens",
     f"PUT {_API}/account/password": _WRONG,
-    f"PUT {_API}/account/pin": _FRESH,
-    f"POST {_API}/tablet": _FRESH,
-    f"POST {_API}/tablet/unlock": f"{pins.TRIES} wrong PINs, then 1, 4, 16 … min",
 }
 """What bounds a route beside its role; of all others the size of the body alone."""
 

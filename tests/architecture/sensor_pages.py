@@ -10,15 +10,12 @@ from typing import get_type_hints
 
 from iveg.domain.kinds import SENSED, Kind
 from iveg.domain.quantities import quantities_of
-from iveg.robot.ros2.sensors import ROS_SENSORS
+from iveg.robot.ros2.topics import ROS_SENSORS
 from tests.architecture.documents import INTERFACES
 
 _HEAD = "| key | type | unit | meaning |\n|---|---|---|---|\n"
 _TYPES = {float | None: "number or null", bool | None: "boolean or null"}
 _BLOCK = re.compile(r"(<!-- small sensors -->\n)(.*?)(<!-- end -->)", re.DOTALL)
-_ROBOT_ROWS = re.compile(
-    r"(\n\| `cmd_status` [^\n]*\n)((?:\|[^\n]*newest reading \|\n)*)"
-)
 _ROS_ROWS = re.compile(r"(\n\| \(none\) [^\n]*\| mask \|\n)((?:\|[^\n]* s \|\n)*)")
 
 
@@ -40,20 +37,6 @@ def _measure(kind: Kind) -> str:
     )
 
 
-def _model(kind: Kind) -> str:
-    says = (kind.of.__doc__ or "").strip()
-    return (
-        f"## {kind.of.__name__}\n\n{says}\n\n{_HEAD}"
-        f"| `age_s` | number or null | s | since it was said |\n{_rows(kind)}\n"
-    )
-
-
-def _member(kind: Kind) -> str:
-    name = kind.of.__name__
-    link = f"[{name}](#{name.lower()})"
-    return f"| `{kind.name}` | {link} or null | – | its newest reading |\n"
-
-
 def _ros(kind: Kind) -> str:
     sensor = ROS_SENSORS.get(kind.name)
     if sensor is None:
@@ -73,18 +56,12 @@ def _mqtt(page: str) -> str:
     return _BLOCK.sub(rf"\1\n{_all(_measure)}\3", page)
 
 
-def _resources(page: str) -> str:
-    page = _BLOCK.sub(rf"\1\n{_all(_model)}\3", page)
-    return _ROBOT_ROWS.sub(rf"\1{_all(_member)}", page)
-
-
 def _ros2(page: str) -> str:
     return _ROS_ROWS.sub(rf"\1{_all(_ros)}", page)
 
 
 PAGES: Mapping[str, Callable[[str], str]] = {
     "mqtt.md": _mqtt,
-    "resources.md": _resources,
     "ros2.md": _ros2,
 }
 """Pages of the contract, and how each is brought up to date."""

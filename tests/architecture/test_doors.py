@@ -15,11 +15,10 @@ from starlette.requests import Request
 from iveg.app.opening import open_dss
 from iveg.asgi import create_app
 from iveg.settings import Settings
-from iveg.web.security.audited import READING
-from iveg.web.security.audited_routes import AUDITED
+from iveg.web.security.audited import AUDITED, READING
 from iveg.web.security.requirements import declared_action
 from iveg.web.security.roles import MAY, Action
-from iveg.web.security.session_life import IDLE_S
+from iveg.web.security.sessions import IDLE_S
 from tests.architecture import documents, security_table
 
 INTERFACES = documents.interfaces()
@@ -29,7 +28,6 @@ API_TOKEN = "a-token-for-programs"
 OPEN_TO_STRANGERS = {
     "/healthz",
     "/signin",
-    "/signin/passkey",
     "/ngsi/notifications",
     "/sw.js",
 }

@@ -10,6 +10,8 @@ from tests.processes import ROOT
 
 MODULES = sorted((ROOT / "iveg").rglob("*.py"))
 FORBIDDEN = ("TODO", "FIXME", "XXX", "NotImplementedError", "time.sleep(")
+DOCUMENTED = {"_asdict", "_replace", "_current_frames"}
+"""Public in spite of their names: of named tuples, and of ``sys``."""
 EVERYTHING = sorted(
     path
     for folder in ("iveg", "tests", "benchmarks", "migrations")
@@ -47,6 +49,22 @@ def test_only_the_clock_reads_the_clock() -> None:
     }
 
     assert readers <= {"iveg/adapters/clock.py"}
+
+
+def test_no_private_attribute_is_a_librarys() -> None:
+    """Every ``_name`` that is read of an object is written somewhere in iVeg itself."""
+    nodes = [(path, node) for path in MODULES for node in ast.walk(_tree(path))]
+    ours = {name for _, node in nodes for name in _written(node)}
+    found = [
+        f"{path.relative_to(ROOT)}: {ast.unparse(node)}"
+        for path, node in nodes
+        if isinstance(node, ast.Attribute)
+        and node.attr.startswith("_")
+        and not node.attr.startswith("__")
+        and node.attr not in ours | DOCUMENTED
+    ]
+
+    assert found == []
 
 
 def test_one_door_of_the_product_names_the_laboratory() -> None:
@@ -106,6 +124,18 @@ def _tree(path: Path) -> ast.Module:
 def _loads_from_afar(line: str) -> bool:
     loads = ("src=", "<link", "url(", "@import")
     return any(word in line for word in loads) and ("//" in line.split("<!--")[0])
+
+
+def _written(node: ast.AST) -> set[str]:
+    """Names that a node makes: of a function, a class, a variable or an attribute."""
+    match node:
+        case ast.FunctionDef(name=name) | ast.AsyncFunctionDef(name=name):
+            return {name}
+        case ast.Name(id=name, ctx=ast.Store()):
+            return {name}
+        case ast.Attribute(value=ast.Name(id="self"), attr=name, ctx=ast.Store()):
+            return {name}
+    return set()
 
 
 def _names(node: ast.Import | ast.ImportFrom) -> set[str]:

@@ -9,8 +9,7 @@ import httpx
 import pytest
 from fastapi import FastAPI
 
-from iveg.adapters.history.engine import history_url
-from iveg.adapters.history.migrate import upgrade
+from iveg.adapters.history.engine import history_url, upgrade
 from iveg.app.opening import open_dss
 from iveg.asgi import create_app
 from iveg.settings import Settings

@@ -8,12 +8,10 @@ import pytest
 from iveg import cli
 from iveg.cli.arguments import parser
 from iveg.robot.ros2.config import RobotConfig, read_config
-from iveg.robot.ros2.topics import TOPICS
 from tests.architecture import documents
 from tests.processes import ROOT
 
 ROBOTS = (ROOT / "docs/robots.md").read_text()
-ROS2 = (documents.INTERFACES / "ros2.md").read_text()
 COMMANDS = (documents.INTERFACES / "cli.md").read_text()
 
 
@@ -26,22 +24,6 @@ def test_the_robot_toml_of_the_page_says_the_defaults() -> None:
     assert config.frames == RobotConfig().frames
     assert config.qualities == RobotConfig().qualities
     assert (config.tf_max_age_s, config.p_min) == (0.5, 0.8)
-
-
-@pytest.mark.parametrize(
-    ("topic", "name"), [(key, one.name) for key, one in TOPICS.items() if one.name]
-)
-def test_every_topic_is_in_the_contract(topic: str, name: str) -> None:
-    beside = topic in ("depth", "camera_info")  # these have the names of one camera
-
-    assert beside or f"`{name}`" in ROS2
-
-
-@pytest.mark.parametrize(
-    "message", sorted({form.ROS for one in TOPICS.values() for form in one.forms})
-)
-def test_every_type_is_in_the_contract(message: str) -> None:
-    assert f"`{message}`" in ROS2
 
 
 def test_every_word_of_the_command_line_is_in_the_contract() -> None:

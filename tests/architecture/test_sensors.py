@@ -8,8 +8,8 @@ from iveg.domain import observations
 from iveg.domain.kinds import KINDS, SENSED, Kind
 from iveg.domain.observations import Observation
 from iveg.domain.quantities import flags_of
-from iveg.lab.emulator.sensors import EMULATED
-from iveg.robot.ros2.sensors import ROS_SENSORS
+from iveg.lab.emulator.world import EMULATED
+from iveg.robot.ros2.topics import ROS_SENSORS
 from tests.processes import ROOT
 
 _RECEIVED_AS_ANOTHER = {"Overtaken", "RefusedFrame", "UnreadScan", "Unplaced"}
@@ -43,14 +43,6 @@ def test_every_observation_has_one_row() -> None:
     assert told == sorted(kinds), "iveg/domain/kinds.py"
 
 
-def test_no_two_kinds_share_a_name_or_a_device() -> None:
-    names = [row.name for row in KINDS]
-    suffixes = [row.suffix for row in KINDS if row.suffix is not None]
-
-    assert len(set(names)) == len(names), "iveg/domain/kinds.py"
-    assert len(set(suffixes)) == len(suffixes), "iveg/domain/kinds.py"
-
-
 @pytest.mark.parametrize("kind", SENSED, ids=lambda kind: kind.name)
 @pytest.mark.parametrize("language", ["en", "es"])
 def test_every_sensor_has_its_words(language: str, kind: Kind) -> None:
@@ -61,10 +53,8 @@ def test_every_sensor_has_its_words(language: str, kind: Kind) -> None:
 
 
 def test_every_sensor_is_emulated() -> None:
-    assert set(EMULATED) == {one.of for one in SENSED}, "iveg/lab/emulator/sensors.py"
+    assert set(EMULATED) == {one.of for one in SENSED}, "iveg/lab/emulator/world.py"
 
 
 def test_every_sensor_has_its_topic_on_a_ros_2_robot() -> None:
-    assert set(ROS_SENSORS) == {one.name for one in SENSED}, (
-        "iveg/robot/ros2/sensors.py"
-    )
+    assert set(ROS_SENSORS) == {one.name for one in SENSED}, "iveg/robot/ros2/topics.py"

@@ -34,7 +34,6 @@ def test_what_the_page_calls_comfort_is_comfort() -> None:
         "iveg.pipeline.mapping",
         "iveg.pipeline.coverage",
         "iveg.pipeline.margins",
-        "iveg.pipeline.latency",
         "iveg.pipeline.messenger",
         "iveg.adapters.history",
         "iveg.adapters.provisioner",

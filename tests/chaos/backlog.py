@@ -10,8 +10,7 @@ import contextlib
 from collections import deque
 from dataclasses import dataclass
 
-from iveg.adapters.broker_address import BrokerAddress
-from iveg.adapters.mqtt import MqttLink
+from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.domain.errors import HopError
 from tests.threads import running
 

@@ -2,8 +2,7 @@
 
 Bytes keep their order, as TCP keeps it; what the network loses comes later, together
 with what was written behind it meanwhile, and what a reset takes is gone with its
-connection.  The emulator's own relay spoils what a robot
-says, packet by packet; this one spoils the connection, in both directions.
+connection.
 """
 
 import asyncio

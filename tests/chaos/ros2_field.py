@@ -11,7 +11,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from iveg.domain.errors import UnreadableError
-from iveg.ros2 import cdr, names, nav_msgs
+from iveg.ros2 import cdr, names
+from iveg.ros2 import messages as ros
 from tests.dds import Dds, free_domain, loopback
 from tests.processes import Program, Site, until
 
@@ -35,7 +36,7 @@ class Witness:
     def __init__(self, dds: Dds) -> None:
         self._reader = dds.reader(
             f"/{names.namespace_of(ROBOT)}/odom",
-            nav_msgs.Odometry,
+            ros.Odometry,
             names.SENSOR_DATA.newest(200),
         )
         self._heard: deque[tuple[float, float]] = deque(maxlen=5000)
@@ -51,7 +52,7 @@ class Witness:
         while not self._ended.wait(0.01):
             for one in self._reader.take():
                 try:
-                    said = cdr.read(nav_msgs.Odometry, one)
+                    said = cdr.read(ros.Odometry, one)
                 except UnreadableError:
                     continue
                 speed = said.twist.twist.linear.x

@@ -49,40 +49,6 @@ def test_f14_a_blocked_loop_stops_the_heartbeat_and_halves_the_robots(
     assert witness.unlicensed == 0
 
 
-def test_f3_without_fiware_the_direct_transport_stops_the_robot(
-    stack: Field, person: Person
-) -> None:
-    stack.kill("fiware")
-
-    assert person.press("AGI")
-    person.wait_for("AGI", "STANDING")
-    robot = person.look("AGI")
-    stack.start("fiware")
-
-    assert robot is not None
-    assert robot["stop"]["transports"] == {"direct": "ok", "fiware": "failed"}
-    assert robot["stop"]["times"]["answer"].keys() == {"direct"}
-
-
-def test_f20_a_locked_database_holds_up_no_stop(stack: Field, person: Person) -> None:
-    file = Path(stack.place.directory) / "history.sqlite"
-    locker = sqlite3.connect(file, isolation_level=None, timeout=10.0)
-    locker.execute("BEGIN EXCLUSIVE")
-    try:
-        assert person.press("AGI")
-        person.wait_for("AGI", "STANDING")
-        robot = person.look("AGI")
-    finally:
-        locker.execute("ROLLBACK")
-        locker.close()
-
-    assert robot is not None
-    command_id = robot["stop"]["command_id"]
-    journal = (file.parent / "commands.jsonl").read_text()
-    assert command_id in journal
-    until(lambda: _is_stored(file, command_id), "the history has caught up")
-
-
 def test_f13_iveg_is_ready_again_and_asserts_the_stop_under_a_new_id(
     stack: Field, person: Person, witness: Witness
 ) -> None:
@@ -140,11 +106,3 @@ def _row_of(file: Path, command_id: str) -> tuple[str, str | None] | None:
             "SELECT state, reason FROM commands WHERE command_id = ?", (command_id,)
         ).fetchone()
     return None if found is None else (found[0], found[1])
-
-
-def _is_stored(file: Path, command_id: str) -> bool:
-    with sqlite3.connect(file, timeout=5.0) as reader:
-        found = reader.execute(
-            "SELECT count(*) FROM commands WHERE command_id = ?", (command_id,)
-        ).fetchone()
-    return bool(found[0])

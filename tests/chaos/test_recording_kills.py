@@ -14,9 +14,8 @@ from pathlib import Path
 
 import pytest
 
-from iveg.adapters.recordings.reading import read_messages
+from iveg.adapters.recordings.reading import finish_broken, read_messages
 from iveg.adapters.recordings.recorder import WRITE_S
-from iveg.adapters.recordings.repair import finish_broken
 from iveg.adapters.recordings.writer import SETTLE_S
 from tests.processes import ROOT, children_of, until
 
@@ -29,9 +28,12 @@ from pathlib import Path
 from iveg.adapters import clock
 from iveg.adapters.recordings.recorder import InputRecorder
 from iveg.adapters.recordings.writer import WriterSetup
+from iveg.domain.retention import DiskSpace
 
 async def main():
-    recorder = InputRecorder(WriterSetup(Path(sys.argv[1])), clock.now)
+    space = DiskSpace(10**12, 10**12)
+    setup = WriterSetup(Path(sys.argv[1]))
+    recorder = InputRecorder(setup, clock.now, read_space=lambda _: space)
     asyncio.create_task(recorder.run())
     while True:
         now = clock.now()
@@ -73,7 +75,7 @@ def _run_and_kill(folder: Path, lived: float, *, spares_writer: bool) -> float:
     """Run a recorder for a while; when it was killed (monotonic, s)."""
     command = [sys.executable, "-c", RECORDER, str(folder)]
     with subprocess.Popen(command, cwd=ROOT) as recorder:
-        until(lambda: folder.is_dir() or None, "it records")
+        until(lambda: _left_open(folder) or None, "it records")
         ends = time.monotonic() + lived
         until(lambda: time.monotonic() > ends or None, "it has lived")
         (writer,) = children_of(recorder.pid)

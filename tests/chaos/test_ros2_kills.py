@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from iveg.adapters.fleet_files import built_in
-from iveg.lab.emulator.ros2_navigation import TIMEOUT_S
+from iveg.lab.emulator.ros2_base import TIMEOUT_S
 from tests.chaos.ros2_field import (
     ROBOT,
     SETTINGS,

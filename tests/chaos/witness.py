@@ -3,8 +3,7 @@
 import contextlib
 from dataclasses import dataclass, field
 
-from iveg.adapters.broker_address import BrokerAddress
-from iveg.adapters.mqtt import MqttLink
+from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Odometry, SafetyReport
 from iveg.ngsi import codec

@@ -18,16 +18,15 @@ import httpx
 import orjson
 
 from iveg.adapters.history.queries import Queries
-from iveg.adapters.history.store import Store
+from iveg.adapters.history.recorder import Store
 from iveg.domain.events import Condition
 from iveg.domain.observations import Climate, Instant, Navigation, RobotFault
 from iveg.domain.records import Record
 from iveg.models.base import write_json
 from iveg.pipeline.publish import Subscriber
 from iveg.pipeline.record import Waiting
-from iveg.web.api import history, stop_records
-from iveg.web.live.feed import TelemetryFeed
-from iveg.web.live.painting import Painting
+from iveg.web.api import day, history
+from iveg.web.live.feed import Painting, TelemetryFeed
 from iveg.web.security.roles import Principal
 from tests.builders import detection, detection_frame, hold, safety_report, scan
 from tests.fakes.records import (
@@ -45,7 +44,6 @@ _ID = re.compile(rb"\bID\d{4}(-\d+)?")
 RECORDED = Path(__file__).with_name("answers.json")
 _TOPICS = (
     "alerts",
-    "flood",
     "rule",
     "health",
     "climate",
@@ -67,7 +65,6 @@ _ROUTES = (
     "commands",
     "commands/C1",
     "commands/latency?since=2023-11-14T22:00:00Z&until=2023-11-14T23:00:00Z",
-    "drills",
     "alerts",
     "log",
     "latency?window=1min&figures=false",
@@ -125,12 +122,11 @@ async def _world() -> WebDesk:
 
 
 def _remember(store: Store) -> None:
-    member = {"priority": "P2", "raised_at": NOON, "acknowledged_by": "ana"}
     records: tuple[Record, ...] = (
         decision_record(),
         detection_record(person_id="P1"),
-        command_record(state="STANDING", standstill_ms=640.0, drill=True, tries=1),
-        alert_record(members=[member]),
+        command_record(state="STANDING", standstill_ms=640.0, tries=1),
+        alert_record(),
         log_record(),
     )
     store.write([Waiting(record, n, 0.0) for n, record in enumerate(records, 1)])
@@ -140,12 +136,11 @@ def _open(desk: WebDesk, queries: Queries) -> None:
     """The routes of the history, beside those that the desk has."""
     seen_at = Instant(0.0, NOON + 60.0)
     find = desk.views.find_command
-    desk.app.include_router(stop_records.router(queries, desk.clock, find))
+    desk.app.include_router(day.stop_records_router(queries, desk.clock, find))
     desk.app.include_router(
         history.router(
             queries,
             FakeWorker(),
-            flood=desk.views.flood,
             read_clock=lambda: seen_at,
         )
     )
@@ -192,7 +187,7 @@ def _paced(desk: WebDesk) -> Any:
     subscriber = Subscriber()
     for topic in _PACED:
         subscriber.changed(topic)
-    painting = Painting(desk.latency.watch)
+    painting = Painting(desk.latency)
     feed = TelemetryFeed(desk.encoder.telemetry, subscriber, painting)
     feed.write_ahead(desk.clock())
     return _read(feed.next_frame(desk.clock()))

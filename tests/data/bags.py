@@ -1,15 +1,13 @@
-"""Small bags of ROS 1 and ROS 2, written where a test wants them."""
+"""Small bags of ROS 2, written where a test wants them."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rosbags.rosbag1 import Writer as Ros1Writer
-from rosbags.rosbag2 import StoragePlugin
-from rosbags.rosbag2 import Writer as Ros2Writer
+from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
 ODOMETRY, SCAN, TEXT = (
@@ -46,14 +44,6 @@ def drive(seconds: float = 2.0, speed: float = 1.0, stamps: bool = True) -> list
     return said
 
 
-def ros1_bag(path: Path, said: Sequence[Said]) -> Path:
-    """A file ``.bag``."""
-    store = get_typestore(Stores.ROS1_NOETIC)
-    with Ros1Writer(path) as writer:
-        _fill(writer, store, store.serialize_ros1, said, {"seq": 0})
-    return path
-
-
 def mcap_bag(path: Path, said: Sequence[Said]) -> Path:
     """The ``.mcap`` of a bag of ROS 2."""
     return _ros2(path, said, StoragePlugin.MCAP) / f"{path.name}.mcap"
@@ -71,18 +61,12 @@ def bag_directory(path: Path, said: Sequence[Said]) -> Path:
 
 def _ros2(path: Path, said: Sequence[Said], plugin: StoragePlugin) -> Path:
     store = get_typestore(Stores.ROS2_HUMBLE)
-    with Ros2Writer(path, version=8, storage_plugin=plugin) as writer:
-        _fill(writer, store, store.serialize_cdr, said, {})
+    with Writer(path, version=8, storage_plugin=plugin) as writer:
+        _fill(writer, store, said)
     return path
 
 
-def _fill(
-    writer: Any,
-    store: Any,
-    serialize: Callable[..., Any],
-    said: Sequence[Said],
-    header: dict[str, int],
-) -> None:
+def _fill(writer: Any, store: Any, said: Sequence[Said]) -> None:
     topics = dict.fromkeys((one.topic, one.kind) for one in said)
     connections = {
         topic: writer.add_connection(topic[0], topic[1], typestore=store)
@@ -92,18 +76,18 @@ def _fill(
         logged = round((LOGGED_FROM_S + number / 20) * 1e9)
         data = one.raw
         if data is None:
-            data = bytes(serialize(_message(store.types, one, header), one.kind))
+            data = bytes(store.serialize_cdr(_message(store.types, one), one.kind))
         writer.write(connections[one.topic, one.kind], logged, data)
 
 
-def _message(types: Any, one: Said, more: dict[str, int]) -> object:
+def _message(types: Any, one: Said) -> object:
     if one.kind == TEXT:
         return types[TEXT](data="hello")
     sec, rest = divmod(one.stamp_s, 1.0)
     stamp = types["builtin_interfaces/msg/Time"](
         sec=int(sec), nanosec=round(rest * 1e9)
     )
-    header = types["std_msgs/msg/Header"](stamp=stamp, frame_id="odom", **more)
+    header = types["std_msgs/msg/Header"](stamp=stamp, frame_id="odom")
     if one.kind == SCAN:
         return types[SCAN](
             header=header,

@@ -14,7 +14,7 @@ import pytest
 
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.domain.observations import LaserScan, Odometry
-from iveg.lab.emulator.detector_model import DETECTORS
+from iveg.lab.emulator.camera import DETECTORS
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.scenarios import scenario_named
 from iveg.lab.emulator.world import SimulatedWorld

@@ -13,6 +13,8 @@ from tests.e2e.slowly import draw_slowly
 from tests.patience import AGAIN, PATIENCE_MS
 from tests.processes import EMULATOR, Site, site
 
+_BUSY = "503 (Service Unavailable)"
+"""What a browser says of a server that says that it is busy."""
 OpenPage = Callable[..., Page]
 
 
@@ -151,7 +153,7 @@ def shoot() -> Callable[[Page, str], None]:
 
 def _listen(page: Page, complaints: list[str]) -> None:
     def take(said: ConsoleMessage) -> None:
-        if said.type in ("error", "warning"):
+        if said.type in ("error", "warning") and _BUSY not in said.text:
             complaints.append(said.text)
 
     page.on("console", take)

@@ -15,9 +15,9 @@ from typing import Any
 
 from playwright.sync_api import Browser, Page, Route, WebSocketRoute
 
-from iveg.adapters.history.store import Store
+from iveg.adapters.history.recorder import Store
 from iveg.domain.records import Record
-from iveg.lab.emulator.climate import climate_at
+from iveg.lab.emulator.fleet import climate_at
 from iveg.ngsi.codec import format_stamp
 from iveg.pipeline.record import Waiting
 from tests.fakes.records import (
@@ -33,6 +33,11 @@ from tests.processes import Site, site
 
 NOW = 1_795_231_880.2
 """When the snapshot was taken: 04:31:20 in Madrid on 21 November 2026."""
+AT = "2026-11-21T03:30:50.500Z"
+"""29.7 s before the snapshot."""
+HOLD = {"id": "x", "source": "iveg", "ack": "remote"}
+STANDS = {"mode": "STOPPED", "twist": {"linear": 0.0, "angular": 0.0}}
+
 Frozen = dict[str, Any]
 _FILE = Path(__file__).parent / "frozen.json"
 
@@ -41,6 +46,45 @@ def frozen() -> Frozen:
     """The snapshot and its scans, to be changed by whoever asked for it."""
     found: Frozen = json.loads(_FILE.read_text())
     return found
+
+
+def snapshot(count: int) -> Frozen:
+    """The snapshot with more robots like the first two."""
+    told = frozen()
+    robots = told["snapshot"]["robots"]
+    for n in range(count - len(robots)):
+        robots.append({**robots[n % 2], "robot_id": f"R{n + 3}"})
+    return told
+
+
+def order(robot: str, state: str, **changes: Any) -> dict[str, Any]:
+    """A STOP as ``/live`` tells it."""
+    times = {"pressed": AT, "requested": AT, "sent": {}, "answer": {}, "standing": AT}
+    seen = {"v": 0.4, "report_age_s": 0.1, "moved_m": 0.3}
+    return {
+        "command_id": f"c-{robot}",
+        "robot_id": robot,
+        "kind": "stop",
+        "state": state,
+        "requested_by": "ana",
+        "times": times,
+        "standstill_ms": 412.0,
+        "tries": 3,
+        "reason": None,
+        "requesters": ["ana"],
+        "hold_id": "x",
+        "pressed_doubted": False,
+        "age_s": 29.7,
+        "note": None,
+        "transports": {"direct": "ok", "fiware": "pending"},
+        "agent_lag_s": None,
+        "robot": seen,
+        "challenge_fresh": False,
+        "outcome": None,
+        "was_loud": False,
+        "steps": [],
+        **changes,
+    }
 
 
 @contextmanager

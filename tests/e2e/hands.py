@@ -124,11 +124,3 @@ def _get(who: Page | BrowserContext, stack: Site, path: str) -> dict[str, Any]:
     url = f"{stack.url}/api/v1/{path}"
     found: dict[str, Any] = who.request.get(url, max_retries=AGAIN).json()
     return found
-
-
-def in_header_or_menu(page: Page, selector: str) -> Locator:
-    """Where a button is seen: a phone has it in the menu."""
-    shown = page.locator(f"{selector}:visible")
-    if shown.count() == 0:
-        page.locator("[data-opens=menu]:visible").first.click()
-    return shown.first

@@ -14,14 +14,13 @@ from pathlib import Path
 import orjson
 
 from iveg.adapters import clock
-from iveg.adapters.broker_address import BrokerAddress
-from iveg.adapters.mqtt import MqttLink
+from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.domain.errors import UnreadableError
 from iveg.domain.observations import Origin
 from iveg.ngsi import names
 from iveg.ngsi.codec import format_stamp, read_feedback
 from iveg.ngsi.codec.fields import write_origin
-from iveg.robot.echo import Echo
+from tests.fakes.echo import Echo
 from tests.processes import Site, site
 from tests.threads import running
 
@@ -80,7 +79,7 @@ class Puppet:
     def _hear(self, topic: str, payload: bytes) -> None:
         if topic != self._orders:
             with contextlib.suppress(UnreadableError):
-                self._echo.note(read_feedback(payload).origin)
+                self._echo.note(read_feedback(payload).origin, clock.mono())
         elif self.answers:
             self._obey(payload)
 
@@ -139,16 +138,9 @@ class Puppet:
     def _origin(self) -> dict[str, object]:
         self._seq += 1
         now = clock.now()
-        return write_origin(
-            Origin(
-                self._boot,
-                self._seq,
-                format_stamp(now.wall),
-                mono=now.mono - self._started,
-                acknowledgements=True,
-                heard=self._echo.heard,
-            )
-        )
+        stamp, mono = format_stamp(now.wall), now.mono - self._started
+        said = Origin(self._boot, self._seq, stamp, mono=mono)
+        return write_origin(self._echo.on(said, now.mono))
 
 
 def described(directory: Path, *robots: str) -> str:

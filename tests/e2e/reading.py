@@ -77,36 +77,6 @@ COVERED_STOPS = """() => [...document.querySelectorAll('[data-stop]')]
 """Which visible STOPs a finger at their centre would miss, and what it would hit.
 Those of cards may have to be scrolled to; those of the strip are always in sight."""
 
-RUN_OVER = """() => [...document.querySelectorAll('td')]
-  .filter((cell) => cell.scrollHeight > cell.clientHeight + 1)
-  .map((cell) => cell.innerText)"""
-"""The words of table cells that run into the cell below."""
-
-CUT_HEADER = """() => [...document.querySelectorAll(
-    '#status, #alerts-count, [data-state=down] #health-sentence, #tablet-said')]
-  .filter((it) => it.checkVisibility())
-  .filter((it) => it.scrollWidth > it.clientWidth
-    || (it.id === 'health-sentence' && it.scrollHeight > it.clientHeight + 1)
-    || [...it.children].some((part) => part.checkVisibility()
-      && part.matches('#status-said') && part.offsetHeight > it.clientHeight))
-  .map((it) => it.innerText)"""
-"""The words of the status line, of a fault and of whose tablet it is, and the number
-of alerts, where they are cut."""
-
-TABLET = """() => {
-  const make = (tag, name, ...parts) => {
-    const one = document.createElement(tag);
-    one.className = name;
-    one.append(...parts);
-    return one;
-  };
-  const said = make('b', '', 'Bloqueada');
-  said.id = 'tablet-said';
-  const text = make('span', 'chip-button__text', said, make('small', '', 'Nave 2'));
-  const chip = make('button', 'chip-button tablet', make('i', 'icon'), text);
-  document.querySelector('.header__bar .user').before(chip);
-}"""
-"""The chip of a shared tablet, which says whose it is."""
 
 OVERFLOW = "() => document.documentElement.scrollWidth - innerWidth"
 """By how much the page is wider than the screen (px)."""

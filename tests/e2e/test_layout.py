@@ -1,29 +1,47 @@
-"""Where things stand on the live page, at every size, with two, three and six robots.
+"""Where things stand on every page and in every window, and that no STOP is covered.
 
-The robots are those of a snapshot (``tests.e2e.frozen``): nothing moves while it is
-measured, and each fleet has one page for all sizes.
+Pages show a snapshot (``tests.e2e.frozen``): nothing moves while it is measured, and
+each fleet has one page for all sizes.
 """
 
 import json
-import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from io import BytesIO
 from typing import Any
 
+import numpy as np
 import pytest
-from playwright.sync_api import Browser, Page, WebSocketRoute, expect
+from numpy.typing import NDArray
+from PIL import Image
+from playwright.sync_api import Browser, Locator, Page, WebSocketRoute, expect
 
+from iveg.models.snapshot import Snapshot
 from tests import staged
-from tests.e2e.frozen import Frozen, frozen, frozen_page, past_site, settle
+from tests.e2e.frozen import (
+    HOLD,
+    STANDS,
+    Frozen,
+    frozen,
+    frozen_page,
+    order,
+    past_site,
+    settle,
+    snapshot,
+)
+from tests.e2e.hands import press_open
 from tests.e2e.reading import (
     COVERED_STOPS,
-    CUT_HEADER,
     OVERFLOW,
     SMALLEST_STOP,
-    TABLET,
+    card,
     evaluate,
     strip_stop,
+    visit,
 )
+from tests.pictures.pages import PAST, prepare
+from tests.pictures.scenes import IDS
+from tests.pictures.scenes import fleet as fleet_in
 from tests.processes import Site
 from tests.staged import STAGED
 
@@ -33,14 +51,23 @@ APART_PX = 24
 DESKTOPS = ((1200, 800), (1440, 900), (1500, 900), (1920, 1080))
 OTHERS = ((1024, 768), (844, 390), (667, 375), (768, 1024), (390, 844), (360, 740))
 SIZES = (*DESKTOPS, *OTHERS)
+FEW = ((1440, 900), (1024, 768), (667, 375), (390, 844), (360, 740))
+"""For what is looked at in every situation."""
+ROUTES = (
+    *("/alerts", "/commands", "/history", "/fleet", "/climate", "/settings"),
+    *("/about", "/decisions/none", "/no-such-page", "/"),
+)
+LONGEST = ("does not slow", "lost while moving", "half speed for a memory", "all clear")
+"""Situations with the longest sentences of their kind, and one without any."""
 
 
 @dataclass
-class Fleet:
-    """The live page of so many robots."""
+class Told:
+    """A page, and the lines by which it hears of its robots."""
 
     page: Page
     lines: list[WebSocketRoute] = field(default_factory=list)
+    robots: list[dict[str, Any]] = field(default_factory=list)
 
     def at(self, size: tuple[int, int]) -> Page:
         """The page in a window of this size."""
@@ -48,47 +75,81 @@ class Fleet:
         self.page.clock.run_for(250)
         return self.page
 
-    def tell(self, robot: dict[str, Any]) -> None:
-        """A robot's state changes."""
-        topic = f"robots/{robot['robot_id']}"
-        self.lines[-1].send(json.dumps({"topic": topic, "data": robot}))
+    def tell(self, *robots: dict[str, Any]) -> None:
+        """Robots' states change."""
+        for robot in robots:
+            topic = f"robots/{robot['robot_id']}"
+            self.lines[-1].send(json.dumps({"topic": topic, "data": robot}))
         self.page.evaluate("() => fetch('/healthz')")
         self.page.clock.run_for(500)
 
+    def stage(self, name: str) -> None:
+        """The first robot is in one of ``STAGED``."""
+        known = STAGED[name][0]
+        said = {"situation": staged.told(known), "age_s": known.age_s}
+        self.tell({**self.robots[0], **said})
 
-def snapshot(count: int) -> Frozen:
-    """The snapshot with more robots like the first two."""
-    told = frozen()
-    robots = told["snapshot"]["robots"]
-    for n in range(count - len(robots)):
-        robots.append({**robots[n % 2], "robot_id": f"R{n + 3}"})
-    return told
+
+Show = Callable[..., Told]
 
 
 @pytest.fixture(scope="module")
 def past(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
-    """A server that has no robots."""
+    """A server of two robots that have never spoken."""
     with past_site(tmp_path_factory.mktemp("layout")) as place:
         yield place
 
 
-@pytest.fixture(scope="module", params=[2, 3, 6], ids="{} robots".format)
-def fleet(
-    request: pytest.FixtureRequest, browser: Browser, past: Site
-) -> Iterator[Fleet]:
-    """A page on it that hears of so many."""
-    told = snapshot(request.param)
-    lines: list[WebSocketRoute] = []
-    size = (1440, 900)
-    with frozen_page(browser, past, size, tell=lambda: told, lines=lines) as page:
-        page.goto(past.url)
-        settle(page, "#map-fit:enabled")
-        yield Fleet(page, lines)
+@pytest.fixture(scope="module")
+def past_of_ten(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
+    """One of ten."""
+    names = ",".join(IDS)
+    with past_site(tmp_path_factory.mktemp("ten"), IVEG_ROBOTS=names) as place:
+        yield place
 
 
-def test_13_19_nothing_overflows_or_covers_a_stop_and_stops_stand_apart(
-    fleet: Fleet,
+@pytest.fixture
+def show(browser: Browser, past: Site) -> Iterator[Show]:
+    """Opens the live page, or another, of a snapshot."""
+    opened = []
+
+    def open_one(
+        told: Frozen,
+        place: Site = past,
+        route: str = "/",
+        ready: str = "#map-fit:enabled",
+        **look: str,
+    ) -> Told:
+        lines: list[WebSocketRoute] = []
+        size = (1440, 900)
+        context = frozen_page(
+            browser, place, size, tell=lambda: told, lines=lines, **look
+        )
+        page = context.__enter__()
+        opened.append(context)
+        page.goto(place.url + route)
+        settle(page, ready)
+        return Told(page, lines, told["snapshot"]["robots"])
+
+    yield open_one
+    for context in opened:
+        context.__exit__(None, None, None)
+
+
+def test_the_snapshot_is_one_that_a_server_may_send() -> None:
+    told = frozen()["snapshot"]
+
+    assert Snapshot.model_validate(told).model_dump(mode="json") == told
+
+
+# --- every page, every window ---------------------------------------------------------
+
+
+@pytest.mark.parametrize("count", [2, 6])
+def test_nothing_overflows_or_covers_a_stop_and_stops_stand_apart(
+    show: Show, count: int
 ) -> None:
+    told = show(snapshot(count))
     wanted = {
         "overflow": 0,
         "covered": [],
@@ -97,8 +158,9 @@ def test_13_19_nothing_overflows_or_covers_a_stop_and_stops_stand_apart(
         "header": [],
         "tags": [],
     }
+
     for size in SIZES:
-        page = fleet.at(size)
+        page = told.at(size)
         found = {
             "overflow": evaluate(page, OVERFLOW),
             "covered": evaluate(page, COVERED_STOPS),
@@ -110,61 +172,341 @@ def test_13_19_nothing_overflows_or_covers_a_stop_and_stops_stand_apart(
         assert found == wanted, size
 
 
-@pytest.mark.parametrize("fleet", [2], indirect=True)
-def test_13_4_the_navigation_has_every_entry_on_every_desktop(fleet: Fleet) -> None:
-    for size in DESKTOPS:
-        page = fleet.at(size)
-        entries = page.locator(".nav a").all()
-        assert len(entries) == page.locator(".menu a").count() > 0
-        for entry in entries:
-            expect(entry).to_be_in_viewport(ratio=1)
+def test_no_page_no_dialog_and_no_message_covers_a_stop_in_any_window(
+    show: Show, past: Site
+) -> None:
+    """The gravest message: a STOP that is not obeyed."""
+    told = show(fleet_in(2, "disobeyed"))
+    found = {}
+
+    for route in ROUTES:
+        visit(told.page, route)
+        told.page.clock.run_for(500)
+        expect(told.page.locator("#p1 .p1__line")).to_be_visible()
+        for size in ((1440, 900), (768, 1024), (390, 844), (360, 740)):
+            page = told.at(size)
+            found[route, size] = [
+                *evaluate(page, COVERED_STOPS),
+                *([] if evaluate(page, OVERFLOW) <= 0 else ["too wide"]),
+                *([] if evaluate(page, SMALLEST_STOP) >= 64 else ["too small"]),
+            ]
+            if route in ("/", "/fleet"):
+                found[route, size] += _covered_by_dialogs(page)
+
+    assert {where: one for where, one in found.items() if one} == {}
 
 
-@pytest.mark.parametrize("fleet", [2], indirect=True)
-def test_13_4_the_user_opens_a_menu_with_a_way_out(fleet: Fleet) -> None:
-    for size in ((1920, 1080), (1024, 768), (844, 390)):
-        page = fleet.at(size)
-        page.locator(".header [data-opens=menu]:visible").first.click()
-
-        page.locator("#sign-out").scroll_into_view_if_needed()
-        expect(page.locator("#sign-out")).to_be_in_viewport(ratio=1)
-        assert evaluate(page, COVERED_STOPS) == []
+def _covered_by_dialogs(page: Page) -> list[Any]:
+    """STOPs that something covers while a dialog is open, of each in turn."""
+    covered = []
+    for opener in page.locator("[data-opens]:visible, .card__menu:visible").all():
+        press_open(page, opener)
+        page.clock.run_for(250)
+        covered += evaluate(page, COVERED_STOPS)
         page.keyboard.press("Escape")
+        page.wait_for_selector("dialog[open]", state="hidden")
+    return covered
 
 
-@pytest.mark.parametrize("fleet", [2], indirect=True)
-def test_13_19_a_low_screen_is_mostly_map(fleet: Fleet) -> None:
-    for size, high in (((1024, 768), 520), ((844, 390), 300), ((667, 375), 285)):
-        box = fleet.at(size).locator("#map").bounding_box()
-        assert box is not None
-        assert box["height"] >= high, size
+def test_without_the_server_no_stop_is_covered(show: Show) -> None:
+    told = show(snapshot(2))
+    told.page.route_web_socket("**/live", lambda line: line.close())
+    told.lines[-1].close()
+    told.page.clock.run_for(4000)
+
+    expect(told.page.locator("#status")).to_contain_text("Sin conexión")
+    for size in FEW:
+        page = told.at(size)
+        assert (evaluate(page, COVERED_STOPS), evaluate(page, OVERFLOW)) == ([], 0)
 
 
-@pytest.mark.parametrize("fleet", [2, 6, 10], indirect=True)
-def test_a_tablet_shows_the_strip_of_time_above_the_stops(fleet: Fleet) -> None:
-    border_px = 1
-    for size in ((768, 1024), (820, 1180), (1024, 1366), (1024, 768), (1180, 820)):
-        page = fleet.at(size)
-        strip = page.locator(".timebar").bounding_box()
-        stops = page.locator("#stops").bounding_box()
-        assert strip is not None
-        assert stops is not None
-        assert strip["y"] + strip["height"] <= stops["y"] + border_px, size
-        assert evaluate(page, UNREACHABLE, ".timebar") == [], size
+def test_the_bar_of_the_past_covers_no_stop_and_no_tool_of_the_map(
+    browser: Browser, past_of_ten: Site
+) -> None:
+    """A robot disobeys then, as now; nobody is told what to do about then."""
+    told = fleet_in(10, "disobeyed")
+    with frozen_page(browser, past_of_ten, SIZES[0], tell=lambda: told) as page:
+        prepare(page, told)
+        page.goto(past_of_ten.url + PAST)
+        settle(page, "#map-fit:enabled")
+        for size in (*FEW, (768, 1024)):
+            Told(page).at(size)
+            assert evaluate(page, COVERED_STOPS) == []
+            page.evaluate("() => scrollTo(0, 0)")
+            assert evaluate(page, UNDER_BAR) == []
+            assert evaluate(page, OVERFLOW) == 0
+            expect(page.locator("#p1 .p1__line")).to_be_in_viewport(ratio=1)
+
+        then = page.locator(".card[data-level=danger]")
+        expect(then.locator(".card__todo")).to_be_empty()
+        expect(page.locator("#status-said")).to_contain_text("use la seta roja")
 
 
-UNREACHABLE = """([within]) => [...document.querySelectorAll(
-  `${within} :is(a, button, svg[tabindex], time)`)]
-  .filter((one) => one.checkVisibility())
-  .flatMap((one) => {
-    const {left, right, top, bottom} = one.getBoundingClientRect();
-    const corners = [[left, top], [right, top], [left, bottom], [right, bottom]];
-    return corners.map(([x, y]) => [one, x < right ? x + 2 : x - 2,
-      y < bottom ? y + 2 : y - 2]);
-  })
-  .filter(([one, x, y]) => !one.contains(document.elementFromPoint(x, y)))
-  .map(([one, x, y]) => `${one.id || one.className} at ${x}, ${y}`)"""
-"""Corners of what can be pressed or read where something else lies over it."""
+def test_the_screen_of_a_wall_shows_nothing_to_press_but_stops(show: Show) -> None:
+    page = show(snapshot(6), language="en").page
+    page.locator(".user").click()
+    page.get_by_role("button", name="Wall display").click()
+    page.get_by_role("button", name="Begin").click()
+    page.wait_for_selector("body[data-wall]:not([data-panel])")
+    page.reload()
+    settle(page, "body[data-wall] #map-fit:enabled")
+    page.clock.run_for(4000)
+
+    gone = page.locator(".nav, .rearm .button, .card__menu, .user")
+    assert gone.count() > 0
+    assert [one for one in gone.all() if one.is_visible()] == []
+    expect(strip_stop(page, "fleet")).to_be_in_viewport(ratio=1)
+    assert evaluate(page, COVERED_STOPS) == []
+
+
+# --- the status line and cards --------------------------------------------------------
+
+
+def test_the_status_line_is_first_and_largest_and_nothing_moves(show: Show) -> None:
+    told = show(snapshot(2))
+    places: dict[tuple[int, int], set[tuple[float, ...]]] = {one: set() for one in FEW}
+
+    for name in LONGEST:
+        told.stage(name)
+        told.page.clock.run_for(1500)
+        for size in FEW:
+            found = evaluate(told.at(size), SAID)
+            assert (found["first"], found["whole"]) == (True, True), (size, name)
+            is_small = size[0] < 400 and found["long"]
+            assert found["larger"] == [] or is_small, (size, name)
+            x, y = found["stop"]
+            places[size].add((found["high"], x, y))
+
+    assert [size for size in FEW if len(places[size]) != 1] == []
+
+
+@pytest.mark.parametrize("language", ["es", "en"])
+def test_the_status_line_cuts_no_sentence_in_any_window_or_size_of_letters(
+    show: Show, language: str
+) -> None:
+    snapshot_of_one = frozen()
+    robot = snapshot_of_one["snapshot"]["robots"][0]
+    robots = [{**robot, "robot_id": "Cosechadora-de-la-nave-3"}]
+    snapshot_of_one["snapshot"]["robots"] = robots
+    away = "#status:not([data-level=away])"
+    told = show(snapshot_of_one, route="/account", ready=away, language=language)
+    cut = {}
+
+    for name in ("lost while moving", "does not slow"):
+        told.stage(name)
+        for wide, high in (*WINDOWS, *ZOOMED):
+            told.page.set_viewport_size({"width": wide, "height": high})
+            letters = (0, LARGE_LETTERS_PX) if (wide, high) in WINDOWS else (0,)
+            for px in letters:
+                cut[name, wide, high, px] = evaluate(told.page, CUT, px)
+            told.page.evaluate("() => { document.adoptedStyleSheets = [] }")
+
+    assert {where: found for where, found in cut.items() if found} == {}
+
+
+def test_the_status_line_shows_its_robot_on_the_map_by_tap_and_by_key(
+    show: Show,
+) -> None:
+    told = show(snapshot(2))
+    told.stage("STOP not confirmed")
+    page = told.page
+    following = page.locator("#following")
+
+    page.locator("#status").click()
+    expect(following).to_contain_text("AGI")
+    page.locator("#map-fit").click()
+    expect(following).to_be_hidden()
+    page.locator("#status").press("Enter")
+    expect(following).to_contain_text("AGI")
+
+
+def test_a_card_shows_no_half_line_and_what_to_do_whole(show: Show) -> None:
+    told = show(snapshot(6))
+    cut = {}
+
+    for name in LONGEST:
+        told.stage(name)
+        for size in (*FEW, (1280, 900)):
+            found = evaluate(told.at(size), CUT_LINES)
+            if found:
+                cut[name, size] = found
+
+    assert cut == {}
+
+
+def test_the_stop_of_each_of_six_cards_is_in_sight_and_far_from_that_of_all(
+    show: Show,
+) -> None:
+    told = show(snapshot(6))
+
+    for size in ((1200, 800), (1440, 900), (1024, 768), (768, 1024)):
+        stops = told.at(size).locator(".card .stop").all()
+        assert len(stops) == 6
+        for stop in stops:
+            expect(stop).to_be_in_viewport(ratio=1)
+    assert [_within_reach(told.at(size)) for size in OTHERS] == [[] for _ in OTHERS]
+
+
+def _within_reach(page: Page) -> object:
+    """Which STOPs are, once the page has measured itself in its new window."""
+    for _ in range(50):
+        near = evaluate(page, WITHIN_REACH)
+        if not near:
+            break
+        page.clock.run_for(100)
+    return near
+
+
+# --- a finger on its way --------------------------------------------------------------
+
+
+def states(robot: str) -> list[dict[str, Any]]:
+    """What a robot may say, with and without a STOP and a warning."""
+    commands = (
+        *("REQUESTED", "SENT", "DELIVERED", "STANDING", "UNCONFIRMED", "STILL_MOVING"),
+        *("STALE", "RELEASING", "READY"),
+    )
+    moved = order(robot, "SENT", reason="moved")
+    warned = {"reason": "clear", "cause": None, "age_s": 0.3, "feedback_age_s": 0.4}
+    fault = {"code": "no_scan", "about": "AGI", "for_s": 12.0}
+    return [
+        {},
+        {"applied": None, "margin": None, "navigation": None, "battery": None},
+        {"age_s": 2.0},
+        {"age_s": 9.0, "pose": None, "twist": None},
+        {"mode": "STOPPED", "holds": [{**HOLD, "source": "hw", "ack": "local"}]},
+        *(
+            {
+                **STANDS,
+                "holds": [] if state == "READY" else [HOLD],
+                "stop": order(robot, state),
+            }
+            for state in commands
+        ),
+        {"holds": [HOLD], "stop": moved, "applied": {**warned, "faults": [fault]}},
+    ]
+
+
+@pytest.mark.parametrize(("count", "language"), [(2, "es"), (2, "en"), (4, "es")])
+def test_nothing_moves_stop_release_or_resume(
+    show: Show, count: int, language: str
+) -> None:
+    """Of more than two robots, Release and Resume stand in a menu, which is open."""
+    told = show(snapshot(count), language=language)
+    told.page.clock.run_for(1500)  # The cards find their order.
+    if count > 2:
+        card(told.page, "AGI").locator(".card__menu").click()
+    sizes = (1440, 900), (768, 1024), (390, 844)
+
+    def places() -> list[list[str]]:
+        return [evaluate(told.at(size), PLACES) for size in sizes]
+
+    before = places()
+    for n in range(len(states(""))):
+        told.tell(
+            *(
+                {**one, "age_s": 0.0, **states(one["robot_id"])[n]}
+                for one in told.robots
+            )
+        )
+        assert places() == before, n
+        assert evaluate(told.page, SPILLED) == [], n
+        both = evaluate(told.page, BOTH)
+        assert both != []
+        assert [one for one, other in both if one != other] == [], n
+
+
+@pytest.mark.parametrize("count", [4, 10])
+def test_on_a_phone_a_stop_is_one_tap_away_and_one_of_ten_two(
+    show: Show, count: int
+) -> None:
+    told = show(snapshot(count))
+    page = told.at((390, 844))
+
+    for route in ("/alerts", "/settings", "/"):
+        visit(page, route)
+        page.clock.run_for(500)
+        whole = strip_stop(page, "fleet")
+        expect(whole).to_be_in_viewport(ratio=1)
+        if count > 4:
+            before = whole.bounding_box()
+            page.locator("#stops-more").click()
+            assert whole.bounding_box() == before
+        for robot in told.robots:
+            expect(strip_stop(page, robot["robot_id"])).to_be_in_viewport(ratio=1)
+        assert evaluate(page, COVERED_STOPS) == []
+
+
+def test_no_drawer_covers_a_stop_of_a_tablet(show: Show) -> None:
+    page = show(snapshot(10)).at((768, 1024))
+
+    page.locator(".drawer-open").click()
+    page.clock.run_for(500)
+
+    expect(page.locator("#log-panel[data-open]")).to_be_in_viewport()
+    assert evaluate(page, COVERED_STOPS) == []
+    assert page.locator("#stops .stop:visible, #stops-more:visible").count() >= 2
+
+
+def test_of_a_flood_of_alerts_the_gravest_is_open_and_a_tap_opens_others(
+    show: Show, past_of_ten: Site
+) -> None:
+    rows = "#past-rows tbody tr"
+    told = show(fleet_in(10, "flooded"), past_of_ten, route="/alerts", ready=rows)
+    page = told.at((390, 844))
+    first = page.locator("#active-alerts > li").first
+
+    expect(first).to_have_attribute("data-priority", "P1")
+    expect(first.locator("form:visible button").first).to_be_visible()
+    expect(page.locator("#active-alerts > li > details[open]")).to_have_count(1)
+    row = page.locator("#active-alerts > li").nth(3)
+    expect(row.locator("form").first).to_be_hidden()
+    row.locator("summary").first.click()
+    expect(row.locator("form").first).to_be_visible()
+    assert evaluate(page, COVERED_STOPS) == []
+
+
+# --- the system's few colours ---------------------------------------------------------
+
+_Pixels = NDArray[np.float64]
+SEEN = 100.0
+"""Between the brightness of two areas that anybody tells apart (of 255)."""
+
+
+def test_in_forced_colours_stop_danger_and_focus_are_seen(show: Show) -> None:
+    """Measured on pictures: a style sheet asks, and such a system shows its own."""
+    page = show(fleet_in(2, "danger"), theme="forced").page
+
+    for name in ("AGI", "AGII", "fleet"):
+        seen = _seen(page.locator(f"#stops [data-stop={name}]"))
+        assert abs(seen[seen.shape[0] // 2, 20] - seen[0, 0]) > SEEN, name
+    status, header = (_seen(page.locator(one)) for one in ("#status", ".header__bar"))
+    danger, other = (
+        _seen(page.locator(f".card[data-robot={name}]")) for name in ("AGII", "AGI")
+    )
+    assert abs(np.median(status) - np.median(header)) > SEEN
+    assert abs(danger[2, 40] - other[2, 40]) > SEEN
+
+    stop = page.locator("#stops [data-stop=AGI]")
+    box = stop.bounding_box()
+    assert box is not None
+    left, top = int(box["x"]) - 6, int(box["y"]) - 6
+    around = slice(top, top + int(box["height"]) + 12), slice(left, None)
+    before = _brightness(page.screenshot())[around]
+    stop.focus()
+    after = _brightness(page.screenshot())[around]
+    assert (np.abs(after - before) > SEEN / 2).sum() > 2 * box["width"]
+
+
+def _seen(part: Locator) -> _Pixels:
+    return _brightness(part.screenshot())
+
+
+def _brightness(png: bytes) -> _Pixels:
+    return np.asarray(Image.open(BytesIO(png)).convert("L"), float)
+
+
+# --- what a page is asked -------------------------------------------------------------
 
 SAID = """() => {
   const said = document.querySelector('#status-said');
@@ -191,179 +533,6 @@ SAID = """() => {
 """The status line: where it stands, whether it fits, and whether no text is larger; and
 where the STOP of all is."""
 
-
-@pytest.mark.parametrize("fleet", [2], indirect=True)
-def test_the_status_line_is_first_and_largest_and_nothing_moves(fleet: Fleet) -> None:
-    first = frozen()["snapshot"]["robots"][0]
-    places: dict[tuple[int, int], set[tuple[float, ...]]] = {
-        one: set() for one in SIZES
-    }
-    for name, (known, *_) in STAGED.items():
-        fleet.tell({**first, "situation": staged.told(known), "age_s": known.age_s})
-        fleet.page.clock.run_for(1500)
-        for size in SIZES:
-            page = fleet.at(size)
-            found = evaluate(page, SAID)
-            assert (found["first"], found["whole"]) == (True, True), (size, name)
-            is_small = size[0] < 400 and found["long"]
-            assert found["larger"] == [] or is_small, (size, name)
-            x, y = found["stop"]
-            places[size].add((found["high"], x, y))
-    assert [size for size in SIZES if len(places[size]) != 1] == []
-
-
-@pytest.mark.parametrize("fleet", [2], indirect=True)
-def test_the_status_line_shows_its_robot_on_the_map_by_tap_and_by_key(
-    fleet: Fleet,
-) -> None:
-    first = frozen()["snapshot"]["robots"][0]
-    danger = staged.told(STAGED["STOP not confirmed"][0])
-    fleet.tell({**first, "situation": danger, "age_s": 0.0})
-    page = fleet.at((1440, 900))
-    following = page.locator("#following")
-
-    for _ in range(2):
-        page.locator("#map-fit").click()
-        expect(following).to_be_hidden()
-        page.locator("#status").click()
-        expect(following).to_contain_text("AGI")
-        assert page.url.endswith("/")
-    page.locator("#map-fit").click()
-    page.locator("#status").press("Enter")
-    expect(following).to_contain_text("AGI")
-    fleet.tell({**first, "situation": staged.told(staged.facts()), "age_s": 0.0})
-
-
-HELD = {"mode": "STOPPED", "holds": [{"id": "x", "source": "hw", "ack": "local"}]}
-SILENT = {"pose": None, "twist": None, "applied": None, "age_s": None}
-STATES: tuple[dict[str, Any], ...] = (
-    {},
-    {"margin": None, "navigation": None},
-    HELD,
-    {"mode": "SLOW", "twist": {"linear": 0.0, "angular": 0.0}},
-    SILENT,
-)
-
-
-@pytest.mark.parametrize("fleet", [2], indirect=True)
-def test_13_19_a_card_is_as_high_whatever_it_says(fleet: Fleet) -> None:
-    first = frozen()["snapshot"]["robots"][0]
-    for size in ((1440, 900), (1024, 768), (768, 1024), (390, 844)):
-        heights = set()
-        for state in STATES:
-            fleet.tell({**first, **state})
-            heights.add(evaluate(fleet.at(size), CARD_HEIGHT))
-        assert len(heights) == 1, size
-
-
-@pytest.mark.parametrize("fleet", [2, 6], indirect=True)
-def test_a_card_shows_no_half_line_and_what_to_do_whole(fleet: Fleet) -> None:
-    first = frozen()["snapshot"]["robots"][0]
-    cut = {}
-    for name, (known, *_) in STAGED.items():
-        fleet.tell({**first, "situation": staged.told(known), "age_s": known.age_s})
-        for size in (*SIZES, (1280, 900)):
-            found = evaluate(fleet.at(size), CUT_LINES)
-            if found:
-                cut[name, size] = found
-    fleet.tell(first)
-
-    assert cut == {}
-
-
-LONG = (
-    "half speed",
-    "half speed for a memory",
-    "too close to where somebody was",
-    "something that only a laser sees",
-    "a camera is silent",
-)
-"""Situations of which there is most to say."""
-
-
-@pytest.mark.parametrize("fleet", [6], indirect=True)
-@pytest.mark.parametrize(
-    "size", [(1200, 800), (1440, 900), (1024, 768), (390, 844), (360, 740)]
-)
-def test_a_small_card_says_whole_what_it_is_because_of(
-    fleet: Fleet, size: tuple[int, int]
-) -> None:
-    first = frozen()["snapshot"]["robots"][0]
-    card = fleet.at(size).locator('.card[data-robot="AGI"]')
-    cut = set()
-    for name in LONG:
-        known = STAGED[name][0]
-        told = {**first, "situation": staged.told(known), "age_s": known.age_s}
-        fleet.tell(told)
-        fleet.page.clock.run_for(1000)  # The cards find their order.
-        fleet.tell(told)
-        # Else it would say how late it is.
-        expect(card).to_have_attribute("data-link", "LIVE")
-        if evaluate(fleet.page, CUT_SAID):
-            cut.add(name)
-    fleet.tell(first)
-
-    assert cut == set()
-
-
-@pytest.mark.parametrize("fleet", [2], indirect=True)
-def test_two_cards_are_whole_on_a_desktop_and_have_no_second_stop(fleet: Fleet) -> None:
-    page = fleet.at((1440, 900))
-
-    for robot in ("AGI", "AGII"):
-        last = page.locator(f'[data-robot="{robot}"] [data-part="margin"]')
-        expect(last).to_be_in_viewport(ratio=1)
-        expect(page.locator(f'[data-stop="{robot}"]:visible')).to_have_count(1)
-
-
-@pytest.mark.parametrize("fleet", [2, 6], indirect=True)
-def test_a_card_has_three_sizes_of_letters(fleet: Fleet) -> None:
-    for size in SIZES:
-        found = evaluate(fleet.at(size), LETTERS)
-        assert len(found) <= 3, (size, found)
-
-
-@pytest.mark.parametrize("fleet", [2], indirect=True)
-def test_the_menu_of_a_recorded_robot_is_on_its_card(fleet: Fleet) -> None:
-    first = frozen()["snapshot"]["robots"][0]
-    fleet.tell({**first, "replay": True})
-    card = fleet.at((1440, 900)).locator(".card").first.bounding_box()
-    menu = fleet.page.locator(".card__menu").first.bounding_box()
-    fleet.tell(first)
-    assert card is not None
-    assert menu is not None
-    assert menu["x"] + menu["width"] <= card["x"] + card["width"]
-
-
-@pytest.mark.parametrize("fleet", [6], indirect=True)
-def test_13_19_the_stop_of_each_of_six_robots_is_in_sight(fleet: Fleet) -> None:
-    for size in ((1200, 800), (1440, 900), (1024, 768), (768, 1024)):
-        stops = fleet.at(size).locator(".card .stop").all()
-
-        assert len(stops) == 6
-        for stop in stops:
-            expect(stop).to_be_in_viewport(ratio=1)
-
-
-@pytest.mark.parametrize("fleet", [2, 6], indirect=True)
-def test_13_19_a_cards_stop_keeps_its_distance_however_it_is_scrolled(
-    fleet: Fleet,
-) -> None:
-    near = [_within_reach(fleet.at(size)) for size in OTHERS]
-
-    assert near == [[] for _ in OTHERS]
-
-
-def _within_reach(page: Page) -> object:
-    """Which STOPs are, once the page has measured itself in its new window."""
-    for _ in range(50):
-        near = evaluate(page, WITHIN_REACH)
-        if not near:
-            break
-        page.clock.run_for(100)
-    return near
-
-
 WITHIN_REACH = """() => {
   const all = document.querySelector('#stops [data-stop="fleet"]');
   const near = new Set();
@@ -388,6 +557,7 @@ WITHIN_REACH = """() => {
   return [...near];
 }"""
 """STOPs of cards that a finger finds within 24 px of that of all, when scrolled."""
+
 CUT_LINES = """() => {
   const card = document.querySelector('.card[data-robot="AGI"]');
   const mode = card.querySelector('.card__mode');
@@ -416,30 +586,7 @@ CUT_LINES = """() => {
 }"""
 """Lines of a card that are seen in part or cut without an ellipsis, and what to do that
 is not seen."""
-CUT_SAID = """() => {
-  const said = document.querySelector('.card[data-robot="AGI"] .card__said');
-  return said.scrollHeight > said.clientHeight + 1;
-}"""
-LETTERS = """() => {
-  const words = document.createTreeWalker(
-    document.querySelector('#robots'), NodeFilter.SHOW_TEXT);
-  const sizes = new Set();
-  while (words.nextNode()) {
-    const of = words.currentNode.parentElement;
-    if (!words.currentNode.data.trim() || !of.checkVisibility()) continue;
-    if (!of.closest('.stop, svg, dialog')) sizes.add(getComputedStyle(of).fontSize);
-  }
-  return [...sizes];
-}"""
-"""Sizes of the letters on cards, but those of STOP and of the gauge, which scales."""
-CARD_HEIGHT = """() => {
-  const box = (part) => document.querySelector(`[data-robot="AGI"] ${part}`)
-    .getBoundingClientRect();
-  const bottom = (part) => box(`[data-part="${part}"]`).bottom;
-  const last = Math.max(bottom('task'), bottom('margin'));
-  return Math.round(last - box('.card__head').top);
-}"""
-"""From the head of a card to its last line (px); a phone has a STOP below."""
+
 NEAREST_STOP = """() => {
   const boxes = [...document.querySelectorAll('[data-stop]')]
     .filter((stop) => stop.checkVisibility({visibilityProperty: true}))
@@ -453,6 +600,7 @@ NEAREST_STOP = """() => {
   return gaps.length ? Math.min(...gaps) : 1000;
 }"""
 """The gap (px) between the STOP of all and the nearest other of the strip."""
+
 COLLISIONS = """() => {
   const parts = [...document.querySelectorAll('.header__bar > *')]
     .filter((part) => !part.matches('.stops, .spring') && part.checkVisibility());
@@ -462,219 +610,6 @@ COLLISIONS = """() => {
 }"""
 """Parts of the header that lie on the one before."""
 
-
-@pytest.mark.parametrize("fleet", [2, 6], indirect=True)
-def test_a_phone_has_one_card_a_swipe_the_worst_first_and_none_moves_once_swiped(
-    fleet: Fleet,
-) -> None:
-    told = frozen()["snapshot"]["robots"][0]
-    page = fleet.at((390, 844))
-    row = page.locator("#robots")
-    row.evaluate("(row) => { scrollTo(0, 0); row.scrollLeft = 0; }")
-    last = page.locator(".card").last
-    danger = {**told["situation"], "level": "danger", "state": "unconfirmed"}
-    worst = {**told, "robot_id": last.get_attribute("data-robot"), "situation": danger}
-
-    fleet.tell({**worst, "age_s": 0.0})
-    page.clock.run_for(1500)
-    first = page.locator(".card").first
-    expect(first).to_have_attribute("data-robot", worst["robot_id"])
-    expect(first.locator(".stop")).to_be_in_viewport(ratio=1)
-    assert row.evaluate("(row) => row.scrollLeft") == 0
-
-    page.locator(".card .card__menu").last.focus()
-    expect(page.locator(".card .card__menu").last).to_be_in_viewport(ratio=1)
-    page.locator(".card .card__menu").last.blur()
-    swiped = row.evaluate("(row) => row.scrollLeft")
-    assert swiped > 0
-    fleet.tell({**told, "age_s": 0.0})
-    page.clock.run_for(1500)
-    expect(page.locator(".card").first).to_have_attribute(
-        "data-robot", worst["robot_id"]
-    )
-    assert row.evaluate("(row) => row.scrollLeft") == swiped
-    row.evaluate("(row) => { row.scrollLeft = 0; }")
-
-
-def test_the_tab_of_the_log_leads_to_it_from_another_page(
-    browser: Browser, past: Site
-) -> None:
-    with frozen_page(browser, past, (390, 844)) as page:
-        page.goto(f"{past.url}/about")
-        page.locator('.tabbar a[href="/#log-panel"]').click()
-        settle(page, "#log li")
-        page.clock.run_for(500)
-
-        box = page.locator("#log-panel").bounding_box()
-        header = page.locator(".header").bounding_box()
-        assert box is not None
-        assert header is not None
-        assert abs(box["y"] - header["height"]) <= 2
-
-
-@pytest.mark.parametrize("name", ["commands", "alerts", "decisions", "audit", "fleet"])
-def test_no_column_of_a_list_is_cut(browser: Browser, past: Site, name: str) -> None:
-    for language in ("es", "en"):
-        with frozen_page(browser, past, (1024, 768), language=language) as page:
-            page.goto(f"{past.url}/{name}")
-            settle(page, ":is(.table--list, #machines) tbody tr")
-            for wide, high in (*SIZES, (767, 900)):
-                page.set_viewport_size({"width": wide, "height": high})
-                assert evaluate(page, CUT_LISTS) == [], (language, wide)
-
-
-@pytest.mark.parametrize("language", ["es", "en"])
-@pytest.mark.parametrize("name", ["AGI", "Tractor"])
-def test_a_phone_cuts_no_sentence_of_danger(
-    browser: Browser, past: Site, language: str, name: str
-) -> None:
-    lost = staged.told(STAGED["lost while moving"][0])
-    told = frozen()
-    robot = told["snapshot"]["robots"][0]
-    robot.update(robot_id=name, situation=lost, age_s=4.2, link="LOST")
-    told["snapshot"]["robots"] = [robot]
-    with frozen_page(
-        browser, past, (844, 390), language=language, tell=lambda: told
-    ) as page:
-        page.goto(f"{past.url}/account")
-        settle(page, "#status[data-level=danger]")
-        page.clock.run_for(500)
-        page.set_viewport_size({"width": 390, "height": 844})
-        found = evaluate(page, SAID)
-        assert page.locator("#status-said").inner_text().startswith(name)
-        assert found["whole"]
-
-
-def test_a_robot_of_the_fleet_page_is_a_few_lines_on_a_phone(
-    browser: Browser, past: Site
-) -> None:
-    with frozen_page(browser, past, (390, 844)) as page:
-        page.goto(f"{past.url}/fleet")
-        settle(page, "#machines tbody tr")
-        high = page.locator("#machines tbody tr").evaluate_all(
-            "(rows) => rows.map((row) => row.offsetHeight)"
-        )
-    assert max(high) < 200
-
-
-def test_a_tablet_cuts_no_number_of_alerts(browser: Browser, past: Site) -> None:
-    with frozen_page(browser, past, (768, 1024)) as page:
-        page.goto(past.url)
-        settle(page, "#map-fit:enabled")
-        wide = page.evaluate(NUMBER_OF_ALERTS)
-    assert wide[0] <= wide[1]
-
-
-NUMBER_OF_ALERTS = """() => {
-  document.querySelector('.brand__house').textContent = 'Invernadero '.repeat(9);
-  document.querySelector('#alerts-count').textContent = '125';
-  const button = document.querySelector('#alerts-button');
-  return [button.scrollWidth, button.clientWidth];
-}"""
-"""How wide the number of alerts is beside a long name, and its place (px)."""
-
-
-@pytest.mark.parametrize("route", ["/", "/fleet"])
-def test_a_page_that_has_heard_nothing_does_not_claim_that_nothing_is_there(
-    browser: Browser, past: Site, route: str
-) -> None:
-    with frozen_page(browser, past, (1440, 900), language="en") as page:
-        page.route_web_socket("**/live", lambda _: None)
-        page.goto(past.url + route)
-        settle(page, "body[data-loaded]")
-        page.clock.run_for(1500)
-
-        expect(page.locator("#alerts-count")).to_have_text("?")
-        shown = page.locator(".empty:visible").all_inner_texts()
-        assert [said for said in shown if NOTHING.search(said)] == []
-        if route == "/":
-            page.locator("[data-opens=people-panel]").click()
-            said = page.locator("#people-none")
-            expect(said).to_have_text("No link: unknown who is there")
-
-
-NOTHING = re.compile("No robot|Nobody|Nothing has happened|No active alerts")
-
-
-@pytest.mark.parametrize("size", [(390, 844), (667, 375), (768, 1024)])
-def test_a_silent_server_is_told_whole_beside_whose_tablet_it_is(
-    browser: Browser, past: Site, size: tuple[int, int]
-) -> None:
-    lines: list[WebSocketRoute] = []
-    with frozen_page(browser, past, size, lines=lines) as page:
-        page.goto(past.url)
-        settle(page, "#map-fit:enabled")
-        page.evaluate(TABLET)
-        page.route_web_socket("**/live", lambda line: line.close())
-        lines[-1].close()
-        page.clock.run_for(4000)
-
-        expect(page.locator("#health-sentence")).to_have_text("Servidor no responde")
-        todo = page.locator(".card__todo").first
-        expect(todo).to_have_text("trátelo como en marcha")
-        assert evaluate(page, CUT_HEADER) == []
-
-
-def test_a_phone_says_below_the_tap_that_its_browser_allows_no_notifications(
-    browser: Browser, past: Site
-) -> None:
-    with frozen_page(browser, past, (390, 844)) as page:
-        page.goto(past.url + "/settings")
-        page.locator("#messages-section").evaluate("(section) => section.open = true")
-        settle(page, "#push-join:visible")
-        page.locator("#push-join").click()
-
-        said = page.locator("#push-result")
-        expect(said).to_have_text("El navegador no permite notificaciones de iVeg.")
-        expect(said).to_be_in_viewport(ratio=1)
-        # At one moment: what is above them may still be coming.
-        apart = """said => said.getBoundingClientRect().top
-          - document.querySelector('#push-join').getBoundingClientRect().bottom"""
-        assert 0 <= said.evaluate(apart) < 24
-
-
-CUT_LISTS = """() => [...document.querySelectorAll('.scroll-x')]
-  .filter((it) => it.querySelector('.table--list, #machines'))
-  .filter((it) => it.checkVisibility() && it.scrollWidth > it.clientWidth)
-  .map((it) => `${it.id}: ${it.scrollWidth - it.clientWidth} px`)"""
-"""Lists that are wider than their place."""
-
-
-def test_the_screen_of_a_wall_looks_and_stops_and_frees_nothing(
-    browser: Browser, past: Site
-) -> None:
-    told = snapshot(6)
-    with frozen_page(
-        browser, past, (1440, 900), language="en", tell=lambda: told
-    ) as page:
-        page.goto(past.url)
-        settle(page, "#map-fit:enabled")
-        page.locator(".user").click()
-        page.get_by_role("button", name="Wall display").click()
-        page.get_by_role("button", name="Begin").click()
-        page.wait_for_selector("body[data-wall]:not([data-panel])")
-
-        page.reload()
-        settle(page, "body[data-wall] #map-fit:enabled")
-        page.clock.run_for(4000)
-        gone = page.locator(".nav, .rearm .button, .card__menu, .user")
-        assert gone.count() > 0
-        assert [one for one in gone.all() if one.is_visible()] == []
-        expect(page.locator("body")).to_have_css("cursor", "none")
-        assert evaluate(page, TAGS_ON_WORDS) == []
-        expect(strip_stop(page, "fleet")).to_be_in_viewport(ratio=1)
-        assert evaluate(page, COVERED_STOPS) == []
-        answers = {
-            path: _posted(page, path)
-            for path in ("fleet/stop", "robots/AGI/release", "alerts/x/acknowledge")
-        }
-        assert answers == {
-            "fleet/stop": 202,
-            "robots/AGI/release": 403,
-            "alerts/x/acknowledge": 403,
-        }
-
-
 TAGS_ON_WORDS = """() => [...document.querySelectorAll('.card')].filter((card) => {
   const bottom = (part) => card.querySelector(part).getBoundingClientRect().bottom;
   const mode = card.querySelector('.card__mode').getBoundingClientRect();
@@ -682,13 +617,82 @@ TAGS_ON_WORDS = """() => [...document.querySelectorAll('.card')].filter((card) =
 }).map((card) => card.dataset.robot)"""
 """Cards on which the age covers what is said."""
 
-
-def _posted(page: Page, path: str) -> object:
-    """The status of a request that changes something, sent by the page itself."""
-    return evaluate(page, _POST, f"/api/v1/{path}")
-
-
-_POST = """async ([path]) => {
-  const headers = {'X-IVEG': '1', 'Content-Type': 'application/json'};
-  return (await fetch(path, {method: 'POST', headers, body: '{}'})).status;
+UNDER_BAR = """() => {
+  const bar = document.querySelector('#past').getBoundingClientRect();
+  return [...document.querySelectorAll('.map-tools button')]
+    .filter((one) => one.getBoundingClientRect().bottom > bar.top
+      && one.getBoundingClientRect().right > bar.left)
+    .map((one) => one.id);
 }"""
+"""Tools of the map that the bar of the past lies over."""
+
+LOW = ((568, 320), (667, 375), (768, 390), (844, 390), (932, 430), (1180, 500))
+NARROW = ((320, 568), (390, 844), (768, 1024))
+WIDE = ((1000, 700), (1024, 768), (1200, 800), (1400, 900))
+ZOOMED = ((720, 450), (512, 384), (422, 195), (195, 422))
+"""Windows of 1440, 1024, 844 and 390 px at 200 %."""
+WINDOWS = (*LOW, *NARROW, *WIDE)
+LARGE_LETTERS_PX = 28
+"""The smallest that some readers set; most set nothing."""
+
+CUT = """async ([px]) => {
+  const said = document.querySelector('#status-said');
+  const sheet = new CSSStyleSheet();
+  sheet.replaceSync(px ? `#status-said { font-size: ${px}px !important }` : '');
+  document.adoptedStyleSheets = [sheet];
+  const drawn = () => new Promise((done) => {
+    const seen = new IntersectionObserver(() => done(seen.disconnect()));
+    seen.observe(said);
+  });
+  await drawn();
+  await drawn();
+  const line = document.querySelector('#status').getBoundingClientRect();
+  const range = document.createRange();
+  range.selectNodeContents(said);
+  return [...range.getClientRects()].flatMap((box) => {
+    const isOut = box.top < line.top - 3 || box.bottom > line.bottom + 3
+      || box.left < line.left || box.right > line.right + 1
+      || box.right > innerWidth + 1;
+    const hits = [box.left + 2, (box.left + box.right) / 2, box.right - 2]
+      .map((x) => document.elementFromPoint(x, (box.top + box.bottom) / 2));
+    const over = hits.find((hit) => hit && !hit.closest('#status'));
+    if (!isOut && !over) return [];
+    return [`${Math.round(box.top)}-${Math.round(box.bottom)} of ${line.height} px`
+      + `: ${over?.className ?? ''} ${said.textContent}`];
+  });
+}"""
+"""Lines of the sentence that end outside of its place, or lie under something, with
+letters of so many px at least, once the page has been drawn with them."""
+
+PLACES = """() => [...document.querySelectorAll(
+  '[data-stop], [data-release], [data-resume]')]
+  .filter((one) => one.checkVisibility())
+  .map((one) => {
+    const {x, y, width, height} = one.getBoundingClientRect();
+    const where = [scrollX + x, scrollY + y, width, height].map(Math.round);
+    return `${one.dataset.stop ?? one.ariaLabel} ${where}`;
+  })"""
+
+SPILLED = """() => [...document.querySelectorAll('[data-stop]')]
+  .filter((one) => one.checkVisibility())
+  .filter((one) => {
+    const {left, top, right, bottom} = one.getBoundingClientRect();
+    const cut = parseFloat(getComputedStyle(one).getPropertyValue('--cut'));
+    const words = document.createRange();
+    words.selectNodeContents(one.querySelector('.stop__label'));
+    return [...words.getClientRects()].some((line) => {
+      // Letters end before their line does, and few stand in its corners.
+      const [high, low] = [line.top + 2 - top, bottom + 2 - line.bottom];
+      const side = Math.min(line.left - left, right - line.right);
+      const end = Math.min(high, low);
+      return side < 0 || end < 0 || side + end < cut - 2;
+    });
+  })
+  .map((one) => `${one.dataset.state} ${one.innerText} ${innerWidth}`)"""
+"""STOPs whose words do not fit, or run over a corner of the octagon (px)."""
+
+BOTH = """() => [...document.querySelectorAll('.card .stop')].map((one) => {
+  const twin = document.querySelector(`#stops [data-stop="${one.dataset.stop}"]`);
+  return [one, twin].map((it) =>
+    `${it.dataset.state} ${it.querySelector('.stop__label').textContent}`);
+})"""

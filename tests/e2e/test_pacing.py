@@ -13,7 +13,7 @@ from urllib.parse import urlsplit
 import pytest
 from playwright.sync_api import Browser, Page
 
-from iveg.web.live.pacing import FRAMES
+from iveg.web.live.feed import FRAMES
 from tests.bonds import bound
 from tests.chaos.radio import Radio, Weather
 from tests.e2e.reading import evaluate

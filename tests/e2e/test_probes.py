@@ -1,7 +1,4 @@
-"""Names that are markup: refused at the door, or text on every page, never more.
-
-A lane of the greenhouse has such a name; detectors, robots and people try the rest.
-"""
+"""Names that are markup are text on every page, never more."""
 
 import json
 from collections.abc import Iterator
@@ -13,10 +10,10 @@ from paho.mqtt import publish
 from playwright.sync_api import expect
 
 import iveg
-from iveg.adapters.broker_address import BrokerAddress
+from iveg.adapters.mqtt import BrokerAddress
 from tests.e2e.conftest import OpenPage
 from tests.e2e.reading import evaluate, visit
-from tests.processes import EMULATOR, Site, site, until
+from tests.processes import EMULATOR, Site, site
 
 pytestmark = pytest.mark.e2e
 
@@ -39,42 +36,6 @@ def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
         probed.start(*EMULATOR)
         probed.wait_until_live()
         yield probed
-
-
-def test_a_robot_of_a_hostile_name_is_refused_before_anything_starts(
-    tmp_path: Path,
-) -> None:
-    with site(tmp_path, IVEG_ROBOTS=PROBE) as wrong:
-        program = wrong.start("serve")
-        status = program.process.wait(30.0)
-
-    assert status != 0
-    [said] = program.text().strip().splitlines()
-    assert "IVEG_ROBOTS" in said
-    assert "Traceback" not in said
-
-
-def test_a_robot_of_a_hostile_name_cannot_be_asked_for(stack: Site) -> None:
-    with stack.api() as api:
-        for path in (f"robots/{PROBE}", f"robots/{PROBE}/scan", f"commands/{PROBE}"):
-            answer = api.get(path)
-
-            assert answer.status_code in (404, 422)
-            assert answer.headers["content-type"] == "application/problem+json"
-
-
-def test_a_reason_that_the_contract_does_not_know_is_refused_and_counted(
-    stack: Site,
-) -> None:
-    state = {"speed_factor": 0.5, "reason": PROBE, "cause": PROBE, "holds": []}
-    _publish(stack, "AGI", "safety", {"safety_state": state})
-
-    def is_counted() -> bool:
-        with stack.api() as api:
-            counters = api.get("health").json()["counters"]
-        return any("reject" in name and n > 0 for name, n in counters.items())
-
-    until(is_counted, "a message that was refused and counted")
 
 
 def test_a_robot_that_nobody_named_is_nobody(stack: Site) -> None:

@@ -1,4 +1,4 @@
-"""The five widgets before robots that speak ROS 2, as ``make demo-ros2`` has them."""
+"""The five widgets before the robots of ``demo --ros2``."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -6,12 +6,13 @@ from collections.abc import Callable, Iterator
 import pytest
 from playwright.sync_api import Page, expect
 
+from iveg.lab.commands.demo import ros2_parts
 from tests.e2e.conftest import OpenPage
 from tests.e2e.hands import let_go
 from tests.e2e.reading import card, evaluate, number, strip_stop
 from tests.processes import Site, site, until
 
-pytestmark = [pytest.mark.e2e, pytest.mark.full_speed]
+pytestmark = [pytest.mark.e2e]
 
 NOTE_PAINTED = """() => {
   window.painted = {};
@@ -27,7 +28,12 @@ STANDING = re.compile(r"PARADO \(hace [\d,]+ s\)")
 @pytest.fixture(scope="module")
 def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
     with site(tmp_path_factory.mktemp("ros2")) as place:
-        place.start("demo", "--ros2")
+        place.start("fiware").wait_until_ready()
+        place.start("serve", "--demo").wait_until_ready()
+        emulator, *robots = ros2_parts(["AGI", "AGII"])
+        place.start(*emulator, "--hz", "10")
+        for words in robots:
+            place.start(*words)
         place.wait_until_live()
         yield place
 

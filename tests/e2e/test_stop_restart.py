@@ -1,16 +1,17 @@
 """iVeg dies and comes back, sessions end: the open page can still stop."""
 
-import json
 from collections.abc import Iterator
+from dataclasses import replace
 
 import pytest
 from playwright.sync_api import Page, expect
 
+from iveg.adapters.access_file import AccessFile
 from tests.e2e.conftest import OpenPage
 from tests.e2e.hands import let_go, open_menu
 from tests.e2e.puppet import CRUISE, Puppet, stage
 from tests.e2e.reading import card, strip_stop
-from tests.processes import Program, Site, until
+from tests.processes import Site, until
 
 pytestmark = [pytest.mark.e2e, pytest.mark.slow]
 
@@ -46,38 +47,26 @@ def agv(scene: tuple[Site, Puppet], page: Page, stack: Site) -> Puppet:
     return robot
 
 
-def test_the_open_page_recovers_from_a_kill_by_itself_and_its_stop_stands(
+def test_a_press_while_the_server_is_dead_arrives_and_the_page_recovers_by_itself(
     page: Page, agv: Puppet, stack: Site
 ) -> None:
-    _server(stack).kill()
+    stack.newest("serve").kill()
+    control = strip_stop(page, "AGV")
     expect(page.locator("#status")).to_contain_text("Sin conexión")
-    expect(strip_stop(page, "AGV")).to_have_attribute("data-state", "lost")
-    _serve_again(stack)
-
-    control = strip_stop(page, "AGV")
-    expect(control).to_have_attribute("data-state", "ready")
-    control.click()
-    expect(control).to_contain_text("PARADO (")
-    assert agv.speed == 0.0
-
-
-def test_a_press_while_the_server_is_dead_arrives_when_it_is_back(
-    page: Page, agv: Puppet, stack: Site
-) -> None:
-    _server(stack).kill()
-    control = strip_stop(page, "AGV")
     expect(control).to_have_attribute("data-state", "lost")
     control.click()
     _serve_again(stack)
 
     expect(control).to_contain_text("PARADO (")
     assert agv.speed == 0.0
+    let_go(page, stack, "AGV")
+    expect(control).to_have_attribute("data-state", "ready")
 
 
 def test_f42_a_page_whose_session_is_over_stops_and_asks_to_sign_in_for_the_rest(
     page: Page, agv: Puppet, stack: Site
 ) -> None:
-    _server(stack).kill()
+    stack.newest("serve").kill()
     _age_sessions(stack, 13 * HOUR)
     _serve_again(stack)
 
@@ -111,10 +100,6 @@ def test_who_signed_out_can_no_longer_stop_and_no_page_looks_as_if_they_could(
     expect(control).to_contain_text("SIN ENLACE — use la seta roja del robot")
 
 
-def _server(stack: Site) -> Program:
-    return [one for one in stack.programs if one.words[0] == "serve"][-1]
-
-
 def _serve_again(stack: Site) -> None:
     stack.start("serve")
     stack.wait_until_served()
@@ -122,9 +107,11 @@ def _serve_again(stack: Site) -> None:
 
 def _age_sessions(stack: Site, seconds: float) -> None:
     """As if that much time had gone by while iVeg was away."""
-    path = stack.directory / "sessions.jsonl"
-    lines = [json.loads(line) for line in path.read_text().splitlines()]
-    for line in lines[1:]:  # the first says how the file is written
-        line["began"] -= seconds
-        line["seen"] -= seconds
-    path.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    file = AccessFile(stack.directory / "accounts.jsonl")
+    known = file.load()
+    aged = (
+        replace(one, began=one.began - seconds, seen=one.seen - seconds)
+        for one in known.sessions
+    )
+    file.save(replace(known, sessions=tuple(aged)))
+    file.close()

@@ -77,11 +77,10 @@ class FakeIdentityProvider:
     """One provider.
 
     Attributes:
-        people: Subject → claims; ``proved`` are the moments of their last proof.
+        people: Subject → claims.
         vice: What it does wrong; empty: nothing.
         id_token: Changes the claims of the next ID token.
         asked: Paths that were asked for, and forms that came to the token endpoint.
-        discloses_proof: It tells ``auth_time``.
     """
 
     url: str
@@ -91,14 +90,12 @@ class FakeIdentityProvider:
     vice: str = ""
     id_token: dict[str, Any] = field(default_factory=dict)
     in_user_info: bool = False
-    discloses_proof: bool = True
     asked: list[str] = field(default_factory=list)
     forms: list[dict[str, str]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.key = _first_key("EC" if self.alg.startswith("ES") else "RSA")
         self.published = [self.key]
-        self.proved: dict[str, float] = {}
         self._codes: dict[str, tuple[str, dict[str, str]]] = {}
         self._tokens: dict[str, str] = {}
 
@@ -111,8 +108,6 @@ class FakeIdentityProvider:
         """What the provider's page does: where a browser goes that was sent here."""
         query = {k: v[0] for k, v in parse_qs(urlsplit(address).query).items()}
         assert (query["response_type"], query["client_id"]) == ("code", CLIENT)
-        if query.get("prompt") == "login" or who not in self.proved:
-            self.proved[who] = self.wall()
         code = secrets.token_urlsafe(16)
         self._codes[code] = (who, query)
         answer = {"code": code, "state": query["state"]}
@@ -225,8 +220,6 @@ class FakeIdentityProvider:
             "exp": now + 300,
             "nonce": nonce,
         }
-        if self.discloses_proof:
-            claims["auth_time"] = int(self.proved[who])
         if not self.in_user_info:
             claims |= self.people[who]
         claims |= self.id_token

@@ -14,7 +14,7 @@ from typing import Any, Self
 import psycopg
 from psycopg.sql import SQL, Identifier
 
-from iveg.adapters.history.migrate import upgrade
+from iveg.adapters.history.engine import upgrade
 from tests.bonds import bound
 from tests.ports import free_ports
 from tests.processes import until

@@ -3,13 +3,13 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from iveg.adapters.disk import disk_space
+from iveg.adapters.files import disk_space
 from iveg.adapters.recordings.directory import RecordingDirectory
 from iveg.adapters.recordings.incoming import Unpacking
 from iveg.adapters.recordings.recorder import InputRecorder
 from iveg.adapters.recordings.writer import RecordingWriter, WriterSetup
-from iveg.domain.disk_space import DiskSpace
 from iveg.domain.recordings import RecordingFile
+from iveg.domain.retention import DiskSpace
 
 
 class FakeRecordings:
@@ -42,22 +42,3 @@ class WriterInPlace:
             for came in self._unpacking.feed(piece):
                 self.writer.write_input(came)
         self.writer.keep_house(now)
-
-
-class FakePast:
-    """Implements ``web.api.past.Past``.
-
-    Attributes:
-        asked: (viewer, Unix s) of each question.
-        fails: What the next ones raise.
-    """
-
-    def __init__(self) -> None:
-        self.asked: list[tuple[str, float]] = []
-        self.fails: Exception | None = None
-
-    async def world(self, viewer: str, wall: float) -> bytes:
-        self.asked.append((viewer, wall))
-        if self.fails is not None:
-            raise self.fails
-        return b'{"at_s":1}'

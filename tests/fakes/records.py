@@ -2,7 +2,6 @@
 
 from typing import Any
 
-from iveg.domain.latency.sketch import sketch_of, write_bins
 from iveg.domain.records import (
     AlertRecord,
     AuditRecord,
@@ -11,7 +10,6 @@ from iveg.domain.records import (
     CommandRecord,
     DecisionRecord,
     DetectionRecord,
-    LatencyRecord,
     LogRecord,
     MeasurementRecord,
     OdometryRecord,
@@ -150,22 +148,6 @@ def alert_record(**fields: Any) -> AlertRecord:
         "robot_id": "AGI",
     }
     return AlertRecord(**(defaults | fields))
-
-
-def latency_record(**fields: Any) -> LatencyRecord:
-    sketch = sketch_of([0.010, 0.020])
-    defaults: dict[str, Any] = {
-        "at": NOON,
-        "robot_id": "AGI",
-        "data": "lidar",
-        "hop": "uplink",
-        "count": sketch.count,
-        "total_s": sketch.total,
-        "least_s": sketch.least,
-        "most_s": sketch.most,
-        "bins": write_bins(sketch),
-    }
-    return LatencyRecord(**(defaults | fields))
 
 
 def log_record(**fields: Any) -> LogRecord:

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from iveg.ros2 import cdr
+from iveg.ros2.messages import Message
 from iveg.ros2.names import DEFAULT, Endpoint, Qos
-from iveg.ros2.schema import Message
 
 
 def endpoint(
@@ -27,6 +27,7 @@ class Reader:
     """A subscription."""
 
     waiting: list[bytes] = field(default_factory=list)
+    writers: int = 1
 
     def take(self) -> list[bytes]:
         found, self.waiting = self.waiting, []
@@ -56,11 +57,17 @@ class FakeNetwork:
         self.readers: dict[str, Reader] = defaultdict(Reader)
         self.writers: dict[str, Writer] = {}
         self.others: list[Endpoint] = []
+        self.deaf_on: list[str] = []
+        self.raw: set[str] = set()
         self.asked: dict[str, tuple[type[Message], Qos]] = {}
         self._watched: list[tuple[list[Any], Callable[[], None]]] = []
 
-    def reader(self, name: str, message: type[Message], qos: Qos) -> Reader:
+    def reader(
+        self, name: str, message: type[Message], qos: Qos, *, raw: bool = False
+    ) -> Reader:
         self.asked[name] = message, qos
+        if raw:
+            self.raw.add(name)
         return self.readers[name]
 
     def writer(self, name: str, message: type[Message], qos: Qos) -> Writer:
@@ -69,6 +76,9 @@ class FakeNetwork:
 
     def endpoints(self) -> list[Endpoint]:
         return self.others
+
+    def unheard(self) -> list[str]:
+        return self.deaf_on
 
     def watch(self, readers: list[Any], on_data: Callable[[], None]) -> None:
         self._watched.append((readers, on_data))

@@ -1,10 +1,13 @@
 """Fixtures that run iVeg's programs on free ports and insist on clean logs."""
 
-from collections.abc import Iterator
+import asyncio
+from collections.abc import AsyncIterator, Iterator
 from pathlib import Path
 
 import pytest
 
+from iveg.adapters.mqtt import BrokerAddress
+from tests.integration.emulator_cloud import Cloud, broker, running, until
 from tests.processes import EMULATOR, Site, site
 
 
@@ -44,3 +47,19 @@ def demo(place: Site) -> Site:
     place.start("demo")
     place.wait_until_live()
     return place
+
+
+@pytest.fixture
+async def address(tmp_path: Path) -> AsyncIterator[BrokerAddress]:
+    """Of a broker on a free port."""
+    async with broker(tmp_path) as where:
+        yield where
+
+
+@pytest.fixture
+async def cloud(address: BrokerAddress) -> AsyncIterator[Cloud]:
+    """A small iVeg on it, which hears and answers."""
+    small = Cloud(address)
+    async with running(asyncio.create_task(small.run())):
+        await until(lambda: small.link.connected)
+        yield small

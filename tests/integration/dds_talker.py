@@ -7,7 +7,8 @@ import sys
 import threading
 from itertools import count
 
-from iveg.ros2 import cdr, geometry_msgs, names
+from iveg.ros2 import cdr, names
+from iveg.ros2 import messages as ros
 from iveg.ros2.names import Qos
 from tests.dds import Dds, loopback
 
@@ -23,19 +24,14 @@ def talk(domain: int) -> None:
     pause = threading.Event()
     with Dds(loopback(domain)) as dds:
         writers = {
-            topic: dds.writer(topic, geometry_msgs.Twist, qos)
-            for topic, qos in QUALITIES.items()
+            topic: dds.writer(topic, ros.Twist, qos) for topic, qos in QUALITIES.items()
         }
         kept = writers.pop("/kept")
         for number in range(3):
-            kept.write(
-                cdr.write(geometry_msgs.Twist(geometry_msgs.Vector3(float(number))))
-            )
+            kept.write(cdr.write(ros.Twist(ros.Vector3(float(number)))))
         for number in count():
             for writer in writers.values():
-                writer.write(
-                    cdr.write(geometry_msgs.Twist(geometry_msgs.Vector3(float(number))))
-                )
+                writer.write(cdr.write(ros.Twist(ros.Vector3(float(number)))))
             pause.wait(0.1)
 
 

@@ -11,8 +11,7 @@ from typing import TypeVar
 
 import aiomqtt
 
-from iveg.adapters.broker_address import BrokerAddress
-from iveg.adapters.mqtt import MqttLink
+from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.domain.feedback import CLEAR, Feedback, SpeedLimit
 from iveg.domain.observations import (
     CommandAnswer,

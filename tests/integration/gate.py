@@ -13,21 +13,18 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Literal
 
-from iveg.adapters.broker_address import BrokerAddress
-from iveg.adapters.mqtt import MqttLink
+from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.domain.errors import HopError
 from tests.threads import running
 
-Mood = Literal["open", "shut", "slow", "hanging", "error", "malformed", "odd"]
+Mood = Literal["open", "shut", "slow", "hanging", "odd"]
 SLOW_S = 2.0
 _LENGTH = re.compile(rb"\r\ncontent-length: *(\d+)", re.IGNORECASE)
-_JSON = b"HTTP/1.1 200 OK\r\nContent-Type: application/json\r\n"
-_ANSWERS: dict[str, bytes] = {
-    "error": b"HTTP/1.1 500 Internal Server Error\r\nContent-Length: 0\r\n\r\n",
-    "malformed": _JSON + b'Content-Length: 10\r\n\r\n{"orion":[',
-    "odd": _JSON + b"Fiware-Total-Count: many\r\nContent-Length: 7\r\n\r\n[7,[8]]",
-}
-"""Refused, not JSON, and JSON that nobody can use."""
+_ODD = (
+    b"HTTP/1.1 200 OK\r\nContent-Type: application/json\r\n"
+    b"Fiware-Total-Count: many\r\nContent-Length: 7\r\n\r\n[7,[8]]"
+)
+"""JSON that nobody can use."""
 
 
 class Gate:
@@ -107,8 +104,8 @@ class Gate:
             return
         if self._mood == "hanging":
             await asyncio.Event().wait()
-        elif self._mood in _ANSWERS:
-            await _answer(reader, writer, _ANSWERS[self._mood])
+        elif self._mood == "odd":
+            await _answer(reader, writer)
         else:
             delay_s = SLOW_S if self._mood == "slow" else 0.0
             await self._pass_on(reader, writer, delay_s)
@@ -148,15 +145,13 @@ async def _copy(
         await writer.drain()
 
 
-async def _answer(
-    reader: asyncio.StreamReader, writer: asyncio.StreamWriter, answer: bytes
-) -> None:
+async def _answer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
     """The same to every request of a connection."""
     while True:
         head = await reader.readuntil(b"\r\n\r\n")
         length = _LENGTH.search(head)
         await reader.readexactly(int(length[1]) if length else 0)
-        writer.write(answer)
+        writer.write(_ODD)
 
 
 class Bridge:

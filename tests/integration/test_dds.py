@@ -5,17 +5,19 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 
 import pytest
 
 from iveg.domain.errors import HopError
-from iveg.ros2 import cdr, geometry_msgs, names, vision_msgs
+from iveg.ros2 import cdr, names
 from iveg.ros2 import detector_messages as d
+from iveg.ros2 import messages as ros
+from iveg.ros2.cdr import type_hash
+from iveg.ros2.messages import Message
 from iveg.ros2.names import Qos
-from iveg.ros2.schema import Message
-from iveg.ros2.type_hash import type_hash
 from tests.bonds import bound
-from tests.dds import Dds, DdsReader, free_domain, loopback
+from tests.dds import Dds, DdsNetwork, DdsReader, free_domain, loopback
 from tests.processes import ROOT, until
 
 RELIABLE, BEST_EFFORT = names.DEFAULT, names.SENSOR_DATA
@@ -50,7 +52,7 @@ def dds(domain: int, talker: subprocess.Popen[bytes]) -> Iterator[Dds]:
 
 def heard(reader: DdsReader) -> list[float] | None:
     """Numbers that wait; None when there are none."""
-    found = [cdr.read(geometry_msgs.Twist, one).linear.x for one in reader.take()]
+    found = [cdr.read(ros.Twist, one).linear.x for one in reader.take()]
     return found or None
 
 
@@ -66,7 +68,7 @@ def heard(reader: DdsReader) -> list[float] | None:
 def test_a_reader_hears_a_writer_that_offers_what_it_asks(
     dds: Dds, topic: str, asked: Qos
 ) -> None:
-    reader = dds.reader(topic, geometry_msgs.Twist, asked)
+    reader = dds.reader(topic, ros.Twist, asked)
 
     found = until(lambda: heard(reader), f"a message on {topic}", 10.0)
 
@@ -74,7 +76,7 @@ def test_a_reader_hears_a_writer_that_offers_what_it_asks(
 
 
 def test_who_comes_late_gets_what_was_kept(dds: Dds) -> None:
-    kept = dds.reader("/kept", geometry_msgs.Twist, KEPT)
+    kept = dds.reader("/kept", ros.Twist, KEPT)
 
     numbers = until(lambda: heard(kept), "what was kept")
 
@@ -87,8 +89,8 @@ def test_who_comes_late_gets_what_was_kept(dds: Dds) -> None:
 def test_a_reader_that_asks_for_more_than_is_offered_hears_nothing_and_shows_it(
     dds: Dds, topic: str, asked: Qos
 ) -> None:
-    reader = dds.reader(topic, geometry_msgs.Twist, asked)
-    other = dds.reader(topic, geometry_msgs.Twist, BEST_EFFORT)
+    reader = dds.reader(topic, ros.Twist, asked)
+    other = dds.reader(topic, ros.Twist, BEST_EFFORT)
 
     until(lambda: heard(other), f"a message on {topic}", 10.0)
     offered = next(one for one in dds.endpoints() if one.topic == topic and one.writes)
@@ -98,7 +100,7 @@ def test_a_reader_that_asks_for_more_than_is_offered_hears_nothing_and_shows_it(
 
 
 def test_endpoints_have_the_names_of_ros_and_say_whose_they_are(dds: Dds) -> None:
-    writer = dds.writer("/ours", geometry_msgs.TwistStamped, RELIABLE)
+    writer = dds.writer("/ours", ros.TwistStamped, RELIABLE)
 
     def foreign() -> bool:
         return {"/best_effort", "/reliable", "/kept"} <= {
@@ -117,18 +119,19 @@ def test_endpoints_have_the_names_of_ros_and_say_whose_they_are(dds: Dds) -> Non
 def test_a_message_of_another_layout_never_arrives(dds: Dds, domain: int) -> None:
     """DDS checks payloads against the type before anybody reads them."""
     with Dds(loopback(domain)) as other:
-        writer = other.writer("/short", geometry_msgs.Twist, RELIABLE)
-        reader = dds.reader("/short", geometry_msgs.Twist, RELIABLE)
+        writer = other.writer("/short", ros.Twist, RELIABLE)
+        reader = dds.reader("/short", ros.Twist, RELIABLE)
         until(lambda: writer.readers == 1 and reader.writers == 1, "both met")
 
         with pytest.raises(HopError):
-            writer.write(cdr.write(geometry_msgs.Vector3()))
+            writer.write(cdr.write(ros.Vector3()))
 
         assert reader.take() == []
 
 
 @pytest.mark.parametrize(
-    "message", [d.BoundingBoxes, d.BoundingBoxes3d, d.DetectionArray]
+    "message",
+    [d.BoundingBoxes, d.NumberedBoundingBoxes, d.BoundingBoxes3d, d.DetectionArray],
 )
 def test_a_detector_is_met_in_its_type_and_tells_its_hash(
     dds: Dds, domain: int, message: type[Message]
@@ -137,7 +140,7 @@ def test_a_detector_is_met_in_its_type_and_tells_its_hash(
     with Dds(loopback(domain), gate="AGI") as other:
         writer = other.writer("/boxes", message, RELIABLE)
         # Tools of ROS may have readers of other types there.
-        dds.reader("/boxes", vision_msgs.Detection3DArray, RELIABLE)
+        dds.reader("/boxes", ros.Detection3DArray, RELIABLE)
         reader = dds.reader("/boxes", message, RELIABLE)
         until(lambda: writer.readers == 1 and reader.writers == 1, "both met")
 
@@ -156,11 +159,61 @@ def test_a_domain_that_was_opened_otherwise_is_refused(domain: int) -> None:
         Dds(type(loopback(domain))(domain, "127.0.0.1", ("127.0.0.2",)))
 
 
-def test_a_network_interface_that_does_not_exist_is_named() -> None:
-    unused = free_domain()
+@pytest.mark.parametrize(
+    ("network", "what"),
+    [
+        (DdsNetwork(0, "iveg-none"), "no interface iveg-none"),
+        (DdsNetwork(0, "127.0.0.1", ("iveg.invalid",)), "peer iveg.invalid"),
+        (DdsNetwork(0, "127.0.0.1", ("::1",)), "peer ::1"),
+    ],
+)
+def test_an_address_that_does_not_exist_is_named(
+    network: DdsNetwork, what: str
+) -> None:
+    """Cyclone ends the process for a peer that it cannot resolve."""
+    with pytest.raises(HopError, match=what):
+        Dds(replace(network, domain=free_domain()))
 
-    with pytest.raises(HopError, match="no participant"):
-        Dds(type(loopback(0))(unused, "iveg-none"))
+
+def test_a_publisher_that_came_and_went_between_two_looks_is_told_once(
+    dds: Dds, domain: int
+) -> None:
+    with Dds(loopback(domain)) as other:
+        reader = dds.reader("/brief", ros.Twist, RELIABLE)
+        other.writer("/brief", ros.Twist, RELIABLE)
+        until(lambda: reader.writers == 1, "both met")
+    until(lambda: reader.writers == 0, "it has gone")
+
+    assert "/brief" in _topics(dds)
+    assert "/brief" not in _topics(dds)
+
+
+def test_a_reader_that_joins_while_readers_are_counted_is_counted(
+    dds: Dds, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    writer = dds.writer("/counted", ros.Twist, RELIABLE)
+    answers: list[list[int]] = [[], [1, 2]]
+
+    def matched(_: object) -> list[int]:
+        answer = answers.pop(0)
+        if not answer:
+            raise IndexError
+        return answer
+
+    monkeypatch.setattr("cyclonedds.pub.DataWriter.get_matched_subscriptions", matched)
+
+    assert writer.readers == 2
+
+
+def test_an_interface_that_came_after_the_start_is_told(
+    dds: Dds, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert dds.unheard() == ()
+
+    later = {"lo": "127.0.0.1", "wlan0": "192.0.2.7"}
+    monkeypatch.setattr(DdsNetwork, "interfaces", lambda _: later)
+
+    assert dds.unheard() == ("wlan0",)
 
 
 def test_a_process_that_was_killed_is_gone_within_seconds(

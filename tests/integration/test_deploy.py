@@ -12,25 +12,18 @@ import sys
 import time
 from collections import defaultdict
 from collections.abc import AsyncIterator, Callable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import aiomqtt
 import pytest
 
-from iveg.adapters.broker_address import BrokerAddress
-from iveg.adapters.certificates import write_secret
-from iveg.adapters.mqtt import MqttLink
+from iveg.adapters.mqtt import BrokerAddress, MqttLink, TlsFiles
 from iveg.adapters.orion import OrionClient
-from iveg.adapters.tls import TlsFiles
-from iveg.cli.diagnosis import judge
-from iveg.cli.doctor import Examination
-from iveg.domain.hops import Check
-from iveg.lab.embedded.http_server import Request, Response, http_server
 from iveg.lab.embedded.server import Running, embedded_fiware
 from iveg.ngsi import names
-from iveg.settings import Settings
 from tests.bonds import bound
+from tests.http_servers import Request, Response, http_server
 from tests.ports import free_ports
 from tests.processes import ROOT, children_of
 
@@ -142,7 +135,6 @@ def local(conf: Path, broker: Broker) -> str:
         .replace("/mosquitto/data", str(broker.folder / "state/mosquitto"))
         .replace("listener 1883", f"listener {broker.port} 127.0.0.1")
         .replace("listener 8883", f"listener {broker.tls_port} 127.0.0.1")
-        .replace("listener 8884", f"listener {broker.tls_port} 127.0.0.1")
     )
 
 
@@ -186,8 +178,7 @@ def of_robot(robot: str) -> set[str]:
     """What a robot may write, written out once more by hand."""
     plain = {f"/iveg/{robot}{suffix}/attrs" for suffix in DEVICES}
     plain.add(f"/iveg/{robot}/cmdexe")
-    late = f"/{robot}/iveg/backfill"
-    return plain | {f"/json{topic}" for topic in plain} | straight(robot) | {late}
+    return plain | {f"/json{topic}" for topic in plain} | straight(robot)
 
 
 def straight(robot: str) -> set[str]:
@@ -203,12 +194,6 @@ FEEDBACK = {
     *("/AGI/iveg/peer_scan", "/AGII/iveg/peer_scan"),
 }
 DESIRED = {"/AGI/iveg/desired", "/AGII/iveg/desired"}
-PROBES = {
-    "/iveg/iveg-doctor/attrs",
-    "/iveg/iveg-doctor/cmd",
-    "/iveg/iveg-doctor/cmdexe",
-    "/iveg/iveg-doctor/echo",
-}
 HEARTBEAT = {"/iveg/iveg-canary/attrs"}
 ELSEWHERE = {
     "/1234/AGI/attrs",
@@ -227,7 +212,6 @@ TOPICS = sorted(
     | COMMANDS
     | FEEDBACK
     | DESIRED
-    | PROBES
     | HEARTBEAT
     | ELSEWHERE
 )
@@ -235,8 +219,8 @@ MAY_WRITE = {
     "AGI": of_robot("AGI"),
     "AGII": of_robot("AGII"),
     "climate": AIR,
-    "iot_agent": COMMANDS | {"/iveg/iveg-doctor/cmd"},
-    "iveg_dss": COMMANDS | FEEDBACK | DESIRED | PROBES | HEARTBEAT,
+    "iot_agent": COMMANDS,
+    "iveg_dss": COMMANDS | FEEDBACK | DESIRED | HEARTBEAT,
     "iveg_emulator": of_robot("AGI") | of_robot("AGII") | AIR,
     "iveg_health": set(),
 }
@@ -252,11 +236,7 @@ MAY_READ = {
     "iot_agent": REPORTS
     | {topic for topic in TOPICS if topic.startswith("/json/")}
     | {"/iveg/AGI/attrs/pose"},
-    "iveg_dss": REPORTS
-    | PROBES
-    | straight("AGI")
-    | straight("AGII")
-    | {"/AGIII/iveg/safety", "/AGI/iveg/backfill", "/AGII/iveg/backfill"},
+    "iveg_dss": REPORTS | straight("AGI") | straight("AGII") | {"/AGIII/iveg/safety"},
     "iveg_emulator": COMMANDS | FEEDBACK | DESIRED,
     "iveg_health": set(),
 }
@@ -305,43 +285,6 @@ async def heard_until_end(client: aiomqtt.Client) -> dict[str, set[str]]:
     return heard
 
 
-@pytest.mark.parametrize(
-    "topic",
-    [
-        "/iveg/{}_odom/attrs",
-        "/{}/iveg/odom",
-        "/iveg/{}_safety/attrs",
-        "/{}/iveg/safety",
-        "/iveg/{}/cmdexe",
-    ],
-)
-async def test_robot_a_cannot_speak_as_robot_b(topic: str, broker: Broker) -> None:
-    async with broker.client("iveg_dss") as dss, broker.client("AGI") as robot:
-        await dss.subscribe(topic.format("AGI"), qos=1)
-        await dss.subscribe(topic.format("AGII"), qos=1)
-        await robot.publish(topic.format("AGII"), b"lie", qos=1)
-        await robot.publish(topic.format("AGI"), b"truth", qos=1)
-        async with asyncio.timeout(30):
-            first = await anext(dss.messages)
-
-    assert (str(first.topic), first.payload) == (topic.format("AGI"), b"truth")
-
-
-async def test_iveg_stops_a_robot_and_no_robot_stops_another(broker: Broker) -> None:
-    async with (
-        broker.client("iveg_dss") as dss,
-        broker.client("AGI") as robot,
-        broker.client("AGII") as other,
-    ):
-        await robot.subscribe("/iveg/AGI/cmd", qos=1)
-        await other.publish("/iveg/AGI/cmd", b"from a robot", qos=1)
-        await dss.publish("/iveg/AGI/cmd", b"stop", qos=1)
-        async with asyncio.timeout(30):
-            first = await anext(robot.messages)
-
-    assert first.payload == b"stop"
-
-
 async def test_the_agents_shared_subscriptions_hear_robots(broker: Broker) -> None:
     async with broker.client("iot_agent") as agent, broker.client("AGI") as robot:
         for topic in ("/+/+/attrs", "/+/+/attrs/+", "/+/+/cmdexe"):
@@ -351,16 +294,6 @@ async def test_the_agents_shared_subscriptions_hear_robots(broker: Broker) -> No
             first = await anext(agent.messages)
 
     assert first.payload == b"answer"
-
-
-async def test_the_health_check_reads_the_brokers_uptime(broker: Broker) -> None:
-    async with broker.client("iveg_health") as health:
-        await health.subscribe("$SYS/broker/uptime")
-        async with asyncio.timeout(30):
-            first = await anext(health.messages)
-
-    assert isinstance(first.payload, bytes)
-    assert b"seconds" in first.payload
 
 
 @pytest.mark.parametrize(
@@ -418,35 +351,6 @@ async def test_robots_may_come_encrypted(broker: Broker) -> None:
     assert first.payload == b"encrypted"
 
 
-@pytest.mark.parametrize(
-    ("user", "broker_state", "said"),
-    [
-        ("iveg_dss", "ok", ""),
-        ("AGI", "failed", "access list"),
-        ("AGIII", "failed", "IVEG_MQTT_PASSWORD"),
-    ],
-)
-async def test_the_doctor_tells_a_closed_door_from_a_short_list(
-    user: str, broker_state: str, said: str, broker: Broker, tmp_path: Path
-) -> None:
-    nobody = f"http://127.0.0.1:{free_ports(1)[0]}"
-    settings = Settings(
-        mqtt_url=f"mqtt://127.0.0.1:{broker.port}",
-        mqtt_user=user,
-        mqtt_password=broker.passwords.get(user, "any"),
-        orion_url=nobody,
-        iota_url=nobody,
-    )
-    examination = Examination(settings, tmp_path, 2.0)
-
-    await examination.run()
-
-    rows = {row.check: row for row in judge(examination.findings, examination.stack)}
-    assert rows[Check.BROKER].state == broker_state
-    assert said in rows[Check.BROKER].sentence
-    assert (rows[Check.DIRECT].state == "ok") == (broker_state == "ok")
-
-
 def test_the_broker_had_nothing_to_complain_of(broker: Broker) -> None:
     """Last: what the tests above provoked are refusals, not faults."""
     provoked = ("run as root", "oversize")
@@ -460,131 +364,27 @@ def test_the_broker_had_nothing_to_complain_of(broker: Broker) -> None:
     assert complaints == []
 
 
-# --- certificates -----------------------------------------------------------------
-
-
-@dataclass
-class Gate:
-    """A Mosquitto that knows robots by their certificates."""
-
-    broker: Broker
-    pid: int
-
-    def make_secrets(self, *more: str) -> None:
-        """As an operator does, and HUP."""
-        secrets = self.broker.folder / "secrets"
-        subprocess.run(
-            [
-                *(sys.executable, str(ROOT / "deploy/make-secrets"), *more),
-                *("--directory", str(secrets)),
-                *("--state", str(self.broker.folder / "state")),
-            ],
-            check=True,
-            stdout=subprocess.DEVNULL,
-            timeout=60,
-        )
-        os.kill(self.pid, signal.SIGHUP)
-
-    def files(self, name: str) -> TlsFiles:
-        folder = self.broker.folder / "secrets/certificates" / name
-        own = folder / name
-        return TlsFiles(str(folder / "ca.crt"), f"{own}.crt", f"{own}.key")
-
-    def client(self, files: TlsFiles) -> aiomqtt.Client:
-        return aiomqtt.Client(
-            "127.0.0.1",
-            self.broker.tls_port,
-            tls_context=files.context(),
-            timeout=20.0,
-        )
-
-    async def is_let_in(self, files: TlsFiles) -> bool:
-        return await asyncio.to_thread(self._greets, files)
-
-    def _greets(self, files: TlsFiles) -> bool:
-        """Whether a CONNECT is answered; a client library would wait for long."""
-        place = ("127.0.0.1", self.broker.tls_port)
-        try:
-            with (
-                socket.create_connection(place, 20) as line,
-                files.context().wrap_socket(line, server_hostname=place[0]) as wrapped,
-            ):
-                wrapped.sendall(b"\x10\x0d\x00\x04MQTT\x04\x02\x00\x3c\x00\x01x")
-                return wrapped.recv(4) == b"\x20\x02\x00\x00"
-        except OSError:
-            return False
-
-
-@pytest.fixture
-def gate(tmp_path: Path) -> Iterator[Gate]:
-    port, tls_port = free_ports(2)
-    broker = Broker(port, tls_port, tmp_path)
-    make_users(broker, "--certificates")
-    with mosquitto(broker, "mosquitto-certificates") as pid:
-        yield Gate(broker, pid)
-
-
-async def test_a_certificate_lets_its_robot_in_as_itself_and_as_nobody_else(
-    gate: Gate,
-) -> None:
-    of_robot = gate.files("AGI")
-    async with (
-        gate.client(gate.files("iveg_dss")) as dss,
-        gate.client(of_robot) as robot,
-    ):
-        await dss.subscribe("/iveg/+/attrs", qos=1)
-        await robot.publish("/iveg/AGII/attrs", b"lie", qos=1)
-        await robot.publish("/iveg/AGI/attrs", b"truth", qos=1)
-        async with asyncio.timeout(30):
-            first = await anext(dss.messages)
-
-    assert (str(first.topic), first.payload) == ("/iveg/AGI/attrs", b"truth")
-    assert not await gate.is_let_in(replace(of_robot, certificate="", key=""))
-
-
-async def test_a_revoked_robot_is_heard_no_more_and_allowed_by_a_new_certificate(
-    gate: Gate, tmp_path: Path
-) -> None:
-    old = tmp_path / "copied"
-    shutil.copytree(Path(gate.files("AGI").certificate).parent, old)
-    copied = TlsFiles(*(str(old / name) for name in ("ca.crt", "AGI.crt", "AGI.key")))
-    async with gate.client(gate.files("iveg_dss")) as dss:
-        await dss.subscribe("/iveg/+/attrs", qos=1)
-        async with gate.client(copied) as robot:
-            gate.make_secrets("--revoke", "AGI")
-            async with asyncio.timeout(30):
-                while await gate.is_let_in(copied):
-                    pass
-            with contextlib.suppress(aiomqtt.MqttError):
-                await robot.publish("/iveg/AGI/attrs", b"still there", qos=1)
-        async with gate.client(gate.files("AGII")) as other:
-            await other.publish("/iveg/AGII/attrs", b"not meant", qos=1)
-        async with asyncio.timeout(30):
-            first = await anext(dss.messages)
-    gate.make_secrets("--allow", "AGI")
-    async with asyncio.timeout(30):
-        while not await gate.is_let_in(gate.files("AGI")):
-            pass
-
-    assert first.payload == b"not meant"
-    assert not await gate.is_let_in(copied)
+# --- certificates, and robots that are refused -----------------------------------
 
 
 async def test_a_new_certificate_is_used_without_a_restart_and_a_broken_one_is_not(
-    gate: Gate, caplog: pytest.LogCaptureFixture
+    broker: Broker, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    files = gate.files("iveg_dss")
-    address = BrokerAddress("127.0.0.1", gate.broker.tls_port, tls=True, files=files)
+    make_certificate(tmp_path)
+    authority = broker.folder / "secrets/mosquitto/tls/server.crt"
+    own, key = tmp_path / "server.crt", tmp_path / "server.key"
+    files = TlsFiles(str(authority), str(own), str(key))
+    user = "iveg_dss", broker.passwords["iveg_dss"]
+    address = BrokerAddress("127.0.0.1", broker.tls_port, *user, tls=True, files=files)
     link = MqttLink(address, "iveg", look_every_s=0.05)
     running = asyncio.create_task(link.run())
     await until(lambda: link.connected)
 
-    write_secret(Path(files.key), b"half a key")
+    key.write_bytes(b"half a key")
     await until(lambda: "certificate not used" in caplog.text)
     await link.publish("/AGI/iveg/desired", b"{}", qos=1)
     kept = link.connects
-    renewed(files)
-    gate.make_secrets()
+    make_certificate(tmp_path)
     await until(lambda: link.connects == kept + 1 and link.connected)
     await link.publish("/AGI/iveg/desired", b"{}", qos=1)
     running.cancel()
@@ -592,9 +392,32 @@ async def test_a_new_certificate_is_used_without_a_restart_and_a_broken_one_is_n
     assert kept == 1
 
 
-def renewed(files: TlsFiles) -> None:
-    """Without a key another certificate is made."""
-    Path(files.key).unlink()
+def test_a_refused_robot_has_no_user_and_no_place_in_the_access_list(
+    tmp_path: Path,
+) -> None:
+    broker = Broker(0, 0, tmp_path)
+    make_users(broker)
+    with (tmp_path / "secrets/env").open("a") as env:
+        env.write("IVEG_REFUSED_ROBOTS=AGI\n")
+    make_users(broker)
+
+    files = tmp_path / "secrets/mosquitto"
+    assert "AGI" not in broker.passwords
+    assert "AGI:" not in (files / "passwords").read_text()
+    assert "/iveg/AGI/attrs" not in (files / "acl").read_text()
+    assert "/iveg/AGII/attrs" in (files / "acl").read_text()
+
+
+def test_robots_that_an_earlier_version_kept_out_do_not_come_in_by_an_update(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "secrets").mkdir()
+    (tmp_path / "secrets/revoked").write_text("AGI\n")
+
+    with pytest.raises(subprocess.CalledProcessError):
+        make_users(Broker(0, 0, tmp_path))
+
+    assert not (tmp_path / "secrets/mosquitto").exists()
 
 
 async def until(true: Callable[[], object]) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 import httpx
 import pytest
 
+from tests.patience import PATIENCE_S
 from tests.processes import EMULATOR, Site, site, until
 
 pytestmark = pytest.mark.slow
@@ -31,7 +32,9 @@ def driving(tmp_path: Path) -> Iterator[Site]:
 def operator(place: Site) -> httpx.Client:
     """The page of whoever opened iVeg's link."""
     headers = {"X-IVEG": "1", "Sec-Fetch-Site": "same-origin"}
-    client = httpx.Client(base_url=place.url, headers=headers, follow_redirects=True)
+    client = httpx.Client(
+        base_url=place.url, headers=headers, follow_redirects=True, timeout=PATIENCE_S
+    )
     client.get(place.sign_in_link).raise_for_status()
     return client
 

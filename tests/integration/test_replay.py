@@ -1,19 +1,16 @@
 """Recorded runs played as robots on a real broker."""
 
 import asyncio
-import gzip
-import itertools
 import logging
 import math
 import re
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
 
-from iveg.adapters.broker_address import BrokerAddress
+from iveg.adapters.mqtt import BrokerAddress
 from iveg.domain.errors import DataFileError
-from iveg.domain.feedback import SpeedLimit
 from iveg.domain.observations import (
     DetectionFrame,
     LaserScan,
@@ -22,33 +19,18 @@ from iveg.domain.observations import (
     SafetyReport,
 )
 from iveg.ngsi import codec
-from iveg.robot.node_settings import NodeSettings
+from iveg.robot.node import NodeSettings
 from iveg.robot.replay.replay import ReplaySettings, run_replay
 from iveg.ros2 import detector_messages as d
-from iveg.ros2 import geometry_msgs, nav_msgs, std_msgs
+from iveg.ros2 import messages as ros
 from tests import data, processes
-from tests.data.bags import Said, bag_directory, db3_bag, drive, mcap_bag, ros1_bag
+from tests.data.bags import Said, bag_directory, db3_bag, drive, mcap_bag
 from tests.data.message_bags import Said as MessageSaid
 from tests.data.message_bags import message_bag
-from tests.data.recorded import emulated_logs, real_log
-from tests.integration.emulator_cloud import Cloud, broker, running, until
+from tests.integration.emulator_cloud import Cloud, running, until
 from tests.processes import Site
 
 AISLE = Path(data.__file__).parent / "aisle.jsonl"
-
-
-@pytest.fixture
-async def address(tmp_path: Path) -> AsyncIterator[BrokerAddress]:
-    async with broker(tmp_path) as where:
-        yield where
-
-
-@pytest.fixture
-async def cloud(address: BrokerAddress) -> AsyncIterator[Cloud]:
-    small = Cloud(address)
-    async with running(asyncio.create_task(small.run())):
-        await until(lambda: small.link.connected)
-        yield small
 
 
 def of_run(
@@ -77,12 +59,6 @@ def replay(
 
 def farthest(cloud: Cloud, robot_id: str = "AGI") -> float:
     return max((o.pose.x for o in cloud.of(robot_id, Odometry)), default=-1.0)
-
-
-def driven(cloud: Cloud, robot_id: str) -> float:
-    """How far from where it began a robot has been (m)."""
-    poses = [odometry.pose for odometry in cloud.of(robot_id, Odometry)]
-    return max((pose.distance_to(poses[0].x, poses[0].y) for pose in poses), default=0)
 
 
 async def test_a_log_is_played_to_its_end_and_the_robot_then_stands(
@@ -133,47 +109,6 @@ async def test_a_stop_pauses_the_log_and_the_robot_reports_standing(
         await until(lambda: cloud.of("AGI", Odometry)[-1].pose.x > stood.x + 0.3)
 
 
-async def test_a_speed_limit_of_a_half_plays_at_half_the_pace(
-    address: BrokerAddress, cloud: Cloud, tmp_path: Path
-) -> None:
-    cloud.speed_limits["AGI"] = SpeedLimit(0.5, "person", "someone", 1.0)
-    async with running(replay(address, tmp_path)):
-        await until(lambda: farthest(cloud) > 1.0)
-
-    driving = [o.twist.linear_x for o in cloud.of("AGI", Odometry)]
-    assert max(driving) == pytest.approx(0.4, abs=0.01)
-
-
-async def test_a_loop_starts_over(
-    address: BrokerAddress, cloud: Cloud, tmp_path: Path
-) -> None:
-    def rounds() -> int:
-        xs = [o.pose.x > 2.0 for o in cloud.of("AGI", Odometry)]
-        return sum(b and not a for a, b in itertools.pairwise(xs))
-
-    async with running(replay(address, tmp_path, speed=10.0, loop=True)):
-        await until(lambda: rounds() >= 2)
-
-
-async def test_robots_of_several_logs_play_side_by_side(
-    address: BrokerAddress, cloud: Cloud, tmp_path: Path
-) -> None:
-    both = ("AGI", "AGII")
-    async with running(replay(address, tmp_path, AISLE, AISLE, robots=both, speed=4.0)):
-        await until(lambda: farthest(cloud, "AGI") > 3.0)
-        await until(lambda: farthest(cloud, "AGII") > 3.0)
-
-
-async def test_a_log_that_breaks_off_ends_the_replay_with_one_sentence(
-    address: BrokerAddress, cloud: Cloud, tmp_path: Path
-) -> None:
-    file = tmp_path / "cut.jsonl.gz"
-    file.write_bytes(gzip.compress(AISLE.read_bytes() * 50)[:-100])
-
-    with pytest.raises(DataFileError, match=r"cut\.jsonl\.gz: cannot be read"):
-        await asyncio.wait_for(replay(address, tmp_path, file, speed=100.0), 30.0)
-
-
 @pytest.mark.parametrize(
     ("files", "robots", "speed", "why"),
     [
@@ -199,44 +134,9 @@ async def test_what_cannot_be_played_is_refused_with_one_sentence(
         )
 
 
-@pytest.fixture
-def two_logs(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[Path, ...]:
-    """Two robots' recordings: the emulator's or, by their names, real ones."""
-    if request.param == "emulated":
-        return emulated_logs(tmp_path)
-    return tuple(real_log(name) for name in request.param)
-
-
-@pytest.mark.parametrize(
-    ("two_logs", "beams"),
-    [("emulated", 720), (("orchard_d1", "orchard_d2"), 897)],
-    indirect=["two_logs"],
-)
-async def test_the_logs_of_two_robots_play_together_and_cleanly(
-    address: BrokerAddress,
-    cloud: Cloud,
-    tmp_path: Path,
-    caplog: pytest.LogCaptureFixture,
-    two_logs: tuple[Path, ...],
-    beams: int,
-) -> None:
-    both = ("AGI", "AGII")
-    with caplog.at_level(logging.WARNING):
-        async with running(
-            replay(address, tmp_path, *two_logs, robots=both, speed=10.0)
-        ):
-            await until(lambda: driven(cloud, "AGI") > 5.0)
-            await until(lambda: driven(cloud, "AGII") > 5.0)
-
-    assert cloud.of("AGI", LaserScan)[-1].ranges.size == beams
-    assert cloud.problems == []
-    assert caplog.records == []
-
-
 @pytest.mark.parametrize(
     ("write", "name"),
     [
-        (ros1_bag, "log.bag"),
         (db3_bag, "run"),
         (mcap_bag, "run"),
         (bag_directory, "run"),
@@ -265,7 +165,7 @@ async def test_a_bag_of_ros_is_played_like_any_recording(
 
 def detected(stamp: float) -> d.BoundingBoxes3d:
     """A person 3 m before the robot, in its own frame, as YOLACT tells it."""
-    header = std_msgs.Header(std_msgs.Time.of(stamp), "base_link")
+    header = ros.Header(ros.Time.of(stamp), "base_link")
     box = d.BoundingBox3d("farmer", 0.9, 2.8, -0.3, 3.2, 0.3, 0.0, 1.8)
     return d.BoundingBoxes3d(header, (box,))
 
@@ -275,11 +175,9 @@ def yolact_bag(path: Path) -> Path:
     said: list[MessageSaid] = []
     for tick in range(20):
         at = 1000.0 + tick / 10
-        place = geometry_msgs.PoseWithCovariance(
-            geometry_msgs.Pose(geometry_msgs.Point(2.0, 1.0))
-        )
-        header = std_msgs.Header(std_msgs.Time.of(at), "odom")
-        said.append(("/odom", nav_msgs.Odometry(header, "base_link", place), at))
+        place = ros.PoseWithCovariance(ros.Pose(ros.Point(2.0, 1.0)))
+        header = ros.Header(ros.Time.of(at), "odom")
+        said.append(("/odom", ros.Odometry(header, "base_link", place), at))
         said.append(("/yolact_coordinate", detected(at), at))
     return message_bag(path, said)
 

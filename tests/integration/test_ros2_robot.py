@@ -12,16 +12,16 @@ import numpy as np
 import pytest
 
 from iveg.adapters import clock
-from iveg.adapters.broker_address import BrokerAddress
-from iveg.adapters.mqtt import MqttLink
+from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.domain.feedback import CLEAR, Feedback
 from iveg.domain.geometry import Pose2D
 from iveg.domain.observations import DetectionFrame, LaserScan, Origin, SafetyReport
 from iveg.domain.peer_scan import peer_scan_of
 from iveg.ngsi import codec
 from iveg.ngsi.names import direct_topic, measure_topic
-from iveg.ros2 import cdr, geometry_msgs, names, nav_msgs, std_msgs
+from iveg.ros2 import cdr, names
 from iveg.ros2 import detector_messages as d
+from iveg.ros2 import messages as ros
 from tests.brokers import broker_on
 from tests.dds import Dds, free_domain, loopback
 from tests.processes import Program, Site, site
@@ -123,28 +123,26 @@ class Sensors:
     """A base's odometry, on DDS, and its ear."""
 
     def __init__(self, dds: Dds) -> None:
-        self._odometry = dds.writer(
-            "/odom", nav_msgs.Odometry, names.DEFAULT.newest(_BURST)
-        )
-        self._tf = dds.writer("/tf", geometry_msgs.TFMessage, names.DEFAULT)
+        self._odometry = dds.writer("/odom", ros.Odometry, names.DEFAULT.newest(_BURST))
+        self._tf = dds.writer("/tf", ros.TFMessage, names.DEFAULT)
         self._boxes = dds.writer("/yolact_coordinate", d.BoundingBoxes3d, names.DEFAULT)
-        self.drive = dds.reader("/cmd_vel", geometry_msgs.Twist, names.DEFAULT)
+        self.drive = dds.reader("/cmd_vel", ros.Twist, names.DEFAULT)
         self.burst = 1
 
     async def talk(self) -> None:
         """Say where the base is thirty times a second, as often as ``burst``."""
         while True:
-            stamp = std_msgs.Time.of(clock.wall())
-            odom = std_msgs.Header(stamp, "odom")
+            stamp = ros.Time.of(clock.wall())
+            odom = ros.Header(stamp, "odom")
             links = (
-                geometry_msgs.TransformStamped(std_msgs.Header(stamp, "map"), "odom"),
-                geometry_msgs.TransformStamped(odom, "base_link"),
+                ros.TransformStamped(ros.Header(stamp, "map"), "odom"),
+                ros.TransformStamped(odom, "base_link"),
             )
-            self._tf.write(cdr.write(geometry_msgs.TFMessage(links)))
-            base = std_msgs.Header(stamp, "base_link")
+            self._tf.write(cdr.write(ros.TFMessage(links)))
+            base = ros.Header(stamp, "base_link")
             self._boxes.write(cdr.write(d.BoundingBoxes3d(base, (PERSON,))))
             for _ in range(self.burst):
-                self._odometry.write(cdr.write(nav_msgs.Odometry(odom, "base_link")))
+                self._odometry.write(cdr.write(ros.Odometry(odom, "base_link")))
             await asyncio.sleep(1 / 30)
 
 
@@ -192,6 +190,19 @@ async def test_a_detector_with_its_own_messages_tells_iveg_of_its_person(
     assert math.dist(seen.box.centre[:2], (3.0, 0.5)) <= 0.1
 
 
+async def test_a_publisher_that_starts_after_the_gate_makes_it_stand(
+    riding: Riding,
+) -> None:
+    async with at_work(riding) as (iveg, _):
+        await reported(iveg, set(), 1.0)
+
+        with Dds(loopback(riding.domain)) as other:
+            other.writer("/cmd_vel", ros.Twist, names.DEFAULT)
+            async with asyncio.timeout(8.0):
+                await reported(iveg, {"second_publisher"}, 0.0)
+        await reported(iveg, set(), 1.0)
+
+
 async def test_a_flood_on_dds_is_named_and_slows_the_robot_until_it_is_over(
     riding: Riding,
 ) -> None:
@@ -208,20 +219,27 @@ async def test_a_flood_on_dds_is_named_and_slows_the_robot_until_it_is_over(
 
 
 async def test_a_check_tells_a_robot_that_talks_what_it_lacks(riding: Riding) -> None:
+    lacks = [
+        r"/odom +nav_msgs/msg/Odometry +1 +\d+\.\d +reliable +odom +ok",
+        r"/scan .*nobody publishes it \(sensor_msgs/msg/LaserScan\)",
+        r"/yolact_coordinate .*a detector's: topics\.detections_3d",
+        r"/cmd_vel +geometry_msgs/msg/Twist .* ok",
+    ]
+    missing = lacks
     async with at_work(riding):
-        check = riding.place.start("robot", "check", *riding.words)
-        code = await asyncio.to_thread(check.process.wait, 30)
+        # Beside busy programs the talker may fall silent, and others are found late.
+        for _ in range(8):
+            check = riding.place.start("robot", "check", *riding.words)
+            assert await asyncio.to_thread(check.process.wait, 60) == 1
+            said = check.text()
+            assert "MQTT" not in said
+            missing = [
+                row for row in lacks if not re.search(f"^{row}$", said, re.MULTILINE)
+            ]
+            if not missing:
+                break
 
-    said = check.text()
-    assert code == 1
-    assert re.search(r"^/odom +nav_msgs/msg/Odometry +1 +\d", said, re.MULTILINE)
-    assert "TF: map → odom → base_link" in said
-    assert "Nobody publishes /scan (sensor_msgs/msg/LaserScan): if it has one." in said
-    assert "The gate of AGI is running." in said
-    assert "/yolact_coordinate is a detector's (gb_visual_detection_3d_msgs/" in said
-    assert "publishes /cmd_vel:" not in said
-    assert "Nobody listens on /cmd_vel:" not in said
-    assert "broker" not in said
+    assert missing == []
 
 
 def test_a_second_gate_refuses_and_says_who_drives(riding: Riding) -> None:
@@ -240,7 +258,7 @@ async def test_nav2s_static_layer_gets_the_fleets_picture(riding: Riding) -> Non
     kept = names.LATCHED
     async with at_work(riding) as (iveg, _):
         with Dds(loopback(riding.domain)) as nav2:
-            layer = nav2.reader("/iveg/costmap", nav_msgs.OccupancyGrid, kept)
+            layer = nav2.reader("/iveg/costmap", ros.OccupancyGrid, kept)
             async with asyncio.timeout(30.0):
                 while iveg.report is None or not iveg.report.peer_scans:  # noqa: ASYNC110
                     await asyncio.sleep(0.05)
@@ -257,14 +275,14 @@ async def test_nav2s_static_layer_gets_the_fleets_picture(riding: Riding) -> Non
 
 
 def newest(
-    waited: Sequence[bytes], before: nav_msgs.OccupancyGrid | None
-) -> nav_msgs.OccupancyGrid:
+    waited: Sequence[bytes], before: ros.OccupancyGrid | None
+) -> ros.OccupancyGrid:
     """The last of what came, if anything did."""
-    empty = nav_msgs.OccupancyGrid()
-    return cdr.read(nav_msgs.OccupancyGrid, waited[-1]) if waited else before or empty
+    empty = ros.OccupancyGrid()
+    return cdr.read(ros.OccupancyGrid, waited[-1]) if waited else before or empty
 
 
-def cost(grid: nav_msgs.OccupancyGrid, x: float, y: float) -> int:
+def cost(grid: ros.OccupancyGrid, x: float, y: float) -> int:
     """At a place in ``map`` (m); unknown in a grid without cells."""
     info = grid.info
     if not grid.data.size:

@@ -9,8 +9,8 @@ from iveg.adapters.orion import OrionClient
 from iveg.adapters.transports import OrionTransport
 from iveg.domain.errors import HopError
 from iveg.domain.transports import DIRECT
-from iveg.lab.embedded.http_server import Request, Response, http_server
 from tests.fakes.context_broker import FakeContextBroker
+from tests.http_servers import Request, Response, http_server
 from tests.unit.pipeline.desk import Desk, settle
 
 TENANT = ("agroconnect", "/greenhouse")

@@ -9,8 +9,7 @@ import httpx
 import orjson
 import pytest
 
-from iveg.adapters.broker_address import BrokerAddress
-from iveg.adapters.mqtt import MqttLink
+from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.domain.observations import Origin
 from iveg.ngsi import codec, names
 from tests.builders import odometry, scan

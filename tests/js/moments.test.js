@@ -1,7 +1,6 @@
 import {
   askedMoment,
   isUnread,
-  nextEvent,
   pastAddress,
 } from "../../iveg/static/js/core/moments.js";
 import { equal, test } from "./harness.js";
@@ -23,19 +22,4 @@ test("a moment that cannot be shown is told, not shown as live without a word", 
     equal(askedMoment(`?t=${asked}`), null);
     equal(isUnread(`?t=${asked}`), true);
   }
-});
-
-test("the next event is the nearest that somebody would look for", () => {
-  const at = (/** @type {number} */ s) => new Date(1000 * s).toISOString();
-  const entries = [
-    { at: at(30), kind: "alert" },
-    { at: at(12), kind: "detection" },
-    { at: at(20), kind: "command" },
-    { at: at(5), kind: "speed" },
-  ];
-
-  equal(nextEvent(entries, 10, 1), 20);
-  equal(nextEvent(entries, 20, 1), 30);
-  equal(nextEvent(entries, 20, -1), 5);
-  equal(nextEvent(entries, 5, -1), null);
 });

@@ -1,9 +1,4 @@
-import {
-  PastLine,
-  problemOf,
-  SLOW_MS,
-  waitSaid,
-} from "../../iveg/static/js/core/past_line.js";
+import { PastLine, SLOW_MS, waitSaid } from "../../iveg/static/js/core/past_line.js";
 import { equal, test } from "./harness.js";
 
 function wired() {
@@ -41,41 +36,6 @@ test("one question is out at a time, and the newest moment is asked next", async
   );
   equal(answers, [200, 404]);
   equal(line.waitedMs, null);
-});
-
-test("a question that takes long can be asked anew, and its answer comes once", async () => {
-  const { line, asked, answers, clock } = wired();
-  line.want(10);
-  clock.ms = SLOW_MS;
-  equal(line.waitedMs, SLOW_MS);
-  line.again();
-  equal(line.waitedMs, 0);
-  equal(asked[0].signal.aborted, true);
-  asked[0].answer(0);
-  asked[1].answer(200);
-  await settled();
-
-  equal(answers, [200]);
-  equal(
-    asked.map(({ atS }) => atS),
-    [10, 10],
-  );
-});
-
-test("why there is no picture is told apart", () => {
-  const ends = { before: "2026-11-26T11:40:20.512Z", after: null };
-  const told = [
-    problemOf(404, { ...ends, after: ends.before }),
-    problemOf(404, ends),
-    problemOf(404, { before: null, after: null }),
-    problemOf(422, {}),
-    problemOf(400, {}),
-    problemOf(503, { why: "viewers" }),
-    problemOf(503, {}),
-    problemOf(0, null),
-  ];
-  const gaps = ["gap_both", "gap_one", "never", "never"];
-  equal(told, [...gaps, "other", "full", "failed", "failed"]);
 });
 
 test("the page says at once that it opens the past, and when that is slow", () => {

@@ -71,14 +71,6 @@ test("a press is repeated under one id until the server has it", async () => {
   equal(new Set(ids).size, 1);
 });
 
-test("two presses have two ids", async () => {
-  const presser = createPresser(fakeLine(), nothing, async () => 202);
-  await presser.press("AGI");
-  const first = presser.pending("AGI")?.pressId;
-  await presser.press("AGI");
-  equal(first === presser.pending("AGI")?.pressId, false);
-});
-
 /** A control and the number of presses that it has told. */
 function control() {
   const button = document.createElement("button");

@@ -39,7 +39,7 @@ test("nothing is released on old news or without a server", () => {
   equal(whyNotRelease(facts({ connection: "lost" })), "no_link");
 });
 
-test("f42 whoever was signed out has to sign in again to release, resume or drill", () => {
+test("f42 whoever was signed out has to sign in again to release or resume", () => {
   equal(whyNotRelease(facts({ connection: "signed-out" })), "signed_out");
   equal(whyNotResume(facts({ connection: "signed-out" })), "signed_out");
 });

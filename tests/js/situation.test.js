@@ -1,10 +1,9 @@
 import { fleetSaid } from "../../iveg/static/js/core/fleet_said.js";
 import { createI18n } from "../../iveg/static/js/core/i18n.js";
 import {
-  markOf,
+  isBlind,
   sentenceOf,
   situationOf,
-  UNHEARD,
 } from "../../iveg/static/js/core/situation.js";
 import { createCardOrder, sorted } from "../../iveg/static/js/panels/card_order.js";
 import { peopleSaid } from "../../iveg/static/js/panels/map_facts.js";
@@ -36,11 +35,17 @@ const heard = (age_s, of, robot_id = "AGI") =>
 
 const CLEAR = situation();
 const NEAR = situation({
-  ...{ level: "caution", state: "half", cause: "person", why: "person_in" },
+  ...{ level: "caution", kind: "person", state: "half" },
+  ...{ cause: "person", why: "person_in" },
   ...{ about: "P1", factor: 0.5, slots: { factor: 0.5, distance: 1.4, lane: "3" } },
 });
-const NOT_SLOWING = situation({ ...NEAR, level: "danger", state: "not_slowing" });
-const STANDING = situation({ level: "locked", state: "standing", action: "release" });
+const NOT_SLOWING = situation({
+  ...NEAR,
+  ...{ level: "danger", kind: "disobeys", state: "not_slowing" },
+});
+const STANDING = situation({
+  ...{ level: "locked", kind: "locked", state: "standing", action: "release" },
+});
 
 test("a clear way grows old by itself: late, lost, and never clear again", () => {
   const ages = [0.1, 1.5, 4, null];
@@ -68,31 +73,33 @@ test("a standstill is as old on the card as on STOP: after 1.5 s nobody knows", 
   equal([level, state, action], ["doubt", "stood", "as_moving"]);
 });
 
-test("without the server all but a danger is to be treated as moving", () => {
+test("without the server no robot hears STOP: each has its own red button", () => {
   const advice = (/** @type {Situation} */ of, /** @type {number} */ age_s) =>
     situationOf(heard(age_s, of), NOW_MS, "lost").action;
   equal(
     [advice(CLEAR, 0.1), advice(CLEAR, 9), advice(STANDING, 1), advice(STANDING, 9)],
-    ["as_moving", "as_moving", "as_moving", "as_moving"],
+    ["red_button", "red_button", "red_button", "red_button"],
   );
   const called = situation({ ...NOT_SLOWING, action: "press_stop" });
-  equal(advice(called, 9), "press_stop");
-  equal(situationOf(undefined, NOW_MS, "lost").action, "as_moving");
+  equal(advice(called, 9), "red_button");
+  equal(situationOf(undefined, NOW_MS, "lost").action, "red_button");
 });
 
 test("card and fleet page say the same of a robot without the server", async () => {
   const { robots } = await all([heard(0.1, STANDING)], 9, "", [], "lost");
   equal(robots[0].row.toLowerCase(), robots[0].line.toLowerCase());
-  equal(robots[0].row.includes("situation.do.as_moving"), true);
+  equal(robots[0].row.includes("situation.do.red_button"), true);
 });
 
-test("the seconds of a silence go on", () => {
-  const lost = situation({
-    level: "danger",
-    state: "lost_moving",
-    slots: { age: 3.1 },
-  });
-  equal(situationOf(heard(4, lost), NOW_MS + 2000).slots.age, 6);
+test("a camera that is out of service or not being read is none", () => {
+  const works = { required: true, missing: false, out_by: null };
+  const blind = [
+    works,
+    { ...works, missing: true },
+    { ...works, required: false, missing: false, out_by: "Ana" },
+    { ...works, required: false, missing: true },
+  ].map((detector) => isBlind(robot({ detector: /** @type {any} */ (detector) })));
+  equal(blind, [false, true, true, false]);
 });
 
 test("a sentence has what, why and what to do", () => {
@@ -114,6 +121,7 @@ test("the worst of the fleet is said, of several alike together", () => {
   equal(said(fleet.slice(0, 2)).said, "B: at half speed: person in aisle 3 at 1.4 m");
   equal(said(fleet), {
     level: "caution",
+    kind: "person",
     said: "B, C: at half speed: person in aisle 3",
     robotId: "B",
   });
@@ -122,6 +130,17 @@ test("the worst of the fleet is said, of several alike together", () => {
   equal(said(apart).said, "B, C: at half speed: person near");
   const two = [heard(0, NOT_SLOWING, "A"), heard(0, NOT_SLOWING, "B")];
   equal(said(two).said.endsWith("(+1 in danger)"), true);
+});
+
+test("the line follows the order, and has the colour of the gravest of the fleet", () => {
+  const doubted = situation({ level: "doubt", kind: "contradiction", state: "held" });
+  const fleet = [heard(0, NEAR, "A"), heard(0, doubted, "B"), heard(0, CLEAR, "C")];
+  equal([said(fleet).robotId, said(fleet).level], ["B", "caution"]);
+  const unknown = situation({ level: "doubt", kind: "stop_unknown", state: "stood" });
+  const moved = situation({ level: "danger", kind: "moved", state: "moved" });
+  const two = said([heard(0, moved, "A"), heard(0, unknown, "B")]);
+  equal([two.robotId, two.level], ["B", "danger"]);
+  equal(two.said.endsWith("(+1 in danger)"), true);
 });
 
 test("all clear needs every robot: one away, waiting or late is not clear", () => {
@@ -137,6 +156,12 @@ test("all clear needs every robot: one away, waiting or late is not clear", () =
   equal([away.level, away.said], ["away", "Nothing heard yet of B"]);
   equal(said([heard(null, CLEAR)]).said, "No robot has spoken yet");
   equal(said([clear, heard(1.5, CLEAR, "B")]).level, "doubt");
+  const flat = situation({
+    kind: "battery",
+    state: "battery_low",
+    slots: { level: 0.15 },
+  });
+  equal(said([clear, heard(0, flat, "B")]).said, "B: battery at 15%");
   equal(said([]).level, "away");
 });
 
@@ -187,19 +212,6 @@ test("a card moves once its order has lasted, and never under a finger or in use
   equal([shown(NOT_SLOWING, 8000), shown(NOT_SLOWING, 9000)], ["BA", "AB"]);
 });
 
-test("each cause has its drawing, and a robot at work none", () => {
-  const marks = (/** @type {any[]} */ of) =>
-    of.map((it) => markOf({ ...UNHEARD, ...it }));
-  equal(
-    marks([
-      ...[{ why: "person_in" }, { why: "robot_at" }, { why: "obstacle" }],
-      ...[{ why: "no_detector_own" }, { why: "held_hw", cause: "hold" }],
-      ...[{ cause: "link" }, { cause: "clear" }, { cause: "stop" }],
-    ]),
-    ["person", "robot", "obstacle", "camera", "lock", "link", null, null],
-  );
-});
-
 test("without the server the line says so, in red", () => {
   equal(ofConnection("lost", 6400, false, EN)?.level, "danger");
   equal(ofConnection("lost", 6400, false, EN)?.said.includes("7\u00a0s"), true);
@@ -209,8 +221,13 @@ test("without the server the line says so, in red", () => {
   equal(ofConnection("open", 0, false, EN), null);
 });
 
-/** @param {import("../../iveg/static/js/core/situation.js").Level} level */
-const told = (level) => ({ level, said: level, about: level, robotId: null });
+const RANKS = { danger: 0, caution: 11, working: 17 };
+
+/** @param {keyof typeof RANKS} level */
+const told = (level) => ({
+  ...{ level, rank: RANKS[level], said: level },
+  ...{ about: level, robotId: null },
+});
 
 test("what is worse shows at once, what is better once it has lasted", () => {
   const calm = createCalm();

@@ -1,7 +1,5 @@
 import { ageOf } from "../../iveg/static/js/core/clock.js";
-import { matches } from "../../iveg/static/js/core/hub.js";
-import { HUES, slotOf } from "../../iveg/static/js/core/slots.js";
-import { COMMANDS_SIZE, LOG_SIZE, Store } from "../../iveg/static/js/core/store.js";
+import { Store } from "../../iveg/static/js/core/store.js";
 import { command, entry, person, robot, snapshot } from "./builders.js";
 import { equal, near, test } from "./harness.js";
 
@@ -62,6 +60,7 @@ test("the ages of a pose and of a state count from when each was true", () => {
     age_s: 2,
     feedback_age_s: 0,
     faults: [],
+    obstacle: null,
   };
   store.apply("snapshot", snapshot({ robots: [robot({ age_s: 0.5, applied })] }), 1000);
   const known = () => store.robots().get("AGI");
@@ -100,32 +99,6 @@ test("of people is told who has changed; the others grow older", () => {
   near(ageOf(store.people()[1], 3000), 1.1);
 });
 
-test("a move of a robot that nobody knows is left alone", () => {
-  const { store, frame, heard, hear } = storeByHand();
-  hear("robots/");
-  store.apply("robots/AGX/move", { robot_id: "AGX", age_s: 0 });
-  frame();
-  equal([heard, store.robots().size], [[], 0]);
-});
-
-test("ages count from the arrival, in lists too", () => {
-  const { store } = storeByHand();
-  store.apply("people", [person({ age_s: 0.5 })], 1000);
-  near(ageOf(store.people()[0], 3000), 2.5);
-});
-
-test("a state is told once a frame, with its newest value", () => {
-  const { store, frame } = storeByHand();
-  /** @type {number[]} */
-  const told = [];
-  store.subscribe("robots/AGI", (data) => told.push(data.pose.x));
-  for (const x of [1, 2, 3])
-    store.apply("robots/AGI", robot({ pose: { x, y: 0, yaw: 0 } }));
-  equal(told, []);
-  frame();
-  equal(told, [3]);
-});
-
 test("telemetry is told as often as it can be read, other state in the next frame", async () => {
   const store = new Store();
   /** @type {string[]} */
@@ -155,15 +128,6 @@ test("log entries and command events are told one by one, at once", () => {
   equal(heard, ["log", "log", "commands/c1", "commands/c1"]);
 });
 
-test("a snapshot is told before what it brought", () => {
-  const { store, frame, heard, hear } = storeByHand();
-  hear("robots/");
-  hear("snapshot");
-  store.apply("snapshot", snapshot());
-  frame();
-  equal(heard, ["snapshot", "robots/AGI"]);
-});
-
 test("a command that follows a snapshot is told after it, and after the snapshot's own", () => {
   const { store } = storeByHand();
   /** @type {string[]} */
@@ -175,71 +139,6 @@ test("a command that follows a snapshot is told after it, and after the snapshot
   store.apply("commands/c1", command({ state: "DELIVERED" }));
 
   equal(heard, ["snapshot", "SENT", "DELIVERED"]);
-});
-
-test("who is told of a snapshot finds all of it in the store", () => {
-  const { store } = storeByHand();
-  /** @type {unknown[]} */
-  const found = [];
-  store.watch((_, topic) => {
-    if (topic === "snapshot") found.push(store.robots().size, store.people().length);
-  });
-  store.apply("snapshot", snapshot({ people: [person()] }));
-  equal(found, [1, 1]);
-});
-
-test("the log keeps its newest entries and no entry twice", () => {
-  const { store } = storeByHand();
-  for (let id = 1; id <= LOG_SIZE + 20; id += 1) store.apply("log", entry(id));
-  store.apply("log", entry(LOG_SIZE + 20));
-  equal(store.log().length, LOG_SIZE);
-  equal([store.log()[0].id, store.log()[LOG_SIZE - 1].id], [21, LOG_SIZE + 20]);
-});
-
-test("only the commands last heard of are kept", () => {
-  const { store } = storeByHand();
-  store.apply("commands/first", command());
-  store.apply("commands/second", command());
-  for (let n = 2; n < COMMANDS_SIZE; n += 1) store.apply(`commands/${n}`, command());
-  store.apply("commands/first", command({ state: "STANDING" }));
-  store.apply("commands/last", command());
-  equal(store.get("commands/first").state, "STANDING");
-  equal(store.get("commands/second"), undefined);
-});
-
-test("a prefix hears one level below itself: a robot, not its scan", () => {
-  equal(matches("robots/", "robots/AGI"), true);
-  equal(matches("robots/", "robots/AGI/scan"), false);
-  equal(matches("robots/+/scan", "robots/AGI/scan"), true);
-  equal(matches("robots/AGI", "robots/AGII"), false);
-  equal(matches("people", "people"), true);
-});
-
-test("who unsubscribed hears nothing any more", () => {
-  const { store, frame, heard, hear } = storeByHand();
-  const end = hear("people");
-  end();
-  store.apply("people", []);
-  frame();
-  equal(heard, []);
-});
-
-test("a robot keeps its hue, and ten robots have ten", () => {
-  const ten = Array.from({ length: 10 }, (_, i) => `R${i}`);
-  const slots = ten.map(slotOf);
-  equal(new Set(slots).size, HUES);
-  equal([Math.min(...slots), Math.max(...slots)], [1, HUES]);
-  equal(ten.map(slotOf), slots);
-});
-
-test("a line's state is told when it changes and keeps since when", () => {
-  const { store, frame, heard, hear } = storeByHand();
-  hear("connection");
-  store.setConnection("lost", 5000);
-  store.setConnection("lost", 9000);
-  frame();
-  equal(heard, ["connection"]);
-  equal(store.connection, { state: "lost", since: 5000 });
 });
 
 test("13.6: lines of before the server's restart come before those that are known", () => {

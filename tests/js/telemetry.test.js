@@ -1,8 +1,4 @@
-import {
-  ProtocolError,
-  readFrame,
-  writePainted,
-} from "../../iveg/static/js/core/protocol.js";
+import { ProtocolError, readFrame } from "../../iveg/static/js/core/protocol.js";
 import { pointsOf } from "../../iveg/static/js/core/telemetry.js";
 import { telemetryFrame } from "./builders.js";
 import { equal, near, test, throws } from "./harness.js";
@@ -59,32 +55,9 @@ test("a scan's ranges become points in the map; what did not return is none", ()
   for (const [i, value] of wanted.entries()) near(points[i], value, 1e-5);
 });
 
-test("scans in one frame are told apart, an odd count is padded", () => {
-  const other = { ...SWEEP, robot_id: "AGII", topic: "robots/AGII/scan", count: 1 };
-  const { told } = read(
-    telemetryFrame({ frame: 1, scans: [SWEEP, other] }, [200, 200, 200, 0, 600, 0]),
-  );
-  equal(
-    told.map(({ data }) => [data.robot_id, data.points.length]),
-    [
-      ["AGI", 6],
-      ["AGII", 2],
-    ],
-  );
-  near(told[1].data.points[1], 8, 1e-5);
-});
-
 test("half a scan is refused", () => {
   throws(
     () => readFrame(telemetryFrame({ frame: 1, scans: [SWEEP] }, [1, 2])),
     ProtocolError,
-  );
-});
-
-test("what was painted is said as the server counts it", () => {
-  equal(writePainted(12), '{"type":"painted","frame":12}');
-  equal(
-    writePainted(12, { at: 3.5, within: 0.002 }),
-    '{"type":"painted","frame":12,"at":3.5,"within":0.002}',
   );
 });

@@ -18,11 +18,10 @@ from iveg.adapters.greenhouses import load_greenhouse
 from iveg.domain.feedback import HALF_SPEED
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
-from iveg.lab.emulator.detector_model import DETECTORS
+from iveg.lab.emulator.camera import DETECTORS
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.scenarios import scenario_named
-from iveg.lab.emulator.truth import in_view
-from iveg.lab.emulator.world import RobotHardware, SimulatedWorld
+from iveg.lab.emulator.world import RobotHardware, SimulatedWorld, in_view
 from iveg.lab.experiment.stage import Stage
 from iveg.ngsi import codec
 from tests.builders import notification
@@ -59,6 +58,7 @@ class Field:
     Attributes:
         desk: iVeg with fakes for disk and broker.
         alter: What becomes of each direct message of the robot whose part lies.
+        translate: What becomes of those of the honest ones: true, and said otherwise.
         copied: Each message of honest robots, for the liar between robot and Orion.
         asked: Releases and resumes that a person asked for.
     """
@@ -70,6 +70,7 @@ class Field:
         self.world = SimulatedWorld(greenhouse, layout, detector, seed)
         self.desk = desk = WebDesk(FLEET, greenhouse)
         self.alter: Alter = lambda topic, payload: [(topic, payload)]
+        self.translate: Alter = self.alter
         self.copied: list[tuple[str, bytes]] = []
         self.sights: list[Sight] = []
         self.asked = 0
@@ -106,8 +107,9 @@ class Field:
             for one in self.alter(topic, payload):
                 self.reader.read(*one)
             return
-        self.reader.read(topic, payload)
-        self.copied.append((topic, payload))
+        for one in self.translate(topic, payload):
+            self.reader.read(*one)
+            self.copied.append(one)
 
     def notify(self, body: bytes) -> None:
         """Orion posts something."""

@@ -1,6 +1,11 @@
 """The parts that lie, one script each, all from a seed.
 
 A liar is given the field before each step, and may alter what passes its part.
+
+Lies that need more than these doors are told elsewhere: files that go bad
+(``tests/integration/test_damage.py``), a second server (``test_two_servers.py``), a
+second publisher beside the gate (``test_discovery.py``), a laser of no use on the robot
+(``tests/unit/robot/ros2/test_inputs.py``).
 """
 
 from abc import ABC, abstractmethod
@@ -10,7 +15,10 @@ from typing import Any
 
 import orjson
 
-from tests.liar.greenhouse import HONEST, LIAR, Field, as_notification
+from iveg.domain.feedback import CLEAR, Feedback
+from iveg.domain.observations import Origin
+from iveg.ngsi import codec
+from tests.liar.greenhouse import FLEET, HONEST, LIAR, Field, as_notification
 
 Json = dict[str, Any]
 _WILD: tuple[Any, ...] = (
@@ -93,19 +101,76 @@ class DetectorLies(_Telemetry):
         said = orjson.loads(payload)
         box = {
             "class_id": self.rnd.choice(
-                ["person", "farmer", "tomato", "AGI", "x" * 99]
+                ["person", "farmer", "tomato", "AGI", "x" * 99, "0", "", 7, "tractor"]
             ),
             "probability": self.rnd.choice([0.0, 0.8, 0.95, 1.0, 95, None]),
-            "frame_id": self.rnd.choice(["map", "base_link", "moon", None]),
+            "frame_id": self.rnd.choice(
+                ["map", "base_link", "moon", None, "rear_camera_optical_frame"]
+            ),
             "position": {
                 axis + end: self.rnd.uniform(-30.0, 60.0)
                 for axis in "xyz"
                 for end in ("min", "max")
             },
         }
+        if self.rnd.random() < 0.2:
+            sides = (axis + end for axis in "xyz" for end in ("min", "max"))
+            box["position"] = dict.fromkeys(sides, 0.0)
         said["bounding_boxes"] = [box] * self.rnd.choice([0, 0, 1, 3, 40, 257])
         sent = [(topic, orjson.dumps(said))]
         return sent * self.rnd.choice([0, 1, 1, 1, 5])
+
+
+class WordsDiffer(Liar):
+    """Honest robots name people, frames and sides in ways that others have, too."""
+
+    def __init__(self, field: Field, rnd: Random) -> None:
+        super().__init__(field, rnd)
+        field.translate = self.translate
+        self.word = rnd.choice(["persona", "people", "gente", "trabajador_0", "0", ""])
+
+    def translate(self, topic: str, payload: bytes) -> list[tuple[str, bytes]]:
+        """The same in other words; some nobody can understand."""
+        said = orjson.loads(payload)
+        for box in said.get("bounding_boxes", ()):
+            if box["class_id"] == "farmer":
+                box["class_id"] = self.word
+                long = self.rnd.choice([0.0, 0.0, 0.5, 1.2])
+                box["position"]["xmin"] -= long
+                box["position"]["xmax"] += long
+        odometry = said.get("base_pose_ground_truth")
+        if odometry is not None:
+            odometry["frame_id"] = self.rnd.choice(["map", "/map", None, "odom"])
+        return [(topic, orjson.dumps(said))]
+
+
+class LensLies(_Telemetry):
+    """A covered lens: each picture is empty, wherever people are."""
+
+    def alter(self, topic: str, payload: bytes) -> list[tuple[str, bytes]]:
+        """The same picture without anybody."""
+        said = orjson.loads(payload)
+        if "bounding_boxes" in said:
+            said["bounding_boxes"] = []
+        return [(topic, orjson.dumps(said))]
+
+
+class LaserLies(_Telemetry):
+    """A laser over everybody's head, and obstacles that are not there."""
+
+    def alter(self, topic: str, payload: bytes) -> list[tuple[str, bytes]]:
+        """A sweep that meets walls alone; a report of somebody, or of nonsense."""
+        said = orjson.loads(payload)
+        if "lidar_points" in said:
+            said["lidar_points"] = [12.0] * len(said["lidar_points"])
+        if "safety_state" in said and self.rnd.random() < 0.5:
+            places = (self.rnd.uniform(-30.0, 60.0) for _ in range(2))
+            seen = dict(zip("xy", places, strict=True))
+            seen |= {"width_m": 0.4, "moved": self.rnd.random() < 0.5}
+            said["safety_state"]["obstacle"] = self.rnd.choice(
+                (seen, seen, wild(seen, self.rnd))
+            )
+        return [(topic, orjson.dumps(said))]
 
 
 class ClockLies(_Telemetry):
@@ -176,6 +241,24 @@ class OrionLies(Liar):
             self.field.notify(orjson.dumps(said))
 
 
+class KeptMeasures(_Telemetry):
+    """What a broker kept of earlier boots, given to an agent that starts again."""
+
+    def alter(self, topic: str, payload: bytes) -> list[tuple[str, bytes]]:
+        """One message of a boot an hour ago, and nothing of today."""
+        said = orjson.loads(payload)
+        for value in said.values():
+            if isinstance(value, dict) and "boot" in value:
+                value["boot"] = f"old-{self.rnd.random()}"
+                value["stamp"] = "2020-01-01T00:00:00.000Z"
+        body = as_notification(topic, orjson.dumps(said))
+        if body is not None:
+            self.field.notify(body)
+        robot = self.field.desk.world.robot(LIAR)
+        assert robot.link(self.field.desk.clock()) == "UNKNOWN"
+        return []
+
+
 class ClientLies(Liar):
     """A client with the liar's own name says anything on its topics, and on none."""
 
@@ -199,13 +282,56 @@ class ClientLies(Liar):
             self.field.reader.read(topic, payload)
 
 
+_STARTED = 100
+"""Lies after which a robot has its first speed limit."""
+
+
+class AuthorLies(Liar):
+    """A second author of feedback: all clear, in its own name, iVeg's, or new ones."""
+
+    def __init__(self, field: Field, rnd: Random) -> None:
+        super().__init__(field, rnd)
+        self.count = 0
+
+    async def act(self) -> None:
+        """Tell robots that they may drive.
+
+        None is faster than iVeg lately allowed, and nobody deaf to it for that.
+        """
+        told = self.field.desk.fleet.told
+        for robot_id in HONEST if told else ():
+            robot = self.field.stage.robots[robot_id]
+            lately = [one.speed_limits[robot_id] for one in told[-2 * len(FLEET) :]]
+            allowed = max(one.speed_factor for one in lately)
+            assert robot.driving.factor <= allowed, (robot_id, lately)
+            is_stopped = robot_id == "AGI" and self.field.pressed_at is not None
+            held = self.count > _STARTED and robot.driving.factor == 0.0
+            assert is_stopped or not held, robot_id
+            topic = self.rnd.choice(FLEET)
+            lie = self._all_clear(topic, told[-1])
+            robot.listen(topic, lie, self.field.desk.clock())
+
+    def _all_clear(self, topic: str, newest: Feedback) -> bytes:
+        self.count += 1
+        boot = self.rnd.choice(["another", "iveg-boot", f"b{self.count}"])
+        ahead = self.rnd.choice([-50, 0, 1, 3, 1000, 2**40])
+        return codec.write_feedback(
+            Feedback(
+                topic,
+                Origin(boot, max(0, (newest.origin.seq or 0) + ahead)),
+                speed_limits=dict.fromkeys(FLEET, CLEAR),
+                seen=newest.seen if self.rnd.random() < 0.5 else {},
+            )
+        )
+
+
 class BrowserLies(Liar):
     """A page without rights, and one with rights and nonsense."""
 
     async def act(self) -> None:
         """Ask for something."""
         robot_id = self.rnd.choice([*HONEST, LIAR, "AGX"])
-        path = self.rnd.choice(["release", "resume", "drill", "detector"])
+        path = self.rnd.choice(["release", "resume", "detector"])
         body = wild({"holds": ["01X"], "in_service": False}, self.rnd)
         async with self.field.desk.browser("viewer") as viewer:
             method = "PUT" if path == "detector" else "POST"
@@ -234,10 +360,15 @@ class DiskLies(Liar):
 LIARS: dict[str, Callable[[Field, Random], Liar]] = {
     "robot": RobotLies,
     "detector": DetectorLies,
+    "words": WordsDiffer,
+    "lens": LensLies,
+    "laser": LaserLies,
     "clock": ClockLies,
     "agent": AgentLies,
     "orion": OrionLies,
+    "kept measures": KeptMeasures,
     "mqtt client": ClientLies,
+    "author of feedback": AuthorLies,
     "browser": BrowserLies,
     "disk": DiskLies,
 }

@@ -3,8 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
-from tests.e2e.frozen import Frozen, frozen
-from tests.e2e.test_strip import HOLD, STANDS, order
+from tests.e2e.frozen import HOLD, STANDS, Frozen, frozen, order
 
 Told = dict[str, Any]
 IDS = ("AGI", "AGII", *(f"R{n}" for n in range(3, 11)))
@@ -12,7 +11,7 @@ IDS = ("AGI", "AGII", *(f"R{n}" for n in range(3, 11)))
 _IN_AISLE: Told = {"distance": 1.4, "lane": "Pasillo 3"}
 
 
-def _is(level: str, state: str, action: str = "none", **found: Any) -> Told:
+def _is(level: str, kind: str, state: str, action: str = "none", **found: Any) -> Told:
     """A situation, as ``/live`` tells it."""
     nothing: Told = {
         "cause": "alarm",
@@ -21,17 +20,18 @@ def _is(level: str, state: str, action: str = "none", **found: Any) -> Told:
         "factor": 1.0,
         "slots": {},
     }
-    return {"level": level, "state": state, "action": action, **nothing, **found}
+    told = {"level": level, "kind": kind, "state": state, "action": action}
+    return {**told, **nothing, **found}
 
 
-_CALM = _is("working", "clear", cause="clear")
+_CALM = _is("working", "working", "clear", cause="clear")
 _NOT_SLOWING = _is(
-    "danger", "not_slowing", "press_stop", why="person_in", slots=_IN_AISLE
+    "danger", "disobeys", "not_slowing", "press_stop", why="person_in", slots=_IN_AISLE
 )
-_LOST = _is("danger", "lost_moving", "keep_away", slots={"age": 4.2})
-_LATE = _is("doubt", "late", "as_moving", cause="link", slots={"age": 1.4})
-_STANDING = _is("locked", "standing", "release", cause="stop")
-_STILL_MOVING = _is("danger", "still_moving", "red_button")
+_LOST = _is("danger", "lost_moving", "lost_moving", "red_button", slots={"age": 4.2})
+_LATE = _is("doubt", "unsure", "late", "as_moving", cause="link", slots={"age": 1.4})
+_STANDING = _is("locked", "locked", "standing", "release", cause="stop")
+_STILL_MOVING = _is("danger", "stop_failed", "still_moving", "red_button")
 
 
 def fleet(count: int, situation: str) -> Frozen:
@@ -39,7 +39,7 @@ def fleet(count: int, situation: str) -> Frozen:
     told = frozen()
     seen = told["snapshot"]
     seen["robots"] = [_robot(seen["robots"][n % 2], n) for n in range(count)]
-    seen["flood"], seen["alerts"] = None, []
+    seen["alerts"] = []
     if count == 1:
         told["scans"] = told["scans"][:1]
     SITUATIONS[situation](seen)
@@ -109,7 +109,6 @@ def _flooded(seen: Told) -> None:
         alert(n, "P3", "alert.battery_low", {"robot": robots[n % len(robots)]})
         for n in range(13, 25)
     ]
-    seen["flood"] = frozen()["snapshot"]["flood"]
 
 
 SITUATIONS: dict[str, Callable[[Told], None]] = {
@@ -137,7 +136,6 @@ def alert(n: int, priority: str, key: str, slots: Told) -> Told:
         "raised_at": at,
         "last_raised_at": at,
         "count": 1,
-        "members": [],
         "told": [],
         **past,
     }

@@ -22,12 +22,12 @@ from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant, Odometry, Origin, Received
 from iveg.domain.probe import ProbeLag
-from iveg.domain.rule.speed_limits import SpeedLimits
+from iveg.domain.rule.judge import SpeedLimits
 from iveg.domain.tracking.people import People
 from iveg.domain.transports import DIRECT, FIWARE, TransportId
 from iveg.domain.world import World
-from iveg.robot.echo import Echo
 from tests.builders import START, odometry, origin
+from tests.fakes.echo import Echo
 
 STEP_S = 0.1
 """Odometry and feedback are sent that often, and what is shown is looked at."""
@@ -148,13 +148,13 @@ class Rig:
         said = replace(
             origin(seq, boot=boot, wall=wall),
             mono=self.now - self.booted,
-            acknowledgements=self.acknowledgements,
-            heard=self.echo.heard if self.acknowledgements else None,
         )
+        if self.acknowledgements:
+            said = self.echo.on(said, self.now)
         self.measured[boot, seq] = self.now
         for transport in self.transports:
             weather = phase.direct if transport == "direct" else phase.fiware
-            self.put(Parcel(odometry(origin=said), transport), weather, rnd)
+            self.put(Parcel(odometry(linear=0.0, origin=said), transport), weather, rnd)
 
     def send_probe(self, fiware: Weather, rnd: Random) -> None:
         one = Origin("iveg", next(self._probes))
@@ -176,7 +176,7 @@ class Rig:
             elif parcel.is_probe:
                 self.probe.returned(parcel.content, self.at())
             else:
-                self.echo.note(parcel.content)
+                self.echo.note(parcel.content, self.now)
 
     def drive(self, phase: Phase, rnd: Random) -> Iterator[float]:
         """Each moment of a phase at which somebody may look (s)."""

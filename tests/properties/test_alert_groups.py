@@ -5,13 +5,8 @@ from dataclasses import dataclass, field
 from hypothesis import given
 from hypothesis import strategies as st
 
-from iveg.domain.alerts.alert_book import (
-    MEMBERS_KEPT,
-    AlertBook,
-    BookedAlert,
-)
-from iveg.domain.events import Condition
-from iveg.domain.messages import Priority
+from iveg.domain.alerts import AlertBook, BookedAlert
+from iveg.domain.events import Condition, Priority
 from tests.builders import at
 
 priorities = st.sampled_from(["P1", "P2", "P3"])
@@ -73,7 +68,7 @@ def test_every_escalation_is_raised_anew_and_needs_to_be_seen(
 
 
 @given(lives)
-def test_every_occurrence_is_counted_and_the_newest_are_told(
+def test_every_occurrence_is_counted(
     life: list[tuple[Priority | None, bool]],
 ) -> None:
     person, raised = Person(), 0
@@ -81,5 +76,4 @@ def test_every_occurrence_is_counted_and_the_newest_are_told(
         raised += sum(one.cleared is None for one in person.live(wrong))
         for alert in person.book.waiting:
             assert alert.count == raised
-            assert len(alert.members) == min(raised, MEMBERS_KEPT)
-            assert alert.raised.mono <= alert.members[0].raised.mono
+            assert alert.raised.mono <= alert.last.raised.mono

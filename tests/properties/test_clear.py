@@ -20,7 +20,7 @@ from iveg.domain.observations import (
     Origin,
     RefusedFrame,
 )
-from iveg.domain.rule.premises import missing_premises
+from iveg.domain.rule.clear import unmet_conditions
 from iveg.domain.world import World
 from tests.builders import at, detection, detection_frame, odometry, origin, received
 from tests.unit.pipeline.desk import Desk
@@ -53,8 +53,9 @@ class Story:
     def honest(self, robot_id: str) -> tuple[Odometry, DetectionFrame]:
         """Where an honest robot is, and what it sees there."""
         seen = (FARMER,) if robot_id == "AGII" else ()
+        place, name = PLACES[robot_id], self.desk.next_origin()
         return (
-            odometry(robot_id, PLACES[robot_id], origin=self.desk.next_origin()),
+            odometry(robot_id, place, linear=0.0, origin=name),
             detection_frame(robot_id, *seen, origin=self.desk.next_origin()),
         )
 
@@ -184,8 +185,8 @@ def test_what_is_missing_only_grows_as_evidence_goes(
         world.robot(name).detector.note_whole(at(0.0).mono)
     for one in first:
         spoil(world, *one)
-    before = missing_premises(world, at(0.0))
+    before = unmet_conditions(world, at(0.0))
     for one in more:
         spoil(world, *one)
-    after = missing_premises(world, at(0.0))
+    after = unmet_conditions(world, at(0.0))
     assert all(set(before[name]) <= set(after[name]) for name in PLACES)

@@ -27,7 +27,7 @@ from iveg.domain.observations import (
     SafetyReport,
 )
 from iveg.ngsi import codec, names
-from iveg.ngsi.texts import MAX_TEXT, clean_text
+from iveg.ngsi.payloads import MAX_TEXT, clean_text
 
 alphabet = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_.: áéñ"
 texts = st.text(alphabet, min_size=1, max_size=40)
@@ -45,18 +45,24 @@ def stamped(boot: str, seq: int, wall: float) -> Origin:
 
 origins = st.builds(stamped, texts, st.integers(0, 2**53), walls)
 told_monos = st.none() | thousandths(0, 1e9)
-heard = st.none() | st.builds(FeedbackRef, texts, st.integers(0, 2**53))
+refs = st.builds(FeedbackRef, texts, st.integers(0, 2**53))
+heard = st.none() | refs
 
 
-@given(origins, told_monos, st.booleans(), heard)
+@given(origins, told_monos, st.booleans(), heard, st.lists(refs, max_size=3))
 def test_what_proves_an_age_survives_the_wire(
-    origin: Origin, mono: float | None, acknowledgements: bool, told: FeedbackRef | None
+    origin: Origin,
+    mono: float | None,
+    acknowledgements: bool,
+    told: FeedbackRef | None,
+    others: list[FeedbackRef],
 ) -> None:
     said = replace(
         origin,
         mono=mono,
         acknowledgements=acknowledgements,
         heard=told if acknowledgements else None,
+        heard_also=tuple(others) if acknowledgements and told else (),
     )
     one = Odometry("AGI", said, Pose2D(0.0, 0.0, 0.0), Twist2D(0.0, 0.0))
 
@@ -80,9 +86,10 @@ detections = st.builds(
     Detection,
     texts,
     thousandths(0, 1),
-    st.tuples(*[st.tuples(metres, metres).map(sorted)] * 3).map(
-        lambda sides: Box3D(*(end for side in sides for end in side))
-    ),
+    # Shorter than 12 m, and not where nobody knows.
+    st.tuples(*[st.tuples(metres, thousandths(0, 11.9))] * 3)
+    .map(lambda sides: Box3D(*(end for a, d in sides for end in (a, round(a + d, 3)))))
+    .filter(lambda box: any((box.xmin, box.xmax, box.ymin, box.ymax))),
     st.sampled_from([None, "map", "base_link", "camera_optical_frame"]),
     maybe,
 )

@@ -15,8 +15,8 @@ import pytest
 
 from iveg.domain.observations import FeedbackRef, Hold, Odometry, Origin, SafetyReport
 from iveg.domain.transports import FIWARE
-from iveg.robot.echo import Echo
 from tests.builders import odometry, origin, safety_report
+from tests.fakes.echo import Echo
 from tests.unit.pipeline.desk import Desk
 
 STEP_S = 0.1
@@ -71,12 +71,8 @@ class Life:
 
     def origin(self, topic: str) -> Origin:
         now = self.desk.clock.now
-        return replace(
-            origin(next(self.seqs[topic]), boot=f"boot-{self.boots}", after=now),
-            mono=now - self.booted,
-            acknowledgements=True,
-            heard=self.echo.heard,
-        )
+        said = origin(next(self.seqs[topic]), boot=f"boot-{self.boots}", after=now)
+        return self.echo.on(replace(said, mono=now - self.booted), now)
 
     def listen(self) -> None:
         """Feedback and STOP reach the robot, late or not at all."""
@@ -85,7 +81,7 @@ class Life:
         self.heard += [(now + self.down_s, one.origin) for one in fresh]
         for due, said in self.heard:
             if due <= now:
-                self.echo.note(said)
+                self.echo.note(said, now)
         self.heard = [one for one in self.heard if one[0] > now]
         hold_id = self.desk.commander.machine("AGI").hold_id
         if hold_id is not None and hold_id != FORGOTTEN.id:

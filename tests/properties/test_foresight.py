@@ -11,8 +11,8 @@ from iveg.domain.feedback import CLEAR, Feedback, FeedbackAlert
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import Origin
 from iveg.domain.rule import foresight as rule_foresight
-from iveg.domain.rule import last_steps
-from iveg.domain.rule.speed_limits import SpeedLimits
+from iveg.domain.rule.foresight import by_cause
+from iveg.domain.rule.judge import SpeedLimits
 from iveg.robot.judgement import Judgement, Limits
 from tests.unit.domain.scene import Scene, person
 from tests.unit.robot.rig import person as alert
@@ -99,15 +99,15 @@ def test_what_is_told_beside_what_slows_changes_no_limit(
             missed_s, turned = (2.0, 0.5) if scene is more else (0.0, math.inf)
             with (
                 patch.object(rule_foresight, "_MISSED_S", missed_s),
-                patch.object(last_steps, "_TURNED_M_S", turned),
+                patch.object(rule_foresight, "_TURNED_M_S", turned),
             ):
                 limits.append(scene.judge())
         assert limits[0] == limits[1]
-        told, before = (one.encounters_shown("AGI") for one in _limits(more, less))
+        told, before = (one.encounters_told("AGI") for one in _limits(more, less))
         assert before.keys() <= told.keys()
         assert all(told[who].in_s <= one.in_s for who, one in before.items())
-        slows = more.speed_limits.foretold.get("AGI", {})
-        assert slows.items() <= more.speed_limits.encounters_shown("AGI").items()
+        slows = by_cause(more.speed_limits.encounters.get("AGI", ()), "slows")
+        assert slows.items() <= more.speed_limits.encounters_told("AGI").items()
 
 
 def _limits(*scenes: Scene) -> list[SpeedLimits]:
@@ -115,7 +115,7 @@ def _limits(*scenes: Scene) -> list[SpeedLimits]:
 
 
 def _in_s(scene: Scene) -> dict[str, float]:
-    ahead = scene.speed_limits.foretold.get("AGI", {})
+    ahead = by_cause(scene.speed_limits.encounters.get("AGI", ()), "slows")
     return {cause: one.in_s for cause, one in ahead.items()}
 
 

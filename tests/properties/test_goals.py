@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from iveg.adapters.broker_address import BrokerAddress
+from iveg.adapters.mqtt import BrokerAddress
 from iveg.domain.errors import CommandRefusedError
 from iveg.domain.feedback import CLEAR, Feedback, SpeedLimit
 from iveg.domain.fleet import RobotProfile
@@ -26,8 +26,7 @@ from iveg.domain.observations import (
     Origin,
 )
 from iveg.ngsi import codec, names
-from iveg.robot.node import RobotNode
-from iveg.robot.node_settings import NodeSettings
+from iveg.robot.node import NodeSettings, RobotNode
 from tests.builders import odometry, safety_report
 from tests.unit.pipeline.desk import Desk, settle
 from tests.unit.robot.rig import AHEAD, REST, release, resume, stop

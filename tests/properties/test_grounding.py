@@ -9,20 +9,20 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from iveg.domain.geometry import Pose2D
-from iveg.robot.grounding.cloud import DepthPicture, Pinhole, cloud_index
-from iveg.robot.grounding.locate import (
+from iveg.robot.grounding import (
+    DepthPicture,
     Grounded,
     Grounding,
-    Mount,
-    Segment,
-    ground,
-    to_detection,
-)
-from iveg.robot.grounding.mask import (
     Mask,
+    Mount,
+    Pinhole,
+    Segment,
+    cloud_index,
     eroded,
+    ground,
     kernel_area,
     read_mask,
+    to_detection,
     write_mask,
 )
 

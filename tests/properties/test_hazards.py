@@ -1,14 +1,16 @@
 """Near by arrays is near one by one: the same speed limits, names and order of all."""
 
-from collections.abc import Iterable
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from iveg.domain.rule import zones
-from iveg.domain.rule.crossings import LimitChange
-from tests.builders import at
+from iveg.domain.detection_rule import DetectionRule
+from iveg.domain.parameters import ByClass
+from iveg.domain.robot_state import RobotState
+from iveg.domain.rule import judge
+from iveg.domain.rule.zones import LimitChange, Zone
 from tests.unit.domain.scene import Scene, person
 
 FLEET = tuple(f"R{number}" for number in range(6))
@@ -43,9 +45,9 @@ def named(changes: Iterable[LimitChange]) -> list[tuple[object, ...]]:
     return [
         (
             one.began,
-            one.crossing.decision_id,
-            one.crossing.robot_id,
-            one.crossing.zone,
+            one.entry.decision_id,
+            one.entry.robot_id,
+            one.entry.zone,
         )
         for one in changes
     ]
@@ -54,8 +56,12 @@ def named(changes: Iterable[LimitChange]) -> list[tuple[object, ...]]:
 Steps = list[tuple[float, str, tuple[int, int], list[tuple[int, int]]]]
 
 
+RULE = DetectionRule(radius_m=ByClass(2.0, {"robot": 3.0}))
+"""Robots have wider zones than people."""
+
+
 def play(steps: Steps, metre: float = 2.0) -> list[object]:
-    scene, told = Scene(FLEET), list[object]()
+    scene, told = Scene(FLEET, rule=RULE), list[object]()
     for pause, robot_id, (x, y), seen in steps:
         scene.now += pause
         scene.drive(robot_id, x / metre, y / metre)
@@ -64,15 +70,32 @@ def play(steps: Steps, metre: float = 2.0) -> list[object]:
     return told
 
 
+def one_by_one(
+    robots: Sequence[RobotState],
+    zones: Sequence[Zone],
+    entries: Mapping[str, Container[str]],
+) -> Iterator[tuple[RobotState, list[Zone]]]:
+    """Every robot with the zones that it is in or was in, each looked at alone."""
+    for robot in robots:
+        if robot.odometry is not None:
+            pose, mine = robot.odometry.pose, entries.get(robot.robot_id, ())
+            yield (
+                robot,
+                [
+                    zone
+                    for zone in zones
+                    if zone.cause in mine
+                    or pose.distance_to(zone.x, zone.y) <= zone.radius_m + 0.01
+                ],
+            )
+
+
 def assert_alike(steps: Steps, metre: float) -> None:
-    """The rule finds the same whether it looks at each or only at who is near."""
-    with pytest.MonkeyPatch.context() as one_by_one:
-        one_by_one.setattr(zones, "_FEW_PAIRS", 10**9)
+    """The rule finds the same whether it looks at all or only at what is near."""
+    with pytest.MonkeyPatch.context() as compared:
+        compared.setattr(judge, "near_zones", one_by_one)
         expected = play(steps, metre)
-    with pytest.MonkeyPatch.context() as arrays:
-        arrays.setattr(zones, "_FEW_PAIRS", -1)
-        found = play(steps, metre)
-    assert found == expected
+    assert play(steps, metre) == expected
 
 
 @given(STEPS)
@@ -81,36 +104,8 @@ def test_arrays_find_what_looking_at_each_finds(steps: Steps) -> None:
 
 
 @given(DRIFTS)
-def test_neighbours_of_half_a_second_ago_are_all_that_looking_at_each_finds(
-    steps: Steps,
-) -> None:
+def test_arrays_find_the_same_in_a_crowd(steps: Steps) -> None:
     assert_alike(steps, 4.0)
-
-
-WAITS = st.lists(st.sampled_from([0.0, 0.05, 0.2, 0.31, 1.0, 2.7]), max_size=3)
-
-
-@given(DRIFTS, WAITS, st.sampled_from([-1, 10**9]))
-def test_judging_anew_only_whose_premises_changed_is_judging_everybody(
-    steps: Steps, waits: list[float], few_pairs: int
-) -> None:
-    scene = Scene(FLEET)
-    with pytest.MonkeyPatch.context() as compared:
-        compared.setattr(zones, "_FEW_PAIRS", few_pairs)
-        for pause, robot_id, (x, y), seen in steps:
-            scene.now += pause
-            scene.drive(robot_id, x / 4, y / 4)
-            scene.look(robot_id, *(person(px / 4, py / 4) for px, py in seen))
-            scene.navigate(robot_id, "hauling" if x > y else "scouting")
-            for wait in (0.0, *waits):
-                scene.now += wait
-                afresh = scene.speed_limits.copy()
-                known = scene.world, scene.people, scene.rule, at(scene.now), "d"
-                expected = afresh.evaluate(*known)
-                found = scene.speed_limits.evaluate(*known)
-                assert found == expected
-                assert scene.speed_limits.crossings == afresh.crossings
-                assert scene.speed_limits.limited_since == afresh.limited_since
 
 
 def test_a_peer_that_comes_back_where_it_was_lost_is_found() -> None:

@@ -21,6 +21,7 @@ from iveg.domain.observations import (
     Observation,
     Odometry,
     Origin,
+    ReportedObstacle,
     SafetyReport,
 )
 from tests.builders import detection, detection_frame, odometry, origin
@@ -86,6 +87,8 @@ lies = st.one_of(
         released=st.lists(st.sampled_from(["01A", "01B"]), max_size=2).map(tuple),
         linear=speeds,
         angular=speeds,
+        obstacle=st.none()
+        | st.builds(ReportedObstacle, metres, metres, st.just(0.4), st.booleans()),
     ),
 )
 

@@ -33,7 +33,7 @@ def rings_of(scene: Scene) -> set[tuple[float, float]]:
     return {
         (one.x, round(radius, 6))
         for person in scene.everyone
-        for one, radius in person.rings(scene.rule, at(scene.now))
+        for one, radius in person.zone_radii(scene.rule, at(scene.now))
     }
 
 
@@ -55,7 +55,6 @@ def test_every_ring_of_the_boxes_alone_is_there_and_no_robot_is_ever_faster(
                 scene.drive(robot_id, x)
             seen = [detection("farmer", x, probability=p) for x, p in picture]
             scene.look(observer, *seen)
-            scene.sweep()
             limits.append(scene.judge())
         assert rings_of(single) <= rings_of(summed)
         before, after = limits

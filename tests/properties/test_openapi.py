@@ -26,7 +26,6 @@ from schemathesis.specs.openapi.checks import (
     status_code_conformance,
 )
 
-from iveg.domain.messages import CHANNELS
 from iveg.web.refusals import declared_actions
 from iveg.web.security.roles import MAY
 from tests.unit.web.whole import STRANGER, WholeServer, whole_server
@@ -34,11 +33,9 @@ from tests.unit.web.whole import STRANGER, WholeServer, whole_server
 EXAMPLES = int(os.environ.get("IVEG_OPENAPI_EXAMPLES", "3"))
 IS_LONG = EXAMPLES > 10
 """Then each run asks something else."""
-KNOWN = {"robot_id": ("AGI", "AGII"), "channel": CHANNELS}
+KNOWN = {"robot_id": ("AGI", "AGII")}
 """What nobody guesses, and what there is."""
-UNPROVEN = {
-    f"urn:iveg:{one}" for one in ("wrong-password", "proof-wrong", "foreign-origin")
-}
+UNPROVEN = {f"urn:iveg:{one}" for one in ("wrong-password", "foreign-origin")}
 """Refused for what is in the body, or because no page of iVeg sends it."""
 DOWN = {"GET /readyz"}
 """Answers 503 by design where no hop is there."""

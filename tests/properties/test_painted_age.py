@@ -7,7 +7,7 @@ often and says so.  Times are monotonic (s); the news is new at every moment.
 from hypothesis import given
 from hypothesis import strategies as st
 
-from iveg.web.live.pacing import CreditWindow
+from iveg.web.live.feed import CreditWindow
 
 SECONDS = 12.0
 SETTLED = 6.0

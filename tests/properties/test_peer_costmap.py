@@ -11,7 +11,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from iveg.adapters.broker_address import BrokerAddress
+from iveg.adapters.mqtt import BrokerAddress
 from iveg.domain.feedback import Feedback
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.observations import LaserScan
@@ -19,8 +19,7 @@ from iveg.domain.peer_scan import peer_scan_of
 from iveg.domain.witness import Outline
 from iveg.ngsi import codec
 from iveg.robot.costmap import FleetCostmap
-from iveg.robot.node import RobotNode
-from iveg.robot.node_settings import NodeSettings
+from iveg.robot.node import NodeSettings, RobotNode
 from tests.builders import AGI, origin, scan
 
 ROOM = Rectangle(-8.0, -8.0, 8.0, 8.0)

@@ -48,7 +48,7 @@ def test_every_robots_newest_look_keeps_its_ring(
     rings = [
         (sighting.observer, round(sighting.x, 6), round(sighting.y, 6))
         for one in scene.everyone
-        for sighting, radius in one.rings(scene.rule, at(scene.now))
+        for sighting, radius in one.zone_radii(scene.rule, at(scene.now))
         if radius >= 2.0
     ]
     for observer, (when, (x, y)) in newest.items():

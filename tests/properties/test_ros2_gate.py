@@ -14,15 +14,14 @@ from hypothesis import strategies as st
 
 from iveg.domain.feedback import SpeedLimit
 from iveg.domain.geometry import REST, Twist2D
-from iveg.lab.emulator.ros2_navigation import TIMEOUT_S, DriveWatchdog
-from iveg.robot.caps import Cap
-from iveg.robot.effects import Drive as Told
-from iveg.robot.gate import RAMP_M_S2, RAMP_RAD_S2
+from iveg.lab.emulator.ros2_base import TIMEOUT_S, DriveWatchdog
+from iveg.robot.gate import RAMP_M_S2, RAMP_RAD_S2, Cap
+from iveg.robot.orders import Drive as Told
 from iveg.robot.ros2.config import DriveConfig
-from iveg.robot.ros2.drive import DriveTopics
-from iveg.robot.ros2.input_faults import InputFaults
-from iveg.robot.ros2.reading import read_twist
-from iveg.ros2 import cdr, geometry_msgs, std_msgs
+from iveg.robot.ros2.outputs import DriveTopics
+from iveg.robot.ros2.reading import InputFaults, read_twist
+from iveg.ros2 import cdr
+from iveg.ros2 import messages as ros
 from tests.unit.robot.rig import STEP_S, Rig, person, release, resume, stop
 
 WALL = 1_700_000_000.0
@@ -79,13 +78,9 @@ class Gate:
     # --- what happens -------------------------------------------------------------
 
     def on_wish(self, forward: float, turn: float, back_s: float) -> None:
-        twist = geometry_msgs.Twist(
-            geometry_msgs.Vector3(forward), geometry_msgs.Vector3(z=turn)
-        )
-        stamp = std_msgs.Time.of(WALL + self.rig.now + back_s)
-        self.on_junk(
-            cdr.write(geometry_msgs.TwistStamped(std_msgs.Header(stamp), twist))
-        )
+        twist = ros.Twist(ros.Vector3(forward), ros.Vector3(z=turn))
+        stamp = ros.Time.of(WALL + self.rig.now + back_s)
+        self.on_junk(cdr.write(ros.TwistStamped(ros.Header(stamp), twist)))
 
     def on_junk(self, payload: bytes) -> None:
         if not self.runs:
@@ -158,7 +153,7 @@ class Gate:
 
     def deliver(self, at: float, payload: bytes) -> None:
         """What arrives at the base, held against what the node allows."""
-        twist = read_twist(cdr.read(geometry_msgs.TwistStamped, payload).twist)
+        twist = read_twist(cdr.read(ros.TwistStamped, payload).twist)
         cap = self.rig.machine.cap.factor
         lived = at - self.wished_at <= 0.5
         wish = self.wished if lived else REST

@@ -6,11 +6,9 @@ import orjson
 from hypothesis import given
 from hypothesis import strategies as st
 
-from iveg.domain.costmap import Occupancy
+from iveg.domain.costmap import Grid, Occupancy, sweep_of
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.observations import LaserScan
-from iveg.domain.occupancy_grid import Grid
-from iveg.domain.sweeps import sweep_of
 from iveg.ngsi import codec
 
 ROOM = Grid.over(Rectangle(0, 0, 20, 10))

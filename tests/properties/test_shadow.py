@@ -4,6 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iveg.domain.detection_rule import DetectionRule
+from iveg.domain.parameters import ByClass
 from iveg.domain.rule.trial import Trial
 from iveg.ngsi import codec
 from tests.builders import detection
@@ -11,8 +12,8 @@ from tests.unit.pipeline.desk import Desk
 
 _CANDIDATE = st.builds(
     DetectionRule,
-    threshold=st.sampled_from((0.0, 0.5, 0.8, 0.95, 1.0)),
-    radius_m=st.sampled_from((0.5, 2.0, 6.0)),
+    threshold=st.builds(ByClass, st.sampled_from((0.0, 0.5, 0.8, 0.95, 1.0))),
+    radius_m=st.builds(ByClass, st.sampled_from((0.5, 2.0, 6.0))),
     foresight=st.booleans(),
     foresight_s=st.sampled_from((0.5, 3.0)),
 )

@@ -17,18 +17,13 @@ def is_fresh(robot: Robot) -> bool:
 
 def contradictions(robot: Robot, *, alerted: bool) -> dict[str, bool]:
     """What must not be, by name."""
-    found, link, margin = robot["situation"], robot["link"], robot["margin"]
+    found, link = robot["situation"], robot["link"]
     level, state, factor = found["level"], found["state"], found["factor"]
     fresh = is_fresh(robot)
     reason = robot["applied"]["reason"] if fresh else None
-    moves = (
-        abs(robot["twist"]["linear"]) > LIMITS.standing_speed if link == "LIVE" else 0
-    )
-    too_close = margin is not None and margin["band"] in ("inside", "unknown")
     silent = link in ("LOST", "UNKNOWN")
     return {
         "clear beside a link that is not": state == "clear" and link != "LIVE",
-        "clear beside a margin": state == "clear" and too_close and moves,
         "clear beside a lack": state == "clear" and bool(robot["missing"]),
         "clear that the robot does not say": state == "clear" and reason != "clear",
         "clear beside a limit": state == "clear" and factor != 1.0,

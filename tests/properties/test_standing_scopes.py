@@ -12,7 +12,7 @@ from iveg.domain.observations import SafetyReport
 from iveg.domain.stop import SendStop, StopMachine
 from iveg.domain.transports import DIRECT, FIWARE, TransportId
 from iveg.ngsi import codec
-from iveg.robot.effects import Effect, Report
+from iveg.robot.orders import Effect, Report
 from tests.builders import at
 from tests.unit.robot.rig import STEP_S, Rig
 

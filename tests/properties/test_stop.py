@@ -24,6 +24,7 @@ from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import (
     CommandAnswer,
     Instant,
+    Odometry,
     Origin,
     SafetyReport,
 )
@@ -42,7 +43,7 @@ from iveg.domain.stop import (
 from iveg.domain.stream_order import StreamOrder
 from iveg.domain.transports import TransportId
 from iveg.ngsi import codec
-from iveg.robot import effects as robot
+from iveg.robot import orders as robot
 from iveg.robot.holds import HoldSet
 from iveg.robot.safety import SafetyMachine
 from tests.builders import START
@@ -305,9 +306,9 @@ class StopOverBadTransports(RuleBasedStateMachine):
 
     def _odometry(self, speed: float) -> None:
         self.moved_at = self.now if speed >= 0.02 else self.moved_at
-        origin = self.rig.odometry_stamp(self.now)
-        new_id = self.new_id()
-        self.perform(self.iveg.odometry(speed, 0.0, self.at(), new_id, origin, inf))
+        origin, twist = self.rig.odometry_stamp(self.now), Twist2D(speed, 0.0)
+        said = Odometry("AGI", origin, HERE, twist)
+        self.perform(self.iveg.odometry(said, self.at(), self.new_id(), inf))
 
     def hear(self, word: object, transport: TransportId) -> None:
         if isinstance(word, CommandAnswer):

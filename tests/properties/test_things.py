@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from iveg.domain.tracking.things import RADIUS_M, SURELY_FROM, Thing
+from iveg.domain.tracking.person import RADIUS_M, SURELY_FROM, Thing
 from tests.builders import at
 from tests.unit.domain.scene import Scene, person
 
@@ -26,7 +26,7 @@ def rings_of(scene: Scene) -> Rings:
     return {
         (one.x, one.confidence, one.observer, radius)
         for somebody in scene.everyone
-        for one, radius in scene.people.rings(somebody, scene.rule, at(scene.now))
+        for one, radius in scene.people.zone_radii(somebody, scene.rule, at(scene.now))
     }
 
 

@@ -1,7 +1,6 @@
 """A laser makes no robot faster, and none later slow (docs/safety.md, "The laser")."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 from hypothesis import given
@@ -12,8 +11,6 @@ from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import LaserScan, Origin
 from iveg.domain.witness import Outline, Plan
 from iveg.robot.judgement import Limits
-from tests.unit.domain.scene import FIELD, HEDGE, Scene
-from tests.unit.domain.scene import person as camera
 from tests.unit.robot.rig import AHEAD, Rig, person
 
 BEAMS = 24
@@ -44,52 +41,6 @@ def test_no_scan_makes_a_robot_faster(
             assert sighted.machine.cap.factor <= blind.machine.cap.factor
             assert sighted.twist.linear_x <= max(blind.twist.linear_x, 0.0)
     assert blind.wished == sighted.wished == AHEAD
-
-
-_SPOT = st.tuples(st.sampled_from((-2.5, 1.2, 2.4, 4.0)), st.sampled_from((0.0, 1.0)))
-_MOMENT = st.tuples(
-    st.sampled_from((0.1, 0.4, 1.2)),
-    st.sampled_from((-1.0, 0.0, 0.8)),
-    st.sampled_from((0.0, 1.5)),
-    st.lists(_SPOT, max_size=2),
-    st.lists(_RANGE, min_size=BEAMS, max_size=BEAMS) | st.none(),
-)
-
-
-@given(
-    st.sampled_from((FIELD, HEDGE)),
-    st.sampled_from((0.0, 0.5, math.pi)),
-    st.lists(_MOMENT, max_size=12),
-)
-def test_no_scan_that_the_server_reads_makes_a_robot_faster_or_later_slow(
-    greenhouse: Greenhouse,
-    mount: float,
-    run: list[
-        tuple[float, float, float, list[tuple[float, float]], list[float] | None]
-    ],
-) -> None:
-    blind, sighted = (Scene(greenhouse=greenhouse) for _ in range(2))
-    x = yaw = 0.0
-    for after_s, speed, turn, people, ranges in run:
-        x, yaw = x + speed * after_s, yaw + turn * after_s
-        limits = []
-        for scene in (blind, sighted):
-            scene.now = round(scene.now + after_s, 6)
-            scene.drive("AGI", x, 0.0, yaw, linear=speed)
-            scene.drive("AGII", 3.0, 1.0, linear=-speed)
-            scene.look("AGI", *(camera(*spot) for spot in people))
-            scene.look("AGII")
-            if scene is sighted and ranges is not None:
-                said = replace(_scan(ranges), mount=Pose2D(0.3, 0.0, mount))
-                scene.scan("AGI", said)
-            limits.append(scene.judge())
-        before, after = limits
-        assert all(
-            after[one].speed_factor <= limit.speed_factor
-            for one, limit in before.items()
-        )
-        named = {one.reason for one in after.values() if one.speed_factor == 1.0}
-        assert named <= {"clear"}
 
 
 def _scan(ranges: list[float]) -> LaserScan:

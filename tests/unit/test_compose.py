@@ -4,7 +4,6 @@ import fnmatch
 import re
 import subprocess
 import sys
-from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -18,15 +17,18 @@ from tests.processes import ROOT
 COMPOSE = (ROOT / "compose.yaml").read_text()
 SERVICES: dict[str, dict[str, Any]] = yaml.safe_load(COMPOSE)["services"]
 NETWORKS: dict[str, dict[str, Any]] = yaml.safe_load(COMPOSE)["networks"]
-KNOWN = {row.metadata["variable"] for row in fields(Settings)}
+KNOWN = set(Settings().to_environment())
 ASKED = set(re.findall(r"(?<!\$)\$\{(\w+)(:-|:\?|:\+|-|\})", COMPOSE))
 MAY_BE_EMPTY = {
     "IVEG_FLEET",
+    "IVEG_REFUSED_ROBOTS",
+    "IVEG_MESSAGES_FILE",
     "IVEG_SSO_CLIENT_ID",
     "IVEG_SSO_CLIENT_SECRET",
     "IVEG_SSO_ISSUER",
     "IVEG_SSO_ROLES",
 }
+LOOPBACK = r"(\$\{\w+:-)?127\.0\.0\.1\}?:"
 PRIVATE = ("mongodb", "orion", "iot-agent", "postgresql", "iveg-migrate", "emulator")
 DOCKERFILE = (ROOT / "Dockerfile").read_text()
 
@@ -78,8 +80,22 @@ def test_compose_keeps_to_the_compose_specification() -> None:
 @pytest.mark.parametrize("service", SERVICES)
 def test_every_variable_of_iveg_is_a_setting(service: str) -> None:
     ours = {name for name in environment(service) if name.startswith("IVEG_")}
+    ours -= {"IVEG_SITE"} if service == "caddy" else set()
 
     assert ours <= KNOWN
+
+
+def test_the_page_is_reached_by_the_proxy_alone() -> None:
+    proxy = NETWORKS["proxy"]
+    (subnet,) = [one["subnet"] for one in proxy["ipam"]["config"]]
+    inside = {name for name, one in SERVICES.items() if "proxy" in one["networks"]}
+    caddy = (ROOT / "deploy/Caddyfile").read_text()
+
+    assert inside == {"caddy", "iveg"}
+    assert environment("iveg")["FORWARDED_ALLOW_IPS"] == subnet
+    assert SERVICES["iveg"]["ports"] == ["127.0.0.1:8000:8000"]
+    assert "reverse_proxy iveg:8000" in caddy
+    assert "@inside path /ngsi/* /metrics\n\trespond @inside 404" in caddy
 
 
 def test_what_iveg_is_told_can_be_read(made: Path) -> None:
@@ -113,19 +129,13 @@ def test_a_fleet_file_is_mounted_where_the_service_reads_it(
 ) -> None:
     env = {**env_of(made), "IVEG_FLEET": file}
     told = {name: filled(value, env) for name, value in environment(service).items()}
-    (mount,) = [one for one in SERVICES[service]["volumes"] if isinstance(one, dict)]
+    mount = next(one for one in SERVICES[service]["volumes"] if isinstance(one, dict))
 
     settings = Settings.from_environment(told)
 
     assert settings.fleet == (mount["target"] if file else "")
     assert load_fleet(str(ROOT / filled(mount["source"], env))).ids
     assert mount["read_only"] is True
-
-
-def test_without_a_choice_the_whole_fleet_file_takes_part(made: Path) -> None:
-    env = {**env_of(made), "IVEG_ROBOTS": ""}
-
-    assert filled(environment("iveg")["IVEG_ROBOTS"], env) == ""
 
 
 def test_every_variable_is_made_or_has_a_default(made: Path) -> None:
@@ -150,12 +160,6 @@ def test_the_start_refuses_without_any_of_the_secrets(made: Path) -> None:
     assert required == set(env_of(made)) - chosen
 
 
-def test_the_example_holds_no_secret() -> None:
-    example = (ROOT / "deploy/env.example").read_text()
-
-    assert re.findall(r"^\w*(?:PASSWORD|TOKEN)\w*=", example, re.MULTILINE) == []
-
-
 @pytest.mark.parametrize("service", SERVICES)
 def test_no_container_has_more_rights_than_it_needs(service: str) -> None:
     stands = SERVICES[service]
@@ -168,13 +172,6 @@ def test_no_container_has_more_rights_than_it_needs(service: str) -> None:
     assert stands.get("user", "") not in ("root", "0")
 
 
-@pytest.mark.parametrize("service", SERVICES)
-def test_every_image_is_pinned_to_a_version(service: str) -> None:
-    tag = SERVICES[service]["image"].partition(":")[2]
-
-    assert re.match(r"\d+\.\d+", tag)
-
-
 @pytest.mark.parametrize("service", PRIVATE)
 def test_what_asks_nobody_who_he_is_cannot_be_reached(service: str) -> None:
     networks = SERVICES[service]["networks"]
@@ -183,17 +180,11 @@ def test_what_asks_nobody_who_he_is_cannot_be_reached(service: str) -> None:
     assert [name for name in networks if not NETWORKS[name].get("internal")] == []
 
 
-def test_every_long_running_service_says_whether_it_is_well() -> None:
-    silent = {name for name, one in SERVICES.items() if "healthcheck" not in one}
-
-    assert silent == {"iveg-migrate", "emulator"}
-
-
 def test_ports_open_on_loopback_unless_a_site_chooses_otherwise() -> None:
     ports = [port for one in SERVICES.values() for port in one.get("ports", [])]
 
-    assert len(ports) == 4
-    assert [port for port in ports if ":-127.0.0.1}:" not in port] == []
+    assert len(ports) == 5
+    assert [port for port in ports if not re.match(LOOPBACK, port)] == []
 
 
 def test_the_history_is_migrated_before_iveg_serves() -> None:
@@ -201,27 +192,6 @@ def test_the_history_is_migrated_before_iveg_serves() -> None:
 
     assert SERVICES["iveg-migrate"]["command"] == ["db", "upgrade"]
     assert wanted == "service_completed_successfully"
-
-
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [
-        ("IOTA_MQTT_RETRIES", "1000000"),
-        ("IOTA_MQTT_RETRY_TIME", "2"),
-        ("IOTA_MQTT_KEEPALIVE", "5"),
-        ("IOTA_MQTT_QOS", "1"),
-        ("IOTA_REGISTRY_TYPE", "mongodb"),
-        ("IOTA_TIMESTAMP", "true"),
-    ],
-)
-def test_the_agent_never_gives_up_and_forgets_nothing(name: str, value: str) -> None:
-    assert environment("iot-agent")[name] == value
-
-
-def test_orion_queues_notifications_instead_of_a_thread_each() -> None:
-    command = SERVICES["orion"]["command"]
-
-    assert command[command.index("-notificationMode") + 1] == "threadpool:120:12"
 
 
 @pytest.mark.parametrize("service", ["iveg", "emulator", "iveg-migrate"])
@@ -258,7 +228,7 @@ def test_mounted_files_are_there_or_are_made(made: Path) -> None:
     ]
     deploy = made.parent
 
-    assert len(mounts) == 4
+    assert len(mounts) == 5
     for mount in mounts:
         inside = Path(mount).relative_to("deploy")
         assert (ROOT / mount).is_file() or (deploy / inside).is_dir(), mount
@@ -315,7 +285,7 @@ def test_the_image_has_the_libraries_of_the_product_and_of_every_way_in() -> Non
 
     beside = {name for name, _ in locked["image"] - locked["run"]}
     assert locked["run"] < locked["image"] <= locked["dev"]
-    assert {"psycopg", "webauthn", "authlib"} <= beside
+    assert {"psycopg", "authlib"} <= beside
     assert re.findall(r"-r (\S+)", DOCKERFILE) == ["image.lock", "audit.lock"]
 
 
@@ -331,18 +301,6 @@ def test_the_base_of_the_image_is_one_by_its_digest() -> None:
     assert re.search(r"@sha256:[0-9a-f]{64}$", bases[0])
 
 
-def test_the_image_lists_what_is_inside_by_a_tool_that_stays_outside() -> None:
-    locked = (ROOT / "requirements/audit.lock").read_text()
-    told = re.findall(r"(\S+)/bin/cyclonedx-py environment", DOCKERFILE)
-
-    assert told == ["/build/audit"]
-    assert "--output-file /opt/iveg/sbom.cdx.json /opt/iveg/bin/python" in DOCKERFILE
-    assert re.findall(r"^(cyclonedx-bom|pip-audit)==", locked, re.MULTILINE) == [
-        "cyclonedx-bom",
-        "pip-audit",
-    ]
-
-
 def test_the_image_runs_as_nobody_in_particular() -> None:
     user = re.findall(r"^USER (\d+):", DOCKERFILE, re.MULTILINE)
 
@@ -352,9 +310,8 @@ def test_the_image_runs_as_nobody_in_particular() -> None:
 # --- make-secrets -----------------------------------------------------------------
 
 
-def test_every_secret_is_random_and_long(tmp_path: Path) -> None:
-    first = env_of(make_secrets(tmp_path / "a"))
-    second = env_of(make_secrets(tmp_path / "b"))
+def test_every_secret_is_random_and_long(made: Path, tmp_path: Path) -> None:
+    first, second = env_of(made), env_of(make_secrets(tmp_path))
     secret = [name for name in first if re.search("PASSWORD|TOKEN", name)]
 
     assert len(secret) == 9

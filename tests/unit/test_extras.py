@@ -12,8 +12,6 @@ from iveg.adapters.history.engine import writing_engine
 from iveg.app.sign_on import open_provider
 from iveg.cli import UNUSABLE, main
 from iveg.domain.errors import MissingExtraError
-from iveg.domain.geometry import Pose2D
-from iveg.robot.replay.recordings import open_recording
 from iveg.settings import Settings
 from tests.processes import ROOT
 
@@ -88,14 +86,6 @@ def test_an_identity_provider_without_its_extra_names_the_setting(
 
     with pytest.raises(MissingExtraError, match=r"IVEG_SSO_ISSUER.*iveg\[sso\]"):
         open_provider(settings)
-
-
-@pytest.mark.parametrize("extra", ["bags"])
-def test_a_bag_without_its_extra_names_the_file_and_what_to_install(
-    without: str, tmp_path: Path
-) -> None:
-    with pytest.raises(MissingExtraError, match=rf"d1\.mcap.*iveg\[{without}\]"):
-        open_recording(tmp_path / "d1.mcap", Pose2D(0.0, 0.0, 0.0))
 
 
 @pytest.mark.parametrize("extra", ["postgresql"])

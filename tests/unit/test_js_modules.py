@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Page
 
-from iveg.web.pages.templates import limits_text
+from iveg.web.pages.drawing import limits_text
 from tests.browsers import running_browser
 
 _ROOT = Path(__file__).parents[2]

@@ -115,35 +115,6 @@ def test_on_debian_root_installs_what_is_missing_and_says_so_first(
     )
 
 
-def test_each_word_asks_only_for_its_own(debian: Machine) -> None:
-    debian.lacks("npm", "chromium")
-
-    debian.set_up("check")
-
-    (install,) = [line for line in debian.asked_of_apt() if "install" in line]
-    assert install.endswith(" npm")
-
-
-def test_no_service_starts_while_it_is_installed_and_the_policy_goes_again(
-    debian: Machine,
-) -> None:
-    debian.lacks("mosquitto")
-
-    debian.set_up("test")
-
-    assert debian.asked_of_apt()[-1] == "policy-rc.d"
-    assert not debian.policy.exists()
-
-
-def test_a_policy_that_is_there_stays_as_it_is(debian: Machine) -> None:
-    debian.lacks("mosquitto")
-    debian.policy.write_text("mine")
-
-    debian.set_up("test")
-
-    assert debian.policy.read_text() == "mine"
-
-
 def test_a_failed_installation_ends_non_zero_and_takes_the_policy_back(
     debian: Machine,
 ) -> None:
@@ -154,21 +125,6 @@ def test_a_failed_installation_ends_non_zero_and_takes_the_policy_back(
 
     assert done.returncode == 100
     assert not debian.policy.exists()
-
-
-def test_somebody_who_is_not_root_installs_by_a_sudo_that_asks_nothing(
-    debian: Machine,
-) -> None:
-    debian.lacks("mosquitto")
-    debian.has("id", says="echo 1000")
-    debian.has("sudo", says='[ "$1" = -n ] || exit 9; shift; exec "$@"')
-    debian.has("true")
-
-    done = debian.set_up("test")
-
-    assert done.returncode == 0
-    assert "sudo -n apt-get" in done.stdout
-    assert debian.asked_of_apt()[-2].endswith(" mosquitto")
 
 
 @pytest.mark.parametrize("sudo", ["exit 1", None])
@@ -187,20 +143,6 @@ def test_where_sudo_would_ask_one_line_says_what_to_run(
     assert debian.asked_of_apt() == []
 
 
-def test_the_set_up_may_be_forbidden_and_then_names_what_is_missing(
-    debian: Machine,
-) -> None:
-    debian.lacks("mosquitto", "npm")
-
-    done = debian.set_up("test", "check", IVEG_SETUP="off")
-
-    (said,) = done.stderr.splitlines()
-    assert done.returncode == 1
-    assert "mosquitto npm" in said
-    assert "IVEG_SETUP=off" in said
-    assert debian.asked_of_apt() == []
-
-
 @pytest.mark.parametrize("system", ["ubuntu", "fedora"])
 def test_elsewhere_nothing_is_installed_and_one_line_names_what_and_how(
     debian: Machine, system: str
@@ -215,23 +157,6 @@ def test_elsewhere_nothing_is_installed_and_one_line_names_what_and_how(
     assert "chromium-headless-shell mosquitto" in said
     assert "playwright install chromium" in said
     assert debian.asked_of_apt() == []
-
-
-def test_a_chromium_that_is_a_snap_is_none(debian: Machine) -> None:
-    debian.is_a("ubuntu")
-    debian.has("snap")
-    debian.lacks("chromium")
-    (debian.programs / "chromium").symlink_to(debian.programs / "snap")
-
-    assert "needs chromium" in debian.set_up("test").stderr
-
-
-def test_playwrights_own_chromium_will_do(debian: Machine) -> None:
-    debian.is_a("ubuntu")
-    debian.lacks("chromium")
-    (debian.root / ".cache/ms-playwright/chromium-1181").mkdir(parents=True)
-
-    assert debian.set_up("test").returncode == 0
 
 
 def test_a_python_that_is_too_old_is_named(debian: Machine) -> None:

@@ -4,9 +4,9 @@ import re
 
 import pytest
 
-from iveg.web.pages.translations import read_translations
+from iveg.web.pages.sentences import read_translations
 
-INSIDE = ("docs", "error")
+INSIDE = ("error",)
 """Pages for programmers, and codes of HTTP."""
 
 
@@ -24,22 +24,11 @@ def test_no_sentence_shows_a_name_from_inside(language: str) -> None:
     assert [k for k, text in sentences(language).items() if names.search(text)] == []
 
 
-def test_13_20_in_spanish_the_button_is_parar_and_what_it_does_a_parada() -> None:
-    said = sentences("es").items()
-    stop = [key for key, text in said if re.search(r"\bSTOP\b", text)]
-    verb = [
-        key for key, text in said if re.search(r"\b(?:un|el|los|órdenes) PARAR\b", text)
-    ]
-
-    assert (stop, verb) == ([], [])
-
-
 @pytest.mark.parametrize(
     ("language", "one", "others"),
     [
         ("es", "zona", r"círculo que|\banillo\b"),
         ("en", "zone", r"\bring\b"),
-        ("es", "simulacro", r"[Pp]rueba de parada"),
         ("es", "aparato", r"este (?:equipo|dispositivo)|Según el equipo"),
         ("es", "certeza", r"\bconfianza\b"),
         ("en", "certainty", r"\bconfidence\b"),

@@ -2,17 +2,34 @@
 
 SQLite runs in WAL so that readers never wait for the writer; its driver's own hidden
 transactions are turned off, so that a transaction begins where we say so.
+
+Bringing a database to the shape that this version of iVeg writes.
+
+The migrations lie beside the package in a checkout and inside it when installed.  Each
+start calls ``upgrade``: nothing to do costs a few milliseconds.
 """
 
+import logging
+import sqlite3
+from datetime import UTC, datetime
+from functools import cache
 from pathlib import Path
 
 import orjson
-from sqlalchemy import URL, Engine, create_engine, event, make_url
+from alembic import command
+from alembic.config import Config
+from alembic.runtime.migration import MigrationContext
+from alembic.script import ScriptDirectory
+from alembic.util import CommandError
+from sqlalchemy import URL, Connection, Engine, create_engine, event, make_url, text
 from sqlalchemy.engine.interfaces import DBAPIConnection
-from sqlalchemy.exc import ArgumentError
+from sqlalchemy.exc import ArgumentError, DatabaseError, OperationalError
 from sqlalchemy.pool import ConnectionPoolEntry, NullPool, Pool, QueuePool
 
-from iveg.domain.errors import MissingExtraError, SettingsError
+import iveg
+from iveg.adapters import clock
+from iveg.adapters.files import make_private
+from iveg.domain.errors import DataFileError, HopError, MissingExtraError, SettingsError
 
 _BUSY_TIMEOUT_S = 5.0
 _POSTGRESQL = {
@@ -104,8 +121,6 @@ def _with_timeout(url: URL) -> URL:
 def _prepare_sqlite(connection: DBAPIConnection, _: ConnectionPoolEntry) -> None:
     connection.isolation_level = None
     for pragma in (
-        # Counts in a new file alone, and before anything is written to it.
-        "auto_vacuum=INCREMENTAL",
         "journal_mode=WAL",
         "synchronous=NORMAL",
         "foreign_keys=ON",
@@ -123,3 +138,146 @@ def _parse(database_url: str) -> URL:
     if url.drivername in ("postgresql", "postgres"):
         return url.set(drivername="postgresql+psycopg")
     return url
+
+
+_log = logging.getLogger(__name__)
+_CHECK_LIMIT_S = 5.0
+_STEPS_BETWEEN_LOOKS = 100_000
+_ONE_AT_A_TIME = 0x69566567
+"""Any fixed number: the PostgreSQL lock that two starts at once would fight for."""
+
+
+def upgrade(database_url: str) -> None:
+    """Make the database fit to be written; a corrupt SQLite file is moved aside.
+
+    Raises:
+        DataFileError: it was written by a newer iVeg, or a migration broke off in it.
+        HopError: it cannot be reached.
+        SettingsError: the address cannot be used.
+    """
+    file = sqlite_file(database_url)
+    if file is not None:
+        _prepare_file(file)
+    engine = writing_engine(database_url)
+    try:
+        with engine.connect() as connection, connection.begin():
+            _upgrade(connection, describe(database_url))
+    except OperationalError as error:
+        raise HopError("database", reason_of(error)) from error
+    finally:
+        engine.dispose()
+
+
+def alembic_config(connection: Connection) -> Config:
+    """Alembic's settings made in code, so that a wheel needs no ini file."""
+    config = Config()
+    location = str(migrations_directory()).replace("%", "%%")
+    config.set_main_option("script_location", location)
+    config.set_main_option("path_separator", "os")
+    config.attributes["connection"] = connection
+    return config
+
+
+def migrations_directory() -> Path:
+    """Directory of the migrations: in an installed package, else in the checkout."""
+    package = Path(iveg.__file__).parent
+    installed = package / "_migrations"
+    return installed if installed.is_dir() else package.parent / "migrations"
+
+
+def revisions(connection: Connection) -> tuple[str | None, list[str]]:
+    """The revision of a database, and all that this version knows, newest first."""
+    found = MigrationContext.configure(connection).get_current_revision()
+    return found, list(_known(migrations_directory()))
+
+
+@cache
+def _known(directory: Path) -> tuple[str, ...]:
+    """All revisions, newest first; to load them takes longer than most else here."""
+    steps = ScriptDirectory(str(directory))
+    return tuple(step.revision for step in steps.walk_revisions())
+
+
+def reason_of(error: Exception) -> str:
+    """The driver's error in one line, without statement and parameters."""
+    cause = getattr(error, "orig", None) or error
+    return " ".join(str(cause).split())
+
+
+def _upgrade(connection: Connection, where: str) -> None:
+    if connection.dialect.name == "postgresql":
+        lock = text("SELECT pg_advisory_xact_lock(:key)")
+        connection.execute(lock, {"key": _ONE_AT_A_TIME})
+    found, known = revisions(connection)
+    if found == known[0]:
+        return
+    if found is not None and found not in known:
+        raise DataFileError(
+            where,
+            "",
+            f"its history was written by a newer iVeg (revision {found}); start that "
+            "version, or name another database in IVEG_DATABASE_URL",
+        )
+    try:
+        command.upgrade(alembic_config(connection), "head")
+    except (DatabaseError, CommandError) as error:
+        raise DataFileError(
+            where,
+            "",
+            f"a migration of its history cannot be finished ({reason_of(error)}); "
+            "restore a backup, or name another database in IVEG_DATABASE_URL",
+        ) from error
+
+
+def _prepare_file(file: Path) -> None:
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        damage = damage_of(file) if file.exists() else None
+        if damage is not None:
+            _move_aside(file, damage)
+        # SQLite gives its write-ahead files the rights of the database.
+        make_private(file)
+        for suffix in ("-wal", "-shm"):
+            beside = file.with_name(file.name + suffix)
+            if beside.exists():
+                make_private(beside)
+    except OSError as error:
+        raise HopError("database", f"{file}: {error.strerror}") from error
+
+
+def damage_of(file: Path) -> str | None:
+    """Damage of a file's structure; None when none was found in 5 s.
+
+    A locked file is not a damaged one; later calls deal with it.
+    """
+    deadline = clock.mono() + _CHECK_LIMIT_S
+    connection = sqlite3.connect(file, isolation_level=None)
+    connection.set_progress_handler(
+        lambda: clock.mono() > deadline, _STEPS_BETWEEN_LOOKS
+    )
+    try:
+        answer = connection.execute("PRAGMA quick_check(1)").fetchone()
+    except sqlite3.OperationalError:
+        return None
+    except sqlite3.DatabaseError as error:
+        return str(error)
+    finally:
+        connection.close()
+    return None if answer == ("ok",) else str(answer[0])
+
+
+def _move_aside(file: Path, damage: str) -> None:
+    moment = datetime.fromtimestamp(clock.wall(), UTC)
+    mark = f".corrupt-{moment:%Y%m%dT%H%M%S%f}"
+    # The write-ahead files go along: left behind, they would play into the new one.
+    for part in ("", "-wal", "-shm"):
+        old = file.with_name(file.name + part)
+        if old.exists():
+            old.rename(file.with_name(file.name + mark + part))
+    _log.error(
+        "The history in %s is damaged (%s). It was moved aside as %s and a new one "
+        "begins; the past is missing until it is restored.",
+        file,
+        damage,
+        file.name + mark,
+    )

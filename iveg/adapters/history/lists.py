@@ -2,18 +2,27 @@
 
 A page ends in a cursor that names its last row, not a count of rows, so that neither
 new rows nor deep pages make the next one wrong or slow.
+
+The lists of the history: which records each has, and how it is sorted.
+
+Places between two pages of a list, as opaque texts that fit into a URL.
 """
 
+import base64
+import binascii
 import string
-from collections.abc import Iterator
-from dataclasses import dataclass, fields, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, fields, replace
 from hashlib import blake2s
-from typing import Any, Generic
+from typing import Any, Generic, TypeVar
 
+import orjson
 from sqlalchemy import (
+    Column,
     ColumnElement,
     Connection,
     RowMapping,
+    Table,
     and_,
     func,
     literal,
@@ -22,9 +31,186 @@ from sqlalchemy import (
     tuple_,
 )
 
-from iveg.adapters.history.cursors import Cursor
-from iveg.adapters.history.listings import ListOf, R
-from iveg.adapters.history.table_mappings import TABLE_MAPPINGS
+from iveg.adapters.history import tables
+from iveg.adapters.history.tables import TABLE_MAPPINGS
+from iveg.domain.errors import UnreadableError
+from iveg.domain.records import (
+    AlertRecord,
+    AuditRecord,
+    CommandRecord,
+    DecisionRecord,
+    DetectionRecord,
+    LogRecord,
+    MeasurementRecord,
+    OdometryRecord,
+    ReadingRecord,
+    Record,
+)
+
+R = TypeVar("R", bound=Record)
+
+
+@dataclass(frozen=True, slots=True)
+class ListOf(Generic[R]):
+    """Listing of one kind of record.
+
+    Attributes:
+        at: The column that orders it; ``key`` settles equal times.
+        classes: Columns that the class filter looks at.
+        which: Rows that are in the list at all; None: every one of the table.
+        sorts: Columns that it can be sorted by beside its time, by name.
+    """
+
+    kind: type[R]
+    table: Table
+    at: Column[float]
+    key: Column[int] | Column[str]
+    classes: tuple[Column[str], ...] = ()
+    probability: Column[float] | None = None
+    which: ColumnElement[bool] | None = None
+    sorts: Mapping[str, Column[str]] = field(default_factory=dict)
+
+
+DECISIONS = ListOf(
+    DecisionRecord,
+    tables.decisions,
+    tables.decisions.c.started_at,
+    tables.decisions.c.decision_id,
+    (tables.decisions.c.class_, tables.decisions.c.class_id),
+    tables.decisions.c.confidence,
+    sorts={"robot": tables.decisions.c.robot_id},
+)
+
+
+DETECTIONS = ListOf(
+    DetectionRecord,
+    tables.detections,
+    tables.detections.c.at,
+    tables.detections.c.row_id,
+    (tables.detections.c.class_, tables.detections.c.class_id),
+    tables.detections.c.probability,
+)
+
+
+TRACKS = replace(DETECTIONS, which=tables.detections.c.person_id.is_not(None))
+
+
+ODOMETRY = ListOf(
+    OdometryRecord,
+    tables.odometry,
+    tables.odometry.c.at,
+    tables.odometry.c.row_id,
+)
+
+
+COMMANDS = ListOf(
+    CommandRecord,
+    tables.commands,
+    tables.commands.c.requested_at,
+    tables.commands.c.command_id,
+    sorts={"robot": tables.commands.c.robot_id, "kind": tables.commands.c.kind},
+)
+
+
+ALERTS = ListOf(
+    AlertRecord,
+    tables.alerts,
+    tables.alerts.c.last_raised_at,
+    tables.alerts.c.alert_id,
+    sorts={"robot": tables.alerts.c.robot_id, "priority": tables.alerts.c.priority},
+)
+
+
+LOG = ListOf(
+    LogRecord,
+    tables.log,
+    tables.log.c.at,
+    tables.log.c.row_id,
+    (tables.log.c.class_,),
+    sorts={"robot": tables.log.c.robot_id, "kind": tables.log.c.kind},
+)
+
+
+NOTE = "log.note"
+
+
+NOTES = replace(LOG, which=tables.log.c.key == NOTE)
+
+
+READINGS = ListOf(
+    ReadingRecord,
+    tables.readings,
+    tables.readings.c.at,
+    tables.readings.c.row_id,
+    (tables.readings.c.kind,),
+)
+
+
+MEASUREMENTS = ListOf(
+    MeasurementRecord,
+    tables.measurements,
+    tables.measurements.c.at,
+    tables.measurements.c.row_id,
+    (tables.measurements.c.entity_id, tables.measurements.c.attribute),
+)
+
+
+AUDIT = ListOf(
+    AuditRecord,
+    tables.audit,
+    tables.audit.c.at,
+    tables.audit.c.seq,
+    (tables.audit.c.action, tables.audit.c.name),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Cursor:
+    """The last row of a page: its time and what tells it from others of that time.
+
+    Attributes:
+        question: What was asked for (``lists.question_of``): only that goes on here.
+        group: Its value in the column that the list is sorted by; None: by time.
+    """
+
+    at: float
+    key: int | str
+    question: str = ""
+    group: str | None = None
+
+
+def write_cursor(cursor: Cursor) -> str:
+    """A cursor as opaque text that fits into a URL."""
+    group = () if cursor.group is None else (cursor.group,)
+    parts = [cursor.at, cursor.key, cursor.question, *group]
+    text = base64.urlsafe_b64encode(orjson.dumps(parts))
+    return text.decode().rstrip("=")
+
+
+def read_cursor(text: str, of: ListOf[R]) -> Cursor:
+    """A cursor that ``write_cursor`` wrote for the same list.
+
+    Raises:
+        UnreadableError: it did not.
+    """
+    try:
+        padded = text.encode("ascii") + b"=" * (-len(text) % 4)
+        at, key, question, *group = orjson.loads(base64.urlsafe_b64decode(padded))
+    except (ValueError, TypeError, binascii.Error) as error:
+        raise UnreadableError("bad_cursor") from error
+    is_group = [*map(type, group)] in ([], [str]) and "".join(group).isprintable()
+    is_named = isinstance(question, str) and is_group
+    if not (isinstance(at, float) and _is_key(key, of) and is_named):
+        raise UnreadableError("bad_cursor")
+    return Cursor(at, key, question, *group)
+
+
+def _is_key(key: object, of: ListOf[R]) -> bool:
+    # Only what a column can hold: the rest would fail inside the database.
+    if of.key.type.python_type is int:
+        return type(key) is int and 0 <= key < 2**63
+    return isinstance(key, str) and key.isascii() and key.isprintable()
+
 
 USUAL_ROWS, MOST_ROWS = 100, 1000
 BY_TIME, NEWEST_FIRST = "at", "-at"

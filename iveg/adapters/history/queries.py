@@ -2,37 +2,82 @@
 
 Every query runs in a thread of its own small pool, so that a long query neither holds
 up the event loop nor takes the threads that a STOP's journal needs.
+
+One question to the history's database, which a connection answers.
+
+Accounts and tokens of earlier versions, which kept them in the history's database.
+
+They are copied once; the tables stay for one version more.
 """
 
 import asyncio
 from collections.abc import AsyncIterator, Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from typing import Any, Concatenate
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
-from sqlalchemy import Connection, Select, func, select
+from sqlalchemy import Connection, Engine, Select, insert, select
+from sqlalchemy.exc import SQLAlchemyError
 
-from iveg.adapters.history import listings, lists
-from iveg.adapters.history.asking import P, T, ask
-from iveg.adapters.history.engine import reading_engine
-from iveg.adapters.history.listings import ListOf, R
-from iveg.adapters.history.lists import Filter, Page, record_of
+from iveg.adapters.history import lists
+from iveg.adapters.history.engine import reading_engine, reason_of
+from iveg.adapters.history.lists import Filter, ListOf, Page, R, record_of
+from iveg.adapters.history.recorder import Store
 from iveg.adapters.history.tables import (
+    access_moved,
+    accounts,
     alerts,
+    api_tokens,
     command_events,
     commands,
     decisions,
     is_open_command,
-    latency,
 )
+from iveg.domain.accounts import Access, Account, ApiToken
+from iveg.domain.errors import HopError
 from iveg.domain.records import (
     AlertRecord,
     CommandEventRecord,
     CommandRecord,
     DecisionRecord,
-    LatencyRecord,
     LogRecord,
 )
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+def ask(
+    engine: Engine,
+    question: Callable[Concatenate[Connection, P], T],
+    *args: P.args,
+    **named: P.kwargs,
+) -> T:
+    """The answer of a database.
+
+    Raises:
+        HopError: it does not answer.
+    """
+    try:
+        with engine.connect() as connection:
+            return question(connection, *args, **named)
+    except SQLAlchemyError as error:
+        raise HopError("database", reason_of(error)) from error
+
+
+def ask_once(
+    url: str,
+    question: Callable[Concatenate[Connection, P], T],
+    *args: P.args,
+    **named: P.kwargs,
+) -> T:
+    """The same, of a database that is asked nothing else."""
+    engine = reading_engine(url)
+    try:
+        return ask(engine, question, *args, **named)
+    finally:
+        engine.dispose()
+
 
 _THREADS = 4
 
@@ -114,33 +159,6 @@ class Queries:
         )
         return await self.ask(_records, AlertRecord, wanted)
 
-    async def drills(
-        self, robot: str | None = None, most: int = 100
-    ) -> tuple[CommandRecord, ...]:
-        """The newest STOP drills, newest first."""
-        c = commands.c
-        wanted = (
-            select(commands)
-            .where(c.drill)
-            .order_by(c.requested_at.desc(), c.command_id.desc())
-            .limit(most)
-        )
-        if robot is not None:
-            wanted = wanted.where(c.robot_id == robot)
-        return await self.ask(_records, CommandRecord, wanted)
-
-    async def last_drills(self) -> dict[str, float]:
-        """Robot → when its last drill that ended in a standstill was asked (Unix s)."""
-        c = commands.c
-        newest = (
-            select(c.robot_id, func.max(c.requested_at))
-            .where(c.drill, c.standing_at.is_not(None))
-            .group_by(c.robot_id)
-        )
-        return await self.ask(
-            lambda connection: {row[0]: row[1] for row in connection.execute(newest)}
-        )
-
     async def command_events(self, command_id: str) -> tuple[CommandEventRecord, ...]:
         """The audit trail of a command, oldest first."""
         steps = await self.steps_of([command_id])
@@ -163,13 +181,7 @@ class Queries:
 
     async def newest_lines(self, most: int) -> tuple[LogRecord, ...]:
         """The newest lines of the log, newest first."""
-        return (await self.page(listings.LOG, Filter(limit=most))).items
-
-    async def latency_minutes(self, since: float) -> tuple[LatencyRecord, ...]:
-        """Every minute of every hop from then on (Unix s), oldest first."""
-        c = latency.c
-        wanted = select(latency).where(c.at >= since).order_by(c.at, c.row_id)
-        return await self.ask(_records, LatencyRecord, wanted)
+        return (await self.page(lists.LOG, Filter(limit=most))).items
 
     def close(self) -> None:
         """Let go of threads and connections."""
@@ -183,3 +195,30 @@ def _records(
     """The rows that a statement finds, as records in its order."""
     rows = connection.execute(wanted).mappings()
     return tuple(record_of(kind, row) for row in rows)
+
+
+def earlier_access(url: str) -> Access | None:
+    """Rows that are still to be copied; None after that. Raises HopError."""
+    return ask_once(url, _read)
+
+
+def mark_moved(url: str, now: float) -> None:
+    """Note that all is copied (Unix s). Raises HopError."""
+    store = Store(url)
+    try:
+        store.run(lambda one: one.execute(insert(access_moved).values(at=now)))
+    finally:
+        store.close()
+
+
+def _read(connection: Connection) -> Access | None:
+    if connection.execute(select(access_moved)).first() is not None:
+        return None
+    known = [one for one in accounts.c if one.key != "name_key"]
+    people = connection.execute(select(*known)).mappings()
+    known = [one for one in api_tokens.c if one.key != "name_key"]
+    programs = connection.execute(select(*known)).mappings()
+    return Access(
+        tuple(Account(**row) for row in people),
+        tuple(ApiToken(**row) for row in programs),
+    )

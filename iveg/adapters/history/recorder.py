@@ -1,36 +1,200 @@
 """Moves offered records into the database, without ever making the pipeline wait.
 
-One task gathers batches, one thread writes them.  While the database is away, records
-that may not be lost go to the journal and telemetry waits its turn in the queue::
+One task gathers batches, one thread writes them.  Rows of orders go to the journal at
+once (``flushed``), which holds them until the database has them; while it is away, all
+others wait in a bounded queue, of which the oldest give way::
 
     enqueue ──> queue ──> batch ──> database
-                └─ away ─> journal ─┘  on its return, and at the next start
+       └─ orders ─> journal ─┘  at the next start
 
-Commands do not wait for a batch:  ``flushed`` puts them into the journal at once, and a
-row that is then written twice is stored once.
+Batches of records into the tables: one transaction each, all or nothing.
+
+Rows of one kind that the database does not take for their values are counted and left
+out, so that they cannot hold up everything behind them.
 """
 
 import asyncio
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
+from functools import cache
 from pathlib import Path
 from typing import Literal, TypeVar
 
-from sqlalchemy import Connection
+from sqlalchemy import Connection, Engine, Insert
+from sqlalchemy.dialects import postgresql, sqlite
+from sqlalchemy.exc import (
+    DataError,
+    DBAPIError,
+    IntegrityError,
+    InterfaceError,
+    ProgrammingError,
+    StatementError,
+)
 
 from iveg.adapters import clock
-from iveg.adapters.history.engine import sqlite_file
-from iveg.adapters.history.spill_file import SpillFile
-from iveg.adapters.history.store import Store
+from iveg.adapters.history.engine import reason_of, sqlite_file, upgrade, writing_engine
+from iveg.adapters.history.tables import TABLE_MAPPINGS, TableMapping
+from iveg.adapters.journal import FileJournal
 from iveg.domain.errors import DataFileError, HopError
 from iveg.domain.observations import Instant
-from iveg.domain.records import CommandEventRecord, CommandRecord, Record
+from iveg.domain.records import (
+    AuditRecord,
+    CommandEventRecord,
+    CommandRecord,
+    Record,
+    is_order,
+)
 from iveg.pipeline.record import CAPACITY, RecordQueue, Waiting
 
 _log = logging.getLogger(__name__)
+_Row = dict[str, object]
 _T = TypeVar("_T")
+_FIELDS = {kind: tuple(f.name for f in fields(kind)) for kind in TABLE_MAPPINGS}
+_DURABLE = CommandRecord | CommandEventRecord | AuditRecord
+_VALUE_ERRORS = (ValueError, TypeError, OverflowError)
+
+
+class Store:
+    """The one writer's side of the database; blocks, so it lives in a thread."""
+
+    def __init__(self, database_url: str) -> None:
+        self._url = database_url
+        self._engine: Engine | None = None
+        self.rejected = 0
+        """Rows that the database can never take."""
+
+    def write(self, rows: Sequence[Waiting]) -> None:
+        """Store a batch; on failure nothing of it is stored.
+
+        Raises:
+            HopError: the database is away, locked, full or damaged.
+            DataFileError: it cannot be brought to the shape that is written here.
+        """
+        self._in_transaction(rows, lambda connection: self._insert(connection, rows))
+
+    def run(self, work: Callable[[Connection], _T]) -> _T:
+        """Other work of the one writer, in a transaction of its own.
+
+        Raises:
+            HopError: the database is away, locked, full or damaged.
+            DataFileError: it cannot be brought to the shape that is written here.
+        """
+        return self._in_transaction((), work)
+
+    def _in_transaction(
+        self, rows: Sequence[Waiting], work: Callable[[Connection], _T]
+    ) -> _T:
+        engine = self._ready()
+        try:
+            with engine.connect() as connection:
+                _choose_durability(connection, rows)
+                with connection.begin():
+                    return work(connection)
+        except DBAPIError as error:
+            self._let_go(error)
+            raise HopError("database", reason_of(error)) from error
+
+    def _insert(self, connection: Connection, rows: Sequence[Waiting]) -> None:
+        for kind, mapping in TABLE_MAPPINGS.items():
+            of_kind = [row for row in rows if type(row.record) is kind]
+            if not of_kind:
+                continue
+            try:
+                with connection.begin_nested():
+                    _insert(connection, kind, mapping, of_kind)
+            except (StatementError, *_VALUE_ERRORS) as error:
+                if not _is_fault_of_row(error, connection.engine):
+                    raise
+                self.rejected += len(of_kind)
+                name, why = kind.__name__, reason_of(error)
+                _log.error("history: %d %s not stored: %s", len(of_kind), name, why)
+
+    def close(self) -> None:
+        """Let go of the connection; the next write makes a new one."""
+        if self._engine is not None:
+            self._engine.dispose()
+            self._engine = None
+
+    def _ready(self) -> Engine:
+        # Looking again after every loss heals a file that was damaged or replaced.
+        if self._engine is None:
+            upgrade(self._url)
+            self._engine = writing_engine(self._url)
+        return self._engine
+
+    def _let_go(self, error: Exception) -> None:
+        # These pass by themselves; checking the whole file again would only add to it.
+        if not any(word in str(error) for word in ("is locked", "is full")):
+            self.close()
+
+
+def _choose_durability(connection: Connection, rows: Sequence[Waiting]) -> None:
+    """SQLite waits for the disk where the batch holds commands or their audit trail.
+
+    Past the pool's back, because SQLAlchemy would begin a transaction for it, and
+    inside one SQLite ignores the change.
+    """
+    if connection.dialect.name != "sqlite":
+        return
+    level = "FULL" if any(isinstance(r.record, _DURABLE) for r in rows) else "NORMAL"
+    connection.connection.cursor().execute(f"PRAGMA synchronous={level}")
+
+
+def _insert(
+    connection: Connection,
+    kind: type,
+    mapping: TableMapping,
+    rows: Sequence[Waiting],
+) -> None:
+    values = _values(rows, mapping)
+    connection.execute(_statement(kind, connection.dialect.name), values)
+
+
+def _values(rows: Iterable[Waiting], mapping: TableMapping) -> list[_Row]:
+    """Rows as columns; of several states of one thing only the newest."""
+    if not mapping.changes:
+        return [_columns(row.record) for row in rows]
+    newest: dict[tuple[object, ...], _Row] = {}
+    for row in sorted(rows, key=lambda row: row.revision):
+        values = _columns(row.record) | {"revision": row.revision}
+        newest[tuple(values[name] for name in mapping.identity)] = values
+    return list(newest.values())
+
+
+def _columns(record: Record) -> _Row:
+    return {name: getattr(record, name) for name in _FIELDS[type(record)]}
+
+
+@cache
+def _statement(kind: type, dialect: str) -> Insert:
+    mapping = TABLE_MAPPINGS[kind]
+    make = postgresql.insert if dialect == "postgresql" else sqlite.insert
+    statement = make(mapping.table)
+    if not mapping.identity:
+        return statement
+    names = [mapping.table.c[key] for key in mapping.identity]
+    if not mapping.changes:
+        return statement.on_conflict_do_nothing(index_elements=names)
+    return statement.on_conflict_do_update(
+        index_elements=names,
+        set_={c: statement.excluded[c.key] for c in mapping.table.c if c not in names},
+        where=mapping.table.c.revision <= statement.excluded.revision,
+    )
+
+
+def _is_fault_of_row(error: Exception, engine: Engine) -> bool:
+    """Whether the values are the cause; else it is the database, and all can wait."""
+    if not isinstance(error, DBAPIError):
+        return True
+    if isinstance(error, IntegrityError | DataError):
+        return True
+    refused = (InterfaceError, ProgrammingError)
+    # Python's SQLite driver reports a type that it cannot bind in one of these two.
+    return engine.dialect.name == "sqlite" and isinstance(error, refused)
+
+
 _BATCH = 500
 _GATHER_S = 0.25
 _LATE_S = 2.0
@@ -45,7 +209,7 @@ class RecorderHealth:
         state: ``ok``, ``late`` (something waits longer than 2 s) or ``down``.
         age_s: How long the oldest record has waited to be stored (s).
         detail: Why the database is away; empty when it is not.
-        counters: written, dropped, journalled, replayed, rejected, waiting.
+        counters: written, dropped, rejected, waiting.
     """
 
     state: Literal["ok", "late", "down"]
@@ -59,36 +223,35 @@ class Recorder:
 
     Args:
         database_url: Brought to the newest shape before the first write.
-        journal: File of the journal, beside the database.
+        journal: Holds rows of orders.
         read_clock: For the age of waiting records and the order of revisions.
     """
 
     def __init__(
         self,
         database_url: str,
-        journal: Path,
+        journal: FileJournal,
         *,
         capacity: int = CAPACITY,
         read_clock: Callable[[], Instant] = clock.now,
     ) -> None:
         self._store = Store(database_url)
-        self._journal = SpillFile(journal)
+        self._journal = journal
         self._clock = read_clock
         self._queue = RecordQueue(capacity)
         self._thread = ThreadPoolExecutor(1, "history")
-        # A STOP waits for its audit row: no thread of anything else may delay that.
-        self._journal_thread = ThreadPoolExecutor(1, "history-journal")
-        self._unflushed: list[Waiting] = []
-        self._securing = asyncio.Lock()
+        self._left: set[int] = set()
+        """Revisions of rows of earlier runs that are not written yet."""
         self._awake, self._full = asyncio.Event(), asyncio.Event()
         self._caught_up = asyncio.Event()
         self._writing: asyncio.Task[None] | None = None
-        self._closing = False
         self._revision = 0
-        self._written = self._journalled = self._replayed = self._lost_at_close = 0
+        self._written = self._lost_at_close = 0
         self._lost_since: float | None = None
+        self._lost_before = 0
         self._detail = ""
         self._pause_s = _FIRST_PAUSE_S
+        self.flushed = journal.flushed
         # What an earlier run could not store goes first.
         self._awake.set()
 
@@ -97,24 +260,12 @@ class Recorder:
     def enqueue(self, record: Record) -> None:
         """Queue a record; never blocks, never awaits, never fails."""
         waiting = self._stamp(record)
-        if isinstance(record, CommandRecord | CommandEventRecord):
-            self._unflushed.append(waiting)
+        if is_order(record):
+            self._journal.note(waiting)
         self._queue.enqueue(waiting)
         self._awake.set()
         if len(self._queue) >= _BATCH:
             self._full.set()
-
-    async def flushed(self) -> None:
-        """Return when every command and audit row so far is in the journal.
-
-        For a STOP, which must survive a crash of the next millisecond.  Those who ask
-        at the same time share one write; a disk that refuses leaves the rows in memory
-        like any other, and is seen in ``health``.
-        """
-        async with self._securing:
-            rows, self._unflushed = self._unflushed, []
-            if rows:
-                await self._append(rows)
 
     async def caught_up(self) -> None:
         """Return when the database has what earlier runs left in the journal."""
@@ -136,22 +287,11 @@ class Recorder:
         return {
             "history_written": self._written,
             "history_dropped": self._queue.dropped + self._lost_at_close,
-            "history_journalled": self._journalled,
-            "history_replayed": self._replayed,
-            "history_rejected": self._store.rejected + self._journal.unreadable,
+            "history_rejected": self._store.rejected,
             "history_waiting": len(self._queue),
         }
 
     # --- beside it ----------------------------------------------------------------
-
-    @property
-    def is_busy(self) -> bool:
-        """Whether rows wait that go before any other work.
-
-        Not while the database is away: a full disk has no room for them before
-        something is deleted.
-        """
-        return self._lost_since is None and len(self._queue) >= _BATCH
 
     async def between_batches(self, work: Callable[[Connection], _T]) -> _T:
         """Other work of the one writer, a transaction between two batches.
@@ -166,28 +306,30 @@ class Recorder:
     # --- the one writer -----------------------------------------------------------
 
     async def run(self) -> None:
-        """Write until cancelled or closed; call ``close`` afterwards."""
-        await asyncio.to_thread(self._journal.keep_reserve)
-        while not self._closing:
+        """Write until cancelled; call ``close`` afterwards."""
+        now = self._clock().mono
+        left = [replace(one, since=now) for one in self._journal.left()]
+        self._left = {one.revision for one in left}
+        self._queue.put_back(left)
+        while True:
             await self._gather()
             await self._round()
 
     async def close(self) -> None:
-        """Store or journal the rest, and close the database."""
-        self._closing = True
-        self._awake.set()
-        self._full.set()
+        """Store the rest, and close the database; orders stay in the journal."""
         if self._writing is not None:
             await asyncio.wait({self._writing})
         while len(self._queue) and self._lost_since is None:
             await self._write_batch(self._queue.dequeue(_BATCH))
-        await self._spill()
-        self._lost_at_close += len(self._queue.dequeue(len(self._queue)))
+        await self.flushed()
+        rest = self._queue.dequeue(len(self._queue))
+        self._lost_at_close = sum(not is_order(one.record) for one in rest)
+        if self._lost_at_close:
+            _log.warning("history: %d rows were not stored", self._lost_at_close)
         await asyncio.get_running_loop().run_in_executor(
             self._thread, self._store.close
         )
         self._thread.shutdown(wait=False)
-        self._journal_thread.shutdown(wait=False)
 
     async def _gather(self) -> None:
         """Wait for work, then a moment longer so that a batch is worth its commit."""
@@ -206,29 +348,20 @@ class Recorder:
             self._write_batch(batch), name="history-batch"
         )
         # Cancelling us must not lose sight of a batch that the thread still writes.
-        while not self._writing.done():
-            await asyncio.wait({self._writing}, timeout=_GATHER_S)
-            if self._lost_since is not None:
-                await self._spill()
+        await asyncio.wait({self._writing})
         if self._lost_since is not None:
-            await self._rest()
+            pause = self._pause_s
+            self._pause_s = min(_LONGEST_PAUSE_S, 2 * pause)
+            await asyncio.sleep(pause)
         if len(self._queue):
             self._awake.set()
         if len(self._queue) >= _BATCH:
             self._full.set()
 
-    async def _rest(self) -> None:
-        pause, self._pause_s = self._pause_s, min(_LONGEST_PAUSE_S, 2 * self._pause_s)
-        self._awake.set()
-        while pause > 0.0 and not self._closing:
-            await asyncio.sleep(_GATHER_S)
-            await self._spill()
-            pause -= _GATHER_S
-
     async def _write_batch(self, batch: list[Waiting]) -> None:
         loop = asyncio.get_running_loop()
         try:
-            await loop.run_in_executor(self._thread, self._write, batch)
+            await loop.run_in_executor(self._thread, self._store.write, batch)
         except (HopError, DataFileError) as error:
             self._lose(str(error))
         except Exception as error:
@@ -237,60 +370,36 @@ class Recorder:
             self._lose(repr(error))
         else:
             self._written += len(batch)
-            self._caught_up.set()
+            self._left.difference_update(one.revision for one in batch)
+            if not self._left:
+                self._caught_up.set()
             self._come_back()
+            orders = {one.revision for one in batch if is_order(one.record)}
+            if orders:
+                await self._journal.committed(orders)
             return
         self._queue.put_back(batch)
-        await self._spill()
-
-    def _write(self, batch: list[Waiting]) -> None:
-        """Write in the thread; the journal's rows are older, so they go first."""
-        position = 0
-        while position < (end := self._journal.size):
-            rows, position = self._journal.read(position, _BATCH)
-            self._store.write(rows)
-            self._replayed += len(rows)
-            if position >= end and self._journal.clear(position):
-                break
-        if batch:
-            self._store.write(batch)
 
     # --- away and back ------------------------------------------------------------
 
     def _lose(self, detail: str) -> None:
         if self._lost_since is None:
             self._lost_since = self._clock().mono
-            _log.warning("history: database lost, keeping what matters: %s", detail)
+            self._lost_before = self._queue.dropped
+            _log.warning("history: database lost: %s", detail)
         self._detail = detail
 
     def _come_back(self) -> None:
         if self._lost_since is not None:
             away = self._clock().mono - self._lost_since
-            _log.info("history: database is back after %.1f s", away)
+            dropped = self._queue.dropped - self._lost_before
+            _log.info(
+                "history: database is back after %.1f s, %d rows were dropped",
+                away,
+                dropped,
+            )
         self._lost_since, self._detail = None, ""
         self._pause_s = _FIRST_PAUSE_S
-
-    async def _spill(self) -> None:
-        """Move records that may not be lost from memory to the journal."""
-        kept = self._queue.dequeue_kept(len(self._queue))
-        safe = not kept
-        try:
-            safe = safe or await self._append(kept)
-        finally:
-            # Cancelled half-way counts as not done: twice is harmless, never is not.
-            if not safe:
-                self._queue.put_back(kept)
-
-    async def _append(self, rows: list[Waiting]) -> bool:
-        try:
-            loop = asyncio.get_running_loop()
-            await loop.run_in_executor(self._journal_thread, self._journal.append, rows)
-        except HopError as error:
-            self._detail = str(error)
-            return False
-        self._journalled += len(rows)
-        self._awake.set()
-        return True
 
     # --- the queue ----------------------------------------------------------------
 
@@ -301,8 +410,8 @@ class Recorder:
         return Waiting(record, self._revision, now.mono)
 
 
-def journal_file(database_url: str, directory: Path) -> Path:
-    """Spill file of a database: beside an SQLite file, else in a directory.
+def spilled_file(database_url: str, directory: Path) -> Path:
+    """Rows that an earlier version kept for its database while that was away.
 
     Raises:
         SettingsError: the address cannot be used.

@@ -2,28 +2,41 @@
 
 A range with few rows is answered row by row; a longer one in equal slices of time, each
 with its mean speed and its strictest factor, so that a short slow-down is never lost.
+
+Rounding that SQLite and PostgreSQL do alike.
+
+Detections of a range by class and confidence.
+
+Times of the newest STOPs of a range.
+
+Where robots and people were in each second of a range.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from sqlalchemy import (
-    ColumnElement,
-    Connection,
-    Integer,
-    cast,
-    func,
-    select,
-)
+from sqlalchemy import ColumnElement, Connection, Integer, cast, func, select
 
-from iveg.adapters.history.rounding import whole
+from iveg.adapters.history.lists import record_of
 from iveg.adapters.history.tables import (
     climate,
+    commands,
+    detections,
     measurements,
     odometry,
 )
+from iveg.domain.day import DaySighting, Pose
 from iveg.domain.fleet import as_counted
+from iveg.domain.records import ByTransport, CommandRecord
+
+
+def whole(connection: Connection, value: ColumnElement[Any]) -> ColumnElement[int]:
+    """Rounded down: a cast does that on SQLite, and rounds to nearest on PostgreSQL."""
+    if connection.dialect.name == "sqlite":
+        return cast(value, Integer)
+    return cast(func.floor(value), Integer)
+
 
 MOST_POINTS = 2000
 MOST_READINGS = 288
@@ -42,7 +55,6 @@ class SpeedSeries:
         limited to: Strictest factor that iVeg limited to in a slice.
         applied: Strictest factor that the robot reported; None where it was silent.
         margin: Least margin (m); None where it was unknown or there was none.
-        late: Whether the robot sent some of it after a gap: nobody acted on it.
         slice_s: Length of a slice (s); 0 where each point is one row.
     """
 
@@ -52,7 +64,6 @@ class SpeedSeries:
     limit: tuple[float, ...]
     applied: tuple[float | None, ...]
     margin: tuple[float | None, ...]
-    late: tuple[bool, ...]
     slice_s: float = field(default=0.0, kw_only=True)
 
 
@@ -166,7 +177,7 @@ def _one(connection: Connection, robot: str, since: float, until: float) -> Spee
         )
     ).one()
     if count <= MOST_POINTS:
-        rows = (o.at, o.linear, o.limit_factor, o.applied_factor, o.margin_m, o.late)
+        rows = (o.at, o.linear, o.limit_factor, o.applied_factor, o.margin_m)
         return SpeedSeries(robot, *_columns(connection, rows, asked))
     # One slice fewer than asked for: the last row may stand on the last edge.
     slice_s = (last - first) / (MOST_POINTS - 1) or 1.0
@@ -177,7 +188,6 @@ def _one(connection: Connection, robot: str, since: float, until: float) -> Spee
         func.min(o.limit_factor),
         func.min(o.applied_factor),
         func.min(o.margin_m),
-        func.max(cast(o.late, Integer)),
     )
     return SpeedSeries(
         robot, *_columns(connection, slices, asked, place), slice_s=slice_s
@@ -194,3 +204,138 @@ def _columns(
     statement = select(*wanted).where(*asked).group_by(*place).order_by(wanted[0])
     rows = connection.execute(statement).all()
     return list(zip(*rows, strict=True)) or [()] * len(wanted)
+
+
+CONFIDENCE_BINS = 20
+
+
+@dataclass(frozen=True, slots=True)
+class ConfidenceCount:
+    """Number of detections of a class in one interval of confidence.
+
+    Attributes:
+        class_id: As the detector said.
+        least: Lower edge, inclusive; the slice is 1 / ``CONFIDENCE_BINS`` wide.
+    """
+
+    class_id: str
+    least: float
+    count: int
+
+
+def confidence_counts(
+    connection: Connection, since: float, until: float, robot: str | None = None
+) -> tuple[ConfidenceCount, ...]:
+    """Detections of ``since <= at < until`` by class and confidence."""
+    bins = detections.c.probability * CONFIDENCE_BINS
+    place = whole(connection, bins).label("place")
+    statement = (
+        select(detections.c.class_id, place, func.count())
+        .where(detections.c.at >= since, detections.c.at < until)
+        .group_by(detections.c.class_id, place)
+    )
+    if robot is not None:
+        statement = statement.where(detections.c.robot_id == robot)
+    counts: dict[tuple[str, int], int] = {}
+    for class_id, number, count in connection.execute(statement):
+        # Certainty itself, 1.0, belongs to the uppermost slice.
+        slot = (class_id, min(int(number), CONFIDENCE_BINS - 1))
+        counts[slot] = counts.get(slot, 0) + count
+    return tuple(
+        ConfidenceCount(class_id, slot / CONFIDENCE_BINS, count)
+        for (class_id, slot), count in sorted(counts.items())
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class CommandLatency:
+    """Times of one STOP from the press (ms); None where a step never came.
+
+    Without a told press, the press is when it was accepted.
+
+    Attributes:
+        answer_ms: To the robot's answer by each transport that brought one.
+        standstill_ms: To the first standing sample.
+        accepted_ms: To this server, where the page told when it was pressed.
+        sent_ms: Until it left by each transport that took it.
+    """
+
+    command_id: str
+    robot_id: str
+    requested_at: float
+    answer_ms: ByTransport
+    sent_ms: ByTransport
+    standstill_ms: float | None
+    accepted_ms: float | None = None
+
+
+def command_latencies(
+    connection: Connection, since: float, until: float, robot: str | None = None
+) -> tuple[CommandLatency, ...]:
+    """The newest STOPs of ``since <= requested_at < until``, oldest first."""
+    c = commands.c
+    statement = (
+        select(commands)
+        .where(c.kind == "stop", c.requested_at >= since, c.requested_at < until)
+        .order_by(c.requested_at.desc(), c.command_id.desc())
+        .limit(MOST_POINTS)
+    )
+    if robot is not None:
+        statement = statement.where(c.robot_id == robot)
+    rows = connection.execute(statement).mappings().all()
+    return tuple(_latency(record_of(CommandRecord, row)) for row in reversed(rows))
+
+
+def _latency(record: CommandRecord) -> CommandLatency:
+    pressed = record.pressed_at
+    asked = record.requested_at if pressed is None else pressed
+    return CommandLatency(
+        record.command_id,
+        record.robot_id,
+        record.requested_at,
+        {one: _ms(asked, at) for one, at in record.answer_at.items()},
+        {one: _ms(asked, at) for one, at in record.sent_at.items()},
+        record.standstill_ms,
+        None if pressed is None else _ms(pressed, record.requested_at),
+    )
+
+
+def _ms(start: float, end: float) -> float:
+    return 1000.0 * (end - start)
+
+
+def poses_of(connection: Connection, since: float, until: float) -> tuple[Pose, ...]:
+    """Poses of robots in each second of ``since <= at < until``, in order."""
+    c = odometry.c
+    second = whole(connection, c.at)
+    wanted = (
+        select(
+            c.robot_id,
+            second,
+            func.avg(c.x),
+            func.avg(c.y),
+            func.avg(func.abs(c.linear)),
+        )
+        .where(c.at >= since, c.at < until)
+        .group_by(c.robot_id, second)
+        .order_by(second)
+    )
+    return tuple(Pose(*row) for row in connection.execute(wanted))
+
+
+def people_seen(
+    connection: Connection, since: float, until: float
+) -> tuple[DaySighting, ...]:
+    """Positions of confirmed people in each second of ``since <= at < until``."""
+    c = detections.c
+    second = whole(connection, c.at)
+    wanted = (
+        select(second, func.avg(c.x), func.avg(c.y), c.robot_id)
+        .where(c.at >= since, c.at < until, c.confident, c.class_ == "person")
+        # A place that is no longer kept is no place near a robot.
+        .where(c.x.is_not(None))
+        # Two people of one second must not become one between them.
+        .group_by(c.robot_id, c.person_id, second)
+        .order_by(second)
+    )
+    return tuple(DaySighting(*row) for row in connection.execute(wanted))

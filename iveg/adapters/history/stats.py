@@ -5,9 +5,8 @@ from dataclasses import dataclass
 from sqlalchemy import Connection, Integer, Table, cast, func, select, text
 from sqlalchemy.exc import OperationalError
 
-from iveg.adapters.history.day_partitions import days_of
-from iveg.adapters.history.purge import age_of, room_inside
 from iveg.adapters.history.tables import metadata, odometry
+from iveg.adapters.history.upkeep import age_of
 
 _MINUTE_S, _HOUR_S = 60.0, 3600.0
 _PAGES_OF = """
@@ -30,7 +29,6 @@ class TableStats:
         oldest: (Unix s); None of an empty table, as ``newest``.
         hourly: Bytes for each hour of each robot, of rows since the oldest odometry;
             None without any.
-        days: Days that have a table of their own; 0 of a table that is one.
     """
 
     name: str
@@ -39,7 +37,6 @@ class TableStats:
     oldest: float | None
     newest: float | None
     hourly: float | None
-    days: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,12 +46,10 @@ class HistoryStats:
     Attributes:
         tables: The largest first.
         robot_hours: Hours in which odometry of a robot came, of all robots.
-        inside: Bytes of an SQLite file that new rows fill before it grows.
     """
 
     tables: tuple[TableStats, ...]
     robot_hours: float
-    inside: int
 
 
 def read_stats(connection: Connection) -> HistoryStats:
@@ -67,11 +62,7 @@ def read_stats(connection: Connection) -> HistoryStats:
         _stats(connection, table, rows, sizes.get(table.name, 0), since, hours)
         for table, rows in counted.items()
     ]
-    return HistoryStats(
-        tuple(sorted(found, key=lambda one: -one.size)),
-        hours,
-        room_inside(connection) if connection.dialect.name == "sqlite" else 0,
-    )
+    return HistoryStats(tuple(sorted(found, key=lambda one: -one.size)), hours)
 
 
 def _count(connection: Connection, table: Table) -> int:
@@ -94,8 +85,7 @@ def _stats(
     if hours and rows:
         recent = connection.scalar(select(func.count()).where(at >= since)) or 0
         hourly = size / rows * recent / hours
-    days = len(days_of(connection, table.name))
-    return TableStats(table.name, rows, size, oldest, newest, hourly, days)
+    return TableStats(table.name, rows, size, oldest, newest, hourly)
 
 
 def _robot_hours(connection: Connection) -> float:

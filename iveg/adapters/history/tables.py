@@ -4,15 +4,23 @@ A column's key is the field of its record, so that a row and a record are the sa
 words.  Facts have a number that only grows; ``(robot_id, at)`` answers "what did this
 robot do then", which time travel, retention and charts all ask.  ``revision`` lets the
 newest state of a decision, command or alert win in whatever order states arrive.
+
+A JSON column that hands out values: PostgreSQL's own type, SQLite's text.
+
+Which record is a row of which table.
 """
 
+from dataclasses import dataclass
 from typing import Any
 
+import orjson
 from sqlalchemy import (
+    JSON,
     BigInteger,
     Boolean,
     Column,
     ColumnElement,
+    Dialect,
     Double,
     Index,
     Integer,
@@ -21,13 +29,68 @@ from sqlalchemy import (
     Text,
     UniqueConstraint,
     and_,
-    false,
     or_,
 )
-from sqlalchemy.types import TypeEngine
+from sqlalchemy.dialects.postgresql import JSONB
+from sqlalchemy.types import TypeDecorator, TypeEngine
 
-from iveg.adapters.history.json_column import JsonValue
 from iveg.domain.goals import OPEN_STATES
+from iveg.domain.records import (
+    AlertRecord,
+    AuditRecord,
+    ClimateRecord,
+    CommandEventRecord,
+    CommandRecord,
+    DecisionRecord,
+    DetectionRecord,
+    LogRecord,
+    MeasurementRecord,
+    OdometryRecord,
+    ReadingRecord,
+)
+
+
+class JsonValue(TypeDecorator[Any]):
+    """JSON as PostgreSQL keeps it (JSONB); in SQLite, whose JSON is text, its text.
+
+    What is damaged, or JSON of another shape, reads as null: one bad row must not hide
+    a list.
+
+    Attributes:
+        shape: ``dict`` or ``list``, of what is kept.
+    """
+
+    impl = JSON
+    cache_ok = True
+
+    def __init__(
+        self, shape: type[dict[str, object]] | type[list[object]] = dict
+    ) -> None:
+        super().__init__()
+        self.shape = shape
+
+    def load_dialect_impl(self, dialect: Dialect) -> TypeEngine[Any]:
+        """What the database knows."""
+        kind: TypeEngine[Any] = Text() if dialect.name == "sqlite" else JSONB()
+        return dialect.type_descriptor(kind)
+
+    def process_bind_param(self, value: object, dialect: Dialect) -> object:
+        """A value on its way in."""
+        return orjson.dumps(value).decode() if dialect.name == "sqlite" else value
+
+    def process_result_value(self, value: Any, dialect: Dialect) -> object:
+        """A value on its way out."""
+        if dialect.name == "sqlite" and value is not None:
+            value = _loaded(value)
+        return value if isinstance(value, self.shape) else None
+
+
+def _loaded(text: str) -> object:
+    try:
+        return orjson.loads(text)
+    except orjson.JSONDecodeError:
+        return None
+
 
 metadata = MetaData(
     naming_convention={
@@ -118,7 +181,6 @@ detections = Table(
     _text("class", key="class_"),
     _text("person_id"),
     _json("box", null=True),
-    Column("late", Boolean, nullable=False, server_default=false()),
     Index(None, "at", "row_id"),
     Index(None, "robot_id", "at", postgresql_include=["class_id", "probability"]),
     sqlite_autoincrement=True,
@@ -137,7 +199,6 @@ commands = Table(
     Column("tries", Integer, nullable=False),
     _text("reason"),
     _number("pressed_at"),
-    Column("drill", Boolean, nullable=False, server_default=false()),
     _json("goal", null=True),
     _revision(),
     Index(None, "requested_at", "command_id"),
@@ -171,7 +232,6 @@ alerts = Table(
     _text("note"),
     Column("count", Integer, nullable=False),
     _number("last_raised_at", null=False),
-    _json("members", list),
     _revision(),
     Index(None, "last_raised_at", "alert_id"),
     Index(None, "robot_id", "raised_at"),
@@ -208,7 +268,6 @@ odometry = Table(
     _number("applied_factor"),
     _text("link"),
     _number("margin_m"),
-    Column("late", Boolean, nullable=False, server_default=false()),
     Index(None, "robot_id", "at", postgresql_include=_CHARTED),
     Index(None, "at"),
     sqlite_autoincrement=True,
@@ -222,20 +281,6 @@ climate = Table(
     _number("temperature"),
     _number("relative_humidity"),
     _number("co2"),
-    Index(None, "at"),
-    sqlite_autoincrement=True,
-)
-
-
-latency = Table(
-    "latency",
-    metadata,
-    _row_id(),
-    _number("at", null=False),
-    *_texts("robot_id", "data", "hop"),
-    Column("count", BigInteger, nullable=False),
-    *_numbers("total_s", "least_s", "most_s"),
-    _text("bins", null=False),
     Index(None, "at"),
     sqlite_autoincrement=True,
 )
@@ -271,35 +316,14 @@ measurements = Table(
 audit = Table(
     "audit",
     metadata,
-    Column("seq", _BIG, primary_key=True, autoincrement=False),
+    Column("seq", _BIG, primary_key=True, autoincrement=True),
     _text("audit_id", null=False),
-    *_numbers("at", "stored_at"),
-    *_texts("person", "name", "role", "method", "action", "subject"),
-    # Text, not JSON: its very bytes are hashed.
-    *_texts("details", "previous_hash", "hash"),
+    _number("at", null=False),
+    *_texts("person", "name", "role", "method", "action", "subject", "details"),
     UniqueConstraint("audit_id"),
     Index(None, "at", "seq"),
 )
-"""Triggers of its migration refuse changes, and deletions beyond ``audit_sealed``."""
-
-audit_sealed = Table(
-    "audit_sealed",
-    metadata,
-    Column("seq", _BIG, primary_key=True, autoincrement=False),
-    _text("hash", null=False),
-    _number("at", null=False),
-)
-"""Ends of segments that retention takes: the row, its hash, when it was sealed."""
-
-audit_end = Table(
-    "audit_end",
-    metadata,
-    Column("one", Integer, primary_key=True, autoincrement=False),
-    Column("seq", BigInteger, nullable=False),
-    _text("hash", null=False),
-    _number("at", null=False),
-)
-"""The newest row that was ever written: one row, so that a lost last one is noticed."""
+"""Triggers of its migrations refuse changes and deletions (``purge.deletable``)."""
 
 
 accounts = Table(
@@ -313,7 +337,6 @@ accounts = Table(
     *_numbers("invited_until", "since"),
     _text("provider", null=False),
     _text("language", null=False),
-    _text("pin", null=False),
     UniqueConstraint("name_key"),
 )
 
@@ -330,15 +353,8 @@ api_tokens = Table(
 )
 
 
-passkeys = Table(
-    "passkeys",
-    metadata,
-    Column("credential_id", Text, primary_key=True),
-    *_texts("account_id", "name", "rp_id", "public_key"),
-    Column("sign_count", BigInteger, nullable=False),
-    _number("made_at", null=False),
-    _number("used_at"),
-)
+access_moved = Table("access_moved", metadata, _number("at", null=False))
+"""One row once accounts and tokens are in their own file; both tables go later."""
 
 
 def is_open_command() -> ColumnElement[bool]:
@@ -348,3 +364,34 @@ def is_open_command() -> ColumnElement[bool]:
     goals = and_(c.kind == "goal", c.state.in_(OPEN_STATES))
     # A release that was refused or confirmed keeps the state that followed.
     return or_(stops, and_(c.kind != "stop", c.state == "RELEASING"), goals)
+
+
+@dataclass(frozen=True, slots=True)
+class TableMapping:
+    """Table of one kind of record.
+
+    Attributes:
+        identity: Columns that name the thing or fact; empty where every row is new.
+        changes: Whether a later record takes the place of an earlier one.
+    """
+
+    table: Table
+    identity: tuple[str, ...] = ()
+    changes: bool = False
+
+
+TABLE_MAPPINGS: dict[type, TableMapping] = {
+    CommandRecord: TableMapping(commands, ("command_id",), changes=True),
+    CommandEventRecord: TableMapping(
+        command_events, ("command_id", "at", "state", "why")
+    ),
+    DecisionRecord: TableMapping(decisions, ("decision_id",), changes=True),
+    AlertRecord: TableMapping(alerts, ("alert_id",), changes=True),
+    LogRecord: TableMapping(log, ("id", "at")),
+    DetectionRecord: TableMapping(detections),
+    OdometryRecord: TableMapping(odometry),
+    ClimateRecord: TableMapping(climate),
+    ReadingRecord: TableMapping(readings),
+    MeasurementRecord: TableMapping(measurements),
+    AuditRecord: TableMapping(audit, ("audit_id",)),
+}

@@ -1,26 +1,207 @@
-"""The history as its upkeep sees it: batches of the one writer, and the disk."""
+"""The history as its retention sees it: pieces of the one writer, and the disk.
+
+Indexes of a few rows of large tables.
+
+A query finds one by its condition, word for word.
+
+Deletion of rows whose time is over, in pieces of one transaction each.
+
+What the history still holds: days, its oldest rows, and what of a day is gone.
+"""
 
 import asyncio
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any, Literal, cast
 
-from iveg.adapters import clock
-from iveg.adapters.disk import disk_space
-from iveg.adapters.history import ages
-from iveg.adapters.history.audit import chain_end
-from iveg.adapters.history.day_partitions import prepare_days
-from iveg.adapters.history.engine import sqlite_file
-from iveg.adapters.history.purge import (
-    PurgeBatch,
-    give_back,
-    purge_batch,
-    room_inside,
+from sqlalchemy import (
+    Column,
+    ColumnElement,
+    Connection,
+    Index,
+    Table,
+    TextClause,
+    and_,
+    delete,
+    exists,
+    func,
+    null,
+    select,
+    text,
+    true,
+    update,
 )
+
+from iveg.adapters.files import disk_space
+from iveg.adapters.history import tables
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.recorder import Recorder
-from iveg.domain.disk_space import DiskSpace
+from iveg.adapters.history.tables import decisions, detections, log, metadata, odometry
 from iveg.domain.errors import HopError
-from iveg.domain.retention import PurgeStep
+from iveg.domain.retention import DAY_S, DiskSpace, PurgeStep
+
+__all__ = ["metadata"]
+
+
+def _partial(
+    name: str,
+    columns: tuple[Column[Any], ...],
+    sqlite: str,
+    postgresql: str | None = None,
+) -> Index:
+    return Index(
+        name,
+        *columns,
+        sqlite_where=text(sqlite),
+        postgresql_where=text(postgresql or sqlite),
+    )
+
+
+# Rows that have a place still, by which they are found to lose it.
+placed_detections = _partial(
+    "ix_detections_placed", (detections.c.at,), "x IS NOT NULL"
+)
+placed_decisions = _partial(
+    "ix_decisions_placed", (decisions.c.started_at,), "x IS NOT NULL"
+)
+placed_lines = _partial(
+    "ix_log_placed", (log.c.at,), "instr(slots, '\"x\":') > 0", "slots ? 'x'"
+)
+
+
+PIECE = 10_000
+"""Rows of one transaction; more where many are of one moment."""
+
+_AGES_BY = {
+    "decisions": tables.decisions.c.started_at,
+    "commands": tables.commands.c.requested_at,
+    "alerts": tables.alerts.c.last_raised_at,
+    "api_tokens": tables.api_tokens.c.made_at,
+    "accounts": tables.accounts.c.since,
+}
+"""Tables whose rows age by another column than ``at``."""
+_OVER: Mapping[str, ColumnElement[bool]] = {
+    # What goes on is kept whatever its age.
+    "decisions": tables.decisions.c.ended_at.is_not(None),
+    "commands": ~tables.is_open_command(),
+    "alerts": tables.alerts.c.cleared_at.is_not(None),
+}
+_PLACED: Mapping[str, Index] = {
+    "detections": placed_detections,
+    "decisions": placed_decisions,
+    "log": placed_lines,
+}
+"""Table → the index of those of its rows that have a place."""
+_GUARD = "audit_no_delete"
+
+
+def age_of(table: str) -> Column[float]:
+    """The column by which the rows of a table age (Unix s)."""
+    at = _AGES_BY.get(table)
+    return cast(
+        "Column[float]", tables.metadata.tables[table].c.at if at is None else at
+    )
+
+
+def purge_piece(connection: Connection, step: PurgeStep, before: float) -> int:
+    """Take the oldest rows of a step, within the transaction of the caller.
+
+    Args:
+        connection: Of the one writer.
+        step: What goes.
+        before: Rows that are older than this (Unix s).
+
+    Returns:
+        Number of rows that it changed; fewer than a piece: nothing is left to do.
+    """
+    table, at = tables.metadata.tables[step.table], age_of(step.table)
+    dialect = connection.dialect.name
+    which = _OVER.get(step.table, true())
+    if step.kind == "positions":
+        which = _PLACED[step.table].dialect_options[dialect]["where"]
+    due = and_(at < before, which)
+    last = select(at).where(due).order_by(at).offset(PIECE - 1).limit(1)
+    until = connection.scalar(last)
+    if until is not None:
+        due = and_(at <= until, which)
+    if step.kind == "positions":
+        change = update(table).where(due).values(_without_place(table, dialect))
+        return connection.execute(change).rowcount
+    with _deletable(connection, table):
+        return connection.execute(delete(table).where(due)).rowcount
+
+
+@contextmanager
+def _deletable(connection: Connection, table: Table) -> Iterator[None]:
+    """Lift the guard of the audit, which refuses deletions, within a transaction."""
+    if table is not tables.audit:
+        yield
+    elif connection.dialect.name == "postgresql":
+        connection.execute(text(f"ALTER TABLE audit DISABLE TRIGGER {_GUARD}"))
+        yield
+        connection.execute(text(f"ALTER TABLE audit ENABLE TRIGGER {_GUARD}"))
+    else:
+        made_by = text("SELECT sql FROM sqlite_master WHERE name = :name")
+        guard = connection.scalars(made_by, {"name": _GUARD}).one()
+        connection.exec_driver_sql(f"DROP TRIGGER {_GUARD}")
+        yield
+        connection.exec_driver_sql(guard)
+
+
+def _without_place(table: Table, dialect: str) -> dict[str, Any]:
+    if table is tables.log:
+        return {"slots": _pruned("slots", ("x", "y"), dialect)}
+    nothing = {name: null() for name in ("x", "y", "z")}
+    if table is tables.detections:
+        return nothing | {"box": null()}
+    places = _pruned("rule_parameters", ("places",), dialect)
+    return nothing | {"rule_parameters": places}
+
+
+def _pruned(column: str, members: tuple[str, ...], dialect: str) -> TextClause:
+    """An object without some members; a damaged one, which reads as none, is empty."""
+    if dialect == "sqlite":
+        paths = ", ".join(f"'$.{one}'" for one in members)
+        pruned, is_object = f"json_remove({column}, {paths})", f"json_valid({column})"
+    else:
+        pruned = " - ".join((column, *(f"'{one}'" for one in members)))
+        is_object = f"jsonb_typeof({column}) = 'object'"
+    return text(f"CASE WHEN {is_object} THEN {pruned} ELSE '{{}}' END")
+
+
+def lost_of(
+    connection: Connection, since: float, until: float
+) -> tuple[Literal["places", "telemetry"], ...]:
+    """What is no longer kept of ``since <= at < until``, or of a part of it."""
+    d, s = detections.c, decisions.c
+    decided = and_(s.started_at >= since, s.started_at < until)
+    # A decision was about somebody, and its robot drove.
+    unplaced = select(exists().where(decided, s.x.is_(None)))
+    unplaced_look = select(exists().where(d.at >= since, d.at < until, d.x.is_(None)))
+    driven = connection.scalar(select(func.min(odometry.c.at)))
+    lost: list[Literal["places", "telemetry"]] = []
+    if any(connection.scalar(one) for one in (unplaced, unplaced_look)):
+        lost.append("places")
+    if driven is not None:
+        unknown = select(exists().where(decided, s.started_at < driven))
+        if driven >= until or connection.scalar(unknown):
+            lost.append("telemetry")
+    return tuple(lost)
+
+
+def recorded_days(connection: Connection, most: int) -> tuple[int, ...]:
+    """Days (UTC, since 1970) with a line in the log, newest first, by hops."""
+    days: list[int] = []
+    newest = select(func.max(log.c.at))
+    while len(days) < most:
+        if days:
+            newest = select(func.max(log.c.at)).where(log.c.at < days[-1] * DAY_S)
+        found = connection.scalar(newest)
+        if found is None:
+            break
+        days.append(int(found // DAY_S))
+    return tuple(days)
 
 
 async def _no_recording() -> bool:
@@ -34,7 +215,6 @@ class RecordedHistory:
         recorder: The one writer.
         queries: Its reading side.
         directory: Of the data, whose disk is watched.
-        stopwatch: Bounds each batch; monotonic (s).
         read_space: Room on the disk of a directory.
         drop_recording: Deletes the oldest recording of inputs, if there is one.
     """
@@ -44,48 +224,20 @@ class RecordedHistory:
         recorder: Recorder,
         queries: Queries,
         directory: Path,
-        stopwatch: Callable[[], float] = clock.mono,
         read_space: Callable[[Path], DiskSpace] = disk_space,
         drop_recording: Callable[[], Coroutine[object, object, bool]] = _no_recording,
     ) -> None:
         self._recorder = recorder
         self._directory = directory
-        self._stopwatch = stopwatch
         self._read_space = read_space
-        self._is_file = sqlite_file(queries.url) is not None
-        self.recorded_days = lambda most: queries.ask(ages.recorded_days, most)
-        self.oldest_telemetry = lambda: queries.ask(ages.oldest_telemetry)
-        self.audit_end = lambda: queries.ask(chain_end)
+        self.recorded_days = lambda most: queries.ask(recorded_days, most)
         self.drop_recording = drop_recording
 
-    @property
-    def is_busy(self) -> bool:
-        """Whether rows wait that go first."""
-        return self._recorder.is_busy
-
-    async def prepare_days(self, now: float) -> None:
-        """Have tables of days that come, on PostgreSQL (Unix s)."""
-        await self._recorder.between_batches(
-            lambda connection: prepare_days(connection, now)
-        )
-
-    async def purge(self, step: PurgeStep, before: float) -> PurgeBatch:
-        """One batch of a step, of rows older than this (Unix s)."""
+    async def purge(self, step: PurgeStep, before: float) -> int:
+        """One piece of a step, of rows older than this (Unix s); number of rows."""
         return await self._recorder.between_batches(
-            lambda connection: purge_batch(connection, step, before, self._stopwatch)
+            lambda connection: purge_piece(connection, step, before)
         )
-
-    async def give_back(self) -> PurgeBatch:
-        """One batch of room that is given back to the disk."""
-        return await self._recorder.between_batches(
-            lambda connection: give_back(connection, self._stopwatch)
-        )
-
-    async def room_inside(self) -> int | None:
-        """Bytes of its file that new rows fill first; None on a server's own disk."""
-        if not self._is_file:
-            return None
-        return await self._recorder.between_batches(room_inside)
 
     async def disk_space(self) -> DiskSpace:
         """Room on the disk of the data."""

@@ -1,6 +1,5 @@
 """The directory of the recordings: names, sizes, and which file is deleted next."""
 
-import logging
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
@@ -9,9 +8,9 @@ from iveg.adapters.recordings.mcap_file import McapFile
 from iveg.domain.observations import Instant
 from iveg.domain.recordings import RecordingFile, RecordingLimits, superfluous
 
-_log = logging.getLogger(__name__)
 _ENDS, _OPEN = ".mcap", ".mcap.open"
-_NAME = "%Y-%m-%dT%H-%M-%SZ"
+NAME = "%Y-%m-%dT%H-%M-%SZ"
+"""Of a file: its first moment (UTC)."""
 
 
 class RecordingDirectory:
@@ -19,10 +18,11 @@ class RecordingDirectory:
 
     Args:
         path: Made when the first recording is.
+        limits: How much is kept.
     """
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
+    def __init__(self, path: Path, limits: RecordingLimits | None = None) -> None:
+        self.path, self._limits = path, limits or RecordingLimits()
 
     def begin(self, start: Instant) -> McapFile:
         """A new recording.  Raises OSError."""
@@ -33,7 +33,7 @@ class RecordingDirectory:
         """A name that no file has, open or finished: a clock may have been set back."""
         wall = start.wall
         while True:
-            stem = datetime.fromtimestamp(wall, UTC).strftime(_NAME)
+            stem = datetime.fromtimestamp(wall, UTC).strftime(NAME)
             if not (self.path / (stem + _ENDS)).exists():
                 found = self.path / (stem + _OPEN)
                 if not found.exists():
@@ -61,22 +61,20 @@ class RecordingDirectory:
 
     def has_finished(self) -> bool:
         """Whether any is finished."""
-        return any(not one.is_open for one in self.files())
+        return self.oldest() is not None
 
-    def prune(self, limits: RecordingLimits) -> int:
+    def prune(self) -> int:
         """Delete what is over the limits; how many files."""
-        gone = superfluous(self.files(), limits)
+        gone = superfluous(self.files(), self._limits)
         for one in gone:
             (self.path / one.name).unlink(missing_ok=True)
         return len(gone)
 
-    def drop_oldest(self) -> bool:
-        """Delete the oldest that is finished; whether there was one."""
-        for one in self.files():
-            if not one.is_open:
-                (self.path / one.name).unlink(missing_ok=True)
-                return True
-        return False
+    def oldest(self) -> Path | None:
+        """The oldest that is finished."""
+        finished = (one.name for one in self.files() if not one.is_open)
+        name = next(finished, None)
+        return None if name is None else self.path / name
 
     def finished(self, name: str) -> Path | None:
         """The file of a finished recording; None where there is none of this name."""

@@ -1,27 +1,83 @@
-"""Observations as Foxglove's well-known messages, so that its viewers draw them.
+"""What viewers such as Foxglove draw of the messages that came in, thinned.
 
-Frames are ``map`` and ``{robot}/base_link``.
+Names and fields of the schemas: https://docs.foxglove.dev/docs/sdk/schemas.  Frames are
+``map`` and ``{robot}/base_link``.
 """
 
+import contextlib
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from iveg.adapters.recordings.foxglove_schemas import (
-    POSE_IN_FRAME,
-    SCAN,
-    SCENE,
-    TRANSFORM,
-)
+import orjson
+
+from iveg.adapters.direct import DirectReader
+from iveg.adapters.recordings.incoming import Incoming, Sort
 from iveg.adapters.recordings.mcap_file import Channel
+from iveg.domain.errors import UnreadableError
 from iveg.domain.geometry import Pose2D
 from iveg.domain.observations import (
     Detection,
     DetectionFrame,
+    Instant,
     LaserScan,
     Observation,
     Odometry,
+    Received,
+    UnreadScan,
+    kind_of,
 )
+from iveg.ngsi.codec import UNREAD, read_notification
+
+# --- schemas ----------------------------------------------------------------------
+
+_NUMBER, _TEXT, _FLAG = {"type": "number"}, {"type": "string"}, {"type": "boolean"}
+
+
+def _object(**properties: object) -> dict[str, object]:
+    return {"type": "object", "properties": properties}
+
+
+def _list(of: object) -> dict[str, object]:
+    return {"type": "array", "items": of}
+
+
+_TIME = _object(sec={"type": "integer"}, nsec={"type": "integer"})
+_VECTOR = _object(x=_NUMBER, y=_NUMBER, z=_NUMBER)
+_QUATERNION = _object(x=_NUMBER, y=_NUMBER, z=_NUMBER, w=_NUMBER)
+_POSE = _object(position=_VECTOR, orientation=_QUATERNION)
+_COLOUR = _object(r=_NUMBER, g=_NUMBER, b=_NUMBER, a=_NUMBER)
+POSE_IN_FRAME = _object(timestamp=_TIME, frame_id=_TEXT, pose=_POSE)
+TRANSFORM = _object(
+    timestamp=_TIME,
+    parent_frame_id=_TEXT,
+    child_frame_id=_TEXT,
+    translation=_VECTOR,
+    rotation=_QUATERNION,
+)
+SCAN = _object(
+    timestamp=_TIME,
+    frame_id=_TEXT,
+    pose=_POSE,
+    start_angle=_NUMBER,
+    end_angle=_NUMBER,
+    ranges=_list(_NUMBER),
+    intensities=_list(_NUMBER),
+)
+_CUBE = _object(pose=_POSE, size=_VECTOR, color=_COLOUR)
+_ENTITY = _object(
+    timestamp=_TIME,
+    frame_id=_TEXT,
+    id=_TEXT,
+    lifetime=_TIME,
+    frame_locked=_FLAG,
+    metadata=_list(_object(key=_TEXT, value=_TEXT)),
+    cubes=_list(_CUBE),
+)
+SCENE = _object(deletions=_list(_object()), entities=_list(_ENTITY))
+
+
+# --- messages ---------------------------------------------------------------------
 
 Told = tuple[Channel, Mapping[str, Any]]
 """A message and its channel."""
@@ -32,16 +88,6 @@ _SHOWN_S = 1.0
 
 
 _TRANSFORMS = Channel("/tf", "foxglove.FrameTransform", TRANSFORM)
-
-
-def channels_of(robot_id: str) -> tuple[Channel, ...]:
-    """All channels that messages of a robot are told on."""
-    return (
-        _pose_channel(robot_id),
-        _TRANSFORMS,
-        _scan_channel(robot_id),
-        _scene_channel(robot_id),
-    )
 
 
 def _pose_channel(robot_id: str) -> Channel:
@@ -145,3 +191,79 @@ def _vector(x: float, y: float, z: float = 0.0) -> Mapping[str, float]:
 
 def _turn(yaw: float) -> Mapping[str, float]:
     return {"x": 0.0, "y": 0.0, "z": math.sin(yaw / 2), "w": math.cos(yaw / 2)}
+
+
+# --- thinned ----------------------------------------------------------------------
+
+DRAWN_APART_S: dict[type[Observation], float] = {
+    Odometry: 0.1,
+    LaserScan: 0.2,
+    DetectionFrame: 0.2,
+}
+"""What viewers draw, and the least time between two of a robot (s)."""
+_EARLY = 0.95
+_DRAWN = Odometry | LaserScan | UnreadScan | DetectionFrame
+_Stream = tuple[str, type[Observation]]
+
+
+class Drawing:
+    """Reads messages once more, for viewers alone.
+
+    Args:
+        apikey: First part of every measure topic.
+        robots: The fleet.
+    """
+
+    def __init__(self, apikey: str, robots: Sequence[str]) -> None:
+        self._robots = frozenset(robots)
+        self._at = Instant(0.0, 0.0)
+        self._found: list[Observation] = []
+        self._due: dict[_Stream, float] = {}
+        self._reader = DirectReader(
+            apikey, robots, lambda: self._at, self._draw_received, lambda *_: None
+        )
+
+    def messages(self, came: Incoming) -> Iterator[tuple[Channel, bytes]]:
+        """Foxglove's messages of an input; none of what cannot be read."""
+        self._at, self._found = came.at, []
+        with contextlib.suppress(UnreadableError):
+            self._read(came)
+        for one in self._found:
+            for channel, value in messages_of(one, came.at.wall):
+                yield channel, orjson.dumps(value)
+
+    def _read(self, came: Incoming) -> None:
+        if came.sort is Sort.NOTIFICATION:
+            _, reading = read_notification(came.payload, lambda *_: False, UNREAD)
+            for one in reading.observations:
+                with contextlib.suppress(UnreadableError):
+                    self._draw(one)
+        elif came.sort is Sort.MEASURE:
+            stream = self._reader.stream(came.name)
+            if stream is None or self._is_due(stream):
+                self._reader.read(came.name, came.payload)
+
+    def _draw_received(self, received: Received) -> None:
+        self._draw(received.observation)
+
+    def _draw(self, observation: Observation) -> None:
+        """Have one drawn that is due.  Raises UnreadableError."""
+        stream = observation.robot_id, kind_of(observation)
+        is_ours = observation.robot_id in self._robots
+        if is_ours and isinstance(observation, _DRAWN) and self._is_due(stream):
+            one = _read(observation)
+            if isinstance(one, LaserScan) and not one.ranges.size:
+                # A twin without its numbers takes nobody's turn.
+                return
+            self._found.append(one)
+            apart_s = DRAWN_APART_S[kind_of(observation)] * _EARLY
+            self._due[stream] = self._at.mono + apart_s
+
+    def _is_due(self, stream: _Stream) -> bool:
+        is_drawn = stream[1] in DRAWN_APART_S
+        return is_drawn and self._at.mono >= self._due.get(stream, float("-inf"))
+
+
+def _read(observation: Observation) -> Observation:
+    """The observation itself; a scan that nobody has read yet is read now."""
+    return observation.read() if isinstance(observation, UnreadScan) else observation

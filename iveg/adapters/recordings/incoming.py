@@ -8,17 +8,17 @@ import re
 import struct
 from collections.abc import Iterator, Sequence
 from enum import IntEnum
-from typing import NamedTuple
-
-import orjson
+from typing import Final, NamedTuple
 
 from iveg.adapters.recordings.mcap_file import Channel
-from iveg.adapters.recordings.memories import packed, recorded
 from iveg.domain.observations import Instant, LaserScan, Observation, Overtaken
 
 NOTIFICATIONS = Channel("/ngsi/notifications", "ngsi.Notification")
-TICKS = Channel("/iveg/ticks", "iveg.Tick")
-MEMORIES = Channel("/iveg/memory", "iveg.Memory")
+PICTURES = Channel("/iveg/pictures", "iveg.Picture")
+WHOLE_S: Final = 10.0
+"""Between two whole pictures."""
+WHOLE, CHANGED = b'{"whole":true,', b'{"whole":false,'
+"""How a picture begins."""
 _NUMBERS = re.compile(rb"\[[-+.,\deE\snul]{100,}\]")
 """A long list of numbers in JSON."""
 _HEAD = struct.Struct("<BddHI")
@@ -33,9 +33,8 @@ class Sort(IntEnum):
     NOTIFICATION = 2
     ROW = 3
     """A row of the history or a version of the rule: the name of its schema."""
-    TICK = 4
-    MEMORY = 5
-    """What the pipeline has in mind (``memories``)."""
+    PICTURE = 4
+    """What pages are sent, or what of that has changed since the picture before."""
 
 
 class Incoming(NamedTuple):
@@ -56,19 +55,7 @@ class Incoming(NamedTuple):
                 return NOTIFICATIONS
             case Sort.ROW:
                 return Channel(f"/iveg/{self.name.lower()}", f"iveg.{self.name}")
-            case Sort.MEMORY:
-                return MEMORIES
-        return TICKS
-
-    @property
-    def message(self) -> bytes:
-        """What is recorded: of a tick both clocks (s); mostly the payload."""
-        match self.sort:
-            case Sort.TICK:
-                return orjson.dumps({"wall": self.at.wall, "mono": self.at.mono})
-            case Sort.MEMORY:
-                return recorded(self.payload)
-        return self.payload
+        return PICTURES
 
 
 def pack(sort: Sort, at: Instant, name: str = "", payload: bytes = b"") -> bytes:
@@ -76,33 +63,6 @@ def pack(sort: Sort, at: Instant, name: str = "", payload: bytes = b"") -> bytes
     encoded = name.encode()
     head = _HEAD.pack(sort, at.mono, at.wall, len(encoded), len(payload))
     return b"".join((head, encoded, payload))
-
-
-class UnfinishedMemory:
-    """A memory on its way to the writer, of which not all pieces are made yet.
-
-    Args:
-        at: Its moment.
-        about: What is told of it (JSON).
-        pieces: Makes them.
-    """
-
-    def __init__(self, at: Instant, about: bytes, pieces: Iterator[bytes]) -> None:
-        self._at, self._about, self._pieces = at, about, pieces
-        self._made: list[bytes] = []
-
-    def make(self) -> Iterator[None]:
-        """Make its pieces, one at a time; whoever stops may go on later."""
-        for piece in self._pieces:
-            self._made.append(piece)
-            yield
-
-    def finished(self) -> bytes:
-        """All of it, packed as other inputs are."""
-        for _ in self.make():
-            pass
-        whole = packed(self._about, b"".join(self._made))
-        return pack(Sort.MEMORY, self._at, payload=whole)
 
 
 def worth_keeping(body: bytes, observed: Sequence[Observation]) -> bytes:

@@ -1,6 +1,5 @@
 """One MCAP file (https://mcap.dev/spec), compressed in chunks, with an index."""
 
-import contextlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -88,11 +87,6 @@ class McapFile:
         try:
             self._writer.finish()
         finally:
-            self._stream.close()
-
-    def abandon(self) -> None:
-        """Close the file without an index; what it holds can be read."""
-        with contextlib.suppress(OSError):
             self._stream.close()
 
     def _ns(self, at: Instant) -> int:

@@ -1,7 +1,8 @@
-"""Recordings of iVeg's own, read back: whole ones, and what a crash left."""
+"""Recordings of iVeg's own, read back: whole ones, parts, and what a crash left."""
 
+import logging
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,17 +11,19 @@ from typing import IO
 import orjson
 import zstandard
 from mcap.exceptions import McapError
+from mcap.reader import make_reader
 from mcap.records import Channel as ChannelRecord
-from mcap.records import Header, Message, Metadata, Schema
-from mcap.stream_reader import CRCValidationError, StreamReader
+from mcap.records import Chunk, Header, McapRecord, Message, Metadata, Schema
+from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
 
-from iveg.adapters.recordings.mcap_file import PADDING, PROFILE, Channel
-from iveg.domain.errors import DataFileError
+from iveg.adapters.recordings.mcap_file import PADDING, PROFILE, Channel, McapFile
+from iveg.domain.errors import DataFileError, HopError
 from iveg.domain.observations import Instant
 
+_log = logging.getLogger(__name__)
 RecordedMessage = tuple[Channel, int, bytes]
 """Channel, ``log_time`` (ns), payload."""
-_BROKEN = (
+BROKEN = (
     McapError,
     CRCValidationError,
     zstandard.ZstdError,
@@ -28,7 +31,11 @@ _BROKEN = (
     ValueError,
     KeyError,
 )
-_LONGEST_RECORD = 1 << 28
+"""What reading says of a file that is cut off, damaged or of another format."""
+LONGEST_RECORD = 1 << 28
+_LARGEST_CHUNK = 1 << 26
+"""Bytes of a chunk that is unpacked; ours have a quarter of a megabyte."""
+_NS = 10**9
 
 
 def is_own(path: Path) -> bool:
@@ -36,7 +43,7 @@ def is_own(path: Path) -> bool:
     try:
         with path.open("rb") as stream:
             header = next(iter(_records(stream)))
-    except (OSError, StopIteration, *_BROKEN):
+    except (OSError, StopIteration, *BROKEN):
         return False
     return isinstance(header, Header) and header.profile == PROFILE
 
@@ -86,13 +93,13 @@ class Reading:
                     channel = self._channels[record.channel_id]
                     if channel != PADDING:
                         yield channel, record.log_time, record.data
-        except _BROKEN:
+        except BROKEN:
             return
         self.is_whole = True
 
     def seconds(self, log_time: int) -> float:
         """Since the beginning (s)."""
-        return (log_time - round(self.start.wall * 1e9)) / 1e9
+        return (log_time - round(self.start.wall * _NS)) / _NS
 
     def instant(self, log_time: int) -> Instant:
         """The moment on both clocks, where the wall clock was not set meanwhile."""
@@ -106,7 +113,7 @@ class Reading:
                     return Instant(float(began["mono"]), float(began["wall"]))
                 if not isinstance(record, Header) or record.profile != PROFILE:
                     break
-        except _BROKEN as error:
+        except BROKEN as error:
             raise self._unusable(f"is no MCAP: {error}.") from error
         raise self._unusable("is no recording of iVeg.")
 
@@ -118,6 +125,108 @@ class Reading:
         return DataFileError(str(self.path), "", reason)
 
 
-def _records(stream: IO[bytes]) -> Iterator[object]:
-    reader = StreamReader(stream, validate_crcs=True, record_size_limit=_LONGEST_RECORD)
-    yield from reader.records
+def unpack(chunk: Chunk) -> Sequence[McapRecord]:
+    """The records of a chunk.  One of ``BROKEN`` is raised where it is damaged.
+
+    A few bytes can claim to be gigabytes: the size is known before any is unpacked.
+    """
+    size = max(chunk.uncompressed_size, len(chunk.data))
+    if chunk.compression == "zstd":
+        size = max(size, zstandard.frame_content_size(chunk.data))
+    elif chunk.compression:
+        raise ValueError(f"compressed by {chunk.compression}")
+    if size > _LARGEST_CHUNK:
+        raise ValueError(f"a chunk of {size} bytes")
+    return breakup_chunk(chunk, validate_crc=True)
+
+
+def _records(stream: IO[bytes]) -> Iterator[McapRecord]:
+    reader = StreamReader(
+        stream,
+        emit_chunks=True,
+        validate_crcs=True,
+        record_size_limit=LONGEST_RECORD,
+    )
+    for record in reader.records:
+        if isinstance(record, Chunk):
+            yield from unpack(record)
+        else:
+            yield record
+
+
+# --- parts ------------------------------------------------------------------------
+
+
+def write_excerpt(folder: Path, target: Path, since: float, until: float) -> int:
+    """Copy what came in between two moments (Unix s); how many messages.
+
+    A file that is damaged gives what can be read of it.
+
+    Raises:
+        HopError: the disk is full or away.
+    """
+    first, last = round(since * _NS), round(until * _NS)
+    copied = 0
+    try:
+        excerpt = McapFile(target, Instant(0.0, since))
+        for path in sorted(folder.glob("*.mcap*")):
+            for channel, log_time, payload in _between(path, first, last):
+                excerpt.add_at(channel, log_time, payload)
+                copied += 1
+        excerpt.finish()
+    except OSError as error:
+        raise HopError("disk", error.strerror or str(error)) from error
+    return copied
+
+
+def _between(path: Path, first: int, last: int) -> Iterator[RecordedMessage]:
+    try:
+        if path.suffix == ".mcap":
+            yield from _by_index(path, first, last)
+            return
+        with read_messages(path) as reading:
+            yield from (one for one in reading if first <= one[1] < last)
+    except (DataFileError, McapError):
+        return
+
+
+def _by_index(path: Path, first: int, last: int) -> Iterator[RecordedMessage]:
+    """Of a finished file only the chunks that are asked for."""
+    with path.open("rb") as stream:
+        reader = make_reader(stream)
+        found = reader.iter_messages(starting_at=first, ending_before=last)
+        for schema, channel, message in found:
+            if schema is not None and channel.topic != PADDING.topic:
+                shape = orjson.loads(schema.data)
+                name = Channel(channel.topic, schema.name, shape)
+                yield name, message.log_time, message.data
+
+
+# --- what a crash left --------------------------------------------------------------
+
+
+def finish_broken(path: Path) -> None:
+    """Put in the place of a file without an end what can be read of it, with an index.
+
+    Takes minutes for an hour of many robots: not for the server's own process.
+
+    Raises:
+        HopError: the disk is full or away.
+    """
+    rescued = path.with_suffix(".rescued")
+    try:
+        rescued.unlink(missing_ok=True)
+        with read_messages(path) as reading:
+            file = McapFile(rescued, reading.start)
+            for channel, log_time, payload in reading:
+                file.add_at(channel, log_time, payload)
+            file.finish()
+        rescued.rename(path.with_suffix(""))
+    except DataFileError as error:
+        # Not even its beginning was on the disk.
+        _log.info("%s", error)
+    except OSError as error:
+        # A disk that is full needs the room.
+        rescued.unlink(missing_ok=True)
+        raise HopError("disk", error.strerror or str(error)) from error
+    path.unlink()

@@ -1,32 +1,24 @@
 """Records what comes in, off the path of everything else: one queue, one process.
 
-The loop packs each input and no more.  Four times a second memories are written out,
-piece by piece, and what waits goes to the process that writes (``writer.py``), in
-pieces that its pipe takes; who waits for the pipe is a task of its own.  What does not
-fit into the queue is not recorded, and counted; so is what a process that ended had not
-kept yet.
+The loop packs each input and no more.  Four times a second what waits goes to the
+process that writes (``writer.py``), in pieces that its pipe takes; who waits for the
+pipe is a task of its own.  What does not fit into the queue is not recorded, and
+counted; so is what a process that ended had not kept yet.
 """
 
 import asyncio
 import logging
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
 import orjson
 
-from iveg.adapters.recordings.directory import RecordingDirectory
-from iveg.adapters.recordings.excerpt import write_excerpt
-from iveg.adapters.recordings.incoming import (
-    Sort,
-    UnfinishedMemory,
-    pack,
-    worth_keeping,
-)
-from iveg.adapters.recordings.live_feed import LiveFeed
-from iveg.adapters.recordings.repair import finish_broken
+from iveg.adapters.files import disk_space
+from iveg.adapters.recordings.incoming import Sort, pack, worth_keeping
+from iveg.adapters.recordings.reading import finish_broken, write_excerpt
 from iveg.adapters.recordings.writer import PRUNE_S, WriterSetup
 from iveg.adapters.recordings.writer_process import WriterProcess
 from iveg.adapters.worker import Worker
@@ -35,7 +27,9 @@ from iveg.domain.errors import HopError
 from iveg.domain.observations import Instant, Observation
 from iveg.domain.recordings import RecordingFile
 from iveg.domain.records import Record, is_telemetry
+from iveg.domain.retention import DiskSpace
 from iveg.pipeline.ports import Clock
+from iveg.pipeline.record import RecordSink
 
 _log = logging.getLogger(__name__)
 _T = TypeVar("_T")
@@ -54,7 +48,7 @@ class InputRecorder:
         setup: Of the process that writes.
         clock: For the time of rows.
         is_on: Whether anything is recorded; what there is, is kept in bounds anyway.
-        live: Is shown all messages, too.
+        read_space: Room on the disk of a directory.
 
     Attributes:
         counters: Inputs ``recordings_written``, and ``recordings_dropped`` for want of
@@ -68,16 +62,17 @@ class InputRecorder:
         clock: Clock,
         *,
         is_on: bool = True,
-        live: LiveFeed | None = None,
+        read_space: Callable[[Path], DiskSpace] = disk_space,
     ) -> None:
-        self.counters = Counter[str]() if live is None else live.counters
+        self.counters = Counter[str]()
         self.rule: Callable[[], DetectionRule | None] = lambda: None
-        self._setup, self._clock, self._is_on = setup, clock, is_on
-        self._live = live
-        self._directory = RecordingDirectory(setup.folder)
+        self._setup, self._clock = setup, clock
+        self._is_wanted = self._is_on = is_on
+        self._read_space = read_space
+        self._directory, self._pictures = setup.directories()
         # What a crash left takes minutes: not in this process.
         self._apart = Worker(limit_s=RESCUE_S)
-        self._waiting: list[bytes | UnfinishedMemory] = []
+        self._waiting: list[bytes] = []
         self._bytes = 0
         self._dropped_at = float("-inf")
         self._told_rule: DetectionRule | None = None
@@ -87,8 +82,6 @@ class InputRecorder:
 
     def measure(self, topic: str, payload: bytes, at: Instant) -> None:
         """A robot's own message, read from the broker."""
-        if self._live is not None:
-            self._live.measure(topic, payload, at)
         if self._is_on:
             self._queue(pack(Sort.MEASURE, at, topic, payload))
 
@@ -96,8 +89,6 @@ class InputRecorder:
         self, body: bytes, at: Instant, observed: Sequence[Observation]
     ) -> None:
         """A notification of Orion's, and what was read in it."""
-        if self._live is not None:
-            self._live.notification(body, at)
         if self._is_on:
             self._queue(pack(Sort.NOTIFICATION, at, "", worth_keeping(body, observed)))
 
@@ -106,41 +97,29 @@ class InputRecorder:
         if self._is_on and not is_telemetry(record):
             self._write_down(record, type(record).__name__.removesuffix("Record"))
 
-    def note(self, name: str, payload: bytes, at: Instant) -> None:
-        """What the loop tells of itself, on the channel of its name."""
-        if self._is_on:
-            self._queue(pack(Sort.ROW, at, name, payload))
+    def picture(self, payload: bytes, at: Instant) -> bool:
+        """What pages were sent; whether there is room for it."""
+        return self._is_on and self._queue(pack(Sort.PICTURE, at, payload=payload))
 
-    def memory(self, about: bytes, memory: Iterator[bytes], at: Instant) -> None:
-        """What the pipeline has in mind, in pieces, and JSON that tells of it.
-
-        It has its place here; its pieces are made before it goes to be written.
-        """
-        if self._is_on:
-            self._queue(UnfinishedMemory(at, about, memory))
-
-    def tick(self, at: Instant) -> None:
-        """The loop lets time pass."""
-        if not self._is_on:
-            return
+    def note_rule(self) -> None:
+        """The rule in force, where it is another than before."""
         rule = self.rule()
         if rule is not None and rule is not self._told_rule:
             self._told_rule = rule
             self._write_down(rule, "Rule")
-        self._queue(pack(Sort.TICK, at))
 
     def _write_down(self, row: Record | DetectionRule, name: str) -> None:
         payload = orjson.dumps(row, default=dict, option=orjson.OPT_SERIALIZE_NUMPY)
         self._queue(pack(Sort.ROW, self._clock(), name, payload))
 
-    def _queue(self, one: bytes | UnfinishedMemory) -> None:
-        size = len(one) if isinstance(one, bytes) else 0
+    def _queue(self, one: bytes) -> bool:
         is_full = len(self._waiting) >= MOST_WAITING
-        if is_full or self._bytes + size > MOST_BYTES:
+        if is_full or self._bytes + len(one) > MOST_BYTES:
             self._drop()
-            return
+            return False
         self._waiting.append(one)
-        self._bytes += size
+        self._bytes += len(one)
+        return True
 
     def _drop(self) -> None:
         self.counters["recordings_dropped"] += 1
@@ -155,19 +134,27 @@ class InputRecorder:
         """Until cancelled; ``close`` still writes what waits then.
 
         Raises:
-            HopError: the process ended, or the disk refuses.
+            HopError: the process ended, or the disk refuses or has too little room.
         """
-        left = await _in_thread(self._directory.left_open)
+        folders = self._directory, self._pictures
+        left = [one for each in folders for one in await _in_thread(each.left_open)]
         rescue = asyncio.create_task(self._rescue(left), name="recordings-rescue")
         try:
-            await (self._have_written() if self._is_on else self._prune_forever())
+            if self._is_wanted:
+                await self._have_written()
+            else:
+                await self._prune_forever()
         finally:
             rescue.cancel()
             await asyncio.gather(rescue, return_exceptions=True)
 
     async def _have_written(self) -> None:
         """Feed one process until it ends.  Raises HopError."""
-        writer = self._writer = await _start(self._setup, self.counters)
+        self._is_on = await _in_thread(self._has_room)
+        if not self._is_on:
+            self.take_waiting()
+            raise HopError("disk", f"less than {self._setup.room / 1e9:.0f} GB free")
+        writer = self._writer = await WriterProcess.start(self._setup, self.counters)
         feed = asyncio.create_task(self._feed(writer), name="recordings-feed")
         try:
             await writer.listen()
@@ -179,23 +166,21 @@ class InputRecorder:
             feed.cancel()
             await asyncio.gather(feed, return_exceptions=True)
 
+    def _has_room(self) -> bool:
+        """Whether recordings fit, those that are there among them."""
+        folder = self._directory.path
+        folder.mkdir(parents=True, exist_ok=True)
+        self._prune()
+        own = sum(
+            one.size for one in (*self._directory.files(), *self._pictures.files())
+        )
+        return self._read_space(folder).free + own >= self._setup.room
+
     async def _feed(self, writer: WriterProcess) -> None:
         while True:
             await asyncio.sleep(WRITE_S)
-            await self._make_memories()
+            self.note_rule()
             await writer.feed(self.take_waiting())
-
-    async def _make_memories(self) -> None:
-        """Make those that wait; whatever is due comes between two pieces."""
-        unfinished = [one for one in self._waiting if not isinstance(one, bytes)]
-        for one in unfinished:
-            try:
-                for _ in one.make():
-                    await asyncio.sleep(0)
-            except Exception:
-                self._waiting.remove(one)
-                self.counters["recordings_dropped"] += 1
-                _log.exception("a memory cannot be recorded")
 
     @property
     def waiting(self) -> int:
@@ -210,7 +195,7 @@ class InputRecorder:
     def take_waiting(self) -> Sequence[bytes]:
         """What waits for the process that writes."""
         waiting, self._waiting, self._bytes = self._waiting, [], 0
-        return [one if isinstance(one, bytes) else one.finished() for one in waiting]
+        return waiting
 
     async def close(self) -> None:
         """Write what waits, and finish the file."""
@@ -221,9 +206,12 @@ class InputRecorder:
 
     async def _prune_forever(self) -> None:
         while True:
-            limits = self._setup.limits
-            await _in_thread(partial(self._directory.prune, limits))
+            await _in_thread(self._prune)
             await asyncio.sleep(PRUNE_S)
+
+    def _prune(self) -> None:
+        for folder in (self._directory, self._pictures):
+            folder.prune()
 
     async def _rescue(self, left: Sequence[Path]) -> None:
         for path in left:
@@ -233,16 +221,23 @@ class InputRecorder:
 
     async def drop_oldest(self) -> bool:
         """Delete the oldest recording; whether there was one that is finished."""
-        return await _in_thread(self._directory.drop_oldest)
+        return await _in_thread(self._drop_oldest)
+
+    def _drop_oldest(self) -> bool:
+        folders = self._directory, self._pictures
+        finished = [one for each in folders if (one := each.oldest()) is not None]
+        for one in sorted(finished, key=lambda path: path.name)[:1]:
+            one.unlink(missing_ok=True)
+        return bool(finished)
 
     async def files(self) -> Sequence[RecordingFile]:
         """All recordings, oldest first."""
         return await _in_thread(self._directory.files)
 
     @property
-    def folder(self) -> Path:
-        """Where recordings are."""
-        return self._directory.path
+    def pictures(self) -> Path:
+        """Folder of the pictures of the past."""
+        return self._pictures.path
 
     async def finished(self, name: str) -> Path | None:
         """The file of a finished recording."""
@@ -258,11 +253,20 @@ class InputRecorder:
         return await self._apart.run(write_excerpt, folder, target, since, until)
 
 
-async def _start(setup: WriterSetup, counters: Counter[str]) -> WriterProcess:
-    try:
-        return await WriterProcess.start(setup, counters)
-    except OSError as error:
-        raise HopError("recordings", error.strerror or str(error)) from error
+class RecordedSink:
+    """The history's recorder, whose rows are recorded here, too.
+
+    Implements ``pipeline.record.RecordSink``.
+    """
+
+    def __init__(self, history: RecordSink, row: Callable[[Record], None]) -> None:
+        self._history, self._row = history, row
+        self.flushed = history.flushed
+
+    def enqueue(self, record: Record) -> None:
+        """Queue a record in both."""
+        self._history.enqueue(record)
+        self._row(record)
 
 
 async def _in_thread(work: Callable[[], _T]) -> _T:

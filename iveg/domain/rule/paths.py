@@ -1,4 +1,4 @@
-"""Paths of the next three seconds, and where they meet circles that move.
+"""Paths of the next three seconds, and where they meet zones that move.
 
 Of numbers alone, so that the server and the software on a robot calculate alike
 (docs/safety.md, "Foresight").
@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from iveg.domain.detection_rule import FORESIGHT_MOST_S
 from iveg.domain.feedback import HALF_SPEED
 from iveg.domain.geometry import Pose2D, Twist2D
+from iveg.domain.parameters import FORESIGHT_MOST_S
 
 _Floats = NDArray[np.float64]
 HORIZON_S = FORESIGHT_MOST_S
@@ -21,7 +21,7 @@ _STEP_S = 0.1
 AHEAD_S: _Floats = np.arange(0.0, HORIZON_S + _STEP_S / 2, _STEP_S)
 """The moments of a path (s)."""
 HOLDS_S = 2.0
-"""Who is slow for a ring stays so while it lies so far ahead (s)."""
+"""A robot that is slow for a zone stays so while it lies so far ahead (s)."""
 EVERY_S = 0.2
 """Encounters are looked for five times a second."""
 MOVES_M_S = 0.05
@@ -60,16 +60,16 @@ def sped_up(twist: Twist2D, to: float) -> Twist2D:
 
 @dataclass(frozen=True, slots=True)
 class Meeting:
-    """A path reaches a circle.
+    """A path reaches a zone.
 
     Attributes:
-        circle: Number of the circle.
+        zone: Number of the zone.
         in_s: How soon (s).
         x: Where the robot will be (m); ``y`` likewise.
-        centre_x: Where the circle's centre will be (m); ``centre_y`` likewise.
+        centre_x: Where the zone's centre will be (m); ``centre_y`` likewise.
     """
 
-    circle: int
+    zone: int
     in_s: float
     x: float
     y: float
@@ -77,8 +77,8 @@ class Meeting:
     centre_y: float
 
 
-class Circles:
-    """Circles that go on at their velocity for the next three seconds.
+class MovingZones:
+    """Zones that go on at their velocity for the next three seconds.
 
     Args:
         rows: Each with x, y (m), velocity in x and y (m/s), age of all this (s) and
@@ -91,7 +91,7 @@ class Circles:
         self._x, self._y = x + vx * goes_on, y + vy * goes_on
 
     def met_by(self, path: Path) -> tuple[list[int], Iterator[Meeting]]:
-        """The circles that a path begins in, and its first meeting with each other."""
+        """The zones that a path begins in, and its first meeting with each other."""
         x, y = path
         apart = np.hypot(self._x - x[:, None], self._y - y[:, None]) - self._radius
         inside = apart <= 0.0
@@ -102,16 +102,16 @@ class Circles:
             for one in met
         )
 
-    def _meeting(self, path: Path, circle: int, apart: _Floats, step: int) -> Meeting:
+    def _meeting(self, path: Path, zone: int, apart: _Floats, step: int) -> Meeting:
         """Where a distance that is at most 0 from a step on becomes so."""
         before, after = float(apart[step - 1]), float(apart[step])
         share = before / (before - after)
         x, y, centre_x, centre_y = (
             float(of[step - 1] + share * (of[step] - of[step - 1]))
-            for of in (*path, self._x[:, circle], self._y[:, circle])
+            for of in (*path, self._x[:, zone], self._y[:, zone])
         )
         in_s = float(AHEAD_S[step - 1]) + _STEP_S * share
-        return Meeting(circle, in_s, x, y, centre_x, centre_y)
+        return Meeting(zone, in_s, x, y, centre_x, centre_y)
 
 
 def path_ahead(pose: Pose2D, twist: Twist2D, plan: Plan | None) -> Path:

@@ -14,7 +14,7 @@ from iveg.domain.comparison import Comparison, Doings
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import HALF_SPEED, SpeedLimit
 from iveg.domain.observations import Instant
-from iveg.domain.rule.crossings import LimitChange
+from iveg.domain.rule.zones import LimitChange
 
 MOST_KEPT: Final = 200
 """Differences in the list; all are counted."""
@@ -61,7 +61,7 @@ class _Sums:
                 self.slowed_s[limit.reason] += passed_s
 
     def meet(self, changes: Iterable[LimitChange]) -> None:
-        self.encounters.update(one.crossing.zone.reason for one in changes if one.began)
+        self.encounters.update(one.entry.zone.reason for one in changes if one.began)
 
     def doings(self) -> Doings:
         seconds = {why: round(s, 3) for why, s in self.slowed_s.items()}

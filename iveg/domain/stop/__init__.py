@@ -8,9 +8,13 @@ from iveg.domain.stop.commands import (
     Times,
     believe,
 )
-from iveg.domain.stop.effects import (
+from iveg.domain.stop.machine import STEPS, Step, StopMachine
+from iveg.domain.stop.status import (
+    FIWARE_PAUSE_S,
+    STANDING_RESEND_S,
     Changed,
     Closed,
+    DesiredRecord,
     Effect,
     Event,
     Key,
@@ -19,9 +23,6 @@ from iveg.domain.stop.effects import (
     SendStop,
     SetDesiredState,
 )
-from iveg.domain.stop.machine import STEPS, Step, StopMachine
-from iveg.domain.stop.sends import FIWARE_PAUSE_S, STANDING_RESEND_S
-from iveg.domain.stop.wanted import DesiredRecord
 
 __all__ = [
     "FIWARE_PAUSE_S",

@@ -2,13 +2,19 @@
 
 A STOP's times are the press on the browser's clock, accepted (``requested``), sent and
 answered on each transport, and standing (docs/interfaces/resources.md).
+
+Outcome of an order, for readers of the history (docs/interfaces/resources.md).
+
+A row keeps the state of the machine when the order was no longer followed, and that is
+the robot's state: "running" does not say how a STOP ended.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from iveg.domain.observations import Instant
+from iveg.domain.records import CommandRecord
 from iveg.domain.transports import Transport, TransportId
 
 State = Literal[
@@ -40,12 +46,10 @@ class Press:
     Attributes:
         press_id: The same on every transport and at every repetition.
         pressed_at: Unix time by our clock, as the browser knows it (s).
-        drill: A proof test, not a need.
     """
 
     press_id: str | None = None
     pressed_at: float | None = None
-    drill: bool = False
 
 
 PLAIN = Press()
@@ -102,7 +106,6 @@ class FollowedCommand:
             count once.
         transports: Each ``pending``, ``ok``, ``failed``, ``unknown`` or ``off``
             (docs/interfaces/resources.md).
-        drill: A STOP that somebody pressed to prove that it works.
         held_as: The hold of an earlier STOP that this one holds on to.
         agent_lag_s: How far the IoT Agent was behind when it was sent (s); None where
             nobody knows.
@@ -118,7 +121,6 @@ class FollowedCommand:
     reason: str | None = None
     standstill_ms: float | None = None
     transports: Mapping[TransportId, str] = field(default_factory=dict)
-    drill: bool = False
     held_as: str | None = None
     agent_lag_s: float | None = None
 
@@ -181,3 +183,53 @@ class FollowedCommand:
 
     def _with(self, transport: TransportId, state: str) -> dict[TransportId, str]:
         return {**self.transports, transport: state}
+
+
+Outcome = Literal[
+    "open",
+    "stood",
+    "not_seen_standing",
+    "released",
+    "resumed",
+    "refused",
+    "expired",
+    "replaced",
+    "reached",
+    "cancelled",
+    "deleted",
+]
+_OF_GOALS: Mapping[str, Outcome] = {
+    "REACHED": "reached",
+    "REFUSED": "refused",
+    "CANCELLED": "cancelled",
+    "DELETED": "deleted",
+}
+LOUD = frozenset({"UNCONFIRMED", "STILL_MOVING"})
+
+
+def outcome_of(record: CommandRecord) -> Outcome:
+    """Outcome of an order; ``open`` while it is followed."""
+    if record.state == "EXPIRED":
+        return "expired"
+    if record.state == "REPLACED":
+        return "replaced"
+    if record.kind == "stop":
+        return _of_stop(record)
+    if record.kind == "goal":
+        return _OF_GOALS.get(record.state, "open")
+    if record.state == "RELEASING":
+        return "open"
+    if record.reason is not None:
+        return "refused"
+    return "released" if record.kind == "release" else "resumed"
+
+
+def _of_stop(record: CommandRecord) -> Outcome:
+    if record.state not in ("RUNNING", "READY"):
+        return "open"
+    return "not_seen_standing" if record.standing_at is None else "stood"
+
+
+def was_loud(states: Iterable[str]) -> bool:
+    """Whether it was unconfirmed or not obeyed at any time."""
+    return not LOUD.isdisjoint(states)

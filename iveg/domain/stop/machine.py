@@ -17,26 +17,31 @@ What happens comes in by a method, from people, transports, the robot or time.  
 method finds out which event that is (after the guard that may refuse an order) and the
 table at the end, ``STEPS``, says what follows.  An event without a row is a mistake in
 this module: nothing changes, ``OffTable`` reports it, and STOP is sent on.
+
+Alert conditions of the STOPs of a fleet.
 """
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
+from iveg.domain.events import Condition
 from iveg.domain.limits import LIMITS
-from iveg.domain.observations import CommandAnswer, Instant, Origin, SafetyReport
-from iveg.domain.stop.attempt import Attempt, drives
+from iveg.domain.motion import UNMOVED, Motion
+from iveg.domain.observations import CommandAnswer, Instant, Odometry, SafetyReport
 from iveg.domain.stop.commands import PLAIN, Press, State
-from iveg.domain.stop.effects import (
+from iveg.domain.stop.status import (
+    Attempt,
+    DesiredRecord,
     Effect,
     Event,
     Key,
     OffTable,
     SendOnce,
     SetDesiredState,
+    StopStatus,
+    drives,
 )
-from iveg.domain.stop.status import StopStatus
-from iveg.domain.stop.wanted import DesiredRecord
 from iveg.domain.transports import TRANSPORTS, Transport, TransportId
 
 _UNHEARD: tuple[State, ...] = ("REQUESTED", "SENT", "UNCONFIRMED")
@@ -86,11 +91,6 @@ class StopMachine(StopStatus):
         """STOP again a robot that an earlier run had stopped."""
         kept = wanted.hold_to_assert()
         return self._step(Event("reasserted", at, new_id, wanted.by, kept=kept))
-
-    def drill(self, by: str, at: Instant, new_id: str, press: Press) -> list[Effect]:
-        """Begin a STOP drill. Raises CommandRefusedError where a guard objects."""
-        self.evidence.check_drill(self.state, at)
-        return self._step(Event("requested", at, new_id, by, press))
 
     def release(
         self, by: str, seen: Iterable[str], at: Instant, new_id: str
@@ -165,7 +165,8 @@ class StopMachine(StopStatus):
             return self._step(Event("refused", at)) if refused else []
         if self.wants_stop and answer.result == "RELEASED":
             # It will never hold by that name again: only a new one can.
-            return self._lifted(at, new_id) if answer.id == self.hold_id else []
+            is_ours = answer.id == self.hold_id
+            return self._lifted(at, new_id, is_ours) if is_ours else []
         held = {answer.id, *(hold.id for hold in answer.holds)}
         if self.stop is None or answer.result != "LATCHED" or self.hold_id not in held:
             return []
@@ -202,8 +203,11 @@ class StopMachine(StopStatus):
         has_stood = self.state in ("STANDING", "STALE")
         if self.hold_id not in {hold.id for hold in report.holds}:
             self.evidence.standstill.forget()
-            lifted = has_stood or self.hold_id in report.released
-            return self._lifted(at, new_id) if lifted and is_later else []
+            is_released = self.hold_id in report.released
+            if not is_later or not (has_stood or is_released):
+                return []
+            is_driving = drives(report)
+            return self._lifted(at, new_id, is_released, is_driving=is_driving)
         if report.challenge != self._doubt:
             self._doubt = None
         self.stop = self.stop.heard_of(transport, at)
@@ -217,23 +221,35 @@ class StopMachine(StopStatus):
 
     def odometry(
         self,
-        linear: float,
-        angular: float,
+        said: Odometry,
         at: Instant,
         new_id: str,
-        origin: Origin,
         age_s: float,
+        motion: Motion = UNMOVED,
     ) -> list[Effect]:
-        """Take a speed, proven to be no older than ``age_s``."""
-        contradicted = self.evidence.is_contradicted(linear, angular, at, origin, age_s)
+        """Take odometry, proven to be no older than ``age_s``.
+
+        ``motion``: of the robot by all that is known.
+        """
+        contradicted = self.evidence.is_contradicted(said, motion, at, age_s)
         moved = contradicted and self.state == "STANDING"
         return self._stop_again("moved", at, new_id) if moved else []
 
     def _delivered(self, at: Instant) -> list[Effect]:
         return self._step(Event("delivered", at)) if self.state in _UNHEARD else []
 
-    def _lifted(self, at: Instant, new_id: str) -> list[Effect]:
-        """The hold is lost without a release."""
+    def _lifted(
+        self, at: Instant, new_id: str, is_released: bool, *, is_driving: bool = False
+    ) -> list[Effect]:
+        """The hold is lost without a release of ours: STOP again.
+
+        One that was adopted, and that nobody here asked for, is another server's: the
+        robot's word that it was released ends it.
+        """
+        stop = self.stop
+        if is_released and stop and (*stop.requesters, stop.reason) == ("iveg", None):
+            effects = self._step(Event("ready", at))
+            return effects + self._step(Event("running", at)) if is_driving else effects
         lost: Key = "moved" if self._doubt is None else "release_unconfirmed"
         return self._stop_again(lost, at, new_id)
 
@@ -388,7 +404,7 @@ def _rows() -> Iterable[tuple[Key, tuple[State, ...], Step]]:
     yield "releasing", ("STANDING", "RUNNING"), order
     yield "resuming", ("READY", "RUNNING"), order
     yield "refused", ("RELEASING",), Step(None, m._say_why, "order")
-    yield "ready", ("RELEASING",), Step("READY", m._let_go, "order")
+    yield "ready", ("RELEASING", "STANDING", *moving), Step("READY", m._let_go, "order")
     yield "running", ("RELEASING", "READY"), Step("RUNNING", ends="all")
     yield "adopted", ("RUNNING", "READY"), Step("DELIVERED", m._adopt)
 
@@ -396,3 +412,33 @@ def _rows() -> Iterable[tuple[Key, tuple[State, ...], Step]]:
 STEPS: Mapping[tuple[State, Key], Step] = {
     (state, key): step for key, states, step in _rows() for state in states
 }
+
+
+_ALERTS = {
+    "UNCONFIRMED": "alert.stop_unconfirmed",
+    "STILL_MOVING": "alert.stop_still_moving",
+}
+_NOT_AT_REST = {"REQUESTED", "SENT", "DELIVERED", *_ALERTS}
+"""A STOP in one of these has not been seen to stand, not even once."""
+
+
+def of_machines(machines: Iterable[StopMachine], now: Instant) -> Iterable[Condition]:
+    """Conditions of STOPs that are not confirmed or not obeyed."""
+    for machine in machines:
+        stop, robot_id = machine.stop, machine.robot_id
+        if stop is None:
+            continue
+        age = round(now.mono - stop.times.requested.mono, 1)
+        key = _ALERTS.get(machine.state)
+        if key is not None:
+            yield Condition.of_robot("P1", key, robot_id, age=age)
+        if stop.reason == "moved" and machine.state in _NOT_AT_REST:
+            yield Condition.of_robot("P1", "alert.stop_moved", robot_id, age=age)
+
+
+def of_mistakes(mistakes: Iterable[OffTable]) -> Iterable[Condition]:
+    """Conditions of internal errors of the machine."""
+    for one in mistakes:
+        yield Condition.of_robot(
+            "P2", "alert.stop_off_table", one.robot_id, state=one.state, event=one.key
+        )

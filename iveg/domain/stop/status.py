@@ -1,18 +1,398 @@
-"""Everything that is kept of the STOP of one robot, and what follows from it."""
+"""Everything that is kept of the STOP of one robot, and what follows from it.
 
-from collections.abc import Iterable
-from dataclasses import replace
+Earlier desired state of a robot: of an earlier run, or of an earlier STOP.
+
+One attempt to release or resume a robot, and the effect its copies can still have.
+
+An order carries a challenge that the robot spends on the first copy, whatever it makes
+of it.  So a newer report with another challenge says that no copy can act any more:
+what it shows has come to stay.
+
+The copies go out once on each transport and come in any order, late, or not at all.
+The robot's reports decide, not its answers: one that shows the release makes it true,
+and a refusal counts once a report shows that the challenge is spent.
+
+Events of a STOP machine, and the effects that it asks for.
+
+Timetable of the repetitions of a STOP on each transport.
+
+A transport that takes any number: at 0, 250, 500 and 1000 ms, then every half second,
+after ten seconds every second; to a robot that has it every second, to a standing one
+every five.  One that takes one at a time (Orion): the next two seconds after the last
+came back, and none to a robot that has it, unless there is no other transport.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from math import inf
+from typing import Literal
 
 from iveg.domain.limits import LIMITS
-from iveg.domain.observations import Instant
-from iveg.domain.stop.attempt import Attempt
-from iveg.domain.stop.commands import FollowedCommand, State
-from iveg.domain.stop.effects import Changed, Closed, Key
-from iveg.domain.stop.evidence import StopEvidence
-from iveg.domain.stop.sends import Sends
-from iveg.domain.stop.wanted import NEW_HOLD, Kept
-from iveg.domain.transports import Transport
+from iveg.domain.observations import CommandAnswer, Instant, SafetyReport
+from iveg.domain.stop.commands import PLAIN, FollowedCommand, Kind, Press, State, Times
+from iveg.domain.stop.standstill import StopEvidence
+from iveg.domain.transports import Transport, TransportId
+
+
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """An existing hold of the robot that a new STOP asserts again.
+
+    Attributes:
+        hold_id: None: the STOP is a new hold.
+        challenge: Of a release that may still lift it.
+    """
+
+    hold_id: str | None = None
+    challenge: str | None = None
+
+
+NEW_HOLD = Kept()
+
+
+@dataclass(frozen=True, slots=True)
+class DesiredRecord:
+    """The stored desire that a robot stands.
+
+    Attributes:
+        by: Who asked.
+        hold_id: The hold of that STOP; None where the disk does not know whether a
+            release has named it.
+        named: Holds that any release ever named, the last 64, newest last.
+        asked: STOPs that the newest release named, if nothing has confirmed it.
+        challenge: The challenge which that release carried.
+    """
+
+    by: str
+    hold_id: str | None = None
+    named: tuple[str, ...] = ()
+    asked: tuple[str, ...] = ()
+    challenge: str | None = None
+
+    def hold_to_assert(self) -> Kept:
+        """The hold that a STOP after a restart asserts again.
+
+        A hold that no release ever named cannot have been lifted, so asserting it again
+        adds none.  One that was named may have been: the robot would answer RELEASED
+        and hold nothing, so the hold is a new one; unless there are so many that
+        theirs is asserted until the robot's word, or its silence, decides.
+        """
+        if self.hold_id in self.named:
+            many = len(self.asked) >= LIMITS.most_holds
+            return Kept(self.hold_id, self.challenge) if many else NEW_HOLD
+        return Kept(self.hold_id)
+
+
+@dataclass(frozen=True, slots=True)
+class Attempt:
+    """A release or resume that was sent and not yet decided.
+
+    Attributes:
+        challenge: That of the report that a person saw.
+        ids: What a release lifts; none in a resume.
+        before: The state that it began in, and goes back to if it is refused.
+        refused: Why one of its copies was refused.
+    """
+
+    command: FollowedCommand
+    challenge: str
+    ids: tuple[str, ...] = ()
+    before: State = "STANDING"
+    refused: str | None = None
+
+    def is_spent(self, report: SafetyReport | None) -> bool:
+        """Whether no copy can act any more.
+
+        Args:
+            report: The robot's newest, by (boot, seq): not older than the one that the
+                order was made from.
+        """
+        return report is not None and report.challenge != self.challenge
+
+    def answered(
+        self, answer: CommandAnswer, transport: TransportId, at: Instant
+    ) -> "Attempt":
+        """The robot answers a copy."""
+        command = self.command.answered(transport, at)
+        refused = self.refused
+        if answer.result == "REFUSED":
+            refused = answer.why or "refused"
+        return replace(self, command=command, refused=refused)
+
+    def verdict(
+        self, report: SafetyReport, hold_id: str | None
+    ) -> Literal["running", "ready", "refused"] | None:
+        """What a report makes of it, if that decides it.
+
+        Args:
+            report: The robot's newest.
+            hold_id: Our hold; None where iVeg has not stopped the robot.
+        """
+        if self.command.kind == "resume" and drives(report):
+            return "running"
+        if self.command.kind == "release" and _is_released(report, hold_id):
+            return "ready"
+        return "refused" if self.is_refused(report, hold_id) else None
+
+    def is_refused(self, report: SafetyReport | None, hold_id: str | None) -> bool:
+        """Whether one copy was refused and none can act any more; args likewise."""
+        if self.refused is None or not self.is_spent(report):
+            return False
+        is_resume = self.command.kind == "resume"
+        return is_resume or (report is not None and _is_held(report, hold_id))
+
+
+def drives(report: SafetyReport) -> bool:
+    """Whether a robot reports that it is free to drive."""
+    return not report.holds and report.speed_factor > 0
+
+
+def _is_released(report: SafetyReport, hold_id: str | None) -> bool:
+    if hold_id is None:
+        return not _is_held(report, None)
+    return not _is_held(report, hold_id) and hold_id in report.released
+
+
+def _is_held(report: SafetyReport, hold_id: str | None) -> bool:
+    if hold_id is None:
+        return any(hold.ack == "remote" for hold in report.holds)
+    return hold_id in {hold.id for hold in report.holds}
+
+
+Key = Literal[
+    "requested",
+    "reasserted",
+    "moved",
+    "release_unconfirmed",
+    "adopted",
+    "sent",
+    "delivered",
+    "standing",
+    "unconfirmed",
+    "still_moving",
+    "stale",
+    "releasing",
+    "resuming",
+    "refused",
+    "ready",
+    "running",
+]
+"""Kinds of events; also names of their log sentences."""
+_ORDERS: Mapping[Key, Kind] = {"releasing": "release", "resuming": "resume"}
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """An event, with the arguments of its step.
+
+    Attributes:
+        new_id: Names the command that begins, and its hold unless one is ``kept``.
+        by: Who wants it.
+        press: What the page says of a press.
+        kept: The hold that a STOP holds on to.
+        attempt: The release or resume that begins.
+    """
+
+    key: Key
+    at: Instant
+    new_id: str = ""
+    by: str = "iveg"
+    press: Press = PLAIN
+    kept: Kept = NEW_HOLD
+    attempt: Attempt | None = None
+
+    def begins(self, robot_id: str, transports: Iterable[Transport]) -> FollowedCommand:
+        """The command that begins with it; ``off`` on transports that cannot carry it.
+
+        A release or resume is sent once, at once; a STOP as often as it takes.
+        """
+        kind = _ORDERS.get(self.key, "stop")
+        is_stop = kind == "stop"
+        plain = not is_stop or self.key in ("requested", "adopted")
+        ways = {one.id: "pending" if one.carries(kind) else "off" for one in transports}
+        return FollowedCommand(
+            self.new_id,
+            robot_id,
+            kind,
+            "REQUESTED" if is_stop else "RELEASING",
+            Times.of(self.at, self.press),
+            requesters=(self.by,),
+            tries=0 if is_stop else 1,
+            reason=None if plain else self.key,
+            transports=ways,
+            held_as=self.kept.hold_id,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class SendStop:
+    """Send this hold on this transport, now, for this command."""
+
+    robot_id: str
+    hold_id: str
+    transport: TransportId
+    command_id: str
+
+
+@dataclass(frozen=True, slots=True)
+class SendOnce:
+    """Send a release or a resume, once on each transport.
+
+    Attributes:
+        ours: Those of its holds that are STOPs of iVeg.
+    """
+
+    attempt: Attempt
+    ours: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class SetDesiredState:
+    """Publish the retained desired state that a reconnecting robot finds."""
+
+    robot_id: str
+    desired: Literal["stopped", "run"]
+    ids: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Changed:
+    """The state changed: one audit row, one log line.
+
+    Attributes:
+        command_id: Whose step it is.
+        key: Names the sentence, such as ``standing`` or ``moved``.
+        commands: The STOP and the order under way, as they are after it.
+    """
+
+    command_id: str
+    state: State
+    key: Key
+    why: str | None = None
+    commands: tuple[FollowedCommand, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Closed:
+    """A command that is no longer followed: its last audit row, and no log line.
+
+    Attributes:
+        key: What closed it; its sentence stands at the command that came.
+    """
+
+    command: FollowedCommand
+    key: Key
+
+
+@dataclass(frozen=True, slots=True)
+class OffTable:
+    """An event without a row in this state: a mistake in the machine.
+
+    Nothing has changed, and the desired state stays.
+    """
+
+    robot_id: str
+    state: State
+    key: Key
+
+
+Effect = SendStop | SendOnce | SetDesiredState | Changed | Closed | OffTable
+
+
+FIWARE_PAUSE_S = 2.0
+DELIVERED_RESEND_S = 1.0
+STANDING_RESEND_S = 5.0
+_EARLY_SENDS = (0.25, 0.5, 1.0)
+_EARLY_S = 1e-3
+"""Clocks that tick in fractions meet a planned moment only nearly."""
+
+Progress = Literal["asked", "delivered", "standing"]
+"""Progress known from the robot: none, STOP received, standing still."""
+_PROGRESS: Mapping[str, Progress] = {
+    "DELIVERED": "delivered",
+    "STILL_MOVING": "delivered",
+    "STANDING": "standing",
+}
+
+
+class Sends:
+    """The timetable of one robot's STOP."""
+
+    def __init__(self, transports: Iterable[Transport]) -> None:
+        self._ways = {one.id: one for one in transports if one.can_stop}
+        self._is_alone = all(one.one_at_a_time for one in self._ways.values())
+        self._sent: dict[TransportId, tuple[float, float]] = {}
+        """When a STOP was last sent (monotonic, s), and how old it was then (s)."""
+        self._busy: set[TransportId] = set()
+        """Those of one at a time with a request under way."""
+        self._next: dict[TransportId, float] = {}
+        """When those may be asked again (monotonic, s)."""
+
+    def begin(self, at: Instant) -> None:
+        """A new episode, on all at once; what is under way is of an earlier one."""
+        self._busy.clear()
+        self.now(at)
+
+    def now(self, at: Instant) -> None:
+        """Make every transport due now."""
+        self._sent.clear()
+        self._next = dict.fromkeys(self._ways, at.mono)
+
+    def repeat_now(self) -> None:
+        """Make those that take any number due at the next check."""
+        self._sent.clear()
+
+    def came_back(self, transport: TransportId, at: Instant) -> None:
+        """Note that a transport's request has ended."""
+        self._busy.discard(transport)
+        self._next[transport] = at.mono + FIWARE_PAUSE_S
+
+    def due(self, stop: FollowedCommand, at: Instant) -> list[SendStop]:
+        """Sends that are due now; they count as sent."""
+        age_s = at.mono - stop.times.requested.mono
+        progress = _PROGRESS.get(stop.state, "asked")
+        hold_id = stop.hold_id or stop.command_id
+        return [
+            SendStop(stop.robot_id, hold_id, way.id, stop.command_id)
+            for way in self._ways.values()
+            if (
+                self._is_free(way.id, at, progress)
+                if way.one_at_a_time
+                else self._is_due(way.id, at, age_s, progress)
+            )
+        ]
+
+    def _is_due(
+        self, way: TransportId, at: Instant, age_s: float, progress: Progress
+    ) -> bool:
+        """Whether to repeat it on a transport that takes any number."""
+        sent_at, age_then = self._sent.get(way, (float("-inf"), 0.0))
+        if at.mono - sent_at < _pause(age_then, progress) - _EARLY_S:
+            return False
+        self._sent[way] = at.mono, age_s
+        return True
+
+    def _is_free(self, way: TransportId, at: Instant, progress: Progress) -> bool:
+        """Whether to ask a transport that takes one at a time."""
+        if way in self._busy or (progress != "asked" and not self._is_alone):
+            return False
+        rest = STANDING_RESEND_S - FIWARE_PAUSE_S if progress == "standing" else 0.0
+        if at.mono < self._next.get(way, 0.0) + rest:
+            return False
+        self._busy.add(way)
+        return True
+
+
+def _pause(age_s: float, progress: Progress) -> float:
+    """Pause after a send at this age (s)."""
+    if progress == "standing":
+        return STANDING_RESEND_S
+    if progress == "delivered":
+        return DELIVERED_RESEND_S
+    for early in _EARLY_SENDS:
+        if age_s < early - _EARLY_S:
+            return early - age_s
+    return 0.5 if age_s < 10.0 else 1.0
 
 
 class StopStatus:

@@ -15,7 +15,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from iveg.domain.detection_rule import Class
+from iveg.domain.parameters import Class
 
 ANY = ""
 """Stands for every detector that has no row of its own."""

@@ -17,7 +17,7 @@ suspicion, and a second of it ends it::
 
 Whoever is confirmed is kept by any box of 0.25 or more in each second, however unsure
 (as ByteTrack keeps a track), and misses count no more.  None of this lifts anything: a
-ring that is drawn goes by time or by an all-clear.
+zone that is drawn goes by time or by an all-clear.
 """
 
 import math
@@ -55,6 +55,7 @@ class Looks:
         over_s: From the first to the newest (s).
         probability: That it is a person (0 to 1).
         confirmed: Whether these looks, or a box among them, reached the threshold.
+        lent: Whether they did only with looks of other robots.
     """
 
     count: int
@@ -63,6 +64,7 @@ class Looks:
     over_s: float
     probability: float
     confirmed: bool = False
+    lent: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -264,12 +266,15 @@ def _nearest(
 def _judged(
     suspect: _Suspect, others: Sequence[_Suspect | None], least: float
 ) -> Looks:
-    """What all who look at a suspect know, which may confirm it."""
+    """What all who look at a suspect know, which may confirm it.
+
+    What a robot's own looks make of it is the same whoever else looks.
+    """
     seen_by = [suspect, *(one for one in others if one is not None)]
-    odds = min(SUREST, sum(one.log_odds for one in seen_by))
-    count, probability = sum(one.count for one in seen_by), 1 / (1 + math.exp(-odds))
+    count, probability = _sum_of(seen_by)
     # One look alone is a box like any other.
-    is_enough = count > 1 and probability >= least
+    own, own_probability = _sum_of([suspect])
+    is_enough = own > 1 and own_probability >= least
     suspect.confirmed |= is_enough or suspect.most >= least
     return Looks(
         count,
@@ -277,8 +282,15 @@ def _judged(
         max(one.most for one in seen_by),
         round(suspect.seen_at - min(one.first_at for one in seen_by), 3),
         probability,
-        suspect.confirmed,
+        suspect.confirmed or (count > 1 and probability >= least),
+        lent=not suspect.confirmed,
     )
+
+
+def _sum_of(suspects: Sequence[_Suspect]) -> tuple[int, float]:
+    """Number of all looks, and the probability that they make."""
+    odds = min(SUREST, sum(one.log_odds for one in suspects))
+    return sum(one.count for one in suspects), 1 / (1 + math.exp(-odds))
 
 
 def _kept(known: Sequence[_Suspect], now: float) -> list[_Suspect]:

@@ -4,18 +4,23 @@ A detection is placed in ``map``, judged by the rule, recognised as a fleet memb
 one stands there, and else handed to the tracker.
 """
 
-import math
 from collections.abc import Iterable, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from iveg.domain.detection_rule import Class, DetectionRule
+from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.frames import FramedBox, resolve_box
 from iveg.domain.geometry import Pose2D
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS
-from iveg.domain.observations import Detection, DetectionFrame, Instant
+from iveg.domain.observations import (
+    Detection,
+    DetectionFrame,
+    Instant,
+    SafetyReport,
+)
+from iveg.domain.parameters import Class
 from iveg.domain.robot_state import RobotState
 from iveg.domain.tracking.calibration import Calibration, Calibrations
 from iveg.domain.tracking.looks import (
@@ -26,13 +31,8 @@ from iveg.domain.tracking.looks import (
     Looks,
     Suspicions,
 )
-from iveg.domain.tracking.numbers import TrackNumbers
-from iveg.domain.tracking.person import Sighting, TrackedPerson
-from iveg.domain.tracking.picture import PlacedDetection
-from iveg.domain.tracking.recognition import straight
-from iveg.domain.tracking.things import Things
-from iveg.domain.tracking.tracker import Tracker
-from iveg.domain.tracking.ways import Ways
+from iveg.domain.tracking.person import Sighting, Things, TrackedPerson
+from iveg.domain.tracking.tracker import PlacedDetection, Tracker, TrackNumbers
 from iveg.domain.world import World
 
 LASER = "laser"
@@ -40,8 +40,8 @@ LASER = "laser"
 EVEN = 0.5
 """Confidence of what a laser sees walk: it may be a person as well as not."""
 _HEIGHT_M = 0.9
-_SUSPECT_M = 1.0
-_PEER_GATE_M = 1.0
+_THINNEST_M = 0.01
+"""A thinner box has no extent."""
 _BEYOND_WALL_M = 2.0
 
 
@@ -79,8 +79,7 @@ class People:
     """Every known person, in the order of appearance.
 
     Args:
-        greenhouse: What is seen beyond its outer wall is of doubtful position, and
-            nobody walks through its crop.
+        greenhouse: What is seen beyond its outer wall is of doubtful position.
         era: Ends every id.
         calibrations: How sure a look makes.
     """
@@ -94,20 +93,19 @@ class People:
         self._calibrations = calibrations or Calibrations()
         self._bounds = None if greenhouse is None else greenhouse.bounds
         self._suspicions = Suspicions()
-        way = straight if greenhouse is None else Ways(greenhouse).between
-        self._tracker = Tracker(numbers=TrackNumbers(era), way=way)
-        self.faint: dict[str, list[Placed]] = {}
+        self._tracker = Tracker(numbers=TrackNumbers(era))
         self.things = Things()
         self.turned_away = 0
         """Detections of the last frame without room."""
         self.unplaced = 0
-        """Detections of the last frame that may be somebody, with an unknown place."""
+        """Detections of the last frame that may be somebody, with an unknown place or
+        an impossible box."""
         self.unknown_frames: frozenset[str] = frozenset()
         """Frames that the last frame named and nobody described."""
 
     def copy(self) -> "People":
         """Another that knows the same, and takes the same words of operators."""
-        shared = self.things, self._bounds, self._calibrations, self._tracker.way
+        shared = self.things, self._bounds, self._calibrations
         return deepcopy(self, {id(one): one for one in shared})
 
     @property
@@ -141,11 +139,7 @@ class People:
             self._doubt(_match_peer(one, observer, world, at), pose, observer)
             for one in placed
         ]
-        placed = self._assign(placed, observer, at, new_id)
-        self.faint[frame.robot_id] = [
-            one for one in placed if one.kind == "faint" or one.possible
-        ]
-        return placed
+        return self._assign(placed, observer, at, new_id)
 
     def _place(
         self,
@@ -162,6 +156,7 @@ class People:
             for box in resolve_box(detection, observer.description):
                 if box is not None and (pose is not None or box.frame_id == "map"):
                     placed.append(_placed(detection, box, index, pose, rule))
+                    is_placed = is_placed and _is_possible(placed[-1])
                     continue
                 is_placed = False
                 if box is None and detection.frame_id is not None:
@@ -187,7 +182,7 @@ class People:
             observer.robot_id,
             seen,
             at,
-            rule.threshold_of("person"),
+            rule.threshold.of("person"),
             observer.recording,
             calibration,
         )
@@ -247,60 +242,34 @@ class People:
 
     def witness(
         self,
-        observer: RobotState,
-        spots: Sequence[tuple[float, float]],
+        report: SafetyReport,
         at: Instant,
         new_id: str,
-    ) -> list[TrackedPerson]:
-        """Take in who walks near a robot by its laser alone; x, y in ``map`` (m)."""
-        seen = [
-            Sighting(
-                observer.robot_id, x, y, _HEIGHT_M, at, LASER, EVEN, None, laser=True
-            )
-            for x, y in spots
-        ]
-        tracks = self._tracker.track_picture(
-            [
-                PlacedDetection("person", one, f"{new_id}-{number}")
-                for number, one in enumerate(seen)
-            ],
-            at,
-        )
-        return [self.known[track] for track in tracks if track is not None]
+    ) -> TrackedPerson | None:
+        """Take in who walks near a robot by its own laser; ``at``: when it saw them."""
+        found = report.obstacle
+        if found is None or not found.moved:
+            return None
+        name, x, y = report.robot_id, found.x, found.y
+        seen = Sighting(name, x, y, _HEIGHT_M, at, LASER, EVEN, None, laser=True)
+        picture = [PlacedDetection("person", seen, f"{new_id}-0")]
+        (track,) = self._tracker.track_picture(picture, at)
+        return None if track is None else self.known[track]
 
-    def rings(
+    def zone_radii(
         self, person: TrackedPerson, rule: DetectionRule, now: Instant
     ) -> Iterable[tuple[Sighting, float]]:
-        """Every circle that protects somebody, with its radius now (m); a thing: none.
+        """Every zone that protects somebody, with its radius now (m); a thing: none.
 
-        The only way to a person's rings, so that all who ask leave the same ones out.
+        The only way to a person's zones, so that all who ask leave the same ones out.
         """
         if self.things.explain(person, now) is not None:
             return ()
-        return person.rings(rule, now)
+        return person.zone_radii(rule, now)
 
     def drop_sighting(self, person_id: str, sighting: Sighting) -> TrackedPerson:
-        """Drop a sighting whose place was seen to be empty."""
+        """Drop a sighting whose place its own camera saw to be empty."""
         return self._tracker.drop(person_id, sighting)
-
-    def exchange(self, person_id: str, old: Sighting, new: Sighting) -> None:
-        """Know more of a sighting than before."""
-        self._tracker.exchange(person_id, old, new)
-
-    def is_suspected(
-        self, person: TrackedPerson, sighting: Sighting, observer: str
-    ) -> bool:
-        """Whether a robot's newest frame has such a faint detection near a sighting.
-
-        Who counts by looks has a ring, which may end one of looks, but none of a box.
-        """
-        is_guess = (sighting.possible or sighting.laser) and not self.things.known
-        return any(
-            one.class_ == person.class_
-            and math.dist(one.position[:2], (sighting.x, sighting.y)) <= _SUSPECT_M
-            and not (is_guess and one.person)
-            for one in self.faint.get(observer, ())
-        )
 
     def forget(self, now: Instant) -> list[TrackedPerson]:
         """Drop persons who have not been seen for ten minutes; returns them."""
@@ -341,6 +310,16 @@ def _looked_at(one: Placed, looks: Looks | None) -> Placed:
     )
 
 
+def _is_possible(one: Placed) -> bool:
+    """Whether a box is one that something has; of a person also its size."""
+    box = one.framed.box
+    fits = one.class_ != "person" or (
+        box.longer_side <= LIMITS.person_widest_m
+        and box.zmax - box.zmin <= LIMITS.person_highest_m
+    )
+    return fits and box.shorter_side >= _THINNEST_M
+
+
 def _may_be_somebody(detection: Detection, rule: DetectionRule) -> bool:
     """Whether a detection would slow robots if its place were known."""
     verdict = rule.judge(detection.class_id, detection.probability)
@@ -349,21 +328,26 @@ def _may_be_somebody(detection: Detection, rule: DetectionRule) -> bool:
 
 
 def _match_peer(one: Placed, observer: RobotState, world: World, at: Instant) -> Placed:
-    """Recognise a sighted robot as the fleet member that stands there by odometry."""
+    """Recognise a sighted robot as the fleet member that is there by odometry.
+
+    Only whoever is believed explains a box, and no farther off than a place is wrong:
+    its word alone must not take the zone away that others' eyes made.
+    """
     if one.class_ != "robot":
         return one
     nearest: tuple[float, str] | None = None
     for peer in world.robots.values():
-        since = peer.likely_pose_at()
-        if peer is observer or peer.odometry is None or since is None:
+        age = peer.age_s(at)
+        if peer is observer or peer.odometry is None or not peer.is_believed(at):
             continue
         if peer.recording != observer.recording:
             continue
-        reach = _PEER_GATE_M
+        reach = LIMITS.uncertainty_m
         if peer.description.is_described:
             # Of a body of unknown size one sighting more is safer than one less.
             reach += peer.profile.length / 2
-        reach += LIMITS.walking_m_s * min(1.0, max(0.0, at.mono - since))
+        if age is not None and not peer.stands:
+            reach += LIMITS.walking_m_s * age
         residual = peer.odometry.pose.distance_to(one.position[0], one.position[1])
         if residual <= reach and (nearest is None or residual < nearest[0]):
             nearest = (residual, peer.robot_id)
@@ -372,7 +356,7 @@ def _match_peer(one: Placed, observer: RobotState, world: World, at: Instant) ->
 
 def _sighting(one: Placed, observer: RobotState, at: Instant) -> Sighting:
     x, y, z = one.position
-    reach = 0.0
+    reach, half = 0.0, one.framed.box.longer_side / 2
     if one.doubtful is not None:
         pose, reach = one.doubtful
         x, y = pose.x, pose.y
@@ -389,6 +373,7 @@ def _sighting(one: Placed, observer: RobotState, at: Instant) -> Sighting:
         reach,
         recording=observer.recording,
         possible=one.possible,
+        beyond_m=max(0.0, half - LIMITS.person_radius_m),
     )
 
 

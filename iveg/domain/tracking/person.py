@@ -2,46 +2,69 @@
 
 ::
 
-    seen (<= 1 s) ──> remembered (<= 10 s, ring grows) ──> last seen (<= 600 s, no ring)
+    seen (<= 1 s) ──> remembered (<= 10 s, zone grows) ──> last seen (<= 600 s, no zone)
       ^________________________|                                 └──> gone
 
 Who was only glimpsed is gone sooner, and as soon as the place was seen to be empty.
+
+How far one who is tracked was ever from one spot, and how sure and fast they were.
+
+Extents are only ever joined: what one sighting of a track knew no other forgets.
+
+Things that are taken for a person: an operator's word "not a person here".
+
+A thing is a place, half a metre around it, until the end of the day at the latest.  It
+takes the zones of a track whose every sighting, and every sighting that these were ever
+taken to continue, is of a thing: inside the circle from the first on, never as fast as
+somebody who walks, and never as sure as 0.95.  So who walks in, who moves and who is
+surely seen is protected as without it (docs/safety.md, "Not a person here").
 """
 
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
-from iveg.domain.detection_rule import Class, DetectionRule
+from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.geometry import Rectangle
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
-from iveg.domain.tracking.extent import Extent
+from iveg.domain.parameters import Class
 from iveg.domain.tracking.looks import Looks
+
+
+@dataclass(frozen=True, slots=True)
+class Extent:
+    """Of some sightings.
+
+    Attributes:
+        around: The box in ``map`` that holds every place of theirs.
+        surest: Greatest confidence (0 to 1).
+        fastest: Greatest speed (m/s).
+    """
+
+    around: Rectangle
+    surest: float
+    fastest: float = 0.0
+
+    def joined(self, other: "Extent | None") -> "Extent":
+        """The extent of both."""
+        if other is None:
+            return self
+        return Extent(
+            self.around.joined(other.around),
+            max(self.surest, other.surest),
+            max(self.fastest, other.fastest),
+        )
+
 
 _SMOOTHED_S = 0.4
 MISTAKEN_S = 2.5
 """What is seen for longer is no mistake of a detector, of which most last 2 s."""
 LASER_LASTS_S = 3.0
 """So long somebody whom only a laser saw is remembered: who or what it was is a guess,
-and beside a robot that passes, a ring that grows for longer slows it for nothing."""
-_MOST_PLACES = 16
+and beside a robot that passes, a zone that grows for longer slows it for nothing."""
 Stage = Literal["seen", "remembered", "last_seen", "gone"]
-
-
-@dataclass(frozen=True, slots=True)
-class Followed:
-    """Where a laser has had somebody in sight, since its camera lost them.
-
-    Attributes:
-        x: Their middle in ``map`` (m); ``y`` likewise.
-        at: When the laser saw them there last (monotonic, s).
-    """
-
-    x: float
-    y: float
-    at: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,10 +85,8 @@ class Sighting:
         laser: Only the observer's laser saw it: it moves like somebody who walks.
         extent: Of its chain, and of all that this was ever taken to continue; None
             before it is part of a chain.
-        known_until: Of a laser: who is seen may be somebody whom a camera saw, and who
-            is remembered so long (monotonic, s).
-        followed: Where they went from there by the observer's laser, which moves the
-            ring and nothing else; None: nobody knows.
+        beyond_m: How much farther its box reaches than a person does (m); the zone is
+            as much wider.
     """
 
     observer: str
@@ -84,32 +105,19 @@ class Sighting:
     possible: bool = False
     laser: bool = False
     extent: Extent | None = None
-    known_until: float = -math.inf
-    followed: Followed | None = None
+    beyond_m: float = 0.0
 
     @property
-    def place(self) -> tuple[float, float]:
-        """Middle of its ring, in ``map`` (m)."""
-        followed = self.followed
-        return (self.x, self.y) if followed is None else (followed.x, followed.y)
-
-    def ring_age_s(self, now: Instant) -> float:
-        """For how long its ring may have grown (s).
-
-        Whoever is followed is not foreseen, so theirs is never younger than of somebody
-        who was in sight a second ago.
-        """
-        age_s, followed = self.age_s(now), self.followed
-        if followed is None:
-            return age_s
-        return min(age_s, LIMITS.seen_s + max(0.0, now.mono - followed.at))
+    def kind(self) -> tuple[bool, bool, bool]:
+        """What it counts by; a chain is of one kind."""
+        looks = self.looks
+        is_lent = self.possible and looks is not None and looks.lent
+        return self.possible, self.laser, is_lent
 
     @property
     def lasts_s(self) -> float:
-        """Age up to which it has a ring (s)."""
-        if not self.laser:
-            return LIMITS.ring_lasts_s
-        return max(LASER_LASTS_S, self.known_until - self.at.mono)
+        """Age up to which it has a zone (s)."""
+        return LASER_LASTS_S if self.laser else LIMITS.ring_lasts_s
 
     def age_s(self, now: Instant) -> float:
         """Seconds since the sighting."""
@@ -140,7 +148,7 @@ class Sighting:
             self.possible,
             self.laser,
             extent if before is None else extent.joined(before.extent),
-            self.known_until if before is None else before.known_until,
+            beyond_m=self.beyond_m,
         )
 
     def in_track(self, person: "TrackedPerson") -> "Sighting":
@@ -150,14 +158,6 @@ class Sighting:
             for earlier in (person.newest, *person.sightings):
                 extent = extent.joined(earlier.extent)
         return replace(self, extent=extent)
-
-    def remembered(self, until: float) -> "Sighting":
-        """The same, which is remembered at least so long (monotonic, s)."""
-        return replace(self, known_until=max(until, self.known_until))
-
-    def followed_to(self, place: Followed) -> "Sighting":
-        """The same of somebody whom a laser has in sight."""
-        return replace(self, followed=place)
 
     def _going_on(self, before: "Sighting") -> tuple[float, float]:
         """The velocity of the chain (m/s), smoothed over 0.4 s, of a walker at most."""
@@ -182,11 +182,8 @@ class TrackedPerson:
 
     Attributes:
         person_id: Of the track: the same person as long as iVeg can tell.
-        sightings: The newest of each chain of sightings; each has a ring of its own.
-        began: The first sighting since they were last out of sight for a second.
+        sightings: The newest of each chain of sightings; each has a zone of its own.
         number: Counts tracks in the order of their appearance.
-        places: Where they appeared and were lost each time that they were followed, the
-            newest last: a glimpse, which may be a mistake, is none of them.
     """
 
     person_id: str
@@ -195,9 +192,7 @@ class TrackedPerson:
     first_seen: Instant
     newest: Sighting
     sightings: tuple[Sighting, ...]
-    began: Sighting
     number: int = 0
-    places: tuple[Sighting, ...] = ()
 
     def age_s(self, now: Instant) -> float:
         """Seconds since the newest sighting by any robot."""
@@ -205,25 +200,8 @@ class TrackedPerson:
 
     @property
     def is_well_known(self) -> bool:
-        """Whether they were followed, now or before."""
-        return bool(self.places) or self.is_followed
-
-    @property
-    def followed_s(self) -> float:
-        """For how long they have been in sight, faint looks among it (s)."""
-        looked = 0.0 if self.began.looks is None else self.began.looks.over_s
-        return looked + self.newest.at.mono - self.began.at.mono
-
-    @property
-    def is_followed(self) -> bool:
-        """Whether they have been in sight for longer than a detector's mistake."""
-        return self.followed_s >= MISTAKEN_S
-
-    @property
-    def last_places(self) -> tuple[Sighting, ...]:
-        """Where they may have been lost: the last of all, or before a glimpse."""
-        is_glimpse = self.places and not self.is_followed
-        return (self.newest, self.places[-1]) if is_glimpse else (self.newest,)
+        """Whether they were in sight for longer than a detector's mistake."""
+        return self.newest.at.mono - self.first_seen.mono >= MISTAKEN_S
 
     @property
     def middle(self) -> tuple[float, float]:
@@ -235,16 +213,15 @@ class TrackedPerson:
 
     @property
     def is_possible(self) -> bool:
-        """Whether every ring is one of looks alone."""
-        rings = self.sightings
-        return bool(rings) and all(one.possible for one in rings)
+        """Whether every zone is one of looks alone."""
+        zones = self.sightings
+        return bool(zones) and all(one.possible for one in zones)
 
     def seen_as(
         self,
         newest: Sighting,
         sightings: tuple[Sighting, ...],
         decision_id: str | None = None,
-        began: Sighting | None = None,
     ) -> "TrackedPerson":
         """The same person, seen otherwise.
 
@@ -252,9 +229,7 @@ class TrackedPerson:
             newest: The newest sighting.
             sightings: The newest of each chain.
             decision_id: Of a new alert, if any.
-            began: Where they appeared again, if that was before ``newest``.
         """
-        is_back = newest.at.mono - self.newest.at.mono > LIMITS.seen_s
         return TrackedPerson(
             self.person_id,
             self.class_,
@@ -262,14 +237,8 @@ class TrackedPerson:
             self.first_seen,
             newest,
             sightings,
-            (began or newest) if is_back else self.began,
             self.number,
-            self._places_now if is_back and self.is_followed else self.places,
         )
-
-    @property
-    def _places_now(self) -> tuple[Sighting, ...]:
-        return (*self.places, self.began, self.newest)[-_MOST_PLACES:]
 
     def stage(self, now: Instant) -> Stage:
         """The stage of life of the newest sighting."""
@@ -295,15 +264,80 @@ class TrackedPerson:
             )
         )
 
-    def rings(
+    def zone_radii(
         self, rule: DetectionRule, now: Instant
     ) -> Iterable[tuple[Sighting, float]]:
-        """Every circle that protects this person, with its radius now (m)."""
+        """Every zone that protects this person, with its radius now (m)."""
         for sighting in self.sightings:
             age = sighting.age_s(now)
             if age <= sighting.lasts_s:
-                # Asked thousands of times a second: nearly nobody is followed.
-                if sighting.followed is not None:
-                    age = sighting.ring_age_s(now)
-                radius, reach = rule.radius_at(age), sighting.reach_m
+                radius = rule.radius_at(age, self.class_) + sighting.beyond_m
+                reach = sighting.reach_m
                 yield sighting, radius if radius >= reach else reach
+
+
+RADIUS_M = 0.5
+SURELY_FROM = 0.95
+MOVES_FROM_M_S = 0.8
+"""Half of a walker's speed: a box that jumps by 0.2 m is noise."""
+MOST_THINGS = 32
+LONGEST_S = 86_400.0
+
+
+@dataclass(frozen=True, slots=True)
+class Thing:
+    """One word of an operator.
+
+    Attributes:
+        x: Of its middle in ``map`` (m); ``y`` likewise.
+        by: Who said so; ``since`` when, ``until`` when at the latest.
+    """
+
+    thing_id: str
+    x: float
+    y: float
+    by: str
+    since: Instant
+    until: Instant
+
+    def is_over(self, now: Instant) -> bool:
+        """Whether its time is up, by either clock."""
+        return now.mono >= self.until.mono or now.wall >= self.until.wall
+
+    def explains(self, person: TrackedPerson) -> bool:
+        """Whether a track is nothing but this thing."""
+        seen = (person.newest, *person.sightings)
+        return person.class_ == "person" and all(map(self._explains, seen))
+
+    def _explains(self, sighting: Sighting) -> bool:
+        extent = sighting.extent
+        return (
+            extent is not None
+            and sighting.recording is None
+            and not sighting.reach_m
+            and not sighting.laser
+            and extent.surest < SURELY_FROM
+            and extent.fastest < MOVES_FROM_M_S
+            and extent.around.farthest_m(self.x, self.y) <= RADIUS_M
+        )
+
+
+@dataclass(slots=True)
+class Things:
+    """Every mark of operators, by id, in the order of their words."""
+
+    known: dict[str, Thing] = field(default_factory=dict)
+
+    def explain(self, person: TrackedPerson, now: Instant) -> Thing | None:
+        """The thing that a track is; None: it is somebody."""
+        for one in self.known.values():
+            if not one.is_over(now) and one.explains(person):
+                return one
+        return None
+
+    def end(self, now: Instant) -> Sequence[Thing]:
+        """Forget those whose time is up; returns them."""
+        over = [one for one in self.known.values() if one.is_over(now)]
+        for one in over:
+            del self.known[one.thing_id]
+        return over

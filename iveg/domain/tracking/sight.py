@@ -1,157 +1,254 @@
-"""Lines of sight: cameras, crop, and the all-clear of an empty spot.
+"""Lines of sight: what one frame of a camera shows, and the end of its own zones.
 
-A ring goes by time or because a robot has had its centre in view for a second and found
-nobody, not even faintly; never for one missing frame (docs/safety.md, "Age").  What a
-camera does not look at a laser may have swept (``laser_sight``).
+A zone goes by time, or because the camera that made it has had its centre in view for a
+second and found nobody, not even faintly; never for one missing frame, and never by the
+word of another (docs/safety.md, "Age").
 """
 
 import math
-from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS
-from iveg.domain.observations import Instant
+from iveg.domain.observations import DetectionFrame, Instant
 from iveg.domain.robot_state import RobotState
-from iveg.domain.tracking.following import Following, Unexplained
-from iveg.domain.tracking.people import People
+from iveg.domain.tracking.looks import KEPT_FROM
+from iveg.domain.tracking.people import People, Placed
 from iveg.domain.tracking.person import Sighting, TrackedPerson
-from iveg.domain.witness import KnownBody
-from iveg.domain.world import World
+from iveg.domain.words import meaning_of
 
-CLEAR_S = 1.0
+CLEAR_S, CLEAR_FRAMES = 1.0, 5
+SUSPECT_M = 1.0
+"""So near to a place a box may be of whoever was there."""
 _EDGE_RAD = math.radians(5.0)
 """So far inside the picture that a person there would be seen whole."""
 _NEAR_M, _RANGE_SHARE = 1.0, 0.75
-_FRESH_LOOK_S = 0.5
-_PERSON_M = 0.6
-"""About the centre of a person's box: half of a person, and the error of the box."""
+_FRESH_S = 0.5
+"""A frame that took longer, or came so long after the one before, proves nothing."""
 _BODY_M = 0.3
 """Half of a person, whose middle keeps so far from what stands there."""
-_YOUNG_S = 0.5
-"""An older sighting says too little of where somebody is to explain a return."""
 
-_Look = tuple[int, str]
-_Spots = NDArray[np.float64]
 _Place = tuple[float, float]
 _NONE = np.empty(0, np.intp)
-Swept = Callable[
-    [RobotState, _Spots, NDArray[np.float64], Sequence[KnownBody], Instant],
-    NDArray[np.intp],
-]
-"""Robot, spots, ages of their sightings (s), whom somebody sees by now, now → the spots
-that its newest scan shows to be empty."""
 
 
-class AllClear:
-    """Takes old sightings away once their place was seen to be empty.
-
-    Args:
-        swept: Asks a robot's laser; nobody's counts if left out.
-        unexplained: Asks it whom it has in sight; likewise.
-    """
-
-    def __init__(
-        self,
-        swept: Swept = lambda *_: _NONE,
-        unexplained: Unexplained = lambda *_: None,
-    ) -> None:
-        self._swept, self._following = swept, Following(unexplained)
-        self._since: dict[_Look, float] = {}
-        self._places: dict[int, tuple[Sighting, Sequence[_Place]]] = {}
-        """By chain the sighting, and where to look for who was seen there."""
-
-    def sweep(
-        self, people: People, world: World, greenhouse: Greenhouse, now: Instant
-    ) -> list[TrackedPerson]:
-        """Remove rings whose centre is seen to be empty; returns their persons."""
-        self._following.tick(people, world, now)
-        watched: dict[_Look, float] = {}
-        empty: set[int] = set()
-        rings = [
-            (person, sighting)
-            for person in people.known.values()
-            for sighting in person.sightings
-            if _may_go(sighting, world, now)
-        ]
-        self._places = {
-            ring.chain: self._places_of(ring, world, greenhouse) for _, ring in rings
-        }
-        looks = _Looks.at([(*one, self._places[one[1].chain][1]) for one in rings], now)
-        groups = _groups(rings, people, now)
-        for robot in world.live_robots() if rings else ():
-            seen = looks.seen(visible_from(robot, looks.spots, greenhouse, now))
-            for is_in, bodies in groups:
-                which = np.flatnonzero(is_in[looks.of])
-                asked = looks.spots[which], looks.ages[which], bodies, now
-                seen |= looks.seen(which[self._swept(robot, *asked)])
-            for index in sorted(seen):
-                person, sighting = rings[index]
-                if people.is_suspected(person, sighting, robot.robot_id):
-                    continue
-                pair = sighting.chain, robot.robot_id
-                watched[pair] = self._since.get(pair, now.mono)
-                if now.mono - watched[pair] >= CLEAR_S:
-                    empty.add(index)
-        self._since = watched
-        ended = [rings[index] for index in sorted(empty)]
-        for _, sighting in ended:
-            _hand_over(sighting, people, now)
-        return [
-            people.drop_sighting(person.person_id, sighting)
-            for person, sighting in ended
-        ]
-
-    def _places_of(
-        self, sighting: Sighting, world: World, greenhouse: Greenhouse
-    ) -> tuple[Sighting, Sequence[_Place]]:
-        """Where to look for somebody, as it was when that was asked first."""
-        known = self._places.get(sighting.chain)
-        if known is not None and known[0].at == sighting.at:
-            return known
-        odometry = world.robot(sighting.observer).odometry
-        if odometry is None or sighting.laser:
-            return sighting, ((sighting.x, sighting.y),)
-        return sighting, beside(greenhouse, sighting.x, sighting.y, odometry.pose)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Looks:
-    """Where to look for those who have rings.
+@dataclass(frozen=True, slots=True)
+class Look:
+    """What one frame of a camera shows.
 
     Attributes:
-        spots: Shape (n, 2), in ``map`` (m); it takes all of a ring.
-        of: Shape (n,): whose ring each is; ``ages`` how old that is (s).
-        counts: How many each ring has.
+        camera: Where it was made, in ``map``; None: it proves nothing to be empty.
+        people: Where it shows a person, however faintly, in ``map`` (m).
+        robots: The same of robots; ``unknown`` of what nobody has a word for.
+        at: When it came.
     """
 
-    spots: _Spots
-    of: NDArray[np.intp]
-    ages: NDArray[np.float64]
-    counts: Sequence[int]
+    robot: RobotState
+    camera: Pose2D | None
+    people: Sequence[_Place]
+    robots: Sequence[_Place]
+    unknown: Sequence[_Place]
+    at: Instant
 
     @classmethod
-    def at(
+    def of_frame(
         cls,
-        rings: Sequence[tuple[TrackedPerson, Sighting, Sequence[_Place]]],
-        now: Instant,
-    ) -> "_Looks":
-        """The places of each ring."""
-        counts = [len(places) for *_, places in rings]
-        spots = [place for *_, places in rings for place in places]
-        of = np.repeat(np.arange(len(rings)), counts)
-        ages = np.array([ring.age_s(now) for _, ring, _ in rings], np.float64)
-        return cls(np.array(spots, np.float64).reshape(-1, 2), of, ages[of], counts)
+        robot: RobotState,
+        frame: DetectionFrame,
+        placed: Iterable[Placed],
+        at: Instant,
+    ) -> "Look":
+        """A frame that was taken in, and what of it could be placed."""
+        places = defaultdict[str, list[_Place]](list)
+        for one in placed:
+            if one.detection.probability >= KEPT_FROM:
+                is_known = meaning_of(one.detection.class_id) is not None
+                meant = one.class_ or ("known" if is_known else "unknown")
+                places[meant].append(one.position[:2])
+        origin = frame.origin
+        pose, is_counted = robot.pose_at_stamp(origin.own_s), origin.seq is not None
+        is_late = is_counted and not robot.is_newest(DetectionFrame, origin)
+        camera = None if pose is None or is_late else _camera_at(pose, robot, at)
+        people, robots, unknown = (
+            places[one] for one in ("person", "robot", "unknown")
+        )
+        return cls(robot, camera, people, robots, unknown, at)
 
-    def seen(self, spots: NDArray[np.intp]) -> set[int]:
-        """The rings of which all places are among these."""
-        found = Counter(self.of[spots].tolist())
-        return {ring for ring, count in found.items() if count == self.counts[ring]}
+    def in_view(
+        self, spots: Sequence[_Place], greenhouse: Greenhouse
+    ) -> NDArray[np.intp]:
+        """The spots at which a person would surely be in the picture."""
+        if self.camera is None or not spots:
+            return _NONE
+        return _in_view(self.camera, self.robot.profile, spots, greenhouse)
+
+    def shows_person_at(self, x: float, y: float, within_m: float = SUSPECT_M) -> bool:
+        """Whether a box may be of a person at a spot."""
+        return any(math.dist(one, (x, y)) <= within_m for one in self.people)
+
+    def shows(self, person: TrackedPerson, x: float, y: float) -> bool:
+        """The same of a person or robot that was seen there; an unknown word counts."""
+        others = (*self.unknown, *(self.robots if person.class_ == "robot" else ()))
+        near = any(math.dist(one, (x, y)) <= SUSPECT_M for one in others)
+        return near or self.shows_person_at(x, y)
+
+
+def visible_from(
+    robot: RobotState, spots: ArrayLike, greenhouse: Greenhouse, now: Instant
+) -> NDArray[np.intp]:
+    """The spots that a robot's camera has in view now, with nothing in between.
+
+    Args:
+        robot: One whose camera may be blind: then none.
+        spots: Shape (n, 2), in ``map`` (m).
+        greenhouse: What stands in between.
+        now: This moment.
+    """
+    camera = _camera_now(robot, now)
+    if camera is None:
+        return _NONE
+    return _in_view(camera, robot.profile, spots, greenhouse)
+
+
+def is_detecting(robot: RobotState, now: Instant) -> bool:
+    """Whether a robot's camera works and its place is known."""
+    return _camera_now(robot, now) is not None
+
+
+def _camera_now(robot: RobotState, now: Instant) -> Pose2D | None:
+    """Where a camera is that can be relied on."""
+    if robot.odometry is None or robot.detector.blind_by is not None:
+        return None
+    return _camera_at(robot.odometry.pose, robot, now)
+
+
+def _camera_at(pose: Pose2D, robot: RobotState, now: Instant) -> Pose2D | None:
+    """Where a robot's camera is, if its frames are read and fresh and it is LIVE.
+
+    Whoever contradicts itself, however shortly, finds no spot empty.
+    """
+    looked, detector = robot.detections_at, robot.detector
+    if looked is None or not robot.is_believed(now):
+        return None
+    is_unread = detector.is_flawed(now, but="blind")
+    is_late = now.mono - looked > _FRESH_S
+    if is_unread or is_late or detector.out_of_service is not None:
+        return None
+    return pose.compose(robot.profile.camera)
+
+
+def _in_view(
+    camera: Pose2D, profile: RobotProfile, spots: ArrayLike, greenhouse: Greenhouse
+) -> NDArray[np.intp]:
+    x, y = np.asarray(spots, np.float64).reshape(-1, 2).T
+    distance = np.hypot(x - camera.x, y - camera.y)
+    bearing = np.arctan2(y - camera.y, x - camera.x) - camera.yaw
+    off = np.abs((bearing + math.pi) % math.tau - math.pi)
+    in_picture = np.flatnonzero(
+        (distance >= _NEAR_M)
+        & (distance <= _RANGE_SHARE * profile.camera_range)
+        & (off <= profile.camera_fov / 2 - _EDGE_RAD)
+    )
+    clear = [
+        one
+        for one in in_picture.tolist()
+        if greenhouse.in_sight(camera.x, camera.y, x[one], y[one])
+    ]
+    return np.array(clear, np.intp)
+
+
+@dataclass(frozen=True, slots=True)
+class _Watch:
+    """A zone that its own camera may find empty.
+
+    Attributes:
+        sighting: That made it.
+        places: Where to look for who was seen there.
+        since: When the first of the frames in a row came that show nobody; ``newest``
+            (monotonic, s).
+        frames: How many they are.
+    """
+
+    sighting: Sighting
+    places: Sequence[_Place]
+    since: float = 0.0
+    newest: float = 0.0
+    frames: int = 0
+
+    def going_on(self, at: float) -> "_Watch":
+        """With one more frame that shows nobody."""
+        is_first = self.frames == 0 or at - self.newest > _FRESH_S
+        since, frames = (at, 1) if is_first else (self.since, self.frames + 1)
+        return replace(self, since=since, newest=at, frames=frames)
+
+    @property
+    def is_over(self) -> bool:
+        """Whether that is long enough to end the zone."""
+        lasted_s = self.newest - self.since
+        return self.frames >= CLEAR_FRAMES and lasted_s >= CLEAR_S - 1e-6
+
+
+class OwnSight:
+    """Takes zones away whose own camera sees their place to be empty."""
+
+    def __init__(self, greenhouse: Greenhouse) -> None:
+        self._greenhouse = greenhouse
+        self._watched: dict[str, Mapping[int, _Watch]] = {}
+        """By robot and chain."""
+
+    def take(self, look: Look, people: People) -> list[TrackedPerson]:
+        """Take a frame that ``people`` has taken in; returns whose zones it ended."""
+        before = self._watched.get(look.robot.robot_id, {})
+        watched: dict[int, _Watch] = {}
+        ended: list[tuple[str, Sighting]] = []
+        for person, sighting in _own_zones(people, look):
+            watch = before.get(sighting.chain)
+            if watch is None or watch.sighting.at != sighting.at:
+                watch = _Watch(sighting, self._places_of(sighting, look))
+            watch = self._looked(watch, person, look)
+            watched[sighting.chain] = watch
+            if watch.is_over:
+                ended.append((person.person_id, sighting))
+        self._watched[look.robot.robot_id] = watched
+        return [people.drop_sighting(*one) for one in ended]
+
+    def _looked(self, watch: _Watch, person: TrackedPerson, look: Look) -> _Watch:
+        sighting, greenhouse = watch.sighting, self._greenhouse
+        is_empty = (
+            sighting.age_s(look.at) > LIMITS.seen_s
+            and look.robot.detector.blind_by is None
+            and not look.shows(person, sighting.x, sighting.y)
+            and look.in_view(watch.places, greenhouse).size == len(watch.places)
+        )
+        return watch.going_on(look.at.mono) if is_empty else replace(watch, frames=0)
+
+    def _places_of(self, sighting: Sighting, look: Look) -> Sequence[_Place]:
+        """Where to look for somebody, as it was when that was asked first."""
+        if look.camera is None:
+            return ((sighting.x, sighting.y),)
+        return beside(self._greenhouse, sighting.x, sighting.y, look.camera)
+
+
+def _own_zones(people: People, look: Look) -> Iterator[tuple[TrackedPerson, Sighting]]:
+    """Zones of known places that the camera of a look made; none of a recording."""
+    robot = look.robot
+    if robot.is_replay:
+        return
+    for person in people.known.values():
+        for one in person.sightings:
+            if (
+                one.observer == robot.robot_id
+                and one.recording is None
+                and not (one.reach_m or one.laser)
+            ):
+                yield person, one
 
 
 def beside(
@@ -209,111 +306,3 @@ def _sides(
         for deep, place, is_seen in sides
         if deep <= LIMITS.uncertainty_m and (here is None or is_seen)
     ]
-
-
-def _hand_over(sighting: Sighting, people: People, now: Instant) -> None:
-    """Whom lasers see where somebody may be by now is remembered as long as these."""
-    until = sighting.at.mono + sighting.lasts_s
-    reach = LIMITS.uncertainty_m + LIMITS.walking_m_s * sighting.age_s(now)
-    for person in tuple(people.known.values()):
-        for one in person.sightings:
-            apart = math.dist((one.x, one.y), (sighting.x, sighting.y))
-            if one.laser and apart <= reach and one.age_s(now) <= LIMITS.seen_s:
-                people.exchange(person.person_id, one, one.remembered(until))
-
-
-def _groups(
-    rings: Sequence[tuple[TrackedPerson, Sighting]], people: People, now: Instant
-) -> list[tuple[NDArray[np.bool_], Sequence[KnownBody]]]:
-    """Rings of boxes, and those of looks and lasers, each with who explains returns.
-
-    No look ends the ring of a box.
-    """
-    if not rings:
-        return []
-    seen = list(seen_sightings(people, now))
-    guessed = np.array([ring.possible or ring.laser for _, ring in rings])
-    bodies = [body for _, body in seen]
-    sure = [body for one, body in seen if not one.possible]
-    groups = (guessed, bodies), (~guessed, sure)
-    return [(is_in, known) for is_in, known in groups if is_in.any()]
-
-
-def seen_sightings(
-    people: People, now: Instant
-) -> Iterator[tuple[Sighting, KnownBody]]:
-    """Who is seen now and has a ring, and where that explains returns of lasers."""
-    for person in people.known.values():
-        # Asked for each scan that is looked at: most people were seen long ago.
-        newest = person.newest
-        if now.mono - newest.at.mono > _YOUNG_S or newest.recording is not None:
-            continue
-        if people.things.known and people.things.explain(person, now) is not None:
-            continue
-        for one in person.sightings:
-            age = one.age_s(now)
-            if age <= _YOUNG_S and not one.reach_m:
-                reach_m = _PERSON_M + LIMITS.walking_m_s * age
-                yield one, KnownBody(one.x, one.y, reach_m)
-
-
-def _may_go(sighting: Sighting, world: World, now: Instant) -> bool:
-    """Whether a sighting is old enough, of a known place, and of a robot of today."""
-    is_old = LIMITS.seen_s < sighting.age_s(now) <= LIMITS.ring_lasts_s
-    is_placed = sighting.reach_m == 0.0
-    return is_old and is_placed and not world.robot(sighting.observer).is_replay
-
-
-def visible_from(
-    robot: RobotState, spots: _Spots, greenhouse: Greenhouse, now: Instant
-) -> NDArray[np.intp]:
-    """The spots that a robot's camera has in view now, with nothing in between.
-
-    Args:
-        robot: One whose camera may be blind: then none.
-        spots: Shape (n, 2), in ``map`` (m).
-        greenhouse: What stands in between.
-        now: This moment.
-    """
-    camera = _camera_of(robot, now) if len(spots) else None
-    if camera is None:
-        return _NONE
-    profile = robot.profile
-    dx, dy = spots[:, 0] - camera.x, spots[:, 1] - camera.y
-    distance = np.hypot(dx, dy)
-    bearing = np.arctan2(dy, dx) - camera.yaw
-    off = np.abs((bearing + math.pi) % math.tau - math.pi)
-    in_picture = np.flatnonzero(
-        (distance >= _NEAR_M)
-        & (distance <= _RANGE_SHARE * profile.camera_range)
-        & (off <= profile.camera_fov / 2 - _EDGE_RAD)
-    )
-    clear = [
-        one
-        for one in in_picture.tolist()
-        if greenhouse.in_sight(camera.x, camera.y, spots[one, 0], spots[one, 1])
-    ]
-    return np.array(clear, np.intp)
-
-
-def is_detecting(robot: RobotState, now: Instant) -> bool:
-    """Whether a robot's camera works and its place is known."""
-    return _camera_of(robot, now) is not None
-
-
-def _camera_of(robot: RobotState, now: Instant) -> Pose2D | None:
-    """Pose of a robot's camera, if it works now and its place is certain.
-
-    Who contradicts itself, however shortly, finds no spot empty, nor does a frame that
-    was not read whole.
-    """
-    if robot.doubts.is_open(now) or robot.detector.is_flawed(now):
-        return None
-    age, looked = robot.age_s(now), robot.detections_at
-    if robot.odometry is None or looked is None:
-        return None
-    if age is None or age > LIMITS.live_s:
-        return None
-    if now.mono - looked > _FRESH_LOOK_S:
-        return None
-    return robot.odometry.pose.compose(robot.profile.camera)

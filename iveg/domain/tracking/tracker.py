@@ -4,38 +4,250 @@ Each frame of one robot is taken in two layers.
 
 *Chains* (protection).  A sighting continues the chain of its own observer whose last
 sighting is near enough, and replaces that sighting alone; else it begins a chain.  Only
-time or an all-clear ends a chain's ring.  Tracks play no part in it.
+time or an all-clear ends a chain's zone.  Tracks play no part in it.
 
-*Tracks* (names).  A chain that goes on keeps its track.  One that begins, or comes back
-after a second, joins the nearest live track first (global assignment over the whole
-picture), else the track that was lost where it appears, for as long as its mark stays
-on the map, else it begins a track.  While that one is new it becomes the lost one that
-most likely walked there (``recognition``).  Live tracks closer than half a metre become
-one.  Two that were ever seen apart at once never do.
+*Tracks* (names).  A chain that goes on keeps its track.  One that begins joins the
+nearest live track (global assignment over the whole picture), else it begins a track:
+who comes back after a gap has a new number.  Live tracks closer than half a metre
+become one.  Two that were ever seen apart at once never do.
+
+Ids of tracks: unique for ever, with a number that starts anew each day (UTC).
+
+Global assignment: as many pairs as can be, and of those the cheapest in sum.
+
+The Hungarian method by shortest augmenting paths with potentials (Kuhn 1955; Jonker and
+Volgenant 1987), O(n^3); pictures hold few people, so n is small.
+
+One picture as the tracker takes it, and its distances to who is known already.
 """
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
 
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
-from iveg.domain.tracking.assignment import assign
-from iveg.domain.tracking.numbers import TrackNumbers
+from iveg.domain.parameters import Class
 from iveg.domain.tracking.person import Sighting, TrackedPerson
-from iveg.domain.tracking.picture import (
-    PlacedDetection,
-    chain_cost,
-    distance_between,
-    first_places,
-    is_replaced,
-    live_cost,
-    lost_cost,
-)
-from iveg.domain.tracking.recognition import Way, recognised, straight
 
-MAX_PEOPLE, MAX_POSSIBLE, MAX_WALKERS = 256, 64, 32
-"""Who counts by looks, and whom only lasers saw, take no place of others."""
+_DAY_S = 86400.0
+
+
+@dataclass(slots=True)
+class TrackNumbers:
+    """Gives out ids.
+
+    Attributes:
+        era: Ends every id, with the day, so that no later start makes the same one.
+    """
+
+    era: str = ""
+    _day: int = -1
+    _shown: int = 0
+
+    def next_id(self, kind: str, at: Instant, known: Iterable[str]) -> str:
+        """A new id; its number is none of those that are ``known``."""
+        day = int(at.wall // _DAY_S)
+        if day != self._day:
+            self._day, self._shown = day, 0
+        in_use = {one.partition("-")[0] for one in known}
+        self._shown += 1
+        while f"{kind}{self._shown}" in in_use:
+            self._shown += 1
+        return f"{kind}{self._shown}" + (self.era and f"{self.era}{day:x}")
+
+
+_NEVER = 1e9
+"""Stands for a pair that cannot be; far above any sum of distances (m)."""
+_PLAINLY = 1e-3
+"""So much cheaper (m) is cheaper, however sums beside ``_NEVER`` are rounded."""
+_FREE = -1
+
+
+def assign(costs: Sequence[Sequence[float]]) -> list[tuple[int, int]]:
+    """Pair rows with columns.
+
+    Args:
+        costs: Shape (rows, columns); ``inf`` where a pair cannot be.
+
+    Returns:
+        Pairs (row, column) in the order of rows, each row and column once at most.
+    """
+    if not costs or not costs[0]:
+        return []
+    plain = _undisputed(costs)
+    if plain is not None:
+        return plain
+    table = np.minimum(np.array(costs), _NEVER)
+    if len(costs) > len(costs[0]):
+        pairs = sorted((row, column) for column, row in _matched(table.T))
+    else:
+        pairs = _matched(table)
+    return [(row, column) for row, column in pairs if math.isfinite(costs[row][column])]
+
+
+def _undisputed(costs: Sequence[Sequence[float]]) -> list[tuple[int, int]] | None:
+    """The pairs where each row has what is plainly its cheapest, no two the same.
+
+    Else None.  No other pairs are as many and as cheap: a row that had another column,
+    or none, would cost more.  So it is nearly always: each person in a picture is near
+    one place.
+    """
+    pairs = []
+    for row, offers in enumerate(costs):
+        least = min(offers)
+        if least >= _NEVER:
+            continue
+        if sum([cost < least + _PLAINLY for cost in offers]) > 1:
+            return None
+        pairs.append((row, offers.index(least)))
+    taken = {column for _, column in pairs}
+    return pairs if len(taken) == len(pairs) else None
+
+
+def _matched(costs: NDArray[np.float64]) -> list[tuple[int, int]]:
+    """The column of each row; there are at least as many columns as rows."""
+    rows, columns = costs.shape
+    row_potential, column_potential = np.zeros(rows), np.zeros(columns)
+    row_of, column_of = np.full(columns, _FREE), np.full(rows, _FREE)
+    for new in range(rows):
+        least, before = np.full(columns, math.inf), np.full(columns, _FREE)
+        reached, done = [], np.zeros(columns, np.bool_)
+        row, length = new, 0.0
+        while row != _FREE:
+            reached.append(row)
+            reduced = length + costs[row] - row_potential[row] - column_potential
+            nearer = ~done & (reduced < least)
+            least[nearer], before[nearer] = reduced[nearer], row
+            column = int(np.where(done, math.inf, least).argmin())
+            length, done[column] = float(least[column]), True
+            row = int(row_of[column])
+        row_potential[new] += length
+        earlier = reached[1:]
+        row_potential[earlier] += length - least[column_of[earlier]]
+        column_potential[done] -= length - least[done]
+        while column != _FREE:  # every row on the way takes the next column
+            row = int(before[column])
+            row_of[column] = row
+            column_of[row], column = column, int(column_of[row])
+    return [(row, int(column)) for row, column in enumerate(column_of)]
+
+
+GATE_M, GATE_CAP_M = 1.0, 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class PlacedDetection:
+    """One confident detection of a picture.
+
+    Attributes:
+        decision_id: Of the alert, should this begin a track.
+        same_as: Index in the picture of the first place of the same box, which may be
+            its own; None: its own.  Every further place joins the track of the first.
+    """
+
+    class_: Class
+    sighting: Sighting
+    decision_id: str
+    same_as: int | None = None
+
+    def first_place(self, index: int) -> int:
+        """Index of the first place of its box; ``index`` is its own."""
+        return index if self.same_as is None else self.same_as
+
+
+def first_places(picture: Sequence[PlacedDetection]) -> list[int]:
+    """Indices of the boxes' first places."""
+    return [
+        index for index, one in enumerate(picture) if one.first_place(index) == index
+    ]
+
+
+def is_alike(person: TrackedPerson, one: PlacedDetection) -> bool:
+    """Whether they can be one: of a class, and of the same map."""
+    frame = person.newest.recording
+    return person.class_ == one.class_ and frame == one.sighting.recording
+
+
+def chain_cost(
+    one: PlacedDetection, person: TrackedPerson, earlier: Sighting, at: Instant
+) -> float:
+    """Distance to the observer's own earlier sighting (m); inf for another person's.
+
+    A sighting that counts by its looks alone replaces none that counts by its box:
+    looks add zones, and take none away.
+    """
+    here = one.sighting
+    # First what nearly all fail: in a storm this is asked of everybody.
+    is_placed = not (earlier.reach_m or here.reach_m)
+    if is_placed and not (
+        -GATE_CAP_M <= earlier.x - here.x <= GATE_CAP_M
+        and -GATE_CAP_M <= earlier.y - here.y <= GATE_CAP_M
+    ):
+        return math.inf
+    if not is_alike(person, one) or bool(earlier.reach_m) != bool(here.reach_m):
+        return math.inf
+    # A laser may see another one: what a camera saw stays.  So does what a robot's own
+    # looks made of it, where another's word makes somebody of a look of its own.
+    if earlier.kind != here.kind:
+        return math.inf
+    if earlier.reach_m:
+        return 0.0
+    distance = distance_between(earlier, here)
+    return distance if distance <= _gate(earlier, at) else math.inf
+
+
+def is_replaced(earlier: Sighting, sighting: Sighting, at: Instant) -> bool:
+    """Whether a box shows where somebody is who counted by the observer's looks."""
+    return (
+        earlier.possible
+        and not sighting.possible
+        and earlier.observer == sighting.observer
+        and not (earlier.reach_m or sighting.reach_m)
+        and distance_between(earlier, sighting) <= _gate(earlier, at)
+    )
+
+
+def live_cost(one: PlacedDetection, person: TrackedPerson, at: Instant) -> float:
+    """Distance to the nearest fresh sighting by anybody (m); inf beyond its gate.
+
+    Where two robots see one person with noise, a detection that lies far from the one
+    sighting seldom lies far from both.
+    """
+    here = one.sighting
+    if not is_alike(person, one) or here.reach_m:
+        return math.inf
+    return min(
+        (
+            distance
+            for earlier in person.sightings
+            # First what nearly all fail: in a storm this is asked of everybody.
+            if abs(earlier.x - here.x) <= GATE_CAP_M
+            and abs(earlier.y - here.y) <= GATE_CAP_M
+            and not earlier.reach_m
+            and earlier.age_s(at) <= LIMITS.seen_s
+            and (distance := distance_between(earlier, here)) <= _gate(earlier, at)
+        ),
+        default=math.inf,
+    )
+
+
+def distance_between(one: Sighting, other: Sighting) -> float:
+    """Horizontal distance between two sightings (m)."""
+    return math.hypot(one.x - other.x, one.y - other.y)
+
+
+def _gate(earlier: Sighting, at: Instant) -> float:
+    """How far one may have walked since a sighting (m, capped)."""
+    return min(GATE_CAP_M, GATE_M + LIMITS.walking_m_s * abs(at.mono - earlier.at.mono))
+
+
+MAX_PEOPLE, MAX_POSSIBLE, MAX_WALKERS = 256, 64, 8
+"""Who counts by looks, and whom only lasers saw, take no place of others; of the last
+each robot has its own places, so that none takes another's."""
 MERGE_M = 0.5
 _APART_M = 3.0
 """Farther from each other, at once, are two: beyond noise and a second's walk."""
@@ -48,17 +260,13 @@ class Tracker:
     Attributes:
         merge_m: Live tracks this near become one (m); below zero none do.
         numbers: Gives out ids.
-        way: How far it is on foot.
     """
 
     merge_m: float = MERGE_M
     numbers: TrackNumbers = field(default_factory=TrackNumbers)
-    way: Way = straight
     known: dict[str, TrackedPerson] = field(default_factory=dict)
     _chains: int = 0
     _tracks: int = 0
-    _new: set[str] = field(default_factory=set)
-    """Tracks that may yet turn out to be one of the lost."""
     _together: dict[str, set[str]] = field(default_factory=dict)
 
     def track_picture(
@@ -81,22 +289,14 @@ class Tracker:
         named = [track for track in tracks if track is not None]
         self._remember_together(named)
         merged = dict(self._merge(dict.fromkeys(named), at))
-        merged |= dict(self._recognise(dict.fromkeys(named), at))
         return [_name_now(track, merged) for track in tracks]
 
     def drop(self, person_id: str, sighting: Sighting) -> TrackedPerson:
-        """Drop a sighting whose place was seen to be empty."""
+        """Drop a sighting whose place its own camera saw to be empty."""
         person = self.known[person_id]
         left = tuple(earlier for earlier in person.sightings if earlier != sighting)
         person = self.known[person_id] = person.seen_as(person.newest, left)
         return person
-
-    def exchange(self, person_id: str, old: Sighting, new: Sighting) -> None:
-        """Know more of a sighting than before."""
-        person = self.known[person_id]
-        every = person.newest, *person.sightings
-        newest, *kept = (new if one is old else one for one in every)
-        self.known[person_id] = person.seen_as(newest, tuple(kept))
 
     def forget(self, now: Instant) -> list[TrackedPerson]:
         """Drop persons whose mark has had its time; returns them."""
@@ -175,16 +375,9 @@ class Tracker:
         firsts = first_places(picture)
         for index in firsts:
             old = chains[index]
-            if old is not None and old[1].age_s(at) <= LIMITS.seen_s:
+            if old is not None:
                 tracks[index] = old[0]
-        self._assign_tracks(picture, tracks, at, is_live=True)
-        taken = set(tracks)
-        for index in firsts:
-            old, of_no_place = chains[index], picture[index].sighting.reach_m
-            if of_no_place and old is not None and old[0] not in taken:
-                tracks[index] = old[0]
-                taken.add(old[0])
-        self._assign_tracks(picture, tracks, at, is_live=False)
+        self._assign_tracks(picture, tracks, at)
         return tracks
 
     def _assign_tracks(
@@ -192,10 +385,8 @@ class Tracker:
         picture: Sequence[PlacedDetection],
         tracks: list[str | None],
         at: Instant,
-        *,
-        is_live: bool,
     ) -> None:
-        """Assign free tracks to detections without one."""
+        """Assign free live tracks to detections without one."""
         wanting = [index for index in first_places(picture) if tracks[index] is None]
         if not wanting:
             return
@@ -203,12 +394,11 @@ class Tracker:
         offered = [
             person
             for person in self.known.values()
-            if person.person_id not in taken
-            and (person.age_s(at) <= LIMITS.seen_s) is is_live
-            and (is_live or person.stage(at) != "gone")
+            if person.person_id not in taken and person.age_s(at) <= LIMITS.seen_s
         ]
-        cost = live_cost if is_live else partial(lost_cost, way=self.way)
-        costs = [[cost(picture[i], person, at) for person in offered] for i in wanting]
+        costs = [
+            [live_cost(picture[i], person, at) for person in offered] for i in wanting
+        ]
         for row, column in assign(costs):
             tracks[wanting[row]] = offered[column].person_id
 
@@ -240,7 +430,10 @@ class Tracker:
             and not is_replaced(earlier, sighting, at)
         )
         later = sighting.at.mono > person.newest.at.mono
-        newest = sighting if later else person.newest
+        # Where a camera sees somebody, what a laser sees there says no more of them.
+        is_beside = sighting.laser and not person.newest.laser
+        is_beside &= person.age_s(at) <= LIMITS.seen_s
+        newest = sighting if later and not is_beside else person.newest
         had_ring = person.age_s(at) <= LIMITS.ring_lasts_s
         decision_id = person.decision_id if had_ring else one.decision_id
         self.known[track] = person.seen_as(newest, (*kept, sighting), decision_id)
@@ -251,6 +444,7 @@ class Tracker:
     ) -> str | None:
         if not self._has_room(at, sighting):
             return None
+        self._end_marks(one, sighting, at)
         self._tracks += 1
         kind = "P" if one.class_ == "person" else "R"
         track = self.numbers.next_id(kind, at, self.known)
@@ -261,37 +455,48 @@ class Tracker:
             at,
             sighting,
             (sighting,),
-            sighting,
             self._tracks,
         )
-        self._new.add(track)
         self._remember_apart(track, sighting, at)
         return track
 
-    def _has_room(self, now: Instant, newest: Sighting) -> bool:
-        """Whether one more can be kept, if need be in place of one without a ring.
+    def _end_marks(self, one: PlacedDetection, here: Sighting, at: Instant) -> None:
+        """Forget who was last seen where somebody is seen now."""
+        for person in list(self.known.values()):
+            last = person.newest
+            is_mark = person.stage(at) == "last_seen" and is_alike(person, one)
+            is_placed = not (last.reach_m or here.reach_m)
+            if is_mark and is_placed and distance_between(last, here) <= GATE_M:
+                self._remove(person.person_id)
 
-        Persons with a ring, and persons who were seen twice, stay.  Who counts by looks
+    def _has_room(self, now: Instant, newest: Sighting) -> bool:
+        """Whether one more can be kept, if need be in place of one without a zone.
+
+        Persons with a zone, and persons who were seen twice, stay.  Who counts by looks
         or a laser alone takes no place from one who counts by a box.
         """
-        walkers = sum(person.newest.laser for person in self.known.values())
+        walkers = [one for one in self.known.values() if one.newest.laser]
         if newest.laser:
-            return walkers < MAX_WALKERS
+            mine = [one for one in walkers if one.newest.observer == newest.observer]
+            return len(mine) < MAX_WALKERS or self._makes_room(mine, now)
         possible = sum(person.is_possible for person in self.known.values())
         if newest.possible:
             return possible < MAX_POSSIBLE
-        if len(self.known) - possible - walkers < MAX_PEOPLE:
+        if len(self.known) - possible - len(walkers) < MAX_PEOPLE:
             return True
-        for person in self.known.values():
-            once = person.first_seen == person.newest.at
-            if once and person.stage(now) in ("last_seen", "gone"):
+        once = (one for one in self.known.values() if one.first_seen == one.newest.at)
+        return self._makes_room(once, now)
+
+    def _makes_room(self, people: Iterable[TrackedPerson], now: Instant) -> bool:
+        """Remove the first of them that has no zone; whether there was one."""
+        for person in people:
+            if person.stage(now) in ("last_seen", "gone"):
                 self._remove(person.person_id)
                 return True
         return False
 
     def _remove(self, track: str) -> None:
         del self.known[track]
-        self._new.discard(track)
         for other in self._together.pop(track, ()):
             self._together[other].discard(track)
 
@@ -327,34 +532,6 @@ class Tracker:
                 self._join(first, second)
                 yield second, first
 
-    def _recognise(
-        self, touched: Iterable[str], at: Instant
-    ) -> Iterator[tuple[str, str]]:
-        """Join new tracks to the lost ones that they are; yields the changed names."""
-        for track in touched:
-            if track not in self._new or self.known[track].age_s(at) > LIMITS.seen_s:
-                continue
-            person = self.known[track]
-            found = recognised(person, self._lost_before(person), self.way)
-            if found is not None:
-                self._join(found.person_id, track, person.began)
-                yield track, found.person_id
-            elif person.is_followed:
-                self._new.discard(track)
-
-    def _lost_before(self, person: TrackedPerson) -> Iterator[TrackedPerson]:
-        """Who may be this one: well known, and in no picture since it appeared."""
-        apart, began = self._together.get(person.person_id, set()), person.began.at.mono
-        for other in self.known.values():
-            if (
-                other.newest.at.mono < began
-                and other.is_well_known
-                and other.class_ == person.class_
-                and other.newest.recording == person.newest.recording
-                and other.person_id not in apart
-            ):
-                yield other
-
     def _twin_of(self, track: str, at: Instant) -> str | None:
         person, most = self.known[track], self.merge_m
         if person.newest.reach_m:
@@ -376,17 +553,14 @@ class Tracker:
                 return other.person_id
         return None
 
-    def _join(self, first: str, second: str, began: Sighting | None = None) -> None:
-        """Every sighting of both is kept: names change, rings do not.
-
-        ``began``: where the second appeared, who is in sight, and the first was lost.
-        """
+    def _join(self, first: str, second: str) -> None:
+        """Every sighting of both is kept: names change, zones do not."""
         older, younger = self.known[first], self.known[second]
         # What one of them knows of how far and fast they went, both know.
         found = [one.in_track(older) for one in (younger.newest, *younger.sightings)]
         newest = max(older.newest, found[0], key=lambda sighting: sighting.at.mono)
         sightings = (*older.sightings, *found[1:])
-        self.known[first] = older.seen_as(newest, sightings, began=began)
+        self.known[first] = older.seen_as(newest, sightings)
         apart = self._together.get(second, set()) - {first}
         self._remove(second)
         self._together.setdefault(first, set()).update(apart)

@@ -28,26 +28,6 @@ def _add_emulator(emulator: argparse.ArgumentParser) -> None:
         "--profile", default="simulation", choices=("simulation", "field", "perfect")
     )
     emulator.add_argument(
-        "--camera",
-        default="boxes",
-        choices=("boxes", "grounding"),
-        help="draw boxes about the truth, or ground masks in depth pictures",
-    )
-    emulator.add_argument(
-        "--plan-off",
-        type=float,
-        default=0.0,
-        metavar="M",
-        help="everything stands so far east of where the plan draws it (m)",
-    )
-    emulator.add_argument(
-        "--pose-error",
-        type=float,
-        default=1.0,
-        metavar="TIMES",
-        help="how many times its usual error odometry makes",
-    )
-    emulator.add_argument(
         "--held", action="store_true", help="robots stay held after they boot"
     )
     emulator.add_argument(
@@ -62,13 +42,10 @@ def _add_emulator(emulator: argparse.ArgumentParser) -> None:
         nargs="+",
         default=[],
         metavar="[ROBOT:]FIELD=VALUE",
-        help="what is wrong from the start, such as drop_percent=10 AGI:deaf=true",
+        help="what is wrong from the start, such as stuck=true AGI:deaf=true",
     )
     emulator.add_argument(
         "--fault-port", type=int, metavar="PORT", help="take fault orders over HTTP"
-    )
-    emulator.add_argument(
-        "--truth", type=Path, metavar="FILE", help="write down what is really in view"
     )
     emulator.add_argument(
         "--dds", action="store_true", help="they speak ROS 2, for `iveg robot`"
@@ -79,7 +56,7 @@ def _add_emulator(emulator: argparse.ArgumentParser) -> None:
 
 def _add_experiment(experiment: argparse.ArgumentParser) -> None:
     words = experiment.add_subparsers(dest="word", required=True)
-    run = words.add_parser("run", help="run it; what broke off is taken up again")
+    run = words.add_parser("run", help="run it and write a report")
     size = run.add_mutually_exclusive_group()
     for name, extent in (
         ("minimal", "one scenario, seconds: whether it works at all"),
@@ -106,11 +83,6 @@ def _add_experiment(experiment: argparse.ArgumentParser) -> None:
         action="store_true",
         help="keep truth, frames and times of every message (always with --full)",
     )
-    add_end(run)
-    compare = words.add_parser("compare", help="two experiments beside each other")
-    for name, word in (("before", "A"), ("after", "B")):
-        where = "folder of an experiment, or its result.json"
-        compare.add_argument(name, type=Path, metavar=word, help=where)
 
 
 def _positive(text: str) -> int:

@@ -46,7 +46,7 @@ def run(call: CommandCall) -> int:
     (directory / "commands.jsonl").unlink(missing_ok=True)
     parts = [["fiware"], ["serve", "--demo"]]
     if call.options.ros2:
-        parts += _ros2_parts(load_fleet(placed.fleet, placed.robots).ids)
+        parts += ros2_parts(load_fleet(placed.fleet, placed.robots).ids)
     elif not call.options.no_emulator:
         parts.append(["emulator"])
     return run_until_stopped(
@@ -54,7 +54,7 @@ def run(call: CommandCall) -> int:
     )
 
 
-def _ros2_parts(robots: Sequence[str]) -> list[list[str]]:
+def ros2_parts(robots: Sequence[str]) -> list[list[str]]:
     """ROS 2 robots on loopback, and an ``iveg robot`` for each."""
     place = ["--ros-domain", str(_free_domain()), "--ros-interface", "127.0.0.1"]
     place += ["--ros-peer", "127.0.0.1"]

@@ -2,7 +2,7 @@
 
 import argparse
 import os
-from contextlib import AbstractContextManager, closing, nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
@@ -14,11 +14,8 @@ from iveg.cli.arguments import CommandCall
 from iveg.cli.nodes import node_settings
 from iveg.cli.running import report_ready, run_until_stopped, tune_garbage_collection
 from iveg.domain.witness import Plan
-from iveg.lab.emulator.emulated_robot import FleetSettings
-from iveg.lab.emulator.fleet import run_emulator
+from iveg.lab.emulator.fleet import FleetSettings, run_emulator
 from iveg.lab.emulator.orders import read_fault_arguments
-from iveg.lab.emulator.scripts import SiteErrors
-from iveg.lab.emulator.truth import TruthLog
 from iveg.settings import Settings
 
 if TYPE_CHECKING:
@@ -42,7 +39,6 @@ async def emulator(options: argparse.Namespace, settings: Settings) -> None:
     with (
         TemporaryDirectory(prefix="iveg-robots-") as directory,
         _network(options) as network,
-        _truth(options.truth) as truth,
     ):
         greenhouse = load_greenhouse(settings.greenhouse)
         plan = Plan.of(greenhouse)
@@ -53,7 +49,6 @@ async def emulator(options: argparse.Namespace, settings: Settings) -> None:
                 node_settings(settings, Path(directory), plan),
                 options.held,
                 options.hz,
-                truth,
                 has_equipment=settings.equipment == DEMO,
             ),
             scenario=options.scenario,
@@ -63,23 +58,16 @@ async def emulator(options: argparse.Namespace, settings: Settings) -> None:
             fault_port=options.fault_port,
             network=network,
             description=fleet,
-            camera=options.camera,
-            errors=SiteErrors(options.plan_off, options.pose_error),
         )
         report_ready()
         await work
-
-
-def _truth(file: Path | None) -> AbstractContextManager[TruthLog | None]:
-    """Log of the targets really in view, if requested."""
-    return nullcontext() if file is None else closing(TruthLog(file))
 
 
 def _network(options: argparse.Namespace) -> "AbstractContextManager[Dds | None]":
     """DDS for robots that speak ROS 2, if requested."""
     if not options.dds:
         return nullcontext()
-    from iveg.cli.robot_config import load_config, network_of
+    from iveg.cli.nodes import load_config, network_of
 
     config, _ = load_config(options, os.environ)
     network = network_of(config, os.environ, "iveg emulator --dds")

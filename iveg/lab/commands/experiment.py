@@ -1,6 +1,5 @@
-"""``iveg experiment``: runs the paper's evaluation on real programs; compares results.
+"""``iveg experiment run``: the paper's evaluation on real programs.
 
-Each finished run is a file, so that the same command continues after Ctrl-C or a crash.
 All programs belong to this experiment alone: it starts its own iVeg beside the FIWARE,
 on free ports, with a data directory of its own.
 """
@@ -19,35 +18,35 @@ import httpx
 
 from iveg.adapters import clock
 from iveg.cli.arguments import CommandCall
-from iveg.cli.live_robots import live_robot
+from iveg.cli.replay import live_robot
 from iveg.cli.running import run_until_stopped
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import DataFileError, HopError, SettingsError
-from iveg.domain.stamps import format_stamp
+from iveg.domain.parameters import by_keys
 from iveg.lab.commands.demo import on_free_ports
 from iveg.lab.commands.processes import Parts
-from iveg.lab.experiment import compare
 from iveg.lab.experiment.desired_states import give_back, read_free_robots
-from iveg.lab.experiment.message_recorder import LAST_COPIES_S, recorder
-from iveg.lab.experiment.observer import ObservedRun, watch
+from iveg.lab.experiment.messages import LAST_COPIES_S, recorder
 from iveg.lab.experiment.outcome import (
-    half_of,
+    Outcome,
+    counted_of,
     outcome_of,
-    stack_of,
+    result_of,
+    timed_of,
+    write_raw,
 )
 from iveg.lab.experiment.plan import (
     GREENHOUSE,
     PLANS,
     ROBOTS,
-    WATCHED,
+    ExperimentPlan,
     PlannedRun,
+    claim,
     directory_of,
+    write_json,
 )
-from iveg.lab.experiment.progress import Progress
-from iveg.lab.experiment.raw import write_raw
-from iveg.lab.experiment.recording import read_truth
-from iveg.lab.experiment.run_store import RunStore
-from iveg.lab.experiment.virtual_run import VirtualRun
+from iveg.lab.experiment.report import write_report
+from iveg.lab.experiment.stage import TimedRecording, VirtualRun
 from iveg.settings import Settings
 
 _STOPS_WITHIN_S = 4.0
@@ -56,29 +55,26 @@ T = TypeVar("T")
 
 
 def run(call: CommandCall) -> int:
-    """Run or compare; returns the exit code."""
+    """Run it; returns the exit code."""
     options, settings, environment = call.options, call.settings, call.environment
-    if options.word == "compare":
-        results = map(compare.read_result, (options.before, options.after))
-        print(compare.write_comparison(*results), end="")
-        return 0
     plan = replace(PLANS[options.size], profile=options.profile)
     if options.seed is not None:
         plan = replace(plan, seed=options.seed)
-    directory = options.out or directory_of(call.data / "experiments", plan)
+    directory = options.out or directory_of(call.data / "experiments", plan.size)
+    claim(directory)
     embedded = options.fiware == ["embedded"]
     named = with_fiware(settings, options.fiware)
     placed = experiment_settings(
         directory, on_free_ports(named, environment, fiware=embedded)
     )
     lab = Lab(
-        RunStore(plan, directory),
+        plan,
+        directory,
         placed,
         embedded=embedded,
         keep_raw=options.keep_raw or plan.size == "full",
     )
-    work = lab.run(environment)
-    return run_until_stopped(work, until_eof=options.until_eof) or lab.exit_code
+    return run_until_stopped(lab.run(environment)) or lab.exit_code
 
 
 def with_fiware(settings: Settings, words: list[str]) -> Settings:
@@ -111,7 +107,6 @@ def experiment_settings(directory: Path, settings: Settings) -> Settings:
         notify_token=secrets.token_hex(32),
         database_url="",
         data_directory=str(directory / "data"),
-        orion_throttle=False,
         recordings=False,
     )
 
@@ -121,29 +116,28 @@ class Lab:
     """One running experiment.
 
     Attributes:
+        directory: Where its results go.
         embedded: Whether FIWARE is started as well.
         keep_raw: Whether raw data stay.
         exit_code: 1 if it ended before its plan was complete.
     """
 
-    notebook: RunStore
+    plan: ExperimentPlan
+    directory: Path
     settings: Settings
     embedded: bool = True
     keep_raw: bool = False
     exit_code: int = 1
+    _outcomes: list[Outcome] = field(default_factory=list)
     _stops: list[str] | None = None
     """Ids of the STOPs that it sent; None: none was sent, empty: it does not know."""
     _retained: Mapping[str, bytes] = field(default_factory=dict)
     """Desired states of the site's robots before."""
 
     async def run(self, environment: Mapping[str, str]) -> None:
-        """Run every step that is not done yet, then write the report."""
+        """Run every step, then write the report."""
         surroundings = {**environment, **self.settings.to_environment()}
-        steps = self.notebook.steps_left()
-        directory = self.notebook.directory
-        print(f"experiment: {directory}", flush=True)
-        progress = Progress(directory, steps, self.notebook.done, sys.stdout)
-        ticking = asyncio.create_task(_ticks(progress))
+        print(f"experiment: {self.directory}", flush=True)
         why = "interrupted"
         try:
             if not self.embedded:
@@ -154,15 +148,13 @@ class Lab:
                     await parts.start("fiware")
                 # As in a demo no link is printed: no person signs in here.
                 await parts.start("serve", "--demo")
-                for step in steps:
-                    await self._step(step, parts, progress)
+                for step in self.plan.steps():
+                    await self._step(step, parts)
             why = ""
         except (HopError, DataFileError, SystemExit) as error:
             why = str(error)
         finally:
-            ticking.cancel()
-            why = await self._give_back() or why
-            self._finish(why, progress)
+            self._finish(await self._give_back() or why)
 
     async def _give_back(self) -> str:
         """Leave a site's robots as they were; why not, or empty."""
@@ -176,63 +168,60 @@ class Lab:
             return f"its STOP is still retained at the broker: {error}"
         return ""
 
-    async def _step(self, step: PlannedRun, parts: Parts, progress: Progress) -> None:
-        progress.begin(step, "counting", clock.mono())
+    async def _step(self, step: PlannedRun, parts: Parts) -> None:
+        self._say(step, "virtual clock")
         rehearsal = VirtualRun(step, self._rule)
         before = os.getloadavg()[0]
         virtual = await parts.outlast(rehearsal.play(step.counted_s))
         real = None
         if step.is_timed:
-            progress.begin(step, "running", clock.mono())
+            self._say(step, "real time")
             before = os.getloadavg()[0]
             real = await self._timed(step, parts)
         load = before, os.getloadavg()[0]
-        stack = None if real is None else stack_of(real)
-        outcome = outcome_of(step, half_of(virtual), stack, load)
+        timed = None if real is None else timed_of(real)
+        outcome = outcome_of(step, counted_of(virtual), timed, load)
         if self.keep_raw:
-            write_raw(self.notebook.raw(step), outcome, virtual, real, self._chosen())
-        self.notebook.keep(step, outcome)
-        progress.end(step, clock.mono())
+            raw = self.directory / "raw" / step.name
+            write_raw(raw, outcome, virtual, real, self._chosen())
+        self._outcomes.append(outcome)
 
-    async def _timed(self, step: PlannedRun, parts: Parts) -> ObservedRun:
+    def _say(self, step: PlannedRun, half: str) -> None:
+        of = len([*self.plan.steps()])
+        place = f"{len(self._outcomes) + 1} of {of}"
+        print(f"{place}  {step.name}: {half}", flush=True)
+
+    async def _timed(self, step: PlannedRun, parts: Parts) -> TimedRecording:
         """The half in real time, whose emulator ends with it."""
-        truth = self.notebook.directory / f"{step.name}.truth.jsonl"
         started = len(parts.running)
         try:
-            return await self._real(step, parts, truth)
+            return await self._real(step, parts)
         finally:
             if len(parts.running) > started:
                 await parts.stop_newest()
-            truth.unlink(missing_ok=True)
 
     @property
     def _rule(self) -> DetectionRule:
         """The rule of the iVeg that is started."""
-        settings = self.settings
-        return DetectionRule(
-            threshold=settings.confidence_threshold, radius_m=settings.safety_radius_m
-        )
+        return DetectionRule.of(self.settings.rule)
 
-    async def _real(self, step: PlannedRun, parts: Parts, truth: Path) -> ObservedRun:
+    async def _real(self, step: PlannedRun, parts: Parts) -> TimedRecording:
         """The same run by all programs, any of which may end early."""
         words = ["--scenario", step.family, "--seed", str(step.seed)]
-        words += ["--profile", step.profile, "--truth", str(truth)]
-        since = format_stamp(clock.wall())
-        url, token = self._url, self.settings.api_token
         async with recorder(self.settings) as recorded:
-            await parts.start("emulator", *words)
-            completed = await parts.outlast(self._until_live())
+            await parts.start("emulator", *words, "--profile", step.profile)
+            began_live = await parts.outlast(self._until_live())
             settled = await parts.outlast(recorded.settle())
-            real = await parts.outlast(watch(url, token, step.seconds, WATCHED))
+            began = clock.wall()
+            await parts.outlast(asyncio.sleep(step.seconds))
+            ended = clock.wall()
             await parts.outlast(asyncio.sleep(LAST_COPIES_S))
-            real.times = recorded.times(real.edges[0], real.edges[-1])
-        real.truth, real.settled = read_truth(truth), settled
-        real.completed = completed and await self._are_live() and bool(real.pairs)
+            times = recorded.times(began, ended)
+        completed = began_live and await self._are_live()
         # Stopped robots are not released here, so STOP comes last.
-        real.stops = await self._stop() if self.notebook.is_last(step) else []
-        asked = f"decisions?since={since}&limit=500"
-        real.decisions = (await self._ask(asked))["items"]
-        return real
+        is_last = step == [*self.plan.steps()][-1]
+        stops = await self._stop() if is_last else ()
+        return TimedRecording(began, ended, times, settled, completed, stops)
 
     async def _until_live(self) -> bool:
         deadline = clock.mono() + _LIVE_WITHIN_S
@@ -278,14 +267,14 @@ class Lab:
         except httpx.HTTPError as error:
             raise HopError("iveg", f"{path}: {error!r}") from error
 
-    def _finish(self, why: str, progress: Progress) -> None:
-        # A reader of the final state may open the report at once.
-        report = self.notebook.finish(self._chosen(), why)
-        progress.finish(why)
+    def _finish(self, why: str) -> None:
+        result = result_of(self.plan, self._outcomes, self._chosen(), why)
+        write_json(self.directory / "result.json", result)
+        report = self.directory / "result.html"
+        report.write_text(write_report(result), encoding="utf-8")
         self.exit_code = int(bool(why))
         if why:
-            reason = f"broken off ({why}); the same command goes on with it"
-            print(f"iveg: {reason}: {self.notebook.directory}", file=sys.stderr)
+            print(f"iveg: broken off ({why}): {self.directory}", file=sys.stderr)
         print(f"report: {report}", flush=True)
 
     def _chosen(self) -> dict[str, object]:
@@ -293,11 +282,9 @@ class Lab:
         settings = self.settings
         return {
             "fiware": "embedded" if self.embedded else "named",
-            "confidence_threshold": settings.confidence_threshold,
-            "safety_radius_m": settings.safety_radius_m,
+            **by_keys(settings.rule),
             "direct_read": settings.direct_read,
             "uplink": settings.uplink,
-            "orion_throttle": settings.orion_throttle,
         }
 
 
@@ -312,9 +299,3 @@ async def refuse_live_robots(settings: Settings) -> None:
     if live is not None:
         reason = f"{live} is live there; stop it first"
         raise DataFileError("--fiware", settings.orion_url, reason)
-
-
-async def _ticks(progress: Progress) -> None:
-    while True:
-        await asyncio.sleep(1.0)
-        progress.tick(clock.mono())

@@ -2,9 +2,13 @@
 
 from urllib.parse import urlsplit
 
-from iveg.adapters.connection_caps import raise_descriptor_limit
 from iveg.cli.arguments import CommandCall
-from iveg.cli.running import report_ready, run_until_stopped, tune_garbage_collection
+from iveg.cli.running import (
+    raise_descriptor_limit,
+    report_ready,
+    run_until_stopped,
+    tune_garbage_collection,
+)
 from iveg.lab.embedded.server import serve_fiware
 from iveg.settings import Settings
 

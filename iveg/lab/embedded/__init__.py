@@ -1,0 +1,1 @@
+"""FIWARE in one process: measures and requests in, commands and notifications out."""

@@ -1,24 +1,26 @@
 """All three embedded parts in one process: MQTT broker, context broker, IoT Agent."""
 
 import asyncio
+import socket
 from collections.abc import AsyncIterator, Callable
 from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass
 from ipaddress import ip_address
 
-from iveg.adapters import clock
+import uvicorn
+from starlette.types import ASGIApp
+
 from iveg.domain.errors import SettingsError
-from iveg.lab.embedded.context_broker import ContextBroker
-from iveg.lab.embedded.http_server import http_server
-from iveg.lab.embedded.iot_agent import IotAgent
-from iveg.lab.embedded.iota_api import IotaApi
-from iveg.lab.embedded.mqtt_broker import MqttBroker
-from iveg.lab.embedded.mqtt_server import mqtt_broker
-from iveg.lab.embedded.ngsi_api import NgsiApi
+from iveg.lab.embedded.context_broker import ContextBroker, ngsi_api
+from iveg.lab.embedded.iot_agent import IotAgent, iota_api
+from iveg.lab.embedded.mqtt_broker import MqttBroker, mqtt_broker
 
 Address = tuple[str, int]
 MakeAgent = Callable[[ContextBroker, MqttBroker], IotAgent]
-MakeApi = Callable[[IotAgent], IotaApi]
+MakeApi = Callable[[IotAgent], ASGIApp]
+_LONGEST_HEAD = 16_384
+_KEPT_S = 60
+_GRACE_S = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +64,7 @@ async def embedded_fiware(
     iota: Address = ("127.0.0.1", 0),
     *,
     make_agent: MakeAgent = IotAgent,
-    make_api: MakeApi = IotaApi,
+    make_api: MakeApi = iota_api,
 ) -> AsyncIterator[Running]:
     """Run all three while the block lasts; port 0 takes a free one.
 
@@ -82,18 +84,74 @@ async def embedded_fiware(
     iota_host = require_loopback("IVEG_IOTA_URL", iota[0])
     async with AsyncExitStack() as stack:
         south = await stack.enter_async_context(mqtt_broker(mqtt_host, mqtt[1]))
-        broker = ContextBroker(clock.wall())
+        broker = ContextBroker()
         stack.callback(broker.close)
         agent = make_agent(broker, south)
-        api = NgsiApi(broker)
         orion_port = await stack.enter_async_context(
-            http_server(api.handle, orion_host, orion[1])
+            http_server(ngsi_api(broker), orion_host, orion[1])
         )
         iota_port = await stack.enter_async_context(
-            http_server(make_api(agent).handle, iota_host, iota[1])
+            http_server(make_api(agent), iota_host, iota[1])
         )
-        agent.url = f"http://{iota_host}:{iota_port}"
+        agent.is_at(f"http://{iota_host}:{iota_port}")
         yield Running(south.port, orion_port, iota_port, broker, agent)
+
+
+@asynccontextmanager
+async def http_server(app: ASGIApp, host: str, port: int) -> AsyncIterator[int]:
+    """Serve an application beside others in this loop, while the block lasts.
+
+    Args:
+        app: Answers requests.
+        host: Address to bind.
+        port: TCP port; 0 for a free one.
+
+    Yields:
+        The port in use.
+
+    Raises:
+        OSError: the port is taken.
+    """
+    config = uvicorn.Config(
+        app,
+        # Unlike httptools it bounds a head.
+        http="h11",
+        h11_max_incomplete_event_size=_LONGEST_HEAD,
+        ws="none",
+        lifespan="off",
+        log_config=None,
+        access_log=False,
+        proxy_headers=False,
+        timeout_keep_alive=_KEPT_S,
+    )
+    config.load()
+    server = uvicorn.Server(config)
+    server.lifespan = config.lifespan_class(config)
+    with socket.create_server((host, port)) as listener:
+        # Not ``serve``, which takes the process's signals.
+        await server.startup([listener])
+        try:
+            yield int(listener.getsockname()[1])
+        finally:
+            await _end(server)
+
+
+async def _end(server: uvicorn.Server) -> None:
+    """Close listener and connections, once what is being answered had a second.
+
+    ``Server.shutdown`` waits for at least 0.1 s, which each test would pay twice.
+    """
+    for listener in server.servers:
+        listener.close()
+    if answering := list(server.server_state.tasks):
+        _, late = await asyncio.wait(answering, timeout=_GRACE_S)
+        for task in late:
+            task.cancel()
+        await asyncio.gather(*late, return_exceptions=True)
+    for connection in list(server.server_state.connections):
+        connection.shutdown()
+    # The loop closes their sockets before it comes back here.
+    await asyncio.sleep(0)
 
 
 async def serve_fiware(
@@ -103,7 +161,7 @@ async def serve_fiware(
     *,
     notify_ready: Callable[[], None],
     make_agent: MakeAgent = IotAgent,
-    make_api: MakeApi = IotaApi,
+    make_api: MakeApi = iota_api,
 ) -> None:
     """Run the embedded FIWARE until cancelled.
 

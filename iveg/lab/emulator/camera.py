@@ -1,30 +1,141 @@
 """Emulated camera and detector: targets in view, and what the paper's detector reports.
 
-Nothing is rendered unless ``grounded`` locates the targets.  A target in the field of
-view, in range and not hidden by crop or crates opens an *encounter* of 0.5 to 2 s;
-a miss, the confidence and a possible false box are drawn once per encounter, so that
-errors last as long as real ones and do not flicker between two frames.
+Nothing is rendered.  A target in the field of view, in range and not hidden by crop or
+crates opens an *encounter* of 0.5 to 2 s; a miss, the confidence and a possible false
+box are drawn once per encounter, so that errors last as long as real ones and do not
+flicker between two frames.
 
-Assumed: the length of an encounter.  The rates are those of ``detector_model``.
+Source of the rates: the seed paper's field table (true positives, false positives,
+false negatives per class).  Assumed: the length of an encounter, the spread of
+confidence, and that false boxes are less sure than true ones.
 """
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import (
+    PERSON_HEIGHT_M,
     Box3D,
     Pose2D,
     box_of_a_person,
     wrap_angle,
 )
 from iveg.domain.observations import Detection
-from iveg.lab.emulator.detector_model import DetectorModel
-from iveg.lab.emulator.greenhouse import Body, Scenery, into
-from iveg.lab.emulator.targets import Target
+from iveg.lab.emulator.greenhouse import Body, Disc, Scenery, into
+
+PERSON = "farmer"
+
+
+@dataclass(frozen=True, slots=True)
+class Counts:
+    """Counts of one class in the paper's field table."""
+
+    true_positives: int
+    false_positives: int
+    false_negatives: int
+
+    @property
+    def encounters(self) -> int:
+        """Number of encounters with a target of the class."""
+        return self.true_positives + self.false_negatives
+
+    @property
+    def miss_rate(self) -> float:
+        """Probability that an encounter is missed."""
+        return self.false_negatives / self.encounters
+
+    @property
+    def ghost_rate(self) -> float:
+        """Probability that an encounter brings a false box of the class."""
+        return self.false_positives / self.encounters
+
+
+FIELD_COUNTS: Mapping[str, Counts] = {
+    PERSON: Counts(36, 6, 3),
+    "AGI": Counts(34, 8, 5),
+    "AGII": Counts(28, 12, 8),
+}
+
+
+_FAULTLESS = Counts(1, 0, 0)
+
+
+@dataclass(frozen=True, slots=True)
+class DetectorModel:
+    """Error model of a detector.
+
+    Attributes:
+        confidence: Mean over encounters (0 to 1); ``spread`` its deviation.
+        flicker: Deviation from frame to frame.
+        ghost_confidence: How much less sure false boxes are.
+        position: Deviation of a box for an encounter (m); ``jitter`` per frame (m).
+        counts: By class; other classes have the counts of ``AGI``.
+        name: As its frames tell it; None: they do not.
+    """
+
+    confidence: float
+    spread: float = 0.05
+    flicker: float = 0.01
+    ghost_confidence: float = 0.10
+    position: float = 0.05
+    jitter: float = 0.01
+    counts: Mapping[str, Counts] = field(default_factory=lambda: FIELD_COUNTS)
+    name: str | None = None
+
+    def counts_of(self, class_id: str) -> Counts:
+        """The rates for a class."""
+        return self.counts.get(class_id, self.counts.get("AGI", _FAULTLESS))
+
+
+DETECTORS: Mapping[str, DetectorModel] = {
+    "field": DetectorModel(0.72, name="field"),
+    "simulation": DetectorModel(0.85, spread=0.03, name="simulation"),
+    "noisy": DetectorModel(0.80, 0.06, 0.06, 0.0, 0.10, 0.05, {}),
+    "perfect": DetectorModel(0.95, 0.0, 0.0, 0.0, 0.0, 0.0, {}),
+}
+
+ROBOT_HEIGHT_M = 1.2
+
+
+_THING_RADIUS_M = 0.2
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """An object that a detector may detect.
+
+    Attributes:
+        key: Unique id.
+        class_id: As the paper's detector names it.
+        body: Its outline; a person's is a square.
+    """
+
+    key: str
+    class_id: str
+    body: Body
+    height: float
+
+
+def person_target(number: int, person: Disc) -> Target:
+    """A person as a target."""
+    pose, size = Pose2D(person.x, person.y, 0.0), 2 * person.radius
+    body = Body(f"person-{number}", pose, size, size)
+    return Target(body.robot_id, PERSON, body, PERSON_HEIGHT_M)
+
+
+def thing_target(x: float, y: float) -> Target:
+    """A post or coat at a position in ``map`` (m), which is taken for a person."""
+    return replace(person_target(0, Disc(x, y, _THING_RADIUS_M)), key="thing")
+
+
+def robot_target(body: Body) -> Target:
+    """A robot as a target: the class is its id, as in the paper."""
+    return Target(body.robot_id, body.robot_id, body, ROBOT_HEIGHT_M)
+
 
 _NEAREST_M = 0.3
 _LONGEST_S, _SHORTEST_S = 2.0, 0.5
@@ -54,21 +165,6 @@ class _Encounter:
     ghost: _Ghost | None
 
 
-@dataclass(frozen=True, slots=True)
-class FoundTarget:
-    """A detected target and its confidence (0 to 1)."""
-
-    target: Target
-    probability: float
-
-
-Place = Callable[
-    [Pose2D, Sequence[FoundTarget], Sequence[Target], Scenery],
-    tuple[tuple[Detection, ...], tuple[str | None, ...]],
-]
-"""Locates detected targets: boxes, and the number of targets without a position."""
-
-
 class EmulatedDetector:
     """Camera of one robot with its detector.
 
@@ -76,10 +172,8 @@ class EmulatedDetector:
         profile: Where the camera sits and what it sees.
         model: How good the network is.
         rng: Random source of its errors.
-        place: Locates detected targets; None draws boxes about the truth.
 
     Attributes:
-        lost: Classes of the targets of the last frame that have no position.
         name: Of the network, as its frames tell it.
     """
 
@@ -88,11 +182,8 @@ class EmulatedDetector:
         profile: RobotProfile,
         model: DetectorModel,
         rng: np.random.Generator,
-        place: Place | None = None,
     ) -> None:
-        self.lost: tuple[str | None, ...] = ()
         self.name = model.name
-        self._place = place
         self._profile = profile
         self._model = model
         self._rng = rng
@@ -114,24 +205,16 @@ class EmulatedDetector:
         """
         camera = pose.compose(self._profile.camera)
         drawn: list[Detection] = []
-        found: list[FoundTarget] = []
         for target in targets:
             seen = self.part_seen(camera, target.body, scenery)
             encounter = self._encounter(now, camera, target, seen > 0.0)
             if encounter is None:
                 continue
             if seen > 0.0 and not encounter.missed:
-                if self._place is None:
-                    drawn.append(self._box(pose, target, encounter, seen))
-                else:
-                    found.append(FoundTarget(target, self._certainty(encounter, seen)))
+                drawn.append(self._box(pose, target, encounter, seen))
             if encounter.ghost is not None:
                 drawn.append(self._ghost_box(pose, encounter.ghost))
-        if self._place is None or not found:
-            self.lost = ()
-            return tuple(drawn)
-        placed, self.lost = self._place(pose, found, targets, scenery)
-        return (*placed, *drawn)
+        return tuple(drawn)
 
     # --- what is in view ----------------------------------------------------------
 
@@ -200,11 +283,9 @@ class EmulatedDetector:
         corners = [into(pose, float(x), float(y)) for x, y in moved]
         xs, ys = [x for x, _ in corners], [y for _, y in corners]
         box = Box3D(min(xs), max(xs), min(ys), max(ys), 0.0, target.height)
-        certainty = self._certainty(encounter, seen)
-        return Detection(target.class_id, certainty, box, "base_link")
-
-    def _certainty(self, encounter: _Encounter, seen: float) -> float:
-        return self._probability(encounter.confidence - _HIDDEN_LOSS * (1.0 - seen))
+        certainty = encounter.confidence - _HIDDEN_LOSS * (1.0 - seen)
+        probability = self._probability(certainty)
+        return Detection(target.class_id, probability, box, "base_link")
 
     def _ghost_box(self, pose: Pose2D, ghost: _Ghost) -> Detection:
         probability = self._probability(ghost.confidence)

@@ -1,41 +1,269 @@
-"""Runs a scenario in real time: each robot's rig under its own safety node, over MQTT.
+"""Scenario in real time: each robot's rig under its own safety node, over MQTT.
 
-The slots of the robots are staggered, so that neither this process nor the broker gets
-bursts.  A late slot is skipped, never repeated.
+A robot's period has three slots: drive and odometry, laser, camera.  The slots of the
+robots are staggered, so that neither this process nor the broker gets bursts.  A late
+slot is skipped, never repeated.  Climate and other equipment know of nobody: their
+devices speak MQTT to the agent, as real ones would; ``iveg/data/equipment.toml`` shows
+them as tiles.
 """
 
 import asyncio
 import logging
+import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass
 from functools import partial
 
-import numpy as np
+import orjson
 
 from iveg.adapters import clock
-from iveg.adapters.mqtt import MqttLink
+from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.domain.errors import DataFileError
 from iveg.domain.fleet import FleetDescription
+from iveg.domain.geometry import REST, Twist2D
 from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.observations import Climate, Instant
 from iveg.domain.stamps import format_stamp
-from iveg.lab.emulator.climate import climate_at
-from iveg.lab.emulator.detector_model import DETECTORS
-from iveg.lab.emulator.emulated_robot import EmulatedRobot, FleetSettings
-from iveg.lab.emulator.equipment import tell_all
+from iveg.lab.emulator.camera import DETECTORS
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.orders import FaultOrder, Order, open_fault_port
-from iveg.lab.emulator.radio import Radio
-from iveg.lab.emulator.relay import Relay
 from iveg.lab.emulator.ros2_base import Ros2Base
-from iveg.lab.emulator.scenarios import scenario_named
-from iveg.lab.emulator.scripts import EXACT, Incident, SiteErrors
-from iveg.lab.emulator.world import Camera, RobotHardware, SimulatedWorld
+from iveg.lab.emulator.scenarios import Incident, scenario_named
+from iveg.lab.emulator.world import EmulatedSensors, RobotHardware, SimulatedWorld
 from iveg.ngsi import names
 from iveg.ngsi.codec import write_climate
-from iveg.robot.pacing import LONGEST_STEP_S, SLOTS, every
+from iveg.robot.node import (
+    LONGEST_STEP_S,
+    SLOTS,
+    NodeSettings,
+    RobotNode,
+    every,
+    in_slots,
+)
 from iveg.robot.ros2.config import RobotConfig
-from iveg.robot.ros2.network import Network
+from iveg.robot.ros2.outputs import Network
 from iveg.ros2.names import namespace_of
+
+_DAY_S = 86_400.0
+
+
+def climate_at(wall: float) -> Climate:
+    """Climate at a time of day (Unix s): warm and dry at 14 h UTC, humid at night.
+
+    Typical of a Mediterranean greenhouse in spring; CO₂ falls while the crop works.
+    """
+    warmth = math.cos((wall % _DAY_S - 14 * 3600.0) / _DAY_S * math.tau)
+    return Climate(
+        temperature=round(22.0 + 6.0 * warmth, 2),
+        relative_humidity=round(0.70 - 0.12 * warmth, 3),
+        co2=round(430.0 - 60.0 * warmth, 1),
+    )
+
+
+Measures = Mapping[str, float]
+_HOUR_S = 3600.0
+
+
+def fertigation_at(wall: float) -> Measures:
+    """Nutrient solution at a time (Unix s): flows in the first third of each hour."""
+    phase = (wall % _HOUR_S) / _HOUR_S
+    swing = math.sin(wall / 400.0)
+    return {
+        "conductivity": round(2.4 + 0.25 * swing, 3),
+        "acidity": round(5.8 + 0.15 * math.cos(wall / 300.0), 2),
+        "flow": 18.5 if phase < 1 / 3 else 0.0,
+    }
+
+
+def osmosis_at(wall: float) -> Measures:
+    """Permeate and pressure: the membrane fouls until its rinse, each two hours."""
+    fouling = (wall % (2 * _HOUR_S)) / (2 * _HOUR_S)
+    return {
+        "permeateConductivity": round(70.0 + 40.0 * fouling, 1),
+        "pressure": round(9.0 + 2.5 * fouling, 2),
+    }
+
+
+EQUIPMENT: Mapping[str, Callable[[float], Measures]] = {
+    "fertigation-1": fertigation_at,
+    "osmosis-1": osmosis_at,
+}
+"""By device."""
+
+
+def tell_all(link: MqttLink, apikey: str, wall: float) -> None:
+    """Have each device send what it measures now."""
+    for device, measure in EQUIPMENT.items():
+        payload = orjson.dumps({**measure(wall), "TimeInstant": format_stamp(wall)})
+        link.enqueue(names.measure_topic(apikey, device), payload)
+
+
+_NAVIGATION_EVERY_S = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class FleetSettings:
+    """Settings shared by all robots of a run.
+
+    Attributes:
+        held: The boot hold is not released at the robots.
+        rate_hz: Of odometry, laser and camera each.
+        has_equipment: Whether other equipment measures, too (``equipment``).
+    """
+
+    node: NodeSettings
+    held: bool = False
+    rate_hz: float = 30.0
+    has_equipment: bool = False
+
+
+class EmulatedLink(MqttLink):
+    """Link to the broker that may swallow what a robot says, without an error.
+
+    Args:
+        is_mute: Whether it does so now.
+    """
+
+    def __init__(
+        self, address: BrokerAddress, name: str, is_mute: Callable[[], bool]
+    ) -> None:
+        super().__init__(address, name)
+        self._is_mute = is_mute
+
+    def enqueue(self, topic: str, payload: bytes, qos: int = 0) -> None:
+        """Send it, or swallow it."""
+        if not self._is_mute():
+            super().enqueue(topic, payload, qos)
+
+    async def publish(
+        self, topic: str, payload: bytes, qos: int = 1, *, retain: bool = False
+    ) -> None:
+        """Send it, or swallow it."""
+        if not self._is_mute():
+            await super().publish(topic, payload, qos, retain=retain)
+
+
+class EmulatedRobot:
+    """One rig and its safety node, called in their slots.
+
+    Attributes:
+        started: Set when fault orders are accepted.
+    """
+
+    def __init__(
+        self,
+        rig: RobotHardware,
+        world: SimulatedWorld,
+        settings: FleetSettings,
+    ) -> None:
+        self.robot_id = rig.robot_id
+        self.started = asyncio.Event()
+        self._rig = rig
+        self._world = world
+        self._settings = settings
+        self._node: RobotNode
+        self._node_task: asyncio.Task[None] | None = None
+        self._tasks: asyncio.TaskGroup
+        self._run_began = 0.0
+        self._navigation_sent: tuple[str, float] = ("", -_NAVIGATION_EVERY_S)
+        self._sensors = EmulatedSensors()
+        self._faults = FaultOrder(robot=self.robot_id)
+        self._requested = REST
+
+    def _new_node(self, *, held: bool) -> RobotNode:
+        return RobotNode(
+            self.robot_id,
+            self._settings.node,
+            profile=self._rig.profile,
+            drive=self._obey_gate,
+            held=held,
+            navigate=partial(self._rig.pursue, around=self._world),
+            read_clock=self._read_clock,
+            open_link=partial(EmulatedLink, is_mute=lambda: bool(self._faults.mute)),
+        )
+
+    async def run(self, began: float, phase: float) -> None:
+        """Drive and sense until cancelled; ``began`` is when the run began."""
+        self._run_began = began
+        self._node = self._new_node(held=self._settings.held)
+        if not self._settings.held:
+            self._node.release_locally()
+        async with asyncio.TaskGroup() as self._tasks:
+            self._start_node()
+            self.started.set()
+            await asyncio.sleep(phase)
+            await in_slots(
+                1.0 / self._settings.rate_hz, (self._drive, self._scan, self._look)
+            )
+
+    # --- the slots ----------------------------------------------------------------
+
+    def _now(self) -> float:
+        return clock.mono() - self._run_began
+
+    def _drive(self, dt: float) -> None:
+        now, node = self._now(), self._node
+        if self._node_task is not None:
+            # While twists have no effect navigation requests zero: the gate requires
+            # that before it lets the robot move again.
+            requested = self._rig.requested_twist(now, self._world)
+            self._requested = requested if node.may_drive else REST
+            node.request_twist(self._requested)
+        self._rig.move(min(dt * SLOTS, LONGEST_STEP_S))
+        if self._node_task is None:
+            return
+        if not self._faults.freeze_odometry:
+            node.sense(self._rig.odometry())
+        navigation = self._rig.navigation()
+        task, published_at = self._navigation_sent
+        if navigation.task != task or now - published_at >= _NAVIGATION_EVERY_S:
+            self._navigation_sent = (navigation.task, now)
+            node.sense(navigation)
+        for reading in self._sensors.due(now):
+            node.sense(reading)
+
+    def _scan(self, _: float) -> None:
+        if self._node_task is not None:
+            self._node.sense(self._rig.scan(self._world))
+
+    def _look(self, _: float) -> None:
+        if self._node_task is None:
+            return
+        self._node.sense(self._rig.detect(self._now(), self._world))
+
+    def _obey_gate(self, command: Twist2D) -> None:
+        """Apply the gate's command; with the fault ``deaf`` only a halt."""
+        ignores = self._faults.deaf and command != REST
+        self._rig.drive(self._requested if ignores else command)
+
+    def _read_clock(self) -> Instant:
+        """The robot's own clocks; the wall clock may be wrong."""
+        now = clock.now()
+        return Instant(now.mono, now.wall + (self._faults.clock_offset_s or 0.0))
+
+    # --- faults -------------------------------------------------------------------
+
+    def obey(self, order: FaultOrder) -> None:
+        """Execute a fault order in the order of its fields."""
+        node = self._node
+        self._faults = self._faults.changed_by(order)
+        self._rig.obey(order)
+        if order.local_hold is not None:
+            node.add_local_hold(order.local_hold)
+        if order.release_locally:
+            node.release_locally()
+        if order.kill and self._node_task is not None:
+            self._node_task.cancel()
+            self._node_task = None
+        if order.revive and self._node_task is None:
+            self._node = self._new_node(held=True)
+            self._start_node()
+
+    def _start_node(self) -> None:
+        self._node_task = self._tasks.create_task(
+            self._node.run(), name=f"node-{self.robot_id}"
+        )
+
 
 _log = logging.getLogger(__name__)
 _CLIMATE_EVERY_S = 10.0
@@ -58,8 +286,6 @@ async def run_emulator(
     on_fault_port: Callable[[int], None] = _log_port,
     network: Network | None = None,
     description: FleetDescription | None = None,
-    camera: Camera = "boxes",
-    errors: SiteErrors = EXACT,
 ) -> None:
     """Run a scenario until cancelled.
 
@@ -77,8 +303,6 @@ async def run_emulator(
         network: DDS: the robots are ROS 2 bases there, controlled by ``iveg robot``;
             topics are below ``/`` and the robot's id in lower case.
         description: Fleet description; None: the built-in one.
-        camera: Source of the boxes: drawn about the truth, or by grounding.
-        errors: Of the plan and of poses.
 
     Raises:
         DataFileError: no such scenario or profile, or too many robots for the
@@ -88,17 +312,14 @@ async def run_emulator(
     if profile not in DETECTORS:
         known = ", ".join(DETECTORS)
         raise DataFileError(f"profile {profile!r}", "", f"is not one of {known}.")
-    played = replace(scenario_named(scenario), errors=errors)
-    layout = lay_out(played, robots, greenhouse, description)
+    layout = lay_out(scenario_named(scenario), robots, greenhouse, description)
     detector = DETECTORS[layout.detector or profile]
-    world = SimulatedWorld(greenhouse, layout, detector, seed, camera)
+    world = SimulatedWorld(greenhouse, layout, detector, seed)
     incidents = (*(Incident(0.0, order) for order in faults), *layout.incidents)
-    is_radio_bad = bool(incidents) or fault_port is not None
     bases = None
     if network is not None:
         bases = partial(_base, world, network, settings.rate_hz)
-    radio_seed = seed if is_radio_bad and network is None else None
-    fleet = SimulatedFleet(world, settings, radio_seed=radio_seed, bases=bases)
+    fleet = SimulatedFleet(world, settings, bases)
     if fault_port is None:
         await fleet.run(incidents)
         return
@@ -118,8 +339,6 @@ class SimulatedFleet:
     """Robots and people of a run, advanced in real time.
 
     Args:
-        radio_seed: Seed of the robots' radios, which then accept fault orders; None
-            connects the robots directly to the broker.
         bases: Makes ROS 2 robots without iVeg's software.
     """
 
@@ -127,7 +346,6 @@ class SimulatedFleet:
         self,
         world: SimulatedWorld,
         settings: FleetSettings,
-        radio_seed: int | None = None,
         bases: Callable[[RobotHardware], Ros2Base] | None = None,
     ) -> None:
         self._world = world
@@ -135,12 +353,10 @@ class SimulatedFleet:
         self._started = clock.now()
         settings.node.directory.mkdir(parents=True, exist_ok=True)
         self._robots: Mapping[str, EmulatedRobot | Ros2Base] = {
-            robot_id: EmulatedRobot(
-                rig, world, settings, _relay(settings, robot_id, place, radio_seed)
-            )
+            robot_id: EmulatedRobot(rig, world, settings)
             if bases is None
             else bases(rig)
-            for place, (robot_id, rig) in enumerate(world.rigs.items())
+            for robot_id, rig in world.rigs.items()
         }
 
     async def run(self, incidents: Sequence[Incident] = ()) -> None:
@@ -206,16 +422,3 @@ class SimulatedFleet:
             return f"there are {len(self._world.people)} people, counted from 0"
         self._world.people[order.person].place(order.x, order.y, hold=order.hold)
         return None
-
-
-def _relay(
-    settings: FleetSettings, robot_id: str, place: int, seed: int | None
-) -> Relay | None:
-    """A robot's faulty link to the broker, with random numbers of its own."""
-    if seed is None:
-        return None
-    devices = (f"{robot_id}_odom", robot_id)
-    topics = {names.measure_topic(settings.node.apikey, one) for one in devices}
-    topics.add(names.direct_topic(robot_id, "_odom"))
-    radio = Radio(frozenset(topics), np.random.default_rng((seed, place)))
-    return Relay(settings.node.address, radio)

@@ -1,12 +1,15 @@
-"""Greenhouse geometry as arrays: obstacles for rays and for robots.
+"""Greenhouse geometry as arrays: obstacles for rays and for robots, and a planar laser.
 
 The domain's ``Greenhouse`` names objects; this module only has rectangles and discs, in
-``map`` (m), laid out for NumPy.
+``map`` (m), laid out for NumPy.  Ray casting by the slab method for rectangles and by
+the quadratic for discs, all rays of a sweep in a few NumPy calls
+(``benchmarks/lidar_cost.py`` says what it costs).  Left out: intensity, motion during
+the sweep, leaves that move.
 """
 
 import math
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -120,20 +123,6 @@ class Scenery:
             screens,
         )
 
-    def moved(self, east_m: float) -> "Scenery":
-        """The same with all that stands within the walls so far to the east."""
-        along = np.array([east_m, 0.0, east_m, 0.0])
-        return replace(
-            self,
-            rectangles=self.rectangles + along,
-            posts=self.posts + along[:3] * (1.0, 0.0, 0.0),
-            leaves=self.leaves + along[:3] * (1.0, 0.0, 0.0),
-            screens=tuple(
-                replace(one, xmin=one.xmin + east_m, xmax=one.xmax + east_m)
-                for one in self.screens
-            ),
-        )
-
     def hides(self, ax: float, ay: float, bx: float, by: float) -> bool:
         """Whether an object occludes the line between two points."""
         return any(area.crosses(ax, ay, bx, by) for area in self.screens)
@@ -192,3 +181,87 @@ def box_span(rays: Floats, origin: Pose2D, boxes: Floats) -> Span:
 def sides_of(area: Rectangle) -> Floats:
     """A rectangle as ``box_span`` reads it."""
     return np.array((area.xmin, area.ymin, area.xmax, area.ymax), float)
+
+
+@dataclass(frozen=True, slots=True)
+class LaserModel:
+    """Data sheet of the sensor.
+
+    Attributes:
+        beams: Rays in a full turn.
+        range_min: (m); ``range_max`` (m).
+        noise: Standard deviation of a range (m); a third of the VLP-16's ±3 cm.
+    """
+
+    beams: int = 720
+    range_min: float = 0.1
+    range_max: float = 30.0
+    noise: float = 0.01
+
+    @property
+    def angle_increment(self) -> float:
+        """Between neighbouring rays (rad); the first points backwards, at -π."""
+        return math.tau / self.beams
+
+
+def sweep(
+    sensor: Pose2D,
+    model: LaserModel,
+    scenery: Scenery,
+    people: Sequence[Disc],
+    others: Sequence[Body],
+    rng: np.random.Generator,
+) -> NDArray[np.float32]:
+    """One turn of the laser.
+
+    Args:
+        sensor: Its pose in ``map``.
+        model: Its data sheet.
+        scenery: Static objects.
+        people: People.
+        others: The other robots.
+        rng: Random source of the noise.
+
+    Returns:
+        Shape (beams,), float32 (m); ``inf`` where nothing is within ``range_max``.
+    """
+    angles = sensor.yaw - math.pi + model.angle_increment * np.arange(model.beams)
+    directions = np.stack((np.cos(angles), np.sin(angles)))
+    ranges = box_span(directions, sensor, sides_of(scenery.bounds))[1]
+    crop = box_span(directions, sensor, scenery.rectangles)
+    for enter, leave in (crop, *(body.span(directions, sensor) for body in others)):
+        hit = np.where((enter <= leave) & (enter >= 0.0), enter, np.inf)
+        ranges = np.minimum(ranges, hit.reshape(-1, model.beams).min(0, initial=np.inf))
+    discs = [(disc.x, disc.y, disc.radius) for disc in people]
+    round_things = np.concatenate(
+        (scenery.posts, scenery.leaves, np.reshape(discs, (-1, 3)))
+    )
+    _discs(sensor, model, round_things, ranges)
+    ranges += rng.normal(0.0, model.noise, model.beams)
+    ranges[(ranges > model.range_max) | (ranges < model.range_min)] = np.inf
+    # Lasers count millimetres.
+    return ranges.round(3).astype(np.float32)
+
+
+def _discs(sensor: Pose2D, model: LaserModel, discs: Floats, ranges: Floats) -> None:
+    """Shorten ``ranges`` by discs, shape (n, 3), for rays that can hit only."""
+    dx, dy = discs[:, 0] - sensor.x, discs[:, 1] - sensor.y
+    distance = np.hypot(dx, dy)
+    matters = (distance > discs[:, 2]) & (distance < model.range_max + discs[:, 2])
+    dx, dy, distance = dx[matters], dy[matters], distance[matters]
+    radius = discs[matters, 2]
+    middle = np.arctan2(dy, dx) - sensor.yaw + math.pi
+    half = np.arcsin(radius / distance)
+    first = np.ceil((middle - half) / model.angle_increment).astype(int)
+    last = np.floor((middle + half) / model.angle_increment).astype(int)
+    counts = np.maximum(last - first + 1, 0)
+    which = np.repeat(np.arange(counts.size), counts)
+    if not which.size:
+        return
+    starts = np.repeat(np.cumsum(counts) - counts, counts)
+    beams = first[which] + np.arange(which.size) - starts
+    off = beams * model.angle_increment - middle[which]
+    along = distance[which] * np.cos(off)
+    across = distance[which] * np.sin(off)
+    depth = np.sqrt(np.maximum(radius[which] ** 2 - across**2, 0.0))
+    np.minimum.at(ranges, beams % model.beams, along - depth)

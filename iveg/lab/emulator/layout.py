@@ -14,14 +14,12 @@ from iveg.domain.errors import DataFileError
 from iveg.domain.fleet import FleetDescription, RobotProfile
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.greenhouse import DriveLane, Greenhouse
-from iveg.lab.emulator.people import WalkStop
-from iveg.lab.emulator.scripts import (
-    EXACT,
+from iveg.lab.emulator.scenarios import (
     TESTBED,
     Incident,
     RobotScript,
     Scenario,
-    SiteErrors,
+    WalkStop,
     route_of,
 )
 
@@ -40,7 +38,6 @@ class Layout:
     people: tuple[tuple[WalkStop, ...], ...]
     incidents: tuple[Incident, ...] = ()
     detector: str | None = None
-    errors: SiteErrors = EXACT
 
 
 def lay_out(
@@ -61,7 +58,7 @@ def lay_out(
         DataFileError: the greenhouse has no room for so many robots, or does not fit
             the scenario.
     """
-    extra = scenario.incidents, scenario.detector, scenario.errors
+    extra = scenario.incidents, scenario.detector
     profiles = {robot_id: _body(robot_id, fleet or built_in()) for robot_id in robots}
     if scenario.greenhouse not in (TESTBED, greenhouse.name):
         about = f"is about {scenario.greenhouse}, not {greenhouse.name}"

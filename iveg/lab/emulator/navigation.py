@@ -1,23 +1,390 @@
-"""Navigation of an emulated robot: its own route, or a goal that somebody gave it.
+"""Motion of an emulated robot: drive with limits, odometer, way, route and goals.
 
-A robot whose goal was taken away stands until it gets another; one that has returned
-goes on with its own route.  A robot that turns on the spot finds its way on a grid; one
-with a turning radius knows no way but its own route.
+Sources: the seed paper (AGI turns on the spot, AGII has a turning radius of 2 m); pure
+pursuit (Coulter, CMU-RI-TR-92-01).  A robot whose goal was taken away stands until it
+gets another; one that has returned goes on with its own route.  A robot that turns on
+the spot finds its way on a grid; one with a turning radius knows no way but its own
+route, and drives an open one forwards and backwards.  Left out: slip, load, slopes.
 """
 
+import heapq
 import math
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
 
 from iveg.domain.fleet import RobotProfile
-from iveg.domain.geometry import REST, Pose2D, Twist2D
+from iveg.domain.geometry import REST, Pose2D, Twist2D, wrap_angle
 from iveg.domain.goals import Goal
 from iveg.domain.observations import Navigation, Origin
-from iveg.lab.emulator.following import Follower
-from iveg.lab.emulator.greenhouse import Disc, Scenery
-from iveg.lab.emulator.scripts import RobotScript, Route, Station, route_of
-from iveg.lab.emulator.ways import way_between
+from iveg.lab.emulator.greenhouse import Body, Disc, Floats, Scenery
+from iveg.lab.emulator.scenarios import SPACING_M, RobotScript, Route, Station, route_of
 from iveg.robot.goals import NEAR_M
+
+_TURN_ACCELERATION = 1.5
+"""Angular acceleration of a differential drive (rad/s²); assumed."""
+
+_STEERING_RATE = 0.6
+"""Change of curvature of an Ackermann drive (1/m per s); assumed."""
+
+
+class Vehicle:
+    """A vehicle that executes drive commands within the limits of its profile."""
+
+    def __init__(self, profile: RobotProfile, pose: Pose2D) -> None:
+        self.profile = profile
+        self.pose = pose
+        self.twist = Twist2D(0.0, 0.0)
+        self._curvature = 0.0
+
+    def step(self, command: Twist2D, dt: float) -> None:
+        """Drive for ``dt`` (s) as commanded, within the limits."""
+        speed = self._speed(command.linear_x, dt)
+        if self.profile.drive == "ackermann":
+            turn = speed * self._steer(command, dt)
+        else:
+            turn = _towards(
+                self.twist.angular_z,
+                clip(command.angular_z, self.profile.max_turn),
+                _TURN_ACCELERATION * dt,
+            )
+        middle = self.pose.yaw + turn * dt / 2
+        self.pose = Pose2D(
+            self.pose.x + speed * dt * math.cos(middle),
+            self.pose.y + speed * dt * math.sin(middle),
+            wrap_angle(self.pose.yaw + turn * dt),
+        )
+        self.twist = Twist2D(speed, turn)
+
+    def _speed(self, wanted: float, dt: float) -> float:
+        now, wanted = self.twist.linear_x, clip(wanted, self.profile.max_speed)
+        slower = abs(wanted) < abs(now) or now * wanted < 0.0
+        limit = self.profile.braking if slower else self.profile.acceleration
+        return _towards(now, wanted, limit * dt)
+
+    def _steer(self, command: Twist2D, dt: float) -> float:
+        # A command without speed defines no steering angle: it stays as it is.
+        if abs(command.linear_x) > 1e-3:
+            wanted = command.angular_z / command.linear_x
+            wanted = clip(wanted, 1.0 / self.profile.turning_radius)
+            self._curvature = _towards(self._curvature, wanted, _STEERING_RATE * dt)
+        return self._curvature
+
+    def body(self, robot_id: str) -> Body:
+        """Footprint of the vehicle."""
+        return Body(robot_id, self.pose, self.profile.length, self.profile.width)
+
+
+def clip(value: float, limit: float) -> float:
+    """The value clipped to ±``limit``."""
+    return min(max(value, -limit), limit)
+
+
+def _towards(value: float, target: float, step: float) -> float:
+    return value + clip(target - value, step)
+
+
+@dataclass(slots=True)
+class Odometer:
+    """Odometry: the true pose with a bounded error.
+
+    Each metre adds an error of about 2 % along and 1 % across, each radian turned one
+    of 3 %, and earlier errors decay, as with the localizer behind
+    ``base_pose_ground_truth``; the error is therefore bounded, and a robot at rest
+    reports a constant pose.
+
+    Attributes:
+        along: Standard deviation, part of the way driven; ``across`` likewise.
+        turning: Standard deviation, part of the angle turned.
+        memory_m: Distance (m) over which an error decays; ``memory_rad`` likewise.
+    """
+
+    rng: np.random.Generator
+    along: float = 0.02
+    across: float = 0.01
+    turning: float = 0.03
+    memory_m: float = 2.0
+    memory_rad: float = 1.0
+    _error: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
+
+    def measure(self, truth: Pose2D, twist: Twist2D, dt: float) -> Pose2D:
+        """The reported pose after moving with ``twist`` for ``dt`` (s)."""
+        way, angle = abs(twist.linear_x) * dt, abs(twist.angular_z) * dt
+        self._walk(0, self.along, way, self.memory_m)
+        self._walk(1, self.across, way, self.memory_m)
+        self._walk(2, self.turning, angle, self.memory_rad)
+        # Driving along a row also corrects the heading of a localizer.
+        self._error[2] *= math.exp(-way / self.memory_m)
+        x, y = truth.transform(self._error[0], self._error[1])
+        return Pose2D(x, y, wrap_angle(truth.yaw + self._error[2]))
+
+    def _walk(self, which: int, part: float, moved: float, memory: float) -> None:
+        # Ornstein-Uhlenbeck over the distance, not over time; its deviation is
+        # part × memory, e.g. 2 % of 2 m = 4 cm.
+        keep = math.exp(-moved / memory)
+        spread = part * memory * math.sqrt(1.0 - keep * keep)
+        fresh = float(self.rng.normal(0.0, spread)) if moved else 0.0
+        self._error[which] = self._error[which] * keep + fresh
+
+
+_CELL_M = 0.25
+_MARGINS_M = (0.4, 0.1)
+"""Tried one after the other beside half the robot's width (m)."""
+_SNAP_M = 0.75
+_Cell = tuple[int, int]
+_Place = tuple[float, float]
+_STEPS = tuple((i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0))
+
+
+def way_between(
+    start: _Place, goal: _Place, scenery: Scenery, half_width_m: float
+) -> list[_Place] | None:
+    """Corners of a way for a robot of this width; None where there is none."""
+    for margin_m in _MARGINS_M:
+        grid = _Grid(scenery, half_width_m + margin_m)
+        way = grid.way(start, goal)
+        if way is not None:
+            return way
+    return None
+
+
+class _Grid:
+    """Where the middle of a robot may be."""
+
+    def __init__(self, scenery: Scenery, keep_off_m: float) -> None:
+        bounds = scenery.bounds
+        self._origin = bounds.xmin, bounds.ymin
+        xs = np.arange(bounds.xmin, bounds.xmax, _CELL_M) + _CELL_M / 2
+        ys = np.arange(bounds.ymin, bounds.ymax, _CELL_M) + _CELL_M / 2
+        x, y = np.meshgrid(xs, ys, indexing="ij")
+        away = np.minimum.reduce(
+            (x - bounds.xmin, bounds.xmax - x, y - bounds.ymin, bounds.ymax - y)
+        )
+        for xmin, ymin, xmax, ymax in scenery.rectangles:
+            dx = np.maximum(np.maximum(xmin - x, x - xmax), 0.0)
+            dy = np.maximum(np.maximum(ymin - y, y - ymax), 0.0)
+            away = np.minimum(away, np.hypot(dx, dy))
+        for px, py, radius in scenery.posts:
+            away = np.minimum(away, np.hypot(x - px, y - py) - radius)
+        self._free: NDArray[np.bool_] = away > keep_off_m
+
+    def way(self, start: _Place, goal: _Place) -> list[_Place] | None:
+        """Corners from one place to another; None where nothing leads there."""
+        first, last = self._free_cell(start), self._free_cell(goal)
+        if first is None or last is None:
+            return None
+        cells = self._search(first, last)
+        if cells is None:
+            return None
+        middle = [self._middle(one) for one in self._straight(cells)]
+        corners = [start, *middle[1:-1], goal]
+        return [a for a, b in zip(corners, [*corners[1:], None], strict=True) if a != b]
+
+    def _free_cell(self, place: _Place) -> _Cell | None:
+        """The free cell nearest to a place, within 0.75 m."""
+        cells = np.argwhere(self._free)
+        if not len(cells):
+            return None
+        centres = cells * _CELL_M + _CELL_M / 2 + np.array(self._origin)
+        away = np.hypot(centres[:, 0] - place[0], centres[:, 1] - place[1])
+        nearest = int(away.argmin())
+        if away[nearest] > _SNAP_M:
+            return None
+        return int(cells[nearest][0]), int(cells[nearest][1])
+
+    def _middle(self, cell: _Cell) -> _Place:
+        x, y = self._origin
+        return x + (cell[0] + 0.5) * _CELL_M, y + (cell[1] + 0.5) * _CELL_M
+
+    def _search(self, first: _Cell, last: _Cell) -> list[_Cell] | None:
+        cost, came_from = {first: 0.0}, {first: first}
+        queue = [(math.dist(first, last), first)]
+        done: set[_Cell] = set()
+        while queue:
+            cell = heapq.heappop(queue)[1]
+            if cell == last:
+                return list(_back(came_from, last))[::-1]
+            if cell in done:
+                continue
+            done.add(cell)
+            for i, j in _STEPS:
+                near = cell[0] + i, cell[1] + j
+                far = cost[cell] + math.hypot(i, j)
+                if self._is_free(near) and far < cost.get(near, math.inf):
+                    cost[near], came_from[near] = far, cell
+                    heapq.heappush(queue, (far + math.dist(near, last), near))
+        return None
+
+    def _is_free(self, cell: _Cell) -> bool:
+        inside = (
+            0 <= cell[0] < self._free.shape[0] and 0 <= cell[1] < (self._free.shape[1])
+        )
+        return inside and bool(self._free[cell])
+
+    def _straight(self, cells: list[_Cell]) -> list[_Cell]:
+        """The cells where the way has to turn."""
+        kept, at = [cells[0]], 0
+        while at < len(cells) - 1:
+            seen = (
+                n for n in range(len(cells) - 1, at, -1) if self._sees(cells, at, n)
+            )
+            at = next(seen, at + 1)
+            kept.append(cells[at])
+        return kept
+
+    def _sees(self, cells: list[_Cell], one: int, other: int) -> bool:
+        (ax, ay), (bx, by) = cells[one], cells[other]
+        steps = 2 * max(abs(bx - ax), abs(by - ay), 1)
+        along = np.linspace(0.0, 1.0, steps + 1)
+        x = np.rint(ax + (bx - ax) * along).astype(int)
+        y = np.rint(ay + (by - ay) * along).astype(int)
+        return bool(self._free[x, y].all())
+
+
+def _back(came_from: dict[_Cell, _Cell], cell: _Cell) -> Iterator[_Cell]:
+    while True:
+        yield cell
+        if came_from[cell] == cell:
+            return
+        cell = came_from[cell]
+
+
+_LOOK_AHEAD_M = 0.7
+_WINDOW = 12
+"""Points of the route that are searched for the robot's position at each tick."""
+_ON_THE_SPOT = 0.9
+"""Angle to the route from which a differential robot turns on the spot (rad)."""
+_COMFORT = 0.4
+"""Deceleration that navigation plans (m/s²)."""
+CLEARANCE_M = 0.6
+"""Free distance ahead of the robot's front below which it waits (m)."""
+_SIDE_M = 0.15
+_HORIZON = 35
+
+
+class Follower:
+    """Drives one vehicle along its route: pure pursuit, stations, and waiting.
+
+    A robot that cannot turn on the spot follows an open route forwards and backwards.
+    """
+
+    def __init__(
+        self,
+        profile: RobotProfile,
+        route: Route,
+        start: Pose2D,
+        cruise: float,
+        stations: Iterable[Station] = (),
+    ) -> None:
+        self._profile = profile
+        self._route = route
+        self._cruise = min(cruise, profile.max_speed)
+        self._stations = {route.index_of(s.x, s.y): s for s in stations}
+        self._index = route.index_of(start.x, start.y)
+        self._direction = 1
+        self._leaves_at: float | None = None
+
+    @property
+    def at_station(self) -> bool:
+        """Whether the robot halts at a station."""
+        return self._leaves_at is not None
+
+    def path(self, length_m: float = 12.0) -> tuple[tuple[float, float], ...]:
+        """The path ahead, one point per metre."""
+        count = round(length_m / SPACING_M)
+        ahead = self._route.ahead(self._index, count, self._direction)
+        return tuple((float(x), float(y)) for x, y in ahead[::10])
+
+    def requested_twist(
+        self, pose: Pose2D, now: float, discs: Sequence[Disc]
+    ) -> Twist2D:
+        """The twist that navigation requests.
+
+        Args:
+            pose: Pose of the robot.
+            now: Seconds into the run.
+            discs: People and parts of other robots, as local sensors detect them.
+        """
+        self._locate(pose)
+        if self._halts(now):
+            return Twist2D(0.0, 0.0)
+        ahead = self._route.ahead(self._index, _HORIZON, self._direction)
+        room = min(self._room(ahead, discs), self._way_to_halt() + CLEARANCE_M)
+        limit = math.sqrt(2.0 * _COMFORT * max(0.0, room - CLEARANCE_M))
+        return self._pursue(pose, ahead, min(self._cruise, limit))
+
+    def _locate(self, pose: Pose2D) -> None:
+        window = self._route.ahead(self._index, _WINDOW, self._direction)
+        away = np.hypot(window[:, 0] - pose.x, window[:, 1] - pose.y)
+        passed = int(away.argmin())
+        index = self._index
+        for _ in range(passed):
+            index = index + self._direction
+            if index % len(self._route.points) in self._stations:
+                break
+        self._index = index % len(self._route.points)
+
+    def _halts(self, now: float) -> bool:
+        if self._leaves_at is None:
+            station = self._stations.get(self._index)
+            at_end = not self._route.closed and self._way_to_end() <= 2
+            if station is None and not at_end:
+                return False
+            station = station or Station(0.0, 0.0, dwell_s=2.0)
+            self._leaves_at = station.departure(now)
+        if now < self._leaves_at:
+            return True
+        self._leaves_at = None
+        if not self._route.closed and self._way_to_end() <= 2:
+            self._direction = -self._direction
+        self._index = (self._index + 3 * self._direction) % len(self._route.points)
+        return False
+
+    def _way_to_end(self) -> int:
+        last = len(self._route.points) - 1
+        return last - self._index if self._direction > 0 else self._index
+
+    def _way_to_halt(self) -> float:
+        """Distance to the next station or end within the horizon (m)."""
+        count = len(self._route.points)
+        for step in range(_HORIZON):
+            index = self._index + step * self._direction
+            ended = not self._route.closed and step >= self._way_to_end()
+            if ended or index % count in self._stations:
+                return step * SPACING_M
+        return math.inf
+
+    def _room(self, ahead: Floats, discs: Sequence[Disc]) -> float:
+        """Free distance ahead of the robot's front (m)."""
+        if not discs:
+            return math.inf
+        half = self._profile.width / 2 + _SIDE_M
+        places = np.array([(disc.x, disc.y, disc.radius) for disc in discs])
+        dx = ahead[:, 0:1] - places[:, 0]
+        dy = ahead[:, 1:2] - places[:, 1]
+        blocked = (np.hypot(dx, dy) < half + places[:, 2]).any(axis=1)
+        if not blocked.any():
+            return math.inf
+        way = int(blocked.argmax()) * SPACING_M
+        return max(0.0, way + half - self._profile.length / 2)
+
+    def _pursue(self, pose: Pose2D, ahead: Floats, speed: float) -> Twist2D:
+        reach = min(round(_LOOK_AHEAD_M / SPACING_M), len(ahead) - 1)
+        x, y = ahead[reach]
+        backwards = self._direction < 0 and self._profile.turning_radius > 0.0
+        heading = pose.yaw + math.pi if backwards else pose.yaw
+        aside = wrap_angle(math.atan2(y - pose.y, x - pose.x) - heading)
+        if self._profile.turning_radius == 0.0 and abs(aside) > _ON_THE_SPOT:
+            return Twist2D(0.0, math.copysign(self._profile.max_turn * 0.8, aside))
+        curvature = 2.0 * math.sin(aside) / max(pose.distance_to(x, y), 0.3)
+        if self._profile.turning_radius > 0.0:
+            curvature = clip(curvature, 1.0 / self._profile.turning_radius)
+        if abs(curvature) * speed > self._profile.max_turn:
+            speed = self._profile.max_turn / abs(curvature)
+        return Twist2D(-speed if backwards else speed, speed * curvature)
+
 
 _STAYS_S = 3.0
 """How long a robot that has returned stands before it goes on (s)."""

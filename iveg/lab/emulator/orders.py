@@ -15,10 +15,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from iveg.adapters.post_listener import post_listener
 from iveg.domain.errors import DataFileError, SettingsError, UnreadableError
-from iveg.ngsi.codec.untrusted import first_complaint
+from iveg.ngsi.codec.fields import first_complaint
 
-Percent = Annotated[float, Field(ge=0, le=100)]
-Milliseconds = Annotated[float, Field(ge=0, le=10_000)]
 Metres = Annotated[float, Field(ge=-1e6, le=1e6)]
 
 
@@ -35,33 +33,12 @@ class OrderPlace(_Order):
     y: Metres
 
 
-class LinkFaults(_Order):
-    """Faults of a robot's link; percentages of telemetry, drawn independently.
-
-    Attributes:
-        mute: Nothing that the robot publishes arrives, without an error.
-        freeze_odometry: ``silent`` (or true): odometry stops; ``repeat``: its last
-            message, stamp and count included, is sent repeatedly.
-        drop_percent: Lost.
-        duplicate_percent: Delivered twice.
-        reorder_percent: Delivered after the next of the same topic.
-        delay_ms: Delay of everything that it publishes.
-        jitter_ms: Random addition to the delay, from 0 to this; order is kept.
-    """
-
-    mute: bool | None = None
-    freeze_odometry: Literal["silent", "repeat", True, False] | None = None
-    drop_percent: Percent | None = None
-    duplicate_percent: Percent | None = None
-    reorder_percent: Percent | None = None
-    delay_ms: Milliseconds | None = None
-    jitter_ms: Milliseconds | None = None
-
-
-class FaultOrder(LinkFaults):
+class FaultOrder(_Order):
     """Faults of one robot; an absent field changes nothing.
 
     Attributes:
+        mute: Nothing that it publishes arrives, without an error.
+        freeze_odometry: Its odometry stops.
         deaf: Ignores iVeg's speed limits.
         clock_offset_s: Its wall clock is this far ahead (s).
         local_hold: Its red button or bumper is pressed.
@@ -75,6 +52,8 @@ class FaultOrder(LinkFaults):
     """
 
     robot: str
+    mute: bool | None = None
+    freeze_odometry: bool | None = None
     deaf: bool | None = None
     clock_offset_s: Annotated[float, Field(ge=-1e9, le=1e9)] | None = None
     local_hold: Literal["hw", "bumper"] | None = None
@@ -166,7 +145,7 @@ def read_fault_arguments(
     """Parse the orders of a command line: ``field=value``, or ``robot:field=value``.
 
     Args:
-        words: Arguments such as ``drop_percent=10`` or ``AGI:deaf=true``.
+        words: Arguments such as ``mute=true`` or ``AGI:deaf=true``.
         robots: Robots of an order that names none.
 
     Raises:

@@ -1,9 +1,4 @@
-"""An emulated ROS 2 base: publishes its topics and executes ``cmd_vel``.
-
-It stands for the base and Nav2 of a real robot, without safety node and MQTT; ``iveg
-robot`` connects it to iVeg. A base without a command for half a second halts by itself,
-whatever the last command was.
-"""
+"""Emulated ROS 2 base: navigates, publishes its topics and executes ``cmd_vel``."""
 
 import asyncio
 import logging
@@ -11,21 +6,69 @@ import math
 
 from iveg.adapters import clock
 from iveg.domain.errors import UnreadableError
-from iveg.domain.geometry import Pose2D
+from iveg.domain.geometry import REST, Pose2D, Twist2D
 from iveg.domain.goals import Goal
 from iveg.domain.observations import Detection
 from iveg.lab.emulator.greenhouse import into
 from iveg.lab.emulator.orders import FaultOrder
-from iveg.lab.emulator.ros2_navigation import DriveWatchdog, SimulatedNavigation
-from iveg.lab.emulator.sensors import EmulatedSensors
-from iveg.lab.emulator.world import RobotHardware, SimulatedWorld
-from iveg.robot.pacing import LONGEST_STEP_S, SLOTS, every, in_slots
+from iveg.lab.emulator.world import EmulatedSensors, RobotHardware, SimulatedWorld
+from iveg.robot.node import LONGEST_STEP_S, SLOTS, every, in_slots
 from iveg.robot.ros2.config import RobotConfig
-from iveg.robot.ros2.network import Network, Writer
+from iveg.robot.ros2.outputs import Network, Writer
 from iveg.robot.ros2.reading import read_twist, write_twist
-from iveg.robot.ros2.sensors import ROS_SENSORS
-from iveg.ros2 import cdr, geometry_msgs, nav_msgs, sensor_msgs, std_msgs, vision_msgs
-from iveg.ros2.schema import Message
+from iveg.robot.ros2.topics import ROS_SENSORS
+from iveg.ros2 import cdr
+from iveg.ros2 import messages as ros
+from iveg.ros2.messages import Message
+
+TIMEOUT_S = 0.5
+"""A base without a command for this long halts (s)."""
+
+
+_GIVES_UP_S, _RESTS_S = 1.0, 0.8
+
+
+class SimulatedNavigation:
+    """Nav2 as a gate meets it: requests twists, gives up without progress, tries again.
+
+    After a resume the gate stays closed until zero was requested; a real navigation
+    without progress cancels its goal and requests zero.
+    """
+
+    def __init__(self) -> None:
+        self._stuck_since: float | None = None
+        self._rests_until = -math.inf
+
+    def requested_twist(
+        self, requested: Twist2D, driven: Twist2D, now: float
+    ) -> Twist2D:
+        """The twist requested now; ``driven`` was the last command of the base."""
+        if now < self._rests_until:
+            return REST
+        if requested == REST or driven != REST:
+            self._stuck_since = None
+        elif self._stuck_since is None:
+            self._stuck_since = now
+        elif now - self._stuck_since > _GIVES_UP_S:
+            self._stuck_since, self._rests_until = None, now + _RESTS_S
+            return REST
+        return requested
+
+
+class DriveWatchdog:
+    """The drive's own watchdog: the newest command while it is valid."""
+
+    def __init__(self) -> None:
+        self._command, self._at = REST, -math.inf
+
+    def replace_command(self, command: Twist2D, now: float) -> None:
+        """Note the newest command."""
+        self._command, self._at = command, now
+
+    def command(self, now: float) -> Twist2D:
+        """Command for the wheels; zero when none came for half a second."""
+        return self._command if now - self._at <= TIMEOUT_S else REST
+
 
 _log = logging.getLogger(__name__)
 _SECOND = 1.0
@@ -70,21 +113,21 @@ class Ros2Base:
 
         self._commands = network.reader(
             names["cmd_vel_out"],
-            geometry_msgs.Twist,
+            ros.Twist,
             config.qualities["cmd_vel_out"].newest(50),
         )
         self._goals = network.reader(
-            names["goal"], geometry_msgs.PoseStamped, config.qualities["goal"].newest()
+            names["goal"], ros.PoseStamped, config.qualities["goal"].newest()
         )
-        self._wishes = writer("cmd_vel_in", geometry_msgs.Twist)
+        self._wishes = writer("cmd_vel_in", ros.Twist)
         self._tf, self._tf_static = (
-            writer("tf", geometry_msgs.TFMessage),
-            writer("tf_static", geometry_msgs.TFMessage),
+            writer("tf", ros.TFMessage),
+            writer("tf_static", ros.TFMessage),
         )
-        self._odometry = writer("odometry", nav_msgs.Odometry)
-        self._scans = writer("scan", sensor_msgs.LaserScan)
-        self._seen = writer("detections_3d", vision_msgs.Detection3DArray)
-        self._paths = writer("path", nav_msgs.Path)
+        self._odometry = writer("odometry", ros.Odometry)
+        self._scans = writer("scan", ros.LaserScan)
+        self._seen = writer("detections_3d", ros.Detection3DArray)
+        self._paths = writer("path", ros.Path)
         self._sensors = EmulatedSensors()
         self._readings = {
             sensor.of: (sensor, writer(name, sensor.message))
@@ -105,7 +148,7 @@ class Ros2Base:
     def obey(self, order: FaultOrder) -> None:
         """Execute the sensor faults of an order; the others concern its software."""
         if order.freeze_odometry is not None:
-            self._is_odometry_frozen = bool(order.freeze_odometry)
+            self._is_odometry_frozen = order.freeze_odometry
         self._rig.obey(order)
 
     # --- the slots ----------------------------------------------------------------
@@ -121,14 +164,14 @@ class Ros2Base:
         self._wishes.write(cdr.write(write_twist(asked)))
         self._rig.move(min(dt * SLOTS, LONGEST_STEP_S))
         if not self._is_odometry_frozen:
-            self._tell_place(std_msgs.Time.of(now.wall))
+            self._tell_place(ros.Time.of(now.wall))
 
     def _read_commands(self, now: float) -> None:
         waited = self._commands.take()
         if not waited:
             return
         try:
-            twist = read_twist(cdr.read(geometry_msgs.Twist, waited[-1]))
+            twist = read_twist(cdr.read(ros.Twist, waited[-1]))
         except UnreadableError as error:
             _log.warning("%s: unusable command: %s", self.robot_id, error)
             return
@@ -140,33 +183,33 @@ class Ros2Base:
         if not waited:
             return
         try:
-            place = cdr.read(geometry_msgs.PoseStamped, waited[-1]).pose.position
+            place = cdr.read(ros.PoseStamped, waited[-1]).pose.position
         except UnreadableError as error:
             _log.warning("%s: unusable goal: %s", self.robot_id, error)
             return
         self._rig.pursue(Goal("", "here", place.x, place.y), self._world)
 
-    def _tell_place(self, stamp: std_msgs.Time) -> None:
+    def _tell_place(self, stamp: ros.Time) -> None:
         measured = self._rig.odometry()
         in_odom = _relative(self._odom_in_map, measured.pose)
         frames = self._frames
-        odometry = nav_msgs.Odometry(
-            std_msgs.Header(stamp, frames.odom),
+        odometry = ros.Odometry(
+            ros.Header(stamp, frames.odom),
             frames.base_link,
-            geometry_msgs.PoseWithCovariance(_pose(in_odom)),
-            geometry_msgs.TwistWithCovariance(write_twist(measured.twist)),
+            ros.PoseWithCovariance(_pose(in_odom)),
+            ros.TwistWithCovariance(write_twist(measured.twist)),
         )
         links = (
             _link(stamp, frames.map, frames.odom, self._odom_in_map),
             _link(stamp, frames.odom, frames.base_link, in_odom),
         )
-        self._tf.write(cdr.write(geometry_msgs.TFMessage(links)))
+        self._tf.write(cdr.write(ros.TFMessage(links)))
         self._odometry.write(cdr.write(odometry))
 
     def _scan(self, _: float) -> None:
         sweep = self._rig.scan(self._world)
-        message = sensor_msgs.LaserScan(
-            std_msgs.Header(std_msgs.Time.of(clock.wall()), _LASER),
+        message = ros.LaserScan(
+            ros.Header(ros.Time.of(clock.wall()), _LASER),
             sweep.angle_min,
             sweep.angle_min + sweep.angle_increment * (sweep.ranges.size - 1),
             sweep.angle_increment,
@@ -181,28 +224,26 @@ class Ros2Base:
     def _look(self, _: float) -> None:
         now = clock.now()
         frame = self._rig.detect(now.mono - self._run_began, self._world)
-        header = std_msgs.Header(std_msgs.Time.of(now.wall), self._frames.base_link)
+        header = ros.Header(ros.Time.of(now.wall), self._frames.base_link)
         seen = tuple(_detection(one, header) for one in frame.detections)
-        self._seen.write(cdr.write(vision_msgs.Detection3DArray(header, seen)))
+        self._seen.write(cdr.write(ros.Detection3DArray(header, seen)))
 
     def _tell_slowly(self, _: float) -> None:
-        header = std_msgs.Header(std_msgs.Time.of(clock.wall()), self._frames.map)
+        header = ros.Header(ros.Time.of(clock.wall()), self._frames.map)
         path = self._rig.navigation().path
         poses = tuple(
-            geometry_msgs.PoseStamped(header, _pose(Pose2D(x, y, 0.0))) for x, y in path
+            ros.PoseStamped(header, _pose(Pose2D(x, y, 0.0))) for x, y in path
         )
-        self._paths.write(cdr.write(nav_msgs.Path(header, poses)))
+        self._paths.write(cdr.write(ros.Path(header, poses)))
         for reading in self._sensors.due(clock.mono() - self._run_began):
             if type(reading) in self._readings:
                 sensor, out = self._readings[type(reading)]
                 out.write(cdr.write(sensor.write(header, reading)))
 
-    def _mounts(self) -> geometry_msgs.TFMessage:
-        stamp = std_msgs.Time.of(clock.wall())
+    def _mounts(self) -> ros.TFMessage:
+        stamp = ros.Time.of(clock.wall())
         laser = self._rig.profile.laser
-        return geometry_msgs.TFMessage(
-            (_link(stamp, self._frames.base_link, _LASER, laser),)
-        )
+        return ros.TFMessage((_link(stamp, self._frames.base_link, _LASER, laser),))
 
 
 def _relative(outer: Pose2D, pose: Pose2D) -> Pose2D:
@@ -210,39 +251,29 @@ def _relative(outer: Pose2D, pose: Pose2D) -> Pose2D:
     return Pose2D(*into(outer, pose.x, pose.y), pose.yaw - outer.yaw)
 
 
-def _turned(yaw: float) -> geometry_msgs.Quaternion:
-    return geometry_msgs.Quaternion(z=math.sin(yaw / 2), w=math.cos(yaw / 2))
+def _turned(yaw: float) -> ros.Quaternion:
+    return ros.Quaternion(z=math.sin(yaw / 2), w=math.cos(yaw / 2))
 
 
-def _pose(pose: Pose2D) -> geometry_msgs.Pose:
-    return geometry_msgs.Pose(geometry_msgs.Point(pose.x, pose.y), _turned(pose.yaw))
+def _pose(pose: Pose2D) -> ros.Pose:
+    return ros.Pose(ros.Point(pose.x, pose.y), _turned(pose.yaw))
 
 
 def _link(
-    stamp: std_msgs.Time, outer: str, inner: str, pose: Pose2D
-) -> geometry_msgs.TransformStamped:
-    transform = geometry_msgs.Transform(
-        geometry_msgs.Vector3(pose.x, pose.y), _turned(pose.yaw)
-    )
-    return geometry_msgs.TransformStamped(
-        std_msgs.Header(stamp, outer), inner, transform
-    )
+    stamp: ros.Time, outer: str, inner: str, pose: Pose2D
+) -> ros.TransformStamped:
+    transform = ros.Transform(ros.Vector3(pose.x, pose.y), _turned(pose.yaw))
+    return ros.TransformStamped(ros.Header(stamp, outer), inner, transform)
 
 
-def _detection(one: Detection, header: std_msgs.Header) -> vision_msgs.Detection3D:
+def _detection(one: Detection, header: ros.Header) -> ros.Detection3D:
     box, (x, y, z) = one.box, one.box.centre
-    size = geometry_msgs.Vector3(
-        box.xmax - box.xmin, box.ymax - box.ymin, box.zmax - box.zmin
-    )
-    sure = vision_msgs.ObjectHypothesis(one.class_id, one.probability)
-    centre = geometry_msgs.Pose(geometry_msgs.Point(x, y, z))
-    return vision_msgs.Detection3D(
+    size = ros.Vector3(box.xmax - box.xmin, box.ymax - box.ymin, box.zmax - box.zmin)
+    sure = ros.ObjectHypothesis(one.class_id, one.probability)
+    centre = ros.Pose(ros.Point(x, y, z))
+    return ros.Detection3D(
         header,
-        (
-            vision_msgs.ObjectHypothesisWithPose(
-                sure, geometry_msgs.PoseWithCovariance(centre)
-            ),
-        ),
-        vision_msgs.BoundingBox3D(centre, size),
+        (ros.ObjectHypothesisWithPose(sure, ros.PoseWithCovariance(centre)),),
+        ros.BoundingBox3D(centre, size),
         one.det_id or "",
     )

@@ -1,41 +1,74 @@
-"""The simulated world: robots and people, and each robot's sensor values.
-
-Deterministic for a seed: time is an argument, so an hour is a loop of steps.
-``fleet.py`` runs the same world in real time over MQTT.
-"""
+"""Simulated world: robots and people, each robot's sensor values, and what is true."""
 
 import math
-from collections.abc import Mapping
-from typing import Literal
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from iveg.domain.fleet import RobotProfile
-from iveg.domain.geometry import REST, Twist2D
+from iveg.domain.geometry import REST, Pose2D, Twist2D
 from iveg.domain.goals import Goal
 from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.kinds import SENSED
 from iveg.domain.observations import (
+    UNKNOWN_ORIGIN,
+    Battery,
     DetectionFrame,
     LaserScan,
     Navigation,
+    Observation,
     Odometry,
     Origin,
 )
-from iveg.lab.emulator.camera import EmulatedDetector, upright_box
-from iveg.lab.emulator.detector_model import PERSON, DetectorModel
-from iveg.lab.emulator.greenhouse import Body, Disc, Scenery
-from iveg.lab.emulator.grounded import GroundedCamera
-from iveg.lab.emulator.kinematics import Vehicle
+from iveg.lab.emulator.camera import (
+    PERSON,
+    DetectorModel,
+    EmulatedDetector,
+    Target,
+    person_target,
+    robot_target,
+    thing_target,
+    upright_box,
+)
+from iveg.lab.emulator.greenhouse import Body, Disc, LaserModel, Scenery, sweep
 from iveg.lab.emulator.layout import Layout
-from iveg.lab.emulator.lidar import LaserModel, sweep
-from iveg.lab.emulator.navigation import Navigator
-from iveg.lab.emulator.odometer import Odometer
+from iveg.lab.emulator.navigation import Navigator, Odometer, Vehicle
 from iveg.lab.emulator.orders import FaultOrder
-from iveg.lab.emulator.people import SimulatedPerson
-from iveg.lab.emulator.scripts import RobotScript
-from iveg.lab.emulator.targets import Target, person_target, robot_target, thing_target
+from iveg.lab.emulator.scenarios import RobotScript, SimulatedPerson
 
-Camera = Literal["boxes", "grounding"]
+_BATTERY_LASTS_S = 8 * 3600.0
+_BATTERY_FULL, _BATTERY_SWAPPED = 0.95, 0.30
+
+
+def battery_after(driven_s: float) -> Battery:
+    """A battery that drains while driving and is swapped before it is low."""
+    usable = _BATTERY_FULL - _BATTERY_SWAPPED
+    level = _BATTERY_FULL - (driven_s / _BATTERY_LASTS_S) % usable
+    return Battery("", UNKNOWN_ORIGIN, round(level, 3), charging=False, voltage=25.6)
+
+
+EMULATED: Mapping[type[Observation], Callable[[float], Observation]] = {
+    Battery: battery_after,
+}
+"""The observation after a time of driving (s), by kind."""
+
+
+@dataclass(slots=True)
+class EmulatedSensors:
+    """The small sensors of one robot, each at its own rate."""
+
+    _sent_at: dict[str, float] = field(default_factory=dict)
+
+    def due(self, now: float) -> Iterator[Observation]:
+        """What is to be sent ``now`` (s of the run)."""
+        for kind in SENSED:
+            every_s = kind.sensor.every_s if kind.sensor else 0.0
+            if now - self._sent_at.get(kind.name, -every_s) >= every_s:
+                self._sent_at[kind.name] = now
+                yield EMULATED[kind.of](now)
+
+
 _LASER = LaserModel()
 _FALSE_PERSON_CONFIDENCE = 0.95
 
@@ -58,8 +91,6 @@ class RobotHardware:
         script: RobotScript,
         detector: DetectorModel,
         rng: np.random.Generator,
-        camera: Camera = "boxes",
-        pose_error: float = 1.0,
     ) -> None:
         self.robot_id = robot_id
         self.profile = profile
@@ -69,11 +100,8 @@ class RobotHardware:
         self.hides_people = False
         self.is_stuck = False
         self._rng = rng
-        self._odometer = Odometer(rng, times=pose_error)
-        place = None
-        if camera == "grounding":
-            place = GroundedCamera(profile, rng.spawn(1)[0]).place
-        self._detector = EmulatedDetector(profile, detector, rng, place)
+        self._odometer = Odometer(rng)
+        self._detector = EmulatedDetector(profile, detector, rng)
         self.vehicle = Vehicle(self.profile, script.start)
         self._believed = script.start
         self._navigator = Navigator(profile, script)
@@ -151,8 +179,8 @@ class RobotHardware:
             x, y = self.false_person
             ghost = upright_box(pose, PERSON, x, y, _FALSE_PERSON_CONFIDENCE)
             found = (*found, ghost)
-        lost, name = self._detector.lost, self._detector.name
-        return DetectionFrame(self.robot_id, Origin(), found, lost, name)
+        name = self._detector.name
+        return DetectionFrame(self.robot_id, Origin(), found, (), name)
 
     def part_seen(self, target: Target, around: "SimulatedWorld") -> float:
         """Visible share of a target from its camera, whatever the detector reports."""
@@ -172,7 +200,6 @@ class SimulatedWorld:
         layout: Robots and people with their routes.
         detector: Error model of the robots' detectors.
         seed: The same seed gives the same people and the same noise.
-        camera: Source of the boxes: drawn about the truth, or by grounding.
     """
 
     def __init__(
@@ -181,14 +208,12 @@ class SimulatedWorld:
         layout: Layout,
         detector: DetectorModel,
         seed: int,
-        camera: Camera = "boxes",
     ) -> None:
         streams = np.random.SeedSequence(seed).spawn(
             len(layout.robots) + len(layout.people) + 1
         )
         generators = [np.random.default_rng(stream) for stream in streams]
-        errors = layout.errors
-        self.scenery = Scenery.of(greenhouse, generators.pop()).moved(errors.plan_off_m)
+        self.scenery = Scenery.of(greenhouse, generators.pop())
         self.rigs: Mapping[str, RobotHardware] = {
             robot_id: RobotHardware(
                 robot_id,
@@ -196,8 +221,6 @@ class SimulatedWorld:
                 script,
                 detector,
                 rng,
-                camera,
-                errors.pose_error,
             )
             for (robot_id, script), rng in zip(
                 layout.robots.items(), generators, strict=False
@@ -232,3 +255,85 @@ class SimulatedWorld:
         """Possible targets of a robot's camera."""
         people = [person_target(n, disc) for n, disc in enumerate(self.discs())]
         return people + [robot_target(body) for body in self.bodies_but(robot_id)]
+
+
+@dataclass(frozen=True, slots=True)
+class Driving:
+    """How a robot may drive.
+
+    Attributes:
+        wanted: Speed that its navigation asks for (m/s); 0 while it is held.
+        factor: Greatest share of it that its own safety machine allows (0 to 1).
+    """
+
+    wanted: float
+    factor: float
+
+
+def in_view(
+    rig: RobotHardware, world: SimulatedWorld
+) -> Iterator[tuple[Target, float]]:
+    """Targets in view of a robot's camera, with the visible share (0 to 1)."""
+    for target in world.targets_for(rig.robot_id):
+        part = rig.part_seen(target, world)
+        if part > 0.0:
+            yield target, part
+
+
+def true_picture(
+    rig: RobotHardware, world: SimulatedWorld, at: float, driving: Driving
+) -> dict[str, object]:
+    """The truth of one picture.
+
+    ``{"robot", "at": Unix s, "pose": {"x", "y", "yaw"}, "speed", "wanted", "factor",
+    "visible": [{"key", "class", "x", "y", "part"}], "people": [{"key", "x", "y",
+    "hidden"}], "robots": [{"key", "x", "y", "yaw"}]}``: the robot's true pose in
+    ``map`` (m, rad) and speed (m/s), ``Driving``, all targets of which a part (0 to 1)
+    is in its view, and every person and robot in the greenhouse, by their true
+    positions, whatever the detector reports; ``hidden``: crop or crates are between
+    this robot's ``base_link`` and the person.
+
+    Args:
+        rig: The robot whose picture it is.
+        world: Everybody.
+        at: When the picture was taken (Unix s, by the robot's own clock).
+        driving: How it may drive then.
+    """
+    pose = rig.vehicle.pose
+    return {
+        "robot": rig.robot_id,
+        "at": at,
+        "pose": _pose(pose),
+        "speed": round(rig.vehicle.twist.linear_x, 3),
+        "wanted": round(driving.wanted, 3),
+        "factor": driving.factor,
+        "visible": [
+            {
+                "key": target.key,
+                "class": target.class_id,
+                **_place(target.body.pose),
+                "part": round(part, 2),
+            }
+            for target, part in in_view(rig, world)
+        ],
+        "people": [
+            {
+                "key": f"person-{number}",
+                **_place(one),
+                "hidden": world.scenery.hides(pose.x, pose.y, one.x, one.y),
+            }
+            for number, one in enumerate(world.discs())
+        ],
+        "robots": [
+            {"key": one.robot_id, **_pose(one.vehicle.pose)}
+            for one in world.rigs.values()
+        ],
+    }
+
+
+def _place(of: Pose2D | Disc) -> dict[str, float]:
+    return {"x": round(of.x, 3), "y": round(of.y, 3)}
+
+
+def _pose(of: Pose2D) -> dict[str, float]:
+    return {**_place(of), "yaw": round(of.yaw, 4)}

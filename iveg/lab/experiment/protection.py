@@ -10,14 +10,22 @@ from there until the robot is limited to half speed.  An *entry* is a ring that 
 reaches, or is reached by, around somebody who has been in view for two seconds, who has
 stepped into view since, which leaves nobody the time to slow before, or who is in no
 camera's view.
+
+A person is in view where the newest picture of some robot has them, if it is not older
+than a quarter of a second: robots take theirs at different times.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import groupby
+from math import dist
+from operator import itemgetter
 from statistics import quantiles
 from typing import Final, Literal
 
+from iveg.domain.feedback import HALF_SPEED
 from iveg.domain.records import Json
+from iveg.lab.experiment.stage import Row
 
 Sight = Literal["in_view", "behind_plants", "unseen"]
 """In view of some camera; hidden from the robot that is near; neither."""
@@ -120,12 +128,6 @@ class Protection:
     delays_s: list[float | None] = field(default_factory=list)
     entries: list[Entry] = field(default_factory=list)
 
-    @classmethod
-    def read(cls, stored: Json) -> "Protection":
-        """What a result file has of it."""
-        entries = [Entry(**one) for one in stored["entries"]]
-        return cls(**{**stored, "entries": entries})
-
     def row(self) -> Json:
         """The numbers by name; None where there was nothing to count."""
         near, slowed = sum(self.near_s.values()), sum(self.slowed_s.values())
@@ -189,3 +191,191 @@ def _quantile(values: list[float], percent: int) -> float | None:
     if len(values) < 2:
         return values[0] if values else None
     return round(quantiles(values, n=100, method="inclusive")[percent - 1], 3)
+
+
+_STILL_S: Final = 0.25
+"""How long a picture, or a gap between two, counts (s)."""
+_SAME_M: Final = 1.0
+"""Who is farther from where iVeg has somebody is somebody else (m)."""
+
+
+def moments_of(
+    truth: Iterable[Row], encounters: Sequence[Row] = ()
+) -> Iterator[NearMoment]:
+    """Every robot at each of its pictures, in the order of time.
+
+    Args:
+        truth: Rows of the truth.
+        encounters: With people, as iVeg told them: ``robot``, ``at``, ``people``
+            (each the place ``x``, ``y`` where iVeg has somebody), at the same times.
+    """
+    people_at = {(one["robot"], one["at"]): one["people"] for one in encounters}
+    newest: dict[str, Row] = {}
+    for at, same in groupby(sorted(truth, key=itemgetter("at")), itemgetter("at")):
+        rows, before = list(same), dict(newest)
+        newest.update({row["robot"]: row for row in rows})
+        young = (row for row in newest.values() if at - row["at"] <= _STILL_S)
+        in_view = {one["key"] for row in young for one in row["visible"]}
+        for row in rows:
+            places = people_at.get((row["robot"], at), ())
+            last_at = before.get(row["robot"], row)["at"]
+            yield NearMoment(
+                row["robot"],
+                at,
+                min(at - last_at, _STILL_S),
+                abs(row["speed"]),
+                row["wanted"],
+                row["factor"],
+                tuple(_people(row, in_view, places)),
+            )
+
+
+def _people(row: Row, in_view: set[str], places: Sequence[Row]) -> Iterator[NearPerson]:
+    foretold = {person_at(row["people"], one["x"], one["y"]) for one in places}
+    here = row["pose"]["x"], row["pose"]["y"]
+    for one in row["people"]:
+        key = one["key"]
+        sight: Sight = "behind_plants" if one["hidden"] else "unseen"
+        if key in in_view:
+            sight = "in_view"
+        yield NearPerson(key, dist(here, (one["x"], one["y"])), sight, key in foretold)
+
+
+def person_at(people: Iterable[Row], x: float, y: float) -> str | None:
+    """Who really is at a place (m), by the truth's keys; None: nobody."""
+    away = {one["key"]: dist((one["x"], one["y"]), (x, y)) for one in people}
+    nearest = min(away, key=lambda key: away[key], default=None)
+    return nearest if nearest is not None and away[nearest] <= _SAME_M else None
+
+
+_PAUSE_S = 1.0
+
+
+_IN_VIEW_S = 2.0
+_GLIMPSE_S = 0.5
+"""Shorter views without a slow-down are no encounter: six pictures of a detector."""
+
+
+def protection_of(moments: Iterable[NearMoment]) -> Protection:
+    """The sums of one run, whose moments come in the order of time."""
+    score = _Score()
+    for moment in moments:
+        score.add(moment)
+    delays = [one.delay_s for one in score.encounters if one.counts]
+    score.sums.delays_s = [None if s is None else round(s, 3) for s in delays]
+    return score.sums
+
+
+@dataclass(slots=True)
+class _Encounter:
+    """One robot near one person in view, all in s."""
+
+    began: float
+    last: float
+    slowed_at: float | None = None
+
+    @property
+    def delay_s(self) -> float | None:
+        """From its begin until the robot was limited (s); None: never."""
+        return None if self.slowed_at is None else self.slowed_at - self.began
+
+    @property
+    def counts(self) -> bool:
+        """Whether it was more than a glimpse, or slowed the robot."""
+        lasted = self.last - self.began >= _GLIMPSE_S - ROUNDING_S
+        return lasted or self.slowed_at is not None
+
+
+@dataclass(slots=True)
+class _Pair:
+    """One person as one robot had them before.
+
+    Attributes:
+        seen_since: Since when in view without a break (s); None: not in view.
+        told_since: Since when iVeg tells of them, without a break of a second (s);
+            ``told_at`` when it did last.
+        outside: Whether the ring lay between them.
+    """
+
+    seen_since: float | None = None
+    told_since: float | None = None
+    told_at: float = float("-inf")
+    outside: bool = False
+    encounter: _Encounter | None = None
+
+
+@dataclass(slots=True)
+class _Score:
+    """Counts moment by moment."""
+
+    sums: Protection = field(default_factory=Protection)
+    encounters: list[_Encounter] = field(default_factory=list)
+    _pairs: dict[tuple[str, str], _Pair] = field(default_factory=dict)
+
+    def add(self, moment: NearMoment) -> None:
+        """Count one moment of one robot."""
+        for person in moment.people:
+            self.note_entry(moment, person)
+        if moment.speed < MOVES_M_S:
+            return
+        slowed = moment.factor <= HALF_SPEED
+        self.sums.driven_s += moment.lasts_s
+        self.sums.driven_m += moment.speed * moment.lasts_s
+        nearest = min((one.distance_m for one in moment.people), default=float("inf"))
+        for away_m in AWAY_M:
+            if slowed and nearest > away_m:
+                self.sums.needless_s[f"{away_m:g}"] += moment.lasts_s
+        for person in moment.people:
+            if person.distance_m <= NEAR_M:
+                self._add_near(moment, person, slowed=slowed)
+
+    def note_entry(self, moment: NearMoment, person: NearPerson) -> None:
+        """Count an entry, if this is one."""
+        pair = self._pairs.setdefault((moment.robot_id, person.name), _Pair())
+        if person.sight != "in_view":
+            pair.seen_since = None
+        elif pair.seen_since is None:
+            pair.seen_since = moment.at
+        outside = person.distance_m > NEAR_M
+        if pair.outside and not outside and moment.wanted > MOVES_M_S:
+            share_ = round(moment.speed / moment.wanted, 4)
+            known = _known(pair, moment.at)
+            self.sums.entries.append(Entry(share_, _told_s(pair, moment.at), known))
+        pair.outside = outside
+        if person.foretold:
+            if moment.at - pair.told_at > _PAUSE_S:
+                pair.told_since = moment.at
+            pair.told_at = moment.at
+
+    def _add_near(
+        self, moment: NearMoment, person: NearPerson, *, slowed: bool
+    ) -> None:
+        self.sums.near_s[person.sight] += moment.lasts_s
+        self.sums.slowed_s[person.sight] += moment.lasts_s * slowed
+        if person.sight != "in_view":
+            return
+        encounter = self._encounter(moment.robot_id, person.name, moment.at)
+        if slowed and encounter.slowed_at is None:
+            encounter.slowed_at = moment.at
+
+    def _encounter(self, robot_id: str, person: str, at: float) -> _Encounter:
+        pair = self._pairs[robot_id, person]
+        if pair.encounter is None or at - pair.encounter.last > _PAUSE_S:
+            pair.encounter = _Encounter(at, at)
+            self.encounters.append(pair.encounter)
+        pair.encounter.last = at
+        return pair.encounter
+
+
+def _known(pair: _Pair, at: float) -> Known:
+    if pair.seen_since is None:
+        return "unseen"
+    is_long = at - pair.seen_since >= _IN_VIEW_S - ROUNDING_S
+    return "in_view" if is_long else "stepped_out"
+
+
+def _told_s(pair: _Pair, at: float) -> float | None:
+    """For how long iVeg has told of an encounter that is about to begin (s)."""
+    if pair.told_since is None or at - pair.told_at > _PAUSE_S:
+        return None
+    return round(at - pair.told_since, 3)

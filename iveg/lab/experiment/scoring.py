@@ -1,26 +1,53 @@
 """Reported detections compared with the ground truth, frame by frame.
 
-As in the paper a detector is scored by its own picture, in the frame of its robot: how
-well the robot knew where it stood is told apart, as an error of place in the map.
+As in the paper a detector is scored by its own picture, in the frame of its robot: an
+error of the robot's pose is none of its detector.
+
 Errors of a detector persist: a person missed in one frame is missed in the next twenty
 as well.  So frames are counted, but the confidence interval of a rate uses the number
 of *looks*: two seconds of one robot at one target, as long as an error lasts.
 """
 
-import math
-from bisect import bisect_left
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from math import sqrt
 from typing import Final
 
 import numpy as np
+
+_Z: Final = 1.959964
+"""Normal quantile for 95 %."""
+
+
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """A share with its 95 % interval; all 0 to 1."""
+
+    share: float
+    low: float
+    high: float
+
+
+def wilson(hits: float, of: float) -> Interval | None:
+    """The Wilson score interval (Wilson 1927); None without data."""
+    if of <= 0:
+        return None
+    share, z2 = hits / of, _Z * _Z
+    middle = (share + z2 / (2 * of)) / (1 + z2 / of)
+    half = _Z / (1 + z2 / of) * sqrt(share * (1 - share) / of + z2 / (4 * of * of))
+    return Interval(share, max(0.0, middle - half), min(1.0, middle + half))
+
+
+def thinned(hits: int, of: int, worth: int) -> Interval | None:
+    """The same where ``of`` counts are worth only ``worth`` independent ones."""
+    return wilson(hits * worth / of, worth) if of and worth else None
+
 
 OVERLAP: Final = 0.5
 """Least intersection over union of a correct box, as in AP@0.5."""
 SIZE_M: Final = {"farmer": 0.5}
 _ROBOT_SIZE_M = 1.0
-_SAME_PICTURE_S = 0.06
 _LOOK_S = 2.0
 """Longest duration of one error of the emulated detector (s)."""
 
@@ -79,8 +106,6 @@ class Tally:
 
     Attributes:
         found: Confidence of each reported detection of a target.
-        off_map, off_robot: Distance of each to the target, in ``map`` and in
-            the robot's frame (m).
         missed: Number of frames with a target in view but not reported.
         ghosts: Confidence of each detection without a target.
         looks, claims: As in ``Score``.
@@ -91,8 +116,6 @@ class Tally:
     ghosts: tuple[float, ...] = ()
     looks: int = 0
     claims: int = 0
-    off_map: tuple[float, ...] = ()
-    off_robot: tuple[float, ...] = ()
 
 
 @dataclass(slots=True)
@@ -102,8 +125,6 @@ class _Count:
     found: list[float] = field(default_factory=list)
     missed: int = 0
     ghosts: list[float] = field(default_factory=list)
-    off_map: list[float] = field(default_factory=list)
-    off_robot: list[float] = field(default_factory=list)
     looks: set[tuple[str, str, int]] = field(default_factory=set)
     claims: set[tuple[str, str, int]] = field(default_factory=set)
 
@@ -114,16 +135,7 @@ class _Count:
             tuple(self.ghosts),
             len(self.looks),
             len(self.claims),
-            tuple(self.off_map),
-            tuple(self.off_robot),
         )
-
-    def find(self, target: SeenObject, one: SeenObject) -> None:
-        """A detection of a target."""
-        self.found.append(round(one.confidence, 4))
-        off = math.hypot(one.x - target.x, one.y - target.y)
-        self.off_map.append(round(off, 4))
-        self.off_robot.append(round(math.hypot(*_between(target, one)), 4))
 
 
 def tally(pairs: Iterable[Pair]) -> dict[str, Tally]:
@@ -136,7 +148,7 @@ def tally(pairs: Iterable[Pair]) -> dict[str, Tally]:
             one, place = counts[target.class_id], (robot_id, target.key, look)
             one.looks.add(place)
             if target.key in matched:
-                one.find(target, matched[target.key])
+                one.found.append(round(matched[target.key].confidence, 4))
                 one.claims.add(place)
             else:
                 one.missed += 1
@@ -145,15 +157,6 @@ def tally(pairs: Iterable[Pair]) -> dict[str, Tally]:
             one.ghosts.append(round(ghost.confidence, 4))
             one.claims.add((robot_id, "", look))
     return {name: counts[name].tally() for name in sorted(counts)}
-
-
-def paired(truth: Iterable[Picture], reported: Iterable[Picture]) -> Iterator[Pair]:
-    """Reported frames with the ground truth of the same moment, where known."""
-    views = _by_robot(truth)
-    for picture in reported:
-        real = _nearest(views.get(picture.robot_id, ()), picture.at)
-        if real is not None:
-            yield real, picture
 
 
 def match(
@@ -215,22 +218,3 @@ def average_precision(
     precision = np.cumsum(is_hit) / np.arange(1, len(is_hit) + 1)
     envelope = np.maximum.accumulate(precision[::-1])[::-1]
     return float((envelope * is_hit).sum() / targets)
-
-
-def _by_robot(pictures: Iterable[Picture]) -> dict[str, list[Picture]]:
-    out: dict[str, list[Picture]] = defaultdict(list)
-    for one in pictures:
-        out[one.robot_id].append(one)
-    for views in out.values():
-        views.sort(key=lambda one: one.at)
-    return out
-
-
-def _nearest(views: Sequence[Picture], at: float) -> Picture | None:
-    """The frame of that moment; None if there is no ground truth."""
-    place = bisect_left(views, at, key=lambda one: one.at)
-    near = views[max(0, place - 1) : place + 1]
-    best = min(near, key=lambda one: abs(one.at - at), default=None)
-    if best is None or abs(best.at - at) > _SAME_PICTURE_S:
-        return None
-    return best

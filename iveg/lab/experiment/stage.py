@@ -1,23 +1,263 @@
-"""A greenhouse on a virtual clock.
+"""Stages of an experiment: robots and iVeg on a virtual clock, and what is recorded."""
 
-The emulator's world, the robots' own safety machines and iVeg's pipeline, without a
-socket or a process.  Their messages are encoded and decoded by the codec, as on the
-wire.  The same seed gives the same run on any machine, however busy it is.
-"""
-
+import asyncio
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from itertools import count
+from typing import Final
 
+from iveg.adapters.fleet_files import load_fleet
+from iveg.adapters.greenhouses import load_greenhouse
+from iveg.app.virtual import VirtualPipeline
+from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import Feedback
-from iveg.domain.observations import Instant
-from iveg.domain.peer_scan import PeerScan
-from iveg.domain.witness import Plan
+from iveg.domain.geometry import REST, Pose2D
+from iveg.domain.observations import FeedbackRef, Instant
+from iveg.domain.records import Json
+from iveg.domain.witness import Outline, Plan
+from iveg.lab.emulator.camera import DETECTORS
+from iveg.lab.emulator.greenhouse import into
+from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.orders import FaultOrder
-from iveg.lab.emulator.scripts import Incident
-from iveg.lab.emulator.world import SimulatedWorld
-from iveg.lab.experiment.staged_robot import STEP_S, Looked, StagedRobot
-from iveg.ngsi import codec, names
+from iveg.lab.emulator.scenarios import Incident, scenario_named
+from iveg.lab.emulator.world import Driving, RobotHardware, SimulatedWorld, true_picture
+from iveg.lab.experiment.messages import MessageTimes
+from iveg.lab.experiment.plan import ROBOTS, PlannedRun
+from iveg.lab.experiment.scoring import Picture, SeenObject
+from iveg.ngsi import codec
 from iveg.pipeline.ingest import Ingest
 from iveg.pipeline.loop import RuleLoop
+from iveg.robot.holds import HoldSet
+from iveg.robot.judgement import Limits
+from iveg.robot.orders import Drive, Effect, Report, SendAnswer
+from iveg.robot.safety import SafetyMachine
+from iveg.robot.uplink import Uplink
+from iveg.web.views import Views
+
+Row = Json
+
+
+@dataclass(slots=True)
+class VirtualRecording:
+    """The half on the virtual clock.
+
+    Attributes:
+        truth: The emulator's rows, one a picture (``emulator.world.true_picture``).
+        reported: What iVeg told of each of these pictures.
+        foretold: Encounters with people as iVeg told them at each picture
+            (``protection.moments_of``).
+        decisions: Each with ``reason``, ``applied_at``, ``observed_at``, ``in_sight``.
+        completed: Whether it reached its end with all robots live.
+    """
+
+    truth: list[Row] = field(default_factory=list)
+    reported: list[Picture] = field(default_factory=list)
+    foretold: list[Row] = field(default_factory=list)
+    decisions: list[Row] = field(default_factory=list)
+    completed: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class TimedRecording:
+    """The half in real time, through all programs.
+
+    Attributes:
+        began, ended: When it was measured (Unix s).
+        times: Each message between them.
+        settled: Whether Orion kept up when it began.
+        completed: Whether all robots were live at both ends.
+        stops: STOP of the fleet, robot by robot; empty unless it was the last run.
+    """
+
+    began: float
+    ended: float
+    times: Sequence[MessageTimes]
+    settled: bool
+    completed: bool
+    stops: Sequence[Row] = ()
+
+
+def picture_of_truth(row: Row) -> Picture:
+    """One true picture, in ``map`` and in the robot's frame."""
+    pose = Pose2D(**row["pose"])
+    seen = tuple(
+        SeenObject(
+            one["key"],
+            one["class"],
+            one["x"],
+            one["y"],
+            local=into(pose, one["x"], one["y"]),
+        )
+        for one in row["visible"]
+    )
+    return Picture(row["robot"], row["at"], seen)
+
+
+def picture_of(frame: Row, at: float) -> Picture:
+    """One detection frame as iVeg told it, taken at this time (s)."""
+    return Picture(frame["robot_id"], at, _seen_in(frame["items"]))
+
+
+def _seen_in(items: Sequence[Row]) -> tuple[SeenObject, ...]:
+    return tuple(
+        SeenObject(
+            str(place),
+            one["class_id"],
+            one["position"]["x"],
+            one["position"]["y"],
+            one["probability"],
+            _centre(one["box"]),
+        )
+        for place, one in enumerate(items)
+    )
+
+
+def _centre(box: Row | None) -> tuple[float, float] | None:
+    """Centre of a box in the robot's frame; None where it was told in another."""
+    if box is None or box["frame_id"] != "base_link":
+        return None
+    return (box["xmin"] + box["xmax"]) / 2, (box["ymin"] + box["ymax"]) / 2
+
+
+STEP_S: Final = 0.05
+
+
+_LOOK_EVERY, _NAVIGATION_EVERY = 2, 20
+"""Steps between two camera frames, the first once all odometry was sent, and between
+two messages of navigation."""
+
+
+Looked = Callable[[RobotHardware], None]
+
+
+class StagedRobot:
+    """One rig with its safety machine, whose effects are executed at once.
+
+    Args:
+        hear: Called with the topic and payload of its messages.
+        looked: Called when its camera has taken a picture.
+        scan_every: Steps between two sweeps of its laser; 0: none.
+        plan: What stands in the greenhouse.
+        is_witness: Its own software reads its laser, too.
+    """
+
+    def __init__(
+        self,
+        rig: RobotHardware,
+        now: Instant,
+        hear: Callable[[str, bytes], None],
+        looked: Looked = lambda _: None,
+        scan_every: int = 0,
+        plan: Plan | None = None,
+        *,
+        is_witness: bool = True,
+    ) -> None:
+        texts = count(1)
+        self._faults = FaultOrder(robot=rig.robot_id)
+        self._rig = rig
+        self._hear = hear
+        self._looked = looked
+        self._scan_every = scan_every
+        self._is_witness = is_witness
+        self._wanted = 0.0
+        self._heard: tuple[FeedbackRef, ...] = ()
+        self._uplink = Uplink(
+            rig.robot_id, "iveg", "b1", self._say, echoes=lambda: self._heard
+        )
+        self._machine = SafetyMachine(
+            rig.robot_id,
+            "b1",
+            now.mono,
+            stored=HoldSet(),
+            fresh=lambda: f"{rig.robot_id}-{next(texts)}",
+            limits=Limits(
+                rig.profile.max_speed,
+                rig.profile.max_turn,
+                outline=Outline(rig.profile.length, rig.profile.width),
+                plan=plan,
+                braking=rig.profile.braking,
+            ),
+        )
+        self._perform(self._machine.release_locally(now.mono), now)
+
+    def step(self, number: int, world: SimulatedWorld, now: Instant) -> None:
+        """Navigate, drive, sense."""
+        into_run = number * STEP_S
+        free = self._machine.may_drive
+        requested = self._rig.requested_twist(into_run, world) if free else REST
+        self._wanted = abs(requested.linear_x)
+        self._perform(self._machine.request_twist(requested, now.mono), now)
+        if self._faults.deaf and free:
+            self._rig.drive(requested)
+        self._rig.move(STEP_S)
+        moved = self._rig.odometry()
+        self._perform(self._machine.odometry(moved.pose, moved.twist, now.mono), now)
+        now = self._dated(now)
+        self._uplink.send(moved, now)
+        if self._scan_every and number % self._scan_every == 0:
+            scan = self._rig.scan(world)
+            if self._is_witness:
+                self._perform(self._machine.scan(scan, now.mono), now)
+            self._uplink.send(scan, now)
+        if number % _LOOK_EVERY == 1:
+            self._uplink.send(self._rig.detect(into_run, world), now)
+            self._looked(self._rig)
+        if number % _NAVIGATION_EVERY == 0:
+            intent = self._rig.navigation()
+            self._machine.note_path(intent.path, now.mono)
+            self._uplink.send(intent, now)
+
+    def _dated(self, now: Instant) -> Instant:
+        """Readings of its own clocks."""
+        return Instant(now.mono, now.wall + (self._faults.clock_offset_s or 0.0))
+
+    def obey(self, order: FaultOrder) -> None:
+        """Take faults of camera and navigation, ``mute``, ``deaf``, ``clock_offset_s``.
+
+        A mute robot's messages do not arrive; a deaf one ignores iVeg's speed limits,
+        but not holds.
+        """
+        self._faults = self._faults.changed_by(order)
+        self._rig.obey(order)
+
+    def listen(self, topic: str, payload: bytes, now: Instant) -> None:
+        """Take iVeg's feedback to a robot of the fleet."""
+        feedback = codec.read_feedback(payload)
+        effects = self._machine.feedback(topic, feedback, now.mono)
+        self._heard = self._machine.authors.echoes(now.mono)
+        self._perform(effects, now)
+
+    def order(self, payload: bytes, now: Instant) -> None:
+        """Take an order that iVeg sends to this robot."""
+        self._perform(self._machine.command(payload, now.mono), now)
+
+    @property
+    def speed(self) -> float:
+        """True speed (m/s)."""
+        return abs(self._rig.vehicle.twist.linear_x)
+
+    @property
+    def driving(self) -> Driving:
+        """How it may drive now."""
+        factor = self._machine.cap.factor if self._machine.may_drive else 0.0
+        return Driving(self._wanted, factor)
+
+    def _perform(self, effects: Sequence[Effect], now: Instant) -> None:
+        for effect in effects:
+            match effect:
+                case Drive(twist):
+                    self._rig.drive(twist)
+                case Report(report):
+                    seq, (_, message) = self._uplink.report(report, self._dated(now))
+                    self._machine.reported(seq, now.mono)
+                    self._say(message.topic, message.payload)
+                case SendAnswer(answer):
+                    message = self._uplink.answer(answer, self._dated(now))
+                    self._say(message.topic, message.payload)
+
+    def _say(self, topic: str, payload: bytes) -> None:
+        if not self._faults.mute:
+            self._hear(topic, payload)
 
 
 class Stage:
@@ -29,7 +269,6 @@ class Stage:
         move_clock: Advances the clock by seconds; returns the time.
         hear: Called with each message of a robot, from its creation on.
         looked, scan_every, plan, is_witness: As for ``StagedRobot``.
-        peer_scans: Scans for peers that iVeg has published; it grows.
 
     Attributes:
         robots: Its robots, by id.
@@ -48,7 +287,6 @@ class Stage:
         looked: Looked = lambda _: None,
         scan_every: int = 0,
         plan: Plan | None = None,
-        peer_scans: Sequence[PeerScan] = (),
         is_witness: bool = True,
     ) -> None:
         self._world = world
@@ -62,9 +300,7 @@ class Stage:
             )
             for robot_id, rig in world.rigs.items()
         }
-        self._scans = peer_scans
         self._delivered = 0
-        self._scans_delivered = 0
         self._steps = 0
 
     def step(self) -> None:
@@ -86,16 +322,92 @@ class Stage:
         self.robots[order.robot].obey(order)
 
     def _deliver(self) -> None:
-        """Deliver new feedback and scans to every robot."""
+        """Deliver new feedback to every robot."""
         new = self._feedback[self._delivered :]
         self._delivered += len(new)
         for feedback in new:
             payload = codec.write_feedback(feedback)
             for robot in self.robots.values():
                 robot.listen(feedback.robot_id, payload, self.now)
-        scans = self._scans[self._scans_delivered :]
-        self._scans_delivered += len(scans)
-        for scan in scans:
-            topic = names.PEER_SCAN_TOPIC.format(robot_id=scan.robot_id)
-            for robot in self.robots.values():
-                robot.listen_to_scan(topic, codec.write_peer_scan(scan))
+
+
+_SCAN_EVERY, _REST_EVERY = 2, 20
+"""Steps between two sweeps, and two rests for other tasks."""
+
+
+class VirtualRun:
+    """One scenario in a pipeline of its own.
+
+    Args:
+        step: The run.
+        rule: The rule as it stands; that of a run by the paper's rule is made of it.
+    """
+
+    def __init__(self, step: PlannedRun, rule: DetectionRule) -> None:
+        scenario = scenario_named(step.family)
+        greenhouse = load_greenhouse(scenario.greenhouse)
+        layout = lay_out(scenario, ROBOTS, greenhouse)
+        self._result = VirtualRecording()
+        self._looks: list[Row] = []
+        by_paper = step.rule == "paper"
+        if by_paper:
+            rule = replace(rule, possible_people=False, foresight=False)
+        self._iveg = iveg = VirtualPipeline(load_fleet(words=ROBOTS), greenhouse, rule)
+        self._views = Views(iveg.parts)
+        detector = DETECTORS[layout.detector or step.profile]
+        self._world = SimulatedWorld(greenhouse, layout, detector, step.seed)
+        self._stage = Stage(
+            self._world,
+            layout.incidents,
+            iveg.parts.ingest,
+            iveg.parts.loop,
+            iveg.feedback,
+            iveg.move,
+            iveg.hear,
+            looked=self._looked,
+            scan_every=0 if by_paper else _SCAN_EVERY,
+            plan=Plan.of(greenhouse),
+        )
+
+    async def play(self, seconds: float) -> VirtualRecording:
+        """Run from the start; yields to other tasks once a virtual second."""
+        for number in range(round(seconds / STEP_S)):
+            self._stage.step()
+            self._report()
+            if number % _REST_EVERY == 0:
+                await asyncio.sleep(0)
+        result, robots = self._result, self._iveg.parts.world.robots
+        result.decisions = [asdict(one) for one in self._iveg.decisions.values()]
+        result.completed = bool(result.reported) and all(
+            robots[one].link(self._iveg.now) == "LIVE" for one in ROBOTS
+        )
+        return result
+
+    def _looked(self, rig: RobotHardware) -> None:
+        """The truth at the moment of the picture."""
+        driving = self._stage.robots[rig.robot_id].driving
+        now = self._iveg.now.mono
+        self._looks.append(true_picture(rig, self._world, now, driving))
+
+    def _report(self) -> None:
+        """Keep what iVeg reports for the frames of this step, beside the truth."""
+        looks, self._looks = self._looks, []
+        for row in looks:
+            frame = self._views.frame(row["robot"], self._iveg.now)
+            self._result.truth.append(row)
+            self._result.foretold.append(foretold_row(self._iveg, row))
+            self._result.reported.append(
+                picture_of(frame.model_dump(mode="json"), row["at"])
+                if frame is not None
+                else Picture(row["robot"], row["at"], ())
+            )
+
+
+def foretold_row(iveg: VirtualPipeline, truth: Row) -> Row:
+    """Encounters with people that iVeg tells now of the robot of a row of the truth."""
+    people = [
+        {"x": round(one.zone.x, 3), "y": round(one.zone.y, 3)}
+        for one in iveg.parts.evaluator.encounters(truth["robot"], iveg.now)
+        if one.zone.reason == "person"
+    ]
+    return {"robot": truth["robot"], "at": truth["at"], "people": people}

@@ -1,15 +1,13 @@
-"""Tables of the report: the paper's numbers beside the measured ones."""
+"""Tables of the report: ours beside the paper's, and how people were protected."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from statistics import fmean
 from typing import Final
 
-from iveg.domain.latency.paper import PAPER, Place
-from iveg.domain.latency.segments import Data
+from iveg.domain.latency import PAPER, Data, Place
 from iveg.domain.records import Json
-from iveg.lab.experiment.cells import interval, ms
-from iveg.lab.experiment.outcome import timed_runs
-from iveg.lab.experiment.paper_tables import (
+from iveg.lab.experiment.messages import HOPS
+from iveg.lab.experiment.outcome import (
     CLASSES,
     COMPLETION,
     CONFIDENCE,
@@ -18,9 +16,33 @@ from iveg.lab.experiment.paper_tables import (
     P95_BELOW_MS,
     PRINTED,
     PaperScore,
-    disagreements,
+    timed_runs,
 )
-from iveg.lab.experiment.slices import HOPS
+from iveg.lab.experiment.protection import AHEAD_S, AWAY_M, SIGHTS, SLOW_SHARE
+
+
+def interval(rate: Mapping[str, float] | None) -> str:
+    """One share with its interval of confidence in a table; a dash for none."""
+    if rate is None:
+        return "–"
+    share, low, high = (100.0 * rate[name] for name in ("share", "low", "high"))
+    return f"{share:.1f} % [{low:.1f}, {high:.1f}]"
+
+
+def percent(share: float | None) -> str:
+    """One share in a table."""
+    return "–" if share is None else f"{share:.1%}"
+
+
+def seconds(value: float | None) -> str:
+    """One delay in a table (s)."""
+    return "–" if value is None else f"{value:.2f}"
+
+
+def ms(value: float | None) -> str:
+    """One duration in a table."""
+    return "–" if value is None else f"{value:.1f}"
+
 
 Result = Json
 Rows = Iterator[Sequence[object]]
@@ -30,14 +52,11 @@ DETECTION: Final = ("class", "source", "TP", "FP", "FN", "precision", "recall", 
 
 def detection(result: Result) -> Rows:
     """Per class, in total and in the mean."""
-    real = result["stack"]
     for class_id in CLASSES:
         yield _counts(class_id, "here", result["detection"][class_id])
-        yield _counts(class_id, "here, real time", real["detection"][class_id])
         for place, rows in PRINTED.items():
             yield _printed(class_id, place, rows[class_id])
     yield _counts("total", "here", result["global"])
-    yield _counts("total", "here, real time", real["global"])
     for place, row in GLOBAL.items():
         yield _printed("total", place, row)
     yield _means(result)
@@ -70,65 +89,26 @@ def _means(result: Result) -> Sequence[object]:
     return "mean", "here", "", "", "", *cells, ap
 
 
-PLACE: Final = (
-    *("class", "source", "n", "in the map, mean", "P95"),
-    *("in the robot's frame, mean", "P95"),
-)
-
-
-def place(result: Result) -> Rows:
-    """Distance of each correct detection from its target (m)."""
-    for source, half in (("here", result), ("here, real time", result["stack"])):
-        for class_id in CLASSES:
-            score = half["detection"][class_id]
-            cells = [
-                _metres(off, name)
-                for off in (score["place"]["map"], score["place"]["robot"])
-                for name in ("mean_m", "p95_m")
-            ]
-            yield class_id, source, score["tp"], *cells
-
-
-def _metres(off: Mapping[str, float] | None, name: str) -> str:
-    return "–" if off is None else f"{off[name]:.3f}"
-
-
-DISAGREES: Final = ("row", "table", "number", "printed", "follows")
-
-
-def disagreeing() -> Rows:
-    """Numbers of the paper's tables that do not follow from those beside them."""
-    for one in disagreements():
-        yield one.row, one.place, one.what, f"{one.printed:g}", f"{one.follows:g}"
-
-
 CLAIMS: Final = ("what the text says", "here", "paper, simulation", "paper, field")
 
 
 def claims(result: Result) -> Rows:
     """Numbers of the paper's text."""
-    done, real = result["completion"], result["stack"]["completion"]
-    here = f"{done['completed']} of {done['runs']}"
-    through = f"{real['completed']} of {real['runs']}"
+    done, of = result["completed"], len(timed_runs(result))
+    here = f"{done['counted']} of {of}"
+    through = f"{done['timed']} of {of}"
     shares = [f"{COMPLETION[place]:.0%}" for place in PRINTED]
     yield "runs completed", f"{here}; through all programs {through}", *shares
-    field = result["field"]
-    tested = f"{field['completed']} of {field['runs']}"
-    yield "runs completed of the field test with failures", tested, *shares
     confidence = result["global"]["confidence"]
     sure = [f"{CONFIDENCE[place]:.0%}" for place in PRINTED]
     yield "mean confidence", "–" if confidence is None else f"{confidence:.0%}", *sure
     yield "…of these at or above the rule's threshold", _confident(result), "", ""
     sent, lost, reordered = (
-        sum(row["messages"].get(name, 0) for row in result["latency"]["rows"])
+        sum(row["messages"].get(name, 0) for row in result["latency"])
         for name in ("sent", "lost", "reordered")
     )
     yield "messages that never came out of Orion", f"{lost} of {sent}", "none", ""
     yield "messages that came out of Orion after a later one", f"{reordered}", "", ""
-    read = result["stack"]["read"]
-    skipped = "messages that iVeg's own reading of the broker skipped for newer ones"
-    of = f"{read.get('skipped', 0)} of {read.get('passed', 0)}"
-    yield skipped, of, "", ""
     below = [f"below {P95_BELOW_MS[place]:.0f} ms" for place in PRINTED]
     worst = worst_p95(result)
     yield "P95 from robot to Orion", "–" if worst is None else f"{worst:.1f} ms", *below
@@ -137,7 +117,7 @@ def claims(result: Result) -> Rows:
 def _confident(result: Result) -> str:
     threshold = result["configuration"].get("confidence_threshold")
     tallies = (one["counted"]["classes"].values() for one in timed_runs(result))
-    found = [sure for each in tallies for one in each for sure in one["found"]]
+    found = [sure for each in tallies for one in each for sure in one.found]
     if threshold is None or not found:
         return "–"
     return f"{sum(one >= threshold for one in found) / len(found):.0%} ({threshold})"
@@ -145,7 +125,7 @@ def _confident(result: Result) -> str:
 
 def worst_p95(result: Result) -> float | None:
     """Greatest P95 of a kind of data from robot to Orion (ms)."""
-    hops = [row["hops"]["robot_orion"] for row in result["latency"]["rows"]]
+    hops = [row["hops"]["robot_orion"] for row in result["latency"]]
     return max((one["p95_ms"] or 0.0 for one in hops), default=0.0) or None
 
 
@@ -154,33 +134,33 @@ STOPS: Final = ("robot", "robot's answer", "standing")
 
 def stops(result: Result) -> Rows:
     """STOP of the fleet (ms since the request)."""
-    for one in result["stack"]["stops"]:
+    for one in result["stops"]:
         answered = ms(one["answer"]["direct"]["p50_ms"])
         yield one["robot_id"], answered, ms(one["standing"]["p50_ms"])
 
 
 LATENCY: Final = (
     *("data", "source", "n", "Δt₁", "P95", "n", "Δt₂", "P95"),
-    *("n", "total", "P95", "Orion first", "n", "Δt₃", "P95"),
+    *("n", "total", "P95", "Orion first"),
 )
 
 
 def latency(result: Result) -> Rows:
     """The paper's table (ms)."""
-    for one in result["latency"]["rows"]:
+    for one in result["latency"]:
         data: Data = one["data"]
-        up, on, total, decided = (
+        up, on, total = (
             (hop["count"], ms(hop["mean_ms"]), ms(hop["p95_ms"]))
             for hop in (one["hops"][name] for name in HOPS)
         )
-        yield data, "here", *up, *on, *total, _first(one["messages"]), *decided
+        yield data, "here", *up, *on, *total, _first(one["messages"])
         for place, printed in PAPER.items():
             row = printed[data]
             yield (
                 *(data, f"paper, {place}"),
                 *("", ms(row.uplink_mean), ms(row.uplink_p95)),
                 *("", ms(row.fiware_mean), ms(row.fiware_p95)),
-                *("", ms(row.total_mean), ms(row.total_p95), "", "", "", ""),
+                *("", ms(row.total_mean), ms(row.total_p95), ""),
             )
 
 
@@ -192,30 +172,65 @@ def _first(messages: Mapping[str, int]) -> str:
 
 RUNS: Final = (
     *("run", "scenario", "seed", "pictures", "completed"),
-    *("in real time", "completed", "Orion kept up", "load before", "after"),
+    *("completed in real time", "Orion kept up", "load before", "after"),
 )
 
 
 def runs(result: Result) -> Rows:
     """One line per run."""
     for one in timed_runs(result):
-        cells = [
+        counted, timed = one["counted"], one["timed"]
+        ends = counted["completed"], timed["completed"], timed["settled"]
+        said = ("yes" if is_so else "no" for is_so in ends)
+        chosen = one["number"], one["family"], one["seed"], counted["pictures"]
+        yield *chosen, *said, *one["load"]
+
+
+PROTECTION: Final = (
+    *("where", "detector", "rule", "in view (s)", "slowed", "behind plants (s)"),
+    *("slowed", "unseen (s)", "slowed", "encounters", "never slowed", "delay P50 (s)"),
+    *("P95", *(f"needless > {away_m:g} m" for away_m in AWAY_M), "driven (m)"),
+)
+
+
+ENTRIES: Final = (
+    *("where", "detector", "rule", "person", "entries"),
+    *(f"foretold ≥ {AHEAD_S:g} s", f"at ≤ {SLOW_SHARE:.0%} of the speed"),
+)
+
+
+_ENTERED: Final = {
+    "in_view": "in view for 2 s",
+    "stepped_out": "stepped into view later",
+    "unseen": "in no camera's view",
+}
+
+
+def protection(result: Result) -> Rows:
+    """Seconds with a person near a moving robot, encounters, and needless slowing."""
+    for one in result["protection"]:
+        near = (
             cell
-            for half in (one["counted"], one["stack"])
-            for cell in (half["pictures"], "yes" if half["completed"] else "no")
-        ]
-        kept_up = "yes" if one["stack"]["settled"] else "no"
-        yield one["number"], one["family"], one["seed"], *cells, kept_up, *one["load"]
+            for sight in SIGHTS
+            for cell in (
+                f"{one['near_s'][sight]:.1f}",
+                percent(one["slowed"][sight]),
+            )
+        )
+        delays = (seconds(one[name]) for name in ("delay_p50_s", "delay_p95_s"))
+        yield (
+            *(one["where"], one["profile"], one["rule"], *near),
+            *(one["encounters"], one["never_slowed"], *delays),
+            *map(percent, one["needless"].values()),
+            f"{one['driven_m']:.1f}",
+        )
 
 
-FIELD_TESTS: Final = ("run", "detector", "seed", "completed", "failed by")
-
-
-def field_tests(result: Result) -> Rows:
-    """One line per field test."""
-    for one in result["runs"]:
-        if one["fails"]:
-            half = one["counted"]
-            done = "yes" if half["completed"] else "no"
-            why = ", ".join(half["failures"]) or "–"
-            yield one["number"], one["profile"], one["seed"], done, why
+def entries(result: Result) -> Rows:
+    """How rings around people were entered."""
+    for one in result["protection"]:
+        for kind, name in _ENTERED.items():
+            entered = one["entries"][kind]
+            rates = percent(entered["foretold"]), percent(entered["slow"])
+            chosen = one["where"], one["profile"], one["rule"]
+            yield *chosen, name, entered["count"], *rates

@@ -15,6 +15,7 @@ from iveg.domain.observations import (
     Observation,
     Odometry,
     Origin,
+    ReportedObstacle,
     SafetyReport,
     Unplaced,
 )
@@ -109,6 +110,7 @@ def write_safety(value: SafetyReport) -> bytes:
                 "feedback_age_s": rounded(value.feedback_age_s),
                 **_faults(value),
                 **({"peer_scans": True} if value.peer_scans else {}),
+                **_obstacle(value.obstacle),
                 **write_origin(value.origin),
             }
         },
@@ -121,6 +123,13 @@ def _faults(value: SafetyReport) -> dict[str, object]:
         for one in value.faults
     ]
     return {"faults": found} if found else {}
+
+
+def _obstacle(value: ReportedObstacle | None) -> dict[str, object]:
+    if value is None:
+        return {}
+    x, y, width = (round(one, 2) for one in (value.x, value.y, value.width_m))
+    return {"obstacle": {"x": x, "y": y, "width_m": width, "moved": value.moved}}
 
 
 def write_unplaced(value: Unplaced) -> bytes:

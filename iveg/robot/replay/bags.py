@@ -1,27 +1,475 @@
 """ROS bags: odometry, scans and detections of recordings, placed by their TF."""
 
 import logging
-from collections.abc import Iterator
-from contextlib import suppress
-from datetime import UTC, datetime
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from iveg.adapters import clock
-from iveg.domain.errors import UnreadableError
+from rosbags.rosbag2 import Reader
+
+from iveg.domain.errors import DataFileError, UnreadableError
 from iveg.domain.geometry import Pose2D
-from iveg.robot.replay.bag_files import BagFile, BagMessage
-from iveg.robot.replay.bag_pass import BagPass, BagTree
-from iveg.robot.replay.bag_plan import AS_RECORDED, BagOptions, BagPlan, Use
+from iveg.domain.observations import (
+    UNKNOWN_ORIGIN,
+    DetectionFrame,
+    Instant,
+    LaserScan,
+    Odometry,
+)
+from iveg.robot.grounding import DEFAULT as GROUNDING
 from iveg.robot.replay.logs import RecordingEntry
-from iveg.ros2 import cdr, nav_msgs
+from iveg.robot.ros2.config import Frames
+from iveg.robot.ros2.detections import Boxes, Camera, Places
+from iveg.robot.ros2.reading import InputFaults, read_pose, read_scan, read_twist
+from iveg.robot.ros2.topics import BOXES, LOOKS
+from iveg.robot.ros2.transforms import IDENTITY, RigidTransform
+from iveg.ros2 import cdr
+from iveg.ros2 import detector_messages as d
+from iveg.ros2 import messages as ros
+from iveg.ros2.cdr import type_hash
+from iveg.ros2.messages import Message, definitions
+
+# --- bag files --------------------------------------------------------------------
+#
+# Bags of ROS 2 as files: their topics, and their messages as plain CDR.
+
+
+@dataclass(frozen=True, slots=True)
+class BagTopic:
+    """One topic of a bag, in one type.
+
+    Attributes:
+        count: Number of messages.
+        type_hash: ``RIHS01_…``; empty where the recorder wrote none.
+    """
+
+    name: str
+    type: str
+    count: int
+    type_hash: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class BagMessage:
+    """One message.
+
+    Attributes:
+        logged_s: When the recorder wrote it (Unix s).
+        payload: Plain CDR.
+    """
+
+    topic: str
+    logged_s: float
+    payload: bytes
+
+
+class BagFile:
+    """A bag, read from its start as often as asked, never held whole.
+
+    Args:
+        path: A file ``.db3`` or ``.mcap``, or a directory.
+
+    Raises:
+        DataFileError: it cannot be read.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        found: dict[tuple[str, str], BagTopic] = {}
+        with self._open() as reader:
+            for one in reader.connections:
+                key, count = (one.topic, one.msgtype), one.msgcount
+                if key in found:
+                    count += found[key].count
+                digest = one.digest if one.digest.startswith("RIHS01_") else ""
+                found[key] = BagTopic(*key, count, digest)
+        self.topics = tuple(found[key] for key in sorted(found))
+
+    def messages(self, topics: Collection[BagTopic]) -> Iterator[BagMessage]:
+        """Messages of these topics in the order in which they were recorded.
+
+        Raises:
+            DataFileError: the recording breaks off.
+        """
+        wanted = {(one.name, one.type) for one in topics}
+        with self._open() as reader:
+            connections = [
+                one for one in reader.connections if (one.topic, one.msgtype) in wanted
+            ]
+            records = reader.messages(connections=connections) if connections else ()
+            for connection, logged, data in records:
+                yield BagMessage(connection.topic, logged / 1e9, bytes(data))
+
+    @contextmanager
+    def _open(self) -> Iterator[Reader]:
+        try:
+            with Reader(self.path) as reader:
+                yield reader
+        except Exception as error:  # whatever a foreign or damaged file provokes
+            said = " ".join(str(error).split()) or type(error).__name__
+            raise self.unusable(f"cannot be read: {said.rstrip('.')}") from error
+
+    def unusable(self, reason: str) -> DataFileError:
+        """The error that this bag cannot be used; ``reason`` without its full stop."""
+        return DataFileError(str(self.path), "", f"{reason}.")
+
+
+# --- bag plan ---------------------------------------------------------------------
+#
+# Which topics of a bag are read, and as what.
+
+DETECTORS: tuple[type[Message], ...] = tuple(dict.fromkeys((*BOXES, *LOOKS)))
+_Forms = Sequence[type[Message]]
+_PREFERRED: tuple[_Forms, ...] = (
+    tuple(one for one in BOXES if one not in LOOKS),
+    tuple(one for one in BOXES if one in LOOKS),
+    tuple(one for one in LOOKS if one not in BOXES),
+)
+"""Detectors of one row exclude each other."""
+_FORMS: tuple[type[Message], ...] = (
+    ros.Odometry,
+    ros.LaserScan,
+    ros.TFMessage,
+    ros.Image,
+    ros.CameraInfo,
+    *DETECTORS,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class BagOptions:
+    """Choices for reading a bag.
+
+    Attributes:
+        odometry: Topic to read; None takes the only one of its type; ``scan`` likewise.
+        detections: Likewise, boxes with depth before those without.
+        depth: Depth picture for boxes without; None takes the only picture whose
+            topic names depth.
+        camera_info: Of the depth picture; None takes the one beside it.
+        bag_time: A bag is timed by its recording times, not by sensor stamps.
+    """
+
+    odometry: str | None = None
+    scan: str | None = None
+    bag_time: bool = False
+    detections: str | None = None
+    depth: str | None = None
+    camera_info: str | None = None
+
+
+AS_RECORDED = BagOptions()
+"""The only topic of each type, by sensor stamps."""
+
+
+@dataclass(frozen=True, slots=True)
+class Use:
+    """A topic with its role and the type it is read in."""
+
+    topic: BagTopic
+    role: str
+    form: type[Message]
+
+
+class BagPlan:
+    """Uses of all topics of a bag.
+
+    Args:
+        file: The bag.
+        options: Topics that are named.
+
+    Raises:
+        DataFileError: its topics leave open which is meant.
+    """
+
+    def __init__(self, file: BagFile, options: BagOptions) -> None:
+        self._file = file
+        self.read: dict[str, Use] = {}
+        self._whys: dict[BagTopic, str] = {}
+        self._choose("odometry", (ros.Odometry,), options.odometry, "--odom-topic")
+        self._choose("scan", (ros.LaserScan,), options.scan, "--scan-topic")
+        for one in self._named((ros.TFMessage,)):
+            self._use(one, "tf_static" if one.name.endswith("tf_static") else "tf")
+        self._choose_detector(options)
+
+    def has(self, *roles: str) -> bool:
+        """Whether a topic is read as one of these."""
+        return any(use.role in roles for use in self.read.values())
+
+    def table(self) -> list[str]:
+        """One line a topic: name, type, messages, and what becomes of it."""
+        rows = [
+            (one.name, one.type, str(one.count), self._fate(one))
+            for one in self._file.topics
+        ]
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        return ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
+
+    def _fate(self, topic: BagTopic) -> str:
+        use = self.read.get(topic.name)
+        if use is not None and use.topic == topic:
+            return use.role
+        return f"ignored: {self._whys.get(topic, 'not needed')}"
+
+    def _choose(
+        self, role: str, forms: _Forms, wanted: str | None, option: str
+    ) -> Use | None:
+        """Choose the topic of a role; None where there is none.
+
+        Raises:
+            DataFileError: several, or the named one is not there.
+        """
+        chosen = self._named(forms, wanted, option)
+        if len(chosen) > 1:
+            raise self._file.unusable(f"{option} must name one of {self._all(forms)}")
+        return self._use(chosen[0], role) if chosen else None
+
+    def _named(
+        self, forms: _Forms, wanted: str | None = None, option: str = ""
+    ) -> list[BagTopic]:
+        """Topics of these types, or the one that is named.
+
+        Raises:
+            DataFileError: that one is not there.
+        """
+        kinds = {one.ROS for one in forms}
+        found = [one for one in self._file.topics if one.type in kinds]
+        named = [one for one in found if wanted in (None, one.name)]
+        if wanted is not None and not named:
+            reason = f"{option} {wanted} is not among {self._all(forms)}"
+            raise self._file.unusable(reason)
+        return named
+
+    def _all(self, forms: _Forms) -> str:
+        names = ", ".join(sorted({one.name for one in self._named(forms)})) or "none"
+        return f"those of {' or '.join(one.ROS for one in forms)}: {names}"
+
+    def _use(self, topic: BagTopic, role: str) -> Use | None:
+        """Read a topic, unless its type has other fields under the same name."""
+        form = next(one for one in _FORMS if topic.type == one.ROS)
+        if topic.type_hash not in ("", *map(type_hash, definitions(form))):
+            self._whys[topic] = f"another definition, {topic.type_hash}"
+            return None
+        return self.read.setdefault(topic.name, Use(topic, role, form))
+
+    def _choose_detector(self, options: BagOptions) -> None:
+        """Boxes with depth first; those without need a depth picture and its camera."""
+        wanted, option = options.detections, "--detections-topic"
+        kinds = _PREFERRED if wanted is None else (DETECTORS,)
+        choices = (self._choose("detections", one, wanted, option) for one in kinds)
+        chosen = next((one for one in choices if one is not None), None)
+        if chosen is None or chosen.form not in LOOKS or self._take_depth(options):
+            return
+        if chosen.form not in BOXES:
+            del self.read[chosen.topic.name]
+            self._whys[chosen.topic] = (
+                "boxes in a picture; no --depth-topic with its --camera-info-topic"
+            )
+
+    def _take_depth(self, options: BagOptions) -> bool:
+        """Take the depth picture and its camera; whether both are there."""
+        depth = [
+            one
+            for one in self._named((ros.Image,), options.depth, "--depth-topic")
+            if options.depth or "depth" in one.name.lower()
+        ]
+        wanted, option = options.camera_info, "--camera-info-topic"
+        cameras = self._named((ros.CameraInfo,), wanted, option)
+        if len(depth) != 1:
+            return False
+        beside = f"{depth[0].name.rpartition('/')[0]}/camera_info"
+        info = [one for one in cameras if one.name == beside] or cameras
+        if len(info) != 1:
+            return False
+        taken = self._use(depth[0], "depth"), self._use(info[0], "camera_info")
+        return None not in taken
+
+
+# --- bag pass ---------------------------------------------------------------------
+#
+# One pass over a bag: its messages as observations in ``map``, as on a live robot.
+#
+# What a bag leaves out is stood in for: without ``map`` the root of its odometry is
+# ``map``; without odometry among its transforms the odometry itself leads to the robot;
+# without the frame of its laser the laser sits where the fleet file says.
+
+_MAX_AGE_S = 1.0
+"""Greatest age of a transform (s); maps are corrected less often in recordings."""
+BagObservation = Odometry | LaserScan | DetectionFrame
+_UNPLACED = "boxes without depth"
+_OWN = "odometry", "scan"
+"""Each message gives an observation of its own."""
+
+
+class BagPass:
+    """State of one pass.
+
+    Args:
+        uses: Topics that are read, by name.
+        tree: Links of the bag that are known before its first message.
+        mount: The laser's pose in ``base_link``, unless the bag has it.
+    """
+
+    def __init__(self, uses: Mapping[str, Use], tree: "BagTree", mount: Pose2D) -> None:
+        self._mount = mount
+        self._tree = tree
+        self._notes = _Notes()
+        self._places = Places(tree.frames, _MAX_AGE_S, self._notes)
+        for links in tree.links:
+            self._places.add(links, static=True)
+        names = {use.role: name for name, use in uses.items()}
+        seen = names.get("detections", "")
+        self._boxes = Boxes(seen, (), self._places, self._notes)
+        called = {"detections_2d": seen, "depth": names.get("depth", "")}
+        self._camera = Camera(called, (), GROUNDING, self._places, self._notes)
+        self._works: dict[str, Callable[[Any, Instant], BagObservation | None]] = {
+            "odometry": self._odometry,
+            "scan": self._scan,
+            "detections": self._detections,
+            "depth": self._camera.add_depth,
+            "camera_info": self._camera.set_info,
+            "tf": lambda one, _: self._places.add(one, static=False),
+            "tf_static": lambda one, _: self._places.add(one, static=True),
+        }
+
+    def observe(self, use: Use, message: object, now: float) -> BagObservation | None:
+        """The observation of one message; ``now`` is when it was written (s).
+
+        Raises:
+            UnreadableError: values out of range.
+        """
+        self._notes.reasons.clear()
+        return self._works[use.role](message, Instant(now, now))
+
+    def late_frame(self, now: float) -> DetectionFrame | None:
+        """The detection frame that has waited for its depth picture."""
+        return self._camera.locate(now)
+
+    def why_lost(self, use: Use, found: BagObservation | None) -> str:
+        """Why a message gave no observation, or a box no place; else empty."""
+        unplaced = isinstance(found, DetectionFrame) and found.unread
+        if not unplaced and (found is not None or use.role not in _OWN):
+            return ""
+        return next(iter(self._notes.reasons), _UNPLACED)
+
+    def _odometry(self, message: ros.Odometry, now: Instant) -> Odometry | None:
+        if self._tree.lacks_base:
+            pose = read_pose(message)
+            self._places.add(_link(message, pose), static=False)
+        place = self._places.locate(message, now.mono)
+        if place is None:
+            return None
+        twist = read_twist(message.twist.twist)
+        return Odometry("", UNKNOWN_ORIGIN, place.flat(), twist)
+
+    def _scan(self, message: ros.LaserScan, now: Instant) -> LaserScan | None:
+        frame, stamp = message.header.frame_id, message.header.stamp.seconds
+        if not self._tree.has_mount(frame):
+            return replace(read_scan(message, IDENTITY), mount=self._mount)
+        mount = self._places.on_robot(frame, stamp, now.mono)
+        return None if mount is None else read_scan(message, mount)
+
+    def _detections(self, message: Message, now: Instant) -> DetectionFrame | None:
+        if type(message) in BOXES and (type(message) not in LOOKS or _is_3d(message)):
+            return self._boxes.locate(message, now.mono)
+        self._camera.replace_look(message, now)
+        return None
+
+
+class BagTree:
+    """Frames of a bag, as far as its beginning tells.
+
+    Args:
+        static: All static messages.
+        moving: The first of the others.
+        odometry: The first odometry; None without.
+
+    Attributes:
+        frames: Names of the robot's frames in the bag.
+        lacks_base: Odometry must stand in for its own transform.
+        links: What is known before the first message.
+    """
+
+    def __init__(
+        self,
+        static: Sequence[ros.TFMessage],
+        moving: Sequence[ros.TFMessage],
+        odometry: ros.Odometry | None,
+    ) -> None:
+        self._parents = {
+            _bare(one.child_frame_id): _bare(one.header.frame_id)
+            for message in (*static, *moving)
+            for one in message.transforms
+        }
+        usual = Frames()
+        odom = base = ""
+        if odometry is not None:
+            odom = _bare(odometry.header.frame_id)
+            base = _bare(odometry.child_frame_id)
+        odom, base = odom or usual.odom, base or usual.base_link
+        if usual.base_link in self._up(base) or base in self._up(usual.base_link):
+            base = usual.base_link  # odometry of a footprint
+        self.frames = Frames(usual.map, odom, base)
+        self.lacks_base = not {odom, usual.map} & set(self._up(base))
+        root = self._up(odom)[-1]
+        self.links = [*static]
+        if usual.map not in self._up(odom):
+            header = ros.Header(frame_id=usual.map)
+            self.links.append(ros.TFMessage((ros.TransformStamped(header, root),)))
+
+    def has_mount(self, frame: str) -> bool:
+        """Whether the bag tells where a frame is on the robot."""
+        return bool(self._parents) and self.frames.base_link in self._up(_bare(frame))
+
+    def _up(self, frame: str) -> list[str]:
+        """A frame and its ancestors."""
+        found = [frame]
+        while (outer := self._parents.get(found[-1])) and outer not in found:
+            found.append(outer)
+        return found
+
+
+class _Notes(InputFaults):
+    """Reasons of what was just lost, beside faults that last."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.reasons: dict[str, None] = {}
+
+    def note(
+        self, code: str, about: str, now: float, for_s: float | None = None
+    ) -> None:
+        """Keep the reason, too."""
+        super().note(code, about, now, for_s)
+        self.reasons[f"{code}, {about}"] = None
+
+
+def _link(odometry: ros.Odometry, pose: RigidTransform) -> ros.TFMessage:
+    """Odometry as a transform."""
+    transform = ros.Transform(ros.Vector3(*pose.move), ros.Quaternion(*pose.q))
+    child = odometry.child_frame_id or Frames().base_link
+    one = ros.TransformStamped(odometry.header, child, transform)
+    return ros.TFMessage((one,))
+
+
+def _is_3d(message: Message) -> bool:
+    return isinstance(message, d.DetectionArray) and any(
+        one.bbox3d.frame_id for one in message.detections
+    )
+
+
+def _bare(frame: str) -> str:
+    return frame.lstrip("/")
+
+
+# --- bags -------------------------------------------------------------------------
 
 __all__ = ["AS_RECORDED", "Bag", "BagOptions"]
 
 _log = logging.getLogger(__name__)
 _LONGEST_S = 1e7
-_FUTURE_S = 86_400.0
 _LINKS_AHEAD = 2000
 """Messages of TF that tell, before the first pass, which frames there are."""
 _STAMPED = "odometry", "scan", "detections"
@@ -31,14 +479,13 @@ class Bag:
     """One recording of ROS, read from its start as often as asked, never held whole.
 
     Args:
-        path: A file ``.db3``, ``.mcap`` or ``.bag``, or a directory of ROS 2.
+        path: A file ``.db3`` or ``.mcap``, or a directory.
         options: Topics and clock.
         mount: The laser's pose in ``base_link``, unless the bag has it.
         needs_odometry: Whether a bag without it is refused.
 
     Raises:
         DataFileError: it cannot be read, or its topics leave open which is meant.
-        MissingExtraError: rosbags is not installed.
     """
 
     def __init__(
@@ -54,7 +501,7 @@ class Bag:
         if not plan.has("odometry") and (
             needs_odometry or not plan.has("scan", "detections")
         ):
-            raise self._file.unusable(f"holds no topic of type {nav_msgs.Odometry.ROS}")
+            raise self._file.unusable(f"holds no topic of type {ros.Odometry.ROS}")
         self._mount = mount
         self._reported: set[str] = set()
         self._tree = self._look_ahead()
@@ -63,14 +510,12 @@ class Bag:
         first = next(self._messages(*_STAMPED), None)
         stamp = 0.0 if first is None else first[1].header.stamp.seconds
         self._bag_time = options.bag_time or (first is not None and stamp <= 0.0)
-        if first is not None:
-            self._tell_future(first[0].logged_s if self._bag_time else stamp)
 
     def entries(self) -> Iterator[RecordingEntry]:
         """All entries, in the order in which they were recorded.
 
-        A message that cannot be used is skipped and counted; the first of a topic is
-        reported, and one with an absurd stamp is omitted.
+        A message that cannot be used is skipped; the first of a topic is reported, and
+        one with an absurd stamp is omitted.
 
         Raises:
             DataFileError: the recording breaks off.
@@ -80,10 +525,9 @@ class Bag:
         look_at = 0.0
         for recorded, use in self._records():
             try:
-                message = self._read(recorded, use)
+                message = cdr.read(use.form, recorded.payload)
                 found = this.observe(use, message, recorded.logged_s)
             except UnreadableError as error:
-                this.losses[recorded.topic, error.reason] += 1
                 self._report(recorded, str(error))
                 continue
             at = self._time(recorded, message)
@@ -93,13 +537,14 @@ class Bag:
                 look_at = at
             if found is None:
                 found, at = this.late_frame(recorded.logged_s), look_at
+            if why := this.why_lost(use, found):
+                self._report(recorded, why)
             if (
                 found is not None
                 and start is not None
                 and abs(at - start) <= _LONGEST_S
             ):
                 yield RecordingEntry(at - start, found)
-        self._tell_counts(this)
 
     def _time(self, recorded: BagMessage, message: object) -> float:
         header = getattr(message, "header", None)
@@ -123,10 +568,7 @@ class Bag:
         """Those of them that can be read."""
         for recorded, use in self._records(*roles):
             with suppress(UnreadableError):
-                yield recorded, self._read(recorded, use)
-
-    def _read(self, recorded: BagMessage, use: Use) -> object:
-        return cdr.read(use.form, recorded.payload)
+                yield recorded, cdr.read(use.form, recorded.payload)
 
     def _look_ahead(self) -> BagTree:
         """Which frames the bag has."""
@@ -148,21 +590,3 @@ class Bag:
             round(recorded.logged_s * 1e9),
             why,
         )
-
-    def _tell_future(self, start: float) -> None:
-        if start > clock.wall() + _FUTURE_S:
-            day = datetime.fromtimestamp(min(start, 2.5e11), UTC).date()
-            _log.warning(
-                "%s is of %s, which is still to come: it plays by the differences.",
-                self._file.path,
-                day,
-            )
-
-    def _tell_counts(self, this: BagPass) -> None:
-        """What became of each topic's messages; one that gave nothing is no detail."""
-        for topic, count in sorted(this.used.items()):
-            _log.info("%s, %s: %d used", self._file.path, topic, count)
-        for (topic, why), count in sorted(this.losses.items()):
-            level = logging.INFO if this.used[topic] else logging.WARNING
-            slots = self._file.path, topic, count, why
-            _log.log(level, "%s, %s: %d not used: %s", *slots)

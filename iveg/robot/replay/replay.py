@@ -8,8 +8,10 @@ and detections are repeated, as the sensors of a robot at rest do.
 """
 
 import asyncio
-from collections.abc import Callable, Mapping, Sequence
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from iveg.adapters import clock
@@ -17,18 +19,226 @@ from iveg.domain.errors import DataFileError
 from iveg.domain.fleet import NOBODY, FleetDescription, RobotProfile
 from iveg.domain.geometry import REST, Pose2D, Twist2D
 from iveg.domain.observations import (
+    Detection,
     DetectionFrame,
     LaserScan,
     Navigation,
     Odometry,
     Origin,
 )
-from iveg.robot.node import RobotNode
-from iveg.robot.node_settings import NodeSettings
-from iveg.robot.pacing import every
-from iveg.robot.replay.bags import AS_RECORDED, BagOptions
-from iveg.robot.replay.playback import Playback
-from iveg.robot.replay.recordings import open_recording
+from iveg.robot.node import NodeSettings, RobotNode, every
+from iveg.robot.replay.bags import AS_RECORDED, Bag, BagOptions
+from iveg.robot.replay.logs import LogReader, OwnRecording, RecordingEntry, is_own
+
+# --- playback ---------------------------------------------------------------------
+#
+# A recording at a moment of its own time, independent of the pace it is played at.
+
+_READ_AHEAD = 256
+"""Entries searched for the next pose; beyond, the last pose is kept."""
+
+_SEEN_FOR_S = 0.4
+"""Time (s of the recording) that detections count, unless others follow."""
+_SILENT_S = 1.0
+"""Time that a whole frame counts (s): a detector without one since is silent."""
+_ONE_PICTURE_S = 0.02
+"""Detections within this time (s) are one frame; frames come 30 times a second."""
+
+
+class Playback:
+    """Position in a recording.
+
+    Args:
+        open_: Returns the entries from the start; at least one is odometry.
+        loop: Starts over at the end.
+
+    Attributes:
+        ended: Whether the last entry was played; never with ``loop``.
+        has_detector: Whether a detection was read: then none means an empty frame; of
+            whole frames, empty ones too, whether one is at most a second old.
+        unread: Class of each box of the newest frame that has no place.
+    """
+
+    def __init__(
+        self, open_: Callable[[], Iterator[RecordingEntry]], *, loop: bool
+    ) -> None:
+        self._open = open_
+        self._loop = loop
+        self.ended = False
+        self.has_detector = self._is_frame = False
+        self._start_over()
+
+    def _start_over(self) -> None:
+        self._source = self._open()
+        self._ahead: deque[RecordingEntry] = deque()
+        self._poses_ahead: deque[tuple[float, Odometry]] = deque()
+        self._picture: tuple[Detection, ...] = ()
+        self.unread: tuple[str | None, ...] = ()
+        self.has_detector = self.has_detector and not self._is_frame
+        self._seen_at = 0.0
+        self._scan: LaserScan | None = None
+        self._read_ahead()
+        self._at = self._ahead[0].at if self._ahead else 0.0
+        while not self._poses_ahead and self._ahead:
+            self._apply(self._ahead.popleft())
+            self._read_ahead()
+        self._last = self._poses_ahead[0]
+
+    def advance(self, seconds: float) -> None:
+        """Advance by ``seconds`` of the recording."""
+        self._at += seconds
+        while self._ahead and self._ahead[0].at <= self._at:
+            self._apply(self._ahead.popleft())
+            self._read_ahead()
+        age = self._at - self._seen_at
+        if age >= (_SILENT_S if self._is_frame else _SEEN_FOR_S):
+            self._picture, self.unread = (), ()
+            self.has_detector = self.has_detector and not self._is_frame
+        if not self._ahead and self._loop:
+            self._start_over()
+        self.ended = not self._ahead and not self._loop
+
+    def _read_ahead(self) -> None:
+        while not self._poses_ahead and len(self._ahead) < _READ_AHEAD:
+            entry = next(self._source, None)
+            if entry is None:
+                return
+            self._ahead.append(entry)
+            if isinstance(entry.observation, Odometry):
+                self._poses_ahead.append((entry.at, entry.observation))
+
+    def _apply(self, entry: RecordingEntry) -> None:
+        match entry.observation:
+            case Odometry():
+                self._last = self._poses_ahead.popleft()
+            case LaserScan() as scan:
+                self._scan = scan
+            case Detection() as detection:
+                self.has_detector = True
+                self._see(detection, entry.at)
+            case DetectionFrame(detections=seen, unread=unread):
+                self.has_detector = self._is_frame = True
+                self._picture, self.unread, self._seen_at = seen, unread, entry.at
+
+    def _see(self, detection: Detection, at: float) -> None:
+        """The newest frame replaces the one before: a walking person counts once."""
+        if not self._picture or abs(at - self._seen_at) > _ONE_PICTURE_S:
+            self._picture, self._seen_at = (), at
+        self._picture = (*self._picture, detection)
+
+    # --- sensor values at this moment ---------------------------------------------
+
+    @property
+    def motion(self) -> tuple[Pose2D, Twist2D]:
+        """Pose and speeds, interpolated between two recorded poses."""
+        at, last = self._last
+        if not self._poses_ahead or self._poses_ahead[0][0] <= at:
+            return last.pose, last.twist
+        then, following = self._poses_ahead[0]
+        part = min(max((self._at - at) / (then - at), 0.0), 1.0)
+        twist = Twist2D(
+            last.twist.linear_x
+            + part * (following.twist.linear_x - last.twist.linear_x),
+            last.twist.angular_z
+            + part * (following.twist.angular_z - last.twist.angular_z),
+        )
+        return last.pose.interpolate(following.pose, part), twist
+
+    @property
+    def scan(self) -> LaserScan | None:
+        """The newest scan; the same object until the next."""
+        return self._scan
+
+    @property
+    def detections(self) -> tuple[Detection, ...]:
+        """Detections of the newest frame; none when it is too old."""
+        return self._picture
+
+
+# --- recordings -------------------------------------------------------------------
+#
+# Recordings of any format as entries in time: logs of JSON lines, ROS bags, iVeg's.
+
+_LOGS, _BAGS = (".jsonl", ".gz"), (".db3", ".mcap")
+
+
+Recording = Callable[[], Iterator[RecordingEntry]]
+"""Plays one recorded run of one robot from the start; at least one entry is odometry.
+It raises DataFileError when the recording is truncated."""
+
+
+def open_recording(
+    path: Path,
+    mount: Pose2D,
+    bag: BagOptions = AS_RECORDED,
+    *,
+    pose: Pose2D | None = None,
+    tell: Callable[[str], None] = lambda _: None,
+) -> Recording:
+    """Open a recording by its file name.
+
+    Args:
+        path: ``.jsonl``, ``.jsonl.gz``, ``.db3``, ``.mcap``, or a directory;
+            of iVeg's own recordings also ``FILE.mcap#ROBOT``.
+        mount: Pose of a bag's laser in ``base_link``; logs contain it.
+        bag: Topics and clock of a bag.
+        pose: Fixed pose of a recording without odometry, such as a camera's.
+        tell: Takes a line for each topic of a bag: what becomes of it.
+
+    Raises:
+        DataFileError: unknown format, unreadable file, or neither odometry nor a fixed
+            pose.
+    """
+    recording = _opened(path, mount, bag, tell, fixed=pose is not None)
+    if any(isinstance(one.observation, Odometry) for one in recording()):
+        return recording
+    if pose is None:
+        reason = "holds no odometry that can be used; --pose says where it stands."
+        raise DataFileError(str(path), "", reason)
+    if next(recording(), None) is None:
+        raise DataFileError(str(path), "", "holds nothing that can be used.")
+    return partial(_fixed, recording, pose)
+
+
+def _opened(
+    path: Path,
+    mount: Pose2D,
+    bag: BagOptions,
+    tell: Callable[[str], None],
+    *,
+    fixed: bool,
+) -> Recording:
+    stem, _, robot_id = str(path).partition(".mcap#")
+    own = Path(f"{stem}.mcap") if robot_id else path
+    if own.suffix == ".mcap" and is_own(own):
+        return OwnRecording(own, robot_id or None).entries
+    if robot_id and own.is_file():
+        reason = (
+            "is no recording of iVeg's that can be read, so # names no robot in it."
+        )
+        raise DataFileError(str(own), "", reason)
+    if path.is_dir() or path.suffix in _BAGS:
+        opened = Bag(path, bag, mount, needs_odometry=not fixed)
+        for line in (f"{path}:", *opened.plan.table()):
+            tell(line)
+        return opened.entries
+    if path.suffix in _LOGS:
+        return LogReader(path).entries
+    known = ", ".join((*_LOGS[:1], ".jsonl.gz", *_BAGS))
+    reason = f"is none of {known}, and no directory of a bag."
+    raise DataFileError(str(path), "", reason)
+
+
+def _fixed(recording: Recording, pose: Pose2D) -> Iterator[RecordingEntry]:
+    """Entries of a static sensor: its pose precedes all others."""
+    entries = recording()
+    first = next(entries)
+    yield RecordingEntry(first.at, Odometry("", Origin(), pose, REST))
+    yield first
+    yield from entries
+
+
+# --- replay -----------------------------------------------------------------------
 
 TASK = "replay"
 """Task of a replayed robot; iVeg recognises replays by the mark of their messages."""

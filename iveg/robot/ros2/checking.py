@@ -1,231 +1,260 @@
-"""``iveg robot check``: endpoints on DDS, missing ones, and bypasses of the gate.
+"""Faults that endpoints on DDS give away: of a running gate, and ``robot check``."""
 
-Without I/O: from a few seconds of observed traffic it derives the report that an
-operator needs before the robot moves.
-"""
-
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
+from iveg.domain.observations import RobotFault
 from iveg.robot.ros2.config import RobotConfig
-from iveg.robot.ros2.drive import message_of
-from iveg.robot.ros2.lookout import deafness
+from iveg.robot.ros2.outputs import message_of
+from iveg.robot.ros2.reading import InputFaults
 from iveg.robot.ros2.topics import TOPICS, sensed_topics
-from iveg.robot.ros2.transforms import NoTransformError, TransformBuffer
-from iveg.robot.ros2.verdict import CheckRow, CheckVerdict
+from iveg.ros2.cdr import type_hash
+from iveg.ros2.messages import Message, definitions
 from iveg.ros2.names import Endpoint, Qos
-from iveg.ros2.type_hash import definition, type_hash
 
-_NEEDED = ("odometry", "tf")
-_WANTED = ("scan",)
-_LEAST_HZ = {"odometry": 5.0, "scan": 2.0, "tf": 2.0}
+# --- lookout ----------------------------------------------------------------------
+#
+# Faults of a running gate that the endpoints of others give away.
+#
+# Without I/O: endpoints and times (monotonic, s) are arguments.
+
+_MET_WITHIN_S = 5.0
 
 
-@dataclass(slots=True)
-class Heard:
-    """Messages received on one topic.
+class Lookout:
+    """Notes what is wrong with the endpoints of others.
 
-    Attributes:
-        count: Number of messages.
-        unreadable: Number that could not be read.
-        age_s: Age of the newest by its stamp, on our clock (s); None: unstamped.
-        frame: Frame of the newest.
+    Args:
+        config: Names and types of the robot's topics.
+        input_faults: Record of faults.
+        now: Start (monotonic, s).
     """
 
-    count: int = 0
-    unreadable: int = 0
-    age_s: float | None = None
+    def __init__(
+        self, config: RobotConfig, input_faults: InputFaults, now: float
+    ) -> None:
+        self._config, self._names = config, config.full_topics
+        self._input_faults = input_faults
+        self._alone_since = self._unheard_since = now
+
+    def look(
+        self, endpoints: Iterable[Endpoint], unheard: Iterable[str], now: float
+    ) -> None:
+        """Judge the endpoints of this moment, and interfaces where nobody is met."""
+        for interface in unheard:
+            self._input_faults.note("network_unheard", interface, now)
+        others = [one for one in endpoints if not one.own]
+        out = self._names["cmd_vel_out"]
+        if any(one.writes and one.topic == out for one in others):
+            self._input_faults.note("second_publisher", out, now)
+        if others:
+            self._alone_since = now
+            self._note_unheard(others, now)
+            self._note_types(others, now)
+        elif now - self._alone_since > _MET_WITHIN_S:
+            domain = f"DDS {self._config.domain}"
+            self._input_faults.note("nobody_there", domain, now)
+
+    def _note_unheard(self, others: Sequence[Endpoint], now: float) -> None:
+        """A base that cannot hear the gate obeys no STOP either."""
+        out = self._names["cmd_vel_out"]
+        message = message_of(stamped=self._config.drive.stamped_out)
+        offered = self._config.qualities["cmd_vel_out"]
+        readers = [one for one in others if one.topic == out and not one.writes]
+        for reader in readers:
+            why = deafness(reader, message, offered)
+            if why:
+                self._input_faults.note("drive_unheard", f"{out}: {why}", now)
+        if readers:
+            self._unheard_since = now
+        elif now - self._unheard_since > _MET_WITHIN_S:
+            self._input_faults.note("drive_unheard", out, now)
+
+    def _note_types(self, others: Sequence[Endpoint], now: float) -> None:
+        for topic, name in sensed_topics(self._names).items():
+            kinds = {one.type for one in others if one.writes and one.topic == name}
+            for kind in kinds:
+                if TOPICS[topic].form(kind) is None:
+                    about = f"{name}: {kind.replace('/msg/', '/')}"
+                    self._input_faults.note("wrong_type", about, now)
+
+
+def deafness(reader: Endpoint, message: type[Message], offered: Qos) -> str:
+    """Why a reader does not hear a writer: what is sent → what it wants; else empty."""
+    if reader.type != message.ROS:
+        return f"{_short(message.ROS)} → {_short(reader.type)}"
+    if reader.qos.reliable and not offered.reliable:
+        return "best effort → reliable"
+    if reader.qos.transient_local and not offered.transient_local:
+        return "volatile → transient local"
+    return ""
+
+
+def _short(ros_type: str) -> str:
+    return ros_type.rpartition("/")[2]
+
+
+def forms_published(
+    topic: str, name: str, endpoints: Iterable[Endpoint]
+) -> list[tuple[type[Message], bool]]:
+    """Types in which others publish a topic (key and full name), of those read.
+
+    True beside one says that its messages have to be taken whatever their fields are.
+    """
+    found: dict[tuple[type[Message], bool], None] = {}
+    for one in endpoints:
+        form = TOPICS[topic].form(one.type)
+        if one.writes and not one.own and one.topic == name and form is not None:
+            forms = definitions(form) if one.typed else (form,)
+            found |= dict.fromkeys((kind, not one.typed) for kind in forms)
+    return list(found)
+
+
+# --- checking ---------------------------------------------------------------------
+#
+# ``iveg robot check``: a list of topics, and what is wrong with each.
+#
+# Without I/O: a few seconds of the gate's own inputs, and the endpoints on DDS.
+
+_LEAST_HZ = {"odometry": 5.0, "tf": 2.0, "scan": 2.0, "camera_info": 0.3}
+_LEAST_HZ |= dict.fromkeys(("detections_3d", "detections_2d", "depth"), 1.0)
+"""Rates below which a topic is called slow."""
+_DETECTORS = "detections_3d", "detections_2d"
+
+
+@dataclass(frozen=True, slots=True)
+class CheckRow:
+    """One line of the table; ``verdict`` is empty where nothing is wrong."""
+
+    topic: str
+    type: str = ""
+    writers: int = 0
+    rate_hz: float = 0.0
+    qos: str = ""
+    frame: str = ""
+    verdict: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Traffic:
+    """Messages of one topic: their rate (Hz), and the frame of the newest."""
+
+    rate_hz: float = 0.0
     frame: str = ""
 
 
 def judge(
     config: RobotConfig,
-    endpoints: Sequence[Endpoint],
-    heard: Mapping[str, Heard],
-    transforms: TransformBuffer,
+    endpoints: Iterable[Endpoint],
+    traffic: Mapping[str, Traffic],
+    faults: Iterable[RobotFault],
     *,
-    seconds: float,
-    stamp: float,
-    broker: str | None,
-    robot_id: str = "",
-) -> CheckVerdict:
-    """Evaluate a few seconds of observed traffic.
+    robot_id: str,
+    has_detector: bool,
+    unheard: Iterable[str] = (),
+) -> tuple[CheckRow, ...]:
+    """Evaluate a few seconds; the robot's own gate may run beside the check.
 
     Args:
         config: Names of the robot's topics.
         endpoints: Readers and writers on DDS.
-        heard: Received messages by topic key.
-        transforms: Received transforms.
-        seconds: Duration of the check (s).
-        stamp: Newest stamp of odometry (s), at which transforms are looked up; 0:
-            without odometry, at the newest transform.
-        broker: Reason why the MQTT broker cannot be reached; None: it can.
-        robot_id: The robot; its own gate may run beside the check.
+        traffic: Messages by topic key.
+        faults: Present faults of the gate's inputs.
+        robot_id: The robot.
+        has_detector: The fleet file says so.
+        unheard: Interfaces where nobody is met.
     """
     names = config.full_topics
-    out = names["cmd_vel_out"]
-    gates = {one.gate for one in endpoints if one.writes and one.topic == out}
-    gate = robot_id if robot_id in gates else ""
-    others = [
-        one for one in endpoints if not one.own and not (gate and one.gate == gate)
-    ]
-    rows, missing = [], [] if broker is None else [broker]
-    if not others:
-        missing.append(
-            f"Nobody speaks ROS 2 on DDS domain {config.domain}: is ROS_DOMAIN_ID "
-            "right, and does multicast pass (else name peers)?"
+    others = [one for one in endpoints if not one.own and one.gate != robot_id]
+    noted = InputFaults()
+    Lookout(config, noted, -math.inf).look(others, unheard, 0.0)
+    verdicts: dict[str, list[str]] = {}
+    for fault in (*faults, *noted.faults(0.0)):
+        about, _, why = fault.about.partition(": ")
+        said = f"{fault.code} ({why})" if why else fault.code
+        verdicts.setdefault(about, []).append(said)
+    seen = {one.topic for one in others if one.writes}
+    needed = {"odometry", "tf", "scan", "cmd_vel_in"}
+    if has_detector and not any(names[key] in seen for key in _DETECTORS):
+        needed.add("detections_3d" if names["detections_3d"] else "detections_2d")
+    if names["detections_2d"] in seen:
+        needed |= {"depth", "camera_info"}
+    rows = []
+    drive = {key: names[key] for key in ("cmd_vel_in", "cmd_vel_out")}
+    for topic, name in (sensed_topics(names) | drive).items():
+        met = [one for one in others if one.topic == name]
+        ends = [one for one in met if one.writes != (topic == "cmd_vel_out")]
+        found = traffic.get(topic, Traffic())
+        said = _badness(topic, config, ends, found.rate_hz, topic in needed)
+        if topic == "cmd_vel_in" and len(met) > len(ends):
+            said = "somebody listens beside the gate: a base would go round it"
+        rows.append(_row(name, ends, found, said, *verdicts.pop(name, ())))
+    rows += [CheckRow(one, verdict=", ".join(said)) for one, said in verdicts.items()]
+    return *rows, *_unnamed(names, others)
+
+
+def _row(name: str, ends: Sequence[Endpoint], found: Traffic, *said: str) -> CheckRow:
+    kinds = " and ".join(sorted({one.type for one in ends}))
+    qos = " and ".join(
+        sorted(
+            {
+                ("reliable" if one.qos.reliable else "best effort")
+                + (", kept" if one.qos.transient_local else "")
+                for one in ends
+            }
         )
-    for topic, name in sensed_topics(names).items():
-        row, faults = _row(topic, name, config, others, heard, seconds)
-        rows.append(row)
-        missing += faults if others else []
-    chain, broken = _chain(config, heard, transforms, stamp or transforms.newest)
-    missing += broken if others else []
-    missing += _drive(config, others) if others else []
-    missing += _unnamed_detectors(names, others)
-    return CheckVerdict(tuple(rows), chain, tuple(missing), gate)
+    )
+    verdict = ", ".join(dict.fromkeys(filter(None, said)))
+    return CheckRow(name, kinds, len(ends), found.rate_hz, qos, found.frame, verdict)
 
 
-def _row(
+def _badness(
     topic: str,
-    name: str,
     config: RobotConfig,
-    others: Sequence[Endpoint],
-    heard: Mapping[str, Heard],
-    seconds: float,
-) -> tuple[CheckRow, list[str]]:
-    writers = [one for one in others if one.topic == name and one.writes]
-    fitting = [one for one in writers if TOPICS[topic].form(one.type)]
-    one = heard.get(topic, Heard())
-    rate = one.count / seconds
-    asked = config.qualities[topic]
-    deaf = [writer for writer in fitting if not asked.hears(writer.qos)]
-    missing = _complaints(topic, name, writers)
-    remark = ""
-    if deaf:
-        remark = "QoS mismatch"
-        mismatch, key = _mismatch(asked, deaf[0].qos)
-        missing.append(f"{name}: {mismatch}; qos.{topic}.{key} = false.")
-    elif fitting and one.unreadable:
-        remark = "unreadable"
-        missing.append(f"{name}: {one.unreadable} messages of another layout.")
-    elif fitting and rate < _LEAST_HZ.get(topic, 0.0):
-        remark = "slow"
-        missing.append(f"{name} has a publisher and comes {rate:.1f} times a second.")
-    kind = writers[0].type if writers else TOPICS[topic].message.ROS
-    return CheckRow(name, kind, len(writers), rate, one.age_s, remark), missing
+    ends: Sequence[Endpoint],
+    rate_hz: float,
+    needed: bool,
+) -> str:
+    """Fault by endpoints and rate, beside those of ``Lookout``; or empty."""
+    row, twist = TOPICS[topic], message_of(stamped=config.drive.stamped_in)
+    if not ends:
+        return f"nobody publishes it ({row.message.ROS})" if needed else ""
+    if topic == "cmd_vel_out":
+        return ""
+    if topic == "cmd_vel_in" and twist.ROS not in {one.type for one in ends}:
+        return f"not {twist.ROS}: drive.stamped_in"
+    for one in ends:
+        form = row.form(one.type)
+        if form and one.type_hash not in ("", *map(type_hash, definitions(form))):
+            return f"other fields: {one.type_hash} there, {type_hash(form)} here"
+        if not config.qualities[topic].hears(one.qos):
+            return f"another quality of service is asked for: qos.{topic}"
+    if rate_hz < _LEAST_HZ.get(topic, 0.0):
+        return "slow" if rate_hz else "silent"
+    return ""
 
 
-def _complaints(
-    topic: str,
-    name: str,
-    writers: Sequence[Endpoint],
-) -> list[str]:
-    kinds = sorted({one.type for one in writers})
-    if len(kinds) > 1:
-        return [f"{name} is published as {' and as '.join(kinds)}: one may be right."]
-    if writers:
-        return _foreign(topic, name, writers[0])
-    if topic in _NEEDED + _WANTED:
-        need = "without it the robot stands" if topic in _NEEDED else "if it has one"
-        return [f"Nobody publishes {name} ({TOPICS[topic].message.ROS}): {need}."]
-    return []
-
-
-def _foreign(topic: str, name: str, writer: Endpoint) -> list[str]:
-    """A type that is not read, or one of the same name with other fields."""
-    there, form = writer.type_hash, TOPICS[topic].form(writer.type)
-    if form is None:
-        suffix = f" ({there})" if there else ""
-        known = " or ".join(one.ROS for one in TOPICS[topic].forms)
-        return [f"{name} is {writer.type}{suffix}, not {known}."]
-    if there in ("", type_hash(form)):
-        return []
-    return [
-        f"{name} is another {writer.type}: {there} there, {type_hash(form)} here "
-        f"({definition(form)})."
-    ]
-
-
-def _mismatch(asked: Qos, offered: Qos) -> tuple[str, str]:
-    """What does not match, and the key of ``qos`` that would."""
-    if asked.reliable and not offered.reliable:
-        return "asked for reliably, published best effort", "reliable"
-    return "asked for transient local, published volatile", "transient_local"
-
-
-def _unnamed_detectors(
-    names: Mapping[str, str], others: Iterable[Endpoint]
-) -> list[str]:
+def _unnamed(names: Mapping[str, str], others: Sequence[Endpoint]) -> list[CheckRow]:
     """Detectors on topics that the file does not name, unless it names a live one."""
-    written = {one.topic for one in others if one.writes}
-    keys = "detections_3d", "detections_2d"
-    if any(names[key] in written for key in keys):
+    found = {one.topic: one for one in others if one.writes}
+    if any(names[key] in found for key in _DETECTORS):
         return []
-    found = {one.topic: one.type for one in others if one.writes}
     return [
-        f"{topic} is a detector's ({kind}): topics.{' or topics.'.join(fitting)}."
-        for topic, kind in sorted(found.items())
-        if (fitting := [key for key in keys if TOPICS[key].form(kind)])
+        _row(
+            topic, [one], Traffic(), f"a detector's: topics.{' or topics.'.join(keys)}"
+        )
+        for topic, one in sorted(found.items())
+        if (keys := [key for key in _DETECTORS if TOPICS[key].form(one.type)])
     ]
 
 
-def _chain(
-    config: RobotConfig,
-    heard: Mapping[str, Heard],
-    transforms: TransformBuffer,
-    stamp: float,
-) -> tuple[str, list[str]]:
-    frames = config.frames
-    wanted = [frames.odom, frames.base_link]
-    laser = heard.get("scan", Heard()).frame
-    if laser:
-        wanted.append(laser)
-    missing: dict[str, None] = {}
-    for inner in wanted:
-        try:
-            transforms.lookup(frames.map, inner, stamp)
-        except NoTransformError as error:
-            missing[f"TF: {error}."] = None
-    names = " → ".join(reversed(transforms.chain(laser or frames.base_link)))
-    return names, list(missing)
-
-
-def _drive(config: RobotConfig, others: Iterable[Endpoint]) -> list[str]:
-    names, drive = config.full_topics, config.drive
-    cmd_vel_in, cmd_vel_out = names["cmd_vel_in"], names["cmd_vel_out"]
-    found: list[str] = []
-    by: dict[tuple[str, bool], list[Endpoint]] = {}
-    for one in others:
-        by.setdefault((one.topic, one.writes), []).append(one)
-    for one in by.get((cmd_vel_out, True), [])[:1]:
-        who = f"The gate of {one.gate}" if one.gate else "Somebody else"
-        found.append(
-            f"{who} publishes {cmd_vel_out}: only the gate may, remap it to "
-            f"{cmd_vel_in}."
-        )
-    base = by.get((cmd_vel_out, False), [])
-    if not base:
-        found.append(f"Nobody listens on {cmd_vel_out}: is the base running?")
-    if by.get((cmd_vel_in, False)):
-        found.append(
-            f"Somebody listens on {cmd_vel_in} beside the gate: a base that does "
-            "goes round it."
-        )
-    wishes = by.get((cmd_vel_in, True), [])
-    if not wishes:
-        found.append(f"Nobody publishes {cmd_vel_in}: is navigation running?")
-    wanted = message_of(stamped=drive.stamped_out).ROS
-    if base and all(one.type != wanted for one in base):
-        found.append(f"{cmd_vel_out} is {base[0].type} there: drive.stamped_out.")
-    offered = config.qualities["cmd_vel_out"]
-    fitting = [one for one in base if one.type == wanted]
-    said = [
-        deafness(one, message_of(stamped=drive.stamped_out), offered) for one in fitting
-    ]
-    if fitting and all(said):
-        found.append(f"{cmd_vel_out}, offered → asked: {said[0]}; qos.cmd_vel_out.")
-    given = message_of(stamped=drive.stamped_in).ROS
-    if wishes and all(one.type != given for one in wishes):
-        found.append(f"{cmd_vel_in} is {wishes[0].type} there: drive.stamped_in.")
-    return found
+def lines(rows: Sequence[CheckRow]) -> list[str]:
+    """The table as text."""
+    table = [("topic", "type", "n", "Hz", "QoS", "frame", "verdict")]
+    for row in rows:
+        verdict = row.verdict or ("ok" if row.writers else "-")
+        count, rate = (f"{row.writers}", f"{row.rate_hz:.1f}") if row.type else ("", "")
+        table.append((row.topic, row.type, count, rate, row.qos, row.frame, verdict))
+    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
+    return ["  ".join(map(str.ljust, row, widths)).rstrip() for row in table]

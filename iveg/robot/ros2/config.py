@@ -176,8 +176,3 @@ def read_config(text: str, file: str) -> RobotConfig:
             for topic, said in page.qos.items()
         },
     )
-
-
-def read_classes(text: str) -> tuple[str, ...]:
-    """A detector's class names, one per line, in the order of their numbers."""
-    return tuple(line.strip() for line in text.splitlines() if line.strip())

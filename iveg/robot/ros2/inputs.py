@@ -8,8 +8,9 @@ more than its bytes.
 import math
 from collections import defaultdict
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, Literal
 
 from iveg.domain.errors import UnreadableError
 from iveg.domain.observations import (
@@ -21,28 +22,54 @@ from iveg.domain.observations import (
     Odometry,
     Unplaced,
 )
-from iveg.robot.grounding.locate import Grounding
+from iveg.robot.grounding import Grounding
 from iveg.robot.ros2 import reading
-from iveg.robot.ros2.boxes import Boxes
-from iveg.robot.ros2.camera import Camera
 from iveg.robot.ros2.config import RobotConfig
-from iveg.robot.ros2.input_faults import InputFaults
-from iveg.robot.ros2.places import Places
-from iveg.robot.ros2.rigid import RigidTransform
-from iveg.robot.ros2.sensors import ROS_SENSORS, RosSensor
-from iveg.robot.ros2.stamps import Stamps
-from iveg.robot.ros2.topics import TOPICS
-from iveg.ros2 import cdr, nav_msgs, sensor_msgs
-from iveg.ros2.schema import Message
+from iveg.robot.ros2.detections import Boxes, Camera, Places
+from iveg.robot.ros2.reading import InputFaults
+from iveg.robot.ros2.topics import ROS_SENSORS, TOPICS, RosSensor
+from iveg.robot.ros2.transforms import RigidTransform
+from iveg.ros2 import cdr
+from iveg.ros2 import messages as ros
+from iveg.ros2.messages import Message
+
+# --- stamps -----------------------------------------------------------------------
+#
+# Order of one topic's messages by their stamps, until its clock was set back.
+
+Verdict = Literal["new", "same", "back", "reset"]
+_BACK_MESSAGES = 5
+
+
+@dataclass(slots=True)
+class Stamps:
+    """Newest stamp of one topic (s), and how many in a row were before it."""
+
+    newest: float = 0.0
+    back: int = 0
+
+    def verdict(self, stamp: float) -> Verdict:
+        """``new``, ``same``, ``back``, or ``reset`` when the clock was set back."""
+        if stamp > self.newest or stamp == 0.0:
+            self.newest, self.back = max(stamp, self.newest), 0
+            return "new"
+        if stamp == self.newest:
+            return "same"
+        self.back += 1
+        if self.back < _BACK_MESSAGES:
+            return "back"
+        self.newest, self.back = stamp, 0
+        return "reset"
+
+
+# --- inputs -----------------------------------------------------------------------
 
 SILENT_S = 1.0
 _CLOCK_OFF_S = 10.0
 _TREE = frozenset({"tf_static", "tf"})
-_PLACED = "odometry", "scan", "detections_3d"
-"""Topics whose data have a frame."""
 
 _Work = Callable[[Any, Instant], Observation | None]
-"""What follows from a message of a topic."""
+"""Makes an observation of a message of a topic, if there is one."""
 
 
 class SensorInputs:
@@ -73,9 +100,8 @@ class SensorInputs:
         self._boxes = Boxes(boxes, classes, self._places, faults)
         self._stamps: defaultdict[str, Stamps] = defaultdict(Stamps)
         self._newest: dict[str, tuple[type[Message], bytes]] = {}
-        self._heard_at: dict[str, float] = {}
+        self._used_at: dict[str, float] = {}
         self._first_heard = math.inf
-        self._is_placed = False
         self._began: float | None = None
         self._sent_at: dict[str, float] = {}
         self._works: dict[str, _Work] = {
@@ -119,7 +145,6 @@ class SensorInputs:
             form: Their type, where the topic may have several.
         """
         message = form or TOPICS[topic].message
-        self._heard_at[topic] = now
         self._first_heard = min(self._first_heard, now)
         if most and len(arrived) >= most:
             self._note("flood", topic, now)
@@ -131,12 +156,19 @@ class SensorInputs:
             if links is not None:
                 self._places.add(links, static=topic == "tf_static")
 
+    def note_unreadable(self, topic: str, form: type[Message], now: float) -> None:
+        """Note that a topic comes in other fields than those of its type."""
+        about = f"{self._names[topic]}: {form.ROS.replace('/msg/', '/')}"
+        self.input_faults.note("unreadable", about, now)
+
     def tick(self, now: Instant) -> list[Observation]:
         """New observations, odometry first."""
         if self._began is None:
-            self._began = now.mono
+            self._began = now.mono + self._tf_max_age_s
         self._note_silence(self._began, now.mono)
-        if self._awaits_transforms(now.mono):
+        # DDS matches the topics of a base one after the other, and each node publishes
+        # its own link of the chain: the first data wait for the transforms that follow.
+        if now.mono - self._first_heard <= self._tf_max_age_s:
             return []
         found = [
             self._attempt(topic, work, *newest, now)
@@ -147,37 +179,11 @@ class SensorInputs:
         return [one for one in found if one is not None]
 
     def _note_silence(self, began: float, now: float) -> None:
-        # A robot may lack a laser; one whose laser fell silent has a fault.
+        # A robot may lack a laser; one whose laser says nothing new has a fault.
         for topic, start in (("odometry", began), ("scan", math.inf)):
-            silent = now - self._heard_at.get(topic, start)
+            silent = now - self._used_at.get(topic, start)
             if silent > SILENT_S:
                 self._note("no_data", topic, now, silent)
-
-    def _awaits_transforms(self, now: float) -> bool:
-        """Whether the first data stay pending, since transforms may follow at once.
-
-        DDS matches the topics of a base one after the other, and each node publishes
-        its own link of the chain.
-        """
-        if not self._is_placed:
-            overdue = now - self._first_heard > self._tf_max_age_s
-            whole = self._heard_at.keys() >= _TREE and self._knows_frames()
-            self._is_placed = overdue or whole
-        return not self._is_placed
-
-    def _knows_frames(self) -> bool:
-        """Whether the tree leads from the frame of each pending datum to ``map``."""
-        for topic in _PLACED:
-            if topic not in self._newest:
-                continue
-            try:
-                message: Any = cdr.read(*self._newest[topic])
-            except UnreadableError:
-                continue
-            frame = message.header.frame_id
-            if not self._places.knows(frame, on_robot=topic == "scan"):
-                return False
-        return True
 
     def _attempt(
         self,
@@ -187,7 +193,7 @@ class SensorInputs:
         payload: bytes,
         now: Instant,
     ) -> Observation | None:
-        """What follows from a message of a topic, unless it is unusable or old."""
+        """The observation of a message; None where it is unusable or old."""
         message = self._read(topic, form, payload, now.mono)
         if message is None:
             return None
@@ -195,17 +201,19 @@ class SensorInputs:
         if is_stream and not self._is_new(topic, message.header.stamp.seconds, now):
             return None
         try:
-            return work(message, now)
+            found = work(message, now)
         except UnreadableError as error:
             self._note(error.reason, topic, now.mono)
             return None
+        self._used_at[topic] = now.mono
+        return found
 
     def _read(self, topic: str, form: type[Message], payload: bytes, now: float) -> Any:
         """A message of a topic; None for one that cannot be read."""
         try:
             return cdr.read(form, payload)
         except UnreadableError:
-            self._note("unreadable", topic, now)
+            self.note_unreadable(topic, form, now)
             return None
 
     def _is_new(self, topic: str, stamp: float, now: Instant) -> bool:
@@ -226,25 +234,21 @@ class SensorInputs:
 
     # --- topics -------------------------------------------------------------------
 
-    def _odometry(
-        self, message: nav_msgs.Odometry, now: Instant
-    ) -> Odometry | Unplaced:
+    def _odometry(self, message: ros.Odometry, now: Instant) -> Odometry | Unplaced:
         twist = reading.read_twist(message.twist.twist)
         place = self._places.locate(message, now.mono)
         if place is None:
             return Unplaced("", UNKNOWN_ORIGIN, "odometry", twist)
         return Odometry("", UNKNOWN_ORIGIN, place.flat(), twist)
 
-    def _scan(
-        self, message: sensor_msgs.LaserScan, now: Instant
-    ) -> LaserScan | Unplaced:
+    def _scan(self, message: ros.LaserScan, now: Instant) -> LaserScan | Unplaced:
         header = message.header
         laser = self._places.laser(header.frame_id, header.stamp.seconds, now.mono)
         if laser is None:
             return Unplaced("", UNKNOWN_ORIGIN, "scan")
         return reading.read_scan(message, laser)
 
-    def _path(self, message: nav_msgs.Path, now: Instant) -> Navigation | None:
+    def _path(self, message: ros.Path, now: Instant) -> Navigation | None:
         frame, here = message.header.frame_id or self._map, self._places.here
         # A path is old by nature: it is placed by the present transform.
         stamp = here.stamp if here else message.header.stamp.seconds

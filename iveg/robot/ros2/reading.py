@@ -5,23 +5,26 @@ Each message is interpreted by one function.  Numbers that are not finite raise
 """
 
 import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from iveg.domain.errors import UnreadableError
+from iveg.domain.feedback import FULL_SPEED, HALF_SPEED
 from iveg.domain.geometry import Box3D, Twist2D
 from iveg.domain.observations import (
     UNKNOWN_ORIGIN,
     Detection,
     LaserScan,
     Navigation,
+    RobotFault,
 )
-from iveg.ngsi.payloads import MAX_BEAMS, MAX_PATH
-from iveg.ngsi.texts import FORBIDDEN, clean_text
-from iveg.robot.ros2.rigid import RigidTransform, rigid_of
-from iveg.ros2 import geometry_msgs, nav_msgs, sensor_msgs, vision_msgs
+from iveg.ngsi.payloads import FORBIDDEN, MAX_BEAMS, MAX_PATH, clean_text
+from iveg.robot.ros2.transforms import RigidTransform, rigid_of
+from iveg.ros2 import messages as ros
 
 FASTEST_M_S = 20.0
 """Speed above which a value is refused: no vehicle in crop rows is so fast (m/s)."""
@@ -32,12 +35,14 @@ number is above, and one comparison finds it."""
 _NOTHING, _UNKNOWN = np.float32(np.inf), np.float32(0.0)
 """Nothing came back; no measurement, which is shorter than any range that counts."""
 _LEAST_RANGE_M = 1e-3
+_FINEST_RAD = 1e-4
+"""No laser is finer."""
 _TILT = math.radians(10.0)
 _LONGEST_RANGE_M = 1e4
 _FORBIDDEN = str.maketrans(dict.fromkeys(FORBIDDEN))
 
 
-def read_pose(odometry: nav_msgs.Odometry) -> RigidTransform:
+def read_pose(odometry: ros.Odometry) -> RigidTransform:
     """Pose of the robot in the odometry frame.
 
     Raises:
@@ -50,7 +55,7 @@ def read_pose(odometry: nav_msgs.Odometry) -> RigidTransform:
     return rigid
 
 
-def read_twist(twist: geometry_msgs.Twist) -> Twist2D:
+def read_twist(twist: ros.Twist) -> Twist2D:
     """Forward speed and yaw rate; the other components do not apply to wheels.
 
     Raises:
@@ -64,14 +69,12 @@ def read_twist(twist: geometry_msgs.Twist) -> Twist2D:
     return Twist2D(forward, turn)
 
 
-def write_twist(twist: Twist2D) -> geometry_msgs.Twist:
+def write_twist(twist: Twist2D) -> ros.Twist:
     """Inverse of ``read_twist``."""
-    return geometry_msgs.Twist(
-        geometry_msgs.Vector3(twist.linear_x), geometry_msgs.Vector3(z=twist.angular_z)
-    )
+    return ros.Twist(ros.Vector3(twist.linear_x), ros.Vector3(z=twist.angular_z))
 
 
-def read_scan(scan: sensor_msgs.LaserScan, laser: RigidTransform) -> LaserScan:
+def read_scan(scan: ros.LaserScan, laser: RigidTransform) -> LaserScan:
     """A scan of a laser that is mounted level, upright or upside down.
 
     Args:
@@ -79,21 +82,20 @@ def read_scan(scan: sensor_msgs.LaserScan, laser: RigidTransform) -> LaserScan:
         laser: Pose of the laser in ``base_link``.
 
     Raises:
-        UnreadableError: ``no_beams``, ``too_many_beams`` (above 4,096),
-            ``not_a_number``, ``bad_range``, ``tilted_laser``.
+        UnreadableError: ``too_many_beams`` (above 4,096),
+            ``not_a_number``, ``bad_range``, ``tilted_laser``, ``no_returns``.
     """
     count = scan.ranges.size
-    if not count:
-        raise UnreadableError("no_beams")
     if count > MAX_BEAMS:
         raise UnreadableError("too_many_beams", f"{count}")
     numbers = scan.angle_min, scan.angle_increment, scan.range_min
     if not all(math.isfinite(one) and abs(one) <= 1e4 for one in numbers):
         raise UnreadableError("not_a_number", "a sweep")
-    if not scan.range_max > 0.0:
+    turns = abs(scan.angle_increment) >= _FINEST_RAD
+    if not turns or not max(0.0, scan.range_min) < scan.range_max:
         raise UnreadableError("bad_range", f"{scan.range_max}")
     side = _side(laser)
-    return LaserScan(
+    read = LaserScan(
         "",
         UNKNOWN_ORIGIN,
         scan.angle_min * side,
@@ -103,9 +105,12 @@ def read_scan(scan: sensor_msgs.LaserScan, laser: RigidTransform) -> LaserScan:
         laser.flat(),
         _ranges(scan),
     )
+    if not read.returns().any():
+        raise UnreadableError("no_returns")
+    return read
 
 
-def _ranges(scan: sensor_msgs.LaserScan) -> NDArray[np.float32]:
+def _ranges(scan: ros.LaserScan) -> NDArray[np.float32]:
     """Ranges as a measure has them (REP-117).
 
     Only +inf says that nothing came back.  NaN is no measurement and -inf is too near
@@ -127,7 +132,7 @@ def _side(laser: RigidTransform) -> int:
 
 
 def read_detection(
-    detection: vision_msgs.Detection3D, place: RigidTransform, classes: tuple[str, ...]
+    detection: ros.Detection3D, place: RigidTransform, classes: tuple[str, ...]
 ) -> Detection:
     """A box in ``map``: the hull of the rotated one.
 
@@ -158,7 +163,7 @@ def read_detection(
 
 
 def read_hypothesis(
-    results: tuple[vision_msgs.ObjectHypothesisWithPose, ...], classes: tuple[str, ...]
+    results: Sequence[ros.ObjectHypothesisWithPose], classes: tuple[str, ...]
 ) -> tuple[str, float]:
     """Class and score of the most probable hypothesis.
 
@@ -181,7 +186,7 @@ def read_hypothesis(
 
 
 def class_id_of(
-    results: tuple[vision_msgs.ObjectHypothesisWithPose, ...], classes: tuple[str, ...]
+    results: Sequence[ros.ObjectHypothesisWithPose], classes: tuple[str, ...]
 ) -> str | None:
     """The only class that a detection may be of; None where it may be another."""
     if len(results) != 1:
@@ -192,12 +197,12 @@ def class_id_of(
         return None
 
 
-def _score(hypothesis: vision_msgs.ObjectHypothesis) -> float:
+def _score(hypothesis: ros.ObjectHypothesis) -> float:
     return -1.0 if math.isnan(hypothesis.score) else hypothesis.score
 
 
 def within_world(box: Box3D) -> Box3D:
-    """The same box, which lies within the world.
+    """Check that a box lies within the world, and return it.
 
     Raises:
         UnreadableError: ``absurd``: not a number, or too far away.
@@ -213,7 +218,7 @@ def within_world(box: Box3D) -> Box3D:
     raise UnreadableError("absurd", "a box outside of the world")
 
 
-def read_path(path: nav_msgs.Path, place: RigidTransform) -> Navigation:
+def read_path(path: ros.Path, place: RigidTransform) -> Navigation:
     """The path in ``map``; a long one is thinned to 1,024 points.
 
     Raises:
@@ -234,3 +239,76 @@ def read_path(path: nav_msgs.Path, place: RigidTransform) -> Navigation:
 def clean(text: str) -> str:
     """Text without characters that Orion refuses."""
     return clean_text(text.translate(_FORBIDDEN)).strip()
+
+
+# --- input faults -----------------------------------------------------------------
+#
+# Faults of a robot's ROS 2 inputs: name and effect on the speed.
+#
+# A fault lasts as long as it is noted, and two seconds more; while it lasts the robot
+# is slow, or halts where driving on would be a guess.
+
+LASTS_S = 2.0
+_MOST = 16
+
+STANDS = frozenset({"second_publisher"})
+"""Faults that hold the robot: another publisher on the drive bypasses the gate."""
+HARMLESS = frozenset({"unknown_to_iveg"})
+"""Faults without effect: the watchdog handles silence."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Noted:
+    """Start and end of a fault (monotonic, s); ``for_s`` None: since ``since``."""
+
+    since: float
+    last: float
+    for_s: float | None
+
+
+class InputFaults:
+    """Record of faults; times are monotonic seconds."""
+
+    def __init__(self) -> None:
+        self._noted: dict[tuple[str, str], _Noted] = {}
+
+    def note(
+        self, code: str, about: str, now: float, for_s: float | None = None
+    ) -> None:
+        """Note a fault at this moment.
+
+        Args:
+            code: A short, stable name.
+            about: Topic or frames.
+            now: Monotonic (s).
+            for_s: Duration so far, where known from elsewhere (s).
+        """
+        key = clean(code), clean(about)
+        before = self._noted.get(key)
+        fresh = before is None or now - before.last > LASTS_S
+        since = now if fresh or before is None else before.since
+        if fresh and len(self._noted) >= _MOST:
+            del self._noted[min(self._noted, key=lambda one: self._noted[one].last)]
+        self._noted[key] = _Noted(since, now, for_s)
+
+    def faults(self, now: float) -> tuple[RobotFault, ...]:
+        """Present faults, in the order of their start."""
+        if not self._noted:
+            return ()
+        self._noted = {
+            key: one for key, one in self._noted.items() if now - one.last <= LASTS_S
+        }
+        return tuple(
+            RobotFault(code, about, now - one.since if one.for_s is None else one.for_s)
+            for (code, about), one in self._noted.items()
+        )
+
+
+def speed_of(faults: Iterable[RobotFault]) -> tuple[float, str | None]:
+    """Speed factor allowed with these faults, and the fault that determines it."""
+    codes = [one.code for one in faults]
+    for code in codes:
+        if code in STANDS:
+            return 0.0, code
+    slow = next((code for code in codes if code not in HARMLESS), None)
+    return (FULL_SPEED if slow is None else HALF_SPEED), slow

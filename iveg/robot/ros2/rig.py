@@ -19,29 +19,35 @@ from iveg.domain.geometry import Rectangle, Twist2D
 from iveg.domain.goals import Goal
 from iveg.domain.observations import RobotFault
 from iveg.domain.witness import Outline
-from iveg.robot.costmap import FleetCostmap
+from iveg.robot.costmap import FleetCostmap, Neighbours
 from iveg.robot.goals import Navigate
-from iveg.robot.neighbours import Neighbours
-from iveg.robot.node import RobotNode
-from iveg.robot.pacing import every
-from iveg.robot.ros2 import markers, neighbours
+from iveg.robot.node import RobotNode, every
+from iveg.robot.ros2 import outputs
+from iveg.robot.ros2.checking import Lookout, forms_published
 from iveg.robot.ros2.config import RobotConfig
-from iveg.robot.ros2.costmap import CostmapTopic
-from iveg.robot.ros2.drive import DriveTopics, message_of
-from iveg.robot.ros2.goal_pose import pose_for
-from iveg.robot.ros2.input_faults import speed_of
 from iveg.robot.ros2.inputs import SensorInputs
-from iveg.robot.ros2.lookout import Lookout, forms_published
-from iveg.robot.ros2.network import Network, Reader, Writer
+from iveg.robot.ros2.outputs import (
+    CostmapTopic,
+    DriveTopics,
+    Network,
+    Reader,
+    Writer,
+    message_of,
+    pose_for,
+)
+from iveg.robot.ros2.reading import speed_of
 from iveg.robot.ros2.topics import TOPICS, sensed_topics
-from iveg.ros2 import cdr, std_msgs
+from iveg.ros2 import cdr
+from iveg.ros2 import messages as ros
+from iveg.ros2.messages import Message, definitions
 from iveg.ros2.names import Endpoint
-from iveg.ros2.schema import Message
 
 _log = logging.getLogger(__name__)
 RATE_HZ = 30.0
 _DEPTH = 50
 """Pending messages after a thirtieth of a second that count as a flood."""
+_OWN_STALL_S = 0.15
+"""After a longer pause between two readings a full queue shows our own delay."""
 _PICTURE_DEPTH = 2
 _LOOK_ROUND_TICKS, _TELL_TICKS = 15, 6
 """Ticks between two checks of endpoints, and between two outputs of neighbours."""
@@ -64,12 +70,14 @@ class _In:
         topic: Its key.
         form: The type that is read.
         most: Depth of its queue; 0: any number is normal.
+        raw: It is read whatever its fields are.
     """
 
     topic: str
     form: type[Message]
     reader: Reader
     most: int
+    raw: bool
 
 
 class Ros2Robot:
@@ -116,6 +124,7 @@ class Ros2Robot:
         self._known = False
         self._lookout = Lookout(config, self._input_faults, clock.mono())
         self._ticks = itertools.count()
+        self._sensed_at = float("-inf")
         self._open(network)
         self.node = make_node(self._drive, self._on_feedback, self.navigate)
         self._costmap = self._open_costmap(network)
@@ -124,6 +133,10 @@ class Ros2Robot:
         qualities, drive = self._config.qualities, self._config.drive
         self._ins: list[_In] = []
         for topic in sensed_topics(self._names):
+            for form in TOPICS[topic].forms:
+                # Codecs are made before the robot drives, not when a detector joins.
+                for one in definitions(form):
+                    cdr.store_of(one)
             if len(TOPICS[topic].forms) == 1:
                 self._listen(topic, TOPICS[topic].message)
         self._wishes = network.reader(
@@ -160,13 +173,13 @@ class Ros2Robot:
         self.node.hear_peer_scans(topic.hear)
         return topic
 
-    def _listen(self, topic: str, form: type[Message]) -> None:
+    def _listen(self, topic: str, form: type[Message], *, raw: bool = False) -> None:
         quality = self._config.qualities[topic]
         is_picture = TOPICS[topic].role == "picture"
         usual = max(_DEPTH, quality.depth)
         qos = quality.newest(_PICTURE_DEPTH if is_picture else usual)
-        reader = self._network.reader(self._names[topic], form, qos)
-        self._ins.append(_In(topic, form, reader, 0 if is_picture else usual))
+        reader = self._network.reader(self._names[topic], form, qos, raw=raw)
+        self._ins.append(_In(topic, form, reader, 0 if is_picture else usual, raw))
         self._ins.sort(key=lambda one: _ORDER.index(one.topic))
 
     async def run(self) -> None:
@@ -193,10 +206,14 @@ class Ros2Robot:
 
     def _sense(self) -> None:
         now = clock.now()
+        is_in_time = now.mono - self._sensed_at <= _OWN_STALL_S
+        self._sensed_at = now.mono
         for one in self._ins:
             waited = one.reader.take()
             if waited:
-                self.inputs.hear(one.topic, waited, now.mono, one.most, one.form)
+                form = TOPICS[one.topic].form(one.form.ROS)
+                most = one.most if is_in_time else 0
+                self.inputs.hear(one.topic, waited, now.mono, most, form)
         self.node.sense(*self.inputs.tick(now))
         self._judge(now.mono)
 
@@ -230,7 +247,7 @@ class Ros2Robot:
     def _look_round(self) -> None:
         """Check the endpoints of others, and iVeg's knowledge of us."""
         now, endpoints = clock.mono(), self._network.endpoints()
-        self._lookout.look(endpoints, now)
+        self._lookout.look(endpoints, self._network.unheard(), now)
         self._meet_detectors(endpoints)
         first = self._first_feedback
         if not self._known and first is not None and now - first > _KNOWN_WITHIN_S:
@@ -242,14 +259,22 @@ class Ros2Robot:
         A reader of each type from the start would be announced, and tools of ROS refuse
         a topic of several types.
         """
-        known = {(one.topic, one.form) for one in self._ins}
         for topic, name in sensed_topics(self._names).items():
-            for form in forms_published(topic, name, endpoints):
-                if (topic, form) in known:
+            known = [one for one in self._ins if one.topic == topic]
+            if len(TOPICS[topic].forms) == 1:
+                continue
+            published = forms_published(topic, name, endpoints)
+            typed = [
+                one for one in known if not one.raw and (one.form, False) in published
+            ]
+            if typed and not any(one.reader.writers for one in typed):
+                self.inputs.note_unreadable(topic, typed[0].form, clock.mono())
+            for form, raw in published:
+                if any((one.form, one.raw) == (form, raw) for one in known):
                     continue
-                if any(topic == other for other, _ in known):
+                if known and all(one.form.ROS != form.ROS for one in known):
                     _log.warning("%s: %s comes as %s now", self._id, name, form.ROS)
-                self._listen(topic, form)
+                self._listen(topic, form, raw=raw)
 
     def _on_feedback(self, peer: str, feedback: Feedback) -> None:
         now = clock.mono()
@@ -289,14 +314,14 @@ class Ros2Robot:
         if place is None or (cloud is None and drawing is None):
             return
         now = clock.now()
-        own, stamp = place.flat(), std_msgs.Time.of(now.wall)
+        own, stamp = place.flat(), ros.Time.of(now.wall)
         present = self._neighbours.present(own, now.mono)
         frames = self._config.frames
         if cloud is not None:
-            found = neighbours.cloud(present, own, stamp, frames.base_link)
+            found = outputs.cloud(present, own, stamp, frames.base_link)
             cloud.write(cdr.write(found))
         if drawing is not None:
-            drawn = markers.markers(present, stamp, frames.map)
+            drawn = outputs.markers(present, stamp, frames.map)
             drawing.write(cdr.write(drawn))
 
 

@@ -1,20 +1,206 @@
-"""Topics of a ROS 2 robot: one row each, in the order in which they are read."""
+"""Topics of a ROS 2 robot, its small sensors, and the families of its detectors."""
 
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
-from iveg.robot.ros2.detectors import BOXES, LOOKS
-from iveg.robot.ros2.sensors import ROS_SENSORS
-from iveg.ros2 import (
-    geometry_msgs,
-    nav_msgs,
-    sensor_msgs,
-    vision_msgs,
-    visualization_msgs,
-)
+from iveg.domain.kinds import Kind, row_of
+from iveg.domain.observations import UNKNOWN_ORIGIN, Battery, Observation
+from iveg.ros2 import detector_messages as d
+from iveg.ros2 import messages as ros
+from iveg.ros2.messages import Message
 from iveg.ros2.names import DEFAULT, LATCHED, SENSOR_DATA, TF, TF_STATIC, Qos
-from iveg.ros2.schema import Message
+
+# --- sensors ----------------------------------------------------------------------
+#
+# Small sensors on a ROS 2 robot: topic and type of each, one row a sensor.
+
+
+def read_battery(state: ros.BatteryState) -> Battery:
+    """Read the state of the battery.
+
+    ROS writes NaN for unmeasured values, and some drivers per cent instead of a share.
+    """
+    share: float | None = state.percentage
+    if share is None or not math.isfinite(share) or not 0.0 <= share <= 100.0:
+        share = None
+    elif share > 1.0:
+        share /= 100.0
+    volts = state.voltage if math.isfinite(state.voltage) else None
+    charging = {1: True, 2: False, 3: False, 4: False}
+    status = charging.get(state.power_supply_status)
+    return Battery("", UNKNOWN_ORIGIN, share, status, volts)
+
+
+def write_battery(header: ros.Header, battery: Any) -> ros.BatteryState:
+    """The inverse, for an emulated base."""
+    return ros.BatteryState(
+        header, voltage=battery.voltage, percentage=battery.percentage
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class RosSensor:
+    """One row.
+
+    Attributes:
+        of: What it observes; the key in ``robot.toml`` is the kind's name.
+        topic: Its name by default.
+        read: Message → observation.  Raises UnreadableError.
+        write: Header and observation → message.
+    """
+
+    of: type[Observation]
+    topic: str
+    message: type[Message]
+    read: Callable[[Any], Observation]
+    write: Callable[[ros.Header, Any], Message]
+
+    @property
+    def kind(self) -> Kind:
+        """Its row among the observations."""
+        return row_of(self.of)
+
+    @property
+    def every_s(self) -> float:
+        """Least time between two that are sent on (s)."""
+        return self.kind.sensor.every_s if self.kind.sensor else 0.0
+
+
+ROS_SENSORS = {
+    row.kind.name: row
+    for row in (
+        RosSensor(
+            Battery,
+            "battery_state",
+            ros.BatteryState,
+            read_battery,
+            write_battery,
+        ),
+    )
+}
+"""By name.  A small sensor that is missing here has no ROS 2 form."""
+
+
+# --- detectors --------------------------------------------------------------------
+#
+# Detections of each family of messages, as those of ``vision_msgs``.
+#
+# A box of a picture that lies over its left or upper edge comes from YOLOX-ROS as a
+# negative number in 16 bits without a sign.
+
+_SIGN, _WRAP = 1 << 15, 1 << 16
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Look:
+    """Detections of one picture, without depth.
+
+    Attributes:
+        header: Of the picture.
+        width: Of the picture (pixels), ``height`` likewise; 0: not told.
+    """
+
+    header: ros.Header
+    detections: tuple[ros.Detection2D, ...]
+    width: int = 0
+    height: int = 0
+
+
+def _vision(look: ros.Detection2DArray) -> Look:
+    return Look(look.header, tuple(look.detections))
+
+
+def _yolox(look: d.BoundingBoxes) -> Look:
+    boxes, own = look.bounding_boxes, look.image_header
+    header = own if own.frame_id or own.stamp != ros.Time() else look.header
+    width = max((one.img_width for one in boxes), default=0)
+    height = max((one.img_height for one in boxes), default=0)
+    return Look(header, tuple(map(_yolox_box, boxes)), width, height)
+
+
+def _yolox_box(one: d.BoundingBox) -> ros.Detection2D:
+    xmin, ymin, xmax, ymax = (
+        float(edge - _WRAP if edge >= _SIGN else edge)
+        for edge in (one.xmin, one.ymin, one.xmax, one.ymax)
+    )
+    centre = ros.Point2D((xmin + xmax) / 2, (ymin + ymax) / 2)
+    box = ros.BoundingBox2D(ros.PicturePose(centre), xmax - xmin, ymax - ymin)
+    return ros.Detection2D(ros.Header(), _sure(one.class_id, one.probability), box)
+
+
+def _yolo(look: d.DetectionArray) -> Look:
+    return Look(look.header, tuple(map(_yolo_box, look.detections)))
+
+
+def _yolo_box(one: d.Detection) -> ros.Detection2D:
+    centre, size = one.bbox.center, one.bbox.size
+    place = ros.PicturePose(
+        ros.Point2D(centre.position.x, centre.position.y), centre.theta
+    )
+    box = ros.BoundingBox2D(place, size.x, size.y)
+    return ros.Detection2D(ros.Header(), _yolo_class(one), box, one.id)
+
+
+def _yolo_3d(found: d.DetectionArray) -> ros.Detection3DArray:
+    return ros.Detection3DArray(
+        found.header, tuple(map(_yolo_box_3d, found.detections))
+    )
+
+
+def _yolo_box_3d(one: d.Detection) -> ros.Detection3D:
+    box = one.bbox3d
+    # Without a frame no node has added depth, and zeros are no place.
+    centre = box.center if box.frame_id else ros.Pose(ros.Point(math.nan))
+    header = ros.Header(frame_id=box.frame_id)
+    found = ros.BoundingBox3D(centre, box.size)
+    return ros.Detection3D(header, _yolo_class(one), found, one.id)
+
+
+def _yolo_class(one: d.Detection) -> tuple[ros.ObjectHypothesisWithPose, ...]:
+    return _sure(one.class_name or str(one.class_id), one.score)
+
+
+def _yolact(found: d.BoundingBoxes3d) -> ros.Detection3DArray:
+    return ros.Detection3DArray(
+        found.header, tuple(map(_yolact_box, found.bounding_boxes))
+    )
+
+
+def _yolact_box(one: d.BoundingBox3d) -> ros.Detection3D:
+    centre = ros.Point(
+        (one.xmin + one.xmax) / 2,
+        (one.ymin + one.ymax) / 2,
+        (one.zmin + one.zmax) / 2,
+    )
+    size = ros.Vector3(one.xmax - one.xmin, one.ymax - one.ymin, one.zmax - one.zmin)
+    box = ros.BoundingBox3D(ros.Pose(centre), size)
+    return ros.Detection3D(ros.Header(), _sure(one.object_name, one.probability), box)
+
+
+def _sure(class_id: str, score: float) -> tuple[ros.ObjectHypothesisWithPose, ...]:
+    return (ros.ObjectHypothesisWithPose(ros.ObjectHypothesis(class_id, score)),)
+
+
+LOOKS: Mapping[type[Message], Callable[[Any], Look]] = {
+    ros.Detection2DArray: _vision,
+    d.BoundingBoxes: _yolox,
+    d.DetectionArray: _yolo,
+}
+"""Boxes in a picture, by type; they need its depth."""
+
+BOXES: Mapping[type[Message], Callable[[Any], ros.Detection3DArray]] = {
+    ros.Detection3DArray: lambda found: found,
+    d.BoundingBoxes3d: _yolact,
+    d.DetectionArray: _yolo_3d,
+}
+"""Boxes with a place, by type."""
+
+
+# --- topics -----------------------------------------------------------------------
+#
+# Topics of a ROS 2 robot: one row each, in the order in which they are read.
 
 Role = Literal["stream", "state", "picture", "transforms", "drive", "output"]
 """``stream``: old messages do not count; ``state``: the newest counts; ``picture``: one
@@ -50,40 +236,32 @@ class RosTopic:
 
 
 TOPICS: Mapping[str, RosTopic] = {
-    "odometry": RosTopic("odom", nav_msgs.Odometry, "stream"),
-    "scan": RosTopic("scan", sensor_msgs.LaserScan, "stream"),
+    "odometry": RosTopic("odom", ros.Odometry, "stream"),
+    "scan": RosTopic("scan", ros.LaserScan, "stream"),
     "detections_3d": RosTopic(
-        "detections_3d", vision_msgs.Detection3DArray, "stream", forms=tuple(BOXES)
+        "detections_3d", ros.Detection3DArray, "stream", forms=tuple(BOXES)
     ),
     # With depth and camera_info an alternative to detections_3d.
-    "detections_2d": RosTopic(
-        "", vision_msgs.Detection2DArray, "stream", forms=tuple(LOOKS)
-    ),
-    "depth": RosTopic(
-        "camera/aligned_depth_to_color/image_raw", sensor_msgs.Image, "picture"
-    ),
-    "camera_info": RosTopic("camera/color/camera_info", sensor_msgs.CameraInfo),
+    "detections_2d": RosTopic("", ros.Detection2DArray, "stream", forms=tuple(LOOKS)),
+    "depth": RosTopic("camera/aligned_depth_to_color/image_raw", ros.Image, "picture"),
+    "camera_info": RosTopic("camera/color/camera_info", ros.CameraInfo),
     # In a mono picture value n marks the n-th detection; without, the whole box counts.
-    "mask": RosTopic("", sensor_msgs.Image, "picture"),
+    "mask": RosTopic("", ros.Image, "picture"),
     **{name: RosTopic(one.topic, one.message) for name, one in ROS_SENSORS.items()},
-    "path": RosTopic("plan", nav_msgs.Path),
+    "path": RosTopic("plan", ros.Path),
     # After a pause each datum finds the transform that was published before it, though
     # both arrive while the topics are being read.
-    "tf_static": RosTopic(
-        "tf_static", geometry_msgs.TFMessage, "transforms", TF_STATIC
-    ),
-    "tf": RosTopic("tf", geometry_msgs.TFMessage, "transforms", TF),
-    "cmd_vel_in": RosTopic("cmd_vel_nav", geometry_msgs.Twist, "drive"),
-    "cmd_vel_out": RosTopic("cmd_vel", geometry_msgs.Twist, "drive", DEFAULT),
+    "tf_static": RosTopic("tf_static", ros.TFMessage, "transforms", TF_STATIC),
+    "tf": RosTopic("tf", ros.TFMessage, "transforms", TF),
+    "cmd_vel_in": RosTopic("cmd_vel_nav", ros.Twist, "drive"),
+    "cmd_vel_out": RosTopic("cmd_vel", ros.Twist, "drive", DEFAULT),
     # Goals of iVeg, as Nav2 takes them.
-    "goal": RosTopic("goal_pose", geometry_msgs.PoseStamped, "output", DEFAULT),
+    "goal": RosTopic("goal_pose", ros.PoseStamped, "output", DEFAULT),
     # People and peers, for Nav2's obstacle layer and for RViz.
-    "obstacles": RosTopic("iveg/obstacles", sensor_msgs.PointCloud2, "output", DEFAULT),
-    "markers": RosTopic(
-        "iveg/markers", visualization_msgs.MarkerArray, "output", DEFAULT
-    ),
+    "obstacles": RosTopic("iveg/obstacles", ros.PointCloud2, "output", DEFAULT),
+    "markers": RosTopic("iveg/markers", ros.MarkerArray, "output", DEFAULT),
     # The fleet's picture, for Nav2's static layer.
-    "costmap": RosTopic("iveg/costmap", nav_msgs.OccupancyGrid, "output", LATCHED),
+    "costmap": RosTopic("iveg/costmap", ros.OccupancyGrid, "output", LATCHED),
 }
 """By key in ``robot.toml``."""
 

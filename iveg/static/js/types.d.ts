@@ -25,10 +25,6 @@ export type Alert = {
   acknowledged_by: string | null;
   note: string | null;
   count: number;
-  /** Recipients of the newest occurrence outside iVeg. */
-  told: Told[];
-  /** The newest occurrences, oldest first. */
-  members: Occurrence[];
 };
 
 /** From the frame that a slow-down rests on to the robot's own report (ms). */
@@ -41,13 +37,6 @@ export type AlertLatency = {
   age_s: number | null;
 };
 
-/** One page of alerts, and how fast they come now. */
-export type AlertListing = {
-  items: Alert[];
-  next: string | null;
-  flood: Flood;
-};
-
 /** Limit that the robot reports to apply. */
 export type Applied = {
   reason: string;
@@ -55,6 +44,7 @@ export type Applied = {
   age_s: number;
   feedback_age_s: number | null;
   faults: Fault[];
+  obstacle: SeenObstacle | null;
 };
 
 /** A rectangle along the axes of ``map`` (m). */
@@ -65,7 +55,7 @@ export type Area = {
   ymax: number;
 };
 
-/** One row, with its place in the chain. */
+/** One row. */
 export type AuditEntry = {
   audit_id: string;
   at: string;
@@ -76,12 +66,6 @@ export type AuditEntry = {
   action: string;
   subject: string;
   details: Record<string, JsonValue>;
-  /** Place in the chain, from 1 without a gap. */
-  seq: number;
-  /** Long after `at`: the database was away. */
-  stored_at: string;
-  previous_hash: string;
-  hash: string;
 };
 
 /** The battery, as the robot said last. */
@@ -93,18 +77,6 @@ export type Battery = {
   charging: boolean | null;
   /** voltage (V) */
   voltage: number | null;
-};
-
-/** Median error of its detections of other robots, by their own poses. */
-export type CameraBias = {
-  off_m: number;
-  /** Seen farther ahead than they are. */
-  ahead_m: number;
-  /** Seen farther to the left than they are. */
-  left_m: number;
-  looks: number;
-  /** When it saw another robot last. */
-  last_at: string;
 };
 
 /** The newest reading. */
@@ -135,7 +107,6 @@ export type Command = {
   command_id: string;
   robot_id: string;
   kind: "stop" | "release" | "resume" | "goal";
-  drill: boolean;
   state: string;
   requested_by: string;
   times: CommandTimes;
@@ -245,8 +216,7 @@ export type Coverage = {
 /** One decision: detection, observer, rule, and the robot's reaction. */
 export type Decision = {
   decision_id: string;
-  /** `late`: made afterwards of what a robot kept during a gap. */
-  kind: "alert" | "mandate" | "late";
+  kind: "alert" | "mandate";
   robot_id: string;
   person_id: string | null;
   observer: string | null;
@@ -274,7 +244,7 @@ export type Decision = {
   applied_at: string | null;
   observed_at: string | null;
   ended_at: string | null;
-  /** m/s, the greatest of the second before ``started_at``. */
+  /** m/s, measured at ``started_at``. */
   speed_before: number | null;
   speed_after: number | null;
   links: DecisionLink[];
@@ -353,7 +323,7 @@ export type Detector = {
   /** Who took it out of service. */
   out_by: string | null;
   out_since: string | null;
-  bias: CameraBias | null;
+  out_reason: string | null;
 };
 
 /** What one version of the rule did over a range. */
@@ -362,33 +332,6 @@ export type Doings = {
   slowed_s: Record<string, number>;
   /** Reason → how often a robot was slowed. */
   encounters: Record<string, number>;
-};
-
-/** One drill and its verdict. */
-export type Drill = {
-  robot_id: string;
-  command_id: string;
-  drilled_at: string;
-  by: string;
-  /** Standing in time; null while it may still come true. */
-  passed: boolean | null;
-  standstill_ms: number | null;
-  command: Command;
-};
-
-/** Mail; its password is never told. */
-export type EmailChannel = {
-  on: boolean;
-  server: string;
-  port: number;
-  security: string;
-  user: string;
-  has_password: boolean;
-  sender: string;
-  recipients: Recipient[];
-  least: "P1" | "P2";
-  language: "es" | "en";
-  last: Told[];
 };
 
 /** A zone that the robot will reach (docs/safety.md, "Foresight"). */
@@ -416,41 +359,6 @@ export type Evidence = {
   probability: number;
 };
 
-/** One experiment, on its way or over. */
-export type Experiment = {
-  name: string;
-  size: string;
-  state: "running" | "done" | "broken";
-  /** Which run it is at; null between two. */
-  run: string | null;
-  /** On the virtual clock, or in real time. */
-  phase: "counting" | "running" | null;
-  done: number;
-  of: number;
-  /** About how long it still takes (s). */
-  left_s: number;
-  /** Why it broke off, in a word or the program's own; empty where it did not. */
-  why: string;
-  /** Of the emulated detector: ``field``, ``simulation``. */
-  profile: string | null;
-  /** First seed; each run's own is in the report. */
-  seed: number | null;
-  /** Of the machine, mean of the last minute of it. */
-  load: number | null;
-  /** As far as it was scored; null: not yet. */
-  protected: Protected | null;
-  began_at: string;
-  /** Whether there is something to open: the report, or what a break left. */
-  report: boolean;
-};
-
-/** All of them, newest first. */
-export type Experiments = {
-  items: Experiment[];
-  /** Why none may be started now: ``running``, ``live_robot``; null: one may. */
-  refused: string | null;
-};
-
 /** A fault of a robot's own data, as the robot reports it. */
 export type Fault = {
   code: string;
@@ -461,14 +369,6 @@ export type Fault = {
 /** A fleet STOP: one command a robot. */
 export type FleetPressed = {
   commands: Pressed[];
-};
-
-/** Number of alerts within the window; ``since`` null: no flood. */
-export type Flood = {
-  count: number;
-  limit: number;
-  window_s: number;
-  since: string | null;
 };
 
 /** A goal, in ``map`` (m). */
@@ -536,17 +436,6 @@ export type Invitation = {
 
 export type JsonValue = unknown;
 
-/** A place where what stands still slows nobody, in ``map``. */
-export type KnownSpot = {
-  x: number;
-  y: number;
-  radius_m: number;
-  /** When it became known. */
-  since: string;
-  /** The mark of an operator; null: lasers learnt it by themselves. */
-  thing_id: string | null;
-};
-
 /** A lane of the greenhouse. */
 export type Lane = {
   xmin: number;
@@ -582,17 +471,12 @@ export type LatencyClock = {
   state: string;
   offset_ms: number | null;
   uncertainty_ms: number | null;
-  jumps: number;
 };
 
 /** One kind of data. */
 export type LatencyRow = {
   data: "odometry" | "detections" | "lidar";
   hops: Record<string, SegmentSpread>;
-  /** Hops at which only a part of the messages is measured. */
-  sampled: ("uplink" | "fiware" | "robot_orion" | "iveg" | "screen")[];
-  /** Null unless they were asked for. */
-  bins: Record<string, SegmentBins> | null;
 };
 
 /** Times of one step (ms); null where nothing was measured. */
@@ -603,28 +487,10 @@ export type LatencySpread = {
   max_ms: number | null;
 };
 
-/** One kind of data of one robot: what really comes, and how. */
-export type LatencyStream = {
-  robot_id: string;
-  data: "odometry" | "detections" | "lidar";
-  heard_hz: number;
-  agent_hz: number;
-  orion_hz: number;
-  /** Share (0 to 1) not sent to the agent; null without messages. */
-  kept_back: number | null;
-  throttled: boolean;
-  orion_first: number;
-  uplink: SegmentOrder;
-  fiware: SegmentOrder;
-  /** By hop and reason, what is in no statistics. */
-  excluded: Record<string, Record<string, number>>;
-};
-
 /** Every hop of every kind of data over one window. */
 export type LatencyTable = {
   at: string;
   window: "1min" | "15min" | "24h";
-  window_s: number;
   /** Null: all robots. */
   robot: string | null;
   /** Whether iVeg reads the broker itself, so that Δt₁ and Δt₂ are two numbers. */
@@ -633,24 +499,11 @@ export type LatencyTable = {
   /** The paper's printed numbers, by place, kind of data and column (ms). */
   paper: Record<string, Record<string, Record<string, number>>>;
   clocks: LatencyClock[];
-  /** How well pages' clocks are known; null while none has told. */
-  pages_within_ms: number | null;
-  streams: LatencyStream[];
-  remarks: SegmentRemark[];
-  trace: LatencyTrace | null;
-  /** Path of the script that draws the figures. */
+  /** Path of the script that draws the figure. */
   library: string;
   style_ids: string[];
-  /** ``bars``, ``cdf`` and ``trace`` as Plotly draws them; empty if unwanted. */
+  /** ``cdf`` as Plotly draws it; empty if unwanted. */
   figures: Record<string, unknown>;
-};
-
-/** One message, hop by hop. */
-export type LatencyTrace = {
-  robot_id: string;
-  data: "odometry" | "detections" | "lidar";
-  stamp: string | null;
-  steps: SegmentStep[];
 };
 
 /** One line of the action and inference log. */
@@ -691,20 +544,6 @@ export type MarginParts = {
   uncertainty_m: number;
 };
 
-/** Result of a test for each recipient. */
-export type MessageTest = {
-  told: Told[];
-};
-
-/** Channels to recipients outside iVeg, with their results. */
-export type Messages = {
-  push: PushChannel;
-  email: EmailChannel;
-  webhook: WebhookChannel;
-  /** ``sent.email`` and so on, since the start. */
-  counts: Record<string, number>;
-};
-
 /** One thing without which a robot is not clear (docs/safety.md, "Clear"). */
 export type MissingPremise = {
   premise: "pose" | "doubt" | "detector";
@@ -717,16 +556,6 @@ export type Navigation = {
   task: string;
   goal: Point | null;
   path: [number, number][];
-};
-
-/** Share of today's known time with a margin below zero (0 to 1). */
-export type NegativeMargin = {
-  share: number | null;
-  known_s: number;
-  unknown_s: number;
-  count: number;
-  since: string | null;
-  age_s: number | null;
 };
 
 /** A program with its token, which is shown this once. */
@@ -753,18 +582,6 @@ export type Obstacle = {
   kind: string;
 };
 
-/** One time that an alert was raised. */
-export type Occurrence = {
-  priority: "P1" | "P2" | "P3";
-  raised_at: string;
-  cleared_at: string | null;
-  acknowledged_at: string | null;
-  acknowledged_by: string | null;
-  note: string | null;
-  /** Recipients outside iVeg. */
-  told: Told[];
-};
-
 /** A browser in which somebody is signed in. */
 export type OpenSession = {
   session_id: string;
@@ -785,25 +602,13 @@ export type OwnAccount = {
   name: string;
   role: string;
   /** How they came in. */
-  method: "link" | "password" | "passkey" | "pin" | "sso" | "tablet" | "token";
+  method: "link" | "password" | "sso" | "token";
   /** They have one; else a link or a token. */
   account: boolean;
   /** Null for programs. */
   signed_in_at: string | null;
   /** When it ends by itself; null: never. */
   ends_at: string | null;
-};
-
-/** A passkey of whoever asks. */
-export type PasskeyOfPerson = {
-  passkey_id: string;
-  /** What the person calls it. */
-  name: string;
-  /** The address it works at. */
-  host: string;
-  made_at: string;
-  /** Null: never. */
-  used_at: string | null;
 };
 
 /** The world as it was at a recorded moment; ages are of that moment. */
@@ -816,7 +621,6 @@ export type PastWorld = {
   /** Those that go on. */
   commands: Command[];
   alerts: Alert[];
-  flood: Flood;
   /** The newest 200, oldest first. */
   log: LogEntry[];
   health: Health;
@@ -826,10 +630,10 @@ export type PastWorld = {
   at: string;
   /** The same (Unix s). */
   at_s: number;
-  /** Whether it has the hash that iVeg had then; null: none was passed. */
-  verified: boolean | null;
   /** Whether another recording has this moment, too: the server's clock was set back. */
   recorded_twice: boolean;
+  /** Topics of the recording that this version does not know. */
+  left_out: string[];
   scans: Scan[];
 };
 
@@ -920,62 +724,12 @@ export type ProgramToken = {
   over: boolean;
 };
 
-/** Whether a release would ask whoever asks to prove anew who they are. */
-export type Proof = {
-  needed: boolean;
-  /** When it would; null: never. */
-  until: string | null;
-  /** `password`, `passkey`, `pin`, `sso`. */
-  ways: string[];
-};
-
-/** People near moving robots, all runs together (docs/experiment.md, Protection). */
-export type Protected = {
-  /** Of the time within 2 m of a moving robot in some camera's view, the share (0 to 1) in which it was limited to half speed; null: nobody was near. */
-  slowed: number | null;
-  encounters: number;
-  /** Encounters in which the robot never was limited. */
-  never_slowed: number;
-};
-
-/** Web push; ``public_key`` is null until it was on once. */
-export type PushChannel = {
-  on: boolean;
-  contact: string;
-  public_key: string | null;
-  devices: PushDevice[];
-  /** Result of the newest message for each recipient. */
-  last: Told[];
-};
-
-/** One browser that receives push messages. */
-export type PushDevice = {
-  device_id: string;
-  who: string;
-  language: "es" | "en";
-  since: string;
-};
-
 /** One reading: the sensor's own fields by name. */
 export type Reading = {
   at: string;
   robot_id: string;
   kind: string;
   value: Record<string, JsonValue>;
-};
-
-/** Somebody with an address. */
-export type Recipient = {
-  who: string;
-  address: string;
-};
-
-/** Who had a robot heard no more. */
-export type Revoked = {
-  by: string;
-  since: string;
-  /** Whether the STOP before it was confirmed. */
-  stood: boolean;
 };
 
 /** One robot with the age of what is said of it. */
@@ -986,6 +740,8 @@ export type Robot = {
   /** The robot's recent report; without one, the speed limit. */
   mode: "RUNNING" | "SLOW" | "STOPPED";
   pose: Pose | null;
+  /** The aisle that it is in. */
+  lane: string | null;
   twist: Twist | null;
   /** As the robot sent it. */
   stamp: string | null;
@@ -1002,8 +758,8 @@ export type Robot = {
   /** What "clear" lacks, its reason first. */
   missing: MissingPremise[];
   detector: Detector;
-  /** Null: it is heard. */
-  revoked: Revoked | null;
+  /** A setting says that it is not heard. */
+  refused: boolean;
   holds: Hold[];
   stop: Command | null;
   stop_state: string;
@@ -1021,14 +777,6 @@ export type Robot = {
   battery: Battery | null;
 };
 
-/** What came of revoking a robot, or of allowing it again. */
-export type RobotAccess = {
-  robot_id: string;
-  revoked: Revoked | null;
-  /** What came of asking the broker. */
-  broker: "done" | "failed" | "not_asked";
-};
-
 /** One robot's STOPs: how many, and each step from the press on. */
 export type RobotLatency = {
   robot_id: string;
@@ -1044,30 +792,33 @@ export type RobotLatency = {
 export type Rule = {
   id: string;
   version: number;
-  /** 0 to 1, inclusive; ``class_thresholds`` by class. */
-  confidence_threshold: number;
-  class_thresholds: Record<string, number>;
-  radius_m: number;
   factor: number;
   /** A detector's word → the class that it stands for. */
   aliases: Record<string, "person" | "robot">;
   /** True; else of before it was always so. */
   possible_people: boolean;
-  foresight: boolean;
-  /** How far ahead foresight looks (s). */
-  foresight_s: number;
   /** What came of the trial that it was before. */
   comparison: Comparison | null;
   author: string;
   since: string | null;
+  /** Least confidence that raises an alert, inclusive. From 0 to 1. */
+  confidence_threshold: number;
+  /** `confidence_threshold` by class, where it differs. */
+  class_thresholds: Record<string, number>;
+  /** Zone round a person or peer while fresh, inclusive (m). From 0.5 to 6. */
+  radius_m: number;
+  /** `radius_m` by class, where it differs. */
+  class_radii_m: Record<string, number>;
+  /** Whether a robot slows before it reaches a zone, to be slow there. */
+  foresight: boolean;
+  /** How far ahead that looks (s). From 0.5 to 3. */
+  foresight_s: number;
 };
 
-/** Reaction times of the fleet and its margins to people; never "safe". */
+/** Reaction times of the fleet. */
 export type Safety = {
   alert_latency: AlertLatency;
   not_echoed: NotAcknowledged;
-  negative_margin: NegativeMargin;
-  worst_margin: WorstMargin;
 };
 
 /** One sweep: points in ``map`` (m). */
@@ -1078,31 +829,12 @@ export type Scan = {
   points: [number, number][];
 };
 
-/** All that was measured of one hop, within 1 %. */
-export type SegmentBins = {
-  /** Upper ends of the bins that are not empty, rising. */
-  edges_ms: number[];
-  /** How many messages fell into each. */
-  counts: number[];
-  /** The sum of all durations, exact. */
-  total_ms: number;
-};
-
-/** Order of the messages at a hop since the start. */
-export type SegmentOrder = {
-  passed: number;
-  missing: number;
-  reordered: number;
-  repeated: number;
-  /** Of those that passed, not read: newer ones were there. */
-  skipped: number;
-};
-
-/** A present problem of a hop: key and values of a sentence. */
-export type SegmentRemark = {
-  key: string;
-  hop: string;
-  slots: Record<string, string | boolean | number | null>;
+/** What a robot's laser sees near it and nothing explains, in ``map`` (m). */
+export type SeenObstacle = {
+  x: number;
+  y: number;
+  width_m: number;
+  moved: boolean;
 };
 
 /** Latency of one hop; null where nothing was measured. */
@@ -1112,15 +844,6 @@ export type SegmentSpread = {
   p50_ms: number | null;
   p95_ms: number | null;
   p99_ms: number | null;
-  least_ms: number | null;
-  most_ms: number | null;
-};
-
-/** One hop of one message, since the robot's stamp, or since the broker without. */
-export type SegmentStep = {
-  hop: "uplink" | "fiware" | "robot_orion" | "iveg" | "screen";
-  from_ms: number;
-  to_ms: number;
 };
 
 /** The name of a template and what fills its holes. */
@@ -1149,7 +872,10 @@ export type SignInCode = {
 
 /** The worst that holds for a robot now, and what a person can do. */
 export type Situation = {
+  /** Of the gravest that holds for it. */
   level: "danger" | "caution" | "doubt" | "locked" | "working" | "away";
+  /** What is told: the first of all that holds. */
+  kind: "disobeys" | "lost_moving" | "stop_failed" | "stop_unknown" | "stop_under_way" | "moved" | "another_iveg" | "recording_live" | "contradiction" | "blind" | "lost" | "person" | "laser" | "robot" | "unsure" | "locked" | "battery" | "working" | "away";
   /** Its sentence is `situation.is.{state}`. */
   state: string;
   /** The reason that is applied. */
@@ -1159,7 +885,7 @@ export type Situation = {
   /** The person, robot or hold of the cause. */
   about: string | null;
   /** Its sentence is `situation.do.{action}`. */
-  action: "none" | "press_stop" | "red_button" | "keep_away" | "as_moving" | "check_robot" | "check_camera" | "check_network" | "check_fleet_file" | "release" | "unlock" | "resume";
+  action: "none" | "press_stop" | "red_button" | "as_moving" | "check_robot" | "check_camera" | "check_network" | "check_fleet_file" | "stop_other_iveg" | "charge" | "release" | "unlock" | "resume";
   /** The strictest speed factor in force. */
   factor: number | null;
   slots: Record<string, string | boolean | number | null>;
@@ -1175,7 +901,6 @@ export type Snapshot = {
   /** Those that go on. */
   commands: Command[];
   alerts: Alert[];
-  flood: Flood;
   /** The newest 200, oldest first. */
   log: LogEntry[];
   health: Health;
@@ -1197,31 +922,10 @@ export type SpeedLimit = {
   foretold_s: number | null;
 };
 
-/** A shared tablet as it is now. */
-export type Tablet = {
-  name: string;
-  /** Who has unlocked it; null: it is locked. */
-  holder: string | null;
-  /** What may be done on it now. */
-  role: "viewer" | "operator" | "admin";
-  /** Until it locks by itself if nothing is done. */
-  left_s: number;
-  people: TabletPerson[];
-};
-
-/** Somebody who may unlock a shared tablet. */
-export type TabletPerson = {
-  person_id: string;
-  name: string;
-  /** How long their PIN is refused; 0: not at all. */
-  blocked_s: number;
-};
-
 /** One mark: who is born inside its circle and stays there slows nobody. */
 export type Thing = {
   thing_id: string;
-  /** ``person``: no person; ``obstacle``: known, whatever lasers see. */
-  kind: "person" | "obstacle";
+  kind: "person";
   /** Of its middle in ``map``. */
   x: number;
   y: number;
@@ -1263,14 +967,6 @@ export type TilePlace = {
   y: number;
 };
 
-/** A recipient of an alert outside iVeg; ``failed`` is the reason of a failure. */
-export type Told = {
-  channel: "push" | "email" | "webhook";
-  to: string;
-  at: string;
-  failed: string | null;
-};
-
 /** A candidate that runs beside the rule in force and acts on nothing. */
 export type Trial = {
   rule: Rule;
@@ -1291,42 +987,6 @@ export type TrialDifference = {
   decision_id: string | null;
   began: string;
   ended: string | null;
-};
-
-/** What came of it, of the whole fleet. */
-export type TriedOutcome = {
-  /** Reason → seconds of a robot slowed. */
-  slowed_s: Record<string, number>;
-  /** Reason → how often a robot was slowed. */
-  encounters: Record<string, number>;
-  near_misses: number;
-  /** Unslowed near somebody (s). */
-  near_s: number;
-  /** Driving that was not driven (s). */
-  lost_s: number;
-  /** Unslowed with somebody really within 2 m (s); null: not known. */
-  missed_s: number | null;
-  /** Slowed for a person with nobody really within 2.3 m (s). */
-  false_s: number | null;
-};
-
-/** Parameters of the rule, those that people cannot change among them. */
-export type TriedParameters = {
-  confidence_threshold: number;
-  radius_m: number;
-  /** So far outside a robot is let go (m). */
-  release_beyond_m: number;
-  /** And so long after (s). */
-  release_after_s: number;
-  factor: number;
-  /** 0: it does not look ahead. */
-  foresight_s: number;
-};
-
-/** One point of the curve. */
-export type TriedPoint = {
-  value: number;
-  outcome: TriedOutcome;
 };
 
 /** Speed (m/s) and turn rate (rad/s). */
@@ -1355,51 +1015,4 @@ export type UserAccount = {
   own: boolean;
   /** The identity provider vouches for the person and gives the role. */
   provided: boolean;
-};
-
-/** The webhook; of its secret address only the host is shown, null without one. */
-export type WebhookChannel = {
-  on: boolean;
-  who: string;
-  host: string | null;
-  least: "P1" | "P2";
-  last: Told[];
-};
-
-/** A question about another rule, and how far its answer is. */
-export type WhatIf = {
-  id: string;
-  by: string;
-  state: "waiting" | "running" | "done" | "failed" | "cancelled";
-  /** 0 to 1. */
-  progress: number;
-  why: string | null;
-  since: string;
-  until: string;
-  vary: string;
-  in_force: TriedParameters;
-  candidate: TriedParameters;
-  answer: WhatIfAnswer | null;
-};
-
-/** The answer to a question. */
-export type WhatIfAnswer = {
-  /** Rows that it rests on; ``detections`` likewise. */
-  poses: number;
-  detections: number;
-  /** Reason → seconds by the decisions of then. */
-  recorded_slowed_s: Record<string, number>;
-  recorded_encounters: Record<string, number>;
-  in_force: TriedOutcome;
-  candidate: TriedOutcome;
-  curve: TriedPoint[];
-};
-
-/** The least margin of today, when it was, and of how many looks. */
-export type WorstMargin = {
-  margin: Margin | null;
-  at: string | null;
-  count: number;
-  since: string | null;
-  age_s: number | null;
 };

@@ -1,16 +1,32 @@
-"""Acknowledgement of alerts, one or a list: by whom, when, and with which note."""
+"""Acknowledgement of alerts, one or a list: by whom, when, and with which note.
 
-from typing import Annotated
+Notes of people over HTTP: pinned to a time and a place, and on the record.
 
-from fastapi import APIRouter, HTTPException, Response
-from pydantic import BaseModel, ConfigDict, Field
+A note is a line of the log: it is written once, and goes into the incident packs of the
+moment that it is about.
+"""
 
-from iveg.models.alert import AcknowledgedAlerts, Alert
-from iveg.ngsi.texts import clean_text
+from collections.abc import Callable, Collection
+from typing import Annotated, Self
+
+from fastapi import APIRouter, Depends, HTTPException, Query, Response
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from iveg.adapters.history import lists
+from iveg.adapters.history.queries import Queries
+from iveg.domain.errors import UnknownRobotError
+from iveg.domain.events import LogEvent, Slot
+from iveg.domain.observations import Instant
+from iveg.models.alert import AcknowledgedAlerts, Alert, Note
+from iveg.models.base import Listing
+from iveg.ngsi.payloads import clean_text, legible
 from iveg.pipeline.evaluate import Evaluator
 from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json
-from iveg.web.security.requirements import Operator
+from iveg.web.api.history_filters import Moment, Span, seconds
+from iveg.web.pages.sentences import local_stamp
+from iveg.web.refusals import refusals
+from iveg.web.security.requirements import Operator, require
 
 MOST_TOGETHER = 200
 """More alerts at once nobody has read."""
@@ -66,3 +82,94 @@ def router(evaluator: Evaluator, clock: Clock) -> APIRouter:
         return Json(AcknowledgedAlerts(items=items, left=left))
 
     return routes
+
+
+KEY = lists.NOTE
+MOST_TEXT = 1000
+LONGEST_AGO_S = 400 * 86_400.0
+_FARTHEST_M = 1e4
+_Metres = Annotated[float, Field(ge=-_FARTHEST_M, le=_FARTHEST_M)]
+_Id = Annotated[str, Field(pattern=r"^[ -~]{1,64}$")]
+
+
+class NoteRequest(BaseModel):
+    """What is to be noted; without a time it is about now."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    text: Annotated[str, Field(max_length=MOST_TEXT)]
+    at: Moment | None = None
+    x: _Metres | None = None
+    y: _Metres | None = None
+    robot_id: _Id | None = None
+    decision_id: _Id | None = None
+
+    @model_validator(mode="after")
+    def _whole(self) -> Self:
+        if (self.x is None) != (self.y is None):
+            raise ValueError("a place has both x and y")
+        if not self.text.strip() or legible(self.text) != self.text:
+            raise ValueError("a note has a text, without marks that turn it round")
+        return self
+
+
+def notes_router(
+    queries: Queries,
+    fleet: Collection[str],
+    log: Callable[[LogEvent, Instant], None],
+    clock: Clock,
+) -> APIRouter:
+    """Read by all, written by operators.
+
+    Args:
+        queries: The history.
+        fleet: Robots of now; notes may also be about those that records name.
+        log: Takes the lines.
+        clock: What a note without a time is about.
+    """
+    routes = APIRouter(prefix="/api/v1", tags=["history"], responses=refusals(503))
+
+    @routes.get(
+        "/notes",
+        response_model=Listing[Note],
+        dependencies=[Depends(require("read"))],
+    )
+    async def notes(asked: Annotated[Span, Query()]) -> Response:
+        """Notes by when they were written, newest first."""
+        since, until = seconds(asked.since), seconds(asked.until)
+        wanted = lists.Filter(since=since, until=until, limit=lists.MOST_ROWS)
+        page = await queries.page(lists.NOTES, wanted)
+        return Json(Listing(items=[Note.of_record(one) for one in page.items]))
+
+    @routes.post("/notes", status_code=201, responses=refusals(404))
+    async def write(body: NoteRequest, who: Operator) -> dict[str, str]:
+        """Write one down; it cannot be taken back."""
+        now = clock()
+        pinned_at = now.wall if body.at is None else body.at.timestamp()
+        if not now.wall - LONGEST_AGO_S <= pinned_at <= now.wall:
+            raise HTTPException(422, "A note is about a moment of the last 400 days.")
+        robot = body.robot_id
+        if not (robot is None or robot in fleet or await _is_recorded(queries, robot)):
+            raise UnknownRobotError(robot)
+        slots: dict[str, Slot] = {
+            "by": who.name,
+            "text": body.text,
+            "pinned": local_stamp(pinned_at),
+            "pinned_at": pinned_at,
+        }
+        if body.x is not None:
+            slots |= {"x": body.x, "y": body.y}
+        log(LogEvent("system", KEY, slots, robot, decision_id=body.decision_id), now)
+        return {"detail": "It is on the record."}
+
+    return routes
+
+
+async def _is_recorded(queries: Queries, robot: str) -> bool:
+    """Whether a decision, an order or an alert names a robot that left the fleet."""
+    wanted = lists.Filter(robot=robot, limit=1)
+    return bool(
+        (await queries.page(lists.DECISIONS, wanted)).items
+        or (await queries.page(lists.COMMANDS, wanted)).items
+        or (await queries.page(lists.ALERTS, wanted)).items
+    )

@@ -9,13 +9,13 @@ from typing import Annotated
 from fastapi import APIRouter, Request, Response
 from pydantic import BaseModel, ConfigDict, Field
 
-from iveg.models.press import FleetPressed, Pressed
+from iveg.models.command import FleetPressed, Pressed
 from iveg.pipeline.command import Commander
 from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.presses import DESCRIBED, press_of
 from iveg.web.refusals import refusals
-from iveg.web.security.requirements import Operator, Presser, ProvenOperator
+from iveg.web.security.requirements import Operator, Presser
 
 HoldId = Annotated[str, Field(min_length=1, max_length=64)]
 
@@ -57,27 +57,12 @@ def router(commander: Commander, clock: Clock) -> APIRouter:
         return Json(FleetPressed(commands=[Pressed.of(one) for one in pressed]), 202)
 
     @routes.post(
-        "/robots/{robot_id}/drill",
-        status_code=202,
-        response_model=Pressed,
-        responses=refusals(409),
-        openapi_extra=DESCRIBED,
-    )
-    async def drill(request: Request, robot_id: str, who: Operator) -> Response:
-        """STOP a robot that stands or crawls, to prove that STOP works; 409 else."""
-        press = await press_of(request)
-        command = await commander.drill(robot_id, who.name, clock(), press)
-        return Json(Pressed.of(command), 202)
-
-    @routes.post(
         "/robots/{robot_id}/release",
         status_code=202,
         response_model=Pressed,
         responses=refusals(409),
     )
-    async def release(
-        robot_id: str, body: ReleaseRequest, who: ProvenOperator
-    ) -> Response:
+    async def release(robot_id: str, body: ReleaseRequest, who: Operator) -> Response:
         """Lift exactly the holds that the person saw; 409 when they have changed."""
         command = await commander.release(robot_id, body.holds, who.name, clock())
         return Json(Pressed.of(command), 202)

@@ -1,19 +1,35 @@
-"""The evening sheet over HTTP: as numbers, and as a page to print."""
+"""The evening sheet over HTTP: as numbers, and as a page to print.
+
+Figures of the history over HTTP, and the library that draws them.
+
+Latency of STOP (docs/interfaces/http.md), read from the history.
+"""
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from collections import defaultdict
+from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from contextlib import closing
 from datetime import date, timedelta
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Depends, Query, Request, Response
+from fastapi import APIRouter, Depends, HTTPException, Path, Query, Request, Response
+from orjson import Fragment
 
-from iveg.adapters.history.ages import lost_of
-from iveg.adapters.history.listings import COMMANDS, DECISIONS
-from iveg.adapters.history.lists import MOST_ROWS, Filter
-from iveg.adapters.history.places import people_seen, poses_of
+from iveg.adapters.history import series
+from iveg.adapters.history.lists import COMMANDS, DECISIONS, MOST_ROWS, Filter
 from iveg.adapters.history.queries import Queries
-from iveg.domain.alerts.alert_book import MOST_KEPT
+from iveg.adapters.history.series import (
+    ClimateSeries,
+    CommandLatency,
+    ConfidenceCount,
+    MeasurementSeries,
+    SpeedSeries,
+    command_latencies,
+    people_seen,
+    poses_of,
+)
+from iveg.adapters.history.upkeep import lost_of
+from iveg.domain.alerts import MOST_KEPT
 from iveg.domain.day import (
     Passing,
     closest_passes,
@@ -21,23 +37,247 @@ from iveg.domain.day import (
     slowed_minutes,
     worked_minutes,
 )
-from iveg.domain.fleet import as_counted
+from iveg.domain.errors import HopError
+from iveg.domain.fleet import FleetDescription, as_counted
 from iveg.domain.greenhouse import Greenhouse
-from iveg.domain.records import CommandRecord, DecisionRecord
+from iveg.domain.observations import Instant
+from iveg.domain.records import ByTransport, CommandRecord, DecisionRecord
 from iveg.domain.stamps import format_stamp
-from iveg.domain.stop.drills import due_drills
-from iveg.models.base import rounded
-from iveg.models.command import Command
+from iveg.domain.transports import TRANSPORTS, TransportId
+from iveg.models.base import GreenhouseMap, Point, rounded, write_json
+from iveg.models.command import Command, Latency, LatencySpread, RobotLatency
 from iveg.models.day import Day, Encounters, Pass, Slowed, Worked
-from iveg.models.places import GreenhouseMap, Point
+from iveg.models.equipment import ClimateReading
 from iveg.pipeline.ports import Clock
-from iveg.web.api.answers import Json
-from iveg.web.api.history_filters import HistoryDay
+from iveg.web.api.answers import Apart, Json
+from iveg.web.api.exports import MEDIA_TYPES
+from iveg.web.api.history_filters import HistoryDay, Range, Span, range_of
+from iveg.web.pages import charts
 from iveg.web.pages.contexts import DayPage
 from iveg.web.pages.drawing import Pages
-from iveg.web.pages.local_time import in_madrid, start_of
+from iveg.web.pages.sentences import in_madrid, start_of
 from iveg.web.refusals import refusals
 from iveg.web.security.requirements import require
+
+_DAY_S = 86_400.0
+_FOR_GOOD = "public, max-age=31536000, immutable"
+
+
+def add_routes(
+    routes: APIRouter,
+    queries: Queries,
+    worker: Apart,
+    threshold: Callable[[], float | None],
+    fleet: FleetDescription,
+    read_clock: Clock,
+) -> None:
+    """Add the figures to the routes of the history, whose arguments these are."""
+
+    @routes.get(
+        "/api/v1/history/charts",
+        summary="Plotly figures of a range",
+        description="Speed with the speed limit, detections by class and "
+        "confidence, how long each STOP took; the last 15 minutes unless told.",
+        response_class=Response,
+        responses={200: {"content": {"application/json": {}}}},
+    )
+    async def draw(asked: Annotated[Range, Query()]) -> Response:
+        since, until = range_of(asked, read_clock().wall)
+        found = await asyncio.gather(
+            queries.ask(series.speed_series, since, until, asked.robot),
+            queries.ask(series.confidence_counts, since, until, asked.robot),
+            queries.ask(series.command_latencies, since, until, asked.robot),
+        )
+        body = await worker.run(_draw_charts, *found, threshold(), fleet)
+        return Response(body, media_type=MEDIA_TYPES["json"])
+
+    @routes.get("/vendor/{name}", include_in_schema=False)
+    async def vendor(name: str) -> Response:
+        script = await asyncio.to_thread(charts.library)
+        if name != script.name:
+            raise HTTPException(404, "There is no such file.")
+        headers = {"Content-Encoding": "gzip", "Cache-Control": _FOR_GOOD}
+        return Response(script.packed, 200, headers, "text/javascript")
+
+    _add_spans(routes, queries, worker, read_clock)
+
+
+def _add_spans(
+    routes: APIRouter, queries: Queries, worker: Apart, read_clock: Clock
+) -> None:
+    """Add what is measured all day."""
+
+    @routes.get(
+        "/api/v1/history/climate",
+        summary="The air over a range",
+        description="Readings, or their means over slices of time, and Plotly figures "
+        "of them; the last 24 hours unless told.",
+        response_class=Response,
+        responses={200: {"content": {"application/json": {}}}},
+    )
+    async def climate(asked: Annotated[Span, Query()]) -> Response:
+        since, until = range_of(asked, read_clock().wall, _DAY_S)
+        found = await queries.ask(series.climate_series, since, until)
+        body = await worker.run(_draw_climate, found, since, until)
+        return Response(body, media_type=MEDIA_TYPES["json"])
+
+    @routes.get(
+        "/api/v1/history/equipment",
+        summary="Other equipment over a range",
+        description="A Plotly figure of each attribute that was heard, by entity and "
+        "attribute; the last 24 hours unless told.",
+        response_class=Response,
+        responses={200: {"content": {"application/json": {}}}},
+    )
+    async def equipment(asked: Annotated[Span, Query()]) -> Response:
+        since, until = range_of(asked, read_clock().wall, _DAY_S)
+        found = await queries.ask(series.measurement_series, since, until)
+        body = await worker.run(_draw_equipment, found, since, until)
+        return Response(body, media_type=MEDIA_TYPES["json"])
+
+
+def _draw_charts(
+    speeds: Sequence[SpeedSeries],
+    counts: Sequence[ConfidenceCount],
+    stops: Sequence[CommandLatency],
+    threshold: float | None,
+    fleet: FleetDescription,
+) -> bytes:
+    return write_json(
+        {
+            **charts.library_facts(),
+            "speed": Fragment(charts.speed_figure(speeds, fleet)),
+            "margin": Fragment(charts.margin_figure(speeds)),
+            "detections": Fragment(charts.confidence_figure(counts, threshold)),
+            "stops": Fragment(charts.stop_figure(stops)),
+        }
+    )
+
+
+def _draw_climate(series: ClimateSeries, since: float, until: float) -> bytes:
+    figures = charts.climate_figures(series)
+    return write_json(
+        {
+            "since": format_stamp(since),
+            "until": format_stamp(until),
+            "slice_s": round(series.slice_s, 3),
+            "items": _readings(series),
+            **charts.library_facts(),
+            "figures": {kind: Fragment(drawn) for kind, drawn in figures.items()},
+        }
+    )
+
+
+def _draw_equipment(
+    series: Mapping[tuple[str, str], MeasurementSeries], since: float, until: float
+) -> bytes:
+    figures = {
+        f"{entity_id}/{attribute}": Fragment(charts.measurement_figure(one))
+        for (entity_id, attribute), one in series.items()
+    }
+    return write_json(
+        {
+            "since": format_stamp(since),
+            "until": format_stamp(until),
+            **charts.library_facts(),
+            "figures": figures,
+        }
+    )
+
+
+def _readings(series: ClimateSeries) -> list[ClimateReading]:
+    """Oldest first."""
+    columns = (series.at, series.temperature, series.relative_humidity, series.co2)
+    return [ClimateReading.of_series(*one) for one in zip(*columns, strict=True)]
+
+
+def stop_records_router(
+    queries: Queries,
+    clock: Clock,
+    find: Callable[[str, Instant], Command | None],
+) -> APIRouter:
+    """Routes of past STOPs; ``find`` knows the commands of this run."""
+    routes = APIRouter(
+        prefix="/api/v1",
+        tags=["commands"],
+        dependencies=[Depends(require("read"))],
+        responses=refusals(503),
+    )
+
+    @routes.get("/commands/latency", response_model=Latency)
+    async def latency(asked: Annotated[Range, Query()]) -> Response:
+        """P50, P95 and longest of each step, per robot; 15 minutes unless told."""
+        since, until = range_of(asked, clock().wall)
+        found = await queries.ask(command_latencies, since, until, asked.robot)
+        body = Latency(
+            since=format_stamp(since),
+            until=format_stamp(until),
+            robots=_by_robot(found),
+        )
+        return Json(body)
+
+    @routes.get("/commands/{command_id}", response_model=Command)
+    async def command(
+        command_id: Annotated[str, Path(pattern=r"^[ -~]{1,64}$")],
+    ) -> Response:
+        """One command: as it stands, with what the history knows of it."""
+        followed = find(command_id, clock())
+        try:
+            kept = await _kept(queries, command_id)
+        except HopError:
+            if followed is None:
+                raise
+            kept = None
+        if followed is None and kept is None:
+            raise HTTPException(404, "There is no such command.")
+        return Json(_joined(followed, kept))
+
+    return routes
+
+
+async def _kept(queries: Queries, command_id: str) -> Command | None:
+    found = await queries.one(COMMANDS, command_id)
+    if found is None:
+        return None
+    return Command.of_record(found, await queries.command_events(command_id))
+
+
+def _joined(followed: Command | None, kept: Command | None) -> Command | None:
+    """What goes on, beside what only the history tells: how it ended, and its steps."""
+    if followed is None or kept is None:
+        return followed or kept
+    ended = {"outcome": kept.outcome, "was_loud": kept.was_loud, "steps": kept.steps}
+    return followed.model_copy(update=ended)
+
+
+def _by_robot(found: Iterable[CommandLatency]) -> list[RobotLatency]:
+    by_robot: dict[str, list[CommandLatency]] = defaultdict(list)
+    for one in found:
+        by_robot[one.robot_id].append(one)
+    robots = sorted(by_robot, key=as_counted)
+    return [_robot(robot_id, by_robot[robot_id]) for robot_id in robots]
+
+
+def _robot(robot_id: str, stops: list[CommandLatency]) -> RobotLatency:
+    return RobotLatency(
+        robot_id=robot_id,
+        stops=len(stops),
+        accepted=LatencySpread.of(one.accepted_ms for one in stops),
+        sent=_by_transport([one.sent_ms for one in stops]),
+        answer=_by_transport([one.answer_ms for one in stops]),
+        standing=LatencySpread.of(one.standstill_ms for one in stops),
+    )
+
+
+def _by_transport(took: list[ByTransport]) -> dict[TransportId, LatencySpread]:
+    """Of each transport of the table, and of those that rows know besides."""
+    known = dict.fromkeys(one.id for one in TRANSPORTS)
+    known |= dict.fromkeys(transport for one in took for transport in one)
+    return {
+        transport: LatencySpread.of(one.get(transport) for one in took)
+        for transport in known
+    }
+
 
 _DAY = timedelta(days=1)
 _MOST_PAGES = 20
@@ -46,24 +286,17 @@ ReadDay = Callable[[date, float], Awaitable[Day]]
 """Has one day read from the history, as far as it has gone (Unix s)."""
 
 
-def read_day(
-    url: str, greenhouse: Greenhouse, drill_days: float, day: date, now: float
-) -> Day:
-    """One day of a history, as far as it has gone (``now`` in Unix s); takes seconds.
-
-    A STOP drill is due after ``drill_days``; 0: never.
-    """
+def read_day(url: str, greenhouse: Greenhouse, day: date, now: float) -> Day:
+    """One day of a history up to ``now`` (Unix s); takes seconds."""
 
     async def read() -> Day:
         with closing(Queries(url)) as queries:
-            return await _read(queries, greenhouse, drill_days, day, now)
+            return await _read(queries, greenhouse, day, now)
 
     return asyncio.run(read())
 
 
-async def _read(
-    queries: Queries, greenhouse: Greenhouse, drill_days: float, day: date, now: float
-) -> Day:
+async def _read(queries: Queries, greenhouse: Greenhouse, day: date, now: float) -> Day:
     since, end = start_of(day), start_of(day + _DAY)
     until = max(since, min(end, now))
     poses = await queries.ask(poses_of, since, until)
@@ -72,8 +305,6 @@ async def _read(
     decisions = await _decisions(queries, since, until)
     slowed = slowed_minutes(decisions, greenhouse, until)
     met = encounter_counts(decisions)
-    last = await queries.last_drills()
-    by = start_of(day + 2 * _DAY)
     return Day(
         day=day.isoformat(),
         since=format_stamp(since),
@@ -100,7 +331,6 @@ async def _read(
         ),
         passes=[_pass(one) for one in closest_passes(poses, seen, greenhouse)],
         stops=[Command.of_record(one) for one in await _stops(queries, since, until)],
-        drills_due=due_drills(last, drill_days, by),
         unseen=len(await queries.unseen_alerts(MOST_KEPT)),
         lost=list(await queries.ask(lost_of, since, until)),
         map=GreenhouseMap.of(greenhouse),

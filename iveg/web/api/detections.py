@@ -1,21 +1,37 @@
-"""Each detection of the last moments (docs/interfaces/http.md, "Each detection")."""
+"""Each detection of the last moments (docs/interfaces/http.md, "Each detection").
+
+Detectors in and out of service over HTTP (docs/interfaces/http.md).
+
+Words of detectors over HTTP (docs/interfaces/http.md).
+
+Marks "not a person here" over HTTP (docs/interfaces/http.md).
+"""
 
 from collections.abc import Sequence
-from typing import Annotated
+from datetime import timedelta
+from typing import Annotated, Self
 
 from fastapi import APIRouter, Depends, Query, Request, Response
+from pydantic import AfterValidator, Field, model_validator
 
 from iveg.adapters.history.lists import USUAL_ROWS
 from iveg.domain.records import DetectionRecord
-from iveg.models.base import Listing, write_json
-from iveg.models.kept_detection import DetectionRow
+from iveg.domain.words import WordAnswer
+from iveg.models.base import Body, Listing, write_json
+from iveg.models.people import DetectionRow, Thing
+from iveg.models.robot import Detector
+from iveg.ngsi.payloads import legible
+from iveg.pipeline.detectors import Detectors
 from iveg.pipeline.newest_detections import NewestDetections
+from iveg.pipeline.ports import Clock
+from iveg.pipeline.things import ThingMarks
 from iveg.web.api import exports
-from iveg.web.api.answers import FEW_ROWS, Apart
+from iveg.web.api.answers import FEW_ROWS, Apart, Json
 from iveg.web.api.exports import MEDIA_TYPES, Form
 from iveg.web.api.history_filters import NewestFilters, admitting
+from iveg.web.pages.sentences import in_madrid, start_of
 from iveg.web.refusals import refusals
-from iveg.web.security.requirements import require
+from iveg.web.security.requirements import Operator, require
 
 
 def router(newest: NewestDetections, worker: Apart) -> APIRouter:
@@ -55,3 +71,123 @@ def _write(form: Form, rows: Sequence[DetectionRecord]) -> bytes:
     return write_json(
         {"items": [DetectionRow.of_row(one) for one in rows], "next": None}
     )
+
+
+class ServiceRequest(Body):
+    """Whether the detector is to be waited for."""
+
+    in_service: bool
+    reason: Annotated[
+        str,
+        Field(max_length=200),
+        AfterValidator(lambda text: " ".join(legible(text).split())),
+    ] = ""
+
+    @model_validator(mode="after")
+    def _out_for_a_reason(self) -> Self:
+        if not (self.in_service or self.reason):
+            raise ValueError("out of service needs a reason")
+        return self
+
+
+def detectors_router(detectors: Detectors, clock: Clock) -> APIRouter:
+    """The word of an operator on a robot's detector."""
+    routes = APIRouter(prefix="/api/v1", tags=["robots"])
+
+    @routes.put(
+        "/robots/{robot_id}/detector", response_model=Detector, responses=refusals(503)
+    )
+    async def service(
+        robot_id: str,
+        body: ServiceRequest,
+        who: Operator,
+    ) -> Response:
+        """Take a detector out of service until its robot's next boot, or put it back.
+
+        Taking it out needs a ``reason``.
+
+        While it is out of service nobody waits for its pictures.
+        """
+        now = clock()
+        robot = await detectors.set_in_service(
+            robot_id,
+            who.name,
+            now,
+            in_service=body.in_service,
+            reason=body.reason,
+        )
+        return Json(Detector.of(robot, now))
+
+    return routes
+
+
+Name = Annotated[str, Field(min_length=1, max_length=64)]
+
+
+class WordRequest(Body):
+    """What a detector's word stands for."""
+
+    detector: Name
+    word: Name
+    is_person: bool
+    sure: bool = Field(
+        default=False, description="Asked a second time; needed for ``false``."
+    )
+
+    @model_validator(mode="after")
+    def _asked_twice(self) -> Self:
+        if not (self.is_person or self.sure):
+            raise ValueError("that it is no person has to be sure")
+        return self
+
+
+def words_router(detectors: Detectors, clock: Clock) -> APIRouter:
+    """The word of an operator on a detector's word."""
+    routes = APIRouter(prefix="/api/v1", tags=["people"])
+
+    @routes.put("/words", status_code=204, responses=refusals(404, 503))
+    async def answer(body: WordRequest, who: Operator) -> Response:
+        """Say whether a word that was asked for stands for a person."""
+        now = clock()
+        said = WordAnswer(body.detector, body.word, body.is_person, who.name, now.wall)
+        await detectors.answer(said, now)
+        return Response(status_code=204)
+
+    return routes
+
+
+class MarkRequest(Body):
+    """Which track is no person."""
+
+    person_id: Name
+
+
+def things_router(marks: ThingMarks, clock: Clock) -> APIRouter:
+    """Read by all, made and taken back by operators."""
+    routes = APIRouter(prefix="/api/v1", tags=["people"])
+    reader = [Depends(require("read"))]
+
+    @routes.get("/things", response_model=Listing[Thing], dependencies=reader)
+    async def things() -> Response:
+        """Every place that an operator marked."""
+        return Json(Listing(items=[Thing.of(one) for one in marks.known]))
+
+    @routes.post(
+        "/things", status_code=201, response_model=Thing, responses=refusals(404, 409)
+    )
+    async def mark(body: MarkRequest, who: Operator) -> Response:
+        """Mark where a track is, until the day's end.
+
+        409 for whoever came from elsewhere, moved or was surely seen.
+        """
+        now = clock()
+        until = start_of(in_madrid(now.wall).date() + timedelta(days=1))
+        thing = marks.mark(body.person_id, who.name, until, now)
+        return Json(Thing.of(thing), 201)
+
+    @routes.delete("/things/{thing_id}", response_model=Thing)
+    async def unmark(thing_id: str, who: Operator) -> Response:
+        """Take a mark back: from now on whoever is there is somebody."""
+        return Json(Thing.of(marks.unmark(thing_id, who.name, clock())))
+
+    return routes

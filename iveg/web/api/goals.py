@@ -6,7 +6,7 @@ from fastapi import APIRouter, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from iveg.domain.goals import GoalWish
-from iveg.models.goal import Goal
+from iveg.models.robot import Goal
 from iveg.pipeline.goals import GoalDispatcher
 from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json

@@ -1,16 +1,217 @@
-"""Health of the data path: for people, supervisors and Prometheus."""
+"""Health of the data path: for people, supervisors and Prometheus.
 
-from collections.abc import Callable
+Metrics for Prometheus: counters, hops, latency, queues, safety figures.
+
+``deploy/grafana`` draws them, and a test compares its names with these.
+"""
+
+import asyncio
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from fastapi import APIRouter, Depends, Response
 from fastapi.responses import PlainTextResponse
+from prometheus_client import CONTENT_TYPE_PLAIN_0_0_4, generate_latest
+from prometheus_client.metrics_core import Metric
+from prometheus_client.registry import Collector
 
+from iveg.domain.latency import LatencyWatch, Sketch, merged
 from iveg.domain.observations import Instant
 from iveg.models.health import Health
 from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.security.requirements import require
+
+_SHARES = (0.5, 0.95, 0.99)
+_Latency = list[tuple[tuple[str, str, str], int, float, list[Sketch]]]
+
+
+@dataclass(frozen=True, slots=True)
+class Queues:
+    """Depth of queues, drops and retries.
+
+    Attributes:
+        depths: Queue → number of waiting items.
+        dropped: Queue → items dropped since the start.
+        retries: Operation → retries since the start.
+    """
+
+    depths: Mapping[str, int]
+    dropped: Mapping[str, int]
+    retries: Mapping[str, int]
+
+
+def metrics_router(
+    clock: Clock,
+    health: Callable[[Instant], Health],
+    watch: LatencyWatch,
+    queues: Callable[[], Queues],
+    longest_turn_s: Callable[[Instant], float],
+) -> APIRouter:
+    """The endpoint that Prometheus asks."""
+    routes = APIRouter(tags=["health"])
+
+    @routes.get(
+        "/metrics",
+        dependencies=[Depends(require("read"))],
+        response_class=PlainTextResponse,
+    )
+    async def metrics() -> Response:
+        """Counters, hops, latency and safety in Prometheus' text format."""
+        now = clock()
+        families = [
+            *_families(health(now), watch, queues()),
+            _family(
+                "gauge",
+                "loop_longest_turn_seconds",
+                "CPU time of the longest turn of the loop in the last two minutes.",
+                {"": round(longest_turn_s(now), 4)},
+            ),
+        ]
+        latency: _Latency = [
+            ((one.robot_id, one.data, hop), part.count, part.total, part.parts("1min"))
+            for one in watch.streams
+            for hop, part in one.segments.items()
+            if part.count
+        ]
+        # Twenty robots have 300 sketches to sum up: beside the loop, not in it.
+        text = await asyncio.to_thread(
+            lambda: generate_latest(_Told([*families, _summary(latency)]))
+        )
+        return Response(text, media_type=CONTENT_TYPE_PLAIN_0_0_4)
+
+    return routes
+
+
+class _Told(Collector):
+    """Families that were computed for one request."""
+
+    def __init__(self, families: list[Metric]) -> None:
+        self._families = families
+
+    def collect(self) -> Iterable[Metric]:
+        """All of them."""
+        return self._families
+
+
+def _family(
+    kind: str,
+    name: str,
+    text: str,
+    samples: Mapping[str, float | None],
+    label: str = "",
+) -> Metric:
+    """One family; samples that nobody knows are left out."""
+    made = Metric(f"iveg_{name}", text, kind)
+    sample = f"iveg_{name}_total" if kind == "counter" else f"iveg_{name}"
+    for key, value in samples.items():
+        if value is not None:
+            made.add_sample(sample, {label: key} if label else {}, value)
+    return made
+
+
+def _families(health: Health, watch: LatencyWatch, queues: Queues) -> list[Metric]:
+    latency, asked = health.safety.alert_latency, health.safety.not_echoed
+    shares = dict(
+        zip(
+            ("0.5", "0.95", "0.99"),
+            (latency.p50_ms, latency.p95_ms, latency.p99_ms),
+            strict=True,
+        )
+    )
+    return [
+        _family(
+            "counter",
+            "events",
+            "Events since the start, by name.",
+            health.counters,
+            "name",
+        ),
+        _family(
+            "gauge",
+            "hop_up",
+            "1 while the hop works, else 0.",
+            {one.hop: one.state == "ok" for one in health.hops},
+            "hop",
+        ),
+        _family(
+            "gauge",
+            "lag_seconds",
+            "Lag of the heartbeat probe at the hop.",
+            {one.hop: one.lag_s for one in health.hops},
+            "hop",
+        ),
+        _family(
+            "gauge",
+            "lag_growing",
+            "1 while that lag grows, else 0.",
+            {one.hop: one.growing for one in health.hops if one.lag_s is not None},
+            "hop",
+        ),
+        _family(
+            "gauge",
+            "clock_offset_seconds",
+            "Clock of the robot minus clock of the server.",
+            {robot: one.offset_s for robot, one in watch.clocks.items()},
+            "robot",
+        ),
+        _family(
+            "gauge",
+            "clock_uncertainty_seconds",
+            "Greatest error of that offset.",
+            {robot: one.uncertainty_s for robot, one in watch.clocks.items()},
+            "robot",
+        ),
+        _family("gauge", "queue_depth", "Items in the queue.", queues.depths, "queue"),
+        _family(
+            "counter",
+            "dropped",
+            "Items that a full queue dropped.",
+            queues.dropped,
+            "queue",
+        ),
+        _family("counter", "retries", "Repeated operations.", queues.retries, "what"),
+        _family(
+            "gauge",
+            "alert_latency_seconds",
+            "From a detection of a person to the robot's report, last five minutes.",
+            {
+                share: None if ms is None else ms / 1000.0
+                for share, ms in shares.items()
+            },
+            "quantile",
+        ),
+        _family(
+            "gauge",
+            "alerts_not_echoed",
+            "Alerts without an answer within one second, last five minutes.",
+            {"": asked.count},
+        ),
+        _family(
+            "gauge",
+            "alerts_asked",
+            "Alerts that required an answer, last five minutes.",
+            {"": asked.of},
+        ),
+    ]
+
+
+def _summary(latency: _Latency) -> Metric:
+    """Quantiles, sum and count of each hop."""
+    name = "iveg_latency_seconds"
+    text = "Latency of a hop; quantiles are of the last minute."
+    made = Metric(name, text, "summary")
+    for (robot, data, hop), count, total, sketches in latency:
+        labels, sketch = {"robot": robot, "data": data, "hop": hop}, merged(sketches)
+        for share in _SHARES:
+            value = sketch.quantile(share)
+            if value is not None:
+                made.add_sample(name, {**labels, "quantile": f"{share:g}"}, value)
+        made.add_sample(f"{name}_sum", labels, total)
+        made.add_sample(f"{name}_count", labels, count)
+    return made
+
 
 _READY: dict[int | str, dict[str, Any]] = {503: {"description": "A hop is not well."}}
 
@@ -18,6 +219,7 @@ _READY: dict[int | str, dict[str, Any]] = {503: {"description": "A hop is not we
 def router(
     clock: Clock,
     health: Callable[[Instant], Health],
+    accounts: Callable[[], str],
 ) -> APIRouter:
     """The endpoints that machines ask."""
     routes = APIRouter(tags=["health"])
@@ -33,8 +235,9 @@ def router(
 
     @routes.get("/readyz", dependencies=[Depends(require("read"))], responses=_READY)
     async def ready() -> Response:
-        """200 when every hop is well, else 503."""
-        state = health(clock())
-        return Json({"ok": state.ok}, 200 if state.ok else 503)
+        """200 when every hop and the file of accounts are well, else 503."""
+        kept = accounts()
+        is_ok = health(clock()).ok and kept == "ok"
+        return Json({"ok": is_ok, "accounts": kept}, 200 if is_ok else 503)
 
     return routes

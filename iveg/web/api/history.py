@@ -1,50 +1,171 @@
 """The history over HTTP: lists to filter and export, and figures.
 
 Lists answer JSON, CSV or NDJSON, as ``Accept`` or ``format`` says.
+
+The lists of the history: of each its source and its models.
 """
 
-from collections.abc import AsyncIterator, Callable, Sequence
-from dataclasses import replace
+from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from functools import cache
-from secrets import token_hex
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Generic, TypeVar, cast
 
 from fastapi import APIRouter, Depends, HTTPException, Path, Query, Request, Response
 from fastapi.responses import StreamingResponse
 from orjson import Fragment
 
 from iveg.adapters import clock
-from iveg.adapters.extras import require_extra
-from iveg.adapters.history import cursors, listings, lists
-from iveg.adapters.history.lists import Filter, Page
+from iveg.adapters.history import lists
+from iveg.adapters.history.lists import Filter, ListOf, Page
 from iveg.adapters.history.queries import Queries
-from iveg.adapters.parquet import parquet_end, parquet_page
-from iveg.domain.alerts.flood import FloodState as NoFlood
-from iveg.domain.errors import MissingExtraError
+from iveg.domain.errors import HopError
 from iveg.domain.fleet import NOBODY, FleetDescription
-from iveg.domain.records import DecisionRecord, Record
-from iveg.models.alert import Flood
-from iveg.models.base import Listing, Model, write_json
+from iveg.domain.records import CommandRecord, DecisionRecord, Record
+from iveg.models.alert import Alert, AuditEntry, LogEntry
+from iveg.models.base import Listing, Model, Reading, write_json
+from iveg.models.command import Command
 from iveg.models.decision import Decision
 from iveg.models.dictionary import DictionaryColumn, dictionary_columns
+from iveg.models.equipment import Measurement
+from iveg.models.people import DetectionRow
+from iveg.models.robot import OdometryRow
 from iveg.pipeline.ports import Clock
-from iveg.web.api import exports, figures
+from iveg.web.api import day, exports
 from iveg.web.api.answers import FEW_ROWS, Apart, Json
 from iveg.web.api.exports import MEDIA_TYPES, Form
 from iveg.web.api.history_filters import Filters, filter_of
-from iveg.web.api.history_lists import HistoryList, R, lists_of
-from iveg.web.pages.local_time import in_madrid
-from iveg.web.pages.sentences import Sentences
-from iveg.web.pages.translations import read_translations
+from iveg.web.pages.sentences import Sentences, in_madrid, read_translations
 from iveg.web.refusals import refusals
 from iveg.web.security.requirements import require
+from iveg.web.security.roles import Action
 
-FileForm = Form | Literal["parquet"]
-_PARQUET = "application/vnd.apache.parquet"
+R = TypeVar("R", bound=Record)
+
+
+@dataclass(frozen=True, slots=True)
+class HistoryList(Generic[R]):
+    """One list: its source and its models.
+
+    Attributes:
+        model: Of a row, and of what ``beside`` found for it.
+        beside: Other rows that the models of some rows need, in their order.
+        needs: What whoever asks must be allowed.
+        of_now: Those of this moment, which no database has to be asked for.
+    """
+
+    path: str
+    of: ListOf[R]
+    model: Callable[..., Model]
+    listing: type[Listing[Any]]
+    says: str
+    beside: Callable[[Sequence[R]], Awaitable[list[Any]]] | None = None
+    needs: Action = "read"
+    of_now: Callable[[], list[Alert]] | None = None
+
+    async def rows(self, records: Sequence[R]) -> list[tuple[Any, ...]]:
+        """What ``model`` is called with, for each record."""
+        if self.beside is None:
+            return [(one,) for one in records]
+        return list(zip(records, await self.beside(records), strict=True))
+
+
+_MEASURED: tuple[HistoryList[Any], ...] = (
+    HistoryList(
+        "detections",
+        lists.DETECTIONS,
+        DetectionRow.of_row,
+        Listing[DetectionRow],
+        "What robots saw, by when it reached iVeg",
+    ),
+    HistoryList(
+        "tracks",
+        lists.TRACKS,
+        DetectionRow.of_row,
+        Listing[DetectionRow],
+        "Where people were: their detections, by when each reached iVeg",
+    ),
+    HistoryList(
+        "odometry",
+        lists.ODOMETRY,
+        OdometryRow.of_record,
+        Listing[OdometryRow],
+        "Poses and speeds of robots with their speed limits, twice a second",
+    ),
+    HistoryList(
+        "readings",
+        lists.READINGS,
+        Reading.of_record,
+        Listing[Reading],
+        "What small sensors of robots said; `class` asks for a kind, as `battery`",
+    ),
+    HistoryList(
+        "measurements",
+        lists.MEASUREMENTS,
+        Measurement.of_record,
+        Listing[Measurement],
+        "Numbers of other equipment; `class` asks for an entity or an attribute",
+    ),
+)
+"""What was measured; each column of the CSV is a key of the JSON."""
+
+
+def lists_of(
+    queries: Queries,
+    alerts_of_now: Callable[[], list[Alert]] = list,
+) -> tuple[HistoryList[Any], ...]:
+    """All lists of the history."""
+
+    async def steps_of(records: Sequence[CommandRecord]) -> list[Any]:
+        steps = await queries.steps_of([one.command_id for one in records])
+        return [steps.get(one.command_id, ()) for one in records]
+
+    return (
+        HistoryList(
+            "decisions",
+            lists.DECISIONS,
+            Decision.of_record,
+            Listing[Decision],
+            "Why robots were slowed, by when it began",
+        ),
+        HistoryList(
+            "commands",
+            lists.COMMANDS,
+            Command.of_record,
+            Listing[Command],
+            "Every STOP, release and resume, by when it was asked",
+            beside=steps_of,
+        ),
+        HistoryList(
+            "alerts",
+            lists.ALERTS,
+            Alert.of_record,
+            Listing[Alert],
+            "Every alert, by when it was last raised",
+            of_now=alerts_of_now,
+        ),
+        HistoryList(
+            "log",
+            lists.LOG,
+            LogEntry.of_record,
+            Listing[LogEntry],
+            "The action and inference log",
+        ),
+        HistoryList(
+            "audit",
+            lists.AUDIT,
+            AuditEntry.of_record,
+            Listing[AuditEntry],
+            "Who did what; `robot` asks for a subject, `class` for an action or name",
+            needs="release",
+        ),
+        *_MEASURED,
+    )
+
+
 _FILES: dict[str, dict[str, str]] = {
     MEDIA_TYPES["csv"]: {},
     MEDIA_TYPES["ndjson"]: {},
-    _PARQUET: {},
 }
 
 
@@ -54,7 +175,7 @@ def router(
     *,
     threshold: Callable[[], float | None] = lambda: None,
     present: Callable[[str], DecisionRecord | None] = lambda _: None,
-    flood: Callable[[], Flood] = lambda: Flood.of(NoFlood()),
+    alerts: Callable[[], list[Alert]] = list,
     fleet: FleetDescription = NOBODY,
     read_clock: Clock = clock.now,
 ) -> APIRouter:
@@ -65,7 +186,7 @@ def router(
         worker: Where files are written and figures drawn.
         threshold: Least confidence of the rule in force, marked in the chart.
         present: A decision that is still in memory; its links are those of now.
-        flood: How fast alerts come.
+        alerts: Those of now.
         fleet: Whose greatest speeds the chart is about.
         read_clock: What "the last 15 minutes" end at.
     """
@@ -74,7 +195,7 @@ def router(
         tags=["history"],
         responses=refusals(503),
     )
-    for one in lists_of(queries, flood):
+    for one in lists_of(queries, alerts):
         _add_list(routes, queries, one, worker)
 
     @routes.get(
@@ -85,9 +206,7 @@ def router(
     async def decision(
         decision_id: Annotated[str, Path(pattern=r"^[ -~]{1,64}$")],
     ) -> Response:
-        found = present(decision_id) or await queries.one(
-            listings.DECISIONS, decision_id
-        )
+        found = present(decision_id) or await queries.one(lists.DECISIONS, decision_id)
         if found is None:
             raise HTTPException(404, "There is no such decision.")
         return Json(Decision.of_record(found))
@@ -100,7 +219,7 @@ def router(
     async def dictionary() -> Listing[DictionaryColumn]:
         return Listing(items=dictionary_columns())
 
-    figures.add_routes(routes, queries, worker, threshold, fleet, read_clock)
+    day.add_routes(routes, queries, worker, threshold, fleet, read_clock)
     return routes
 
 
@@ -120,19 +239,40 @@ def _add_list(
     ) -> Response:
         form = filters.format or exports.form_of(request.headers)
         asked = filter_of(filters, one.of)
+        if one.of_now is not None and form == "json" and _is_plain(asked):
+            return await _with_now(queries, one, asked, one.of_now())
         if form == "json":
             return await _listing(await queries.page(one.of, asked), one, worker)
         return await _file(queries, one, filters, asked, form, worker)
 
 
+def _is_plain(asked: Filter) -> bool:
+    return replace(asked, limit=lists.USUAL_ROWS) == Filter()
+
+
+async def _with_now(
+    queries: Queries, one: HistoryList[R], asked: Filter, now: list[Alert]
+) -> Response:
+    """The newest page, with what memory knows better; alone where nothing else does."""
+    page: Page[R] = Page((), None)
+    with suppress(HopError):
+        page = await queries.page(one.of, asked)
+    told = {alert.alert_id for alert in now}
+    stored = [cast("Alert", one.model(*row)) for row in await one.rows(page.items)]
+    items = [*now, *(alert for alert in stored if alert.alert_id not in told)]
+    items.sort(key=lambda alert: alert.last_raised_at, reverse=True)
+    after = None if page.next is None else lists.write_cursor(page.next)
+    return Json(one.listing(items=items, next=after))
+
+
 async def _listing(page: Page[R], one: HistoryList[R], worker: Apart) -> Response:
-    after = None if page.next is None else cursors.write_cursor(page.next)
+    after = None if page.next is None else lists.write_cursor(page.next)
     rows = await one.rows(page.items)
     if len(rows) <= FEW_ROWS:
         items = [one.model(*row) for row in rows]
-        return Json(one.listing(items=items, next=after, **one.more()))
+        return Json(one.listing(items=items, next=after))
     items_json = Fragment(await worker.run(_write_items, one.model, rows))
-    return Json({"items": items_json, "next": after, **one.more()})
+    return Json({"items": items_json, "next": after})
 
 
 def _write_items(model: Callable[..., Model], rows: Sequence[tuple[Any, ...]]) -> bytes:
@@ -144,12 +284,10 @@ async def _file(
     one: HistoryList[R],
     filters: Filters,
     asked: Filter,
-    form: FileForm,
+    form: Form,
     worker: Apart,
 ) -> Response:
     """A whole list as a file; with a limit, that many rows of it."""
-    if form == "parquet":
-        _require_parquet()
     if filters.limit is None:
         asked = replace(asked, limit=lists.MOST_ROWS)
     # The first page is read before the answer begins, so that a refusal can be told.
@@ -157,16 +295,13 @@ async def _file(
     if filters.limit is not None:
         first = replace(first, next=None)
     pages = queries.pages(one.of, first, asked)
-    if form == "parquet":
-        body = _parquet(one.path, pages, worker)
-    elif form == "csv":
+    if form == "csv":
         body = _csv(one.of.kind, pages, filters.language, worker)
     else:
         body = _ndjson(one, pages, worker)
     name = f"{one.path}{_day(asked) if filters.language else ''}.{form}"
     headers = {"Content-Disposition": f'attachment; filename="{name}"'}
-    media_type = _PARQUET if form == "parquet" else MEDIA_TYPES[form]
-    return StreamingResponse(body, 200, headers, media_type)
+    return StreamingResponse(body, 200, headers, MEDIA_TYPES[form])
 
 
 async def _csv(
@@ -189,23 +324,6 @@ async def _ndjson(
 ) -> AsyncIterator[bytes]:
     async for records in pages:
         yield await worker.run(exports.ndjson_rows, one.model, await one.rows(records))
-
-
-def _require_parquet() -> None:
-    try:
-        require_extra("parquet", "an export as Parquet")
-    except MissingExtraError as error:
-        raise HTTPException(501, str(error)) from error
-
-
-async def _parquet(
-    name: str, pages: AsyncIterator[Sequence[Record]], worker: Apart
-) -> AsyncIterator[bytes]:
-    key, number = token_hex(8), 0
-    async for records in pages:
-        yield await worker.run(parquet_page, key, name, number, records)
-        number += 1
-    yield await worker.run(parquet_end, key, number)
 
 
 @cache

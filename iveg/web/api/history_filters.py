@@ -20,10 +20,8 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-from iveg.adapters.history import cursors, lists
-from iveg.adapters.history.cursors import Cursor
-from iveg.adapters.history.listings import ListOf
-from iveg.adapters.history.lists import Filter
+from iveg.adapters.history import lists
+from iveg.adapters.history.lists import Cursor, Filter, ListOf
 from iveg.domain.errors import UnreadableError
 from iveg.domain.records import Record
 from iveg.pipeline.newest_detections import JudgedDetection
@@ -134,9 +132,7 @@ class Filters(RowFilters):
         description="`at`; of decisions, orders, alerts and log also `robot`, of "
         "orders and log `kind`, of alerts `priority`; `-` before it: downwards",
     )
-    format: Form | Literal["parquet"] | None = Field(
-        None, description="Instead of an `Accept` header; Parquet is always whole"
-    )
+    format: Form | None = Field(None, description="Instead of an `Accept` header")
     language: Literal["es", "en"] | None = Field(
         None,
         description="CSV as that reader's spreadsheet expects it, with sentences",
@@ -215,7 +211,7 @@ def _cursor(
     if text is None:
         return None
     try:
-        cursor = cursors.read_cursor(text, of)
+        cursor = lists.read_cursor(text, of)
     except UnreadableError as error:
         raise _invalid("cursor", "not a cursor of this list") from error
     if cursor.question != lists.question_of(of, asked):

@@ -1,30 +1,27 @@
 """Incident packs over HTTP: all that is known of some minutes, as one ZIP.
 
-The page in both languages, the recording, the rows of the history, every version of the
-rule and the settings without secrets, under a manifest that one changed byte breaks
-(docs/interfaces/recordings.md, "Incident packs").
+A page, the recording, the rows of the history, every version of the rule and the
+settings without secrets (docs/interfaces/recordings.md, "Incident packs").
 """
 
 import asyncio
 import shutil
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import zipfile
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any, Protocol
 
 import orjson
-from fastapi import APIRouter, HTTPException, Query
+from fastapi import APIRouter, HTTPException, Query, Request
 from fastapi.responses import FileResponse
 from pydantic import Field
 from starlette.background import BackgroundTask
 
-from iveg.adapters.history import listings
-from iveg.adapters.history.listings import ListOf, R
-from iveg.adapters.history.lists import MOST_ROWS, Filter
+from iveg.adapters.history import lists
+from iveg.adapters.history.lists import MOST_ROWS, Filter, ListOf, R
 from iveg.adapters.history.queries import Queries
-from iveg.adapters.incident_files import write_pack
-from iveg.adapters.pdf import print_pdf
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import HopError
 from iveg.domain.events import LogEvent
@@ -35,13 +32,15 @@ from iveg.models.rule import Rule
 from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Apart
 from iveg.web.api.history_filters import Span
+from iveg.web.pages.drawing import appearance_of
 from iveg.web.pages.incident_report import write_report
 from iveg.web.refusals import refusals
 from iveg.web.security.requirements import Operator
 
 MEDIA_TYPE = "application/zip"
 LONGEST_S, BEFORE_S, AFTER_S = 3600.0, 30.0, 30.0
-_LANGUAGES = ("es", "en")
+_About = tuple[str, float, float, str]
+"""Language of the page, since, until (Unix s), and what the pack is about."""
 
 
 class Recordings(Protocol):
@@ -68,7 +67,6 @@ class Sources:
         settings: Those that hold no secret, by variable.
         log: Takes a line of the log.
         version: Of iVeg.
-        browser: Program that prints the page as PDF; None: HTML alone.
     """
 
     queries: Queries
@@ -79,7 +77,6 @@ class Sources:
     log: Callable[[LogEvent, Instant], None]
     clock: Clock
     version: str
-    browser: str | None = None
 
 
 def router(sources: Sources) -> APIRouter:
@@ -94,6 +91,7 @@ def router(sources: Sources) -> APIRouter:
     async def incident(
         asked: Annotated[About, Query()],
         principal: Operator,
+        request: Request,
     ) -> FileResponse:
         """Everything about some minutes as a ZIP, at most an hour."""
         since, until, said = await _range(asked, sources)
@@ -105,11 +103,12 @@ def router(sources: Sources) -> APIRouter:
         folder = Path(await asyncio.to_thread(tempfile.mkdtemp, prefix="iveg-pack-"))
         clear = BackgroundTask(shutil.rmtree, folder, ignore_errors=True)
         try:
-            end = await _pack(sources, folder, since, until, said)
+            language = appearance_of(request).language
+            await _pack(sources, folder, (language, since, until, said))
         except BaseException:
             shutil.rmtree(folder, ignore_errors=True)
             raise
-        slots = {"by": principal.name, "about": said, "chain": end}
+        slots = {"by": principal.name, "about": said}
         sources.log(LogEvent("system", "log.incident_packed", slots), sources.clock())
         name = f"incident-{format_stamp(since)[:19].replace(':', '-')}Z.zip"
         return FileResponse(
@@ -122,9 +121,9 @@ def router(sources: Sources) -> APIRouter:
 async def _range(asked: About, sources: Sources) -> tuple[float, float, str]:
     """Since, until (Unix s), and what it is about."""
     rows: dict[str, tuple[ListOf[Any], str]] = {
-        "decision": (listings.DECISIONS, "ended_at"),
-        "command": (listings.COMMANDS, "standing_at"),
-        "alert": (listings.ALERTS, "cleared_at"),
+        "decision": (lists.DECISIONS, "ended_at"),
+        "command": (lists.COMMANDS, "standing_at"),
+        "alert": (lists.ALERTS, "cleared_at"),
     }
     for kind, (of, ends) in rows.items():
         wanted = getattr(asked, kind)
@@ -151,14 +150,10 @@ def _around(began: float, ended: float) -> tuple[float, float]:
     return since, min(ended + AFTER_S, since + LONGEST_S)
 
 
-async def _pack(
-    sources: Sources, folder: Path, since: float, until: float, said: str
-) -> str:
-    """Write ``pack.zip``; returns the end of its chain."""
-    recording = folder / "recording.mcap"
-    messages = await sources.recordings.excerpt(recording, since, until)
-    rows = await _rows(sources.queries, since, until)
-    rules = [Rule.of(one).model_dump(mode="json") for one in sources.rules()]
+async def _pack(sources: Sources, folder: Path, about: _About) -> None:
+    """Write ``pack.zip``."""
+    _, since, until, said = about
+    messages = await sources.recordings.excerpt(folder / "recording.mcap", since, until)
     facts = {
         "iveg": sources.version,
         "made_at": format_stamp(sources.clock().wall),
@@ -166,11 +161,11 @@ async def _pack(
         "since": format_stamp(since),
         "until": format_stamp(until),
         "messages": messages,
+        "rules": [Rule.of(one).model_dump(mode="json") for one in sources.rules()],
+        "settings": dict(sources.settings),
     }
-    kept = {"rules.json": rules, "settings.json": dict(sources.settings)}
-    return await sources.worker.run(
-        _write, folder, (since, until, said), facts, rows, kept, sources.browser
-    )
+    rows = await _rows(sources.queries, since, until)
+    await sources.worker.run(_write, folder, about, facts, rows)
 
 
 async def _rows(
@@ -178,17 +173,17 @@ async def _rows(
 ) -> dict[str, list[Record]]:
     """Rows of the history by list, oldest first."""
     parts: dict[str, ListOf[Any]] = {
-        "decisions": listings.DECISIONS,
-        "commands": listings.COMMANDS,
-        "alerts": listings.ALERTS,
-        "log": listings.LOG,
-        "detections": listings.DETECTIONS,
-        "odometry": listings.ODOMETRY,
+        "decisions": lists.DECISIONS,
+        "commands": lists.COMMANDS,
+        "alerts": lists.ALERTS,
+        "log": lists.LOG,
+        "detections": lists.DETECTIONS,
+        "odometry": lists.ODOMETRY,
     }
     asked = Filter(since=since, until=until, limit=MOST_ROWS)
     found = {name: await _all(queries, of, asked) for name, of in parts.items()}
     # A note is about a moment, whenever it was written after it.
-    later = await _all(queries, listings.NOTES, Filter(since=since, limit=MOST_ROWS))
+    later = await _all(queries, lists.NOTES, Filter(since=since, limit=MOST_ROWS))
     found["notes"] = [
         one for one in later if since <= one.slots.get("pinned_at", one.at) < until
     ]
@@ -201,45 +196,25 @@ async def _all(queries: Queries, of: ListOf[R], asked: Filter) -> list[R]:
     return [one async for page in pages for one in page][::-1]
 
 
-def _reports(
-    about: tuple[float, float, str],
-    rows: Mapping[str, Sequence[Record]],
-    browser: str | None,
-) -> Iterator[tuple[str, bytes]]:
-    """The page in each language, and as PDF where there is a browser."""
-    since, until, said = about
-    names = ("decisions", "commands", "alerts", "log", "notes")
-    events = [row for name in names for row in rows[name]]
-    for language in _LANGUAGES:
-        html = write_report(language, since, until, events, said)
-        yield f"report.{language}.html", html
-        pdf = None if browser is None else print_pdf(browser, html)
-        if pdf is not None:
-            yield f"report.{language}.pdf", pdf
-
-
 def _write(
     folder: Path,
-    about: tuple[float, float, str],
+    about: _About,
     facts: Mapping[str, object],
     rows: Mapping[str, Sequence[Record]],
-    kept: Mapping[str, object],
-    browser: str | None,
-) -> str:
+) -> None:
     """The pack, where nothing waits for it."""
-    reports = dict(_reports(about, rows, browser))
-    lines = {
-        f"rows/{name}.ndjson": b"".join(orjson.dumps(asdict(one)) + b"\n" for one in of)
-        for name, of in rows.items()
-    }
-    written = {
-        name: orjson.dumps(value, option=orjson.OPT_INDENT_2)
-        for name, value in kept.items()
-    }
-    parts: list[tuple[str, bytes | Path]] = [*reports.items(), *lines.items()]
-    parts += written.items()
+    language, since, until, said = about
+    names = ("decisions", "commands", "alerts", "log", "notes")
+    events = [row for name in names for row in rows[name]]
     try:
-        recording = ("recording.mcap", folder / "recording.mcap")
-        return write_pack(folder / "pack.zip", facts, [*parts, recording])
+        with zipfile.ZipFile(folder / "pack.zip", "w", zipfile.ZIP_DEFLATED) as pack:
+            pack.writestr(
+                "report.html", write_report(language, since, until, events, said)
+            )
+            pack.writestr("about.json", orjson.dumps(facts, option=orjson.OPT_INDENT_2))
+            for name, of in rows.items():
+                lines = (orjson.dumps(asdict(one)) + b"\n" for one in of)
+                pack.writestr(f"rows/{name}.ndjson", b"".join(lines))
+            pack.write(folder / "recording.mcap", "recording.mcap")
     except OSError as error:
         raise HopError("disk", error.strerror or str(error)) from error

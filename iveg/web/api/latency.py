@@ -1,25 +1,131 @@
-"""The paper's latency table, live, beside its own numbers (docs/interfaces/http.md)."""
+"""The paper's latency table, live, beside its own numbers (docs/interfaces/http.md).
+
+The latency table: read in the loop from streams of measures, written elsewhere.
+"""
 
 import asyncio
-from typing import Annotated
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Annotated, Any, Literal
 
+import orjson
 from fastapi import APIRouter, Depends, Query, Request, Response
+from pydantic import BaseModel, ConfigDict, Field
 
-from iveg.domain.latency.account import collect, merge
-from iveg.domain.latency.watch import LatencyWatch
-from iveg.models.latency import LatencyTable
+from iveg.domain.latency import (
+    DATA,
+    PAPER,
+    SEGMENTS,
+    Cell,
+    ClockOffset,
+    Data,
+    LatencyWatch,
+    Sketch,
+    Window,
+    collect,
+    merge,
+)
+from iveg.domain.observations import Instant
+from iveg.domain.stamps import format_stamp
+from iveg.models.base import write_json
+from iveg.models.health import LatencyClock, LatencyRow, LatencyTable, SegmentSpread
 from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Apart
-from iveg.web.api.exports import MEDIA_TYPES, form_of
-from iveg.web.api.latency_table import (
-    Asked,
-    members_of,
-    sampled_hops,
-    write_csv,
-    write_table,
-)
+from iveg.web.api.exports import MEDIA_TYPES, cell, csv_lines, form_of
+from iveg.web.pages import charts
+from iveg.web.pages.charts import cdf_figure
 from iveg.web.refusals import refusals
 from iveg.web.security.requirements import require
+
+
+class Asked(BaseModel):
+    """Window and robot of the question."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    window: Window = Field("15min", description="1min, 15min or 24h")
+    robot: str | None = Field(
+        None, pattern=r"^[A-Za-z0-9-]{1,64}$", description="Robot id; all unless told"
+    )
+    figures: bool = Field(True, description="Whether to draw the distributions, too")
+    format: Literal["json", "csv"] | None = Field(
+        None, description="Instead of an `Accept` header"
+    )
+
+
+def members_of(watch: LatencyWatch, asked: Asked, now: Instant) -> dict[str, object]:
+    """Values read from the watch, in the loop's thread."""
+    return {
+        "at": format_stamp(now.wall),
+        "window": asked.window,
+        "robot": asked.robot,
+        "paper": {
+            place: {data: asdict(row) for data, row in rows.items()}
+            for place, rows in PAPER.items()
+        },
+        "clocks": [
+            _clock(robot_id, one)
+            for robot_id, one in watch.clocks.items()
+            if asked.robot in (None, robot_id)
+        ],
+    }
+
+
+def write_table(
+    sketches: Mapping[Cell, Sketch], members: dict[str, Any], asked: Asked
+) -> bytes:
+    """The whole answer; in the worker."""
+    figures: dict[str, object] = {}
+    if asked.figures:
+        figures["cdf"] = orjson.Fragment(cdf_figure(sketches))
+    answer = LatencyTable(
+        **members,
+        direct=any(sketches[data, "uplink"].count for data in DATA),
+        rows=[_row(data, sketches) for data in DATA],
+        **charts.library_facts(),
+        figures=figures,
+    )
+    # Member by member, as only orjson knows what to do with a figure that is drawn.
+    return write_json(vars(answer))
+
+
+def write_csv(sketches: Mapping[Cell, Sketch]) -> bytes:
+    """One line a kind of data and hop."""
+    names = list(SegmentSpread.model_fields)
+    rows = [["data", "hop", *names]]
+    for (data, hop), sketch in sketches.items():
+        spread = vars(_spread(sketch))
+        rows.append([data, hop, *(cell(name, spread[name]) for name in names)])
+    return csv_lines(rows)
+
+
+def _row(data: Data, sketches: Mapping[Cell, Sketch]) -> LatencyRow:
+    return LatencyRow(
+        data=data, hops={hop: _spread(sketches[data, hop]) for hop in SEGMENTS}
+    )
+
+
+def _spread(of: Sketch) -> SegmentSpread:
+    return SegmentSpread(
+        count=of.count,
+        mean_ms=_ms(of.mean),
+        p50_ms=_ms(of.quantile(0.50)),
+        p95_ms=_ms(of.quantile(0.95)),
+        p99_ms=_ms(of.quantile(0.99)),
+    )
+
+
+def _clock(robot_id: str, of: ClockOffset) -> LatencyClock:
+    return LatencyClock(
+        robot_id=robot_id,
+        state=of.state,
+        offset_ms=_ms(of.offset_s),
+        uncertainty_ms=_ms(of.uncertainty_s),
+    )
+
+
+def _ms(seconds: float | None) -> float | None:
+    return None if seconds is None else round(1000.0 * seconds, 2)
 
 
 def router(watch: LatencyWatch, clock: Clock, worker: Apart) -> APIRouter:
@@ -37,18 +143,16 @@ def router(watch: LatencyWatch, clock: Clock, worker: Apart) -> APIRouter:
         responses={200: {"content": {MEDIA_TYPES["csv"]: {}}}},
     )
     async def latency(request: Request, asked: Annotated[Asked, Query()]) -> Response:
-        """Mean and quantiles of each hop, clocks, rates, loss, and the figures."""
+        """Mean and quantiles of each hop, clocks, and the figure."""
         parts = collect(watch.streams, asked.window, asked.robot)
         form = asked.format or form_of(request.headers)
         if form == "csv":
             return Response(write_csv(await asyncio.to_thread(merge, parts)), 200, _CSV)
-        streams = [one for one in watch.streams if asked.robot in (None, one.robot_id)]
-        members = members_of(watch, streams, asked, clock())
-        sampled = sampled_hops(streams)
+        members = members_of(watch, asked, clock())
         # A day of twenty robots is merged in a thread, as sending all of it to the
-        # worker costs more; the figures of the sums are drawn there.
+        # worker costs more; the figure of the sums is drawn there.
         sketches = await asyncio.to_thread(merge, parts)
-        body = await worker.run(write_table, sketches, members, sampled, asked)
+        body = await worker.run(write_table, sketches, members, asked)
         return Response(body, media_type="application/json")
 
     return routes

@@ -1,29 +1,67 @@
-"""The world at any recorded moment (docs/interfaces/http.md, "The past")."""
+"""The world at any recorded moment (docs/interfaces/http.md, "The past").
 
+Recordings of what came in over HTTP (docs/interfaces/recordings.md).
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Annotated, Protocol
 
 from fastapi import APIRouter, Depends, HTTPException, Query, Response
+from fastapi.responses import FileResponse
 
+from iveg.domain.recordings import RecordingFile
+from iveg.models.base import Listing
+from iveg.models.health import Recording
 from iveg.models.snapshot import PastWorld
 from iveg.pipeline.ports import Clock
+from iveg.web.api.answers import Json
 from iveg.web.api.history_filters import Moment
+from iveg.web.live.pictures import Past
 from iveg.web.refusals import refusals
 from iveg.web.security.requirements import require
 
-_VIEWER = r"^[A-Za-z0-9-]{1,64}$"
+MEDIA_TYPE = "application/vnd.mcap"
 
 
-class Past(Protocol):
-    """Runs the pipeline over what was recorded: ``app.viewers``."""
+class Recordings(Protocol):
+    """The recordings on the disk; each question may raise HopError."""
 
-    async def world(self, viewer: str, wall: float) -> bytes:
-        """The world at a moment (Unix s), as JSON.
+    async def files(self) -> Sequence[RecordingFile]:
+        """All of them, oldest first."""
 
-        Raises:
-            NotRecordedError: nothing was recorded there.
-            UnreadableError: another version or fleet recorded it.
-            HopError: too many look at once, or it could not be made.
-        """
+    async def finished(self, name: str) -> Path | None:
+        """The file of one that is finished."""
+
+
+def recordings_router(recordings: Recordings) -> APIRouter:
+    """Their list, and each as a file."""
+    routes = APIRouter(
+        prefix="/api/v1",
+        tags=["history"],
+        dependencies=[Depends(require("read"))],
+        responses=refusals(503),
+    )
+
+    @routes.get("/recordings", response_model=Listing[Recording])
+    async def listing() -> Response:
+        """Recordings of what came in, oldest first."""
+        files = await recordings.files()
+        return Json(Listing(items=[Recording.of(one) for one in files]))
+
+    @routes.get(
+        "/recordings/{recording_id}",
+        response_class=FileResponse,
+        responses={200: {"content": {MEDIA_TYPE: {}}}},
+    )
+    async def recording(recording_id: str) -> FileResponse:
+        """The recording of this name as MCAP; 404 while it is still written."""
+        path = await recordings.finished(recording_id)
+        if path is None:
+            raise HTTPException(404, "There is no such recording that is finished.")
+        return FileResponse(path, media_type=MEDIA_TYPE, filename=recording_id)
+
+    return routes
 
 
 def router(past: Past, clock: Clock) -> APIRouter:
@@ -32,22 +70,17 @@ def router(past: Past, clock: Clock) -> APIRouter:
         prefix="/api/v1",
         tags=["history"],
         dependencies=[Depends(require("read"))],
-        responses=refusals(400, 404, 503),
+        responses=refusals(404, 503),
     )
 
     @routes.get("/world", response_model=PastWorld)
     async def world(
         at: Annotated[Moment, Query(description="Which moment (ISO-8601)")],
-        viewer: Annotated[
-            str,
-            Query(pattern=_VIEWER, description="Any name; its next question is fast"),
-        ] = "nobody",
     ) -> Response:
-        """The world at a recorded moment, by the rule and program that ran then."""
+        """The world at a recorded moment, as pages were told of it then."""
         wall = at.timestamp()
         if wall > clock().wall:
             raise HTTPException(422, "That moment is still to come.")
-        body = await past.world(viewer, wall)
-        return Response(body, media_type="application/json")
+        return Response(await past.world(wall), media_type="application/json")
 
     return routes

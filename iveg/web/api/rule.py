@@ -1,22 +1,18 @@
 """The detection rule over HTTP: the version in force, earlier ones, a new one."""
 
-from typing import Annotated, Literal, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any
 
 from fastapi import APIRouter, Depends, Response
-from pydantic import Field, field_validator
+from pydantic import Field, create_model, field_validator
 
-from iveg.domain.detection_rule import (
-    FORESIGHT_LEAST_S,
-    FORESIGHT_MOST_S,
-    Class,
-    DetectionRule,
-)
+from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import VersionMissingError
-from iveg.domain.limits import LIMITS
+from iveg.domain.parameters import PARAMETERS, Class
 from iveg.models.base import Body, Listing
 from iveg.models.rule import Rule as RuleModel
 from iveg.models.rule import Trial as TrialModel
-from iveg.ngsi.texts import clean_text
+from iveg.models.rule import parameter_fields
+from iveg.ngsi.payloads import clean_text
 from iveg.pipeline.ports import Clock
 from iveg.pipeline.rules import Rules
 from iveg.pipeline.trials import Trials
@@ -25,14 +21,10 @@ from iveg.web.refusals import refusals
 from iveg.web.security.requirements import Operator, require
 from iveg.web.security.roles import Principal
 
-T = TypeVar("T")
-_Share = Annotated[float, Field(ge=0.0, le=1.0, allow_inf_nan=False)]
-_RADIUS = Field(ge=LIMITS.ring_least_m, le=LIMITS.ring_most_m, allow_inf_nan=False)
-_HORIZON = Field(ge=FORESIGHT_LEAST_S, le=FORESIGHT_MOST_S, allow_inf_nan=False)
 _MOST_ALIASES = 200
 
 
-class RuleChange(Body):
+class _RuleChange(Body):
     """The parameters to change; others stay as they are.
 
     A detector's word must stand for `person` or `robot`; both names always stand for
@@ -41,19 +33,9 @@ class RuleChange(Body):
 
     version: int | None = None
     """The version that the person saw: 428 without, 409 when it is in force no more."""
-    confidence_threshold: _Share | None = None
-    class_thresholds: dict[Literal["person", "robot"], _Share] | None = None
-    radius_m: Annotated[float, _RADIUS] | None = None
-    aliases: (
-        Annotated[
-            dict[str, Literal["person", "robot"]], Field(max_length=_MOST_ALIASES)
-        ]
-        | None
-    ) = None
+    aliases: Annotated[dict[str, Class], Field(max_length=_MOST_ALIASES)] | None = None
     possible_people: bool | None = None
     """Of one version ago: looks always add up."""
-    foresight: bool | None = None
-    foresight_s: Annotated[float, _HORIZON] | None = None
 
     @field_validator("aliases")
     @classmethod
@@ -74,21 +56,27 @@ class RuleChange(Body):
         return possible_people
 
     def applied_to(self, rule: DetectionRule) -> DetectionRule:
-        """The rule with these parameters."""
+        """A rule with these parameters, of nobody yet."""
+        told = dict(self)
+        values: dict[str, Any] = {
+            row.name: row.read(told, getattr(rule, row.name), row.key)
+            for row in PARAMETERS
+        }
+        aliases = dict(rule.aliases) if self.aliases is None else self.aliases
         return DetectionRule(
-            rule.id,
-            rule.version,
-            _new(self.confidence_threshold, rule.threshold),
-            _new(self.class_thresholds, dict(rule.class_thresholds)),
-            _new(self.radius_m, rule.radius_m),
-            _new(self.aliases, dict(rule.aliases)),
-            foresight=_new(self.foresight, rule.foresight),
-            foresight_s=_new(self.foresight_s, rule.foresight_s),
+            **values, id=rule.id, version=rule.version, aliases=aliases
         )
 
 
-def _new(wanted: T | None, old: T) -> T:
-    return old if wanted is None else wanted
+if TYPE_CHECKING:
+    RuleChange = _RuleChange
+else:
+    RuleChange = create_model(
+        "RuleChange",
+        __base__=_RuleChange,
+        __doc__=_RuleChange.__doc__,
+        **parameter_fields(lambda row: row.key, "none"),
+    )
 
 
 class Promotion(Body):

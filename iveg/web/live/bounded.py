@@ -13,8 +13,6 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import (
     WebSocketsSansIOProtocol,
 )
 
-from iveg.adapters.connections import CONNECTION, Connection
-
 SEND_BUFFER: Final = 65536
 """In the kernel (bytes, Linux doubles it): 0.2 MB/s over a round trip of 300 ms."""
 
@@ -29,17 +27,3 @@ class BoundedSocket(WebSocketsSansIOProtocol):
         kernel: socket.socket | None = transport.get_extra_info("socket")
         if kernel is not None:
             kernel.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)
-        if (connection := self._connection) is not None:
-            connection.serve()
-
-    def connection_lost(self, exc: Exception | None) -> None:
-        """The connection is closed."""
-        super().connection_lost(exc)
-        if (connection := self._connection) is not None:
-            connection.leave()
-
-    @property
-    def _connection(self) -> Connection | None:
-        """Its place among the connections of the server, from before the upgrade."""
-        place: Connection | None = self.app_state.get(CONNECTION)
-        return place

@@ -4,29 +4,192 @@ A message is encoded once for all browsers.  Each browser has one task that send
 newest values; a browser that reads nothing keeps no queue and is closed after a while
 (fault F23).  Telemetry goes in frames, as fast as a browser paints them; everything
 else passes beside them at once.
+
+Messages from one browser: pings, presses, painted frames.
+
+The line to one browser: its messages, one after the other.
 """
 
 import asyncio
 import logging
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable, Coroutine, Iterable
 
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
+from starlette.websockets import WebSocketState
 
-from iveg.domain.latency.watch import LatencyWatch
+from iveg.domain.errors import UnknownRobotError, UnreadableError
+from iveg.domain.latency import LatencyWatch
 from iveg.domain.observations import Instant
+from iveg.domain.stop import Press
 from iveg.models.snapshot import Snapshot
+from iveg.ngsi.codec import load_json
+from iveg.ngsi.payloads import legible
 from iveg.pipeline import topics
 from iveg.pipeline.ports import Clock
-from iveg.pipeline.publish import Hub
-from iveg.web.live.client_messages import ClientMessages, Stop, current_principal
+from iveg.pipeline.publish import Hub, Subscriber
 from iveg.web.live.encoder import Encoder, frame_text
-from iveg.web.live.feed import TelemetryFeed
-from iveg.web.live.line import Line, sent
-from iveg.web.live.pacing import SUBPROTOCOL
-from iveg.web.live.painting import Painting
-from iveg.web.security.authentication import NO_SESSION
+from iveg.web.live.feed import SUBPROTOCOL, Painting, TelemetryFeed
+from iveg.web.presses import read_press
+from iveg.web.security.authentication import NO_SESSION, Authenticator
 from iveg.web.security.requirements import Reader
-from iveg.web.security.roles import Principal
+from iveg.web.security.roles import Action, Principal
+
+_MAX_MESSAGE = 65536
+
+Stop = Callable[[str | None, Principal, Press], Awaitable[object]]
+
+
+def current_principal(
+    websocket: WebSocket, principal: Principal, action: Action
+) -> Principal | None:
+    """The same session as of now; None: it may not."""
+    authenticator: Authenticator = websocket.app.state.authenticator
+    current = authenticator.current(principal)
+    return current if current is not None and current.may(action) else None
+
+
+class ClientMessages:
+    """Messages from one browser: pings, presses, painted frames.
+
+    Answers go out with all else, so that a press is read at once also where the way
+    back is full.
+    """
+
+    def __init__(
+        self,
+        websocket: WebSocket,
+        subscriber: Subscriber,
+        clock: Clock,
+        stop: Stop,
+        principal: Principal,
+        feed: TelemetryFeed,
+    ) -> None:
+        self._websocket = websocket
+        self._subscriber = subscriber
+        self._clock = clock
+        self._stop = stop
+        self._principal = principal
+        self._feed = feed
+
+    async def listen(self, others: Iterable[asyncio.Task[None]]) -> None:
+        """Until the browser goes or is sent away; then ``others`` end, too."""
+        line = self._websocket
+        try:
+            while line.application_state is WebSocketState.CONNECTED:
+                await self._hear(await line.receive_text())
+        except WebSocketDisconnect:
+            return
+        finally:
+            for task in others:
+                task.cancel()
+
+    async def _hear(self, raw: str) -> None:
+        try:
+            message = load_json(raw[:_MAX_MESSAGE])
+        except UnreadableError as error:
+            self._subscriber.append(topics.PROBLEM.name, {"reason": error.reason})
+            return
+        if not isinstance(message, dict):
+            return
+        match message.get("type"):
+            case "painted":
+                now = self._clock().mono
+                self._feed.painted(message.get("frame"), now, message)
+            case "ping":
+                t, server = message.get("t"), self._clock().wall
+                self._subscriber.append(topics.PONG.name, {"t": t, "server": server})
+            case "stop":
+                await self._press(message)
+
+    async def _press(self, message: dict[str, object]) -> None:
+        robot_id = message.get("robot_id")
+        who = current_principal(self._websocket, self._principal, "stop")
+        if who is not None and (robot_id is None or isinstance(robot_id, str)):
+            try:
+                await self._stop(robot_id, who, read_press(message))
+            except UnknownRobotError as error:
+                reason = legible(str(error))
+                self._subscriber.append(topics.PROBLEM.name, {"reason": reason})
+
+
+TOO_SLOW = 4008
+_SEND_LIMIT_S = 10.0
+
+
+class Line:
+    """The messages to one browser, one after the other.
+
+    Args:
+        limit_s: How long a browser may take to read one.
+    """
+
+    def __init__(
+        self,
+        websocket: WebSocket,
+        subscriber: Subscriber,
+        encoder: Encoder,
+        clock: Clock,
+        limit_s: float = _SEND_LIMIT_S,
+    ) -> None:
+        self._websocket = websocket
+        self._subscriber = subscriber
+        self._encoder = encoder
+        self._clock = clock
+        self._limit_s = limit_s
+        self._sending_since: float | None = None
+
+    async def say(self, frame: bytes) -> None:
+        """Send JSON."""
+        await sent(self._websocket.send_text(frame.decode()))
+
+    async def send(self, feed: TelemetryFeed) -> None:
+        """Everything, as fast as the browser reads; telemetry as fast as it paints."""
+        loop = asyncio.get_running_loop()
+        while not self._subscriber.overflowed:
+            self._sending_since = None
+            await self._subscriber.news(feed.wait_s(self._clock().mono))
+            self._sending_since = loop.time()
+            await self._send_frame(feed)
+            await self._send_news()
+            feed.write_ahead(self._clock())
+        await self.close_slow()
+
+    @property
+    def is_stuck(self) -> bool:
+        """Whether the browser has not read for long."""
+        since = self._sending_since
+        now = asyncio.get_running_loop().time()
+        return since is not None and now - since > self._limit_s
+
+    async def close_slow(self) -> None:
+        """Close: the browser reads too slowly."""
+        await sent(self._websocket.close(TOO_SLOW))
+
+    async def _send_frame(self, feed: TelemetryFeed) -> None:
+        frame = feed.next_frame(self._clock())
+        if frame is not None:
+            await sent(self._websocket.send_bytes(frame))
+
+    async def _send_news(self) -> None:
+        for topic, item in self._subscriber.drain_events():
+            await self.say(self._encoder.event(topic, item))
+        for topic in self._subscriber.drain_topics():
+            frame = self._encoder.frame(topic)
+            if frame is not None:
+                await self.say(frame)
+
+
+async def sent(sending: Coroutine[object, object, None]) -> None:
+    """Send; of a socket that has closed meanwhile a server says RuntimeError.
+
+    Raises:
+        ConnectionResetError: the browser is gone.
+    """
+    try:
+        await sending
+    except RuntimeError as error:
+        raise ConnectionResetError(str(error)) from error
+
 
 _log = logging.getLogger(__name__)
 NO_PROTOCOL = 4406

@@ -3,22 +3,38 @@
 A part is JSON, and for a scan also its integers; docs/interfaces/live.md has their
 shapes.  Browsers differ in when they take a part, never in its bytes: each part carries
 the moment of its truth (``at``, the server's monotonic clock).
+
+Ranges of a scan as the integers that a browser draws.
 """
 
 from collections.abc import Iterable, Sequence
 from typing import Final, NamedTuple
 
+import numpy as np
 import orjson
 
 from iveg.domain.margins import LeastMargins
-from iveg.domain.observations import Instant, Odometry
+from iveg.domain.observations import Instant, LaserScan, Odometry
 from iveg.models.base import rounded, write_json
 from iveg.models.people import Person
 from iveg.models.robot import Robot
 from iveg.pipeline import topics
 from iveg.pipeline.publish import Hub
-from iveg.web.live.ranges import UNIT_M, write_ranges
 from iveg.web.views import Views
+
+UNIT_M: Final = 0.005
+"""Unit of a range: finer than a map shows, and 327 m fit in 16 bits."""
+NO_RETURN: Final = 0xFFFF
+
+
+def write_ranges(scan: LaserScan) -> bytes:
+    """Ranges as ``uint16`` in ``UNIT_M``, little-endian, padded to four bytes."""
+    ranges = scan.ranges
+    units = np.full(ranges.size + ranges.size % 2, NO_RETURN, "<u2")
+    counts = scan.returns() & (ranges < UNIT_M * NO_RETURN)
+    units[: ranges.size][counts] = np.rint(ranges[counts] / UNIT_M)
+    return units.tobytes()
+
 
 _MOVES: Final = frozenset({"pose", "twist", "stamp", "age_s"})
 """Members of a robot that go by themselves, with each measure."""
@@ -83,19 +99,27 @@ class TelemetryEncoder:
         self._moves[robot_id] = odometry, part
         return part
 
-    def state(self, robot_id: str, since: int, now: Instant) -> Part | None:
-        """Other members of a robot that have changed since a version; None for none."""
+    def state(
+        self, robot_id: str, since: int, now: Instant, young_s: float = 0.0
+    ) -> Part | None:
+        """Other members of a robot that have changed since a version; None for none.
+
+        Those of which the newest was encoded less than ``young_s`` ago are not encoded
+        anew.
+        """
         topic = topics.ROBOT.of(robot_id)
         state = self._states.setdefault(robot_id, _RobotState())
-        if state.version != self._hub.versions[topic]:
+        is_young = now.mono - state.at < young_s
+        if state.version != self._hub.versions[topic] and not is_young:
             robot = self._views.robot(robot_id, now, self._margins_at(now))
             state.update(robot, self._hub.versions[topic], now.mono)
         return state.changes(topic, since)
 
-    def people(self, since: int, now: Instant) -> Part | None:
+    def people(self, since: int, now: Instant, young_s: float = 0.0) -> Part | None:
         """The list of people, and changes since a version; None without a change."""
         version = self._hub.versions[topics.PEOPLE.name]
-        if self._people.version != version:
+        is_young = now.mono - self._people.at < young_s
+        if self._people.version != version and not is_young:
             people = self._views.people(now, self._margins_at(now))
             self._people.update(people, version, now.mono)
         return self._people.changes(since)
@@ -161,13 +185,13 @@ class _RobotState:
 
     def __init__(self) -> None:
         self.version = -1
-        self._at = 0.0
+        self.at = float("-inf")
         self._values: dict[str, object] = {}
         self._members: dict[str, tuple[int, bytes]] = {}
 
     def update(self, robot: Robot, version: int, at: float) -> None:
         """Compare with the members of the last update."""
-        self.version, self._at = version, at
+        self.version, self.at = version, at
         for name, value in robot.__dict__.items():
             if name in _MOVES or self._values.get(name, self) == value:
                 continue
@@ -182,7 +206,7 @@ class _RobotState:
             return None
         head = b'{"topic":%b,"at":%b,"data":{%b}}' % (
             orjson.dumps(topic),
-            orjson.dumps(self._at),
+            orjson.dumps(self.at),
             b",".join(newer),
         )
         return Part(self.version, head)
@@ -193,7 +217,7 @@ class _People:
 
     def __init__(self) -> None:
         self.version = -1
-        self._at = 0.0
+        self.at = float("-inf")
         self._changed = -1
         self._ids: list[str] = []
         self._values: dict[str, object] = {}
@@ -201,7 +225,7 @@ class _People:
 
     def update(self, people: Sequence[Person], version: int, at: float) -> None:
         """Compare with the people of the last update."""
-        self.version, self._at = version, at
+        self.version, self.at = version, at
         ids = [person.person_id for person in people]
         if ids != self._ids:
             self._ids, self._changed = ids, version
@@ -228,7 +252,7 @@ class _People:
             return None
         newer = [text for version, text in self._texts.values() if version > since]
         head = b'{"topic":"people","at":%b,"data":{"ids":%b,"changed":[%b]}}' % (
-            orjson.dumps(self._at),
+            orjson.dumps(self.at),
             orjson.dumps(self._ids),
             b",".join(newer),
         )

@@ -5,15 +5,12 @@ A template sees its own dataclass as ``page`` and the functions ``t`` (a sentenc
 attribute).  Live values never come this way; they arrive on ``/live``.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal, get_args
 
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.transports import TRANSPORTS
-from iveg.models.cost import Cost
 from iveg.models.day import Day
-from iveg.web.pages.openapi import ApiDoc
 
 Theme = Literal["auto", "light", "dark", "sunlight"]
 HUES = 10
@@ -29,22 +26,18 @@ class Site:
         greenhouse: Name as people say it.
         robots: Ids in fleet order; the order decides each robot's colour.
         demo: The robots are emulated.
-        laboratory: Experiments can be started from the page.
         transports: Ids, in the order of their columns.
         link: One link signs people in; else passwords alone do.
         sso: What the button of the identity provider says; None: there is none.
-        passkeys: The library for passkeys is installed.
     """
 
     greenhouse: str
     robots: tuple[str, ...]
     version: str
     demo: bool
-    laboratory: bool = False
     transports: tuple[str, ...] = tuple(one.id for one in TRANSPORTS)
     link: bool = True
     sso: str | None = None
-    passkeys: bool = False
 
     @property
     def slots(self) -> dict[str, int]:
@@ -71,7 +64,6 @@ class PageFrame:
         role: ``viewer``, ``operator``, ``admin`` or ``program``.
         account: Whether they have one of their own.
         unready: Nobody can sign in as admin yet.
-        tablet: Whether this browser is shared, and unlocked by a PIN.
     """
 
     site: Site
@@ -81,7 +73,6 @@ class PageFrame:
     role: str | None = None
     account: bool = False
     unready: bool = False
-    tablet: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,46 +109,6 @@ class DayPage(Page):
     day: Day
     before: str
     after: str
-
-
-@dataclass(frozen=True, slots=True)
-class ComparePage(Page):
-    """``compare.html``: what two ranges cost, side by side.
-
-    Attributes:
-        than: What ``one`` is compared with.
-    """
-
-    than: Cost
-    one: Cost
-
-    @property
-    def slowed(self) -> Mapping[tuple[str, str | None], tuple[float, float]]:
-        """(cause, aisle) → minutes of both, the longest in all first."""
-        minutes = [
-            {(row.cause, row.lane): row.minutes for row in cost.slowed or ()}
-            for cost in (self.than, self.one)
-        ]
-        than, one = minutes
-        keys = sorted(than | one, key=lambda it: -than.get(it, 0) - one.get(it, 0))
-        return {key: (than.get(key, 0.0), one.get(key, 0.0)) for key in keys}
-
-    def alerts(self, priority: str) -> tuple[int | None, int | None]:
-        """How many of a priority, in both; None where nobody knows."""
-        than, one = (
-            None
-            if cost.alerts is None
-            else sum(row.count for row in cost.alerts if row.priority == priority)
-            for cost in (self.than, self.one)
-        )
-        return than, one
-
-
-@dataclass(frozen=True, slots=True)
-class DocsPage(Page):
-    """``docs.html``: the HTTP interface, drawn from our own OpenAPI document."""
-
-    document: ApiDoc
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,12 +1,23 @@
-"""Draws pages: a context by its template, in the reader's language."""
+"""Draws pages: a context by its template, in the reader's language.
 
+Templates of the pages, in one language each, with the words that they may use.
+"""
+
+import json
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import asdict, replace
+from datetime import datetime
+from importlib.resources import files
 
 from fastapi import Request, Response
 from fastapi.responses import HTMLResponse
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup, escape
 
 from iveg.adapters.passwords import LEAST
+from iveg.domain.limits import LIMITS
+from iveg.domain.parameters import CLASSES, PARAMETERS
+from iveg.domain.stamps import format_stamp
 from iveg.web import cookies
 from iveg.web.pages.contexts import (
     THEMES,
@@ -17,11 +28,97 @@ from iveg.web.pages.contexts import (
     SignInPage,
     Site,
 )
-from iveg.web.pages.templates import environment_of
-from iveg.web.pages.translations import LANGUAGES, preferred_language, read_translations
-from iveg.web.problem import Problem
+from iveg.web.pages.sentences import (
+    LANGUAGES,
+    Sentences,
+    Slot,
+    Translations,
+    in_madrid,
+    preferred_language,
+    read_translations,
+)
+from iveg.web.problems import Problem
 from iveg.web.security.requirements import authenticator_of
 from iveg.web.security.roles import Principal
+
+
+def limits_text() -> str:
+    """The table of safety numbers, as ``static/js/core/limits.js`` reads it."""
+    return json.dumps(asdict(LIMITS))
+
+
+def rule_parameters_text() -> str:
+    """The parameters of the rule, as ``static/js/pages/parameters.js`` reads them."""
+    keys = ("key", "class_key", "unit", "protects", "word")
+    return json.dumps([{key: getattr(one, key) for key in keys} for one in PARAMETERS])
+
+
+def _clock(stamp: str) -> str:
+    """Time of day in Madrid of an ISO-8601 stamp."""
+    return f"{in_madrid(datetime.fromisoformat(stamp).timestamp()):%H:%M:%S}"
+
+
+def _wall(stamp: str) -> str:
+    """Day and time in Madrid of an ISO-8601 stamp, as a form has them."""
+    at = datetime.fromisoformat(stamp).timestamp()
+    return in_madrid(at).isoformat(" ", "seconds")
+
+
+def _before(stamp: str) -> str:
+    """Ten seconds before an ISO-8601 stamp, as an address of the map of then."""
+    at = datetime.fromisoformat(stamp).timestamp()
+    return f"/?t={format_stamp(at - 10.0)}"
+
+
+def environment_of(translations: Translations) -> Environment:
+    """Templates that speak one language."""
+    environment = Environment(
+        loader=FileSystemLoader(str(files("iveg") / "templates")),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+
+    environment.filters["clock"] = _clock
+    environment.filters["wall"] = _wall
+    environment.filters["before"] = _before
+    environment.filters["lane"] = Sentences(translations).lane
+
+    def say(key: str, **slots: Slot) -> Markup:
+        data = Markup(' data-slots="{}"').format(json.dumps(slots)) if slots else ""
+        return Markup('<span data-i18n="{}"{}>{}</span>').format(
+            key, data, translations.say(key, **slots)
+        )
+
+    def label(attribute: str, key: str, **slots: Slot) -> Markup:
+        data = Markup(' data-slots="{}"').format(json.dumps(slots)) if slots else ""
+        return Markup('{}="{}" data-i18n-{}="{}"{}').format(
+            attribute, translations.say(key, **slots), attribute, key, data
+        )
+
+    def greenhouse(name: str) -> str:
+        return translations.sentences.get(f"greenhouse.{name}", name)
+
+    def say_house(name: str) -> Markup:
+        key = f"greenhouse.{name}"
+        return say(key) if key in translations.sentences else escape(name)
+
+    environment.globals.update(
+        greenhouse=greenhouse,
+        say_house=say_house,
+        t=translations.say,
+        say=say,
+        label=label,
+        has=translations.sentences.__contains__,
+        limits=LIMITS,
+        limits_text=limits_text(),
+        rule_parameters=PARAMETERS,
+        rule_parameters_text=rule_parameters_text(),
+        classes=CLASSES,
+    )
+    return environment
+
 
 _EXPLAINED = (400, 401, 403, 404, 405, 429, 500, 503)
 
@@ -47,7 +144,7 @@ class Pages:
     ) -> PageFrame:
         """The frame around a page for this reader."""
         frame = PageFrame(
-            self._site, _look(request), route, unready=not self._is_ready()
+            self._site, appearance_of(request), route, unready=not self._is_ready()
         )
         if visitor is None:
             return frame
@@ -56,7 +153,6 @@ class Pages:
             name=visitor.name,
             role=visitor.role,
             account=visitor.has_account,
-            tablet=visitor.is_tablet,
         )
 
     def draw(self, page: Page, status: int = 200) -> HTMLResponse:
@@ -106,7 +202,8 @@ class Pages:
         return self.draw(page, status)
 
 
-def _look(request: Request) -> Appearance:
+def appearance_of(request: Request) -> Appearance:
+    """Language and colours that a reader chose, else those of the browser."""
     chosen = request.cookies
     language = chosen.get(cookies.LANGUAGE, "")
     if language not in LANGUAGES:

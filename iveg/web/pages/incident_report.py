@@ -16,9 +16,12 @@ from iveg.domain.records import (
 )
 from iveg.domain.stamps import format_stamp
 from iveg.models.decision import sentence_of
-from iveg.web.pages.local_time import in_madrid, local_stamp
-from iveg.web.pages.sentences import Sentences
-from iveg.web.pages.translations import read_translations
+from iveg.web.pages.sentences import (
+    Sentences,
+    in_madrid,
+    local_stamp,
+    read_translations,
+)
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,14 +2,135 @@
 
 The formats are those of ``static/js/core/messages.js``; a missing template shows its
 key, so that a row of an older version is never lost.
+
+The greenhouse's clock: Europe/Madrid on paper and screen, UTC in data.
+
+Central European time with the summer time of Directive 2000/84/EC, so that no table of
+time zones must be installed.
+
+Texts of the page on the server: the same templates that the browser reads.
+
+``iveg/static/i18n/{es,en}.json`` hold nested blocks; a key such as ``nav.live`` walks
+down them.  Holes are ``{name}``, ``{name:2}`` (decimals), ``{name:percent}`` and
+``{name:who}``; the browser knows further formats, for values that only it ever shows.
+
+Messages to people elsewhere, in words.
 """
 
+import json
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, date, datetime, timedelta
+from importlib.resources import files
 from typing import Final
 
-from iveg.web.pages.local_time import in_madrid
-from iveg.web.pages.translations import HOLE, Translations
+from iveg.domain.events import AlertItem, Language, MessageText
+from iveg.pipeline.messenger import Write
+
+_HOUR = timedelta(hours=1)
+
+
+def in_madrid(at: float) -> datetime:
+    """A moment (Unix s) on the wall clock; the value holds no zone."""
+    moment = datetime.fromtimestamp(at, UTC).replace(tzinfo=None)
+    return moment + (2 * _HOUR if _is_summer(moment) else _HOUR)
+
+
+def local_stamp(at: float) -> str:
+    """A moment (Unix s) on the wall clock, to the second."""
+    return f"{in_madrid(at):%Y-%m-%d %H:%M:%S}"
+
+
+def start_of(day: date) -> float:
+    """When a day begins there (Unix s); clocks never change at midnight."""
+    midnight = datetime(day.year, day.month, day.day)  # noqa: DTZ001 - a wall clock
+    ahead = 2 * _HOUR if _is_summer(midnight - _HOUR) else _HOUR
+    return (midnight - ahead).replace(tzinfo=UTC).timestamp()
+
+
+def _is_summer(moment: datetime) -> bool:
+    """From the last Sunday of March to that of October, both at 01:00 UTC."""
+    return _last_sunday(moment.year, 3) <= moment < _last_sunday(moment.year, 10)
+
+
+def _last_sunday(year: int, month: int) -> datetime:
+    last = datetime(year, month, 31, 1)  # noqa: DTZ001 - UTC, as its callers have it
+    return last - timedelta(days=(last.weekday() + 1) % 7)
+
+
+LANGUAGES = ("es", "en")
+"""Both complete; the first is the one for readers of neither."""
+
+HOLE: Final = re.compile(r"\{(\w+)(?::(\w+))?\}")
+
+Slot = str | int | float
+
+
+@dataclass(frozen=True, slots=True)
+class Translations:
+    """All sentences of one language, by key."""
+
+    language: str
+    sentences: Mapping[str, str]
+
+    def say(self, key: str, **slots: Slot) -> str:
+        """The sentence with its holes filled.
+
+        Raises:
+            KeyError: no such sentence; a template of ours is wrong.
+        """
+
+        def fill(hole: re.Match[str]) -> str:
+            return self._write(slots[hole[1]], hole[2])
+
+        return HOLE.sub(fill, self.sentences[key])
+
+    def _write(self, value: Slot, form: str | None) -> str:
+        if form == "who":
+            return self.sentences.get(f"who.{value}", str(value))
+        if isinstance(value, str) or form is None:
+            return str(value)
+        if form == "percent":
+            return self.percent(value)
+        return self.decimal(f"{value:.{int(form)}f}")
+
+    def percent(self, share: float) -> str:
+        """A share as browsers write it: Spanish keeps the sign on the number's line."""
+        sign = "\u00a0%" if self.language == "es" else "%"
+        return f"{100 * share:.0f}{sign}"
+
+    def decimal(self, number: str) -> str:
+        """A number with the decimal sign of the language."""
+        return number.replace(".", ",") if self.language == "es" else number
+
+
+def read_translations(language: str) -> Translations:
+    """Read the sentences of one of ``LANGUAGES`` from the package."""
+    file = files("iveg") / "static" / "i18n" / f"{language}.json"
+    blocks = json.loads(file.read_text(encoding="utf-8"))
+    return Translations(language, dict(_flatten(blocks)))
+
+
+def _flatten(blocks: Mapping[str, object], path: str = "") -> Iterator[tuple[str, str]]:
+    for name, value in blocks.items():
+        if isinstance(value, Mapping):
+            yield from _flatten(value, f"{path}{name}.")
+        else:
+            yield f"{path}{name}", str(value)
+
+
+def preferred_language(accept: str) -> str:
+    """The first of ``LANGUAGES`` in an ``Accept-Language`` header, else Spanish.
+
+    Browsers write the header in the order of preference, so weights are not compared.
+    """
+    for item in accept.split(","):
+        language = item.split(";")[0].strip().lower()[:2]
+        if language in LANGUAGES:
+            return language
+    return LANGUAGES[0]
+
 
 _TRACK = re.compile(r"([PR])(\d+)(?:-[0-9a-f]+)?")
 _NOTHING: Final = "—"
@@ -21,6 +142,8 @@ _NAMED: Final = {
     "hop": "hop",
     "part": "part",
     "doubt": "doubt",
+    "parameter": "rule.part",
+    "class_of": "rule.class",
 }
 _LANES: Final = (
     (re.compile(r"(?:Pasillo )?(\d+)"), "lane.number"),
@@ -108,3 +231,20 @@ class Sentences:
 
 def _trimmed(text: str) -> str:
     return text.rstrip("0").rstrip(".,") if "." in text or "," in text else text
+
+
+def writer(language: Language) -> Write:
+    """Writes messages in words: priority and time, but no place and no person."""
+    said = Sentences(read_translations(language))
+
+    def write(items: Sequence[AlertItem], is_escalated: bool) -> MessageText:
+        slots = {
+            "priority": min(one.priority for one in items),
+            "count": len(items),
+            "at": min(one.raised.wall for one in items),
+        }
+        title = "messages.title_unseen" if is_escalated else "messages.title"
+        body = "messages.body_one" if len(items) == 1 else "messages.body_more"
+        return MessageText(said.say(title, slots), said.say(body, slots))
+
+    return write

@@ -1,16 +1,58 @@
-"""Routes by which people come in and go: the page of sign-in and what it posts."""
+"""Routes by which people come in and go: the page of sign-in and what it posts.
 
-from fastapi import APIRouter, Depends, Request, Response
+The way to the identity provider and back, as a person's browser goes it.
+"""
+
+from typing import Annotated, Final
+
+from fastapi import APIRouter, Depends, Query, Request, Response
 from fastapi.responses import JSONResponse
 from pydantic import Field
 
 from iveg.adapters.passwords import LEAST, MOST
+from iveg.domain.errors import SignOnError
 from iveg.models.base import Body
+from iveg.web.pages.contexts import EnteredPage
 from iveg.web.pages.drawing import Pages
-from iveg.web.problem import Problem
-from iveg.web.security.answer import AnswerOfDevice
+from iveg.web.problems import Problem
 from iveg.web.security.requirements import Reader, authenticator_of, require
-from iveg.web.security.single_sign_on import SingleSignOn
+from iveg.web.security.single_sign_on import CALLBACK, SingleSignOn
+
+_STATUS: Final = {"unreachable": 503, "busy": 429, "outdated": 400}
+
+
+def router(pages: Pages, sign_on: SingleSignOn) -> APIRouter:
+    """The routes of single sign-on; open, as nobody is signed in there yet."""
+    routes = APIRouter(include_in_schema=False, dependencies=[Depends(require("open"))])
+
+    @routes.get("/signin/sso", response_model=None)
+    async def begin(
+        request: Request,
+        to: Annotated[str, Query(max_length=512)] = "/",
+    ) -> Response:
+        try:
+            return await sign_on.begin(request, to)
+        except SignOnError as error:
+            return _refused(pages, request, error)
+
+    @routes.get(CALLBACK, response_model=None)
+    async def finish(request: Request) -> Response:
+        try:
+            token, to = await sign_on.finish(request)
+        except SignOnError as error:
+            return _refused(pages, request, error)
+        page = EnteredPage(pages.frame(request, "entered"), to)
+        response = pages.draw(page)
+        # A redirect would still be the provider's, and leave the Strict cookie behind.
+        response.headers["Refresh"] = f"0; url={to}"
+        return authenticator_of(request).admit(request, token, response)
+
+    return routes
+
+
+def _refused(pages: Pages, request: Request, error: SignOnError) -> Response:
+    status = _STATUS.get(error.failure, 403)
+    return pages.sign_in(request, status, failure=error.failure)
 
 
 class _ByLink(Body):
@@ -33,13 +75,7 @@ class _ByInvitation(Body):
     password: str = Field(min_length=LEAST, max_length=MOST)
 
 
-class _ByPasskey(Body):
-    """What a device answered to the challenge of ``GET /signin/passkey``."""
-
-    passkey: AnswerOfDevice
-
-
-_SignIn = _ByLink | _ByPassword | _ByInvitation | _ByPasskey
+_SignIn = _ByLink | _ByPassword | _ByInvitation
 """What the sign-in page posts."""
 
 
@@ -79,8 +115,6 @@ async def _enter(request: Request, body: _SignIn) -> Response | Problem:
             return await authenticator.sign_in_by_password(request, name, password)
         case _ByInvitation(invitation=invitation, password=password):
             return await authenticator.accept(request, invitation, password)
-        case _ByPasskey(passkey=answer):
-            return await authenticator.sign_in_by_passkey(request, answer)
 
 
 async def _leave(request: Request, sign_on: SingleSignOn | None) -> Response:

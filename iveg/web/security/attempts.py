@@ -1,8 +1,11 @@
 """Proofs of who somebody is are looked at within a limit of wrong ones.
 
-Whatever the proof: a link, a password, a passkey or an invitation.
+Whatever the proof: a link, a password or an invitation.  Of an address too many are
+refused; of an account they wait ever longer, so that guesses from many addresses are
+slow and no stranger shuts anybody out.
 """
 
+import asyncio
 import logging
 import math
 from collections.abc import Awaitable, Callable
@@ -13,9 +16,14 @@ from starlette.requests import Request
 from iveg.domain.audit import STRANGER, Actor
 from iveg.pipeline.audit import AuditTrail
 from iveg.pipeline.ports import Clock
-from iveg.web.problem import Problem
+from iveg.web.problems import Problem
 from iveg.web.security.csrf import refuse_forgery, refuse_other_bodies
-from iveg.web.security.rate_limits import REFUSED_ROWS, Allowance, FailedAttempts
+from iveg.web.security.rate_limits import (
+    REFUSED_ROWS,
+    AccountDelays,
+    Allowance,
+    FailedAttempts,
+)
 
 _log = logging.getLogger(__name__)
 _T = TypeVar("_T")
@@ -27,12 +35,20 @@ class Attempts:
     Args:
         clock: Read at each of them.
         trail: Told of sign-ins, and of those that were refused.
+        pause: Waits for so long (s).
     """
 
-    def __init__(self, clock: Clock, trail: AuditTrail | None = None) -> None:
+    def __init__(
+        self,
+        clock: Clock,
+        trail: AuditTrail | None = None,
+        pause: Callable[[float], Awaitable[object]] = asyncio.sleep,
+    ) -> None:
         self._clock = clock
         self._trail = trail
+        self.pause = pause
         self._failed = FailedAttempts()
+        self._delays = AccountDelays()
         # Strangers' rows are for ever: a flood from many addresses writes few.
         self._rows = Allowance(REFUSED_ROWS, clock().mono)
         self.refused = 0
@@ -44,6 +60,7 @@ class Attempts:
         request: Request,
         wrong: str,
         proof: Callable[[], Awaitable[_T | None] | None],
+        of: str = "",
     ) -> _T | Problem:
         """What a proof proves, within the limit of wrong ones; else why not.
 
@@ -51,6 +68,7 @@ class Attempts:
             request: Who brings it.
             wrong: What the log says of one that proves nothing.
             proof: Looks at it; None where it is wrong.
+            of: Key of the account that it names; empty: none.
 
         Raises:
             ForeignOriginError: another site's page sent it.
@@ -65,9 +83,19 @@ class Attempts:
         # that the right password passes is none for who guesses.
         if self._failed.wait_s(address, now) > 0.0:
             return self.refuse(address, now, wrong)
+        if delay_s := self._delays.delay_s(of, now):
+            await self.pause(delay_s)
+            # Others of this address may have been wrong while it waited.
+            now = self._clock().mono
+            if self._failed.wait_s(address, now) > 0.0:
+                return self.refuse(address, now, wrong)
         looking = proof()
         found = None if looking is None else await looking
-        return self.refuse(address, now, wrong) if found is None else found
+        if found is None:
+            self._delays.failed(of, now)
+            return self.refuse(address, now, wrong)
+        self._delays.succeeded(of)
+        return found
 
     def refuse(self, address: str, now: float, wrong: str) -> Problem:
         """Count a proof that proves nothing, and say how it is answered.
@@ -100,7 +128,3 @@ class Attempts:
         if self._logged_at is None or now - self._logged_at >= 60.0:
             self._logged_at = now
             _log.warning("sign-in refused: %s (%d so far)", wrong, self.refused)
-
-    def succeeded(self, address: str) -> None:
-        """Forget the wrong proofs of this address."""
-        self._failed.succeeded(address)

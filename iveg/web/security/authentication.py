@@ -18,22 +18,16 @@ from starlette.requests import HTTPConnection, Request
 from starlette.responses import RedirectResponse, Response
 from starlette.websockets import WebSocket
 
-from iveg.adapters.sessions import FileSessions
-from iveg.adapters.webauthn import Credential
-from iveg.domain.accounts import DEFAULT_NAME, Account, SignInMethod
+from iveg.domain.accounts import DEFAULT_NAME, AccessBook, Account, name_key
 from iveg.domain.errors import NotAllowedError
 from iveg.pipeline.audit import AuditTrail
 from iveg.pipeline.ports import Clock
 from iveg.web.cookies import keep_language, session_cookie
-from iveg.web.errors import NotSignedInError
-from iveg.web.problem import Problem
+from iveg.web.problems import NotSignedInError, Problem
 from iveg.web.security.attempts import Attempts
 from iveg.web.security.audited import READING
 from iveg.web.security.csrf import is_own, refuse_forgery, refuse_other_bodies
-from iveg.web.security.passkeys import SIGN_IN, Passkeys, site_of
-from iveg.web.security.people import People
-from iveg.web.security.programs import Programs
-from iveg.web.security.proofs import Freshness
+from iveg.web.security.people import People, Programs
 from iveg.web.security.roles import PROGRAM, Action, Principal
 from iveg.web.security.secrets import same_secret
 from iveg.web.security.sessions import Sessions
@@ -51,13 +45,11 @@ class Authenticator:
         sign_in_token: The link's token (hex); it signs a browser in as operator.
         api_token: The bearer token of programs; empty lets no program in.
         clock: Read at each question.
-        store: Where sessions outlive a restart; None forgets them.
+        book: Who is known; None: nobody yet.
         link_name: Name of whoever holds the link.
         trail: Told of sign-ins, and of those that were refused.
         people: Those with accounts; None: there is the link alone.
         programs: Those with tokens of their own; None: there is ``api_token`` alone.
-        passkeys: Those of people; None: there are none.
-        proven_within_s: How old a proof may be that a release rests on (s); 0: any.
     """
 
     def __init__(
@@ -66,13 +58,11 @@ class Authenticator:
         sign_in_token: str,
         api_token: str,
         clock: Clock,
-        store: FileSessions | None = None,
+        book: AccessBook | None = None,
         link_name: str = DEFAULT_NAME,
         trail: AuditTrail | None = None,
         people: People | None = None,
         programs: Programs | None = None,
-        passkeys: Passkeys | None = None,
-        proven_within_s: float = 0.0,
     ) -> None:
         self._sign_in_token = sign_in_token
         self._api_token = api_token
@@ -80,16 +70,7 @@ class Authenticator:
         self.attempts = Attempts(clock, trail)
         self._people = people
         self._programs = programs
-        self._passkeys = passkeys
-        self.freshness = Freshness(proven_within_s, clock)
-        role_now = None if people is None else people.role_now
-        self.sessions = Sessions(
-            clock,
-            store,
-            link_name=link_name,
-            role_now=role_now,
-            account=(lambda _: None) if people is None else people.account,
-        )
+        self.sessions = Sessions(clock, book or AccessBook(), link_name)
 
     # --- people sign in ---------------------------------------------------------
 
@@ -118,6 +99,7 @@ class Authenticator:
         if not same_secret(token, self._sign_in_token):
             return self.attempts.refuse(address, self._clock().mono, "wrong token")
         # Somebody else's wrong links must not shut out whoever has the right one.
+        self._end_before(request)
         return self.admit(request, self.sessions.open_by_link(), response)
 
     async def sign_in_by_password(
@@ -128,7 +110,10 @@ class Authenticator:
         A wrong name is told as a wrong password, and takes as long.
         """
         return await self._prove(
-            request, lambda one: one.sign_in(name, password), "wrong name or password"
+            request,
+            lambda one: one.sign_in(name, password),
+            "wrong name or password",
+            name_key(name),
         )
 
     async def accept(
@@ -139,32 +124,18 @@ class Authenticator:
             request, lambda one: one.accept(invitation, password), "no such invitation"
         )
 
-    async def sign_in_by_passkey(
-        self, request: Request, credential: Credential
-    ) -> Response | Problem:
-        """Exchange a passkey's answer for a session cookie; raises as ``sign_in``."""
-        site = site_of(request)
-
-        async def proof(people: People) -> Account | None:
-            found = self._passkeys and await self._passkeys.prove(
-                site, credential, SIGN_IN
-            )
-            return people.account(found.account_id) if found else None
-
-        return await self._prove(request, proof, "no such passkey", "passkey")
-
     async def change_password(
         self, request: Request, who: Principal, old: str, new: str
     ) -> Response | Problem:
         """Sign somebody in anew by a new password; their other sessions end.
 
         A wrong old one counts as a sign-in that was refused.
-
-        Raises:
-            HopError: the database is away; nothing was changed.
         """
         return await self._prove(
-            request, lambda one: one.change_password(who, old, new), "wrong password"
+            request,
+            lambda one: one.change_password(who, old, new),
+            "wrong password",
+            name_key(who.name),
         )
 
     async def _prove(
@@ -172,19 +143,17 @@ class Authenticator:
         request: Request,
         proof: Callable[[People], Awaitable[Account | None]],
         wrong: str,
-        method: SignInMethod = "password",
+        of: str = "",
     ) -> Response | Problem:
         people = self._people
         account = await self.attempts.weigh(
-            request, wrong, lambda: None if people is None else proof(people)
+            request, wrong, lambda: None if people is None else proof(people), of
         )
         if isinstance(account, Problem):
             return account
-        before = self.identify(request)
-        if before is not None:
-            self.sessions.revoke(before)
+        self._end_before(request)
         cookie = self.sessions.open(
-            account.name, account.role, account.account_id, method
+            account.name, account.role, account.account_id, "password"
         )
         response = Response(status_code=204)
         keep_language(response, account.language)
@@ -195,7 +164,6 @@ class Authenticator:
     ) -> Response:
         """Give a browser its session; the rest goes into the audit."""
         address = "" if request.client is None else request.client.host
-        self.attempts.succeeded(address)
         secure = request.url.scheme == "https"
         who = self.sessions.find(cookie)
         if who is not None:
@@ -212,9 +180,7 @@ class Authenticator:
 
     def sign_out(self, request: Request) -> Response:
         """End the session of this browser and redirect to the sign-in page."""
-        principal = self.identify(request)
-        if principal is not None:
-            self.sessions.revoke(principal)
+        self._end_before(request)
         response = RedirectResponse("/", 303)
         secure = request.url.scheme == "https"
         response.delete_cookie(
@@ -224,6 +190,12 @@ class Authenticator:
             samesite="strict",
         )
         return response
+
+    def _end_before(self, request: Request) -> None:
+        """End the session that this browser has."""
+        before = self.identify(request)
+        if before is not None:
+            self.sessions.revoke(before)
 
     # --- identification ---------------------------------------------------------
 
@@ -267,9 +239,6 @@ class Authenticator:
             if principal.session is not None:
                 refuse_forgery(request)
             refuse_other_bodies(request)
-            # Anybody's STOP is no sign that the person is still there.
-            if principal.method == "pin" and action not in ("read", "stop"):
-                self.sessions.acted(principal)
         return principal
 
     async def authorise_websocket(self, websocket: WebSocket) -> Principal:

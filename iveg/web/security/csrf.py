@@ -4,7 +4,7 @@ from urllib.parse import urlsplit
 
 from starlette.requests import HTTPConnection, Request
 
-from iveg.web.errors import ForeignOriginError, NotJsonError
+from iveg.web.problems import ForeignOriginError, NotJsonError
 
 
 def refuse_forgery(request: Request) -> None:

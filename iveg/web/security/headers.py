@@ -11,7 +11,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from iveg.domain.errors import UnreadableError
 from iveg.ngsi.codec import load_json
-from iveg.web.problem import Problem
+from iveg.web.problems import Problem
 
 MAX_BODY = 1_048_576
 """1 MiB, as at Orion (bytes)."""

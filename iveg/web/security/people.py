@@ -1,138 +1,58 @@
-"""People with accounts: their passwords and invitations, and what their sessions are.
+"""People with accounts: their passwords and invitations.
 
-Accounts are read anew twice a second, so that who is disabled at the console is out of
-every page within a second.  While the database is away the last that was read counts;
-before the first reading a session may stop and no more.
+Programs with tokens of their own: what each may do, and when it was here last.
 """
 
-import contextlib
-from collections.abc import Callable, Mapping
-from functools import partial
-from typing import Protocol, TypeVar
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Final
 
-from iveg.adapters.admission import Admission, ChangingAccounts, has_admin
+from iveg.adapters.admission import Admission, has_admin
 from iveg.adapters.passwords import Passwords
-from iveg.adapters.sessions import Session
-from iveg.domain.accounts import Account, Language, digest_of, name_key
+from iveg.domain.accounts import (
+    AccessBook,
+    Account,
+    ApiToken,
+    Language,
+    TokenScope,
+    digest_of,
+    name_key,
+)
 from iveg.domain.audit import Actor, NamedActor
-from iveg.domain.errors import HopError
 from iveg.pipeline.ports import Clock
-from iveg.web.security.rereading import Rereading
-from iveg.web.security.roles import Role
-
-_T = TypeVar("_T")
+from iveg.web.security.roles import Principal, Role
 
 
-class AccountRows(ChangingAccounts, Protocol):
-    """Accounts within one transaction."""
-
-    def read(self) -> Mapping[str, Account]:
-        """All accounts, by id, which nobody else changes meanwhile."""
-
-
-class Accounts(Protocol):
-    """Storage of accounts; blocks, and raises HopError while it is away."""
-
-    def read(self) -> Mapping[str, Account]:
-        """All accounts, by id."""
-
-    def together(self, work: Callable[[AccountRows], _T]) -> _T:
-        """Read and change in one transaction; what raises changes nothing."""
-
-    def accept(self, digest: str, password: str, now: float) -> Account | None:
-        """Exchange an invitation for a password, once; None where it is none."""
-
-    def change_password(
-        self, by: Actor, was: str, password: str, now: float
-    ) -> Account | None:
-        """Put a hash in the place of another; None where that is kept no longer."""
-
-    def choose_language(self, person: str, language: Language) -> None:
-        """Keep what somebody reads."""
-
-
-class People(Rereading):
-    """Knows who may sign in, and which sessions still stand.
+class People:
+    """Knows who may sign in, from memory alone.
 
     Args:
-        store: Where accounts are kept.
+        book: Where accounts are known.
         passwords: Checks passwords.
         clock: Read at each question.
     """
 
-    def __init__(self, store: Accounts, passwords: Passwords, clock: Clock) -> None:
-        super().__init__("accounts")
-        self._store = store
+    def __init__(self, book: AccessBook, passwords: Passwords, clock: Clock) -> None:
+        self._book = book
         self._passwords = passwords
         self._clock = clock
-        self._known: Mapping[str, Account] | None = None
 
-    async def refresh(self) -> None:
-        """Read them once. Raises HopError."""
-        self._known = await self._apart(self._store.read)
+    @property
+    def known(self) -> Mapping[str, Account]:
+        """All accounts, by id."""
+        return self._book.accounts
 
     def is_led(self) -> bool:
-        """Whether somebody can sign in as admin; before the first reading, too."""
-        if self._known is None:
-            return True
-        return has_admin(self._known.values(), self._clock().wall)
+        """Whether somebody can sign in as admin."""
+        return has_admin(self.known.values(), self._clock().wall)
 
-    async def known(self) -> Mapping[str, Account]:
-        """All accounts as they are kept now, by id. Raises HopError."""
-        await self.refresh()
-        return self._known or {}
-
-    async def change(
-        self, by: Actor, work: Callable[[Admission, Mapping[str, Account]], _T]
-    ) -> _T:
-        """Change accounts; counts at once, here and in every session.
-
-        Args:
-            by: Who changes them.
-            work: Called in a thread and one transaction, with all accounts by id.
-
-        Raises:
-            HopError: the database is away; nothing was changed.
-        """
-        now = self._clock().wall
-
-        def change(rows: AccountRows) -> _T:
-            return work(Admission(rows, by, now), rows.read())
-
-        done = await self._apart(lambda: self._store.together(change))
-        with contextlib.suppress(HopError):
-            await self.refresh()
-        return done
-
-    def role_now(self, session: Session, left: Role) -> Role | None:
-        """The role that an account leaves a session; None: it is over at once.
-
-        Args:
-            session: Somebody's, who came with a password or by the provider.
-            left: The role that its age leaves.
-        """
-        if self._known is None:
-            return "expired"
-        account = self.find(session.person)
-        if account is None or not account.is_open(self._clock().wall):
-            return None
-        return left if session.began >= account.since else None
-
-    def present(self) -> list[Account]:
-        """Those who may be here and have begun."""
-        now = self._clock().wall
-        known = (self._known or {}).values()
-        return [one for one in known if one.state(now) == "active"]
-
-    def account(self, account_id: str) -> Account | None:
-        """Somebody's account; None where they may not be here, or have not begun."""
-        account = self.find(account_id)
-        begun = account is not None and account.state(self._clock().wall) == "active"
-        return account if begun else None
+    def admission(self, by: Actor) -> Admission:
+        """Changes accounts and tokens as somebody; each counts at once."""
+        return Admission(self._book, by, self._clock().wall)
 
     def find(self, person: str) -> Account | None:
-        """The account of this id, as it was read last."""
-        return (self._known or {}).get(person)
+        """The account of this id."""
+        return self.known.get(person)
 
     async def sign_in(self, name: str, password: str) -> Account | None:
         """The account of this name and password; None takes as long.
@@ -140,80 +60,124 @@ class People(Rereading):
         Raises:
             BusyError: too many sign in at once.
         """
-        key, now = name_key(name), self._clock().wall
-        known = (self._known or {}).values()
+        key = name_key(name)
+        known = self.known.values()
         found = next((one for one in known if name_key(one.name) == key), None)
         fits = await self._passwords.fits(password, found.password if found else "")
-        return found if found and fits and found.is_open(now) else None
+        if not found or not fits:
+            return None
+        # Whoever was changed meanwhile has proved an account that is none any more.
+        now = self.find(found.account_id)
+        is_same = now is not None and now.password == found.password
+        return now if now and is_same and now.is_open(self._clock().wall) else None
 
-    async def vouched(self, user: Account) -> Account:
+    def vouched(self, user: Account) -> Account:
         """The account of somebody whom the provider vouches for; made where needed.
 
         Raises:
             SignOnError: they are shut out here.
-            HopError: the database is away.
         """
         by = NamedActor(user.account_id, user.name, user.role, "sso")
-        return await self.change(by, lambda one, known: one.vouched(known, user))
-
-    async def proven(self, account: Account, password: str) -> Account | None:
-        """The same account where the password is its own. Raises BusyError."""
-        fits = await self._passwords.fits(password, account.password)
-        return account if fits else None
-
-    async def has_pin(self, account: Account, pin: str) -> bool:
-        """Whether a PIN is this person's. Raises BusyError."""
-        return await self._passwords.fits(pin, account.pin)
-
-    async def give_pin(self, by: Actor, account: Account, pin: str) -> None:
-        """Let a PIN unlock tablets as this person; an empty one takes theirs away.
-
-        Raises:
-            BusyError: too many sign in at once.
-            HopError: the database is away; nothing was changed.
-        """
-        kept = await self._passwords.hashed(pin) if pin else ""
-        person = account.account_id
-        await self.change(by, lambda one, known: one.give_pin(known[person], kept))
+        return self.admission(by).vouched(user)
 
     async def accept(self, invitation: str, password: str) -> Account | None:
         """Begin an account by its invitation; None where that is none any more.
 
         Raises:
             BusyError: too many sign in at once.
-            HopError: the database is away.
         """
-        digest, now = digest_of(invitation), self._clock().wall
-        if not any(one.invitation == digest for one in (self._known or {}).values()):
+        digest = digest_of(invitation)
+        if self._invited(digest) is None:
             return None
         kept = await self._passwords.hashed(password)
-        account = await self._apart(partial(self._store.accept, digest, kept, now))
-        await self.refresh()
-        return account
+        account, now = self._invited(digest), self._clock().wall
+        if account is None:
+            return None
+        begun = replace(account, password=kept, invitation="", since=now)
+        self._book.put(begun)
+        return begun
+
+    def _invited(self, digest: str) -> Account | None:
+        now = self._clock().wall
+        waiting = (
+            one
+            for one in self.known.values()
+            if one.invitation == digest and one.invited_until > now and not one.disabled
+        )
+        return next(waiting, None)
 
     async def change_password(self, who: Actor, old: str, new: str) -> Account | None:
         """Give somebody a new password; None where the old one is wrong.
 
         Raises:
             BusyError: too many sign in at once.
-            HopError: the database is away.
         """
         account = self.find(who.person)
         was = account.password if account else ""
         if not await self._passwords.fits(old, was):
             return None
-        kept, now = await self._passwords.hashed(new), self._clock().wall
-        work = partial(self._store.change_password, who, was, kept, now)
-        changed = await self._apart(work)
-        await self.refresh()
-        return changed
+        kept = await self._passwords.hashed(new)
+        account = self.find(who.person)
+        if account is None or account.password != was or account.disabled:
+            return None
+        return self.admission(who).give_password(account, kept)
 
-    async def choose_language(self, person: str, language: Language) -> None:
-        """Keep what somebody reads. Raises HopError."""
-        await self._apart(partial(self._store.choose_language, person, language))
-        await self.refresh()
+    def choose_language(self, person: str, language: Language) -> None:
+        """Keep what somebody reads."""
+        account = self.find(person)
+        if account is not None:
+            self._book.put(replace(account, language=language))
 
     def close(self) -> None:
-        """End the threads."""
-        super().close()
+        """End the thread of passwords."""
         self._passwords.close()
+
+
+_ROLES: Final[Mapping[TokenScope, Role]] = {
+    "read": "reader",
+    "stop": "program",
+    "operate": "controller",
+}
+_USED_S = 60.0
+
+
+class Programs:
+    """Knows the tokens of programs, from memory alone.
+
+    Args:
+        book: Where they are known.
+        clock: Read at each question.
+    """
+
+    def __init__(self, book: AccessBook, clock: Clock) -> None:
+        self._book = book
+        self._clock = clock
+        self._kept_at = clock().mono
+
+    @property
+    def known(self) -> list[ApiToken]:
+        """All tokens, with their newest use."""
+        return [*self._book.tokens.values()]
+
+    def find(self, token: str) -> Principal | None:
+        """Whose token this is; None: nobody's, or nobody's any more."""
+        known, now = self._book.tokens.get(digest_of(token)), self._clock()
+        if known is None or not known.is_open(now.wall):
+            return None
+        self._book.tokens[known.digest] = replace(known, used_at=now.wall)
+        if now.mono - self._kept_at >= _USED_S:
+            self._kept_at = now.mono
+            self._book.keep()
+        return _principal(known)
+
+    def current(self, principal: Principal) -> Principal | None:
+        """The same program as of now; None where its token has ended."""
+        now = self._clock().wall
+        same = (one for one in self.known if one.token_id == principal.person)
+        return next((_principal(one) for one in same if one.is_open(now)), None)
+
+
+def _principal(token: ApiToken) -> Principal:
+    return Principal(
+        token.name, _ROLES[token.scope], person=token.token_id, method="token"
+    )

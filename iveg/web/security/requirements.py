@@ -27,9 +27,8 @@ class Requirement:
     It serves HTTP and WebSocket routes alike.
     """
 
-    def __init__(self, action: Action, *, proven: bool = False) -> None:
+    def __init__(self, action: Action) -> None:
         self.action = action
-        self._proven = proven
 
     async def __call__(self, connection: HTTPConnection) -> Principal:
         """The authorised principal, or the error that refuses the request."""
@@ -38,10 +37,7 @@ class Requirement:
             return authenticator.identify(connection) or NOBODY
         if isinstance(connection, WebSocket):
             return await authenticator.authorise_websocket(connection)
-        who = authenticator.authorise(Request(connection.scope), self.action)
-        if self._proven:
-            authenticator.freshness.refuse_stale(who)
-        return who
+        return authenticator.authorise(Request(connection.scope), self.action)
 
 
 _REQUIREMENTS: Final[Mapping[Action, Requirement]] = {
@@ -50,20 +46,14 @@ _REQUIREMENTS: Final[Mapping[Action, Requirement]] = {
 }
 
 
-def require(action: Action, *, proven: bool = False) -> Requirement:
-    """Requirement of a route: ``Depends(require("stop"))``; ``open`` asks nothing.
-
-    Args:
-        action: What the role has to allow.
-        proven: Whether the proof of who it is must be fresh, too (``Freshness``).
-    """
-    return Requirement(action, proven=True) if proven else _REQUIREMENTS[action]
+def require(action: Action) -> Requirement:
+    """Requirement of a route: ``Depends(require("stop"))``; ``open`` asks nothing."""
+    return _REQUIREMENTS[action]
 
 
 Reader = Annotated[Principal, Depends(require("read"))]
 Presser = Annotated[Principal, Depends(require("stop"))]
 Operator = Annotated[Principal, Depends(require("release"))]
-ProvenOperator = Annotated[Principal, Depends(require("release", proven=True))]
 Admin = Annotated[Principal, Depends(require("admin"))]
 
 

@@ -33,8 +33,6 @@ class Principal:
         person: Id of the account; names may change and be given anew.
         method: How they proved who they are.
         signed_in_at: When (Unix s); None for programs, which do so at each request.
-        proven_at: When the person last proved who they are (Unix s); later than that
-            they were only let in again, by the provider's own session. None: unknown.
         wall: The session was left to a screen that everybody passes.
     """
 
@@ -44,18 +42,12 @@ class Principal:
     person: str = ""
     method: SignInMethod = "link"
     signed_in_at: float | None = None
-    proven_at: float | None = None
     wall: bool = False
 
     @property
     def has_account(self) -> bool:
         """Whether it is a person by name, not whoever holds a link or a token."""
         return self.method in OF_ACCOUNTS
-
-    @property
-    def is_tablet(self) -> bool:
-        """Whether it is a shared tablet, locked or not."""
-        return self.method in ("pin", "tablet")
 
     def may(self, action: Action) -> bool:
         """Whether the role's row holds this action."""

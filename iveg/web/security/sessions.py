@@ -1,69 +1,78 @@
 """Sessions of people: their tokens, and what each still allows.
 
-Only digests of the tokens are kept, in memory and in a store that outlives a restart.
+Only digests of the tokens are kept.
+
+How long a session lasts, and which role is left of it.
+
+Ages follow the wall clock, because no other goes on counting while iVeg is down::
+
+    signed in ──12 h idle, or 24 h──> expired: STOP alone ──12 h──> gone
+        ├──────── a viewer: 30 days ──────^
+        └──────── signed out ─────────────────────────────────────> gone
 """
 
 import hashlib
 import secrets
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Collection
 from dataclasses import replace
-from typing import Any
+from typing import Any, cast
 
-from iveg.adapters.sessions import FileSessions, Session
 from iveg.domain.accounts import (
     DEFAULT_NAME,
     LINK_PERSON,
     OF_ACCOUNTS,
-    Account,
+    AccessBook,
+    PersonRole,
+    Session,
     SignInMethod,
 )
 from iveg.pipeline.ports import Clock
 from iveg.web.security.roles import Principal, Role
-from iveg.web.security.session_life import role_at
-from iveg.web.security.tablets import TABLET, left_s, tablet_principal
 
-_MOST_SESSIONS = 1000
-_PEOPLE = frozenset({"viewer", "operator", "admin"})
+IDLE_S, ABSOLUTE_S, STOP_ONLY_S = 12 * 3600.0, 24 * 3600.0, 12 * 3600.0
+VIEWER_S = 30 * 86400.0
+"""Walls and shared tablets look and stop, and nobody signs them in each morning."""
+
+
+def role_at(session: Session, now: float) -> Role | None:
+    """The role that is left at ``now`` (Unix s); None when all is over."""
+    ends = min(session.seen + IDLE_S, session.began + ABSOLUTE_S)
+    if session.role == "viewer":
+        ends = session.began + VIEWER_S
+    over = now - (ends if session.until is None else min(ends, session.until))
+    if over <= 0:
+        return session.role
+    return "expired" if over <= STOP_ONLY_S else None
+
+
 _KEEP_SEEN_S = 60.0
 """A crash forgets at most this much of a sign of life."""
 
 
 class Sessions:
-    """People who are signed in.
-
-    Bounded: when it is full, the session that was idle longest ends.
+    """People who are signed in, from memory alone.
 
     Args:
         clock: Read at each question.
-        store: Where they outlive this process; None forgets them with it.
-        most: How many there may be.
+        book: Where sessions are known, and the accounts that decide over them.
         link_name: Name of whoever holds the link of the environment.
-        role_now: The role that an account leaves a session of its person; None: over.
-        account: Somebody's account while they may be here.
     """
 
     def __init__(
-        self,
-        clock: Clock,
-        store: FileSessions | None = None,
-        most: int = _MOST_SESSIONS,
-        link_name: str = DEFAULT_NAME,
-        role_now: Callable[[Session, Role], Role | None] | None = None,
-        account: Callable[[str], Account | None] = lambda _: None,
+        self, clock: Clock, book: AccessBook, link_name: str = DEFAULT_NAME
     ) -> None:
         self._clock = clock
-        self._store = store
-        self._most = most
+        self._book = book
         self._link_name = link_name
-        self._role_now = role_now
-        self._account = account
-        self._sessions: dict[bytes, Session] = {}
         self._kept_at = 0.0
-        if store is not None:
-            self._remember(store.load())
+        self._remember()
 
     def __len__(self) -> int:
         return len(self._sessions)
+
+    @property
+    def _sessions(self) -> dict[bytes, Session]:
+        return self._book.sessions
 
     def open_by_link(self) -> str:
         """Begin a session of whoever holds the link; returns its token."""
@@ -76,7 +85,6 @@ class Sessions:
         person: str = "",
         method: SignInMethod = "link",
         until: float | None = None,
-        proven: float | None = None,
     ) -> str:
         """Begin a session; returns its token, which is stored nowhere.
 
@@ -86,21 +94,13 @@ class Sessions:
             person: Id of the account.
             method: How they signed in.
             until: When it is over at the latest (Unix s).
-            proven: When the provider saw them prove who they are (Unix s); None: it
-                does not say.  Every other way in is a proof by itself.
         """
-        if len(self._sessions) >= self._most:
-            idlest = min(self._sessions, key=lambda one: self._sessions[one].seen)
-            del self._sessions[idlest]
         token = secrets.token_urlsafe(32)
         now = self._clock().wall
         digest = _digest(token)
-        proven = proven if method == "sso" else now
-        began = Session(
-            digest.hex(), name, role, now, now, person, method, proven, until
-        )
-        self._sessions[digest] = began
-        self._keep()
+        theirs = cast("PersonRole", role)
+        began = Session(digest.hex(), name, theirs, now, now, person, method, until)
+        self._book.open(began)
         return token
 
     def find(self, token: str) -> Principal | None:
@@ -119,10 +119,6 @@ class Sessions:
             self._sessions.pop(principal.session, None)
             self._keep()
 
-    def proven(self, principal: Principal) -> None:
-        """Note that the person has proven anew who they are."""
-        self._change(principal, proven=self._clock().wall)
-
     def standing(self) -> list[tuple[Session, Role]]:
         """Those that are not over, each with the role that is left of it."""
         found = []
@@ -137,46 +133,6 @@ class Sessions:
         for session in ended:
             self._sessions.pop(bytes.fromhex(session.digest), None)
         self._keep()
-
-    # --- a shared tablet ----------------------------------------------------------
-
-    def make_tablet(self, principal: Principal, name: str) -> None:
-        """Make a browser a tablet; it keeps nothing of whoever did."""
-        now = self._clock().wall
-        self._change(
-            principal,
-            name=name,
-            role="viewer",
-            person=TABLET,
-            method=TABLET,
-            began=now,
-            proven=None,
-        )
-
-    def unlock(self, principal: Principal, account_id: str) -> None:
-        """Have a tablet act as somebody."""
-        now = self._clock().wall
-        self._change(principal, holder=account_id, acted=now, proven=now)
-
-    def lock(self, principal: Principal) -> None:
-        """Have a tablet act as nobody."""
-        self._change(principal, holder="")
-
-    def acted(self, principal: Principal) -> None:
-        """Note that whoever unlocked a tablet has done something."""
-        self._change(principal, acted=self._clock().wall)
-
-    def unlocked_s(self, principal: Principal) -> float:
-        """How long a tablet stays unlocked if nothing is done (s)."""
-        session = self._sessions.get(principal.session or b"")
-        return 0.0 if session is None else left_s(session, self._clock().wall)
-
-    def tablet_name(self, principal: Principal) -> str:
-        """What a tablet is called, whoever has unlocked it."""
-        session = self._sessions.get(principal.session or b"")
-        return "" if session is None else session.name
-
-    # ------------------------------------------------------------------------------
 
     def lower(self, principal: Principal) -> None:
         """Leave a session what a viewer may do, until somebody signs in anew."""
@@ -194,10 +150,7 @@ class Sessions:
         if session is None:
             return None
         now = self._clock().wall
-        role = role_at(session, now)
-        if role is not None and session.method in OF_ACCOUNTS:
-            # Without accounts nobody can say whether the person still has one.
-            role = self._role_now(session, role) if self._role_now else None
+        role = self._role(session, now)
         if role is None:
             del self._sessions[digest]
             self._keep()
@@ -206,8 +159,6 @@ class Sessions:
             self._sessions[digest] = replace(session, seen=now)
             if abs(now - self._kept_at) >= _KEEP_SEEN_S:
                 self._keep()
-        if session.method == TABLET and role != "expired":
-            return tablet_principal(session, now, self._account)
         return Principal(
             session.name,
             role,
@@ -215,20 +166,32 @@ class Sessions:
             session.person,
             session.method,
             session.began,
-            session.proven,
             session.wall,
         )
 
-    def _remember(self, kept: Iterable[Session]) -> None:
-        """Take in those of earlier runs that are not over; the newest of too many."""
+    def _role(self, session: Session, now: float) -> Role | None:
+        """The role that age and account leave a session; None: it is over."""
+        role = role_at(session, now)
+        if role is None or session.method not in OF_ACCOUNTS:
+            return role
+        account = self._book.accounts.get(session.person)
+        if account is None:
+            # No account is ever deleted: its line was damaged, and STOP outlives that.
+            return "expired"
+        is_theirs = session.role in (account.role, "viewer")
+        is_theirs &= account.is_open(now) and session.began >= account.since
+        return role if is_theirs else None
+
+    def _remember(self) -> None:
+        """Take in those of earlier runs that are not over."""
         now = self._clock().wall
-        newest = sorted(kept, key=lambda session: session.seen)[-self._most :]
-        for session in newest:
+        for digest, session in [*self._sessions.items()]:
             # A clock that was ahead must not have made a session that never ends.
             began, seen = min(session.began, now), min(session.seen, now)
             known = self._named(replace(session, began=began, seen=seen))
-            if session.role in _PEOPLE and role_at(known, now) is not None:
-                self._sessions[bytes.fromhex(session.digest)] = known
+            self._sessions[digest] = known
+            if role_at(known, now) is None:
+                del self._sessions[digest]
 
     def _named(self, session: Session) -> Session:
         """A session of the link under the link's present name.
@@ -244,8 +207,7 @@ class Sessions:
 
     def _keep(self) -> None:
         self._kept_at = self._clock().wall
-        if self._store is not None:
-            self._store.save(self._sessions.values())
+        self._book.keep()
 
 
 def _digest(token: str) -> bytes:

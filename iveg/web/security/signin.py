@@ -11,7 +11,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from iveg.web.problem import Problem
+from iveg.web.problems import Problem
 from iveg.web.security.authentication import Authenticator
 
 

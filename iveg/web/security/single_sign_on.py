@@ -5,9 +5,7 @@ A browser goes to the provider and comes back with a code, which iVeg exchanges:
     begin ──> provider's page ──> finish ──> session, at most IVEG_SSO_HOURS
                                      └─────> refused: why, on the page and in the audit
 
-``begin(anew=True)`` (``GET /signin/sso?anew=1&to=PATH``) has a person prove once more
-who they are, and ``finish`` looks at ``auth_time``: what the session then tells as
-``proven_at`` is the provider's word, and None where it gives none.
+Sign-ins that are at the identity provider: which answers are awaited, and whose.
 """
 
 import asyncio
@@ -17,27 +15,81 @@ import re
 import secrets
 from collections import OrderedDict
 from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
 from typing import Final, TypeVar
 
 from starlette.requests import Request
 from starlette.responses import RedirectResponse, Response
 
 from iveg.adapters.identity_provider import Attempt, IdentityProvider, Vouched
-from iveg.domain.accounts import Account
+from iveg.domain.accounts import Account, ClaimReading, ProvenIdentity
 from iveg.domain.audit import STRANGER, Actor, NamedActor
 from iveg.domain.errors import HopError, SignOnError
-from iveg.domain.single_sign_on import ClaimReading, ProvenIdentity
+from iveg.domain.observations import Instant
 from iveg.pipeline.audit import AuditTrail
 from iveg.pipeline.ports import Clock
 from iveg.web.security.authentication import Authenticator
 from iveg.web.security.people import People
 from iveg.web.security.rate_limits import REFUSED_ROWS, Allowance, FailedAttempts
 from iveg.web.security.roles import Principal
-from iveg.web.security.waiting_sign_ons import WAITS_S, WaitingSignOn, WaitingSignOns
+
+WAITS_S: Final = 600.0
+_MOST, _MOST_OF_ADDRESS = 1000, 16
+
+
+@dataclass(frozen=True, slots=True)
+class WaitingSignOn:
+    """A sign-in that was sent to the provider.
+
+    Attributes:
+        browser: What the browser's own cookie says, so that nobody ends the sign-in of
+            somebody else in their browser.
+        to: Path at which the person goes on.
+        before: Whose session the browser had.
+    """
+
+    attempt: Attempt
+    browser: str
+    address: str
+    to: str
+    began: Instant
+    before: Principal | None
+
+
+class WaitingSignOns:
+    """Bounded: the oldest gives way, that of the same address first."""
+
+    def __init__(self) -> None:
+        self._waiting: OrderedDict[str, WaitingSignOn] = OrderedDict()
+
+    def __len__(self) -> int:
+        return len(self._waiting)
+
+    def put(self, one: WaitingSignOn) -> None:
+        """Await the answer to one more."""
+        same = [
+            state
+            for state, other in self._waiting.items()
+            if other.address == one.address
+        ]
+        if len(same) >= _MOST_OF_ADDRESS:
+            del self._waiting[same[0]]
+        elif len(self._waiting) >= _MOST:
+            self._waiting.popitem(last=False)
+        self._waiting[one.attempt.state] = one
+
+    def pop(self, state: str, browser: str, now: Instant) -> WaitingSignOn | None:
+        """The sign-in that an answer belongs to, once; None: to none any more."""
+        one = self._waiting.get(state)
+        if one is None or one.browser != browser or not browser:
+            # Another browser's answer: the sign-in goes on to wait for its own.
+            return None
+        del self._waiting[state]
+        return one if now.mono - one.began.mono < WAITS_S else None
+
 
 CALLBACK: Final = "/signin/sso/callback"
 _TOGETHER_S, _MOST_TOGETHER = 12.0, 8
-_LEEWAY_S: Final = 30.0
 _MOST_HINTS: Final = 1000
 _OWN_PATH: Final = re.compile(r"/(?![/\\])[!-\[\]-~]{0,500}")
 _MOST_CODE: Final = 4096
@@ -80,24 +132,19 @@ class SingleSignOn:
 
     # --- to the provider and back -------------------------------------------------
 
-    async def begin(
-        self, request: Request, to: str = "/", *, anew: bool = False
-    ) -> Response:
+    async def begin(self, request: Request, to: str = "/") -> Response:
         """Send a browser to the provider.
 
         Args:
             request: Of the browser.
             to: Path of this server at which the person goes on; another is ``/``.
-            anew: The person, who is signed in, must prove who they are once more.
 
         Raises:
             SignOnError: it cannot begin; the audit has it.
         """
         before = self._authenticator.identify(request)
-        attempt = Attempt(f"{_base(request)}{CALLBACK}", anew=anew)
+        attempt = Attempt(f"{_base(request)}{CALLBACK}")
         try:
-            if anew and (before is None or before.method != "sso"):
-                raise SignOnError("not_renewed", "no session of the provider's")
             address = await self._bounded(lambda: self._provider.address(attempt))
         except SignOnError as error:
             self._refused(request, error, before or STRANGER)
@@ -137,7 +184,7 @@ class SingleSignOn:
             vouched = await self._bounded(lambda: self._vouched(request, waiting))
             identity = self._reading.read(self._issuer, vouched.subject, vouched.claims)
             who = _actor(identity)
-            return await self._open(waiting, identity, vouched), waiting.to
+            return self._open(waiting, identity, vouched), waiting.to
         except SignOnError as error:
             self._refused(request, error, who)
             raise
@@ -167,32 +214,25 @@ class SingleSignOn:
             raise SignOnError("untrusted", "the answer holds no code")
         return await self._provider.vouch(waiting.attempt, code)
 
-    async def _open(
+    def _open(
         self, waiting: WaitingSignOn, identity: ProvenIdentity, vouched: Vouched
     ) -> str:
         """Begin the session of somebody who was vouched for."""
-        if waiting.attempt.anew:
-            _check_renewed(waiting, identity)
         if identity.role is None:
             raise SignOnError("no_role", "none of the claim's values gives one")
         user = Account(
             identity.person, identity.name, identity.role, provider=self._issuer
         )
-        try:
-            account = await self._people.vouched(user)
-        except HopError as error:
-            raise SignOnError("unreachable", str(error)) from error
+        account = self._people.vouched(user)
         sessions, now = self._authenticator.sessions, self._clock().wall
         if waiting.before is not None:
             sessions.revoke(waiting.before)
-        proven = identity.auth_time
         token = sessions.open(
             account.name,
             account.role,
             account.account_id,
             "sso",
             until=now + self._lasts_s,
-            proven=None if proven is None else min(proven, now),
         )
         self._keep_hint(sessions.find(token), vouched.id_token)
         return token
@@ -253,15 +293,6 @@ class SingleSignOn:
             "detail": error.detail,
         }
         self._trail.note(who, "sign_in_refused", details=details, at=now)
-
-
-def _check_renewed(waiting: WaitingSignOn, identity: ProvenIdentity) -> None:
-    """Raise SignOnError unless the same person has just proved who they are."""
-    if waiting.before is None or waiting.before.person != identity.person:
-        raise SignOnError("not_renewed", "somebody else signed in")
-    at = identity.auth_time
-    if at is None or at < waiting.began.wall - _LEEWAY_S:
-        raise SignOnError("not_renewed", "the provider does not say that they did")
 
 
 def _actor(identity: ProvenIdentity) -> Actor:

@@ -1,14 +1,12 @@
-"""People with accounts before a real iVeg: an admin's pages, and who is shut out."""
+"""People before a real iVeg: the link, an admin's pages, and who is shut out."""
 
 from collections.abc import Callable
+from contextlib import closing
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Browser, Page, expect
 
-from iveg.adapters import clock
-from iveg.adapters.admission import Admission
-from iveg.adapters.history.accounts import AccountStore
-from iveg.domain.audit import CONSOLE
+from tests.consoles import console
 from tests.e2e.conftest import OpenPage
 from tests.e2e.reading import COVERED_STOPS, OVERFLOW, evaluate, serious, visit
 from tests.patience import AGAIN
@@ -23,14 +21,10 @@ ROUTES = ("/account", "/users", "/tokens", "/sessions")
 def chief(open_page: OpenPage, stack: Site) -> Page:
     """An admin's page."""
     page = open_page(route="/about", alone=True)
-    store = AccountStore(stack.settings["IVEG_DATABASE_URL"])
-    invitation, _ = store.together(
-        lambda rows: Admission(rows, CONSOLE, clock.wall()).add("Chief", "admin")
-    )
-    store.close()
+    invitation, _ = console(stack.directory).add("Chief", "admin")
 
     def is_in() -> bool:
-        # The server reads accounts twice a second, and five wrong tries cost a minute.
+        # The server takes accounts up within a second; five wrong tries cost a minute.
         page.wait_for_timeout(700)
         return _begin(page, stack, invitation) == 204
 
@@ -69,6 +63,21 @@ def test_what_an_admin_sees_is_accessible_and_who_is_ended_while_watching_is_out
         f"{stack.url}/api/v1/robots/AGI/stop", headers=_own(stack), max_retries=AGAIN
     )
     assert stopped.status == 401
+
+
+def test_the_link_signs_in_and_its_token_is_sent_in_no_address(
+    stack: Site, browser: Browser
+) -> None:
+    with closing(browser.new_context(base_url=stack.url)) as context:
+        page = context.new_page()
+        asked: list[str] = []
+        page.on("request", lambda request: asked.append(request.url))
+
+        page.goto(stack.printed_link)
+        page.wait_for_url(f"{stack.url}/")
+
+        token = stack.settings["IVEG_SIGN_IN_TOKEN"]
+        assert not [url for url in asked if token in url.partition("#")[0]]
 
 
 def _begin(page: Page, stack: Site, invitation: str) -> int:

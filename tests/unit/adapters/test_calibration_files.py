@@ -1,8 +1,6 @@
 import pytest
 
 from iveg.adapters.calibration_files import (
-    PAPER,
-    load_calibrations,
     read_calibrations,
 )
 from iveg.domain.errors import DataFileError
@@ -32,26 +30,11 @@ def test_a_row_is_of_its_detector_and_right_as_often_as_was_counted() -> None:
     assert rows.row_of("ssd", "person") == rows.row_of(None, "person") == PLAIN
 
 
-def test_a_row_without_a_detector_is_of_all_that_have_none() -> None:
-    other = ONE.replace('detector = "yolox"\n', "").replace("right = 36", "right = 6")
-    rows = read_calibrations(ONE + other, "rows.toml")
-
-    assert rows.row_of("ssd", "person") == rows.row_of(None, "person")
-    assert (
-        rows.row_of("ssd", "person").offset < 0 < rows.row_of("yolox", "person").offset
-    )
-
-
 def test_nothing_counted_is_certain() -> None:
     counts = ONE.replace("= 36", "= 9000000").replace("= 6", "= 0")
 
     row = read_calibrations(counts, "rows.toml").row_of("yolox", "person")
     assert row.offset == FARTHEST
-
-
-def test_confidences_count_as_told_where_nobody_counted() -> None:
-    assert load_calibrations("").row_of("field", "person") is PLAIN
-    assert load_calibrations(PAPER).row_of("field", "person").offset > 0.0
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,6 @@ from iveg.domain.observations import (
     CommandAnswer,
     DetectionFrame,
     LaserScan,
-    Observation,
     Odometry,
     Received,
     SafetyReport,
@@ -30,7 +29,6 @@ class Bench:
     def __init__(self, scope: Scope = "all") -> None:
         self.offered: list[Received] = []
         self.rejected: list[tuple[str, str, str]] = []
-        self.passed_over: list[tuple[str, type[Observation], int]] = []
         self.clock = FakeClock()
         self.reader = DirectReader(
             "iveg",
@@ -39,36 +37,7 @@ class Bench:
             self.offered.append,
             lambda *problem: self.rejected.append(problem),
             scope,
-            passed_over=lambda *told: self.passed_over.append(told),
         )
-
-
-SAFETY = {
-    "/iveg/AGI/attrs": 1,
-    "/iveg/AGI_safety/attrs": 1,
-    "/AGI/iveg/safety": 1,
-    "/iveg/AGI_yolox_bounding_boxes/attrs": 1,
-    "/AGI/iveg/yolox_bounding_boxes": 1,
-    "/iveg/AGI/cmdexe": 1,
-}
-TELEMETRY = {
-    "/iveg/AGI_odom/attrs": 0,
-    "/AGI/iveg/odom": 0,
-    "/iveg/AGI_lidar2D/attrs": 0,
-    "/AGI/iveg/lidar2D": 0,
-    "/iveg/AGI_nav/attrs": 0,
-    "/iveg/AGI_battery/attrs": 0,
-}
-
-
-@pytest.mark.parametrize(
-    ("scope", "topics"),
-    [("all", SAFETY | TELEMETRY), ("safety", SAFETY), ("off", {})],
-)
-def test_it_listens_to_what_its_scope_says(
-    scope: Scope, topics: dict[str, int]
-) -> None:
-    assert Bench(scope).reader.subscriptions() == topics
 
 
 def test_looks_reports_and_answers_come_in_on_the_direct_transport() -> None:
@@ -97,16 +66,7 @@ def test_poses_come_straight_from_either_topic(topic: str) -> None:
     assert (type(read.observation), read.transport) == (Odometry, "direct")
 
 
-def test_what_was_overtaken_unread_is_told_by_robot_and_kind() -> None:
-    bench = Bench()
-
-    bench.reader.pass_over("/AGI/iveg/odom", 2)
-    bench.reader.pass_over("/iveg/AGI/cmdexe", 2)
-
-    assert bench.passed_over == [("AGI", Odometry, 2)]
-
-
-def test_of_scans_at_30_hz_every_second_is_read_and_the_others_are_told() -> None:
+def test_of_scans_at_30_hz_every_second_is_read() -> None:
     bench = Bench()
 
     for turn in range(30):
@@ -116,7 +76,6 @@ def test_of_scans_at_30_hz_every_second_is_read_and_the_others_are_told() -> Non
 
     read = [kind_of(one.observation) for one in bench.offered]
     assert (read.count(LaserScan), read.count(Odometry)) == (15, 30)
-    assert bench.passed_over == 15 * [("AGI", LaserScan, 1)]
 
 
 @pytest.mark.parametrize(
@@ -150,26 +109,6 @@ def test_f30_an_apostrophe_that_orion_refuses_costs_nobody_their_ring() -> None:
     assert len(bench.offered) == 1
 
 
-@pytest.mark.parametrize("topic", ["/iveg/AGX/attrs", "/other/AGI/attrs", "", "/"])
-def test_topics_of_nobody_are_left_alone(topic: str) -> None:
-    bench = Bench()
-
-    bench.reader.read(topic, b"whatever")
-
-    assert (bench.offered, bench.rejected) == ([], [])
-
-
-@pytest.mark.parametrize("topic", ["/iveg/AGI_safety/attrs", "/iveg/AGI/cmdexe"])
-def test_what_cannot_be_read_is_counted_with_its_source(topic: str) -> None:
-    bench = Bench()
-
-    bench.reader.read(topic, b"null")
-
-    ((source, reason, _),) = bench.rejected
-    assert source.startswith("AGI")
-    assert reason == "not_an_object"
-
-
 def test_f27_a_report_with_a_number_that_is_none_is_counted() -> None:
     bench = Bench()
     value = {"speed_factor": 1, "reason": "clear", "v": "here"}
@@ -179,3 +118,16 @@ def test_f27_a_report_with_a_number_that_is_none_is_counted() -> None:
 
     assert bench.offered == []
     assert len(bench.rejected) == 1
+
+
+def test_what_the_broker_had_retained_is_no_news_and_counted_by_name() -> None:
+    bench = Bench()
+
+    for topic in ("/iveg/AGI_odom/attrs", "/iveg/AGI/cmdexe", "/other/topic"):
+        bench.reader.refuse_stored(topic, codec.write_odometry(odometry()))
+
+    assert bench.offered == []
+    assert bench.rejected == [
+        ("AGI", "retained", "/iveg/AGI_odom/attrs"),
+        ("AGI", "retained", "/iveg/AGI/cmdexe"),
+    ]

@@ -1,13 +1,8 @@
-import tomllib
-from pathlib import Path
-
 import pytest
 
 from iveg.adapters.equipment_files import DEMO, load_equipment, read_equipment
-from iveg.domain.equipment import UNITS
 from iveg.domain.errors import DataFileError
-from iveg.lab.emulator.equipment import EQUIPMENT
-from tests.processes import ROOT
+from iveg.lab.emulator.fleet import EQUIPMENT
 
 ONE = """\
 [[tiles]]
@@ -37,10 +32,6 @@ def test_what_the_file_says_is_the_tile() -> None:
     assert one.name == {"es": "Panel: salida", "en": "Panel: outlet"}
     assert one.limits == {"low": 5.0, "high": 60.0}
     assert (one.place, one.silent_after_s, one.device) == ((1.0, 2.0), 300.0, "panel-1")
-
-
-def test_no_file_is_no_equipment() -> None:
-    assert load_equipment("") == ()
 
 
 @pytest.mark.parametrize(
@@ -95,22 +86,7 @@ def test_tiles_that_contradict_each_other_are_refused(text: str, said: str) -> N
     assert said in complaint(text)
 
 
-def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
-    with pytest.raises(DataFileError, match=r"nowhere\.toml"):
-        load_equipment(str(tmp_path / "nowhere.toml"))
-
-
 def test_the_emulator_measures_each_tile_of_the_demo() -> None:
     for tile in load_equipment(DEMO):
         value = EQUIPMENT[tile.device](1_795_000_000.0)[tile.attribute]
         assert tile.limits.get("low", value) <= value <= tile.limits.get("high", value)
-
-
-def test_the_page_has_every_unit_and_an_example_that_can_be_used() -> None:
-    page = (ROOT / "docs/equipment.md").read_text()
-    example = page.partition("```toml\n")[2].partition("```")[0]
-
-    assert [one for one in UNITS if f"`{one}`" not in page] == []
-    assert len(read_equipment(example, "example")) == 1
-    keys = {key for tile in tomllib.loads(example)["tiles"] for key in tile}
-    assert [key for key in keys if f"`{key}`" not in page] == []

@@ -8,7 +8,7 @@ from contextlib import asynccontextmanager
 import pytest
 
 from iveg.adapters.bounded_json import BoundedJson
-from iveg.adapters.fiware_token import HOP, FiwareToken, TokenGrant
+from iveg.adapters.fiware_http import HOP, FiwareToken, TokenGrant
 from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.orion import OrionClient
 from iveg.adapters.transports import OrionTransport
@@ -70,14 +70,6 @@ async def test_orion_behind_a_proxy_is_read_and_written_with_one_token(
     assert place.pep.forms == [{"grant_type": "client_credentials"}]
 
 
-async def test_the_agent_behind_a_proxy_gets_the_same_header() -> None:
-    async with embedded_fiware() as fiware, place_of(fiware.iota_url) as place:
-        version = await place.agent.version()
-
-    assert version != "unknown"
-    assert place.pep.seen == [("token-1", 200)]
-
-
 async def test_keyrock_gives_a_user_s_token_by_the_password_grant(place: Place) -> None:
     place.use(TokenGrant(place.grant.url, CLIENT, SECRET, USER, PASSWORD, "permanent"))
 
@@ -117,26 +109,6 @@ async def test_a_token_is_renewed_beside_at_four_fifths_of_its_life(
     assert len(place.pep.forms) == 2
 
 
-@pytest.mark.parametrize("says", ["3600", "²", "soon", True, {}, -1, None])
-async def test_whatever_is_said_of_its_life_a_token_is_used(
-    place: Place, says: object
-) -> None:
-    place.pep.says = says
-
-    await place.orion.version()
-
-    assert place.pep.seen == [("token-1", 200)]
-
-
-async def test_a_token_that_is_over_is_never_sent(place: Place) -> None:
-    place.pep.life_s = 2.0
-    await place.orion.version()
-    place.clock.now += 60.0
-    await place.orion.version()
-
-    assert place.pep.seen == [("token-1", 200), ("token-2", 200)]
-
-
 async def test_a_token_that_was_revoked_is_replaced_once_for_all_who_ask(
     place: Place,
 ) -> None:
@@ -164,18 +136,6 @@ async def test_a_proxy_that_refuses_every_token_is_told_as_such_and_not_flooded(
         "401 to GET /version: Invalid token: access token is invalid"
     }
     assert len(place.pep.forms) == 2
-
-
-async def test_who_has_no_role_at_the_proxy_is_told_by_its_words(place: Place) -> None:
-    place.pep.vice = "no_role"
-
-    with pytest.raises(HopError) as refused:
-        await place.orion.version()
-
-    assert refused.value.hop == "orion"
-    assert refused.value.detail == (
-        "403 to GET /version: User access-token not authorized"
-    )
 
 
 @pytest.mark.parametrize(
@@ -232,20 +192,6 @@ async def test_a_stop_over_fiware_waits_for_no_token_longer_than_for_orion(
 
     assert time.monotonic() - begun < 3.0
     assert place.pep.seen == []
-
-
-async def test_who_gives_up_takes_the_token_from_nobody_else(place: Place) -> None:
-    place.pep.vice = "hangs"
-    first = asyncio.create_task(place.orion.version())
-    second = asyncio.create_task(place.agent.version())
-    while not place.pep.forms:  # noqa: ASYNC110
-        await asyncio.sleep(0)
-    first.cancel()
-    place.pep.is_released.set()
-
-    with pytest.raises(HopError, match="400"):  # Orion has no such path: it was asked
-        await second
-    assert len(place.pep.forms) == 1
 
 
 def test_what_is_secret_stands_in_no_traceback() -> None:

@@ -1,4 +1,3 @@
-import math
 from pathlib import Path
 
 import pytest
@@ -6,7 +5,6 @@ import pytest
 from iveg.adapters.fleet_files import built_in, load_fleet, read_fleet
 from iveg.domain.errors import DataFileError
 from iveg.domain.fleet import CAUTIOUS, RobotDescription
-from iveg.domain.geometry import Pose2D
 from tests.processes import ROOT
 
 ONE = """\
@@ -48,14 +46,24 @@ def test_what_the_file_says_of_a_robot_is_what_is_known_of_it() -> None:
     assert one.profile.unlabelled_frame is None
 
 
-def test_a_robot_without_body_and_drive_is_one_that_nobody_described() -> None:
-    one = read_fleet(ONE, "fleet.toml").of_robot("B2")
+def test_frames_and_classes_of_a_robot_are_what_its_messages_name() -> None:
+    said = (
+        'pose_frame = "odom"\nclasses = """\nperson\ntractor\n"""\ncamera = { frame = '
+    )
+    text = ONE.replace("camera = { ", said + '"zed_link", ')
 
-    assert (one.kind, one.is_described) == ("live", False)
-    assert one.profile.camera == Pose2D(0.2, 0.0, 0.0)
-    assert one.profile.unlabelled_frame == "camera_link"
-    assert one.profile.camera_fov == pytest.approx(math.pi / 2)
-    assert one.profile.length == CAUTIOUS.length
+    one = read_fleet(text, "").of_robot("B2")
+
+    assert (one.pose_frame, one.classes) == ("odom", ("person", "tractor"))
+    assert one.profile.camera_frame == "zed_link"
+
+
+def test_a_class_list_of_unsure_form_is_refused_by_its_line() -> None:
+    text = ONE.replace("camera =", 'classes = """\n1: person\n"""\ncamera =')
+
+    refused = complaint(text)
+
+    assert refused.startswith("fleet.toml:18:1, robots[1].classes: line 1 has")
 
 
 def test_margins_never_count_on_better_brakes_than_the_drive_has() -> None:
@@ -84,16 +92,6 @@ def test_what_is_wrong_is_named_by_file_line_and_column(
     old: str, new: str, place: str
 ) -> None:
     assert complaint(ONE.replace(old, new)).startswith(place)
-
-
-def test_a_file_that_is_cut_off_or_empty_is_refused_at_its_place() -> None:
-    assert complaint("").startswith("fleet.toml:1:1, robots:")
-    assert complaint('[[robots]]\nid = "B1').startswith("fleet.toml:2:")
-
-
-def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
-    with pytest.raises(DataFileError, match="cannot be read"):
-        load_fleet(str(tmp_path / "fleet.toml"))
 
 
 def test_without_a_word_the_fleet_is_everybody_in_the_file(tmp_path: Path) -> None:

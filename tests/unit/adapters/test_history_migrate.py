@@ -6,13 +6,11 @@ from alembic.autogenerate import compare_metadata
 from alembic.runtime.migration import MigrationContext
 from sqlalchemy import Connection, text
 
-from iveg.adapters.history.day_partitions import PARTITIONED
-from iveg.adapters.history.engine import describe, sqlite_url, writing_engine
-from iveg.adapters.history.migrate import upgrade
-from iveg.adapters.history.partial_indexes import metadata
-from iveg.domain.errors import DataFileError, HopError, SettingsError
+from iveg.adapters.history.engine import sqlite_url, upgrade, writing_engine
+from iveg.adapters.history.upkeep import metadata
+from iveg.domain.errors import DataFileError, HopError
 
-PARTS = tuple(f"{name}_" for name in PARTITIONED)
+PARTS = "odometry_", "detections_"
 
 
 def execute(empty_url: str, statement: str) -> None:
@@ -37,16 +35,6 @@ def test_migrations_make_the_tables_that_the_code_describes(empty_url: str) -> N
     engine = writing_engine(empty_url)
     with engine.connect() as connection:
         assert differences(connection) == []
-    engine.dispose()
-
-
-def test_a_missing_column_would_be_noticed(empty_url: str) -> None:
-    upgrade(empty_url)
-    execute(empty_url, "ALTER TABLE log DROP COLUMN decision_id")
-
-    engine = writing_engine(empty_url)
-    with engine.connect() as connection:
-        assert len(differences(connection)) == 1
     engine.dispose()
 
 
@@ -119,20 +107,6 @@ def test_damage_inside_a_file_is_found(tmp_path: Path, sqlite_url: str) -> None:
     assert len(list(tmp_path.glob("history.db.corrupt-*"))) == 1
 
 
-def test_an_empty_file_becomes_a_history(tmp_path: Path, sqlite_url: str) -> None:
-    (tmp_path / "history.db").touch()
-
-    upgrade(sqlite_url)
-
-    assert list(tmp_path.glob("*.corrupt-*")) == []
-
-
-def test_a_missing_directory_is_made(tmp_path: Path) -> None:
-    upgrade(f"sqlite:///{tmp_path / 'a' / 'b' / 'history.db'}")
-
-    assert (tmp_path / "a" / "b" / "history.db").exists()
-
-
 def test_a_locked_file_is_a_hop_that_does_not_answer_and_not_damage(
     tmp_path: Path, sqlite_url: str
 ) -> None:
@@ -145,20 +119,6 @@ def test_a_locked_file_is_a_hop_that_does_not_answer_and_not_damage(
 
     other.close()
     assert list(tmp_path.glob("*.corrupt-*")) == []
-
-
-def test_a_server_that_is_not_there_is_a_hop_that_does_not_answer() -> None:
-    with pytest.raises(HopError, match="database"):
-        upgrade("postgresql://somebody:secret@127.0.0.1:1/history")
-
-
-def test_sqlite_in_memory_is_refused_because_it_forgets() -> None:
-    with pytest.raises(SettingsError, match="a file"):
-        upgrade("sqlite://")
-
-
-def test_a_password_is_not_shown() -> None:
-    assert "secret" not in describe("postgresql://somebody:secret@server/history")
 
 
 @pytest.mark.parametrize("before", [(), ("iveg.sqlite",)], ids=["new", "old"])

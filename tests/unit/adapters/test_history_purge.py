@@ -2,38 +2,22 @@
 
 import asyncio
 import contextlib
-import sqlite3
-from collections.abc import Callable, Iterator, Sequence
-from itertools import count
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import pytest
-from alembic import command
 from sqlalchemy import Engine, text
 
-from iveg.adapters.history import listings
-from iveg.adapters.history.ages import recorded_days
-from iveg.adapters.history.engine import writing_engine
+from iveg.adapters.history import lists, upkeep
+from iveg.adapters.history.engine import upgrade, writing_engine
 from iveg.adapters.history.lists import Filter
-from iveg.adapters.history.migrate import alembic_config, upgrade
-from iveg.adapters.history.places import people_seen
-from iveg.adapters.history.purge import (
-    BOUND_S,
-    CHUNK,
-    PurgeBatch,
-    count_due,
-    give_back,
-    purge_batch,
-    room_inside,
-)
 from iveg.adapters.history.queries import Queries
-from iveg.adapters.history.recorder import Recorder
-from iveg.adapters.history.series import speed_series
-from iveg.adapters.history.store import Store
-from iveg.adapters.history.table_mappings import TABLE_MAPPINGS
-from iveg.adapters.history.upkeep import RecordedHistory
-from iveg.domain.errors import HopError
-from iveg.domain.records import LatencyRecord, ReadingRecord, Record
+from iveg.adapters.history.recorder import Recorder, Store
+from iveg.adapters.history.series import people_seen, speed_series
+from iveg.adapters.history.tables import TABLE_MAPPINGS
+from iveg.adapters.history.upkeep import RecordedHistory, purge_piece, recorded_days
+from iveg.adapters.journal import FileJournal
+from iveg.domain.records import ReadingRecord, Record
 from iveg.domain.retention import DAY_S, PURGE_STEPS, PurgeStep
 from iveg.pipeline.record import Waiting
 from tests.fakes.records import (
@@ -103,25 +87,9 @@ def queries(database_url: str) -> Iterator[Queries]:
     queries.close()
 
 
-def still() -> float:
-    """A stopwatch that stands: no batch reaches its bound."""
-    return 0.0
-
-
-def ticking(step_s: float) -> Callable[[], float]:
-    """A stopwatch that moves with each look."""
-    ticks = count()
-    return lambda: next(ticks) * step_s
-
-
-def run(
-    engine: Engine,
-    step: PurgeStep,
-    before: float,
-    stopwatch: Callable[[], float] = still,
-) -> PurgeBatch:
+def run(engine: Engine, step: PurgeStep, before: float) -> int:
     with engine.begin() as connection:
-        return purge_batch(connection, step, before, stopwatch)
+        return purge_piece(connection, step, before)
 
 
 def rows(engine: Engine, table: str, what: str = "count(*)") -> object:
@@ -131,11 +99,8 @@ def rows(engine: Engine, table: str, what: str = "count(*)") -> object:
 
 def test_every_table_is_kept_for_a_time_that_is_told() -> None:
     kept = {one.table.name for one in TABLE_MAPPINGS.values()}
-    own = {TABLE_MAPPINGS[LatencyRecord].table.name}
 
-    assert {
-        step.table for step in PURGE_STEPS if step.kind != "positions"
-    } == kept - own
+    assert {step.table for step in PURGE_STEPS if step.kind != "positions"} == kept
 
 
 def test_each_step_takes_what_is_older_and_nothing_of_that_moment_or_younger(
@@ -147,13 +112,11 @@ def test_each_step_takes_what_is_older_and_nothing_of_that_moment_or_younger(
         [one for n, at in enumerate(ages) for one in everything(at, f"M{n}")],
     )
 
-    # The audit goes by whole days (test_history_audit).
+    # Of the audit: test_history_audit.
     steps = [one for one in PURGE_STEPS if one.table != "audit"]
     for step in steps:
-        with engine.begin() as connection:
-            due = count_due(connection, step, OLD)
-        assert (due, run(engine, step, OLD)) == (1, PurgeBatch(1, is_last=True)), step
-        assert run(engine, step, OLD) == PurgeBatch(0, is_last=True)
+        assert run(engine, step, OLD) == 1, step
+        assert run(engine, step, OLD) == 0
 
     assert {step.table: rows(engine, step.table) for step in steps} == (
         dict.fromkeys((step.table for step in steps), 2)
@@ -165,16 +128,16 @@ async def test_places_go_and_all_else_of_the_rows_stays(
     engine: Engine, database_url: str, queries: Queries
 ) -> None:
     write(database_url, everything(OLD - 1.0, "M"))
-    [decided] = (await queries.page(listings.DECISIONS, Filter())).items
-    [seen] = (await queries.page(listings.DETECTIONS, Filter())).items
-    [told] = (await queries.page(listings.LOG, Filter())).items
+    [decided] = (await queries.page(lists.DECISIONS, Filter())).items
+    [seen] = (await queries.page(lists.DETECTIONS, Filter())).items
+    [told] = (await queries.page(lists.LOG, Filter())).items
 
     for step in PURGE_STEPS[:3]:
         run(engine, step, OLD)
 
-    [decision] = (await queries.page(listings.DECISIONS, Filter())).items
-    [detection] = (await queries.page(listings.DETECTIONS, Filter())).items
-    [line] = (await queries.page(listings.LOG, Filter())).items
+    [decision] = (await queries.page(lists.DECISIONS, Filter())).items
+    [detection] = (await queries.page(lists.DETECTIONS, Filter())).items
+    [line] = (await queries.page(lists.LOG, Filter())).items
     assert (decision.x, decision.y, decision.z) == (None, None, None)
     assert decision.rule_parameters == {"radius_m": 2.0}
     assert (decision.distance_m, decision.links) == (decided.distance_m, decided.links)
@@ -188,7 +151,7 @@ async def test_places_go_and_all_else_of_the_rows_stays(
     assert await queries.ask(people_seen, 0.0, NOON) == ()
 
 
-async def test_what_goes_on_and_drills_are_kept_whatever_their_age(
+async def test_what_goes_on_is_kept_whatever_their_age(
     engine: Engine, database_url: str
 ) -> None:
     write(
@@ -197,15 +160,12 @@ async def test_what_goes_on_and_drills_are_kept_whatever_their_age(
             decision_record(started_at=OLD, ended_at=None),
             alert_record(raised_at=OLD, last_raised_at=OLD, cleared_at=None),
             command_record(command_id="held", requested_at=OLD, state="STANDING"),
-            command_record(
-                command_id="drill", requested_at=OLD, state="RUNNING", drill=True
-            ),
         ],
     )
 
     for step in PURGE_STEPS:
         if step.kind == "decisions":
-            assert run(engine, step, NOON).rows == 0
+            assert run(engine, step, NOON) == 0
 
 
 async def test_a_decision_that_is_written_again_loses_its_place_again(
@@ -213,10 +173,10 @@ async def test_a_decision_that_is_written_again_loses_its_place_again(
 ) -> None:
     step = PurgeStep("positions", "decisions")
     write(database_url, [decision_record(started_at=OLD)])
-    assert run(engine, step, NOON).rows == 1
+    assert run(engine, step, NOON) == 1
     write(database_url, [decision_record(started_at=OLD, ended_at=NOON)])
 
-    assert run(engine, step, NOON).rows == 1
+    assert run(engine, step, NOON) == 1
     assert rows(engine, "decisions", "x") is None
 
 
@@ -231,116 +191,55 @@ def test_a_damaged_row_does_not_hold_up_those_behind_it(
         spoil = text("UPDATE log SET slots = :slots WHERE id = 1")
         connection.execute(spoil, {"slots": damaged})
 
-    done = run(engine, PurgeStep("positions", "log"), NOON)
+    run(engine, PurgeStep("positions", "log"), NOON)
 
-    assert done.is_last
+    assert run(engine, PurgeStep("positions", "log"), NOON) == 0
     assert rows(engine, "log", "min(instr(slots, '\"x\":'))") == 0
     assert rows(engine, "log", "max(instr(slots, '\"x\":'))") == 0
     engine.dispose()
 
 
-@pytest.mark.parametrize(
-    ("step_s", "statements"), [(BOUND_S, 1), (BOUND_S / 2, 2), (BOUND_S / 4, 4)]
-)
-def test_a_batch_ends_at_its_bound_and_says_that_more_is_left(
-    engine: Engine, database_url: str, step_s: float, statements: int
+def test_a_piece_takes_the_oldest_and_whole_moments(
+    engine: Engine, database_url: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    write(database_url, [odometry_record(at=OLD + n) for n in range(10 * CHUNK)])
-    step = PurgeStep("telemetry", "odometry")
+    monkeypatch.setattr(upkeep, "PIECE", 3)
+    times = (0.0, 1.0, 2.0, 2.0, 3.0, 4.0)
+    write(database_url, [odometry_record(at=OLD + after) for after in times])
 
-    batch = run(engine, step, NOON, ticking(step_s))
+    took = [run(engine, PurgeStep("telemetry", "odometry"), NOON) for _ in range(3)]
 
-    assert batch == PurgeBatch(statements * CHUNK, is_last=False)
-    assert rows(engine, "odometry", "min(at)") == OLD + statements * CHUNK
+    assert took == [4, 2, 0]
 
 
-async def test_a_purge_beside_recording_loses_no_row_and_keeps_its_batches_small(
-    database_url: str, tmp_path: Path, queries: Queries
+async def test_a_purge_beside_recording_loses_no_row(
+    database_url: str,
+    tmp_path: Path,
+    queries: Queries,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    write(database_url, [odometry_record(at=OLD + n / 10) for n in range(3000)])
-    recorder = Recorder(database_url, tmp_path / "journal")
+    monkeypatch.setattr(upkeep, "PIECE", 50)
+    write(database_url, [odometry_record(at=OLD + n / 10) for n in range(1000)])
+    recorder = Recorder(database_url, FileJournal(tmp_path / "journal"))
     writing = asyncio.create_task(recorder.run())
-    history = RecordedHistory(recorder, queries, tmp_path, ticking(2 * BOUND_S))
-    batches, recorded, beside = 0, 0, 0
+    history = RecordedHistory(recorder, queries, tmp_path)
+    taken, recorded = 0, 0
 
     while True:
         for _ in range(20):
             recorder.enqueue(odometry_record(at=NOON + recorded))
             recorded += 1
-        batch = await history.purge(PurgeStep("telemetry", "odometry"), NOON)
-        assert batch.rows <= CHUNK
-        batches += 1
-        if batch.is_last:
+        rows = await history.purge(PurgeStep("telemetry", "odometry"), NOON)
+        taken += rows
+        if not rows:
             break
-        beside = recorder.counters["history_written"]
 
     writing.cancel()
     with contextlib.suppress(asyncio.CancelledError):
         await writing
     await recorder.close()
     (found,) = await queries.ask(speed_series, 0.0, NOON * 2)
-    assert batches > 3000 / CHUNK
-    assert beside > 0
-    assert recorder.counters["history_written"] == recorded
+    assert (taken, recorder.counters["history_written"]) == (1000, recorded)
     assert [*found.at] == [NOON + n for n in range(recorded)]
-
-
-async def test_rows_that_wait_go_before_a_purge(tmp_path: Path) -> None:
-    recorder = Recorder(f"sqlite:///{tmp_path / 'history.db'}", tmp_path / "journal")
-    found = []
-
-    for n in range(500):
-        found.append(recorder.is_busy)
-        recorder.enqueue(odometry_record(at=NOON + n))
-    full = recorder.is_busy
-    await recorder.close()
-
-    assert (any(found), full, recorder.is_busy) == (False, True, False)
-
-
-async def test_a_database_that_is_away_is_a_hop_and_no_error_of_ours(
-    tmp_path: Path,
-) -> None:
-    url = f"sqlite:///{tmp_path / 'history.db'}?timeout=0.05"
-    recorder, queries = Recorder(url, tmp_path / "journal"), Queries(url)
-    upgrade(url)
-    other = sqlite3.connect(tmp_path / "history.db", isolation_level=None)
-    other.execute("BEGIN EXCLUSIVE")
-    history = RecordedHistory(recorder, queries, tmp_path)
-
-    with pytest.raises(HopError, match="locked"):
-        await history.purge(PURGE_STEPS[0], NOON)
-
-    other.close()
-    assert (await history.purge(PURGE_STEPS[0], NOON)).is_last
-    assert (await history.disk_space()).total > 0
-    await recorder.close()
-    queries.close()
-
-
-def test_an_sqlite_file_gives_its_free_pages_back(tmp_path: Path) -> None:
-    file = tmp_path / "history.db"
-    url = f"sqlite:///{file}"
-    write(url, [odometry_record(at=OLD + n) for n in range(20_000)])
-    engine = writing_engine(url)
-    while not run(engine, PurgeStep("telemetry", "odometry"), NOON).is_last:
-        pass
-    with engine.begin() as connection:
-        inside = room_inside(connection)
-    assert inside > 10**6
-
-    with engine.begin() as connection:
-        batch = give_back(connection, ticking(BOUND_S / 4))
-        left = room_inside(connection)
-        again = give_back(connection, still)
-
-    assert batch == PurgeBatch(3, is_last=False)
-    assert left == inside - 3 * 4096
-    assert again.is_last
-    with engine.begin() as connection:
-        assert room_inside(connection) == 0
-    engine.dispose()
-    assert file.stat().st_size < 10**6
 
 
 def test_days_of_the_log_are_found_newest_first(
@@ -351,19 +250,3 @@ def test_days_of_the_log_are_found_newest_first(
 
     assert asyncio.run(queries.ask(recorded_days, 3)) == (4000, 7, 1)
     assert asyncio.run(queries.ask(recorded_days, 99)) == (4000, 7, 1, 0)
-
-
-def test_the_way_back_to_the_version_before_and_forth_again_keeps_what_has_a_place(
-    engine: Engine, database_url: str
-) -> None:
-    write(database_url, everything(OLD, "M1") + everything(NOON, "M2"))
-    run(engine, PurgeStep("positions", "detections"), NOON)
-
-    with engine.begin() as connection:
-        command.downgrade(alembic_config(connection), "name_transport_and_limit")
-    before = rows(engine, "detections"), rows(engine, "detections", "max(at)")
-    upgrade(database_url)
-
-    assert before == (1, NOON)
-    write(database_url, [detection_record(at=NOON + 1.0)])
-    assert rows(engine, "detections", "max(row_id)") == 3

@@ -12,10 +12,11 @@ import pytest
 from sqlalchemy import text
 
 from iveg.adapters import clock
-from iveg.adapters.history.engine import reading_engine
-from iveg.adapters.history.migrate import upgrade
-from iveg.adapters.history.recorder import Recorder, journal_file
+from iveg.adapters.history.engine import reading_engine, upgrade
+from iveg.adapters.history.recorder import Recorder, spilled_file
+from iveg.adapters.journal import FileJournal
 from iveg.domain.observations import Instant
+from iveg.domain.records import Record
 from tests.fakes.disk import files_no_longer_than
 from tests.fakes.postgresql import PostgreSQL
 from tests.fakes.records import (
@@ -26,7 +27,6 @@ from tests.fakes.records import (
     command_record,
     decision_record,
     detection_record,
-    latency_record,
     log_record,
     odometry_record,
 )
@@ -38,11 +38,10 @@ EVERYTHING = (
     command_record(),
     decision_record(),
     detection_record(),
-    latency_record(),
     log_record(),
     odometry_record(),
 )
-KEPT = 6
+ORDERS = 2
 _PATIENCE_S = 30.0
 
 
@@ -50,7 +49,8 @@ _PATIENCE_S = 30.0
 async def recording(
     database_url: str, directory: Path, capacity: int = 20_000
 ) -> AsyncIterator[Recorder]:
-    journal = journal_file(database_url, directory)
+    journal = FileJournal(directory / "commands.jsonl")
+    journal.read()
     recorder = Recorder(database_url, journal, capacity=capacity)
     task = asyncio.create_task(recorder.run())
     try:
@@ -60,6 +60,7 @@ async def recording(
         with contextlib.suppress(asyncio.CancelledError):
             await task
         await recorder.close()
+        journal.close()
 
 
 async def until(condition: Callable[[], bool]) -> None:
@@ -122,91 +123,30 @@ async def test_everything_that_is_offered_is_stored(
     assert set(counts(database_url).values()) == {1}
 
 
-async def test_closing_stores_what_still_waits(
-    database_url: str, tmp_path: Path
-) -> None:
-    recorder = Recorder(database_url, tmp_path / "journal")
-    for number in range(1200):
-        recorder.enqueue(odometry_record(at=NOON + number))
-
-    await recorder.close()
-
-    assert scalar(database_url, "SELECT count(*) FROM odometry") == 1200
-    assert recorder.counters["history_dropped"] == 0
-
-
-async def test_a_command_is_one_row_that_changes_and_a_trail_that_grows(
-    database_url: str, tmp_path: Path
-) -> None:
-    async with recording(database_url, tmp_path) as recorder:
-        for number, step in enumerate(("REQUESTED", "SENT", "STANDING")):
-            recorder.enqueue(command_record(state=step))
-            recorder.enqueue(command_event_record(state=step, at=NOON + number))
-            await until(lambda: recorder.counters["history_waiting"] == 0)
-
-    assert scalar(database_url, "SELECT count(*) FROM commands") == 1
-    assert scalar(database_url, "SELECT state FROM commands") == "STANDING"
-    assert scalar(database_url, "SELECT count(*) FROM command_events") == 3
-
-
-async def test_two_states_in_one_batch_leave_the_later_one(
-    database_url: str, tmp_path: Path
-) -> None:
-    recorder = Recorder(database_url, tmp_path / "journal")
-    recorder.enqueue(alert_record(count=1))
-    recorder.enqueue(alert_record(count=2))
-
-    await recorder.close()
-
-    assert scalar(database_url, "SELECT count FROM alerts") == 2
-
-
-async def test_offering_never_waits_for_a_locked_database(
-    sqlite_url: str, tmp_path: Path
-) -> None:
-    upgrade(sqlite_url)
-    other = lock(sqlite_url)
-    async with recording(f"{sqlite_url}?timeout=0.2", tmp_path) as recorder:
-        started = time.perf_counter()
-        for number in range(5000):
-            recorder.enqueue(odometry_record(at=NOON + number))
-        took = time.perf_counter() - started
-        await until(lambda: state(recorder) == "down")
-        other.close()
-        await until(lambda: recorder.counters["history_written"] == 5000)
-
-    # Each would have waited 0.2 s.
-    assert took < 10.0
-
-
-async def test_while_the_database_is_locked_nothing_that_matters_is_lost(
+async def test_while_the_database_is_locked_only_the_oldest_telemetry_is_lost(
     sqlite_url: str, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level(logging.INFO, "iveg.adapters.history.recorder")
     upgrade(sqlite_url)
     other = lock(sqlite_url)
-    journal = tmp_path / "history.db.journal"
     url = f"{sqlite_url}?timeout=0.2"
     async with recording(url, tmp_path, 10) as recorder:
         for record in EVERYTHING:
             recorder.enqueue(record)
         for number in range(100):
             recorder.enqueue(odometry_record(at=NOON + number))
-        await until(lambda: recorder.counters["history_journalled"] == KEPT)
-        assert state(recorder) == "down"
-        assert len(journal.read_bytes().splitlines()) == KEPT
-        assert recorder.counters["history_waiting"] <= 10
+        await until(lambda: state(recorder) == "down")
+        await until(lambda: recorder.counters["history_waiting"] == 10)
 
         other.close()
         await until(lambda: state(recorder) == "ok")
         await until(lambda: recorder.counters["history_waiting"] == 0)
-        await until(lambda: journal.stat().st_size == 0)
 
     stored = counts(sqlite_url)
     assert stored.pop("odometry") == 4
     assert stored.pop("detections") == 0
     assert set(stored.values()) == {1}
-    assert recorder.counters["history_dropped"] == 99
+    assert recorder.counters["history_dropped"] == 98
     assert [record.levelname for record in caplog.records] == ["WARNING", "INFO"]
 
 
@@ -222,7 +162,6 @@ async def test_a_full_disk_stops_the_history_and_not_what_matters(
             recorder.enqueue(log_record())
             await until(lambda: state(recorder) == "down")
             recorder.enqueue(log_record(id=2))
-            await until(lambda: recorder.counters["history_journalled"] >= 1)
         await until(lambda: state(recorder) == "ok")
         await until(lambda: recorder.counters["history_waiting"] == 0)
 
@@ -233,80 +172,56 @@ async def test_a_full_disk_stops_the_history_and_not_what_matters(
 async def test_a_server_that_dies_is_missed_and_welcomed_back(
     postgresql: PostgreSQL, postgresql_url: str, tmp_path: Path
 ) -> None:
-    journal = tmp_path / "history.spill_file"
     async with recording(postgresql_url, tmp_path) as recorder:
         recorder.enqueue(command_record(state="REQUESTED"))
         await until(lambda: recorder.counters["history_written"] == 1)
         postgresql.stop()
         recorder.enqueue(command_record(state="STANDING"))
         recorder.enqueue(odometry_record())
-        await until(lambda: recorder.counters["history_journalled"] == 1)
-        assert state(recorder) == "down"
+        await until(lambda: state(recorder) == "down")
 
         postgresql.start()
         await until(lambda: state(recorder) == "ok")
-        await until(lambda: journal.stat().st_size == 0)
         await until(lambda: recorder.counters["history_waiting"] == 0)
 
     assert scalar(postgresql_url, "SELECT state FROM commands") == "STANDING"
     assert scalar(postgresql_url, "SELECT count(*) FROM odometry") == 1
 
 
-async def test_what_a_crashed_run_left_in_its_journal_is_stored_at_the_next_start(
-    database_url: str, tmp_path: Path
-) -> None:
-    crashed = Recorder(database_url, tmp_path / "journal")
-    crashed.enqueue(command_record(state="REQUESTED"))
+async def crash(database_url: str, path: Path, *records: Record) -> None:
+    """A run that ends when these are in the journal, and not in the database."""
+    crashed = Recorder(database_url, FileJournal(path))
+    for record in records:
+        crashed.enqueue(record)
     await crashed.flushed()
 
+
+async def test_what_a_crash_left_in_the_journal_is_stored_at_the_next_start(
+    database_url: str, tmp_path: Path
+) -> None:
+    await crash(database_url, tmp_path / "commands.jsonl", command_record(state="SENT"))
     upgrade(database_url)
     assert scalar(database_url, "SELECT count(*) FROM commands") == 0
-    recorder = Recorder(database_url, tmp_path / "journal")
-    task = asyncio.create_task(recorder.run())
-    await until(lambda: (tmp_path / "journal").stat().st_size == 0)
-    task.cancel()
-    await asyncio.wait({task})
-    await recorder.close()
 
-    assert scalar(database_url, "SELECT state FROM commands") == "REQUESTED"
+    async with recording(database_url, tmp_path) as recorder:
+        await asyncio.wait_for(recorder.caught_up(), _PATIENCE_S)
+        stored = scalar(database_url, "SELECT state FROM commands")
 
-
-async def test_it_has_caught_up_when_the_database_holds_what_a_crash_left(
-    database_url: str, tmp_path: Path
-) -> None:
-    crashed = Recorder(database_url, tmp_path / "journal")
-    crashed.enqueue(command_record(state="REQUESTED"))
-    await crashed.flushed()
-
-    recorder = Recorder(database_url, tmp_path / "journal")
-    task = asyncio.create_task(recorder.run())
-    await asyncio.wait_for(recorder.caught_up(), _PATIENCE_S)
-    stored = scalar(database_url, "SELECT state FROM commands")
-    task.cancel()
-    await asyncio.wait({task})
-    await recorder.close()
-
-    assert stored == "REQUESTED"
+    assert stored == "SENT"
 
 
 async def test_an_old_state_in_a_journal_never_overwrites_a_newer_one(
     database_url: str, tmp_path: Path
 ) -> None:
-    journal = tmp_path / "journal"
-    first = Recorder(database_url, journal)
-    first.enqueue(command_record(state="REQUESTED"))
-    await first.flushed()
-    old = journal.read_bytes()
-    first.enqueue(command_record(state="STANDING"))
-    await first.close()
-    journal.write_bytes(old)
+    path = tmp_path / "commands.jsonl"
+    await crash(database_url, path, command_record(state="REQUESTED"))
+    old = path.read_bytes()
+    async with recording(database_url, tmp_path) as recorder:
+        recorder.enqueue(command_record(state="STANDING"))
+    path.write_bytes(old)
 
-    second = Recorder(database_url, journal)
-    task = asyncio.create_task(second.run())
-    await until(lambda: journal.stat().st_size == 0)
-    task.cancel()
-    await asyncio.wait({task})
-    await second.close()
+    async with recording(database_url, tmp_path) as recorder:
+        await asyncio.wait_for(recorder.caught_up(), _PATIENCE_S)
 
     assert scalar(database_url, "SELECT state FROM commands") == "STANDING"
 
@@ -314,59 +229,80 @@ async def test_an_old_state_in_a_journal_never_overwrites_a_newer_one(
 async def test_replaying_the_audit_trail_twice_writes_it_once(
     database_url: str, tmp_path: Path
 ) -> None:
-    journal = tmp_path / "journal"
+    path = tmp_path / "commands.jsonl"
+    await crash(database_url, path, command_event_record())
+    left = path.read_bytes()
     for _ in range(2):
-        recorder = Recorder(database_url, journal)
-        recorder.enqueue(command_event_record())
-        await recorder.flushed()
-        await recorder.close()
+        path.write_bytes(left)
+        async with recording(database_url, tmp_path) as recorder:
+            await asyncio.wait_for(recorder.caught_up(), _PATIENCE_S)
 
     assert scalar(database_url, "SELECT count(*) FROM command_events") == 1
 
 
-async def test_closing_while_the_database_is_away_leaves_it_to_the_journal(
+async def test_the_journal_lets_go_of_what_the_database_has(
+    database_url: str, tmp_path: Path
+) -> None:
+    journal = FileJournal(tmp_path / "commands.jsonl")
+    recorder = Recorder(database_url, journal)
+    recorder.enqueue(command_record())
+    await recorder.flushed()
+    before = len(journal.left())
+
+    await recorder.close()
+
+    assert (before, len(journal.left())) == (1, 0)
+    journal.close()
+
+
+async def test_closing_while_the_database_is_away_leaves_orders_to_the_journal(
     sqlite_url: str, tmp_path: Path
 ) -> None:
     upgrade(sqlite_url)
     other = lock(sqlite_url)
-    recorder = Recorder(f"{sqlite_url}?timeout=0.1", tmp_path / "journal")
+    journal = FileJournal(tmp_path / "commands.jsonl")
+    recorder = Recorder(f"{sqlite_url}?timeout=0.1", journal)
     for record in EVERYTHING:
         recorder.enqueue(record)
 
     await recorder.close()
+    journal.close()
     other.close()
 
-    assert len((tmp_path / "journal").read_bytes().splitlines()) == KEPT
-    assert recorder.counters["history_dropped"] == len(EVERYTHING) - KEPT
+    later = FileJournal(tmp_path / "commands.jsonl")
+    later.read()
+    left = [one.record for one in later.left()]
+    assert left == [command_event_record(), command_record()]
+    assert recorder.counters["history_dropped"] == len(EVERYTHING) - ORDERS
+    later.close()
 
 
-async def test_one_bad_row_does_not_hold_up_its_neighbours(
+async def test_a_bad_row_holds_up_no_rows_of_other_kinds(
     database_url: str, tmp_path: Path
 ) -> None:
     async with recording(database_url, tmp_path) as recorder:
         recorder.enqueue(odometry_record(x=None))
         recorder.enqueue(log_record(id=2**70))
         recorder.enqueue(log_record(id=2))
-        recorder.enqueue(odometry_record())
-        await until(lambda: recorder.counters["history_waiting"] == 0)
-        await until(lambda: state(recorder) == "ok")
+        recorder.enqueue(command_record())
         await until(lambda: recorder.counters["history_written"] == 4)
+        await until(lambda: state(recorder) == "ok")
 
-    assert recorder.counters["history_rejected"] == 2
-    assert scalar(database_url, "SELECT count(*) FROM odometry") == 1
-    assert scalar(database_url, "SELECT id FROM log") == 2
+    assert recorder.counters["history_rejected"] == 3
+    assert scalar(database_url, "SELECT count(*) FROM odometry") == 0
+    assert scalar(database_url, "SELECT count(*) FROM commands") == 1
 
 
 async def test_text_that_postgresql_cannot_hold_is_left_out(
     postgresql_url: str, tmp_path: Path
 ) -> None:
-    recorder = Recorder(postgresql_url, tmp_path / "journal")
+    recorder = Recorder(postgresql_url, FileJournal(tmp_path / "journal"))
     recorder.enqueue(alert_record(note="nul \0"))
-    recorder.enqueue(alert_record(alert_id="A2"))
+    recorder.enqueue(command_record())
 
     await recorder.close()
 
-    assert scalar(postgresql_url, "SELECT alert_id FROM alerts") == "A2"
+    assert scalar(postgresql_url, "SELECT command_id FROM commands") == "C1"
     assert recorder.counters["history_rejected"] == 1
 
 
@@ -374,7 +310,7 @@ async def test_a_file_that_rots_while_in_use_is_moved_aside(
     sqlite_url: str, tmp_path: Path
 ) -> None:
     file = tmp_path / "history.db"
-    recorder = Recorder(sqlite_url, tmp_path / "journal")
+    recorder = Recorder(sqlite_url, FileJournal(tmp_path / "journal"))
     task = asyncio.create_task(recorder.run())
     recorder.enqueue(command_record())
     await until(lambda: recorder.counters["history_written"] == 1)
@@ -385,7 +321,7 @@ async def test_a_file_that_rots_while_in_use_is_moved_aside(
         raw.write(os.urandom(100))
 
     recorder.enqueue(command_record(command_id="C2"))
-    await until(lambda: recorder.counters["history_replayed"] == 1)
+    await until(lambda: recorder.counters["history_written"] == 2)
     task.cancel()
     await asyncio.wait({task})
     await recorder.close()
@@ -396,7 +332,9 @@ async def test_a_file_that_rots_while_in_use_is_moved_aside(
 
 async def test_what_waits_too_long_is_late(sqlite_url: str, tmp_path: Path) -> None:
     recorder = Recorder(
-        sqlite_url, tmp_path / "journal", read_clock=lambda: Instant(100.0, NOON)
+        sqlite_url,
+        FileJournal(tmp_path / "journal"),
+        read_clock=lambda: Instant(100.0, NOON),
     )
     recorder.enqueue(odometry_record())
 
@@ -412,7 +350,7 @@ async def test_what_waits_too_long_is_late(sqlite_url: str, tmp_path: Path) -> N
 async def test_securing_a_stop_returns_when_the_journal_holds_it(
     sqlite_url: str, tmp_path: Path
 ) -> None:
-    recorder = Recorder(sqlite_url, tmp_path / "journal")
+    recorder = Recorder(sqlite_url, FileJournal(tmp_path / "journal"))
 
     recorder.enqueue(command_record())
     await recorder.flushed()
@@ -421,23 +359,11 @@ async def test_securing_a_stop_returns_when_the_journal_holds_it(
     await recorder.close()
 
 
-async def test_whoever_secures_at_the_same_time_waits_for_the_same_write(
-    sqlite_url: str, tmp_path: Path
-) -> None:
-    recorder = Recorder(sqlite_url, tmp_path / "journal")
-    recorder.enqueue(command_record())
-
-    await asyncio.gather(*(recorder.flushed() for _ in range(3)))
-
-    assert recorder.counters["history_journalled"] == 1
-    await recorder.close()
-
-
 async def test_what_the_disk_did_not_take_waits_for_the_database(
     sqlite_url: str, tmp_path: Path
 ) -> None:
     (tmp_path / "journal").mkdir()
-    recorder = Recorder(sqlite_url, tmp_path / "journal")
+    recorder = Recorder(sqlite_url, FileJournal(tmp_path / "journal"))
 
     recorder.enqueue(command_record())
     await recorder.flushed()
@@ -447,11 +373,11 @@ async def test_what_the_disk_did_not_take_waits_for_the_database(
     assert scalar(sqlite_url, "SELECT count(*) FROM commands") == 1
 
 
-def test_the_journal_lies_beside_the_file_or_in_the_data_directory() -> None:
+def test_what_an_earlier_version_spilled_lies_where_it_put_it() -> None:
     directory = Path("/data")
 
-    beside = journal_file("sqlite:////var/lib/history.db", directory)
-    apart = journal_file("postgresql://server/history", directory)
+    beside = spilled_file("sqlite:////var/lib/history.db", directory)
+    apart = spilled_file("postgresql://server/history", directory)
 
     assert beside == Path("/var/lib/history.db.journal")
     assert apart == Path("/data/history.spill_file")

@@ -1,18 +1,13 @@
-"""How large the history is, and how the room of deleted rows is given back."""
+"""The size of the history."""
 
 import sqlite3
 from pathlib import Path
 
 import pytest
-from sqlalchemy import text
 
-from iveg.adapters.history.engine import reading_engine, writing_engine
-from iveg.adapters.history.migrate import upgrade
+from iveg.adapters.history.engine import reading_engine
+from iveg.adapters.history.recorder import Store
 from iveg.adapters.history.stats import HistoryStats, TableStats, read_stats
-from iveg.adapters.history.store import Store
-from iveg.adapters.history.vacuum import vacuum
-from iveg.domain.disk_space import DiskSpace
-from iveg.domain.errors import HopError
 from iveg.domain.records import Record
 from iveg.pipeline.record import Waiting
 from tests.fakes.records import NOON, climate_record, odometry_record
@@ -62,15 +57,6 @@ def test_each_table_is_counted_measured_and_aged(database_url: str) -> None:
     assert found.tables[0] == max(found.tables, key=lambda one: one.size)
 
 
-def test_an_empty_history_is_measured(database_url: str) -> None:
-    upgrade(database_url)
-
-    found = measured(database_url)
-
-    assert found.robot_hours == 0
-    assert {one.rows for one in found.tables} == {0}
-
-
 def test_where_sqlite_tells_no_sizes_rows_share_the_file(tmp_path: Path) -> None:
     url = f"sqlite:///{tmp_path / 'history.db'}"
     fill(url)
@@ -84,59 +70,3 @@ def test_where_sqlite_tells_no_sizes_rows_share_the_file(tmp_path: Path) -> None
     total = sum(one.size for one in found.tables)
     assert total == pytest.approx((tmp_path / "history.db").stat().st_size, rel=0.01)
     assert of(found, "odometry").size == pytest.approx(total * 1200 / 1270, rel=0.01)
-
-
-def test_vacuum_gives_room_back_and_keeps_every_row(database_url: str) -> None:
-    fill(database_url)
-    engine = writing_engine(database_url)
-    with engine.begin() as connection:
-        connection.execute(text("DELETE FROM odometry WHERE robot_id = 'A'"))
-    engine.dispose()
-    before = of(measured(database_url), "odometry")
-
-    vacuum(database_url)
-
-    found = measured(database_url)
-    assert (before.rows, of(found, "odometry").rows) == (600, 600)
-    assert found.inside == 0
-
-
-def test_vacuum_lets_a_file_of_an_earlier_version_shrink_by_itself(
-    tmp_path: Path,
-) -> None:
-    file = tmp_path / "history.db"
-    old = sqlite3.connect(file)
-    old.execute("CREATE TABLE a (b)")
-    before = old.execute("PRAGMA auto_vacuum").fetchone()
-    old.close()
-
-    vacuum(f"sqlite:///{file}")
-
-    new = sqlite3.connect(file)
-    assert (before, new.execute("PRAGMA auto_vacuum").fetchone()) == ((0,), (2,))
-    new.close()
-
-
-def test_vacuum_is_refused_while_another_program_has_the_file_open(
-    tmp_path: Path,
-) -> None:
-    url = f"sqlite:///{tmp_path / 'history.db'}"
-    fill(url)
-    serving = writing_engine(url)
-    with serving.begin() as connection:
-        connection.execute(text("DELETE FROM odometry WHERE robot_id = 'A'"))
-
-    with pytest.raises(HopError, match="end iveg serve first"):
-        vacuum(url)
-
-    with serving.begin() as connection:
-        assert connection.scalar(text("SELECT count(*) FROM odometry")) == 600
-    serving.dispose()
-
-
-def test_vacuum_is_refused_where_there_is_no_room_for_it(tmp_path: Path) -> None:
-    url = f"sqlite:///{tmp_path / 'history.db'}"
-    fill(url)
-
-    with pytest.raises(HopError, match="MB are needed"):
-        vacuum(url, lambda _: DiskSpace(1000, 10**9))

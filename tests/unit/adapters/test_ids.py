@@ -1,7 +1,7 @@
 """Ids are ULIDs: the alphabet, the moment first, then chance."""
 
 from iveg.adapters import clock
-from iveg.adapters.ids import new_id
+from iveg.adapters.clock import new_id
 
 DIGITS = "0123456789ABCDEFGHJKMNPQRSTVWXYZ"
 

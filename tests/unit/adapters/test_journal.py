@@ -4,6 +4,7 @@ import asyncio
 import logging
 import threading
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict
 from pathlib import Path
 from random import Random
 from typing import Literal
@@ -13,7 +14,10 @@ import pytest
 
 from iveg.adapters.journal import FileJournal
 from iveg.domain.stop import DesiredRecord
+from iveg.pipeline.record import Waiting
 from tests.builders import START
+from tests.fakes.disk import files_no_longer_than
+from tests.fakes.records import command_event_record, command_record, log_record
 
 
 async def write(path: Path, *lines: tuple[str, str]) -> FileJournal:
@@ -40,7 +44,7 @@ async def test_a_line_is_on_disk_when_the_call_returns(tmp_path: Path) -> None:
     path = tmp_path / "commands.jsonl"
     journal = await write(path, ("AGI", "stopped"))
 
-    (_, line) = path.read_bytes().splitlines()
+    (_, line) = path.read_bytes().rstrip(b"\0").splitlines()
 
     assert orjson.loads(line) == {
         "at": START.wall,
@@ -121,20 +125,6 @@ async def test_a_release_that_came_true_is_over_but_its_names_stay_known(
     }
 
 
-async def test_of_the_names_the_last_sixty_four_are_kept(tmp_path: Path) -> None:
-    path = tmp_path / "commands.jsonl"
-    journal = await write(path, ("AGI", "stopped"))
-    for number in range(70):
-        await journal.log_release(
-            "AGI", "01A", ["01A", f"n{number}"], "c", "ana", START
-        )
-    journal.close()
-
-    named = FileJournal(path).read()["AGI"].named
-    assert len(named) == 64
-    assert named[-2:] == ("01A", "n69")
-
-
 def test_a_hold_that_an_earlier_version_wrote_down_may_have_been_named(
     tmp_path: Path,
 ) -> None:
@@ -145,10 +135,6 @@ def test_a_hold_that_an_earlier_version_wrote_down_may_have_been_named(
     )
 
     assert FileJournal(path).read() == {"AGI": DesiredRecord("ana", None)}
-
-
-def test_without_a_file_nothing_is_wanted(tmp_path: Path) -> None:
-    assert FileJournal(tmp_path / "none").read() == {}
 
 
 async def test_a_line_that_a_crash_cut_short_hurts_no_other(
@@ -192,20 +178,6 @@ async def test_a_line_that_says_nothing_releases_nothing(
     assert FileJournal(path).read() == {"AGI": DesiredRecord("ana", "01A")}
 
 
-async def test_lines_of_many_at_once_are_whole(tmp_path: Path) -> None:
-    path = tmp_path / "commands.jsonl"
-    journal = FileJournal(path)
-    await asyncio.gather(
-        *(
-            journal.log_desired(f"R{number}", "stopped", "01A", "ana", START)
-            for number in range(40)
-        )
-    )
-    journal.close()
-
-    assert len(FileJournal(path).read()) == 40
-
-
 async def test_a_disk_that_fails_is_logged_and_holds_up_nothing(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -241,7 +213,7 @@ async def test_a_compacted_journal_says_what_the_long_one_said(
     journal.close()
 
     long = FileJournal(path).read()
-    lines = path.read_bytes().splitlines()
+    lines = path.read_bytes().rstrip(b"\0").splitlines()
     assert FileJournal(path).read() == long
     assert len(lines) <= 1 + 2 * 3
 
@@ -250,25 +222,6 @@ async def test_a_compacted_journal_says_what_the_long_one_said(
     await again.log_desired("AGI", "stopped", "new", "ben", START)
     again.close()
     assert FileJournal(path).read()["AGI"].hold_id == "new"
-
-
-async def test_names_of_releases_survive_that_the_journal_is_compacted(
-    tmp_path: Path,
-) -> None:
-    path = tmp_path / "commands.jsonl"
-    journal = await write(path, ("AGI", "stopped"))
-    await journal.log_release("AGI", "01A", ["01A"], "c1", "ana", START)
-    await journal.log_desired("AGI", "run", None, "ana", START)
-    journal.close()
-    assert FileJournal(path).read() == {}
-
-    later = FileJournal(path)
-    await later.log_desired("AGI", "stopped", "01B", "ben", START)
-    later.close()
-
-    assert FileJournal(path).read() == {
-        "AGI": DesiredRecord("ben", "01B", named=("01A",))
-    }
 
 
 async def test_a_journal_of_a_newer_iveg_is_believed_and_left_as_it_is(
@@ -299,3 +252,122 @@ async def test_f64_a_stop_is_on_disk_while_all_other_threads_are_busy(
     free.set()
     await busy
     journal.close()
+
+
+# --- rows of orders ---------------------------------------------------------------
+
+
+async def keep(journal: FileJournal, *rows: Waiting) -> None:
+    for row in rows:
+        journal.note(row)
+    await journal.flushed()
+
+
+def left(path: Path) -> list[int]:
+    """Revisions of the rows that the next run finds."""
+    journal = FileJournal(path)
+    journal.read()
+    journal.close()
+    return [one.revision for one in journal.left()]
+
+
+async def test_rows_of_orders_outlive_a_crash_beside_what_is_wanted(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "commands.jsonl"
+    journal = await write(path, ("AGI", "stopped"))
+    rows = Waiting(command_record(), 7, 5.0), Waiting(command_event_record(), 8, 5.0)
+    await keep(journal, *rows)
+
+    later = FileJournal(path)
+    assert later.read() == {"AGI": DesiredRecord("ana", "01A")}
+    assert [(one.record, one.revision) for one in later.left()] == [
+        (command_record(), 7),
+        (command_event_record(), 8),
+    ]
+
+
+async def test_only_what_the_history_holds_is_compacted_away(tmp_path: Path) -> None:
+    path = tmp_path / "commands.jsonl"
+    journal = await write(path, ("AGI", "stopped"))
+    rows = [Waiting(command_record(reason="r" * 400), n, 0.0) for n in range(1, 800)]
+    await keep(journal, *rows)
+    grown = len(path.read_bytes().rstrip(b"\0"))
+
+    await journal.committed({one.revision for one in rows[:-1]})
+
+    assert len(path.read_bytes().rstrip(b"\0")) < grown / 100
+    assert left(path) == [799]
+    assert FileJournal(path).read() == {"AGI": DesiredRecord("ana", "01A")}
+    await keep(journal, Waiting(command_record(), 800, 0.0))
+    assert left(path) == [799, 800]
+    journal.close()
+
+
+async def test_on_a_full_disk_orders_are_still_written_down(tmp_path: Path) -> None:
+    path = tmp_path / "commands.jsonl"
+    journal = FileJournal(path)
+    journal.read()
+
+    with files_no_longer_than(path.stat().st_size):
+        await keep(journal, *(Waiting(command_record(), n, 0.0) for n in range(1, 500)))
+        await journal.log_desired("AGI", "stopped", "01A", "ana", START)
+
+    assert len(left(path)) == 499
+    assert FileJournal(path).read() == {"AGI": DesiredRecord("ana", "01A")}
+
+
+async def test_rows_that_the_disk_refused_are_written_with_the_next(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    path = tmp_path / "commands.jsonl"
+    path.mkdir()
+    journal = FileJournal(path)
+    await keep(journal, Waiting(command_record(), 1, 0.0))
+    path.rmdir()
+
+    await keep(journal, Waiting(command_record(), 2, 0.0))
+    journal.close()
+
+    assert left(path) == [1, 2]
+    assert "could not be written" in caplog.text
+
+
+async def test_a_write_that_is_cancelled_half_way_is_done_again(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "commands.jsonl"
+    journal = FileJournal(path)
+    journal.note(Waiting(command_record(), 1, 0.0))
+    writing = asyncio.create_task(journal.flushed())
+    await asyncio.sleep(0)
+    writing.cancel()
+    await asyncio.wait({writing})
+
+    await journal.flushed()
+    journal.close()
+
+    assert left(path) == [1]
+
+
+async def test_what_an_earlier_version_spilled_is_taken_over_once(
+    tmp_path: Path,
+) -> None:
+    path, spilled = tmp_path / "commands.jsonl", tmp_path / "history.db.journal"
+    (await write(path, ("AGI", "stopped"))).close()
+    record = asdict(command_record()) | {"drill": False}
+    lines = (
+        {"kind": "CommandRecord", "revision": 3, "record": record},
+        {"kind": "LogRecord", "revision": 4, "record": asdict(log_record())},
+    )
+    spilled.write_bytes(b"".join(orjson.dumps(one) + b"\n" for one in lines))
+    spilled.with_name("history.db.journal-reserve").write_bytes(bytes(10))
+
+    journal = FileJournal(path, spilled)
+    assert journal.read() == {"AGI": DesiredRecord("ana", "01A")}
+    journal.close()
+
+    assert [one.record for one in journal.left()] == [command_record(), log_record()]
+    assert not spilled.exists()
+    assert not spilled.with_name("history.db.journal-reserve").exists()
+    assert left(path) == [3, 4]

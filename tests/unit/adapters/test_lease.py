@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from iveg.adapters.lease import lease
+from iveg.adapters.files import lease
 from iveg.domain.errors import HopError
 from tests.processes import ROOT
 
 HOLDER = (
     "import sys, threading, pathlib;"
-    "from iveg.adapters.lease import lease;"
+    "from iveg.adapters.files import lease;"
     "held = lease(pathlib.Path(sys.argv[1]), 'AGI');"
     "held.__enter__();"
     "print('held', flush=True); threading.Event().wait()"

@@ -8,14 +8,15 @@ from collections.abc import AsyncIterator, Callable
 import orjson
 import pytest
 
-from iveg.adapters.broker_address import BrokerAddress
-from iveg.adapters.mqtt import MqttLink
+from iveg.adapters.mqtt import MOST_EARLY, BrokerAddress, MqttLink
 from iveg.adapters.transports import MqttTransport
 from iveg.domain.errors import HopError
 from iveg.domain.feedback import Feedback
 from iveg.domain.observations import Origin
-from iveg.lab.embedded.mqtt_server import mqtt_broker
+from iveg.lab.embedded.mqtt_broker import mqtt_broker
 from tests.ports import free_ports
+
+CONNACK = b"\x20\x02\x00\x00"
 
 
 async def until(true: Callable[[], object], within_s: float = 30.0) -> None:
@@ -49,9 +50,8 @@ class Heard:
     def __init__(self, port: int, *topics: str) -> None:
         self.messages: list[tuple[str, bytes]] = []
         self.connects = self.losses = 0
-        self.link = MqttLink(
-            BrokerAddress("127.0.0.1", port),
-            "test",
+        self.link = MqttLink(BrokerAddress("127.0.0.1", port), "test")
+        self.link.attach(
             dict.fromkeys(topics, 1),
             lambda topic, payload: self.messages.append((topic, payload)),
             self._connected,
@@ -82,26 +82,7 @@ def test_an_address_is_read_from_its_url(url: str, address: BrokerAddress) -> No
     assert BrokerAddress.from_url(url) == address
 
 
-def test_user_and_password_of_their_own_win_over_the_url() -> None:
-    address = BrokerAddress.from_url("mqtt://a:b@broker", "c", "d")
-
-    assert (address.user, address.password) == ("c", "d")
-
-
 # --- a connection -----------------------------------------------------------------
-
-
-async def test_what_is_published_and_offered_arrives() -> None:
-    async with mqtt_broker("127.0.0.1", 0) as broker:
-        port = broker.port
-        heard = Heard(port, "/a", "/b")
-        async with running(heard.link):
-            await until(lambda: heard.link.connected)
-            await heard.link.publish("/a", b"1")
-            heard.link.enqueue("/b", b"2")
-            await until(lambda: len(heard.messages) == 2)
-
-    assert sorted(heard.messages) == [("/a", b"1"), ("/b", b"2")]
 
 
 async def test_of_what_is_offered_while_away_the_newest_of_each_topic_arrives() -> None:
@@ -128,7 +109,7 @@ async def test_messages_at_qos_1_go_together_and_newer_ones_after_their_pubacks(
         reader: asyncio.StreamReader, writer: asyncio.StreamWriter
     ) -> None:
         await reader.read(1000)
-        writer.write(b"\x20\x02\x00\x00")  # CONNACK
+        writer.write(CONNACK)
         said.put_nowait(await reader.readexactly(2 * len(first)))
         await acknowledges.wait()
         writer.write(b"\x40\x02\x00\x02" + b"\x40\x02\x00\x01")
@@ -149,6 +130,30 @@ async def test_messages_at_qos_1_go_together_and_newer_ones_after_their_pubacks(
             assert await said.get() == b"\x32\x06\x00\x01a\x00\x033"
 
 
+async def test_an_order_waits_for_no_confirmation_of_telemetry() -> None:
+    said = bytearray()
+
+    async def silent_broker(
+        reader: asyncio.StreamReader, writer: asyncio.StreamWriter
+    ) -> None:
+        await reader.read(64)
+        writer.write(CONNACK)
+        while more := await reader.read(2**20):
+            said.extend(more)
+        writer.close()
+
+    async with await asyncio.start_server(silent_broker, "127.0.0.1", 0) as server:
+        port = server.sockets[0].getsockname()[1]
+        link = MqttLink(BrokerAddress("127.0.0.1", port), "test")
+        for number in range(100):
+            link.enqueue(f"telemetry/{number}", b"", qos=1)
+        async with running(link):
+            await until(lambda: link.connected)
+            order = asyncio.create_task(link.publish("cmd", b"stop"))
+            await until(lambda: b"stop" in said)
+            order.cancel()
+
+
 async def test_while_the_socket_is_full_only_the_newest_of_a_topic_waits() -> None:
     heard, reads = bytearray(), asyncio.Event()
 
@@ -156,7 +161,7 @@ async def test_while_the_socket_is_full_only_the_newest_of_a_topic_waits() -> No
         reader: asyncio.StreamReader, writer: asyncio.StreamWriter
     ) -> None:
         await reader.read(64)
-        writer.write(b"\x20\x02\x00\x00")  # CONNACK
+        writer.write(CONNACK)
         await reads.wait()
         while more := await reader.read(2**20):
             heard.extend(more)
@@ -208,17 +213,83 @@ async def test_f1_a_broker_that_goes_and_comes_back_is_found_again(
                 assert len(losses_told(caplog)) == 1
 
 
-async def test_a_broker_that_is_not_there_yet_is_told_once_and_found_when_it_comes(
-    caplog: pytest.LogCaptureFixture,
+# --- what a broker says while the subscriptions are made --------------------------
+
+
+@contextlib.asynccontextmanager
+async def broker_that_says(early: bytes) -> AsyncIterator[tuple[int, bytearray]]:
+    """Messages before SUBACK: the broker's port, and what it hears from then on."""
+    heard = bytearray()
+
+    async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        await reader.read(1000)
+        writer.write(CONNACK)
+        subscribe = await reader.read(1000)
+        writer.write(early)
+        while more := await reader.read(100_000):
+            if not heard:
+                writer.write(b"\x90\x03" + subscribe[2:4] + b"\x01")
+            heard.extend(more)
+        writer.close()
+
+    async with await asyncio.start_server(serve, "127.0.0.1", 0) as server:
+        yield server.sockets[0].getsockname()[1], heard
+
+
+def at_qos_1(payload: bytes) -> bytes:
+    """A PUBLISH on topic ``t`` with packet identifier 7."""
+    body = b"\x00\x01t\x00\x07" + payload
+    return b"\x32" + bytes((len(body),)) + body
+
+
+async def test_of_what_came_before_the_subscriptions_stood_the_newest_are_kept() -> (
+    None
+):
+    early = b"".join(at_qos_1(b"%d" % number) for number in range(MOST_EARLY + 500))
+    async with broker_that_says(early) as (port, _):
+        heard = Heard(port, "t")
+        async with running(heard.link):
+            await until(lambda: heard.messages)
+
+    kept = [int(payload) for _, payload in heard.messages]
+    assert kept[:MOST_EARLY] == [*range(500, MOST_EARLY + 500)]
+
+
+async def test_a_message_before_the_subscriptions_is_acknowledged_and_waits() -> None:
+    connected: list[bool] = []
+    async with broker_that_says(at_qos_1(b"order")) as (port, said):
+        link = MqttLink(
+            BrokerAddress("127.0.0.1", port),
+            "test",
+            {"t": 1},
+            lambda *_: connected.append(link.connected),
+        )
+        async with running(link):
+            await until(lambda: connected)
+
+    assert said.startswith(b"\x40\x02\x00\x07")
+    assert connected == [True]
+
+
+@pytest.mark.parametrize("qos", [0, 1])
+async def test_a_mistake_of_who_listens_ends_the_link_and_not_its_connection_alone(
+    qos: int,
 ) -> None:
-    port = free_ports(1)[0]
-    heard = Heard(port)
-    async with running(heard.link):
-        await until(lambda: losses_told(caplog))
-        async with mqtt_broker("127.0.0.1", port):
-            await until(lambda: heard.link.connected)
-            assert len(losses_told(caplog)) == 1
-            assert (heard.connects, heard.losses) == (1, 0)
+    def mistake(topic: str, _: bytes) -> None:
+        raise LookupError(topic)
+
+    async with mqtt_broker("127.0.0.1", 0) as broker:
+        sender = Heard(broker.port)
+        link = MqttLink(
+            BrokerAddress("127.0.0.1", broker.port), "test", {"t": qos}, mistake
+        )
+        async with running(sender.link):
+            ending = asyncio.create_task(link.run())
+            await until(lambda: sender.link.connected and link.connected)
+            await sender.link.publish("t", b"x", qos)
+            with pytest.raises(LookupError):
+                async with asyncio.timeout(20.0):
+                    await ending
 
 
 # --- the direct transport ---------------------------------------------------------
@@ -261,6 +332,27 @@ async def test_a_robot_that_reconnects_finds_the_level_and_no_old_command() -> N
         "/AGI/iveg/desired",
         "/iveg/AGI/cmd",
     ]
+
+
+@pytest.mark.parametrize("qos", [0, 1])
+async def test_what_the_broker_had_retained_is_told_apart_from_news(qos: int) -> None:
+    stored: list[tuple[str, bytes]] = []
+    async with mqtt_broker("127.0.0.1", 0) as broker:
+        sender, reader = Heard(broker.port), Heard(broker.port)
+        reader.link.attach(
+            {"t": qos},
+            lambda topic, payload: reader.messages.append((topic, payload)),
+            on_stored=lambda topic, payload: stored.append((topic, payload)),
+        )
+        async with running(sender.link):
+            await until(lambda: sender.link.connected)
+            await sender.link.publish("t", b"old", retain=True)
+            async with running(reader.link):
+                await until(lambda: reader.link.connected and stored)
+                await sender.link.publish("t", b"new", retain=True)
+                await until(lambda: reader.messages)
+
+    assert (stored, reader.messages) == ([("t", b"old")], [("t", b"new")])
 
 
 async def test_a_release_and_a_resume_are_published_once_at_qos_0_and_not_kept() -> (

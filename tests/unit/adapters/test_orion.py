@@ -1,18 +1,16 @@
 import asyncio
 from collections.abc import AsyncIterator
 
-import aiomqtt
 import pytest
 
-from iveg.adapters import clock, fiware_http
+from iveg.adapters import fiware_http
 from iveg.adapters.fleet_provisioning import provision
 from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.orion import OrionClient
 from iveg.domain.errors import HopError
-from iveg.lab.embedded.http_server import Request, Response, http_server
 from iveg.lab.embedded.server import Running
-from iveg.ngsi import codec, names
 from tests.faulty_fiware import faulty_fiware
+from tests.http_servers import Request, Response, http_server
 
 TENANT = ("agroconnect", "/greenhouse")
 ODOMETRY = {"type": "object", "value": {"x": 1.0, "y": 2.0, "yaw": 0.1}}
@@ -39,18 +37,6 @@ async def put(orion: OrionClient, robot_id: str, **attributes: object) -> None:
     )
 
 
-async def test_the_version_is_told(orion: OrionClient) -> None:
-    assert (await orion.version()).startswith("4.7.0")
-
-
-async def test_robots_are_read_as_the_codec_takes_them(orion: OrionClient) -> None:
-    await put(orion, "AGI", base_pose_ground_truth=ODOMETRY, cmd={"value": "x"})
-    (entity,) = await orion.read_robots()
-    assert "cmd" not in entity
-    (odometry,) = codec.read_entity(entity).observations
-    assert odometry.robot_id == "AGI"
-
-
 async def test_all_robots_are_read_however_many_pages(orion: OrionClient) -> None:
     wanted = [f"R{number:03}" for number in range(230)]
     for robot_id in wanted:
@@ -71,20 +57,6 @@ async def test_reading_robots_never_waits_for_a_stuck_agent(
         await agent.ask("POST", "/test/faults", body={})
     assert [one["id"] for one in robots] == ["AGI"]
     assert modified is not None
-
-
-async def test_the_time_of_the_last_odometry_is_orions(orion: OrionClient) -> None:
-    before = clock.wall()
-    await put(orion, "AGI", base_pose_ground_truth=ODOMETRY)
-    modified = await orion.modified_at("AGI")
-    assert modified is not None
-    assert before - 0.001 <= modified <= clock.wall() + 0.001
-
-
-async def test_a_robot_without_odometry_has_no_time(orion: OrionClient) -> None:
-    assert await orion.modified_at("AGI") is None
-    await put(orion, "AGI")
-    assert await orion.modified_at("AGI") is None
 
 
 async def test_a_connection_that_the_other_side_may_be_closing_is_not_used_again(
@@ -113,63 +85,9 @@ async def test_a_connection_that_the_other_side_may_be_closing_is_not_used_again
             await ended.acquire()
 
 
-async def test_an_attribute_is_deleted_once(orion: OrionClient) -> None:
-    await put(orion, "AGI", cmd={"value": "x"})
-    assert await orion.has_attribute("AGI", "cmd")
-    assert await orion.delete_attribute("AGI", "cmd")
-    assert not await orion.has_attribute("AGI", "cmd")
-    assert not await orion.delete_attribute("AGI", "cmd")
-
-
-async def test_a_command_goes_alone_typed_and_as_an_update() -> None:
-    asked: list[Request] = []
-
-    async def handle(request: Request) -> Response:
-        asked.append(request)
-        return Response(204)
-
-    async with (
-        http_server(handle, "127.0.0.1", 0) as port,
-        OrionClient(f"http://127.0.0.1:{port}", *TENANT) as client,
-    ):
-        await client.update_command("AGI", {"stop": {"id": "1"}})
-    (request,) = asked
-    assert (request.method, request.path) == ("PATCH", "/v2/entities/AGI/attrs")
-    assert request.query == {"type": "Robot"}
-    assert request.body == (b'{"cmd":{"type":"command","value":{"stop":{"id":"1"}}}}')
-    assert request.headers["fiware-service"] == "agroconnect"
-    assert request.headers["fiware-servicepath"] == "/greenhouse"
-
-
-async def test_a_command_reaches_the_robot(up: Running, orion: OrionClient) -> None:
-    async with IotAgentClient(up.iota_url, *TENANT) as agent:
-        await provision(agent, orion, ["AGI"], "iveg", up.orion_url)
-    async with aiomqtt.Client("127.0.0.1", up.mqtt_port) as mqtt:
-        await mqtt.subscribe(names.command_topic("iveg", "AGI"))
-        await orion.update_command("AGI", {"stop": {"id": "1"}})
-        async with asyncio.timeout(30):
-            message = await anext(aiter(mqtt.messages))
-    assert message.payload == b'{"cmd":{"stop":{"id":"1"}}}'
-
-
 async def test_a_refusal_says_status_and_orions_words(orion: OrionClient) -> None:
     with pytest.raises(HopError, match=r"404 to PATCH .*has not been found"):
         await orion.update_command("NOBODY", {"stop": {"id": "1"}})
-
-
-async def test_silence_ends_after_the_time_that_was_given() -> None:
-    asleep = asyncio.Event()
-
-    async def handle(_: Request) -> Response:
-        await asleep.wait()
-        return Response(204)
-
-    async with (
-        http_server(handle, "127.0.0.1", 0) as port,
-        OrionClient(f"http://127.0.0.1:{port}", *TENANT) as client,
-    ):
-        with pytest.raises(HopError, match=r"orion: no answer to PATCH .* in 0\.05 s"):
-            await client.update_command("AGI", {}, timeout_s=0.05)
 
 
 async def test_an_orion_that_is_away_is_a_hop_error() -> None:

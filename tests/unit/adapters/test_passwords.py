@@ -1,13 +1,11 @@
 """Argon2id off the loop: what fits, what takes as long, and how much waits."""
 
-import asyncio
 import time
 from collections.abc import Iterator
 
 import pytest
 
 from iveg.adapters.passwords import Passwords
-from iveg.domain.errors import BusyError
 
 
 @pytest.fixture
@@ -46,16 +44,3 @@ async def test_a_name_that_is_not_there_takes_as_long_as_a_wrong_password(
             spent[one] += time.process_time() - began
 
     assert 0.5 < spent[""] / spent[kept] < 2.0
-
-
-async def test_the_loop_goes_on_and_too_many_are_refused(passwords: Passwords) -> None:
-    asked = [asyncio.create_task(passwords.hashed("x")) for _ in range(20)]
-    await asyncio.sleep(0)
-    turns = 0
-    while not all(one.done() for one in asked):
-        await asyncio.sleep(0.001)
-        turns += 1
-
-    refused = [one for one in asked if isinstance(one.exception(), BusyError)]
-    assert len(refused) == 4
-    assert turns > 16

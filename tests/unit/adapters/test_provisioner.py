@@ -2,7 +2,6 @@
 
 import asyncio
 import contextlib
-import logging
 from collections.abc import AsyncIterator, Callable
 
 import orjson
@@ -10,23 +9,19 @@ import pytest
 
 from iveg.adapters import clock
 from iveg.adapters.bounded_json import BoundedJson
-from iveg.adapters.broker_address import BrokerAddress
-from iveg.adapters.fiware_http import Document
-from iveg.adapters.fiware_token import HOP, FiwareToken, TokenGrant
+from iveg.adapters.fiware_http import HOP, Document, FiwareToken, TokenGrant
 from iveg.adapters.iot_agent import IotAgentClient
-from iveg.adapters.mqtt import MqttLink
+from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.adapters.orion import OrionClient
 from iveg.adapters.provisioner import Provisioner
-from iveg.adapters.subscriptions import ensure_subscriptions
-from iveg.adapters.wanted_subscriptions import wanted_for
-from iveg.domain.feeds import Feeds
+from iveg.adapters.subscriptions import ensure_subscriptions, wanted_for
 from iveg.domain.observations import Odometry, Origin, Received
-from iveg.lab.embedded.http_server import Request, Response, http_server
 from iveg.lab.embedded.server import Running, embedded_fiware
 from iveg.ngsi import codec, names
 from iveg.pipeline.health_monitor import HealthMonitor
 from iveg.pipeline.ingest import Ingest
 from tests.builders import odometry
+from tests.http_servers import Request, Response, http_server
 from tests.ports import free_ports
 
 SERVICE = ("agroconnect", "/greenhouse")
@@ -88,7 +83,6 @@ class Site:
             self.link,
             self.health_monitor,
             self.ingest,
-            Feeds(),
             robots=["AGI"],
             apikey="iveg",
             context_broker_url=fiware.orion_url,
@@ -120,16 +114,6 @@ async def fiware() -> AsyncIterator[Running]:
         yield running
 
 
-async def test_an_empty_fiware_gets_devices_and_subscriptions(fiware: Running) -> None:
-    async with Site(fiware).running() as site:
-        await until(lambda: site.provisioner.subscription_ids)
-        kept = await site.orion.read_subscriptions()
-
-    assert {one["id"] for one in kept} == site.provisioner.subscription_ids
-    assert site.health_monitor.agent_error == ""
-    assert site.health_monitor.orion_ok_at is not None
-
-
 async def test_without_a_token_for_the_proxy_the_endpoint_is_the_cause_of_both(
     fiware: Running,
 ) -> None:
@@ -156,7 +140,7 @@ async def test_a_subscription_is_ours_as_soon_as_orion_uses_it(
     async with site.running():
         ids = await first_ids(site)
 
-    assert orion.taken == [True] * len(wanted_for(["AGI"]))
+    assert orion.taken == [True] * len(wanted_for())
     assert site.provisioner.is_ours(next(iter(ids)))
     assert not site.provisioner.is_ours("somebody else's")
 
@@ -178,7 +162,7 @@ async def test_the_secret_of_an_earlier_start_is_known_and_no_other(
 ) -> None:
     async with OrionClient(fiware.orion_url, *SERVICE) as orion:
         url = "http://127.0.0.1:9/ngsi/notifications"
-        await ensure_subscriptions(orion, url, "cd" * 32, wanted_for(["AGI"]))
+        await ensure_subscriptions(orion, url, "cd" * 32, wanted_for())
     site = Site(fiware)
     assert site.provisioner.is_former("any, before Orion has said which are ours")
     async with site.running():
@@ -186,15 +170,6 @@ async def test_the_secret_of_an_earlier_start_is_known_and_no_other(
 
     assert site.provisioner.is_former("cd" * 32)
     assert not site.provisioner.is_former("ef" * 32)
-
-
-async def test_the_probe_goes_the_way_of_every_measure(fiware: Running) -> None:
-    async with Site(fiware).running() as site:
-        await until(lambda: site.heard)
-
-    topic, payload = site.heard[0]
-    assert topic == "/iveg/iveg-canary/attrs"
-    assert b'"boot":"boot"' in payload
 
 
 async def test_what_a_gap_has_lost_is_read_once_and_never_looks_live(
@@ -216,79 +191,6 @@ async def test_what_a_gap_has_lost_is_read_once_and_never_looks_live(
 
     assert all(one.asked for one in read)
     assert {one.transport for one in read} == {"fiware"}
-
-
-async def test_f6_an_orion_that_is_down_is_told_once_and_shown(
-    fiware: Running, caplog: pytest.LogCaptureFixture
-) -> None:
-    down = Site(fiware, orion_url="http://127.0.0.1:9")
-    async with down.running() as site:
-        await until(lambda: site.health_monitor.orion_error)
-        await until(lambda: len(_warnings(caplog)) >= 1)
-        before = site.health_monitor.orion_error
-        site.health_monitor.orion_error = ""
-        await until(lambda: site.health_monitor.orion_error == before)
-
-    told = [line for line in _warnings(caplog) if line.startswith("orion: ")]
-    assert len(told) == 1
-    assert "cannot be reached" in site.health_monitor.orion_error
-
-
-@pytest.mark.slow
-async def test_f8_a_subscription_that_was_deleted_is_told_and_made_again(
-    fiware: Running,
-) -> None:
-    async with Site(fiware).running() as site:
-        await until(lambda: site.provisioner.subscription_ids)
-        lost = next(iter(site.provisioner.subscription_ids))
-        await site.orion.delete_subscription(lost)
-        await until(lambda: site.health_monitor.notify_error)
-        await until(lambda: not site.health_monitor.notify_error)
-        kept = await site.orion.read_subscriptions()
-
-    assert {one["id"] for one in kept} == site.provisioner.subscription_ids
-    assert len(kept) == len(wanted_for(["AGI"]))
-
-
-@pytest.mark.slow
-async def test_twenty_lives_of_iveg_leave_one_subscription_of_each_kind(
-    fiware: Running,
-) -> None:
-    seen = set()
-    for _ in range(20):
-        async with Site(fiware).running() as site:
-            seen.add(await first_ids(site))
-    async with OrionClient(fiware.orion_url, *SERVICE) as orion:
-        kept = await orion.read_subscriptions()
-
-    assert len(kept) == len(wanted_for(["AGI"]))
-    assert seen == {frozenset(one["id"] for one in kept)}
-
-
-async def test_a_probe_that_reached_orion_is_found_there(fiware: Running) -> None:
-    async with Site(fiware).running() as site:
-        await until(lambda: site.health_monitor.stored_at is not None)
-
-
-@pytest.mark.slow
-async def test_a_foreign_device_on_a_robots_entity_is_told_while_it_is_there(
-    fiware: Running, caplog: pytest.LogCaptureFixture
-) -> None:
-    device = {
-        "device_id": "AAA_gps",
-        "apikey": "iveg",
-        "entity_name": "AGI",
-        "entity_type": "Robot",
-    }
-    async with Site(fiware).running() as site:
-        await until(lambda: site.provisioner.subscription_ids)
-        await site.agent.create_device(device)
-        await until(lambda: site.health_monitor.agent_warning)
-        await site.agent.delete_device("AAA_gps")
-        await until(lambda: not site.health_monitor.agent_warning)
-
-    told = [line for line in _warnings(caplog) if line.startswith("Device AAA_gps")]
-    assert len(told) == 1
 
 
 async def test_an_agent_that_falls_behind_is_asked_nothing_more(
@@ -316,8 +218,8 @@ async def test_an_agent_that_falls_behind_is_asked_nothing_more(
 @pytest.mark.parametrize(
     "body",
     [
-        [{"id": 5, "description": "iVeg: odometry AGI", "notification": 7}],
-        [{"description": "iVeg: odometry AGI", "notification": {}}],
+        [{"id": 5, "description": "iVeg: odometry", "notification": 7}],
+        [{"description": "iVeg: odometry", "notification": {}}],
         {"subscriptions": []},
         [7],
         "text",
@@ -337,11 +239,3 @@ async def test_json_that_nobody_can_use_is_orions_fault_and_kills_nothing(
             await until(lambda: site.health_monitor.notify_error)
 
     assert site.health_monitor.notify_error == "answered JSON that means nothing here"
-
-
-def _warnings(caplog: pytest.LogCaptureFixture) -> list[str]:
-    return [
-        one.getMessage()
-        for one in caplog.records
-        if one.levelno >= logging.WARNING and one.name == "iveg.adapters.provisioner"
-    ]

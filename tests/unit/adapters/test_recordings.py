@@ -13,24 +13,21 @@ import pytest
 from mcap.reader import make_reader
 
 from iveg.adapters import clock
-from iveg.adapters.recordings.incoming import Sort, Unpacking, pack
+from iveg.adapters.recordings.incoming import WHOLE, Sort, Unpacking, pack
 from iveg.adapters.recordings.mcap_file import CHUNK_BYTES, PADDING
-from iveg.adapters.recordings.memories import memory_in
-from iveg.adapters.recordings.reading import is_own, read_messages
-from iveg.adapters.recordings.recorded_sink import RecordedSink
+from iveg.adapters.recordings.reading import finish_broken, is_own, read_messages
 from iveg.adapters.recordings.recorder import (
     MOST_BYTES,
     MOST_WAITING,
     WRITE_S,
     InputRecorder,
 )
-from iveg.adapters.recordings.repair import finish_broken
 from iveg.adapters.recordings.writer import WriterSetup
 from iveg.domain.detection_rule import DetectionRule
-from iveg.domain.disk_space import DiskSpace
 from iveg.domain.errors import DataFileError, HopError
 from iveg.domain.observations import Instant, LaserScan, Observation, Overtaken
-from iveg.domain.records import ClimateRecord, LogRecord
+from iveg.domain.parameters import ByClass
+from iveg.domain.retention import DiskSpace
 from iveg.ngsi import codec
 from tests.builders import (
     START,
@@ -44,7 +41,6 @@ from tests.builders import (
     scan,
 )
 from tests.fakes.clock import FakeClock
-from tests.fakes.recorder import FakeRecorder
 from tests.fakes.recordings import WriterInPlace
 
 TWINS = "/ngsi/notifications"
@@ -108,7 +104,6 @@ async def test_what_came_in_is_there_byte_for_byte_with_its_time(site: Site) -> 
     body = b'{ "subscriptionId": "1", "data": [] }'
     site.hear(0.0, b'{"x":  1}')
     site.recorder.notification(body, at(0.125), ())
-    site.recorder.tick(Instant(START.mono + 0.25, START.wall + 100.25))
     site.write(0.3)
     site.close()
 
@@ -117,14 +112,12 @@ async def test_what_came_in_is_there_byte_for_byte_with_its_time(site: Site) -> 
     assert privately(path) == [
         (ODOM, 0.0, b'{"x":  1}'),
         ("/ngsi/notifications", 0.125, body),
-        ("/iveg/ticks", 0.25, b'{"wall":1700000100.25,"mono":1000.25}'),
     ]
     assert [one[:2] for one in publicly(path)] == [
         (ODOM, "iveg.Measure"),
         ("/ngsi/notifications", "ngsi.Notification"),
-        ("/iveg/ticks", "iveg.Tick"),
     ]
-    assert site.writer.kept == 3
+    assert site.writer.kept == 2
 
 
 async def test_viewers_draw_poses_scans_and_boxes_thinned(site: Site) -> None:
@@ -181,22 +174,6 @@ async def test_of_a_scan_that_its_twin_has_overtaken_no_numbers_are_kept(
     assert drawn.count("foxglove.LaserScan") == 3
 
 
-async def test_rows_of_the_history_are_recorded_but_no_telemetry(site: Site) -> None:
-    history = FakeRecorder()
-    sink = RecordedSink(history, site.recorder.row)
-    row = LogRecord(id=1, at=1.0, kind="system", key="log.start")
-    air = ClimateRecord(at=1.0, temperature=20.0, relative_humidity=0.5, co2=400.0)
-    for one in (row, air):
-        sink.enqueue(one)
-    site.write(1.0)
-    site.close()
-
-    ((topic, schema, value),) = publicly(site.only())
-    assert (topic, schema) == ("/iveg/log", "iveg.Log")
-    assert value["key"] == "log.start"  # type: ignore[index]
-    assert history.records == [row, air]
-
-
 async def test_an_hour_has_a_file_of_its_own_and_a_clock_set_back_spoils_none(
     site: Site,
 ) -> None:
@@ -216,22 +193,6 @@ async def test_an_hour_has_a_file_of_its_own_and_a_clock_set_back_spoils_none(
     ]
 
 
-async def test_a_clock_that_is_set_within_an_hour_begins_a_file_and_reorders_nothing(
-    site: Site,
-) -> None:
-    set_by = {0.0: 0.0, 10.5: 0.9, 21.0: 100.0, 25.0: 50.0, 32.0: 50.0, 33.0: 50.0}
-    for mono, wall in set_by.items():
-        then = Instant(START.mono + mono, START.wall + mono + wall)
-        site.recorder.measure(ODOM, b"{}", then)
-    site.write(34.0)
-    site.close()
-
-    found = [privately(site.path / one) for one in site.names()]
-    # 25 s is too soon for another file.
-    told = [[seconds for _, seconds, _ in one] for one in found]
-    assert told == [[0.0, 10.5], [0.0, 1.0], [0.0, 4.0]]
-
-
 async def test_a_crash_costs_the_open_chunk_and_nothing_before(site: Site) -> None:
     site.hear(0.0, b'{"n":1}')
     site.write(2.0)
@@ -249,18 +210,6 @@ async def test_a_crash_costs_the_open_chunk_and_nothing_before(site: Site) -> No
     assert not copied.exists()
     assert privately(rescued) == found
     assert [value for _, _, value in publicly(rescued, ODOM)] == [{"n": 1}]
-
-
-@pytest.mark.parametrize("cut", [0, 5, 40, 200])
-async def test_a_file_that_broke_off_at_its_beginning_goes(
-    site: Site, cut: int
-) -> None:
-    site.hear(0.0)
-    site.write(2.0)
-    broken = site.path / "2023-11-14T21-00-00Z.mcap.open"
-    broken.write_bytes(site.only().read_bytes()[:cut])
-    finish_broken(broken)
-    assert not broken.exists()
 
 
 async def test_every_cut_of_a_file_is_read_as_far_as_it_goes(site: Site) -> None:
@@ -328,11 +277,11 @@ async def test_each_version_of_the_rule_is_recorded_and_stands_in_each_file(
 ) -> None:
     rule = DetectionRule()
     site.recorder.rule = lambda: rule
-    site.recorder.tick(at(0.0))
-    site.recorder.tick(at(0.1))
-    rule = replace(rule, version=2, threshold=0.9)
-    site.recorder.tick(at(0.2))
-    site.recorder.tick(at(3600.0))
+    site.recorder.note_rule()
+    site.recorder.note_rule()
+    rule = replace(rule, version=2, threshold=ByClass(0.9))
+    site.recorder.note_rule()
+    site.hear(3600.0)
     site.write(3600.0)
     site.close()
 
@@ -347,7 +296,7 @@ async def test_each_version_of_the_rule_is_recorded_and_stands_in_each_file(
 def test_inputs_are_the_same_in_whatever_pieces_they_come(size: int) -> None:
     packed = [
         pack(Sort.MEASURE, at(1.0), "/á", b"1"),
-        pack(Sort.TICK, at(2.0)),
+        pack(Sort.PICTURE, at(2.0), payload=b"{}"),
         pack(Sort.ROW, at(3.0), "Log", b"{}" * 50),
     ]
     whole, unpacking = b"".join(packed), Unpacking()
@@ -357,14 +306,13 @@ def test_inputs_are_the_same_in_whatever_pieces_they_come(size: int) -> None:
         for one in unpacking.feed(whole[begins : begins + size])
     ]
     assert [one.at for one in found] == [at(1.0), at(2.0), at(3.0)]
-    assert [one.channel.topic for one in found] == ["/á", "/iveg/ticks", "/iveg/log"]
-    assert found[2].message == b"{}" * 50
+    assert [one.channel.topic for one in found] == ["/á", "/iveg/pictures", "/iveg/log"]
+    assert found[2].payload == b"{}" * 50
 
 
 async def test_recordings_that_are_off_take_nothing_in(tmp_path: Path) -> None:
     site = Site(tmp_path, is_on=False)
     site.hear(0.0)
-    site.recorder.tick(START)
     site.recorder.notification(b"{}", START, ())
     assert site.recorder.waiting == 0
     assert not site.path.exists()
@@ -375,9 +323,11 @@ async def test_the_oldest_goes_where_the_disk_is_low_and_never_the_open_one(
 ) -> None:
     for hour in range(3):
         site.hear(3600.0 * hour)
+        site.recorder.picture(WHOLE + b'"at":0}', at(3600.0 * hour))
         site.write(3600.0 * hour)
-    assert [await site.recorder.drop_oldest() for _ in range(3)] == [True, True, False]
-    assert len(site.names()) == 1
+    dropped = [await site.recorder.drop_oldest() for _ in range(5)]
+    assert dropped == [True, True, True, True, False]
+    assert [one.suffix for one in site.path.rglob("*.mcap*")] == [".open", ".open"]
 
 
 class Running:
@@ -385,7 +335,10 @@ class Running:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self.recorder = InputRecorder(WriterSetup(folder), clock.now)
+        self.space = DiskSpace(free=10**12, total=10**12)
+        self.recorder = InputRecorder(
+            WriterSetup(folder), clock.now, read_space=lambda _: self.space
+        )
         self.part = asyncio.create_task(self.recorder.run())
 
     def hear(self, number: int) -> None:
@@ -439,47 +392,24 @@ async def test_a_process_that_hangs_and_is_killed_delays_nobody_and_another_goes
     ]
 
 
-async def test_a_memory_is_made_in_pieces_and_keeps_its_place(tmp_path: Path) -> None:
-    running, done = Running(tmp_path), list[object]()
-
-    def pieces() -> Iterator[bytes]:
-        for one in (b"o", b"n", b"e"):
-            asyncio.get_running_loop().call_soon(done.append, "what is due")
-            done.append(one)
-            yield one
-
-    running.hear(1)
-    running.recorder.memory(b"{}", pieces(), clock.now())
-    running.hear(2)
-    written = running.recorder.counters
-    await running.until(lambda: written["recordings_written"] == 3)
-    await running.close()
-
-    assert done == [b"o", "what is due", b"n", "what is due", b"e", "what is due"]
-    (path,) = _inside(tmp_path)
-    first, memory, second = [data for _, _, data in privately(path)]
-    assert (first, second) == (b"1", b"2")
-    assert memory_in(orjson.loads(memory)) == b"one"
-
-
-async def test_a_memory_that_cannot_be_made_is_told_and_hurts_nobody(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
-    running = Running(tmp_path)
-    running.hear(1)
-    running.recorder.memory(b"{}", (bytes(1 // n) for n in (1, 0)), clock.now())
-    running.hear(2)
-    await running.until(lambda: running.recorder.counters["recordings_written"] == 2)
-    await running.close()
-
-    assert running.recorder.counters["recordings_dropped"] == 1
-    assert "a memory cannot be recorded" in caplog.text
-    (path,) = _inside(tmp_path)
-    assert [data for _, _, data in privately(path)] == [b"1", b"2"]
-
-
 def _inside(folder: Path) -> list[Path]:
     return sorted(folder.iterdir())
+
+
+async def test_a_small_disk_is_left_to_others_until_there_is_room(
+    tmp_path: Path,
+) -> None:
+    running = Running(tmp_path)
+    running.space = replace(running.space, free=19 * 10**9)
+    with pytest.raises(HopError, match="less than 20 GB free"):
+        await running.part
+    running.hear(1)
+    assert (running.recorder.waiting, running.recorder.pid) == (0, None)
+
+    running.space = replace(running.space, free=20 * 10**9)
+    running.part = asyncio.create_task(running.recorder.run())
+    await running.until(lambda: running.recorder.pid)
+    await running.close()
 
 
 async def test_a_disk_that_refuses_is_told_and_hurts_nobody(tmp_path: Path) -> None:
@@ -489,5 +419,5 @@ async def test_a_disk_that_refuses_is_told_and_hurts_nobody(tmp_path: Path) -> N
     with pytest.raises(HopError, match="disk: Not a directory"):
         await running.part
     running.hear(2)
-    assert running.recorder.counters["recordings_dropped"] == 1
+    assert running.recorder.waiting == 2
     await running.close()

@@ -1,6 +1,6 @@
 import pytest
 
-from iveg.adapters.toml_positions import Path, place_of
+from iveg.adapters.toml_files import KeyPath, place_of
 
 TEXT = """\
 title = "x"
@@ -47,7 +47,9 @@ name = "y"
         (("house", "name"), (22, 1)),
     ],
 )
-def test_a_key_is_found_by_line_and_column(path: Path, place: tuple[int, int]) -> None:
+def test_a_key_is_found_by_line_and_column(
+    path: KeyPath, place: tuple[int, int]
+) -> None:
     assert place_of(TEXT, path) == place
 
 
@@ -61,6 +63,6 @@ def test_a_key_is_found_by_line_and_column(path: Path, place: tuple[int, int]) -
     ],
 )
 def test_what_is_missing_is_looked_for_where_it_belongs(
-    path: Path, place: tuple[int, int]
+    path: KeyPath, place: tuple[int, int]
 ) -> None:
     assert place_of(TEXT, path) == place

@@ -9,7 +9,6 @@ import pytest
 
 from iveg.adapters.orion import OrionClient
 from iveg.adapters.transports import OrionTransport
-from iveg.domain.errors import HopError
 from iveg.domain.goals import CancelOrder, Goal, GoalOrder
 
 
@@ -80,16 +79,3 @@ async def test_a_goal_is_a_command_of_its_own_alone() -> None:
         {"goal": {"type": "command", "value": {"set": told}}},
         {"goal": {"type": "command", "value": {"cancel": {"id": "01G"}}}},
     ]
-
-
-@pytest.mark.parametrize("status", [b"404 Not Found", b"500 Oh"])
-async def test_f6_a_refusal_is_a_failed_hop(status: bytes) -> None:
-    async with orion(status) as (transport, _):
-        with pytest.raises(HopError):
-            await transport.stop("AGI", "01A", "x")
-
-
-async def test_f7_a_slow_orion_is_given_up_after_a_second_and_a_half() -> None:
-    async with orion(b"204 No Content", answers=False) as (transport, _):
-        with pytest.raises(HopError, match=r"1\.5 s"):
-            await transport.stop("AGI", "01A", "x")

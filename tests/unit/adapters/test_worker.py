@@ -11,7 +11,6 @@ import pytest
 
 from iveg.adapters.worker import MOST_WAITING, Worker
 from iveg.domain.errors import HopError
-from iveg.models.day import Worked
 from tests.processes import is_alive, until
 
 
@@ -91,12 +90,6 @@ async def test_a_worker_that_died_is_made_anew_and_ends_with_the_server(
     assert len({first, second, os.getpid()}) == 3
     assert len(failures) == 2
     until(lambda: not is_alive(second), "the worker ends", 10.0)
-
-
-async def test_a_model_comes_back_as_it_was(worker: Worker) -> None:
-    worked = Worked(lane="1", robot_id="AGI", minutes=2.0)
-
-    assert await worker.run(Worked, **vars(worked)) == worked
 
 
 async def test_more_than_can_wait_is_refused(worker: Worker) -> None:

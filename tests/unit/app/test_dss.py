@@ -22,8 +22,6 @@ async def test_mqtt_and_the_rule_loop_alone_share_the_fate_of_the_process(
     assert set(dss.vital()) == {"mqtt", "rule-loop"}
     assert set(dss.comfort()) == {
         "accounts",
-        "api-tokens",
-        "passkeys",
         "costmap",
         "coverage",
         "provisioner",
@@ -32,13 +30,11 @@ async def test_mqtt_and_the_rule_loop_alone_share_the_fate_of_the_process(
         "retention",
         "messages",
         "peer-scans",
-        "second-witness",
         "earlier",
         "loop-watch",
-        "past",
+        "pictures",
         "recordings",
         "shadow-rule",
-        "what-if",
     }
 
 

@@ -9,10 +9,10 @@ import pytest
 
 from iveg.cli import COMMANDS, main, robot
 from iveg.cli.arguments import CommandCall, parser
+from iveg.cli.nodes import load_config
 from iveg.cli.robot import refuse_second_gate
-from iveg.cli.robot_config import load_config
-from iveg.domain.errors import DataFileError, HopError, SettingsError
-from iveg.ros2 import geometry_msgs
+from iveg.domain.errors import HopError, SettingsError
+from iveg.ros2 import messages as ros
 from iveg.settings import Settings
 from tests.fakes.ros2_network import FakeNetwork, endpoint
 
@@ -61,22 +61,6 @@ def test_words_count_before_the_file_and_the_file_before_the_environment(
     assert classes == ("tomato", "farmer")
 
 
-@pytest.mark.parametrize("said", ["x", "-3", "1.5"])
-def test_a_domain_of_the_environment_that_is_none_is_refused(said: str) -> None:
-    with pytest.raises(SettingsError, match="ROS_DOMAIN_ID"):
-        load_config(options(), {"ROS_DOMAIN_ID": said})
-
-
-def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
-    with pytest.raises(DataFileError, match="cannot be read"):
-        load_config(options("--config", str(tmp_path / "none.toml")), {})
-
-
-def test_a_topic_of_the_command_line_that_is_none_is_named() -> None:
-    with pytest.raises(DataFileError, match="not a ROS topic"):
-        load_config(options("--cmd-vel-out", "cmd vel"), {})
-
-
 def test_nobody_lets_a_robot_go_over_a_broker_that_is_not_here(
     tmp_path: Path,
 ) -> None:
@@ -92,7 +76,7 @@ def test_nobody_lets_a_robot_go_over_a_broker_that_is_not_here(
 
 async def test_a_drive_that_somebody_else_publishes_is_refused() -> None:
     network = FakeNetwork()
-    network.others.append(endpoint("/cmd_vel", geometry_msgs.Twist))
+    network.others.append(endpoint("/cmd_vel", ros.Twist))
 
     with pytest.raises(HopError, match="/cmd_vel has a publisher already"):
         await refuse_second_gate(network, "/cmd_vel", 0.01, 0.2)
@@ -100,8 +84,8 @@ async def test_a_drive_that_somebody_else_publishes_is_refused() -> None:
 
 async def test_a_gate_that_was_killed_is_waited_for_until_it_is_forgotten() -> None:
     network = FakeNetwork()
-    network.others.append(endpoint("/cmd_vel", geometry_msgs.Twist))
-    network.others.append(endpoint("/cmd_vel", geometry_msgs.Twist, writes=False))
+    network.others.append(endpoint("/cmd_vel", ros.Twist))
+    network.others.append(endpoint("/cmd_vel", ros.Twist, writes=False))
     asyncio.get_running_loop().call_later(0.1, network.others.pop, 0)
 
     await refuse_second_gate(network, "/cmd_vel", 0.01, 5.0)

@@ -14,8 +14,9 @@ from iveg.domain.stop import (
     SetDesiredState,
     StopMachine,
 )
+from iveg.domain.stop.commands import FollowedCommand
 from iveg.domain.transports import DIRECT, FIWARE, TransportId
-from tests.builders import at, safety_report
+from tests.builders import at, odometry, safety_report
 
 BOOT_HOLD = Hold("boot-b1", "boot", "remote")
 CHALLENGE, NEXT_CHALLENGE = "0123456789abcdef", "fedcba9876543210"
@@ -50,8 +51,7 @@ class Bench:
     def sent(
         self, transport: TransportId = DIRECT.id, *, ok: bool = True
     ) -> list[Effect]:
-        assert self.machine.stop is not None
-        command_id = self.machine.stop.command_id
+        command_id = self.stop.command_id
         return self.keep(self.machine.sent(transport, command_id, at(self.now), ok=ok))
 
     def report(
@@ -104,7 +104,10 @@ class Bench:
     def odometry(self, linear: float, angular: float = 0.0) -> list[Effect]:
         return self.keep(
             self.machine.odometry(
-                linear, angular, at(self.now), self.new_id(), UNKNOWN_ORIGIN, inf
+                odometry(linear=linear, angular=angular, origin=UNKNOWN_ORIGIN),
+                at(self.now),
+                self.new_id(),
+                inf,
             )
         )
 
@@ -131,10 +134,21 @@ class Bench:
         return Hold(self.machine.hold_id, "iveg", "remote")
 
     @property
+    def stop(self) -> FollowedCommand:
+        """The STOP that is wanted."""
+        assert self.machine.stop is not None
+        return self.machine.stop
+
+    @property
+    def once(self) -> FollowedCommand:
+        """The release or resume under way."""
+        assert self.machine.once is not None
+        return self.machine.once
+
+    @property
     def attempt(self) -> str:
         """Of the release or resume under way."""
-        assert self.machine.once is not None
-        return self.machine.once.command_id
+        return self.once.command_id
 
     def stand(self, *also: Hold) -> "Bench":
         """Report our hold at rest until the machine believes it."""
@@ -181,47 +195,41 @@ def levels(effects: list[Effect]) -> list[str]:
     return [one.desired for one in effects if isinstance(one, SetDesiredState)]
 
 
-def _pressed() -> Bench:
+def pressed() -> Bench:
     bench = Bench()
     bench.press()
     return bench
 
 
-def _sent() -> Bench:
-    bench = _pressed()
-    bench.sent(DIRECT.id)
+def standing(*also: Hold) -> Bench:
+    return pressed().stand(*also)
+
+
+def releasing() -> Bench:
+    """A robot that stood and is being released."""
+    bench = standing()
+    bench.release(bench.ours.id)
     return bench
 
 
-def _delivered() -> Bench:
-    bench = _pressed()
-    bench.report(bench.ours)
-    return bench
+def _after(*steps: Callable[[Bench], object]) -> Callable[[], Bench]:
+    """Makes a robot whose STOP was asked for and to which this happened then."""
 
+    def make() -> Bench:
+        bench = pressed()
+        for step in steps:
+            step(bench)
+        return bench
 
-def _unconfirmed() -> Bench:
-    bench = _pressed()
-    bench.wait(1.1)
-    return bench
-
-
-def _stale() -> Bench:
-    bench = _pressed()
-    bench.stand()
-    bench.wait(2.0)
-    return bench
-
-
-def _ready() -> Bench:
-    return Bench().ready()
+    return make
 
 
 IN_STATE: dict[str, Callable[[], Bench]] = {
     "RUNNING": Bench,
-    "REQUESTED": _pressed,
-    "SENT": _sent,
-    "DELIVERED": _delivered,
-    "UNCONFIRMED": _unconfirmed,
-    "STALE": _stale,
-    "READY": _ready,
+    "REQUESTED": pressed,
+    "SENT": _after(Bench.sent),
+    "DELIVERED": _after(lambda bench: bench.report(bench.ours)),
+    "UNCONFIRMED": _after(lambda bench: bench.wait(1.1)),
+    "STALE": _after(Bench.stand, lambda bench: bench.wait(2.0)),
+    "READY": lambda: Bench().ready(),
 }

@@ -1,18 +1,14 @@
 """Robot, broker, FIWARE, iVeg and a page, each with a delay, on a clock of its own."""
 
 import heapq
-import random
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import count
 
-from iveg.domain.age import FeedbackLedger
-from iveg.domain.latency.segments import DATA, Data, Segment
-from iveg.domain.latency.sketch import Sketch, merged
-from iveg.domain.latency.stream import Stream
-from iveg.domain.latency.watch import LatencyWatch
+from iveg.domain.latency import DATA, Data, LatencyWatch, Segment, Sketch, merged
 from iveg.domain.observations import FeedbackRef, Observation, Origin, Received
 from iveg.domain.transports import DIRECT, FIWARE, TransportId
+from iveg.domain.world import FeedbackLedger
 from tests.builders import START, at, detection_frame, odometry, scan
 
 Delay = Callable[[], float]
@@ -28,15 +24,6 @@ def still(seconds: float) -> Delay:
     return lambda: seconds
 
 
-def jittered(least: float, most: float) -> Delay:
-    chance = random.Random(5)  # noqa: S311 - jitter
-    return lambda: chance.uniform(least, most)
-
-
-def none_lost(_: int) -> bool:
-    return False
-
-
 def as_it_is(origin: Origin) -> Origin:
     return origin
 
@@ -48,28 +35,22 @@ class Chain:
     Attributes:
         up: What a message takes to the broker (s); ``agent`` on to Orion; ``iveg`` to
             the decision; ``page`` to the screen.
-        lost_up: Whether the n-th is lost before the broker; ``lost_agent`` behind it.
         written: What becomes of an origin before it is sent.
-        direct: Whether iVeg reads the broker itself; ``reading`` how long that takes.
+        direct: Whether iVeg reads the broker itself.
     """
 
     up: Delay = field(default=still(0.004))
     agent: Delay = field(default=still(0.020))
     iveg: Delay = field(default=still(0.001))
     page: Delay = field(default=still(0.010))
-    lost_up: Callable[[int], bool] = none_lost
-    lost_agent: Callable[[int], bool] = none_lost
     written: Callable[[Origin], Origin] = as_it_is
     direct: bool = True
-    thinned: bool = False
-    reading: Delay = field(default=still(0.0))
-    robots: tuple[str, ...] = ("AGI",)
     watch: LatencyWatch = field(init=False)
     now: float = 0.0
 
     def __post_init__(self) -> None:
         self._ledger = FeedbackLedger()
-        self.watch = LatencyWatch(self.robots, self._ledger.composed_at)
+        self.watch = LatencyWatch(("AGI",), self._ledger.composed_at)
         self._rounds = 0
         self._numbers = count()
         self._last: dict[TransportId, Received] = {}
@@ -82,53 +63,36 @@ class Chain:
             self.now = self._rounds / HZ
             first = self._rounds
             self._ledger.composed("iveg", first, first, START.mono + self.now - 0.01)
-            for robot_id in self.robots:
-                for data in DATA:
-                    self._send(robot_id, data)
+            for data in DATA:
+                self._send(data)
             while self._waiting and self._waiting[0][0] <= self.now:
                 heapq.heappop(self._waiting)[2]()
             self.watch.tick(at(self.now))
 
-    def stream(self, data: Data = "odometry", robot_id: str = "AGI") -> Stream:
-        streams = {(one.robot_id, one.data): one for one in self.watch.streams}
-        return streams[robot_id, data]
-
-    def took(
-        self, hop: Segment, data: Data = "odometry", robot_id: str = "AGI"
-    ) -> Sketch:
+    def took(self, hop: Segment, data: Data = "odometry") -> Sketch:
         """The last minute of a hop."""
-        return merged(self.stream(data, robot_id).segments[hop].parts("1min"))
+        (stream,) = (one for one in self.watch.streams if one.data == data)
+        return merged(stream.segments[hop].parts("1min"))
 
     def last(self, transport: TransportId) -> Received:
         """What came last on a transport."""
         return self._last[transport]
 
-    def said(self) -> dict[str, dict[str, str | float]]:
-        """What is wrong with the hops now, by its sentence."""
-        remarks = self.watch.overloads.remarks
-        return {one.key: dict(one.slots) for one in remarks}
-
-    def _send(self, robot_id: str, data: Data) -> None:
+    def _send(self, data: Data) -> None:
         seq, stamp = self._rounds, round(START.wall + self.now, 3)
         heard = FeedbackRef("iveg", self._rounds)
         sent = self.written(Origin("b", seq, str(stamp), stamp, self.now, True, heard))
-        told = MAKE[data](robot_id, sent)
-        if self.lost_up(seq):
-            return
+        told = MAKE[data]("AGI", sent)
         broker = self.now + self.up()
         if self.direct:
-            read = broker + self.reading()
-            self._later(read, lambda: self._arrive(told, read, DIRECT.id, data))
-        if not self.lost_agent(seq):
-            orion = broker + self.agent()
-            self._later(orion, lambda: self._arrive(told, orion, FIWARE.id, data))
+            self._later(broker, lambda: self._arrive(told, broker, DIRECT.id, data))
+        orion = broker + self.agent()
+        self._later(orion, lambda: self._arrive(told, orion, FIWARE.id, data))
 
     def _arrive(
         self, told: Observation, when: float, transport: TransportId, data: Data
     ) -> None:
-        received = Received(
-            told, at(when), transport, thinned=self.thinned and transport == "fiware"
-        )
+        received = Received(told, at(when), transport)
         self.watch.arrived(received)
         self._last[transport] = received
         if transport == "direct" or not self.direct:

@@ -10,19 +10,18 @@ from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import (
     Detection,
     DetectionFrame,
-    LaserScan,
     Navigation,
     Origin,
     Received,
+    ReportedObstacle,
 )
-from iveg.domain.rule.crossings import LimitChange
-from iveg.domain.rule.obstacles import Obstacles
-from iveg.domain.rule.speed_limits import SpeedLimits
+from iveg.domain.rule.judge import SpeedLimits
+from iveg.domain.rule.zones import LimitChange
+from iveg.domain.tracking.blind import BlindCameras
 from iveg.domain.tracking.calibration import Calibrations
 from iveg.domain.tracking.people import People, Placed
 from iveg.domain.tracking.person import TrackedPerson
-from iveg.domain.tracking.sight import AllClear
-from iveg.domain.witness import Plan
+from iveg.domain.tracking.sight import Look, OwnSight
 from iveg.domain.world import World
 from tests.builders import (
     at,
@@ -63,10 +62,10 @@ class Scene:
     def __post_init__(self) -> None:
         self.world = World(fleet_of(*self.robots))
         self.people = People(self.greenhouse, calibrations=self.calibrations)
-        plan = Plan.of(self.greenhouse)
-        self.obstacles = Obstacles(self.world, self.people, plan)
-        self.speed_limits = SpeedLimits(self.greenhouse, self.obstacles.seen)
-        self.all_clear = AllClear()
+        self.speed_limits = SpeedLimits(self.greenhouse)
+        self.own_sight = OwnSight(self.greenhouse)
+        self.blind = BlindCameras(self.greenhouse)
+        self.ended: list[TrackedPerson] = []
         self._seq = 0
 
     # --- what robots say ----------------------------------------------------------
@@ -86,19 +85,30 @@ class Scene:
         self._apply(received(said, after=self.now))
 
     def look(
-        self, robot_id: str, *detections: Detection, unreadable: int = 0
+        self,
+        robot_id: str,
+        *detections: Detection,
+        unreadable: int = 0,
+        late_s: float = 0.0,
     ) -> list[Placed]:
-        """A robot says what it sees."""
+        """A robot says what it sees, or saw so long ago."""
         self._seq += 1
         frame = detection_frame(
-            robot_id, *detections, unreadable=unreadable, origin=self._origin()
+            robot_id, *detections, unreadable=unreadable, origin=self._origin(late_s)
         )
+        return self.take(frame)
+
+    def take(self, frame: DetectionFrame) -> list[Placed]:
+        """A frame comes in."""
         self._apply(received(frame, after=self.now))
-        placed, robot = self.sight(frame), self.world.robot(robot_id)
+        placed, robot = self.sight(frame), self.world.robot(frame.robot_id)
         if flaw_of(frame, self.rule, self.people.turned_away):
             robot.detector.note_flaw("unreadable", at(self.now))
         else:
             robot.detector.note_whole(robot.detections_at)
+        look = Look.of_frame(robot, frame, placed, at(self.now))
+        self.blind.take(look, self.people, self.world)
+        self.ended += self.own_sight.take(look, self.people)
         return placed
 
     def sight(self, frame: DetectionFrame) -> list[Placed]:
@@ -106,16 +116,16 @@ class Scene:
             frame, self.world, self.rule, at(self.now), f"look{self._seq}"
         )
 
-    def scan(self, robot_id: str, said: LaserScan) -> None:
-        """A robot says what its laser measures."""
+    def walks_by(
+        self, robot_id: str, x: float, y: float = 0.0, *, moved: bool = True
+    ) -> TrackedPerson | None:
+        """A robot reports what its laser sees: somebody who walks, or a thing."""
         self._seq += 1
-        self._apply(received(replace(said, robot_id=robot_id, origin=self._origin())))
-        robot = self.world.robot(robot_id)
-        if isinstance(robot.scan, LaserScan):
-            self.obstacles.look(robot, robot.scan, at(self.now))
-        for name, when, spots in self.obstacles.walkers():
-            seer = self.world.robot(name)
-            self.people.witness(seer, spots, when, f"laser{self._seq}")
+        seen = ReportedObstacle(x, y, 0.4, moved)
+        said = safety_report(robot_id, speed_factor=0.5, reason="obstacle")
+        said = replace(said, obstacle=seen, origin=self._origin())
+        self._apply(received(said, after=self.now))
+        return self.people.witness(said, at(self.now), f"laser{self._seq}")
 
     def report(
         self,
@@ -146,8 +156,8 @@ class Scene:
         said = Navigation(robot_id, self._origin(), task, None, path)
         self._apply(received(said))
 
-    def _origin(self) -> Origin:
-        return replace(origin(self._seq, after=self.now), replay=self.replay)
+    def _origin(self, late_s: float = 0.0) -> Origin:
+        return replace(origin(self._seq, after=self.now - late_s), replay=self.replay)
 
     def _apply(self, one: Received) -> None:
         self.world.apply(replace(one, at=at(self.now)))
@@ -160,11 +170,6 @@ class Scene:
         )
         self.changes += changes
         return speed_limits
-
-    def sweep(self) -> list[TrackedPerson]:
-        return self.all_clear.sweep(
-            self.people, self.world, self.greenhouse, at(self.now)
-        )
 
     @property
     def everyone(self) -> list[TrackedPerson]:

@@ -2,8 +2,8 @@
 
 import pytest
 
-from iveg.domain.age import FeedbackLedger
 from iveg.domain.observations import FeedbackRef
+from iveg.domain.world import FeedbackLedger
 
 
 def ledger(*moments: float, each: int = 2) -> FeedbackLedger:
@@ -27,10 +27,15 @@ def test_what_was_heard_tells_when_it_was_composed(seq: int, moment: float) -> N
 
 
 @pytest.mark.parametrize(
-    "echo", [None, heard(0), heard(7), heard(3, boot="an earlier iVeg")]
+    "echoes", [(), (heard(0),), (heard(7),), (heard(3, boot="an earlier iVeg"),)]
 )
-def test_what_was_never_sent_proves_nothing(echo: FeedbackRef | None) -> None:
-    assert ledger(10.0, 10.1, 10.2).composed_at(echo) is None
+def test_what_was_never_sent_proves_nothing(echoes: tuple[FeedbackRef, ...]) -> None:
+    assert ledger(10.0, 10.1, 10.2).composed_at(*echoes) is None
+
+
+def test_of_several_authors_ours_proves_the_age_wherever_it_stands() -> None:
+    echoes = heard(9, boot="another"), heard(99), heard(5), heard(2)
+    assert ledger(10.0, 10.1, 10.2).composed_at(*echoes) == 10.2
 
 
 def test_before_the_first_feedback_nothing_is_proven() -> None:

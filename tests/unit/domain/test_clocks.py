@@ -13,7 +13,7 @@ from iveg.domain.observations import (
     SafetyReport,
 )
 from iveg.domain.transports import DIRECT, FIWARE, TransportId
-from tests.builders import START, at, origin
+from tests.builders import at, origin
 
 HOUR_S = 3600.0
 YEARS_S = 5 * 365 * 86400.0
@@ -51,13 +51,6 @@ class Robot:
 
 
 # --- delays -----------------------------------------------------------------------
-
-
-def test_what_a_message_took_beyond_the_fastest_is_its_delay() -> None:
-    robot = Robot()
-    robot.send(0.0, 0.02)
-
-    assert robot.send(1.0, 0.5) == pytest.approx(0.48)
 
 
 @pytest.mark.parametrize("delay", [0.001, 9.0, 25.0, 60.0])
@@ -176,22 +169,6 @@ def test_our_own_wall_clock_ages_nothing_when_it_is_set() -> None:
 # --- the offset -------------------------------------------------------------------
 
 
-def test_the_offset_is_the_least_of_a_minute_of_direct_messages() -> None:
-    robot = Robot()
-    for number, delay in enumerate((0.30, 0.02, 0.25, 0.40)):
-        robot.send(float(number), delay)
-        robot.send(float(number), 7.0, FIWARE.id)
-
-    assert robot.offset(4.0) == pytest.approx(0.02)
-
-
-def test_fiware_tells_no_offset() -> None:
-    robot = Robot(ahead_s=-9.0)
-    robot.send(0.0, 1.0, FIWARE.id)
-
-    assert robot.offset(1.0) is None
-
-
 def test_a_new_boot_has_a_clock_of_its_own() -> None:
     robot = Robot()
     robot.send_many(0.0, 5)
@@ -199,14 +176,6 @@ def test_a_new_boot_has_a_clock_of_its_own() -> None:
     robot.send(1.0, boot="boot-b")
 
     assert robot.offset(1.0) == pytest.approx(-7.0)
-
-
-def test_boots_that_are_long_gone_are_forgotten() -> None:
-    robot = Robot()
-    for number in range(100):
-        robot.send(0.0, boot=f"boot-{number}")
-
-    assert len(robot.estimate._filters) == 16
 
 
 @pytest.mark.parametrize(
@@ -228,10 +197,6 @@ def test_a_warning_lasts_a_minute_so_that_none_flaps() -> None:
     told = [robot.estimate.warning(at(s)) is not None for s in (1.0, 59.0, 61.0)]
 
     assert told == [True, True, False]
-
-
-def test_nothing_is_told_of_a_clock_that_nobody_heard() -> None:
-    assert RobotClock().warning(START) is None
 
 
 # --- a detector's own clock -------------------------------------------------------

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import pytest
 
-from iveg.domain.geometry import Rectangle
+from iveg.domain.geometry import Rectangle, wrap_angle
 from iveg.domain.observations import (
     FeedbackRef,
     Hold,
@@ -19,7 +19,6 @@ from iveg.domain.world import World
 from tests.builders import (
     at,
     fleet_of,
-    hold,
     odometry,
     origin,
     safety_report,
@@ -117,6 +116,7 @@ def _outside(robot: Robot) -> None:
 
 def _fast(robot: Robot) -> None:
     robot.wait(STEP_S)
+    robot.x += 1.6 * STEP_S
     robot.say(odometry(x=robot.x, y=5.0, linear=1.6, origin=robot.origin()))
 
 
@@ -135,36 +135,26 @@ def _jumping(robot: Robot) -> None:
     robot.drive(STEP_S)
 
 
-def _leaping_clock(robot: Robot) -> None:
-    robot.ahead_s += 11.0
-    robot.drive(STEP_S)
+def _gliding(robot: Robot) -> None:
+    robot.x += 0.03
+    robot.drive(STEP_S, speed=0.0)
 
 
-def _falling_clock(robot: Robot) -> None:
-    robot.ahead_s -= 1.0
-    robot.drive(STEP_S)
-
-
-def _booting(robot: Robot) -> None:
-    robot.boot = f"boot-{robot.seq}"
-    robot.drive(STEP_S)
-
-
-def _prophetic(robot: Robot) -> None:
+def _dead_reckoned(robot: Robot) -> None:
     robot.wait(STEP_S)
-    heard = FeedbackRef("iveg", robot.told + 1)
-    said = odometry(x=robot.x, y=5.0, origin=replace(robot.origin(), heard=heard))
+    robot.say(odometry(x=robot.x, y=5.0, linear=0.5, origin=robot.origin()))
+
+
+def _sliding(robot: Robot) -> None:
+    robot.x += 0.03
+    robot.wait(STEP_S)
+    robot.say(odometry(x=robot.x, y=5.0, yaw=1.5, linear=0.0, origin=robot.origin()))
+
+
+def _turning(robot: Robot) -> None:
+    robot.wait(STEP_S)
+    said = odometry(x=robot.x, y=5.0, linear=0.0, angular=0.5, origin=robot.origin())
     robot.say(said)
-
-
-def _standing_on_wheels(robot: Robot) -> None:
-    robot.drive(STEP_S)
-    robot.say(robot.report())
-
-
-def _holding_what_was_released(robot: Robot) -> None:
-    robot.wait(STEP_S)
-    robot.say(robot.report(hold("01X"), released=("01X",)))
 
 
 LIES: list[tuple[str, Callable[[Robot], None]]] = [
@@ -173,12 +163,10 @@ LIES: list[tuple[str, Callable[[Robot], None]]] = [
     ("too_fast", _spinning),
     ("too_fast", _fast_report),
     ("jumped", _jumping),
-    ("clock_leapt", _leaping_clock),
-    ("clock_leapt", _falling_clock),
-    ("boots_often", _booting),
-    ("heard_unsent", _prophetic),
-    ("stands_moving", _standing_on_wheels),
-    ("foreign_hold", _holding_what_was_released),
+    ("pose_against_twist", _gliding),
+    ("pose_against_twist", _dead_reckoned),
+    ("sideways", _sliding),
+    ("yaw_against_turn", _turning),
 ]
 kinds_of_lies = pytest.mark.parametrize(
     ("code", "lie"), LIES, ids=[lie.__name__.strip("_") for _, lie in LIES]
@@ -212,28 +200,9 @@ def test_what_contradicts_once_is_no_doubt(
     assert robot.met == set()
 
 
-@kinds_of_lies
-def test_f65_a_doubt_ends_after_a_second_of_consistency(
-    code: str, lie: Callable[[Robot], None]
-) -> None:
-    robot = Robot()
-    robot.drive(1.0)
-    for _ in range(20):
-        lie(robot)
-    robot.come_to_reason()
-
-    robot.drive(1.0)
-    shortly_before = robot.doubts
-    robot.drive(0.2)
-
-    assert code in shortly_before
-    assert robot.doubts == ()
-
-
-@kinds_of_lies
-def test_a_recording_may_say_anything(code: str, lie: Callable[[Robot], None]) -> None:
+def test_a_recording_may_say_anything() -> None:
     robot = Robot("AGI:recording")
-    for _ in range(20):
+    for _, lie in LIES * 20:
         lie(robot)
 
     assert robot.robot.is_replay
@@ -260,7 +229,7 @@ def test_many_small_steps_that_add_up_are_a_jump() -> None:
         robot.x += 0.4
         robot.drive(STEP_S, speed=0.0)
 
-    assert robot.doubts == ("jumped",)
+    assert set(robot.doubts) == {"jumped", "pose_against_twist"}
 
 
 def test_full_speed_and_a_turn_on_the_spot_are_plausible() -> None:
@@ -268,7 +237,8 @@ def test_full_speed_and_a_turn_on_the_spot_are_plausible() -> None:
     robot.drive(3.0, speed=1.0)
     for _ in range(30):
         robot.wait(STEP_S)
-        said = odometry(x=robot.x, y=5.0, linear=0.0, angular=1.0)
+        yaw = wrap_angle(robot.now)
+        said = odometry(x=robot.x, y=5.0, yaw=yaw, linear=0.0, angular=1.0)
         robot.say(replace(said, origin=robot.origin()))
 
     assert robot.met == set()
@@ -284,22 +254,6 @@ def test_a_robot_that_nobody_described_may_drive_as_any_robot_does() -> None:
 
     assert slow_enough == set()
     assert robot.doubts == ("too_fast",)
-
-
-def test_the_edge_of_a_greenhouses_size_around_it_is_not_outside() -> None:
-    robot = Robot(x=100.0)
-    robot.drive(3.0, speed=0.0)
-
-    assert robot.met == set()
-
-
-def test_without_a_greenhouse_nothing_is_outside() -> None:
-    robot = Robot(x=1e5)
-    robot.world = World(fleet_of("AGI"))
-    robot.robot = robot.world.robot("AGI")
-    robot.drive(3.0, speed=0.0)
-
-    assert robot.met == set()
 
 
 @pytest.mark.parametrize("mono", [True, False])
@@ -318,16 +272,6 @@ def test_what_fiware_keeps_and_lets_go_at_once_is_no_jump(mono: bool) -> None:
         robot.now = round(robot.now + 0.02, 6)
         robot.say(one)
     robot.drive(1.0, speed=1.0)
-
-    assert robot.met == set()
-
-
-def test_poses_of_a_robot_that_does_not_count_may_come_mixed() -> None:
-    robot = Robot(transport=FIWARE.id)
-    for late in (0.0, 3.0, 0.0, 2.0) * 10:
-        robot.wait(STEP_S)
-        x = 5.0 + robot.now - late
-        robot.say(odometry(x=x, y=5.0, linear=1.0, origin=Origin()))
 
     assert robot.met == set()
 

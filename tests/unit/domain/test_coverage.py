@@ -27,13 +27,6 @@ def looking(seconds: float = 0.0) -> tuple[Scene, AisleCoverage]:
     return scene, coverage
 
 
-def test_what_no_camera_ever_looked_at_is_never() -> None:
-    coverage = AisleCoverage(GREENHOUSE)
-
-    assert coverage.ages(at(5)) == [[None] * 12, [None] * 12]
-    assert coverage.share(at(5)) == 0.0
-
-
 def test_a_camera_sees_ahead_and_not_behind_or_through_the_crop() -> None:
     _, coverage = looking()
 
@@ -49,13 +42,6 @@ def test_ages_grow_and_what_was_looked_at_long_ago_is_not_seen_now() -> None:
     assert (coverage.share(at(1)) or 0.0) > 0.0
     assert coverage.share(at(11)) == 0.0
     assert coverage.ages(at(11))[0][6] == 11
-
-
-def test_a_robot_that_is_silent_looks_at_nothing() -> None:
-    scene, coverage = looking()
-    coverage.update(scene.world.live_robots(), at(2.0))
-
-    assert coverage.ages(at(2.0))[0][6] == 2
 
 
 def test_an_open_field_has_no_aisles_to_look_at() -> None:

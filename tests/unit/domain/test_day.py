@@ -14,7 +14,6 @@ from iveg.domain.day import (
 from iveg.domain.geometry import Rectangle
 from iveg.domain.greenhouse import DriveLane, Greenhouse
 from iveg.domain.records import DecisionRecord
-from iveg.domain.stop.drills import due_drills
 from tests.fakes.records import NOON, decision_record
 
 GREENHOUSE = Greenhouse(
@@ -88,10 +87,3 @@ def test_the_closest_passes_are_of_moving_robots_and_not_one_pass_told_thrice() 
 
     assert [(one.at, one.distance_m) for one in found] == [(11.0, 0.5), (200.0, 2.0)]
     assert found[0].lane == "1"
-
-
-def test_a_drill_is_due_when_it_will_be_too_old_tomorrow() -> None:
-    last = {"AGI": NOON - 29.5 * 86_400.0, "AGII": NOON}
-
-    assert due_drills(last, 30.0, NOON + 86_400.0) == ["AGI"]
-    assert due_drills(last, 0.0, NOON + 86_400.0) == []

@@ -77,11 +77,6 @@ def test_forty_five_frames_a_second_are_judged_and_no_more() -> None:
     assert admitted == pytest.approx(FRAMES_HZ * 11, abs=1)
 
 
-def test_thirty_frames_a_second_are_judged_for_ever() -> None:
-    detector = DetectorEvidence()
-    assert all(detector.admits_frame(at(n / 30)) for n in range(3000))
-
-
 @pytest.mark.parametrize("class_id", ["farmer", " Husky ", None])
 def test_an_unread_box_that_may_be_of_a_person_or_robot_is_a_flaw(
     class_id: str | None,

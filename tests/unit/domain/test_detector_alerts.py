@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from iveg.domain.alerts import conditions
+from iveg.domain import alerts
 from iveg.domain.detector import OutOfService
 from iveg.domain.observations import RefusedFrame
 from iveg.domain.world import World
@@ -22,14 +22,10 @@ def driving(world: World | None = None, now: float = 0.0) -> World:
 
 
 def keys(world: World, now: float, started: float = -60.0) -> list[str]:
-    found = conditions.of_detector(world.robot("AGI"), at(now), started=at(started))
+    robot = world.robot("AGI")
+    found = [*alerts.of_detector(robot, at(now), started=at(started))]
     assert {one.priority for one in found} <= {"P2"}
-    return [
-        one.key
-        for one in conditions.of_detector(
-            world.robot("AGI"), at(now), started=at(started)
-        )
-    ]
+    return [one.key for one in found]
 
 
 def test_a_detector_that_worked_and_falls_silent_is_told_at_once() -> None:
@@ -127,7 +123,7 @@ def test_out_of_service_it_is_a_notice_and_not_silence() -> None:
     world = driving()
     world.robot("AGI").detector.out_of_service = OutOfService("maria", 1.0)
 
-    (found,) = conditions.of_detector(world.robot("AGI"), at(0.0), started=STARTED)
+    (found,) = alerts.of_detector(world.robot("AGI"), at(0.0), started=STARTED)
 
     assert (found.priority, found.key) == ("P3", "alert.detector_out_of_service")
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from iveg.domain.disk_space import DiskSpace
+from iveg.domain.retention import DiskSpace
 
 GB = 10**9
 

@@ -1,7 +1,7 @@
 import pytest
 
-from iveg.domain.doubt import Doubts
 from iveg.domain.observations import Instant
+from iveg.domain.robot_state import Doubts
 
 
 def at(mono: float) -> Instant:

@@ -37,14 +37,10 @@ def told(*values: Any) -> tuple[Equipment, list[State]]:
 @pytest.mark.parametrize(
     ("value", "state"),
     [
-        (0.4, "low_low"),
-        (0.9, "low"),
-        (1.0, "ok"),
-        (3.5, "ok"),
-        (3.6, "high"),
+        (0.4, "low_low"), (0.9, "low"), (1.0, "ok"), (3.5, "ok"), (3.6, "high"),
         (5, "high_high"),
     ],
-)
+)  # fmt: skip
 def test_a_number_beyond_a_limit_has_the_state_of_the_gravest(
     value: float, state: State
 ) -> None:
@@ -82,22 +78,6 @@ def test_a_tile_that_loses_its_signal_is_silent_alone() -> None:
     assert (wrong.slots["minutes"], wrong.slots["tile_en"]) == (5.0, "EC")
 
 
-def test_before_the_first_value_a_tile_waits_and_then_is_silent() -> None:
-    equipment = Equipment([TILE], START)
-
-    assert equipment.state(TILE, at(299.0)) == "waiting"
-    assert list(equipment.conditions(at(299.0))) == []
-    assert equipment.state(TILE, at(301.0)) == "silent"
-
-
-def test_a_value_after_the_silence_is_well_again() -> None:
-    equipment, _ = told(2.1)
-    equipment.read("unit", {"ec": 2.2}, at(1000.0))
-
-    assert list(equipment.conditions(at(1001.0)))[:0] == []
-    assert equipment.state(TILE, at(1001.0)) == "ok"
-
-
 @pytest.mark.parametrize(
     ("value", "priority", "key", "limit"),
     [
@@ -116,11 +96,3 @@ def test_a_limit_is_an_alert_that_names_it(
 
     assert (wrong.priority, wrong.key) == (priority, key)
     assert (wrong.slots["limit"], wrong.slots["unit"]) == (TILE.limits[limit], "mS/cm")
-
-
-def test_other_entities_and_attributes_touch_no_tile() -> None:
-    equipment = Equipment([TILE], START)
-
-    assert equipment.read("other", {"ec": 2.0}, at(0)) == []
-    assert equipment.read("unit", {"flow": 2.0}, at(0)) == []
-    assert equipment.state(TILE, at(1)) == "waiting"

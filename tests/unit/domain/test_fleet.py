@@ -34,15 +34,11 @@ def test_names_of_robots_are_sorted_as_people_count() -> None:
 @pytest.mark.parametrize(
     ("word", "read"),
     [
-        ("AGI", ("AGI", None)),
-        ("D1:recording", ("D1", "recording")),
-        ("D1:live", ("D1", "live")),
-        ("D1:", None),
-        ("D1:dream", None),
-        ("climate", None),
-        ("a b", None),
+        ("AGI", ("AGI", None)), ("D1:recording", ("D1", "recording")),
+        ("D1:live", ("D1", "live")), ("D1:", None), ("D1:dream", None),
+        ("climate", None), ("a b", None),
     ],
-)
+)  # fmt: skip
 def test_the_short_form_says_id_and_kind(
     word: str, read: tuple[str, str | None] | None
 ) -> None:

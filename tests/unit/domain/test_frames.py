@@ -6,7 +6,13 @@ from dataclasses import replace
 import pytest
 
 from iveg.domain.fleet import CAUTIOUS, Frame, RobotDescription
-from iveg.domain.frames import FramedBox, frame_named, resolve_box
+from iveg.domain.frames import (
+    FramedBox,
+    frame_named,
+    is_pose_frame,
+    may_be_laser_frame,
+    resolve_box,
+)
 from iveg.domain.geometry import Box3D, Pose2D
 from iveg.domain.observations import Detection
 from tests.builders import AGI
@@ -49,32 +55,59 @@ def test_names_of_tf_are_known_with_slashes_and_the_robots_own_prefix(
 @pytest.mark.parametrize(
     "name",
     [
-        "odom",
-        "world",
-        "/",
-        "Map",
-        "camera",
-        "laser",
-        "AGII/base_link",
-        "AGII/camera_optical_frame",
-        "agii_base_link",
-        "base_link/AGI",
-        "unplaced",
+        "odom", "world", "/", "Map", "camera", "laser", "AGII/base_link",
+        "AGII/camera_optical_frame", "agii_base_link", "base_link/AGI", "unplaced",
     ],
-)
+)  # fmt: skip
 def test_other_names_and_the_prefixes_of_others_are_unknown(name: str) -> None:
     assert frame_named(name, "AGI") is None
     assert boxes(name) == [None]
 
 
+@pytest.mark.parametrize(
+    "name",
+    [
+        "rear_camera_link", "rear_camera_optical_frame",
+        "agi_rear_camera_optical_frame", "AGI/camera2_optical_frame",
+        "camera_rear_color_optical_frame",
+    ],
+)  # fmt: skip
+def test_a_second_camera_is_not_taken_for_the_first(name: str) -> None:
+    assert frame_named(name, "AGI") is None
+
+
+def test_a_camera_of_another_name_is_the_one_that_the_fleet_file_names() -> None:
+    named = replace(AGI, camera_frame="zed_left_optical_frame")
+    robot = RobotDescription("AGI", profile=named)
+
+    assert boxes("agi/zed_left_optical_frame", robot=robot) == boxes("camera_optical")
+    assert boxes("zed_right_optical_frame", robot=robot) == [None]
+
+
+def test_odometry_is_in_map_or_in_the_frame_that_the_fleet_file_names() -> None:
+    in_odom = replace(ROBOT, pose_frame="odom")
+
+    assert all(is_pose_frame(one, ROBOT) for one in ("map", "/map", "AGI/map"))
+    assert not any(is_pose_frame(one, ROBOT) for one in ("odom", "AGII/map", "Map"))
+    assert [is_pose_frame(one, in_odom) for one in ("agi/odom", "map")] == [True, False]
+    assert boxes("odom", robot=in_odom) == boxes("map")
+
+
+@pytest.mark.parametrize(
+    ("name", "may_be"),
+    [
+        ("laser", True), ("/AGI/base_scan", True), ("agi_lidar_link", True),
+        ("base_link", True), ("map", False), ("AGI/odom", False), ("agi_map", False),
+        ("AGII/laser", False), ("camera_depth_optical_frame", False),
+    ],
+)  # fmt: skip
+def test_a_scan_is_in_a_level_frame_of_its_own_robot(name: str, may_be: bool) -> None:
+    assert may_be_laser_frame(name, "AGI") is may_be
+
+
 def test_a_hyphen_of_a_robots_id_is_an_underscore_in_tf() -> None:
     assert frame_named("carrier_2/base_link", "CARRIER-2") == "base_link"
     assert frame_named("CARRIER-2/base_link", "CARRIER-2") == "base_link"
-
-
-def test_a_robot_may_be_called_as_a_frame_begins() -> None:
-    assert frame_named("base_link", "base") == "base_link"
-    assert frame_named("camera_optical_frame", "camera") == "camera_optical_frame"
 
 
 @pytest.mark.parametrize("name", ["map", "base_link"])
@@ -83,12 +116,6 @@ def test_a_box_in_map_or_base_link_stays_as_it_is(name: str) -> None:
 
     assert found is not None
     assert (found.box, found.frame_id) == (BOX, name)
-
-
-def test_a_box_in_camera_link_is_moved_by_the_mount() -> None:
-    (found,) = boxes("camera_link")
-
-    assert found == FramedBox(Box3D(1.4, 3.4, 0.0, 0.5, 0.6, 2.4), "base_link")
 
 
 def test_in_optical_axes_x_is_right_y_is_down_and_z_is_forward() -> None:

@@ -2,9 +2,9 @@
 
 import pytest
 
-from iveg.domain.hops import NEEDS, Check, Hop
+from iveg.domain.probe import Hop
 from iveg.pipeline.health_monitor import HealthMonitor
-from iveg.web.pages.translations import LANGUAGES, read_translations
+from iveg.web.pages.sentences import LANGUAGES, read_translations
 from tests.builders import at
 
 
@@ -12,11 +12,6 @@ def test_the_running_monitor_judges_hops_in_the_order_of_the_table() -> None:
     judged = [hop.name for hop in HealthMonitor(at(0.0)).hops(at(1.0))]
 
     assert judged == [hop for hop in Hop if hop is not Hop.PAGE]
-
-
-def test_the_doctor_tries_every_hop() -> None:
-    assert {check.hop for check in Check} == set(Hop)
-    assert set(NEEDS) == set(Check)
 
 
 @pytest.mark.parametrize("language", LANGUAGES)

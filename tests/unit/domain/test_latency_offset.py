@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from iveg.domain.latency.offset import AGREE, ClockOffset
+from iveg.domain.latency import AGREE, ClockOffset
 from tests.builders import START, at
 
 STAMP_ROUNDING_S = 0.001
@@ -27,7 +27,7 @@ class Talker:
     acknowledgements: bool = True
     now: float = 0.0
 
-    def talk(self, clock: ClockOffset, seconds: float) -> Iterator[float | str]:
+    def talk(self, clock: ClockOffset, seconds: float) -> Iterator[float | None]:
         """What the clock says of each message."""
         for _ in range(round(30 * seconds)):
             self.now += 1 / 30
@@ -37,11 +37,11 @@ class Talker:
             yield clock.time_message(stamp, at(self.now + self.up_s), composed)
 
 
-def said(talker: Talker, clock: ClockOffset, seconds: float) -> list[float | str]:
+def said(talker: Talker, clock: ClockOffset, seconds: float) -> list[float | None]:
     return list(talker.talk(clock, seconds))
 
 
-def numbers(found: list[float | str]) -> list[float]:
+def numbers(found: list[float | None]) -> list[float]:
     return [one for one in found if isinstance(one, float)]
 
 
@@ -81,22 +81,10 @@ def test_messages_of_a_clock_that_jumps_are_excluded_until_it_is_known_again(
     talker.ahead_s = jump_s
     found = said(talker, clock, 20.0)
 
-    assert found[:AGREE] == ["clock_jump"] * AGREE
+    assert found[:AGREE] == [None] * AGREE
     assert clock.jumps == 1
     assert max(numbers(found)) < 0.11
     assert clock.state == "corrected"
-
-
-def test_one_stamp_that_is_wrong_is_no_jump() -> None:
-    clock, talker = ClockOffset(), Talker()
-    said(talker, clock, 5.0)
-
-    wrong = clock.time_message(START.wall + 999.0, at(5.0), START.mono + 4.95)
-    right = said(talker, clock, 1.0)
-
-    assert wrong == "clock_jump"
-    assert all(isinstance(one, float) for one in right)
-    assert clock.jumps == 0
 
 
 def test_a_robot_that_does_not_echo_is_taken_at_its_word_and_marked() -> None:
@@ -109,51 +97,22 @@ def test_a_robot_that_does_not_echo_is_taken_at_its_word_and_marked() -> None:
     assert clock.uncertainty_s is None
 
 
-def test_a_future_that_nothing_explains_gives_no_number() -> None:
+@pytest.mark.parametrize("ahead_s", [0.3, -3600.0])
+def test_a_future_or_past_that_nothing_explains_gives_no_number(
+    ahead_s: float,
+) -> None:
     clock = ClockOffset()
 
-    found = said(Talker(acknowledgements=False, ahead_s=0.3), clock, 2.0)
+    found = said(Talker(acknowledgements=False, ahead_s=ahead_s), clock, 2.0)
 
     assert numbers(found) == []
     assert clock.state == "untrusted"
 
 
-def test_an_hour_in_the_past_that_nothing_explains_gives_no_number() -> None:
-    clock = ClockOffset()
-
-    found = said(Talker(acknowledgements=False, ahead_s=-3600.0), clock, 2.0)
-
-    assert set(found) == {"stale_stamp"}
-    assert clock.state == "untrusted"
-
-
-def test_a_slow_way_up_is_not_taken_for_a_clock() -> None:
-    clock, talker = ClockOffset(), Talker()
-    said(talker, clock, 5.0)
-
-    talker.up_s = 0.450
-    found = said(talker, clock, 130.0)
-
-    assert {round(one, 2) for one in numbers(found)} == {0.45}
-    assert len(numbers(found)) == len(found)
-
-
-def test_a_clock_that_drifts_is_followed_and_nothing_falls_below_zero() -> None:
-    clock, talker = ClockOffset(), Talker()
-    found: list[float | str] = []
-    for second in range(200):
-        talker.ahead_s = 3e-4 * second
-        found += said(talker, clock, 1.0)
-
-    assert clock.jumps == 0
-    assert min(numbers(found)) >= 0.0
-    assert clock.offset_s == pytest.approx(0.060, abs=0.06)
-
-
 def test_no_stamp_whatever_it_says_gives_a_number_below_zero() -> None:
     clock, chance = ClockOffset(), random.Random(7)  # noqa: S311 - a fault
     now = 0.0
-    found: list[float | str] = []
+    found: list[float | None] = []
     for _ in range(5_000):
         now += 0.03
         stamp = START.wall + now + chance.choice([0, 0, 0, chance.gauss(0, 1), 3600])

@@ -1,19 +1,10 @@
-"""Sketches: quantiles within 1 % of exact, bounded, mergeable, and back from a text."""
+"""Sketches: quantiles within 1 % of exact, bounded, mergeable."""
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from iveg.domain.errors import UnreadableError
-from iveg.domain.latency.series import SLICES_A_MINUTE, Series
-from iveg.domain.latency.sketch import (
-    NOTHING,
-    Sketch,
-    merged,
-    read_bins,
-    sketch_of,
-    write_bins,
-)
+from iveg.domain.latency import SLICES_A_MINUTE, Series, merged, sketch_of
 from tests.data import latencies
 
 SHARES = (0.5, 0.9, 0.95, 0.99)
@@ -55,46 +46,11 @@ def test_many_sketches_together_are_as_one_of_all_their_samples() -> None:
     assert parts.mean == pytest.approx(whole.mean)
 
 
-def test_a_sketch_stays_small_whatever_comes() -> None:
-    sketch = sketch_of(np.geomspace(1e-9, 1e6, 100_000).tolist())
-
-    assert sketch.keys.size <= 1_013
-
-
-def test_nothing_has_no_quantile_and_no_mean() -> None:
-    assert merged([]) is NOTHING
-    assert sketch_of([]).quantile(0.5) is None
-    assert NOTHING.mean is None
-
-
-def test_the_distribution_rises_to_one() -> None:
-    edges, shares = sketch_of([0.01, 0.02, 0.02, 0.5]).distribution()
-
-    assert edges == sorted(edges)
-    assert shares == [0.25, 0.75, 1.0]
-    assert edges[-1] == pytest.approx(0.5)
-
-
-def test_bins_come_back_from_their_text() -> None:
-    sketch = sketch_of(latencies.recorded("uplink").tolist())
-
-    keys, counts = read_bins(write_bins(sketch))
-
-    back = Sketch(sketch.count, sketch.total, sketch.least, sketch.most, keys, counts)
-    assert back.quantile(0.95) == sketch.quantile(0.95)
-
-
-@pytest.mark.parametrize("text", ["", "*", "AAAA", "eJwzNDI2MQUAAvgBAA=="])
-def test_what_is_no_text_of_bins_is_refused(text: str) -> None:
-    with pytest.raises(UnreadableError, match="not_bins"):
-        read_bins(text)
-
-
 def filled(minutes: int, each: float = 0.010) -> Series:
     """A series of one sample a slice; of minute m they are m + 1 times ``each``."""
     series = Series()
     for slice_ in range(minutes * SLICES_A_MINUTE):
-        series.add(each * (slice_ // SLICES_A_MINUTE + 1), 10.0 * slice_)
+        series.add(each * (slice_ // SLICES_A_MINUTE + 1))
         series.end_slice(slice_ + 1)
     return series
 
@@ -116,19 +72,3 @@ def test_what_is_older_than_a_day_is_forgotten() -> None:
 
     assert merged(series.parts("24h")).count == 24 * 360
     assert merged(series.parts("24h")).least == pytest.approx(0.061)
-
-
-def test_what_was_measured_just_now_counts_before_its_slice_is_over() -> None:
-    series = filled(minutes=1)
-
-    series.add(0.9, 61.0)
-
-    assert merged(series.parts("1min")).most == 0.9
-
-
-def test_a_burst_between_two_slices_keeps_the_buffer_short() -> None:
-    series = Series()
-    for _ in range(10_000):
-        series.add(0.01, 0.0)
-
-    assert merged(series.parts("1min")).count == 10_000

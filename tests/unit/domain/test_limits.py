@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from iveg.domain.detection_rule import DetectionRule
-from iveg.domain.limits import LIMITS, ring_radius
+from iveg.domain.limits import LIMITS, grown_radius
+from iveg.domain.parameters import ByClass
 from iveg.robot.judgement import Limits
 from iveg.settings import Settings
 from tests.processes import ROOT
@@ -20,17 +21,19 @@ RINGS = json.loads((ROOT / "tests/data/rings.json").read_text())
 
 @pytest.mark.parametrize("case", RINGS, ids=lambda one: f"{one}")
 def test_the_ring_law_gives_the_shared_cases(case: dict[str, float]) -> None:
-    rule = DetectionRule(radius_m=case["radius_m"])
+    rule = DetectionRule(radius_m=ByClass(case["radius_m"]))
 
-    assert rule.radius_at(case["age_s"]) == pytest.approx(case["ring_m"], abs=1e-6)
+    assert rule.radius_at(case["age_s"], "person") == pytest.approx(
+        case["ring_m"], abs=1e-6
+    )
 
 
 def test_the_ring_law_judges_an_array_as_it_judges_each_age() -> None:
     ages = np.linspace(0.0, 12.0, 500)
 
-    rings = ring_radius(2.0, ages, np.minimum, np.maximum)
+    rings = grown_radius(2.0, ages, np.minimum, np.maximum)
 
-    assert rings.tolist() == [ring_radius(2.0, age) for age in ages.tolist()]
+    assert rings.tolist() == [grown_radius(2.0, age) for age in ages.tolist()]
 
 
 def test_nobody_can_change_a_limit() -> None:
@@ -49,7 +52,8 @@ def test_every_limit_has_a_unit_a_source_and_a_meaning(row: Field[Any]) -> None:
 def test_rule_robot_and_settings_begin_with_the_limits() -> None:
     settings, robot = Settings(), Limits()
 
-    assert settings.safety_radius_m == DetectionRule().radius_m == LIMITS.ring_default_m
+    assert settings.rule.radius_m == ByClass(LIMITS.ring_default_m)
+    assert DetectionRule.of(settings.rule) == DetectionRule()
     assert settings.feedback_stand_s == robot.stand_s == LIMITS.feedback_stand_s
     assert settings.feedback_slow_s == robot.slow_s == LIMITS.feedback_slow_s
 

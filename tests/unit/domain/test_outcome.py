@@ -2,7 +2,7 @@
 
 import pytest
 
-from iveg.domain.stop.outcome import outcome_of, was_loud
+from iveg.domain.stop.commands import outcome_of, was_loud
 from tests.fakes.records import command_record
 
 

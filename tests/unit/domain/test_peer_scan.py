@@ -61,19 +61,3 @@ def test_a_beam_with_a_ray_that_says_nothing_says_nothing(nothing: float) -> Non
 
     assert found[3] == 0.0
     assert np.isinf(np.delete(found, [2, 3, 4])).all()
-
-
-def test_where_the_laser_does_not_look_nothing_is_said() -> None:
-    half = scan(
-        ranges=[6.0] * 360, angle_min=-math.pi / 2, angle_increment=math.pi / 360
-    )
-
-    found = told(half).ranges
-
-    assert (found[:18] == 0.0).all()
-    assert (found[19:53] > 5.9).all()
-    assert (found[54:] == 0.0).all()
-
-
-def test_what_is_beyond_the_range_that_counts_came_not_back() -> None:
-    assert np.isinf(told(all_round([30.0] * 720)).ranges).all()

@@ -9,7 +9,6 @@ from iveg.domain.geometry import Rectangle
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import Instant
 from iveg.domain.tracking.people import People
-from tests.builders import detection
 from tests.unit.domain.scene import Scene, person
 
 ON = DetectionRule(possible_people=True)
@@ -65,41 +64,6 @@ def test_less_is_nobody(chances: tuple[float, ...], every_s: float) -> None:
     assert scene.everyone == []
 
 
-def test_a_person_who_is_known_is_kept_by_weak_looks() -> None:
-    scene = Scene(rule=ON)
-    looked(scene, 0.85, 0.55, 0.55)
-
-    (somebody,) = scene.everyone
-    assert somebody.newest.confidence == 0.55
-    assert somebody.newest.possible
-
-
-def test_faint_looks_at_different_places_are_nobody() -> None:
-    scene = Scene(rule=ON)
-    for x in (5.0, 8.0, 11.0):
-        looked(scene, 0.7, x=x)
-
-    assert scene.everyone == []
-
-
-def test_only_people_are_possible() -> None:
-    scene = Scene(rule=ON)
-    for _ in range(4):
-        scene.look("AGI", detection("husky", 5.0, probability=0.7))
-
-    assert scene.everyone == []
-
-
-def test_a_sure_look_is_possible_no_more() -> None:
-    scene = Scene(rule=ON)
-    looked(scene, 0.7, 0.7, 0.7, 0.9)
-
-    (somebody,) = scene.everyone
-    assert not somebody.newest.possible
-    assert somebody.newest.looks is not None
-    assert somebody.newest.looks.count == 4
-
-
 def test_a_weak_box_moves_no_ring_of_a_sure_one() -> None:
     scene = Scene(rule=ON)
     looked(scene, 0.85)
@@ -126,22 +90,9 @@ def test_where_a_weak_box_stands_no_sure_ring_is_cleared() -> None:
     looked(scene, 0.85)
     for _ in range(30):
         looked(scene, 0.55, every_s=0.1)
-        scene.sweep()
 
     (somebody,) = scene.everyone
     assert {one.possible for one in somebody.sightings} == {False, True}
-
-
-def test_where_a_weak_box_stands_that_has_a_ring_an_old_weak_one_is_cleared() -> None:
-    scene = Scene(rule=ON)
-    looked(scene, 0.7, 0.7, 0.7)
-    scene.now += 1.5
-    for _ in range(30):
-        looked(scene, 0.7, every_s=0.1, x=5.9)
-        scene.sweep()
-
-    rings = [one for somebody in scene.everyone for one in somebody.sightings]
-    assert [one.x for one in rings] == [5.9]
 
 
 def test_a_possible_person_slows_like_any_other() -> None:
@@ -184,24 +135,8 @@ def test_the_zone_of_a_doubtful_person_lies_round_who_saw_them() -> None:
 
     assert speed_limits["AGI"].reason == "person"
     assert speed_limits["AGII"].reason == "person"
-    ((look, radius),) = scene.everyone[0].rings(scene.rule, look_now(scene))
+    ((look, radius),) = scene.everyone[0].zone_radii(scene.rule, look_now(scene))
     assert (look.x, look.y, radius) == (10.0, 10.0, 8.0)
-
-
-def test_who_is_out_of_the_camera_s_reach_is_not_slowed_by_it() -> None:
-    scene = Walled()
-    scene.drive("AGII", 19.0, 10.0)
-    scene.look("AGI", person(40.0, 10.0))
-
-    assert scene.judge()["AGII"].reason != "person"
-
-
-def test_a_doubtful_look_again_is_the_same_doubtful_person() -> None:
-    scene = Walled()
-    scene.look("AGI", person(40.0, 10.0))
-    scene.look("AGI", person(70.0, 30.0))
-
-    assert len(scene.everyone) == 1
 
 
 def test_a_doubtful_person_takes_nobody_s_place() -> None:
@@ -213,13 +148,6 @@ def test_a_doubtful_person_takes_nobody_s_place() -> None:
 
     places = sorted((one.newest.reach_m > 0.0, one.newest.x) for one in scene.everyone)
     assert places == [(False, 10.6), (True, 10.0)]
-
-
-def test_a_faint_look_beyond_the_wall_is_faint() -> None:
-    scene = Walled()
-    scene.look("AGI", person(40.0, 10.0, probability=0.5))
-
-    assert scene.everyone == []
 
 
 def look_now(scene: Scene) -> Instant:

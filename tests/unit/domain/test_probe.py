@@ -1,5 +1,7 @@
 """How far the chain is behind, by iVeg's own probes."""
 
+import pytest
+
 from iveg.domain.observations import Origin
 from iveg.domain.probe import ProbeLag
 from tests.builders import at
@@ -52,67 +54,34 @@ def test_a_probe_that_was_passed_by_a_later_one_counts_no_more() -> None:
     assert lag.lag(at(60.0)) == 0.5
 
 
-def test_a_straggler_does_not_replace_what_a_newer_one_said() -> None:
+@pytest.mark.parametrize("later", [probe(1), probe(2), Origin("before", 9)])
+def test_a_copy_a_straggler_or_a_probe_of_an_earlier_life_says_nothing(
+    later: Origin,
+) -> None:
     lag = sent(0.0, 2.0)
     lag.returned(probe(2), at(2.5))
-    lag.returned(probe(1), at(30.0))
-
-    assert lag.lag(at(30.0)) == 0.5
-
-
-def test_a_copy_that_comes_later_says_nothing() -> None:
-    lag = sent(0.0)
-    lag.returned(probe(1), at(0.5))
-    lag.returned(probe(1), at(40.0))
+    lag.returned(later, at(40.0))
 
     assert lag.lag(at(40.0)) == 0.5
 
 
-def test_a_probe_that_comes_back_after_ten_minutes_is_matched() -> None:
-    lag = sent(*(2.0 * n for n in range(300)))
-    lag.returned(probe(1), at(600.0))
-
-    assert (lag.lag(at(600.0)), lag.is_known) == (600.0, True)
-
-
-def test_what_is_remembered_is_bounded() -> None:
-    lag = sent(*(2.0 * n for n in range(2000)))
-
-    assert lag.sent_at(probe(1)) is None
-    assert lag.sent_at(probe(2000)) == at(3998.0).mono
-
-
-def test_a_probe_of_an_earlier_life_says_nothing() -> None:
-    lag = sent(0.0)
-    lag.returned(Origin("before", 1), at(1.0))
-
-    assert not lag.is_known
-
-
-def backlog(*transits: float) -> ProbeLag:
-    """Probes every two seconds that took so long (s)."""
-    lag = sent(*(2.0 * n for n in range(len(transits))))
+@pytest.mark.parametrize(
+    ("transits", "grows"),
+    [
+        ([0.3 * n for n in range(12)], True),
+        ([12.0] * 12, False),
+        ([12.0 - n for n in range(12)], False),
+    ],
+    ids=["longer", "as it is", "drains"],
+)
+def test_a_backlog_grows_while_probes_take_longer(
+    transits: list[float], *, grows: bool
+) -> None:
+    lag = sent(*(2.0 * n for n in range(12)))
     for seq, transit in enumerate(transits):
         lag.returned(probe(seq + 1), at(2.0 * seq + transit))
-    return lag
 
-
-def test_a_backlog_that_gets_longer_grows() -> None:
-    lag = backlog(*(0.3 * n for n in range(12)))
-
-    assert lag.grows(at(25.3))
-
-
-def test_a_backlog_that_stays_as_it_is_does_not_grow() -> None:
-    lag = backlog(*[12.0] * 12)
-
-    assert (lag.lag(at(34.0)), lag.grows(at(34.0))) == (12.0, False)
-
-
-def test_a_backlog_that_drains_does_not_grow() -> None:
-    lag = backlog(*(12.0 - n for n in range(12)))
-
-    assert not lag.grows(at(23.0))
+    assert lag.grows(at(22.0 + transits[-1])) is grows
 
 
 def test_a_chain_that_stops_grows() -> None:

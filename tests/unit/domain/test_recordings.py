@@ -30,10 +30,6 @@ def test_the_oldest_go_until_the_rest_has_room() -> None:
     assert len(names(RecordingLimits(days=0, most_bytes=1))) == 6
 
 
-def test_without_limits_all_stay() -> None:
-    assert names(RecordingLimits(days=0, most_bytes=0)) == []
-
-
 def test_the_one_that_is_written_stays() -> None:
     files = [recording("2026-11-19T08", 100, is_open=True), *DAYS]
     gone = names(RecordingLimits(days=1, most_bytes=1), files)

@@ -4,10 +4,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from iveg.domain.accounts import is_name
-from iveg.domain.single_sign_on import (
+from iveg.domain.accounts import (
     ClaimReading,
     another_name,
+    is_name,
     name_of,
     person_id,
     values_at,
@@ -88,10 +88,3 @@ def test_whatever_name_is_told_orion_takes_the_one_that_is_made(told: str) -> No
 )
 def test_a_name_stays_as_it_is_but_for_what_orion_refuses(told: str, name: str) -> None:
     assert name_of(told, "sso-0b1d2c3e4f") == name
-
-
-@pytest.mark.parametrize("at", [True, "1700000000", -1, float("inf"), None, [1]])
-def test_a_proof_is_a_moment_or_is_not_told(at: object) -> None:
-    reading = ClaimReading("roles", "name", {})
-
-    assert reading.read("https://a.test", "1", {"auth_time": at}).auth_time is None

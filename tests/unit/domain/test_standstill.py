@@ -1,10 +1,13 @@
 """A rest that is measured on the robot's clock, and what contradicts it."""
 
+from math import inf
+
 import pytest
 
+from iveg.domain.motion import UNMOVED
 from iveg.domain.observations import Instant, Origin
 from iveg.domain.stop.standstill import Standstill
-from tests.builders import START, at
+from tests.builders import START, at, odometry
 
 HOUR_S = 3600.0
 SECONDS = [0.2 * number for number in range(6)]
@@ -31,12 +34,25 @@ def arrived(mono: float, late: float = 0.0) -> Instant:
     return at(mono + late)
 
 
+def take(
+    rest: Standstill,
+    moment: Instant,
+    origin: Origin,
+    age_s: float = inf,
+    *,
+    moves: bool,
+) -> bool | None:
+    """What odometry comes to whose wheels turn, or rest; its pose stays."""
+    sample = odometry(linear=0.3 * moves, origin=origin)
+    return rest.odometry(sample, UNMOVED, moment, age_s)
+
+
 def moving(
     rest: Standstill, *moments: float, late: float = 0.0, boot: str = "a"
 ) -> list[bool | None]:
     """What moving samples of odometry come to, measured at these moments."""
     return [
-        rest.odometry(arrived(mono, late), said(mono, boot=boot), moves=True)
+        take(rest, arrived(mono, late), said(mono, boot=boot), moves=True)
         for mono in moments
     ]
 
@@ -122,7 +138,7 @@ def test_no_wall_clock_protects_a_standstill(step_s: float) -> None:
     rest = stood()
 
     found = [
-        rest.odometry(arrived(mono), said(mono, clock_off=step_s), moves=True)
+        take(rest, arrived(mono), said(mono, clock_off=step_s), moves=True)
         for mono in (11.1, 11.2, 11.3)
     ]
 
@@ -131,9 +147,9 @@ def test_no_wall_clock_protects_a_standstill(step_s: float) -> None:
 
 def test_a_clock_that_is_set_back_makes_its_sample_count_as_later() -> None:
     rest = stood()
-    rest.odometry(arrived(9.0), said(9.0), moves=True)
+    take(rest, arrived(9.0), said(9.0), moves=True)
 
-    back = rest.odometry(arrived(9.1, 5.0), said(9.1, clock_off=-HOUR_S), moves=True)
+    back = take(rest, arrived(9.1, 5.0), said(9.1, clock_off=-HOUR_S), moves=True)
 
     assert back is False
 
@@ -146,7 +162,7 @@ def test_motion_that_cannot_be_compared_contradicts(origin: Origin) -> None:
     rest = stood()
 
     found = [
-        rest.odometry(arrived(11.0 + 0.1 * number), origin, moves=True)
+        take(rest, arrived(11.0 + 0.1 * number), origin, moves=True)
         for number in range(3)
     ]
 
@@ -156,10 +172,10 @@ def test_motion_that_cannot_be_compared_contradicts(origin: Origin) -> None:
 def test_a_topic_whose_moments_fell_once_is_compared_no_more() -> None:
     rest = stood()
     again = [Origin("a", 20_000 + n, mono=1.0 + 0.1 * n) for n in range(4)]
-    rest.odometry(arrived(11.0), Origin("a", 19_999, mono=11.0), moves=False)
+    take(rest, arrived(11.0), Origin("a", 19_999, mono=11.0), moves=False)
 
     found = [
-        rest.odometry(arrived(11.1 + 0.1 * n), one, moves=True)
+        take(rest, arrived(11.1 + 0.1 * n), one, moves=True)
         for n, one in enumerate(again)
     ]
 
@@ -170,7 +186,7 @@ def test_moments_that_lie_are_found_out_by_what_the_robot_had_heard() -> None:
     rest = stood()
 
     found = [
-        rest.odometry(arrived(12.0 + s), said(1.0 + s), 0.2, moves=True)
+        take(rest, arrived(12.0 + s), said(1.0 + s), 0.2, moves=True)
         for s in (0.0, 0.1, 0.2)
     ]
 

@@ -3,10 +3,11 @@
 import pytest
 
 from iveg.domain.errors import CommandRefusedError
+from iveg.domain.motion import MotionTrack
 from iveg.domain.observations import Hold
 from iveg.domain.stop import Changed, Closed, Effect
-from iveg.domain.transports import DIRECT, FIWARE
-from tests.builders import at, safety_report
+from iveg.domain.transports import DIRECT
+from tests.builders import at, odometry, safety_report
 from tests.unit.domain.bench import (
     BOOT_HOLD,
     IN_STATE,
@@ -15,16 +16,16 @@ from tests.unit.domain.bench import (
     Bench,
     levels,
     once,
+    releasing,
     sends,
+    standing,
 )
 
 # --- RELEASING --------------------------------------------------------------------
 
 
 def test_i2_a_release_is_sent_once_with_exactly_the_holds_and_the_challenge() -> None:
-    bench = Bench()
-    bench.press()
-    bench.stand(BOOT_HOLD)
+    bench = standing(BOOT_HOLD)
 
     bench.release(bench.ours.id, BOOT_HOLD.id)
     effects = bench.log + bench.wait(1.5)
@@ -39,32 +40,11 @@ def test_i2_a_release_is_sent_once_with_exactly_the_holds_and_the_challenge() ->
     }
 
 
-def test_without_the_direct_transport_a_release_takes_the_other_alone() -> None:
-    bench = Bench(direct=False)
-    bench.press()
-    bench.stand()
-
-    (sent,) = once(bench.release(bench.ours.id))
-
-    assert sent.attempt.command.transports == {"direct": "off", "fiware": "pending"}
-
-
-def test_nothing_is_sent_again_while_a_release_is_on_its_way() -> None:
-    bench = Bench()
-    bench.press()
-    bench.stand()
-    bench.release(bench.ours.id)
-
-    assert bench.wait(1.9) == []
-
-
 @pytest.mark.parametrize("seen", [(), ("id-1",), ("id-1", "boot-b1", "more")])
 def test_i2_a_release_of_another_set_than_the_robot_reports_is_refused(
     seen: tuple[str, ...],
 ) -> None:
-    bench = Bench()
-    bench.press()
-    bench.stand(BOOT_HOLD)
+    bench = standing(BOOT_HOLD)
 
     with pytest.raises(CommandRefusedError, match="the holds changed"):
         bench.release(*seen)
@@ -73,9 +53,7 @@ def test_i2_a_release_of_another_set_than_the_robot_reports_is_refused(
 
 
 def test_a_person_may_name_local_holds_too_but_they_are_not_sent() -> None:
-    bench = Bench()
-    bench.press()
-    bench.stand(RED_BUTTON)
+    bench = standing(RED_BUTTON)
 
     effects = bench.release(bench.ours.id, RED_BUTTON.id)
 
@@ -91,9 +69,7 @@ def test_i2_a_robot_that_only_local_holds_keep_cannot_be_released() -> None:
 
 
 def test_i2_a_release_needs_a_fresh_report() -> None:
-    bench = Bench()
-    bench.press()
-    bench.stand()
+    bench = standing()
     bench.wait(1.1)
 
     with pytest.raises(CommandRefusedError, match="not fresh"):
@@ -130,9 +106,7 @@ def test_i2_a_release_is_refused_unless_the_robot_is_known_to_stand(state: str) 
 
 
 def test_the_reported_release_of_our_hold_makes_the_robot_ready() -> None:
-    bench = Bench()
-    bench.press()
-    bench.stand()
+    bench = standing()
     ours = bench.ours.id
     bench.release(ours)
 
@@ -144,10 +118,7 @@ def test_the_reported_release_of_our_hold_makes_the_robot_ready() -> None:
 
 
 def test_a_report_that_lacks_our_hold_is_no_release_unless_it_says_so() -> None:
-    bench = Bench()
-    bench.press()
-    bench.stand()
-    bench.release(bench.ours.id)
+    bench = releasing()
 
     bench.report()
 
@@ -155,20 +126,16 @@ def test_a_report_that_lacks_our_hold_is_no_release_unless_it_says_so() -> None:
 
 
 def test_the_answer_released_is_noted_and_decides_nothing() -> None:
-    bench = Bench()
-    bench.press()
-    bench.stand()
-    bench.release(bench.ours.id)
+    bench = releasing()
 
     bench.answer("RELEASED")
 
     assert bench.state == "RELEASING"
-    assert bench.machine.once is not None
-    assert bench.machine.once.times.answered[DIRECT.id] == at(bench.now)
+    assert bench.once.times.answered[DIRECT.id] == at(bench.now)
 
 
 def test_a_refused_release_leaves_the_robot_standing_and_says_why() -> None:
-    bench = released()
+    bench = releasing()
     bench.answer("REFUSED", why="not_standing", attempt=bench.attempt)
 
     effects = bench.report(bench.ours, challenge=NEXT_CHALLENGE)
@@ -179,7 +146,7 @@ def test_a_refused_release_leaves_the_robot_standing_and_says_why() -> None:
 
 
 def test_the_refusal_of_one_copy_ends_nothing_while_another_may_act() -> None:
-    bench = released()
+    bench = releasing()
 
     bench.answer("REFUSED", why="challenge", attempt=bench.attempt)
     bench.report(bench.ours)
@@ -190,7 +157,7 @@ def test_the_refusal_of_one_copy_ends_nothing_while_another_may_act() -> None:
 
 
 def test_a_refusal_that_comes_after_the_report_ends_it_at_once() -> None:
-    bench = released()
+    bench = releasing()
     bench.report(bench.ours, challenge=NEXT_CHALLENGE)
     assert bench.state == "RELEASING"
 
@@ -199,39 +166,22 @@ def test_a_refusal_that_comes_after_the_report_ends_it_at_once() -> None:
     assert bench.state == "STANDING"
 
 
-def test_the_late_refusal_of_one_attempt_changes_nothing_of_the_next() -> None:
-    bench = released()
-    first = bench.attempt
-    bench.answer("REFUSED", why="challenge", attempt=first)
-    bench.report(bench.ours, challenge=NEXT_CHALLENGE)
-    bench.release(bench.ours.id)
-
-    for transport in (DIRECT.id, FIWARE.id):
-        bench.answer("REFUSED", why="challenge", attempt=first, transport=transport)
-    bench.report(bench.ours, challenge="another")
-
-    assert bench.state == "RELEASING"
-    assert bench.machine.once is not None
-    assert bench.machine.once.times.answered.get(DIRECT.id) is None
-
-
 @pytest.mark.parametrize("result", ["RELEASED", "RESUMED", "REFUSED"])
 @pytest.mark.parametrize("attempt", ["", "01OTHER"])
 def test_an_answer_that_does_not_name_the_attempt_is_none_of_it(
     result: str, attempt: str
 ) -> None:
-    bench = released()
+    bench = releasing()
 
     bench.answer(result, attempt=attempt)
     bench.report(bench.ours, challenge=NEXT_CHALLENGE)
 
     assert bench.state == "RELEASING"
-    assert bench.machine.once is not None
-    assert bench.machine.once.times.answered.get(DIRECT.id) is None
+    assert bench.once.times.answered.get(DIRECT.id) is None
 
 
 def test_an_unconfirmed_release_keeps_the_hold_that_a_later_report_shows() -> None:
-    bench = released()
+    bench = releasing()
     held = bench.ours
     before = bench.machine.stop
     bench.report(held, challenge=NEXT_CHALLENGE)
@@ -248,34 +198,13 @@ def test_an_unconfirmed_release_keeps_the_hold_that_a_later_report_shows() -> No
 def test_an_unconfirmed_release_of_a_lost_name_keeps_what_is_held_in_its_place() -> (
     None
 ):
-    bench = released()
+    bench = releasing()
     other = Hold("01OTHER", "iveg", "remote")
     bench.report(other, challenge=NEXT_CHALLENGE)
 
     bench.wait(2.05)
 
     assert bench.machine.hold_id == "01OTHER"
-
-
-def test_a_hold_that_was_kept_is_measured_standing_again() -> None:
-    bench = released()
-    bench.report(bench.ours, challenge=NEXT_CHALLENGE)
-    bench.wait(2.05)
-
-    bench.stand()
-
-    assert bench.state == "STANDING"
-
-
-def test_a_fourth_hold_is_not_added_while_the_robot_reports_three() -> None:
-    bench = of_three()
-    bench.wait(1.5)
-    bench.report(*THREE)
-
-    effects = bench.wait(0.5)
-
-    assert bench.changes()[-1] == "release_unconfirmed"
-    assert {one.hold_id for one in sends(effects)} == {THREE[-1].id}
 
 
 def test_a_press_during_a_release_of_three_adds_no_fourth() -> None:
@@ -323,15 +252,6 @@ def test_a_hold_in_doubt_is_certain_once_the_challenge_has_changed() -> None:
     assert bench.machine.hold_id == THREE[-1].id
 
 
-def test_a_robot_with_three_holds_that_moves_gets_no_fourth() -> None:
-    bench = of_three(release=False)
-
-    effects = bench.report(*THREE, linear=0.3)
-
-    assert bench.changes()[-1] == "moved"
-    assert {one.hold_id for one in sends(effects)} == {THREE[-1].id}
-
-
 THREE = tuple(Hold(f"01HELD{n}", "iveg", "remote") for n in range(3))
 
 
@@ -352,19 +272,8 @@ def of_three(*, release: bool = True) -> Bench:
     return bench
 
 
-def released() -> Bench:
-    """A robot that stood and is being released."""
-    bench = Bench()
-    bench.press()
-    bench.stand()
-    bench.release(bench.ours.id)
-    return bench
-
-
 def test_i7_a_release_without_the_robots_word_becomes_a_stop_under_a_new_id() -> None:
-    bench = Bench()
-    bench.press()
-    bench.stand()
+    bench = standing()
     old = bench.ours.id
     bench.release(old)
 
@@ -379,9 +288,7 @@ def test_i7_a_release_without_the_robots_word_becomes_a_stop_under_a_new_id() ->
 
 
 def test_f37_a_stop_during_a_release_wins() -> None:
-    bench = Bench()
-    bench.press()
-    bench.stand()
+    bench = standing()
     old = bench.ours.id
     bench.release(old)
 
@@ -394,31 +301,13 @@ def test_f37_a_stop_during_a_release_wins() -> None:
     assert levels(bench.log)[-1] == "stopped"
 
 
-def test_the_result_of_a_release_is_not_taken_for_that_of_a_stop() -> None:
-    bench = Bench()
-    bench.press()
-    bench.stand()
-    bench.release(bench.ours.id)
-    assert bench.machine.once is not None
-    release_id = bench.machine.once.command_id
-    bench.press("ben")
-
-    bench.machine.sent(FIWARE.id, release_id, at(bench.now), ok=True)
-
-    assert bench.state == "REQUESTED"
-
-
 def test_the_late_result_of_a_stop_is_not_taken_for_that_of_a_release() -> None:
-    bench = Bench()
-    bench.press()
-    bench.stand()
-    bench.release(bench.ours.id)
+    bench = releasing()
 
     bench.sent(DIRECT.id)
 
-    assert bench.machine.once is not None
-    assert bench.machine.once.times.sent.get(DIRECT.id) is None
-    assert bench.machine.once.transports[DIRECT.id] == "pending"
+    assert bench.once.times.sent.get(DIRECT.id) is None
+    assert bench.once.transports[DIRECT.id] == "pending"
 
 
 def test_a_held_robot_that_iveg_did_not_stop_can_be_released() -> None:
@@ -441,16 +330,6 @@ def test_such_a_release_that_is_refused_ends_where_it_began() -> None:
 
     assert bench.state == "RUNNING"
     assert not bench.machine.wants_stop
-
-
-def test_such_a_release_is_not_done_while_a_remote_hold_is_left() -> None:
-    bench = Bench()
-    bench.report(BOOT_HOLD)
-    bench.release(BOOT_HOLD.id)
-
-    bench.report(BOOT_HOLD)
-
-    assert bench.state == "RELEASING"
 
 
 # --- READY, RUNNING ---------------------------------------------------------------
@@ -497,30 +376,12 @@ def test_a_resume_that_is_refused_leaves_the_robot_ready() -> None:
     assert bench.state == "READY"
 
 
-def test_a_resume_without_the_robots_word_becomes_a_stop() -> None:
-    bench = Bench().ready()
-    bench.resume()
-
-    bench.wait(2.1)
-
-    assert bench.machine.wants_stop
-
-
 def test_a_held_robot_cannot_be_resumed() -> None:
     bench = Bench().ready()
     bench.report(RED_BUTTON)
 
     with pytest.raises(CommandRefusedError, match="still held"):
         bench.resume()
-
-
-def test_a_stop_of_a_ready_robot_begins_a_new_episode() -> None:
-    bench = Bench().ready()
-
-    bench.press()
-
-    assert bench.state == "REQUESTED"
-    assert bench.ours.id != "id-1"
 
 
 @pytest.mark.parametrize("state", ["RUNNING", "READY"])
@@ -555,6 +416,32 @@ def test_an_adopted_hold_is_sent_like_any_other_that_the_robot_has(
     assert {one.transport for one in sends(effects)} == {transport}
 
 
+def test_an_adopted_hold_ends_when_the_robot_says_that_another_server_released_it() -> (
+    None
+):
+    bench = Bench()
+    bench.report(Hold("01OTHER", "iveg", "remote"))
+    bench.stand()
+
+    effects = bench.report(released=("01OTHER",))
+
+    assert bench.state == "READY"
+    assert levels(effects) == ["run"]
+    assert not sends(effects)
+
+
+def test_an_adopted_hold_that_somebody_here_asks_for_too_is_stopped_again() -> None:
+    bench = Bench()
+    bench.report(Hold("01OTHER", "iveg", "remote"))
+    bench.stand()
+    bench.press()
+
+    bench.report(released=("01OTHER",))
+
+    assert bench.state == "REQUESTED"
+    assert bench.ours.id != "01OTHER"
+
+
 def test_a_boot_hold_alone_is_not_adopted() -> None:
     bench = Bench()
 
@@ -572,8 +459,7 @@ def closed(effects: list[Effect]) -> dict[str, tuple[str, str]]:
 
 
 def test_a_release_that_timed_out_is_expired_and_its_stop_replaced() -> None:
-    bench = IN_STATE["REQUESTED"]().stand()
-    bench.release(bench.ours.id)
+    bench = releasing()
 
     effects = bench.wait(2.1)
 
@@ -584,36 +470,8 @@ def test_a_release_that_timed_out_is_expired_and_its_stop_replaced() -> None:
     assert bench.machine.wants_stop
 
 
-def test_a_stop_of_a_robot_that_moved_is_replaced_by_the_new_one() -> None:
-    bench = IN_STATE["REQUESTED"]().stand()
-    before = bench.machine.stop
-
-    effects = bench.report(bench.ours, linear=0.3)
-
-    assert closed(effects) == {"stop": ("REPLACED", "moved")}
-    assert before is not None
-    assert before is not bench.machine.stop
-    assert bench.machine.stop is not None
-    assert bench.machine.stop.state == "REQUESTED"
-
-
-def test_a_release_that_somebody_overtook_with_a_stop_is_replaced() -> None:
-    bench = IN_STATE["REQUESTED"]().stand()
-    bench.release(bench.ours.id)
-
-    effects = bench.press("ben")
-
-    assert closed(effects)["release"] == ("REPLACED", "requested")
-
-
-def test_a_stop_that_others_join_is_not_closed() -> None:
-    bench = IN_STATE["REQUESTED"]()
-
-    assert closed(bench.press("ben")) == {}
-
-
 def test_i2_a_release_is_refused_while_another_stop_cannot_have_been_seen() -> None:
-    bench = IN_STATE["REQUESTED"]().stand()
+    bench = standing()
     bench.press("ben")
 
     with pytest.raises(CommandRefusedError, match="just now"):
@@ -630,3 +488,20 @@ def test_i2_a_release_is_refused_while_another_stop_cannot_have_been_seen() -> N
         bench.wait(0.1)
     bench.release(bench.ours.id)
     assert bench.state == "RELEASING"
+
+
+def test_i2_a_robot_whose_pose_moves_is_not_released_though_it_reports_rest() -> None:
+    bench, track = Bench(), MotionTrack()
+    bench.press()
+    bench.stand()
+    moved = bench.ours
+    for number in range(5):
+        bench.report(moved)
+        said = odometry(x=0.06 * number, linear=0.0)
+        motion = track.note_odometry(said.pose, said.twist, bench.now)
+        bench.machine.evidence.standstill.odometry(said, motion, at(bench.now))
+        bench.wait(0.1)
+    bench.report(moved)
+
+    with pytest.raises(CommandRefusedError, match="it is moving"):
+        bench.release(moved.id)

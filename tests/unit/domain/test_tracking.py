@@ -7,13 +7,10 @@ from hypothesis import strategies as st
 
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.observations import Instant
-from iveg.domain.tracking.assignment import assign
-from iveg.domain.tracking.numbers import TrackNumbers
 from iveg.domain.tracking.person import Sighting
-from iveg.domain.tracking.picture import PlacedDetection
-from iveg.domain.tracking.tracker import Tracker
+from iveg.domain.tracking.tracker import PlacedDetection, Tracker, TrackNumbers, assign
 from tests.builders import START, at
-from tests.unit.domain.scene import FIELD, HEDGE, Scene, person
+from tests.unit.domain.scene import Scene, person
 
 # --- global assignment ------------------------------------------------------------
 
@@ -77,18 +74,6 @@ def test_two_who_walk_side_by_side_keep_their_names() -> None:
     }
 
 
-def test_a_nearer_pair_does_not_take_what_another_needs() -> None:
-    scene = Scene()
-    scene.look("AGI", person(3.0), person(4.0))
-    scene.now = 0.3
-
-    # Nearest first would give 4.0 to the one at 3.9 and leave 4.9 to nobody near it.
-    scene.look("AGI", person(3.9), person(4.9))
-
-    found = {one.person_id: round(one.newest.x, 6) for one in scene.everyone}
-    assert found == {"P1": 3.9, "P2": 4.9}
-
-
 def test_two_tracks_that_come_to_one_spot_become_one_and_keep_both_rings() -> None:
     scene = Scene()
     scene.look("AGI", person(3.0))
@@ -100,7 +85,7 @@ def test_two_tracks_that_come_to_one_spot_become_one_and_keep_both_rings() -> No
 
     (known,) = scene.everyone
     assert known.person_id == "P1"
-    circles = sorted(look.x for look, _ in known.rings(scene.rule, at(scene.now)))
+    circles = sorted(look.x for look, _ in known.zone_radii(scene.rule, at(scene.now)))
     assert circles == [4.0, 4.4]
 
 
@@ -129,67 +114,16 @@ def names(scene: Scene) -> list[str]:
     return [one.person_id for one in scene.everyone]
 
 
-def test_who_walked_behind_crop_comes_out_as_the_same_person() -> None:
+def test_who_comes_back_after_a_gap_is_a_new_person_with_a_new_alert() -> None:
     scene = Scene()
     follow(scene, (3.0, 0.0))
-    scene.now += 4.0
-
-    scene.look("AGI", person(7.0))
-    assert names(scene) == ["P1", "P2"], "a glimpse takes nobody's name"
-
-    follow(scene, (7.0, 0.0))
-    assert names(scene) == ["P1"]
-
-
-def test_the_circle_at_the_spot_where_somebody_was_lost_stays() -> None:
-    scene = Scene()
-    follow(scene, (3.0, 0.0))
-    scene.now += 4.0
-    follow(scene, (7.0, 0.0))
-
-    (known,) = scene.everyone
-    rings = known.rings(scene.rule, at(scene.now))
-    assert sorted(look.x for look, _ in rings) == [3.0, 7.0]
-
-
-def test_nobody_walks_through_a_row_of_crop() -> None:
-    across, beside = Scene(greenhouse=HEDGE), Scene(greenhouse=FIELD)
-    for scene in (across, beside):
-        follow(scene, (2.5, 0.0))
-        scene.now += 5.0
-        follow(scene, (3.5, 0.0))
-
-    assert names(across) == ["P1", "P2"], "the way round is 100 m"
-    assert names(beside) == ["P1"]
-
-
-def test_a_mistake_of_a_detector_moves_nobody() -> None:
-    scene = Scene()
-    follow(scene, (3.0, 0.0), (30.0, 0.0))
-    scene.now += 5.0
-    follow(scene, (4.5, 0.0), seconds=1.0)
-    scene.now += 5.0
-    assert scene.everyone[0].newest.x == 4.5
-
-    follow(scene, (1.5, 0.0), seconds=0.0)
-
-    assert names(scene) == ["P1", "P2"], "near where P1 was known, not the glimpse"
-    assert scene.everyone[0].newest.x == 1.5
-
-
-def test_people_come_back_to_where_they_worked() -> None:
-    scene = Scene()
-    follow(scene, (3.0, 0.0))
-    scene.now += 15.0
-    follow(scene, (9.0, 0.0))
-    follow(scene, (3.0, 6.0))
-    assert len(scene.everyone) == 2
+    first = scene.everyone[0].decision_id
     scene.now += 15.0
 
-    follow(scene, (3.0, 0.5))
+    scene.look("AGI", person(3.0))
 
-    # The other was lost nearer to it, but never stood there.
-    assert [one.person_id for one in scene.everyone if one.newest.y == 0.5] == ["P1"]
+    assert names(scene) == ["P2"], "a mark ends where somebody is seen"
+    assert scene.everyone[0].decision_id != first
 
 
 def test_two_who_were_seen_apart_at_once_by_two_robots_never_become_one() -> None:
@@ -203,37 +137,6 @@ def test_two_who_were_seen_apart_at_once_by_two_robots_never_become_one() -> Non
     assert scene.everyone[1].newest.x == 3.0, "at one spot"
 
 
-def test_a_live_track_is_joined_before_a_lost_one_is_revived() -> None:
-    scene = Scene(robots=("AGI", "AGII"))
-    scene.look("AGI", person(3.0))
-    scene.now = 3.0
-    scene.look("AGII", person(4.5))
-    assert [one.person_id for one in scene.everyone] == ["P1"]
-    scene.now = 3.1
-    scene.look("AGII", person(4.5), person(9.0))
-    scene.now = 6.0
-    scene.look("AGII", person(9.0))
-    scene.now = 6.1
-
-    (placed,) = scene.look("AGI", person(8.6))
-
-    assert placed.person is not None
-    assert placed.person.person_id == "P2"
-
-
-def test_who_comes_back_from_where_somebody_was_last_seen_is_the_same() -> None:
-    scene = Scene()
-    scene.look("AGI", person(3.0))
-    first = scene.everyone[0]
-    scene.now = 50.0
-
-    scene.look("AGI", person(4.9))
-
-    (back,) = scene.everyone
-    assert back.person_id == first.person_id
-    assert back.decision_id != first.decision_id, "the alert is a new one"
-
-
 def test_the_alert_of_somebody_who_is_followed_stays_the_same() -> None:
     scene = Scene()
     scene.look("AGI", person(3.0))
@@ -245,19 +148,6 @@ def test_the_alert_of_somebody_who_is_followed_stays_the_same() -> None:
     scene.look("AGI", person(3.5))
 
     assert {one.decision_id for one in scene.everyone} == {first}
-
-
-def test_no_start_of_iveg_repeats_an_id() -> None:
-    before, after = (
-        Tracker(numbers=TrackNumbers("-5f0c")),
-        Tracker(numbers=TrackNumbers("-a31b")),
-    )
-    seen = Sighting("AGI", 3.0, 0.0, 0.9, at(0), "farmer", 0.94)
-    one = PlacedDetection("person", seen, "d1")
-
-    ids = {*before.track_picture([one], at(0)), *after.track_picture([one], at(0))}
-
-    assert ids == {"P1-5f0c4cdb", "P1-a31b4cdb"}
 
 
 def test_numbers_begin_anew_each_day_and_ids_never_come_again() -> None:
@@ -274,36 +164,6 @@ def test_numbers_begin_anew_each_day_and_ids_never_come_again() -> None:
 
     assert [str(one).partition("-")[0] for one in ids] == ["P1", "P2", "P3", "P1"]
     assert len(set(ids)) == 4
-
-
-def test_whoever_appears_far_from_every_mark_is_somebody_else() -> None:
-    scene = Scene()
-    scene.look("AGI", person(3.0))
-    scene.now = 50.0
-
-    scene.look("AGI", person(9.1))
-
-    assert len(scene.everyone) == 2
-
-
-def test_of_two_who_are_lost_the_likelier_one_comes_back() -> None:
-    scene = Scene()
-    follow(scene, (3.0, 0.0), (9.0, 0.0))
-    scene.now += 15.0
-
-    follow(scene, (6.5, 0.0))
-
-    assert [one.person_id for one in scene.everyone if one.newest.x == 6.5] == ["P2"]
-
-
-def test_the_mark_of_who_was_seen_shortly_goes_sooner() -> None:
-    scene = Scene()
-    scene.look("AGI", person(3.0), person(8.0))
-    follow(scene, (8.0, 0.0))
-
-    stages = [one.stage(at(scene.now + 62.0)) for one in scene.everyone]
-
-    assert stages == ["gone", "last_seen"]
 
 
 def test_a_glimpse_ends_when_its_place_was_seen_empty_and_a_name_does_not() -> None:
@@ -336,7 +196,7 @@ def rings_of(tracker: Tracker, now: Instant) -> set[tuple[str, float, float, flo
     return {
         (look.observer, look.x, look.y, radius)
         for one in tracker.known.values()
-        for look, radius in one.rings(DetectionRule(), now)
+        for look, radius in one.zone_radii(DetectionRule(), now)
     }
 
 

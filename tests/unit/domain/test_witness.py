@@ -8,9 +8,8 @@ import pytest
 from iveg.domain.geometry import REST, Pose2D, Rectangle, Twist2D
 from iveg.domain.greenhouse import Greenhouse, PlacedObstacle, StructuralPost
 from iveg.domain.observations import LaserScan, Origin
-from iveg.domain.witness import KnownBody, Outline, Plan, Witness
-from iveg.lab.emulator.greenhouse import Body, Disc, Scenery
-from iveg.lab.emulator.lidar import LaserModel, sweep
+from iveg.domain.witness import KnownPeer, Outline, Plan, Witness
+from iveg.lab.emulator.greenhouse import Body, Disc, LaserModel, Scenery, sweep
 
 ROOM = Greenhouse(
     "room",
@@ -31,6 +30,7 @@ class Beside:
         self.room = room
         self.witness = Witness(BODY, None if plan is None else Plan.of(plan))
         self.now = 0.0
+        self.peers_stand = True
         self.rng = np.random.default_rng(1)
 
     def look(
@@ -65,7 +65,8 @@ class Beside:
         scan = LaserScan(
             "R", Origin(), -math.pi, MODEL.angle_increment, 0.1, 30.0, HERE, ranges
         )
-        self.witness.look(scan, pose, twist, map(KnownBody.of_peer, peers), self.now)
+        known = [KnownPeer(one, self.peers_stand) for one in peers]
+        self.witness.look(scan, pose, twist, known, self.now)
 
 
 @pytest.mark.parametrize("place", [(2.4, 0.0), (0.0, 0.65), (-1.5, 0.5), (2.2, -0.6)])
@@ -112,10 +113,20 @@ def test_nobody_stands_where_the_plan_is_off_or_plants_lean_out(
         assert not beside.look(pose=pose, believed=pose.compose(off), leaves=leaves)
 
 
-def test_a_peer_is_nobody_and_a_person_beside_it_is() -> None:
+@pytest.mark.parametrize("stands", [True, False])
+def test_a_peer_is_nobody_and_a_person_beside_it_is(stands: bool) -> None:
     beside, peer = Beside(), Pose2D(1.8, 0.0, 0.0)
+    beside.peers_stand = stands
     assert not any(beside.look(peers=(peer,)) for _ in range(20))
     assert [beside.look((0.4, -0.65), peers=(peer,)) for _ in range(3)][-1]
+
+
+@pytest.mark.parametrize("stands", [True, False])
+def test_who_is_close_to_a_peer_that_stands_is_no_part_of_it(stands: bool) -> None:
+    beside, across = Beside(), Pose2D(1.8, 0.0, math.pi / 2)
+    beside.peers_stand = stands
+    seen = [beside.look((1.2, -0.45), peers=(across,)) for _ in range(3)]
+    assert seen[-1] is stands
 
 
 def test_what_is_larger_than_two_people_counts_once_it_moves() -> None:
@@ -151,9 +162,3 @@ def test_a_scan_of_one_value_makes_nobody_up_and_hides_nobody_later(
     beside.now += 0.1
     beside.hear(np.full(MODEL.beams, value, np.float32))
     assert [beside.look((2.0, 0.0)) for _ in range(3)][-1]
-
-
-def test_a_hundred_people_are_witnessed_like_one() -> None:
-    beside, rng = Beside(), np.random.default_rng(3)
-    crowd = [(float(x), float(y)) for x, y in rng.uniform(-6.0, 6.0, (100, 2))]
-    assert [beside.look(*crowd) for _ in range(3)][-1]

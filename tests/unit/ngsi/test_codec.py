@@ -3,25 +3,31 @@
 import math
 from dataclasses import replace
 
-import numpy as np
 import orjson
 import pytest
 
+from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import CLEAR, Feedback, FeedbackAlert, SpeedLimit
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import (
-    Climate,
     CommandAnswer,
     CommandStatus,
     DetectionFrame,
-    HeartbeatProbe,
     LaserScan,
     Navigation,
     Odometry,
     Origin,
+    ReportedObstacle,
 )
+from iveg.domain.parameters import ByClass, sent_to_robots
 from iveg.ngsi import codec, names
-from tests.builders import START, at, notification, odometry, origin, pose_value
+from tests.builders import (
+    START,
+    at,
+    odometry,
+    origin,
+    safety_report,
+)
 
 LISTING_1 = b"""{
   "id": "AGX", "type": "Robot",
@@ -62,20 +68,6 @@ def test_the_papers_listing_1_is_accepted_as_it_stands() -> None:
     assert frame.detections[0].frame_id is None
 
 
-def test_a_notification_names_its_subscription() -> None:
-    subscription, reading = codec.read_notification(notification(subscription_id="s-7"))
-
-    assert subscription == "s-7"
-    assert reading.observations == (odometry(origin=origin()),)
-
-
-def test_key_values_are_read_like_normalized_attributes() -> None:
-    (pose,) = entity(base_pose_ground_truth=pose_value(1.0, 2.0))
-
-    assert isinstance(pose, Odometry)
-    assert pose.pose == Pose2D(1.0, 2.0, 0.0)
-
-
 def test_a_single_box_and_a_list_of_boxes_are_both_accepted() -> None:
     sides = ("xmin", "xmax", "ymin", "ymax", "zmin", "zmax")
     box = {
@@ -97,10 +89,6 @@ def test_an_empty_list_says_looked_and_saw_nothing() -> None:
     assert frame == DetectionFrame("AGI", Origin("b", 4), ())
 
 
-def test_attributes_that_nobody_knows_or_that_are_null_are_skipped() -> None:
-    assert entity(colour="red", navigation=None, cmd="") == []
-
-
 def test_the_agents_opinion_and_the_robots_answer_are_told_apart() -> None:
     status, answer = entity(
         cmd_status="OK", cmd_info={"id": "01A", "r": "LATCHED", "boot": "b", "seq": 1}
@@ -108,29 +96,6 @@ def test_the_agents_opinion_and_the_robots_answer_are_told_apart() -> None:
 
     assert status == CommandStatus("AGI", "OK")
     assert answer == CommandAnswer("AGI", Origin("b", 1), "01A", "LATCHED")
-
-
-def test_climate_and_heartbeat_are_read() -> None:
-    air = {
-        "id": names.CLIMATE_ID,
-        "type": names.CLIMATE_TYPE,
-        "temperature": {"type": "Number", "value": 21.5},
-        "relativeHumidity": 0.6,
-    }
-    probe = {
-        "id": names.HEARTBEAT_ID,
-        "type": names.HEARTBEAT_TYPE,
-        "probe": {"seq": 3},
-    }
-
-    assert codec.read_entity(air).observations == (Climate(21.5, 0.6, None),)
-    assert codec.read_entity(probe).observations == (HeartbeatProbe(Origin(None, 3)),)
-
-
-def test_a_foreign_entity_is_counted_by_its_kind() -> None:
-    (problem,) = codec.read_entity({"id": "x", "type": "Room"}).problems
-
-    assert (problem.reason, problem.detail) == ("foreign_entity", "Room")
 
 
 # --- Algorithm 1 ------------------------------------------------------------------
@@ -170,13 +135,6 @@ def test_algorithm_1s_single_payload_is_accepted() -> None:
     assert (seen.frame_id, seen.probability) == ("map", 0.91)
 
 
-def test_a_pose_of_algorithm_1_may_carry_its_own_stamp() -> None:
-    (pose,) = entity(pose={"x": 0, "y": 0, "yaw": 0, "stamp": "2026-01-01T00:00:00Z"})
-
-    assert isinstance(pose, Odometry)
-    assert pose.origin.stamp_s == pytest.approx(1767225600.0)
-
-
 def test_a_detection_of_algorithm_1_without_confidence_is_counted() -> None:
     (frame,) = entity(**{"class": "farmer", "position_3D": {"x": 1, "y": 2, "z": 0}})
 
@@ -185,14 +143,6 @@ def test_a_detection_of_algorithm_1_without_confidence_is_counted() -> None:
 
 
 # --- scans ------------------------------------------------------------------------
-
-
-def test_null_is_no_return() -> None:
-    (sweep,) = entity(lidar_points=[1.0, None, 3])
-
-    assert isinstance(sweep, LaserScan)
-    assert sweep.ranges.dtype == np.float32
-    assert sweep.ranges.tolist() == [1.0, math.inf, 3.0]
 
 
 def test_a_header_says_where_the_laser_sits_and_looks() -> None:
@@ -232,18 +182,6 @@ def test_stamps_are_iso_8601_in_utc_or_nothing(
     text: str, seconds: float | None
 ) -> None:
     assert codec.parse_stamp(text) == seconds
-
-
-def test_a_stamp_is_kept_exactly_as_sent() -> None:
-    value = {**pose_value(), "stamp": "2023-11-14T23:13:20.1234+01:00"}
-    (pose,) = entity(base_pose_ground_truth=value)
-
-    assert isinstance(pose, Odometry)
-    assert pose.origin.stamp == "2023-11-14T23:13:20.1234+01:00"
-
-
-def test_a_written_stamp_has_milliseconds_and_a_z() -> None:
-    assert codec.format_stamp(START.wall + 0.25) == "2023-11-14T22:13:20.250Z"
 
 
 # --- commands, feedback -----------------------------------------------------------
@@ -344,13 +282,6 @@ def test_who_is_named_clear_is_clear_and_who_is_not_named_is_not_there() -> None
     assert feedback.speed_limits == {"AGI": CLEAR}
 
 
-def test_feedback_with_nothing_to_tell_says_null() -> None:
-    written = orjson.loads(codec.write_feedback(Feedback("AGI", Origin())))
-
-    assert (written["alert"], written["alerts"]) == (None, [])
-    assert written["robot_pose"] is None
-
-
 def test_feedback_tells_how_people_go_on_where_the_rule_looks_ahead() -> None:
     alert = FeedbackAlert("d", "s", "person", position=(1.0, 2.0, 0.0))
     goes = replace(alert, velocity=(0.5, -1.0))
@@ -374,12 +305,6 @@ def test_a_limit_says_that_it_is_over_and_else_nothing_of_it() -> None:
 
     assert codec.read_feedback(payload).speed_limits == limits
     assert "over" not in orjson.loads(payload)["speed_limits"]["AGII"]
-
-
-def test_a_backlog_that_nobody_knows_is_not_told() -> None:
-    assert "backlog" not in orjson.loads(
-        codec.write_feedback(Feedback("AGI", Origin()))
-    )
 
 
 @pytest.mark.parametrize(("lag", "told"), [(0.04, 0.0), (12.34, 12.3), (500.0, 60.0)])
@@ -420,16 +345,40 @@ def test_a_backlog_that_cannot_be_read_costs_no_speed_limit(
     assert feedback.speed_limits["AGI"].speed_factor == 0.5
 
 
-def test_another_object_is_told_as_a_stamp_alone() -> None:
-    feedback = Feedback("AGI", Origin(), FeedbackAlert("", "t"))
-
-    assert orjson.loads(codec.write_feedback(feedback))["alert"] == {"stamp": "t"}
-
-
 def test_every_measure_carries_its_stamp_at_the_top_level_too() -> None:
     written = orjson.loads(codec.write_odometry(odometry(origin=origin())))
 
     assert written["TimeInstant"] == codec.format_stamp(at(0).wall)
+
+
+@pytest.mark.parametrize("moved", [True, False])
+def test_what_a_laser_sees_is_told_in_the_report_and_read_the_same(moved: bool) -> None:
+    seen = ReportedObstacle(3.25, -1.5, 0.45, moved)
+    said = replace(safety_report(), obstacle=seen)
+    (read,) = codec.read_measure("AGI_safety", codec.write_safety(said)).observations
+
+    assert read == said
+    assert b"obstacle" not in codec.write_safety(safety_report())
+
+
+@pytest.mark.parametrize(
+    "obstacle",
+    [
+        {"x": 1e9, "y": 0.0, "width_m": 0.4, "moved": True},
+        {"x": 0.0, "y": 0.0, "width_m": -0.1, "moved": True},
+        {"x": 0.0, "y": 0.0, "width_m": 0.4, "moved": "yes"},
+        {"x": 0.0, "y": 0.0, "moved": True},
+        [0.0, 0.0],
+        "somebody",
+    ],
+)
+def test_an_obstacle_that_cannot_be_read_costs_no_report(obstacle: object) -> None:
+    said = orjson.loads(codec.write_safety(safety_report()))
+    said["safety_state"]["obstacle"] = obstacle
+    reading = codec.read_measure("AGI_safety", orjson.dumps(said))
+
+    assert reading.problems == ()
+    assert reading.observations == (safety_report(),)
 
 
 # --- names ------------------------------------------------------------------------
@@ -478,3 +427,39 @@ def test_what_robots_are_told_alike_is_written_once_and_reads_the_same() -> None
             written = writer.write(one)
             assert orjson.loads(written) == orjson.loads(codec.write_feedback(one))
             assert codec.read_feedback(written) == one
+
+
+@pytest.mark.parametrize("frame", ["map", "odom", "AGII/laser", "/world"])
+def test_a_scan_in_no_frame_of_its_robot_is_refused_by_name(frame: str) -> None:
+    body = b'{"lidar_points": [1.0], "lidar_header": {"angle_min": 0, '
+    body += b'"angle_increment": 0.1, "range_max": 9, "frame_id": "%b"}}'
+
+    for instead in ({}, codec.UNREAD):
+        read = codec.read_measure("AGI_lidar2D", body % frame.encode(), instead=instead)
+
+        assert read.observations == ()
+        assert [one.reason for one in read.problems] == ["unknown_frame"]
+
+
+def test_robots_read_the_radii_of_the_rule_in_the_feedback() -> None:
+    rule = DetectionRule(radius_m=ByClass(2.0, {"robot": 3.0}))
+    told = Feedback("AGI", Origin("b", 1), rule=sent_to_robots(rule))
+
+    payload = codec.write_feedback(told)
+
+    assert orjson.loads(payload)["rule"] == {"radius_m": {"person": 2.0, "robot": 3.0}}
+    assert codec.read_feedback(payload).rule == told.rule
+
+
+@pytest.mark.parametrize(
+    "rule",
+    [None, 3, [], {"radius_m": 3}, {"radius_m": {"robot": "3", "person": True}},
+     {"radius_m": {"robot": 0.4, "person": 1e9}}, {"radius_m": {"crate": 3}}],
+    ids=str,
+)  # fmt: skip
+def test_radii_that_cannot_be_read_are_left_out_and_the_feedback_counts(
+    rule: object,
+) -> None:
+    payload = orjson.dumps({"boot": "b", "seq": 1, "robot_id": "AGI", "rule": rule})
+
+    assert codec.read_feedback(payload).rule == {}

@@ -44,6 +44,7 @@ class Desk:
         direct: bool = True,
         also: Mapping[Transport, CommandPort] | None = None,
         tiles: Sequence[Tile] = (),
+        refused: Sequence[str] = (),
     ) -> None:
         self.clock = FakeClock()
         self.fleet = FakeFleet()
@@ -67,7 +68,7 @@ class Desk:
                 self.clock,
                 self.ids,
             ),
-            Choices(tiles=tiles),
+            Choices(tiles=tiles, refused=refused),
         )
         self.hub, self.event_log, self.health_monitor = (
             parts.hub,

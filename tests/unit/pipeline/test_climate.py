@@ -14,17 +14,6 @@ def kept(desk: Desk) -> list[ClimateRecord]:
     return [one for one in desk.sink.records if isinstance(one, ClimateRecord)]
 
 
-def test_a_reading_is_kept_as_it_was() -> None:
-    desk = Desk()
-
-    reads(desk, 0.0, temperature=None)
-
-    (record,) = kept(desk)
-    assert record == ClimateRecord(
-        at=desk.clock().wall, relative_humidity=0.5, co2=400.0
-    )
-
-
 def test_every_reading_is_told_and_one_a_minute_is_kept() -> None:
     desk = Desk()
 

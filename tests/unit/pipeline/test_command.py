@@ -4,7 +4,7 @@ import asyncio
 
 import pytest
 
-from iveg.domain.errors import CommandRefusedError, UnknownRobotError
+from iveg.domain.errors import UnknownRobotError
 from iveg.domain.observations import Hold
 from iveg.domain.records import CommandEventRecord, CommandRecord
 from iveg.domain.stop import STEPS, DesiredRecord, FollowedCommand, StopMachine
@@ -30,9 +30,6 @@ async def released(desk: Desk) -> str:
     desk.report("AGI", released=(held,))
     await settle()
     return held
-
-
-# --- both transports at once ------------------------------------------------------
 
 
 async def test_i5_both_transports_have_it_before_the_disk_is_asked() -> None:
@@ -155,9 +152,6 @@ async def test_stopping_a_robot_outside_the_fleet_stops_nothing() -> None:
     assert desk.fleet.stops == []
 
 
-# --- what comes back --------------------------------------------------------------
-
-
 async def test_i3_204_from_orion_and_a_puback_are_no_evidence() -> None:
     desk = Desk()
 
@@ -165,25 +159,6 @@ async def test_i3_204_from_orion_and_a_puback_are_no_evidence() -> None:
     await desk.wait(5.0)
 
     assert desk.now(command).state == "UNCONFIRMED"
-
-
-async def test_f39_reports_alone_bring_standing() -> None:
-    desk = Desk()
-    command = await press(desk)
-
-    await desk.stand()
-
-    assert desk.now(command).state == "STANDING"
-    assert desk.now(command).standstill_ms is not None
-
-
-async def test_the_robots_answer_alone_brings_delivered() -> None:
-    desk = Desk()
-    command = await press(desk)
-
-    desk.answer("LATCHED")
-
-    assert desk.now(command).state == "DELIVERED"
 
 
 async def test_f41_reports_with_an_old_number_do_not_keep_it_standing() -> None:
@@ -206,18 +181,6 @@ async def test_what_was_asked_of_orion_says_nothing_about_stop() -> None:
     desk.hear(safety_report("AGI", held, origin=desk.next_origin()), asked=True)
 
     assert desk.now(command).state == "SENT"
-
-
-async def test_odometry_that_moves_stops_a_standing_robot_again() -> None:
-    desk = Desk()
-    command = await press(desk)
-    await desk.stand()
-    for _ in range(3):
-        desk.drive("AGI", linear=0.4)
-    await settle()
-
-    assert desk.commander.machine("AGI").hold_id != command.command_id
-    assert desk.journal.lines[-1][1] == "stopped"
 
 
 @pytest.mark.parametrize(
@@ -296,9 +259,6 @@ async def test_a_silent_robots_tries_are_told_at_most_a_few_times_a_second() -> 
     assert 10 <= told <= 5 * 4
 
 
-# --- release ----------------------------------------------------------------------
-
-
 async def test_i6_a_release_goes_once_on_each_transport_and_names_its_attempt() -> None:
     desk = Desk()
     command = await press(desk)
@@ -316,16 +276,6 @@ async def test_i6_a_release_goes_once_on_each_transport_and_names_its_attempt() 
     assert desk.fleet.orders == desk.broker.orders
     assert desk.fleet.orders[0][1] == once.command_id
     assert len(desk.fleet.stops) == before
-
-
-async def test_without_the_direct_transport_a_release_goes_through_orion_alone() -> (
-    None
-):
-    desk = Desk(direct=False)
-    await released(desk)
-
-    assert len(desk.broker.orders) == 1
-    assert desk.fleet.asked == []
 
 
 async def test_a_transport_that_hangs_does_not_hold_up_a_release_on_the_other() -> None:
@@ -376,19 +326,6 @@ async def test_the_journal_knows_what_a_release_names_before_it_goes_out() -> No
     held = command.command_id
     challenge = desk.fleet.orders[0][0]
     assert desk.journal.named_lines == [("AGI", held, (held,), challenge)]
-
-
-async def test_an_order_remembers_how_far_the_agent_was_behind_when_it_left() -> None:
-    desk = Desk()
-    command = await press(desk)
-    await desk.stand()
-    desk.lag(12.0)
-
-    once = await desk.commander.release(
-        "AGI", [command.command_id], "ana", desk.clock()
-    )
-
-    assert (desk.now(command).agent_lag_s, desk.now(once).agent_lag_s) == (None, 12.0)
 
 
 async def test_orions_204_while_the_agent_is_cut_off_is_unknown() -> None:
@@ -454,44 +391,6 @@ async def test_a_resume_goes_once_on_each_transport() -> None:
     assert [one for one in desk.fleet.asked if one[0] == "resume"] == [order]
     assert desk.fleet.orders[-1] == desk.broker.orders[-1]
     assert desk.fleet.orders[-1][1] == once.command_id
-
-
-async def test_a_refused_release_is_told_with_its_reason() -> None:
-    desk = Desk()
-    command = await press(desk)
-    await desk.stand()
-    await desk.commander.release("AGI", [command.command_id], "ana", desk.clock())
-
-    desk.answer("REFUSED", why="challenge")
-    held = Hold(command.command_id, "iveg", "remote")
-    desk.report("AGI", held, challenge="another")
-
-    assert desk.sentences()[-1] == "log.stop.refused"
-    assert desk.event_log.lines[-1].slots["why"] == "challenge"
-
-
-async def test_a_release_of_a_moving_robot_is_refused() -> None:
-    desk = Desk()
-    await press(desk)
-
-    with pytest.raises(CommandRefusedError):
-        await desk.commander.release("AGI", ["x"], "ana", desk.clock())
-
-
-async def test_the_history_says_that_a_released_stop_is_over() -> None:
-    desk = Desk()
-    held = await released(desk)
-    desk.report("AGI", factor=1.0, reason="clear", linear=0.3, released=(held,))
-
-    states = [
-        one.state
-        for one in desk.sink.records
-        if isinstance(one, CommandRecord) and one.command_id == held
-    ]
-    assert states[-2:] == ["READY", "RUNNING"]
-
-
-# --- restart, broker back ---------------------------------------------------------
 
 
 async def test_a_restart_asserts_a_hold_again_that_no_release_ever_named() -> None:
@@ -645,18 +544,6 @@ async def test_a_broker_that_is_back_gets_every_level_again() -> None:
     assert desk.fleet.levels == [("AGI", "stopped", (command.command_id,))]
 
 
-async def test_a_level_that_cannot_be_set_holds_up_nothing() -> None:
-    desk = Desk()
-    desk.fleet.fails = True
-
-    await press(desk)
-
-    assert desk.broker.asked
-
-
-# --- audit ------------------------------------------------------------------------
-
-
 async def test_i9_each_step_is_one_row_of_the_audit() -> None:
     desk = Desk()
     held = await released(desk)
@@ -688,16 +575,6 @@ async def test_f38_fifty_presses_are_fifty_rows_and_one_episode() -> None:
         *(f"joined by operator-{number}" for number in range(1, 50)),
     ]
     assert len({row.command_id for row in rows}) == 1
-
-
-async def test_delivered_is_told_with_the_time_it_took() -> None:
-    desk = Desk()
-    await press(desk)
-    desk.clock.now = 0.08
-    desk.answer("LATCHED")
-
-    (line,) = (one for one in desk.event_log.lines if one.key == "log.stop.delivered")
-    assert line.slots["ms"] == 80
 
 
 async def test_old_commands_make_room() -> None:

@@ -176,20 +176,3 @@ async def test_a_robot_that_stands_did_not_move_by_the_word_of_an_earlier_boot(
     assert (stood, state(desk)) == ("STANDING", "STANDING")
     assert hold_id(desk) == ours
     assert "log.stop.moved" not in desk.sentences()
-
-
-async def test_after_reports_of_an_earlier_boot_the_present_one_is_seen_to_stand() -> (
-    None
-):
-    desk = await restarted()
-    desk.commander.restore({"AGI": DesiredRecord("ana", BEFORE.id)}, desk.clock())
-    before = Robot(desk, "boot-a", heard=EARLIER_IVEG)
-    present = Robot(desk, "boot-b")
-
-    for _ in range(30):
-        for _ in range(3):
-            before.report(linear=0.4)
-        await present.hold(0.1)
-
-    assert state(desk) == "STANDING"
-    assert "log.stop.moved" not in desk.sentences()

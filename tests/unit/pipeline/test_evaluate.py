@@ -16,15 +16,8 @@ from iveg.domain.records import (
     DetectionRecord,
     OdometryRecord,
 )
-from iveg.domain.transports import DIRECT, FIWARE
 from iveg.models.decision import Decision
-from tests.builders import (
-    detection,
-    detection_frame,
-    odometry,
-    origin,
-    safety_report,
-)
+from tests.builders import detection, detection_frame, safety_report
 from tests.fakes.records import alert_record
 from tests.unit.pipeline.desk import Desk, conditions_of
 
@@ -58,9 +51,6 @@ def test_13_13_a_decision_remembers_where_the_robots_were() -> None:
     assert {one.robot_id for one in view.places} == {"AGI", "AGII"}
     assert isinstance(view.rule.parameters, dict)
     assert "places" not in view.rule.parameters
-
-
-# --- feedback ---------------------------------------------------------------------
 
 
 def test_feedback_tells_how_people_go_on_for_as_long_as_they_are_seen() -> None:
@@ -143,34 +133,12 @@ def test_another_confident_object_is_told_as_a_stamp_alone() -> None:
     assert alert.stamp
 
 
-async def test_the_heartbeat_comes_ten_times_a_second_and_from_the_loop_alone() -> None:
-    desk = watched(Desk())
-    desk.fleet.told.clear()
-
-    await desk.wait(2.0)
-
-    to_agi = [one for one in desk.fleet.told if one.robot_id == "AGI"]
-    assert 20 <= len(to_agi) <= 24
-
-
-async def test_f14_a_loop_that_hangs_sends_nothing() -> None:
-    desk = watched(Desk())
-    desk.fleet.told.clear()
-    desk.clock.now += 2.0
-
-    assert desk.fleet.told == []
-
-
-# --- decisions --------------------------------------------------------------------
-
-
 def test_a_decision_is_written_down_with_its_feedback() -> None:
     desk = watched(Desk())
 
     meet(desk)
 
     newest = desk.records(DecisionRecord)[-1]
-    assert isinstance(newest, DecisionRecord)
     assert (newest.robot_id, newest.observer) == ("AGI", "AGII")
     assert newest.feedback_at is not None
     assert newest.rule_parameters["threshold"] == 0.8
@@ -188,7 +156,7 @@ def test_what_the_robot_applies_and_shows_completes_the_decision() -> None:
         factor=0.5,
         reason="person",
         decision_id=speed_limit.decision_id,
-        linear=0.5,
+        linear=0.2,
     )
     desk.drive("AGI", 0.0, linear=0.2)
 
@@ -210,7 +178,6 @@ async def test_the_end_of_a_crossing_ends_its_decision() -> None:
 
     assert list(desk.evaluator.decisions.open) == []
     newest = desk.records(DecisionRecord)[-1]
-    assert isinstance(newest, DecisionRecord)
     assert newest.ended_at is not None
 
 
@@ -224,9 +191,6 @@ def test_a_robot_that_slows_for_somebody_it_cannot_see_is_counted() -> None:
     assert desk.evaluator.protected_unseen == 1
 
 
-# --- alerts -----------------------------------------------------------------------
-
-
 async def test_13_10_a_slow_down_that_the_rule_asked_for_is_no_alert() -> None:
     desk = watched(Desk())
     meet(desk)
@@ -238,10 +202,10 @@ async def test_13_10_a_slow_down_that_the_rule_asked_for_is_no_alert() -> None:
 
 async def test_a_robot_that_does_not_slow_down_raises_a_grave_alert() -> None:
     desk = watched(Desk())
-    for _ in range(22):
+    for number in range(22):
         meet(desk)
-        desk.drive("AGI", 0.0)
-        desk.drive("AGII", 50.0)
+        desk.drive("AGI", 0.08 * number, linear=0.8)
+        desk.drive("AGII", 50.0, linear=0.0)
         desk.look("AGI")
         await desk.wait(0.1)
 
@@ -269,36 +233,13 @@ async def test_acknowledging_is_written_down_and_told() -> None:
     desk.evaluator.alerts.acknowledge(first.alert_id, "ana", "seen", desk.clock())
 
     newest = desk.records(AlertRecord)[-1]
-    assert isinstance(newest, AlertRecord)
     assert (newest.acknowledged_by, newest.note) == ("ana", "seen")
     assert desk.sentences()[-1] == "log.alert.acknowledged"
-
-
-def test_an_alert_that_nobody_knows_is_acknowledged_by_nobody() -> None:
-    desk = Desk()
-
-    assert desk.evaluator.alerts.acknowledge("none", "ana", "", desk.clock()) is None
-    assert desk.sentences() == []
-
-
-async def test_a_flood_is_told_when_it_begins() -> None:
-    desk = Desk()
-    for number in range(11):
-        desk.report("AGI", factor=1.0, reason="clear", linear=0.5)
-        desk.drive("AGI", float(number), linear=0.5)
-        await desk.wait(3.2)
-
-    assert desk.evaluator.alerts.flood.since is not None
-    assert desk.sentences().count("log.flood.began") == 1
-
-
-# --- what is stored ---------------------------------------------------------------
 
 
 def stored_verdicts(desk: Desk) -> set[str]:
     """Verdicts of the newest row of the newest decision."""
     newest = desk.records(DecisionRecord)[-1]
-    assert isinstance(newest, DecisionRecord)
     return {one["verdict"] for one in newest.links}
 
 
@@ -307,8 +248,8 @@ async def test_the_stored_decision_says_missing_as_soon_as_it_is() -> None:
     meet(desk)
     assert "open" in stored_verdicts(desk)
 
-    for _ in range(6):
-        desk.drive("AGI", 0.0)
+    for number in range(6):
+        desk.drive("AGI", 0.36 * number, linear=0.8)
         meet(desk)
         await desk.wait(0.45)
 
@@ -318,9 +259,9 @@ async def test_the_stored_decision_says_missing_as_soon_as_it_is() -> None:
 
 
 async def drive_on(desk: Desk, seconds: float) -> None:
-    """AGI drives on at 0.5 m/s and is heard; it reports nothing."""
-    for _ in range(round(seconds / 0.1)):
-        desk.drive("AGI", 0.0)
+    """AGI drives on at 0.8 m/s, to and fro, and is heard; it reports nothing."""
+    for number in range(round(seconds / 0.1)):
+        desk.drive("AGI", 0.08 * number, linear=0.8)
         meet(desk)
         await desk.wait(0.1)
 
@@ -336,20 +277,7 @@ async def test_a_robot_that_nobody_can_hear_is_not_judged_until_it_is_heard_agai
         await drive_on(desk, 1.0)
         told.append("alert.person_not_slowing" in conditions_of(desk))
 
-    assert told == [False, False, False, True]
-
-
-async def test_a_robot_that_braked_before_the_ring_is_judged_by_its_speed_before() -> (
-    None
-):
-    desk = watched(Desk())
-    for linear in (0.6, 0.6, 0.5, 0.44):
-        desk.drive("AGI", 0.0, linear=linear)
-        await desk.wait(0.1)
-    meet(desk)
-
-    (decision,) = desk.evaluator.decisions.open
-    assert decision.crossing.speed_before == 0.6
+    assert told == [False, False, True, True]
 
 
 async def test_a_decision_that_waits_is_not_stored_again_and_again() -> None:
@@ -370,7 +298,6 @@ def test_a_decision_that_is_open_when_iveg_goes_away_says_so() -> None:
     desk.evaluator.leave(desk.clock())
 
     newest = desk.records(DecisionRecord)[-1]
-    assert isinstance(newest, DecisionRecord)
     assert newest.ended_at == desk.clock().wall
     assert stored_verdicts(desk) == {"ok", "unknown"}
 
@@ -379,13 +306,10 @@ def test_what_a_crash_left_open_is_closed_and_says_that_nobody_knows() -> None:
     crashed, desk = watched(Desk()), Desk()
     meet(crashed)
     left = crashed.records(DecisionRecord)[-1]
-    assert isinstance(left, DecisionRecord)
 
     desk.evaluator.close_earlier([left], [alert_record()], desk.clock())
 
     (closed,), (cleared,) = desk.records(DecisionRecord), desk.records(AlertRecord)
-    assert isinstance(closed, DecisionRecord)
-    assert isinstance(cleared, AlertRecord)
     assert closed.decision_id == left.decision_id
     assert closed.ended_at == cleared.cleared_at == desk.clock().wall
     assert stored_verdicts(desk) == {"ok", "unknown"}
@@ -407,9 +331,6 @@ async def test_what_this_run_has_open_is_left_alone() -> None:
 
     assert alerts
     assert len(desk.sink.records) == before
-
-
-# --- the log ----------------------------------------------------------------------
 
 
 async def test_a_link_that_comes_and_goes_is_told_once_each_time() -> None:
@@ -461,10 +382,7 @@ def test_a_long_sighting_is_one_line_and_two_rows_a_second() -> None:
 
 @pytest.mark.parametrize(
     ("class_id", "probability", "key"),
-    [
-        ("farmer", 0.6, "log.detection_faint"),
-        ("crate", 0.9, "log.detection_unmapped"),
-    ],
+    [("farmer", 0.6, "log.detection_faint"), ("crate", 0.9, "log.detection_unmapped")],
 )
 def test_faint_and_unmapped_detections_are_never_silently_ignored(
     class_id: str, probability: float, key: str
@@ -485,18 +403,9 @@ async def test_a_person_who_is_not_seen_any_more_is_remembered_then_expired() ->
     assert told == ["log.person_remembered", "log.person_expired"]
 
 
-async def test_who_is_gone_leaves_the_page() -> None:
-    desk = watched(Desk())
-    meet(desk, 80.0)
-    desk.clock.now = 601.0
-    await desk.wait(0.05)
-
-    assert desk.evaluator.people.known == {}
-
-
 async def test_a_spot_that_was_looked_at_in_vain_is_told() -> None:
     desk = watched(Desk())
-    desk.look("AGII", detection("farmer", 4.0))
+    desk.look("AGI", detection("farmer", 4.0))
     for _ in range(30):
         await desk.wait(0.1)
         desk.drive("AGI", 0.0, linear=0.0)
@@ -536,24 +445,6 @@ def test_a_possible_person_is_told_as_such_where_the_rule_counts_them() -> None:
     assert line.slots["probability"] == 0.8322
 
 
-def test_the_record_of_a_possible_person_says_from_how_many_looks() -> None:
-    desk = watched(Desk())
-    for _ in range(2):
-        desk.clock.now += 0.3
-        desk.drive("AGI", 0.0)
-        desk.look("AGII", detection("farmer", 1.5, probability=0.75))
-
-    record = desk.records(DecisionRecord)[-1]
-    assert isinstance(record, DecisionRecord)
-    assert record.rule_parameters["looks"] == {
-        "count": 2,
-        "least": 0.75,
-        "most": 0.75,
-        "over_s": 0.3,
-        "probability": 0.9,
-    }
-
-
 def test_looks_at_ever_new_things_do_not_fill_the_memory() -> None:
     desk = watched(Desk())
     for number in range(5):
@@ -561,18 +452,6 @@ def test_looks_at_ever_new_things_do_not_fill_the_memory() -> None:
         desk.look("AGII", *things)
 
     assert desk.evaluator.tracking.subjects == CLASS_NAMES + 1
-
-
-# --- what counts ------------------------------------------------------------------
-
-
-def test_poses_are_written_down_twice_a_second() -> None:
-    desk = Desk()
-    for tenth in range(100):
-        desk.clock.now = tenth / 10
-        desk.drive("AGI", 0.1 * tenth)
-
-    assert 19 <= len(desk.records(OdometryRecord)) <= 24
 
 
 def test_28_6_a_pose_is_kept_with_its_margin_while_that_is_measured() -> None:
@@ -590,36 +469,14 @@ def test_28_6_a_pose_is_kept_with_its_margin_while_that_is_measured() -> None:
         return [one.margin_m for one in rows if one.at - start <= seconds][-1]
 
     robot, people = desk.world.robot("AGI"), desk.evaluator.people.known.values()
-    gap_m = LeastMargins([robot], people, desk.clock()).telling()[0].gap_m
+    least = LeastMargins([robot], people, desk.clock()).of_robot("AGI")
+    assert least is not None
     margin_m = kept(1.0)
     assert margin_m is not None
-    assert 2.0 < gap_m - margin_m < 4.0
+    assert 2.0 < least.gap_m - margin_m < 4.0
     # Measured; nobody has looked for a second; somebody looks; the robot stands.
     states = [kept(at) is not None for at in (1.0, 1.5, 3.0, 3.5, 4.5, 5.8)]
     assert states == [True, True, False, False, True, False]
-
-
-def test_28_6_a_margin_that_is_computed_no_more_is_not_kept_on() -> None:
-    desk = watched(Desk())
-    meet(desk, 6.0)
-    for tenth in range(1, 12):
-        desk.clock.now = tenth / 10
-        meet(desk, 6.0)
-        desk.drive("AGI", 0.0)
-
-    margins = desk.parts.margins
-    assert margins.of("AGI", desk.clock()) is not None
-    assert margins.of("AGI", desk.clock().later(1.2)) is None
-
-
-def test_the_same_look_on_the_other_transport_is_one_sighting() -> None:
-    desk = watched(Desk())
-    frame = detection_frame("AGII", detection("farmer", 9.0), origin=desk.next_origin())
-    desk.hear(frame, DIRECT.id)
-    desk.hear(frame, FIWARE.id)
-
-    assert desk.world.counters["DetectionFrame.duplicate"] == 1
-    assert len(desk.records(DetectionRecord)) == 1
 
 
 def test_a_late_look_still_protects_whom_it_saw_and_leaves_the_page_alone() -> None:
@@ -657,13 +514,6 @@ def test_f46_somebody_whose_observer_died_still_slows_who_comes_near() -> None:
     assert desk.evaluator.speed_limits["AGI"].reason == "person"
 
 
-def test_who_crosses_whom_is_known() -> None:
-    desk = watched(Desk())
-    meet(desk)
-
-    assert [one.robot_id for one in desk.evaluator.crossings] == ["AGI"]
-
-
 def test_a_held_robot_says_so_in_the_log_once() -> None:
     desk = watched(Desk())
     for _ in range(3):
@@ -684,13 +534,3 @@ def test_what_orion_kept_of_an_earlier_run_slows_nobody_in_the_log() -> None:
 
     assert not any(key.startswith("log.speed") for key in before)
     assert desk.sentences()[-1].startswith("log.speed_down")
-
-
-def test_older_odometry_moves_nobody() -> None:
-    desk = watched(Desk())
-
-    desk.hear(odometry("AGI", 99.0, origin=origin(0)))
-
-    pose = desk.world.robot("AGI").odometry
-    assert pose is not None
-    assert pose.pose.x == 0.0

@@ -2,7 +2,7 @@
 
 import pytest
 
-from iveg.domain.acknowledgements import Acknowledgements, acknowledgements_of
+from iveg.domain.alerts import Acknowledgements, acknowledgements_of
 from iveg.domain.observations import Observation, Received
 from iveg.domain.transports import DIRECT
 from tests.builders import detection, detection_frame, odometry, origin, safety_report
@@ -89,29 +89,3 @@ async def test_a_robot_that_judges_ahead_is_timed_from_the_look_it_was_told_of()
 
     assert (told.timed, told.asked, told.missed) == (1, 1, 0)
     assert told.p50_s == pytest.approx(0.2, abs=1e-6)
-
-
-async def test_a_robot_that_was_slow_for_another_is_not_timed_by_its_new_reason() -> (
-    None
-):
-    desk = await _near_a_person(2.4)
-    _look(desk, 10)
-    await desk.wait(0.25)
-    _report(desk, 11, "another")
-    (person,) = desk.evaluator.people.known.values()
-    _report(desk, 12, person.decision_id)
-    desk.arrive(odometry("AGI", 1.9, origin=origin(13, after=desk.clock.now)))
-
-    assert desk.told().timed == 0
-
-
-async def test_a_ring_that_nobody_has_looked_at_for_a_while_times_nobody() -> None:
-    desk = await _near_a_person(2.4)
-    _look(desk, 10)
-    await desk.wait(0.9)
-    desk.arrive(odometry("AGI", 1.9, origin=origin(13, after=desk.clock.now)))
-    _report(desk, 14, None)
-
-    told = desk.told()
-
-    assert (told.timed, told.asked) == (0, 1)

@@ -3,13 +3,11 @@
 from dataclasses import replace
 
 import orjson
-import pytest
 
 from iveg.domain.observations import Detection
 from iveg.ngsi import codec
 from iveg.web.views import Views
 from tests.builders import detection
-from tests.processes import ROOT
 from tests.unit.pipeline.desk import Desk, conditions_of
 
 ALERT = "alert.frame_not_named"
@@ -77,13 +75,6 @@ async def test_a_robot_whose_frame_the_fleet_names_is_no_notice() -> None:
     assert ALERT not in conditions_of(desk)
 
 
-@pytest.mark.parametrize("language", ["es", "en"])
-def test_the_notice_names_the_setting(language: str) -> None:
-    texts = orjson.loads((ROOT / f"iveg/static/i18n/{language}.json").read_bytes())
-
-    assert "camera.unlabelled_frame" in texts["alert"]["frame_not_named"]
-
-
 async def test_the_papers_box_is_one_person_at_two_places_on_the_page() -> None:
     desk = parked()
     views = Views(desk.parts)
@@ -99,10 +90,7 @@ async def test_the_papers_box_is_one_person_at_two_places_on_the_page() -> None:
     assert [round(one.position.x, 2) for one in shown.items] == [0.62, 1.02]
     assert {one.box.frame_id for one in shown.items if one.box} == {"base_link"}
     told = desk.fleet.told[-1].alerts
-    assert {round(one.position[0], 2) for one in told if one.position} == {
-        0.62,
-        1.02,
-    }
+    assert {round(one.position[0], 2) for one in told if one.position} == {0.62, 1.02}
 
 
 def test_a_person_in_an_unknown_frame_slows_who_is_near_for_a_second() -> None:
@@ -127,28 +115,6 @@ async def test_a_box_before_the_first_pose_slows_and_is_no_alert_yet() -> None:
 
     assert factors(desk) == [0.5, 0.5]
     assert "alert.unreadable_detection" not in conditions_of(desk)
-
-
-def test_a_tomato_in_an_unknown_frame_slows_nobody() -> None:
-    desk = parked()
-
-    desk.look("AGI", replace(detection("tomato", 4.0), frame_id="odom"))
-
-    assert factors(desk) == [1.0, 1.0]
-
-
-def test_an_unknown_frame_is_counted_each_time_and_logged_once_for_each_robot() -> None:
-    desk = parked()
-    for robot_id in ("AGI", "AGI", "AGII"):
-        desk.look(robot_id, replace(detection(x=4.0), frame_id="odom"))
-
-    lines = [one for one in desk.event_log.lines if one.key == "log.unknown_frame"]
-    assert [dict(one.slots) for one in lines] == [
-        {"robot": "AGI", "frame": "odom"},
-        {"robot": "AGII", "frame": "odom"},
-    ]
-    assert desk.world.counters["detections.unknown_frame"] == 3
-    assert desk.world.counters["people.unplaced"] == 3
 
 
 def test_a_robot_that_invents_frames_fills_neither_the_log_nor_the_room_of_others() -> (

@@ -4,11 +4,10 @@ from dataclasses import replace
 
 import pytest
 
-from iveg.domain.errors import CommandRefusedError, UnknownRobotError
 from iveg.domain.goals import CancelOrder, FollowedGoal, GoalOrder, GoalWish
 from iveg.domain.observations import GoalAnswer, Hold, Origin
 from iveg.domain.records import CommandEventRecord, CommandRecord
-from iveg.domain.stop.outcome import outcome_of
+from iveg.domain.stop.commands import outcome_of
 from tests.builders import odometry, safety_report
 from tests.unit.pipeline.desk import Desk, settle
 
@@ -25,11 +24,7 @@ def free(desk: Desk, *holds: Hold) -> None:
     desk.hear(odometry("AGI", 3.0, linear=0.0, origin=counted(desk)))
     desk.hear(
         safety_report(
-            "AGI",
-            *holds,
-            speed_factor=limit[0],
-            reason=limit[1],
-            origin=counted(desk),
+            "AGI", *holds, speed_factor=limit[0], reason=limit[1], origin=counted(desk)
         )
     )
 
@@ -66,24 +61,6 @@ async def test_a_goal_goes_once_on_each_transport_with_challenge_and_deadline() 
     assert [one[0] for one in desk.broker.asked] == ["goal"]
     assert desk.fleet.stops == []
     assert desk.commander.machine("AGI").state == "RUNNING"
-
-
-async def test_answer_and_progress_are_recorded() -> None:
-    desk = await sent()
-    say(desk, "ACCEPTED")
-    desk.clock.now += 4.0
-    free(desk)
-    say(desk, "REACHED")
-
-    goal = newest(desk)
-    lines = [one for one in desk.event_log.lines if one.key.startswith("log.goal")]
-    assert goal.state == "REACHED"
-    assert [one.key.removeprefix("log.goal.") for one in lines] == [
-        "sent.here",
-        "accepted",
-        "reached",
-    ]
-    assert (lines[0].slots["by"], lines[-1].slots["s"]) == ("ana", 4.0)
 
 
 def row(desk: Desk) -> CommandRecord:
@@ -125,14 +102,6 @@ async def test_the_row_of_a_goal_says_how_it_ended(
     assert outcome_of(row(desk)) == outcome
 
 
-async def test_a_goal_that_a_stop_deletes_says_so_in_its_row() -> None:
-    desk = await sent()
-    await desk.commander.stop(["AGI"], "ben", desk.clock())
-    newest(desk)
-
-    assert (row(desk).state, outcome_of(row(desk))) == ("DELETED", "deleted")
-
-
 async def test_a_goal_that_no_transport_took_has_no_time_of_it() -> None:
     desk = Desk()
     desk.fleet.fails = True
@@ -163,13 +132,6 @@ async def test_an_unanswered_goal_is_not_confirmed_and_never_sent_again() -> Non
     assert newest(desk).state == "UNCONFIRMED"
     await desk.wait(30.0)
     assert len(desk.fleet.goals) == 1
-
-
-async def test_a_refusal_is_told_with_its_reason() -> None:
-    desk = await sent()
-    say(desk, "REFUSED", "no_way")
-
-    assert (newest(desk).state, newest(desk).why) == ("REFUSED", "no_way")
 
 
 @pytest.mark.parametrize("answer", [None, "ACCEPTED"])
@@ -237,20 +199,6 @@ async def test_a_cancellation_names_the_goal_and_waits_for_the_robot() -> None:
     assert newest(desk).state == "CANCELLED"
 
 
-async def test_without_a_goal_there_is_nothing_to_cancel() -> None:
-    desk = Desk()
-
-    with pytest.raises(CommandRefusedError, match="it has no goal"):
-        desk.parts.goals.cancel("AGI", "ana", desk.clock())
-
-
-async def test_a_goal_for_nobody_is_refused() -> None:
-    desk = Desk()
-
-    with pytest.raises(UnknownRobotError):
-        desk.parts.goals.give("AGX", THERE, "ana", desk.clock())
-
-
 async def test_words_of_another_goal_change_nothing() -> None:
     desk = await sent()
     desk.hear(GoalAnswer("AGI", counted(desk), "01OTHER", "REACHED"))
@@ -263,26 +211,4 @@ async def test_an_answer_that_orion_kept_changes_nothing() -> None:
     answer = GoalAnswer("AGI", counted(desk), newest(desk).goal.goal_id, "REACHED")
     desk.hear(answer, asked=True)
 
-    assert newest(desk).state == "SENT"
-
-
-async def test_why_the_robot_may_not_is_told_before_what_is_wrong_with_the_place() -> (
-    None
-):
-    desk = Desk()
-    free(desk, Hold("hw-1", "hw", "local"))
-
-    with pytest.raises(CommandRefusedError, match="another hold"):
-        desk.parts.goals.give("AGI", GoalWish("here", 1e5, 0.0), "ana", desk.clock())
-    assert desk.fleet.goals == []
-
-
-async def test_a_transport_that_fails_hurts_nothing() -> None:
-    desk = Desk()
-    free(desk)
-    desk.broker.refuse()
-    desk.parts.goals.give("AGI", THERE, "ana", desk.clock())
-    await settle()
-
-    assert len(desk.fleet.goals) == 1
     assert newest(desk).state == "SENT"

@@ -18,7 +18,7 @@ from iveg.domain.observations import (
 )
 from iveg.domain.records import ReadingRecord
 from iveg.domain.world import World
-from iveg.models.device import Device
+from iveg.models.robot import Device
 from iveg.ngsi import codec
 from tests.builders import (
     at,

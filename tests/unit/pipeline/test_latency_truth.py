@@ -1,22 +1,20 @@
-"""Delays that the emulator's radio and an agent put in are found in the right hop.
+"""Delays that a radio and an agent put in are found in the right hop.
 
 Robots, their uplink, the codec and all of iVeg are real; time is moved by hand, so that
 what was put in is known to the microsecond.
 """
 
 import heapq
+from dataclasses import dataclass, field
 from itertools import count
 from statistics import mean, quantiles
 
 import numpy as np
 import pytest
 
-from iveg.domain.latency.segments import Segment
-from iveg.domain.latency.sketch import Sketch, merged
+from iveg.domain.latency import Segment, Sketch, merged
 from iveg.domain.observations import Instant, Received
 from iveg.domain.transports import DIRECT, FIWARE, TransportId
-from iveg.lab.emulator.orders import LinkFaults
-from iveg.lab.emulator.radio import Packet, Radio
 from iveg.ngsi import codec
 from tests.builders import START
 from tests.stage import Stage
@@ -24,20 +22,39 @@ from tests.stage import Stage
 CALM_AGENT_S = 0.015
 
 
+@dataclass
+class Radio:
+    """Delays messages and keeps their order, as one connection does.
+
+    Attributes:
+        late_s: Delay of each; ``jitter_s``: random addition, from 0 to this.
+    """
+
+    late_s: float = 0.0
+    jitter_s: float = 0.0
+    _rng: np.random.Generator = field(default_factory=lambda: np.random.default_rng(3))
+    _newest_due: float = 0.0
+
+    def due(self, now: float) -> float:
+        """When a message of now arrives."""
+        late_s = self.late_s + self._rng.uniform(0.0, self.jitter_s)
+        self._newest_due = max(self._newest_due, now + late_s)
+        return self._newest_due
+
+
 class Air(Stage):
     """A stage whose messages take their time: radio to the broker, agent to Orion.
 
     Attributes:
-        faults: Of AGI's radio; AGII's is well.
+        radio: AGI's; AGII's is well.
         agent_s: From the broker to Orion.
         put_in: What each of AGI's poses took to the broker, as the radio had it (s).
     """
 
-    def __init__(self, faults: LinkFaults, agent_s: float = CALM_AGENT_S) -> None:
+    def __init__(self, radio: Radio, agent_s: float = CALM_AGENT_S) -> None:
         self.agent_s = agent_s
         self.put_in: list[float] = []
-        self._radio = Radio(frozenset(), np.random.default_rng(3))
-        self._radio.faults = faults
+        self.radio = radio
         self._on_way: list[tuple[float, int, TransportId, str, bytes]] = []
         self._numbers = count()
         # Robots speak as soon as they are made.
@@ -57,8 +74,7 @@ class Air(Stage):
         now, device = self.now.mono, topic.split("/")[2]
         due = now
         if device.startswith("AGI_"):
-            # What a radio does to telemetry: its order on one connection is kept.
-            [(due, _)] = self._radio.pass_on(Packet(topic, 1, payload), now)
+            due = self.radio.due(now)
         if device == "AGI_odom":
             self.put_in.append(due - now)
         transports: tuple[tuple[TransportId, float], ...] = (
@@ -71,7 +87,7 @@ class Air(Stage):
 
     def took(self, robot_id: str, hop: Segment) -> Sketch:
         """What a hop took for a robot's odometry in the last minute."""
-        streams = self.desk.latency.watch.streams
+        streams = self.desk.latency.streams
         one = next(s for s in streams if (s.robot_id, s.data) == (robot_id, "odometry"))
         return merged(one.segments[hop].parts("1min"))
 
@@ -87,34 +103,29 @@ def close(seconds: float) -> object:
 
 
 @pytest.mark.parametrize(
-    ("faults", "agent_s", "uplink_s"),
-    [
-        (LinkFaults(), CALM_AGENT_S, 0.0),
-        (LinkFaults(delay_ms=50.0), CALM_AGENT_S, 0.050),
-        (LinkFaults(), CALM_AGENT_S + 0.120, 0.0),
-        (LinkFaults(delay_ms=50.0), CALM_AGENT_S + 0.120, 0.050),
-    ],
-    ids=["calm", "radio", "agent", "both"],
+    ("late_s", "agent_s"),
+    [(0.050, CALM_AGENT_S), (0.0, CALM_AGENT_S + 0.120)],
+    ids=["radio", "agent"],
 )
 async def test_a_delay_is_found_in_the_hop_that_has_it_and_in_no_other(
-    faults: LinkFaults, agent_s: float, uplink_s: float
+    late_s: float, agent_s: float
 ) -> None:
-    air = Air(faults, agent_s)
+    air = Air(Radio(late_s), agent_s)
 
     await play(air, 12.0)
 
     found = {hop: air.took("AGI", hop) for hop in ("uplink", "fiware", "robot_orion")}
     assert found["uplink"].count > 200
     assert {hop: one.mean for hop, one in found.items()} == {
-        "uplink": close(uplink_s),
+        "uplink": close(late_s),
         "fiware": close(agent_s),
-        "robot_orion": close(uplink_s + agent_s),
+        "robot_orion": close(late_s + agent_s),
     }
     assert air.took("AGII", "uplink").mean == close(0.0)
 
 
 async def test_jitter_of_300_ms_is_found_as_the_radio_had_it() -> None:
-    air = Air(LinkFaults(jitter_ms=300.0))
+    air = Air(Radio(jitter_s=0.300))
 
     await play(air, 20.0)
 
@@ -130,12 +141,12 @@ async def test_jitter_of_300_ms_is_found_as_the_radio_had_it() -> None:
 async def test_a_delay_that_begins_later_is_not_taken_for_a_clock_that_was_set() -> (
     None
 ):
-    air = Air(LinkFaults())
+    air = Air(Radio())
     await play(air, 5.0)
 
-    air._radio.faults = LinkFaults(delay_ms=400.0)
+    air.radio.late_s = 0.400
     await play(air, 15.0)
 
-    clock = air.desk.latency.watch.clocks["AGI"]
+    clock = air.desk.latency.clocks["AGI"]
     assert (clock.state, clock.offset_s, clock.jumps) == ("in_step", 0.0, 0)
     assert air.took("AGI", "uplink").quantile(0.95) == close(0.400)

@@ -11,7 +11,6 @@ import pytest
 from iveg.domain.observations import (
     CommandAnswer,
     HeartbeatProbe,
-    Instant,
     Origin,
     Received,
 )
@@ -52,7 +51,7 @@ def test_what_is_taken_is_shown_at_once_and_judged_with_the_next_judgement() -> 
     near = detection_frame("AGI", detection(x=1.0), origin=desk.next_origin())
     desk.hub.versions.clear()
 
-    desk.loop.step([Received(near, desk.clock())], desk.clock(), judges=False)
+    desk.loop.take([Received(near, desk.clock())])
     shown, limit = (
         "detections/AGI" in desk.hub.versions,
         desk.evaluator.speed_limits["AGI"],
@@ -74,106 +73,6 @@ async def test_pages_are_shown_what_came_before_the_fleet_is_judged() -> None:
         await settle()
 
         assert (was_unjudged, desk.evaluator.is_unjudged) == (True, False)
-
-
-async def test_what_comes_before_the_fleet_is_judged_is_taken_first(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    desk, taken = Desk(), list[bool]()
-    tick, peer = desk.evaluator.tick, desk.evaluator.world.robot("AGII")
-
-    def judged(*args: Any) -> None:
-        taken.append(peer.odometry is not None)
-        tick(*args)
-
-    monkeypatch.setattr(desk.evaluator, "tick", judged)
-    browser = desk.hub.join()
-    desk.ingest.enqueue(Received(odometry(), desk.clock()))
-    async with running(desk):
-        async with asyncio.timeout(30):
-            await browser.news()
-        desk.ingest.enqueue(Received(odometry("AGII"), desk.clock()))
-        await settle()
-
-        assert taken[:1] == [True]
-
-
-async def test_what_comes_while_the_world_ages_is_taken_before_it_is_judged(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    desk, done = Desk(), list[str]()
-    age, tick = desk.evaluator.age, desk.evaluator.tick
-    peer = desk.evaluator.world.robot("AGII")
-    come = Received(odometry("AGII"), desk.clock())
-
-    def aged(now: Instant) -> None:
-        age(now)
-        done.append("aged")
-        asyncio.get_running_loop().call_soon(desk.ingest.enqueue, come)
-
-    def judged(*args: Any) -> None:
-        done.append("judged" if peer.odometry else "judged without it")
-        tick(*args)
-
-    monkeypatch.setattr(desk.evaluator, "age", aged)
-    monkeypatch.setattr(desk.evaluator, "tick", judged)
-    desk.ingest.enqueue(Received(odometry(), desk.clock()))
-    async with running(desk):
-        await settle()
-
-        assert done == ["aged", "judged"]
-
-
-async def test_what_comes_while_it_is_judged_is_taken_before_that_is_written_down(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    desk, seen = Desk(), list[bool]()
-    tick, peer = desk.evaluator.tick, desk.evaluator.world.robot("AGII")
-    come = Received(odometry("AGII"), desk.clock())
-
-    def judged(*args: Any) -> None:
-        tick(*args)
-        asyncio.get_running_loop().call_soon(desk.ingest.enqueue, come)
-
-    monkeypatch.setattr(desk.evaluator, "tick", judged)
-    monkeypatch.setattr(
-        desk.loop, "_write_down", lambda _: seen.append(peer.odometry is not None)
-    )
-    desk.ingest.enqueue(Received(odometry(), desk.clock()))
-    async with running(desk):
-        await settle()
-
-        assert seen == [True]
-
-
-async def test_what_is_written_down_is_of_the_moment_of_the_last_step(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    desk, told = Desk(), list[Instant]()
-    waiting, moving = list[int](), itertools.count(1)
-
-    def written(now: Instant) -> None:
-        waiting.append(desk.ingest.waiting)
-        assert now == told[-1]
-
-    def stepped(now: Instant, _: object) -> None:
-        told.append(now)
-        # Messages keep coming, and the clock goes on.
-        said = odometry(origin=Origin("b", next(moving)))
-        come = Received(said, desk.clock())
-        asyncio.get_running_loop().call_soon(desk.ingest.enqueue, come)
-        desk.clock.now += 0.001
-
-    monkeypatch.setattr(desk.loop, "_stepped", stepped)
-    monkeypatch.setattr(desk.loop, "_write_down", written)
-    desk.ingest.enqueue(Received(odometry(origin=Origin("b", 0)), desk.clock()))
-    async with running(desk) as loop:
-        for _ in range(100):
-            await asyncio.sleep(0)
-
-        assert waiting
-        assert not any(waiting)
-        assert not loop.done()
 
 
 async def test_the_fleet_is_judged_however_much_comes_all_the_time(
@@ -199,14 +98,12 @@ async def test_the_fleet_is_judged_however_much_comes_all_the_time(
         assert desk.fleet.told
 
 
-def test_heartbeats_keep_their_pace_while_ageing_takes_now_more_now_less() -> None:
+def test_heartbeats_keep_their_pace_while_ticks_come_now_late_now_in_time() -> None:
     desk = Desk()
     desk.drive("AGI")
     began, told = desk.clock().mono, len(desk.fleet.told)
     for number in range(40):
-        desk.clock.now = began + number * TICK_S
-        desk.loop.age(desk.clock())
-        desk.clock.now += 0.012 * (number % 4 < 2)
+        desk.clock.now = began + number * TICK_S + 0.012 * (number % 4 < 2)
         desk.loop.step([], desk.clock())
 
     heartbeats = (len(desk.fleet.told) - told) / len(desk.evaluator.world.robots)
@@ -267,9 +164,6 @@ async def test_health_is_told_every_second() -> None:
     assert desk.hub.versions["health"] - before >= 5
 
 
-# --- to whom it may concern -------------------------------------------------------
-
-
 def test_a_browser_gets_the_newest_of_each_topic_and_every_event() -> None:
     hub = Desk().hub
     browser = hub.join()
@@ -289,17 +183,6 @@ async def test_a_browser_that_lets_events_pile_up_is_marked_and_keeps_no_more() 
 
     assert browser.overflowed
     assert len(browser.pending) == MAX_PENDING
-
-
-def test_who_has_gone_gets_nothing() -> None:
-    hub = Desk().hub
-    browser = hub.join()
-    assert hub.watchers == 1
-
-    hub.leave(browser)
-    hub.changed("robots/AGI")
-
-    assert (hub.watchers, browser.telemetry) == (0, {})
 
 
 def test_log_numbers_grow_also_over_a_restart() -> None:

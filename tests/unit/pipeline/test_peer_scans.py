@@ -79,30 +79,6 @@ def test_a_peer_is_told_of_twice_a_second_at_most_and_each_scan_once() -> None:
     assert len(field.heard()) <= 1
 
 
-def test_never_two_in_one_turn() -> None:
-    field = Field()
-    field.laser("AGI")
-    field.laser("AGII")
-    field.tell("AGI", asks=True)
-    field.tell("AGII", asks=True)
-    field.pass_s(0.05)
-    first = field.heard()
-    field.pass_s(0.05)
-
-    assert sorted(first + field.heard()) == ["AGI", "AGII"]
-    assert len(first) == 1
-
-
-def test_who_reports_no_longer_asks_no_longer() -> None:
-    field = Field()
-    field.tell("AGII", asks=True)
-    field.now += 10.0
-    field.laser("AGI")
-    field.pass_s(0.5)
-
-    assert field.heard() == []
-
-
 def test_a_scan_without_a_place_or_long_ago_is_not_sent() -> None:
     field = Field()
     field.laser("AGI", placed=False)

@@ -1,12 +1,9 @@
-"""One press is one STOP, and a drill is a STOP."""
+"""One press is one STOP."""
 
 import pytest
 
-from iveg.domain.errors import CommandRefusedError
-from iveg.domain.observations import Hold
 from iveg.domain.records import CommandRecord
 from iveg.domain.stop import FollowedCommand, Press
-from iveg.domain.stop.drills import Drills
 from iveg.pipeline.presses import REMEMBERED_S
 from tests.builders import START
 from tests.unit.pipeline.desk import Desk, settle
@@ -114,100 +111,3 @@ async def test_standstill_counts_from_the_finger_and_the_history_knows_it() -> N
     ]
     assert desk.now(command).standstill_ms == pytest.approx(500.0, abs=1.0)
     assert rows[-1].pressed_at == pytest.approx(START.wall - 0.5)
-
-
-# --- drills -----------------------------------------------------------------------
-
-
-async def drill(desk: Desk, linear: float) -> FollowedCommand:
-    desk.report(factor=1.0, reason="clear", linear=linear)
-    return await desk.commander.drill("AGI", "ana", desk.clock())
-
-
-@pytest.mark.parametrize("linear", [0.0, 0.2, -0.2])
-async def test_a_drill_is_a_stop_that_holds_until_somebody_releases(
-    linear: float,
-) -> None:
-    desk = Desk()
-
-    command = await drill(desk, linear)
-    await desk.stand()
-
-    assert command.drill
-    assert desk.commander.machine("AGI").state == "STANDING"
-    assert "AGI" in desk.commander.drills.last
-    assert ("AGI", "stopped", command.command_id, "ana") in desk.journal.lines
-
-
-async def test_a_robot_that_drives_is_not_drilled() -> None:
-    desk = Desk()
-
-    with pytest.raises(CommandRefusedError, match="moving"):
-        await drill(desk, 0.21)
-
-    assert desk.fleet.stops == []
-
-
-async def test_odometry_alone_shows_that_a_robot_drives() -> None:
-    desk = Desk()
-    desk.report(factor=1.0, reason="clear")
-    desk.drive("AGI", linear=0.5)
-
-    with pytest.raises(CommandRefusedError, match="moving"):
-        await desk.commander.drill("AGI", "ana", desk.clock())
-
-
-async def test_a_robot_that_nobody_hears_is_not_drilled() -> None:
-    desk = Desk()
-    desk.report(factor=1.0, reason="clear")
-    desk.clock.now += 1.1
-
-    with pytest.raises(CommandRefusedError, match="not fresh"):
-        await desk.commander.drill("AGI", "ana", desk.clock())
-
-
-async def test_a_stopped_robot_is_not_drilled() -> None:
-    desk = Desk()
-    await press(desk)
-
-    with pytest.raises(CommandRefusedError, match="its state is"):
-        await drill(desk, 0.0)
-
-
-async def test_a_plain_stop_is_no_drill() -> None:
-    desk = Desk()
-    await press(desk)
-    desk.report("AGI", Hold("x", "hw", "local"))
-
-    await desk.stand()
-
-    assert desk.commander.drills.last == {}
-
-
-DAY = 86_400.0
-
-
-@pytest.mark.parametrize(
-    ("days", "age_days", "due"),
-    [(30.0, 29.9, []), (30.0, 31.0, ["AGI"]), (0.0, 400.0, [])],
-)
-def test_a_drill_is_due_after_the_days_that_were_set(
-    days: float, age_days: float, due: list[str]
-) -> None:
-    drills = Drills(days)
-    drills.remember({"AGI": START.wall - age_days * DAY})
-
-    assert [one.robot_id for one in drills.conditions(START)] == due
-
-
-def test_a_robot_that_was_never_drilled_is_not_reminded_of() -> None:
-    assert list(Drills(30.0).conditions(START)) == []
-
-
-def test_an_old_drill_from_the_history_does_not_hide_a_new_one() -> None:
-    drills = Drills(30.0)
-    drills.passed("AGI", START.wall)
-
-    drills.remember({"AGI": START.wall - 40 * DAY})
-
-    assert drills.last == {"AGI": START.wall}

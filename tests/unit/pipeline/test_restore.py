@@ -4,7 +4,7 @@ import asyncio
 from dataclasses import replace
 from typing import cast
 
-from iveg.domain.alerts.stored import read_alert
+from iveg.domain.alerts import read_alert
 from iveg.domain.errors import HopError
 from iveg.domain.records import AlertRecord, LogRecord
 from iveg.pipeline.restore import History, remember
@@ -40,9 +40,6 @@ class LeftBehind:
     async def unseen_alerts(self, most: int) -> tuple[AlertRecord, ...]:
         return self._alerts[:most]
 
-    async def last_drills(self) -> dict[str, float]:
-        return {}
-
     async def newest_lines(self, most: int) -> tuple[LogRecord, ...]:
         return self._lines[:most]
 
@@ -66,7 +63,6 @@ def unseen(alert_id: str, cleared_at: float | None = None) -> AlertRecord:
         cleared_at=cleared_at,
         acknowledged_at=None,
         acknowledged_by=None,
-        members=[],
     )
 
 

@@ -4,23 +4,12 @@ from collections.abc import Sequence
 
 import pytest
 
-from iveg.adapters.history.purge import PurgeBatch
-from iveg.domain.alerts.alert_book import BookedAlert
-from iveg.domain.audit import ChainEnd
-from iveg.domain.disk_space import DiskSpace
+from iveg.domain.alerts import BookedAlert
 from iveg.domain.errors import HopError
 from iveg.domain.records import LogRecord
-from iveg.domain.retention import DAY_S, PURGE_STEPS, PurgeStep, Retention
+from iveg.domain.retention import DAY_S, PURGE_STEPS, DiskSpace, PurgeStep, Retention
 from iveg.pipeline.audit import AuditTrail
-from iveg.pipeline.retention import (
-    ENOUGH_INSIDE,
-    LOOK_S,
-    MOST_WAITS,
-    PAUSE_S,
-    PURGE_S,
-    SETTLES_S,
-    HistoryUpkeep,
-)
+from iveg.pipeline.retention import PAUSE_S, SETTLES_S, HistoryUpkeep
 from tests.builders import START
 from tests.unit.pipeline.desk import Desk
 
@@ -32,13 +21,10 @@ class FakeHistory:
     """Implements ``RetainedHistory``: numbers of rows instead of rows.
 
     Attributes:
-        due: Rows that a step has left to change; a batch takes ten.
-        done: Batches, with the moment before which rows went.
-        busy: How many more looks find rows that wait.
-        away: Whether the database does not answer; ``audit_away``: of the audit.
-        freed: Batches of room that was given back.
+        due: Rows that a step has left to change; a piece takes ten.
+        done: Pieces, with the moment before which rows went.
+        away: Whether the database does not answer.
         recordings: Recordings of inputs.
-        prepared: Moments at which tables of days were asked for (Unix s).
     """
 
     def __init__(self, today: int) -> None:
@@ -46,50 +32,23 @@ class FakeHistory:
         self.done: list[tuple[PurgeStep, float]] = []
         self.days = tuple(range(today, today - 500, -1))
         self.space = ROOMY
-        self.inside: int | None = 0
-        self.busy = self.freed = 0
-        self.away = self.audit_away = False
+        self.away = False
         self.recordings = 0
-        self.oldest: float | None = None
-        self.prepared: list[float] = []
-
-    @property
-    def is_busy(self) -> bool:
-        self.busy -= 1
-        return self.busy >= 0
 
     async def recorded_days(self, most: int) -> Sequence[int]:
         if self.away:
             raise HopError("database", "away")
         return self.days[:most]
 
-    async def oldest_telemetry(self) -> float | None:
-        return self.oldest
-
-    async def audit_end(self) -> ChainEnd:
-        if self.audit_away:
-            raise HopError("database", "away")
-        return ChainEnd(7, "ab" * 32)
-
-    async def prepare_days(self, now: float) -> None:
-        self.prepared.append(now)
-
-    async def purge(self, step: PurgeStep, before: float) -> PurgeBatch:
+    async def purge(self, step: PurgeStep, before: float) -> int:
         rows = min(10, self.due.get(step, 0))
         self.due[step] = self.due.get(step, 0) - rows
         self.done.append((step, before))
-        return PurgeBatch(rows, is_last=rows < 10)
+        return rows
 
     async def drop_recording(self) -> bool:
         self.recordings -= 1
         return self.recordings >= 0
-
-    async def give_back(self) -> PurgeBatch:
-        self.freed += 1
-        return PurgeBatch(0, is_last=True)
-
-    async def room_inside(self) -> int | None:
-        return self.inside
 
     async def disk_space(self) -> DiskSpace:
         return self.space
@@ -123,11 +82,6 @@ class Upkeep:
         kept = (one for one in self.desk.sink.records if isinstance(one, LogRecord))
         return [dict(one.slots) for one in kept if one.key == "log.history_kept"]
 
-    def keys(self) -> list[str]:
-        """The keys of all lines of the log, in order."""
-        kept = (one for one in self.desk.sink.records if isinstance(one, LogRecord))
-        return [one.key for one in kept]
-
     def alerts(self) -> list[BookedAlert]:
         """What is raised after the loop's next turn."""
         self.desk.loop.step([], self.desk.clock())
@@ -152,20 +106,10 @@ async def test_the_first_purge_waits_until_the_server_has_settled() -> None:
     assert [step for step, _ in upkeep.history.done] == list(PURGE_STEPS)
 
 
-async def test_tables_of_days_are_there_from_the_start_and_looked_after_hourly() -> (
-    None
-):
-    upkeep = await settled()
-    for minute in range(1, 10):
-        await upkeep.look(60.0 * minute)
-
-    assert upkeep.history.prepared == [START.wall, START.wall + SETTLES_S]
-
-
-async def test_each_kind_goes_by_its_own_horizon_once_an_hour() -> None:
+async def test_each_kind_goes_by_its_own_horizon_once_a_day() -> None:
     upkeep = await settled()
     await upkeep.look(SETTLES_S)
-    await upkeep.look(SETTLES_S + PURGE_S - 1.0)
+    await upkeep.look(SETTLES_S + 60.0)
     now = START.wall + SETTLES_S
 
     ages = {step: (now - before) / DAY_S for step, before in upkeep.history.done}
@@ -175,65 +119,30 @@ async def test_each_kind_goes_by_its_own_horizon_once_an_hour() -> None:
     assert ages == {step: pytest.approx(days[step.kind]) for step in PURGE_STEPS}
 
 
-async def test_many_rows_go_in_batches_with_a_pause_after_each() -> None:
+async def test_many_rows_go_in_pieces_with_a_pause_after_each() -> None:
     upkeep = await settled()
     upkeep.history.due = {ODOMETRY: 35, PURGE_STEPS[0]: 12}
 
     await upkeep.look(SETTLES_S)
 
-    assert [step for step, _ in upkeep.history.done].count(ODOMETRY) == 4
-    assert upkeep.pauses == [PAUSE_S] * 4
+    assert [step for step, _ in upkeep.history.done].count(ODOMETRY) == 5
+    assert upkeep.pauses == [PAUSE_S] * 6
     assert upkeep.part.counters == {"history_deleted": 35, "history_unplaced": 12}
 
 
-async def test_it_gives_way_to_rows_that_wait() -> None:
-    upkeep = await settled()
-    upkeep.history.busy = 3
-
-    await upkeep.look(SETTLES_S)
-
-    assert upkeep.pauses == [1.0] * 3
-    assert len(upkeep.history.done) == len(PURGE_STEPS)
-
-
-async def test_a_recorder_that_never_catches_up_leaves_the_purge_to_the_next_look() -> (
+async def test_a_day_on_which_the_database_was_away_is_taken_up_at_the_next_look() -> (
     None
 ):
     upkeep = await settled()
-    upkeep.history.busy = MOST_WAITS + 1
-
-    with pytest.raises(HopError):
-        await upkeep.look(SETTLES_S)
-    none = list(upkeep.history.done)
-    await upkeep.look(SETTLES_S + LOOK_S)
-
-    assert none == []
-    assert len(upkeep.history.done) == len(PURGE_STEPS)
-
-
-async def test_a_line_a_day_says_what_went() -> None:
-    upkeep = await settled()
-    upkeep.history.due = {ODOMETRY: 7}
-
-    for hour in range(49):
-        await upkeep.look(SETTLES_S + hour * PURGE_S)
-
-    assert upkeep.lines()[0] == {"deleted": 7, "unplaced": 0}
-    assert upkeep.lines()[1:] == [{"deleted": 0, "unplaced": 0}] * 2
-
-
-async def test_a_day_whose_audit_cannot_be_asked_for_is_logged_an_hour_later() -> None:
-    upkeep = await settled()
-    upkeep.history.audit_away = True
+    upkeep.history.away = True
     with pytest.raises(HopError):
         await upkeep.look(SETTLES_S)
     early = upkeep.lines()
 
-    upkeep.history.audit_away = False
-    await upkeep.look(SETTLES_S + PURGE_S)
+    upkeep.history.away = False
+    await upkeep.look(SETTLES_S + 60.0)
 
-    assert early == []
-    assert upkeep.keys() == ["log.history_kept", "log.audit_day"]
+    assert (early, len(upkeep.lines())) == ([], 1)
 
 
 async def test_a_low_disk_is_a_p2_until_it_is_well_again() -> None:
@@ -252,50 +161,17 @@ async def test_a_low_disk_is_told_while_the_database_is_away() -> None:
     upkeep.history.away, upkeep.history.space = True, LOW
 
     with pytest.raises(HopError):
-        await upkeep.look(1.0)
+        await upkeep.look(SETTLES_S)
 
     assert len(upkeep.alerts()) == 1
 
 
-async def test_a_low_disk_takes_a_day_of_telemetry_at_each_look_and_no_decision() -> (
-    None
-):
+async def test_a_low_disk_takes_a_recording_at_each_look_and_no_row() -> None:
     upkeep = await settled()
-    upkeep.history.oldest = oldest = START.wall - 20 * DAY_S
-    upkeep.history.space = LOW
-
-    await upkeep.look(1.0)
-
-    now = START.wall + 1.0
-    before = dict(upkeep.history.done)
-    ages = {step: (now - at) / DAY_S for step, at in before.items()}
-    assert before[ODOMETRY] == oldest + DAY_S
-    assert {ages[step] for step in PURGE_STEPS if step.kind == "decisions"} == {365.0}
-    assert {ages[step] for step in PURGE_STEPS if step.kind == "audit"} == {400.0}
-    assert upkeep.history.freed == 1
-
-
-@pytest.mark.parametrize("inside", [None, ENOUGH_INSIDE])
-async def test_a_low_disk_takes_nothing_where_that_makes_no_room(
-    inside: int | None,
-) -> None:
-    upkeep = await settled()
-    upkeep.history.space, upkeep.history.inside = LOW, inside
-
-    await upkeep.look(1.0)
-
-    assert upkeep.history.done == []
-    assert len(upkeep.alerts()) == 1
-
-
-async def test_a_low_disk_takes_recordings_before_telemetry() -> None:
-    upkeep = await settled()
-    upkeep.history.oldest = START.wall - 20 * DAY_S
     upkeep.history.space, upkeep.history.recordings = LOW, 2
 
-    for minute in (1.0, 2.0, 3.0):
-        await upkeep.look(minute)
-        left = 0 if minute < 3.0 else 1
-        assert upkeep.history.freed == left
+    for second in (1.0, 2.0, 3.0):
+        await upkeep.look(second)
 
-    assert upkeep.part.counters["recordings_deleted"] == 2
+    assert upkeep.part.counters == {"recordings_deleted": 2}
+    assert upkeep.history.done == []

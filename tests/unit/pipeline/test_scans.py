@@ -64,21 +64,3 @@ def test_a_scan_without_a_place_is_refused_at_once() -> None:
     header = {"frame_id": "unplaced"}
 
     assert hear(Desk(), measure(lidar_header=header)) == ["unplaced"]
-
-
-def test_a_twin_of_a_scan_is_not_read() -> None:
-    desk = Desk()
-    hear(desk, measure())
-    kept = desk.world.robot("AGI").scan
-    hear(desk, measure())
-
-    assert desk.world.robot("AGI").scan is kept
-
-
-def test_only_scans_wait_to_be_read() -> None:
-    pose = codec.write_odometry(odometry())
-    now, later = (
-        codec.read_measure("AGI_odom", pose, instead=one) for one in ({}, codec.UNREAD)
-    )
-
-    assert now == later

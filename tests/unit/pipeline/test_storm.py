@@ -57,7 +57,7 @@ def test_who_must_slow_down_is_told_at_once_and_the_rest_thirty_times_a_second()
         before = len(desk.fleet.told)
         desk.look("AGI", detection(x=0.5 + 0.004 * tick, y=100.0 * (tick % 2)))
         told.append(len(desk.fleet.told) > before)
-    slowed_at = next(one.entered.mono for one in desk.evaluator.crossings)
+    slowed_at = next(one.entered.mono for one in desk.evaluator.entries)
     assert slowed_at == pytest.approx(START.mono + 0.1)
     assert told[0]
     assert sum(told) <= 8 + 31

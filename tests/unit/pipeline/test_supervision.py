@@ -9,7 +9,7 @@ from iveg.domain.observations import LaserScan, Received
 from iveg.pipeline.supervision import Supervision
 from tests.builders import odometry, scan
 from tests.fakes.clock import FakeClock
-from tests.unit.pipeline.desk import Desk, conditions_of, settle
+from tests.unit.pipeline.desk import Desk, conditions_of
 
 
 class BrokenError(Exception):
@@ -46,45 +46,6 @@ def test_f61_a_guarded_call_that_fails_is_counted_and_named_until_it_is_well(
     assert len(caplog.records) == 1
 
 
-async def test_f61_a_part_that_fails_is_started_again_and_is_down_meanwhile(
-    caplog: pytest.LogCaptureFixture,
-) -> None:
-    clock, began = FakeClock(), asyncio.Event()
-    supervision = Supervision(clock, first_pause_s=0.001)
-    starts: list[float] = []
-
-    async def draw() -> None:
-        starts.append(clock.now)
-        clock.now += 60.0
-        if len(starts) < 3:
-            raise BrokenError
-        began.set()
-
-    async with asyncio.timeout(30):
-        await supervision.keep_running("costmap", draw)
-
-    assert began.is_set()
-    assert supervision.counters["comfort_failed.costmap"] == 2
-    assert len(caplog.records) == 1 + 1
-    assert said(supervision, clock) == []
-
-
-async def test_f61_a_part_waits_ever_longer_and_is_named_all_the_while() -> None:
-    clock = FakeClock()
-    supervision = Supervision(clock, first_pause_s=60.0)
-
-    async def draw() -> None:
-        raise BrokenError
-
-    running = asyncio.create_task(supervision.keep_running("costmap", draw))
-    await settle()
-    clock.now = 50.0
-
-    assert said(supervision, clock) == [("P3", "alert.part_down", "costmap")]
-    running.cancel()
-    await asyncio.gather(running, return_exceptions=True)
-
-
 def test_f63_a_long_turn_is_a_p2_with_its_part_and_a_short_one_is_none() -> None:
     clock = FakeClock()
     supervision = Supervision(clock)
@@ -99,9 +60,6 @@ def test_f63_a_long_turn_is_a_p2_with_its_part_and_a_short_one_is_none() -> None
     assert longest == 0.31
     assert list(supervision.conditions(clock())) == []
     assert supervision.longest_turn_s(clock()) == 0.0
-
-
-# --- what vital code calls ------------------------------------------------------------
 
 
 async def test_f61_a_history_that_fails_holds_up_neither_stop_nor_feedback(
@@ -150,9 +108,6 @@ def test_what_a_limit_rests_on_is_not_dropped_in_silence() -> None:
 
     with pytest.raises(TypeError):
         desk.loop.step([Received(bad, desk.clock())], desk.clock())
-
-
-# --- the last word --------------------------------------------------------------------
 
 
 def test_f62_the_last_feedback_limits_every_robot_to_half_speed() -> None:

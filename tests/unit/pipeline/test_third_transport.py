@@ -1,8 +1,8 @@
 """A third way to the robots is one entry of the table: nothing else is told of it."""
 
-from iveg.domain.observations import CommandAnswer, Hold
+from iveg.domain.observations import CommandAnswer
 from iveg.domain.records import CommandRecord
-from iveg.domain.transports import FIWARE, Transport, TransportId
+from iveg.domain.transports import Transport, TransportId
 from iveg.models.command import Command as CommandModel
 from tests.fakes.fleet import FakeFleet
 from tests.fakes.records import NOON
@@ -31,21 +31,6 @@ async def test_a_stop_goes_over_the_third_transport_again_and_again() -> None:
 
     assert dds.stops == [("AGI", hold_id)] * 4
     assert len(desk.fleet.stops) == 4
-    await desk.commander.close()
-
-
-async def test_json_says_how_far_an_order_came_on_the_third_transport() -> None:
-    desk = Desk(also={DDS: FakeFleet()})
-    command_id = await stopped(desk)
-    desk.hear(
-        CommandAnswer("AGI", desk.next_origin(), command_id, "LATCHED"),
-        TransportId("dds"),
-    )
-
-    told_now = told(desk, command_id)
-
-    assert told_now.transports == {"direct": "ok", "fiware": "pending", "dds": "ok"}
-    assert set(desk.commander.commands[command_id].times.answered) == {"dds"}
     await desk.commander.close()
 
 
@@ -87,16 +72,3 @@ async def test_a_release_goes_once_over_every_transport_that_can() -> None:
     assert deaf.stops
     assert desk.now(order).transports[TransportId("radio")] == "off"
     await desk.commander.close()
-
-
-async def test_a_pose_by_the_third_transport_counts_as_direct_and_is_named() -> None:
-    desk = Desk(also={DDS: FakeFleet()})
-    desk.report("AGI", Hold("boot-b1", "boot", "remote"))
-    desk.drive("AGI", 1.0)
-    desk.clock.now = 0.1
-
-    feed = desk.world.feeds.of("AGI")
-    feed.heard(TransportId("dds"), desk.clock().mono, news=True)
-
-    assert feed.transport(desk.clock().mono) == "dds"
-    assert feed.transport(desk.clock().mono) != FIWARE.id

@@ -9,10 +9,11 @@ import orjson
 from iveg.domain.feedback import CLEAR, Feedback, FeedbackAlert, SpeedLimit
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import CommandAnswer, Hold, Origin, SafetyReport
+from iveg.domain.parameters import Class
 from iveg.ngsi import codec
-from iveg.robot.effects import Drive, Effect, Persist, Report, SendAnswer
 from iveg.robot.holds import HoldSet
 from iveg.robot.judgement import Limits
+from iveg.robot.orders import Drive, Effect, Persist, Report, SendAnswer
 from iveg.robot.safety import SafetyMachine
 
 STEP_S = 0.05
@@ -27,7 +28,7 @@ def person(
     *,
     decision_id: str = "d-1",
     radius_m: float | None = 2.0,
-    class_: str = "person",
+    class_: Class = "person",
     class_id: str = "farmer",
     observer: str = "AGII",
     velocity: tuple[float, float] | None = None,

@@ -11,12 +11,10 @@ from iveg.domain.costmap import InflatedGrid
 from iveg.domain.feedback import Feedback
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.observations import Origin
-from iveg.domain.occupancy_grid import MAX_CELLS
 from iveg.domain.peer_scan import peer_scan_of
 from iveg.domain.witness import Outline
 from iveg.ngsi import codec
-from iveg.robot.costmap import FleetCostmap
-from iveg.robot.neighbours import Neighbour
+from iveg.robot.costmap import FleetCostmap, Neighbour
 from tests.builders import START, origin, scan
 
 ROOM = Rectangle(0, 0, 20, 20)
@@ -100,16 +98,6 @@ def test_a_peer_that_sees_this_robot_leaves_no_trail_of_it() -> None:
     assert at(found, 9.95, 12.95) == 100
 
 
-def test_what_nobody_tells_any_more_becomes_unknown_again() -> None:
-    one = costmap()
-    one.hear(TOPIC, payload(), HERE)
-    drawn(one, PERSON)
-    drawn(one, now=15.0)
-    found = drawn(one, now=40.0)
-
-    assert (found.data == -1).all()
-
-
 def test_the_newest_of_a_peer_wins_and_an_older_one_is_dropped() -> None:
     one = costmap()
     one.hear(TOPIC, payload(5.0, seq=3), HERE)
@@ -120,25 +108,6 @@ def test_the_newest_of_a_peer_wins_and_an_older_one_is_dropped() -> None:
     one.hear(TOPIC, payload(3.0, seq=1, boot="d"), HERE)
 
     assert at(drawn(one), 12.95, 10.05) > 0
-
-
-def test_without_a_greenhouse_a_window_goes_with_the_robot() -> None:
-    one = costmap(None)
-    one.hear(TOPIC, payload(), HERE)
-    near = drawn(one)
-    far = drawn(one, own=Pose2D(400.0, -300.0, 0.0))
-
-    assert at(near, 12.95, 10.05) == 100
-    assert far.data.size <= MAX_CELLS
-    assert far.grid.xmin < 400.0 < far.grid.xmin + far.grid.width * 0.1
-    assert (far.data == -1).all()
-
-
-@pytest.mark.parametrize("side", [900.0, 1e6])
-def test_a_grid_is_bounded_however_large_the_area(side: float) -> None:
-    found = drawn(costmap(Rectangle(0, 0, side, side)))
-
-    assert found.data.size <= MAX_CELLS
 
 
 @pytest.mark.parametrize(

@@ -1,11 +1,126 @@
-"""The last word before the drive."""
+"""Speed caps of a robot, its own foresight, and the gate before the drive."""
 
 import math
 
 import pytest
 
-from iveg.domain.geometry import REST, Twist2D
-from iveg.robot.gate import Gate
+from iveg.domain.feedback import FeedbackAlert
+from iveg.domain.fleet import CAUTIOUS
+from iveg.domain.geometry import REST, Pose2D, Twist2D
+from iveg.domain.rule.paths import slows_within_s
+from iveg.robot.gate import FREE, AppliedCap, Cap, Gate, lowest, quantised
+from tests.unit.robot.rig import STEP_S, Rig, person
+
+# --- caps -------------------------------------------------------------------------
+
+HALF = Cap(0.5, "person", "p1")
+
+
+def test_at_equal_factors_a_person_is_told_first_and_one_with_a_name() -> None:
+    told = lowest(
+        (
+            Cap(0.5, "watchdog"),
+            Cap(0.5, "robot", "AGII"),
+            Cap(0.5, "person"),
+            HALF,
+            Cap(0.5, "stale"),
+        )
+    )
+    assert told == HALF
+
+
+def test_factors_go_down_to_the_next_step() -> None:
+    factors = [quantised(one) for one in (-1.0, 0.0, 0.49, 0.5, 0.99, 1.0, 2.0)]
+    assert factors == [0.0, 0.0, 0.0, 0.5, 0.5, 1.0, 1.0]
+
+
+def test_a_lower_cap_counts_at_once() -> None:
+    assert AppliedCap(FREE).settle(HALF, 5.0).cap == HALF
+
+
+def test_a_higher_cap_waits_a_second() -> None:
+    applied = AppliedCap(HALF).settle(FREE, 5.0).settle(FREE, 5.95)
+    assert applied.cap == HALF
+    assert applied.settle(FREE, 6.0).cap == FREE
+
+
+def test_one_relapse_starts_the_second_anew() -> None:
+    applied = AppliedCap(HALF).settle(FREE, 5.0).settle(HALF, 5.9).settle(FREE, 6.0)
+    assert applied.settle(FREE, 6.9).cap == HALF
+    assert applied.settle(FREE, 7.0).cap == FREE
+
+
+def test_the_same_factor_with_another_reason_is_told_at_once() -> None:
+    assert AppliedCap(HALF).settle(Cap(0.5, "stale"), 5.0).cap.reason == "stale"
+
+
+# --- lookahead --------------------------------------------------------------------
+
+STILL = (0.0, 0.0)
+
+
+def driving(*alerts: FeedbackAlert, foresight: bool = True, speed: float = 1.0) -> Rig:
+    """At the origin, straight ahead; iVeg itself limits nothing."""
+    rig = Rig(foresight=foresight, alerts=()).drive_on()
+    rig.wished, rig.alerts = Twist2D(speed, 0.0), alerts
+    rig.run(1.5)
+    return rig
+
+
+def slowed_at(rig: Rig, path: tuple[tuple[float, float], ...] = ()) -> float | None:
+    """Where it is first limited on its way along x, up to 5 m; None: nowhere."""
+    while rig.pose.x < 5.0:
+        if path:
+            rig.machine.note_path(path, rig.now)
+        rig.step()
+        if rig.factor < 1.0:
+            return rig.pose.x
+        x = rig.pose.x + rig.speed.linear_x * STEP_S
+        rig.pose = Pose2D(round(x, 6), 0.0, 0.0)
+    return None
+
+
+def test_it_is_slow_at_the_ring_and_names_the_person() -> None:
+    rig = driving(person(6.5, velocity=STILL))
+    x = slowed_at(rig)
+    # The ring begins at 4.5; it looks five times a second.
+    soon = 4.5 - 1.0 * slows_within_s(CAUTIOUS.braking, 1.0)
+    assert x == pytest.approx(soon + 0.1, abs=0.2)
+    assert (rig.factor, rig.reason) == (0.5, "person")
+    assert rig.machine.cap.decision_id == "d-1"
+
+
+@pytest.mark.parametrize(
+    ("alert", "foresight"),
+    [(person(6.5, velocity=STILL), False), (person(6.5), True)],
+    ids=["the rule does not", "nobody knows how they go on"],
+)
+def test_without_a_forecast_the_ring_counts_as_before(
+    alert: FeedbackAlert, foresight: bool
+) -> None:
+    x = slowed_at(driving(alert, foresight=foresight))
+    assert x == pytest.approx(4.5, abs=0.06)
+
+
+def test_it_needs_no_network_while_what_it_was_told_is_young() -> None:
+    rig = driving(person(4.0, velocity=STILL), speed=0.3)
+    assert rig.factor == 1.0
+    rig.speaks, rig.speed = False, Twist2D(1.0, 0.0)
+    rig.obeys = False
+    rig.run(0.4)
+    rig.pose = Pose2D(1.4, 0.0, 0.0)
+    rig.run(0.3)
+    assert (rig.factor, rig.reason) == (0.5, "person")
+
+
+def test_a_robot_without_a_place_foresees_nothing_and_stands() -> None:
+    rig = driving(person(6.5, velocity=STILL))
+    rig.odometry = False
+    rig.run(1.0)
+    assert (rig.factor, rig.reason) == (0.0, "stale")
+
+
+# --- gate -------------------------------------------------------------------------
 
 FORWARD = Twist2D(1.0, 0.5)
 
@@ -56,11 +171,6 @@ def test_a_turn_on_the_spot_is_capped_and_ramped() -> None:
     for number in range(10):
         out = gate.output(0.5, True, 2.0 + number / 20)
     assert out.angular_z == 0.5
-
-
-def test_a_wish_beyond_the_drive_is_cut_and_keeps_its_curve() -> None:
-    out = reach(open_gate(), Twist2D(4.0, 1.0), 1.0, 5.0)
-    assert out == Twist2D(1.0, 0.25)
 
 
 @pytest.mark.parametrize("wrong", [math.nan, math.inf, -math.inf])

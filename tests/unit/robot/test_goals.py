@@ -9,8 +9,7 @@ from iveg.domain.geometry import Pose2D
 from iveg.domain.goals import CancelOrder, Goal, GoalOrder
 from iveg.domain.observations import GoalAnswer
 from iveg.ngsi import codec, names
-from iveg.robot.goal_orders import read_goal
-from iveg.robot.goals import Facts, RobotGoals
+from iveg.robot.goals import Facts, RobotGoals, read_goal
 
 GOAL = Goal("01G", "here", 2.0, 3.0)
 ORDER = GoalOrder(GOAL, "c1", 17.0)
@@ -78,10 +77,6 @@ def test_a_goal_without_a_way_is_refused() -> None:
     assert robot.goals.goal is None
 
 
-def test_a_robot_without_navigation_refuses() -> None:
-    assert said(RobotGoals("AGI").answer(ORDER, FREE)) == ["01G REFUSED no_way"]
-
-
 @pytest.mark.parametrize("facts", [FREE, THERE])
 def test_a_hold_makes_it_forget_even_a_goal_that_it_has_reached(facts: Facts) -> None:
     robot = Robot()
@@ -95,31 +90,12 @@ def test_a_hold_makes_it_forget_even_a_goal_that_it_has_reached(facts: Facts) ->
     assert robot.settle(replace(facts, runs=False)) == []
 
 
-def test_a_copy_after_the_hold_is_answered_and_starts_nothing() -> None:
-    robot = Robot()
-    robot.take(ORDER)
-    robot.settle(replace(FREE, runs=False))
-    told = list(robot.told)
-
-    assert robot.take(ORDER) == ["01G ACCEPTED"]
-    assert robot.told == told
-    assert robot.goals.goal is None
-
-
 def test_a_cancellation_that_overtakes_its_goal_wins() -> None:
     robot = Robot()
 
     assert robot.take(CancelOrder("01G")) == ["01G DROPPED cancelled"]
     assert robot.take(ORDER) == ["01G REFUSED cancelled"]
     assert robot.told == []
-
-
-def test_a_cancellation_of_another_goal_leaves_this_one() -> None:
-    robot = Robot()
-    robot.take(ORDER)
-
-    assert robot.take(CancelOrder("01F")) == ["01F DROPPED cancelled"]
-    assert robot.goals.goal == GOAL
 
 
 def test_a_new_goal_takes_the_place_of_the_old_one() -> None:
@@ -138,13 +114,6 @@ def test_a_refused_goal_leaves_the_one_before() -> None:
 
     assert robot.take(late) == ["01H REFUSED too_late"]
     assert robot.goals.goal == GOAL
-
-
-def test_a_pause_is_reached_wherever_the_robot_stands() -> None:
-    robot = Robot()
-    robot.take(replace(ORDER, goal=replace(GOAL, kind="pause", x=0.0, y=0.0)))
-
-    assert robot.settle(THERE) == ["01G REACHED"]
 
 
 # --- the wire ---------------------------------------------------------------------

@@ -5,8 +5,7 @@ from pathlib import Path
 import pytest
 
 from iveg.domain.observations import Hold
-from iveg.robot.hold_file import read_holds, write_holds
-from iveg.robot.holds import HoldSet
+from iveg.robot.holds import HoldSet, read_holds, write_holds
 
 STOP = Hold("01A", "iveg", "remote")
 BUTTON = Hold("hw-1", "hw", "local")

@@ -1,14 +1,10 @@
 """A robot sends an agent that is behind less, within floors, and more again later."""
 
-from collections import deque
-from dataclasses import dataclass, field
 from itertools import pairwise
 
 import pytest
 
-from iveg.domain.observations import Instant, Origin
-from iveg.domain.probe import ProbeLag
-from iveg.robot.rates import LEVELS, PATIENCE_S, UplinkRates
+from iveg.robot.uplink import LEVELS, PATIENCE_S, UplinkRates
 
 KINDS = ("_lidar2D", "_yolox_bounding_boxes", "_odom")
 TICK_S = 1 / 30
@@ -79,11 +75,6 @@ def test_news_is_a_measure_at_any_level() -> None:
     assert rates.is_measure("_yolox_bounding_boxes", 1.001, news=True)
 
 
-def test_a_sensor_slower_than_its_floor_is_left_alone() -> None:
-    rates = UplinkRates(level=LEVELS)
-    assert all(rates.is_measure("_odom", now) for now in range(100))
-
-
 @pytest.mark.parametrize("backlog_s", [None, 0.0, 0.49])
 def test_no_news_and_good_news_lower_nothing(backlog_s: float | None) -> None:
     rates = UplinkRates()
@@ -111,12 +102,6 @@ def test_a_backlog_is_answered_within_seconds_and_forgiven_slowly() -> None:
     assert rates.level == 0.0
 
 
-def test_a_level_between_well_and_behind_stays() -> None:
-    rates = UplinkRates(level=1.5)
-    told_for(rates, 0.4, 600.0, 0.0)
-    assert rates.level == 1.5
-
-
 def test_each_time_that_it_was_too_early_it_waits_longer() -> None:
     rates, now, waits = UplinkRates(), 0.0, []
     for _ in range(4):
@@ -126,73 +111,3 @@ def test_each_time_that_it_was_too_early_it_waits_longer() -> None:
             now = told_for(rates, 0.0, 0.2, now)
         waits.append(round((now - began) / PATIENCE_S))
     assert waits == [1, 2, 4, 8]
-
-
-# --- two robots and an agent that carries a hundred measures a second ---------------
-
-
-@dataclass
-class Stack:
-    """An agent that takes so many measures a second in order, and iVeg's own probe."""
-
-    per_s: float
-    rates: list[UplinkRates] = field(
-        default_factory=lambda: [UplinkRates(), UplinkRates()]
-    )
-    now: float = 0.0
-    queue: deque[Origin | None] = field(default_factory=deque)
-    probe: ProbeLag = field(default_factory=ProbeLag)
-    carried: float = 0.0
-    probes: int = 0
-
-    def run(self, seconds: float) -> list[float]:
-        """The lag that iVeg tells, thirty times a second."""
-        lags = []
-        for _ in range(round(seconds / TICK_S)):
-            self._tick()
-            lag = self.probe.lag(self.at())
-            lags.append(lag or 0.0)
-            for rates in self.rates:
-                rates.note_backlog(lag, self.now)
-        return lags
-
-    def at(self) -> Instant:
-        return Instant(self.now, self.now)
-
-    def _tick(self) -> None:
-        self.now += TICK_S
-        for rates in self.rates:
-            for kind in KINDS:
-                self.queue.extend([None] * rates.is_measure(kind, self.now))
-        if self.now >= 2.0 * self.probes:
-            self.probes += 1
-            origin = Origin("boot", self.probes)
-            self.probe.sent(origin, self.at())
-            self.queue.append(origin)
-        # What it could have carried while idle is gone.
-        spare = min(self.carried, 1.0)
-        self.carried = spare + self.per_s * TICK_S
-        while self.queue and self.carried >= 1.0:
-            self.carried -= 1.0
-            taken = self.queue.popleft()
-            if taken is not None:
-                self.probe.returned(taken, self.at())
-
-
-@pytest.mark.parametrize("per_s", [40.0, 70.0, 100.0, 150.0])
-def test_two_robots_settle_on_what_the_agent_can_carry(per_s: float) -> None:
-    stack = Stack(per_s)
-    first = stack.run(60.0)
-    assert max(first) < 20.0
-    later = stack.run(1800.0)
-    assert sum(lag > 1.0 for lag in later) < 0.02 * len(later)
-    assert max(later[len(later) // 2 :]) < 3.0
-
-
-def test_a_load_that_goes_is_forgotten() -> None:
-    stack = Stack(70.0)
-    stack.run(60.0)
-    assert all(rates.level > 1.0 for rates in stack.rates)
-    stack.per_s = 1000.0
-    stack.run(300.0)
-    assert [rates.level for rates in stack.rates] == [0.0, 0.0]

@@ -1,30 +1,187 @@
-"""Algorithm 1: what leaves the robot."""
+"""What a robot sends, in which order, and what it cannot place."""
 
+import asyncio
+import contextlib
+import logging
+import threading
+from collections.abc import AsyncIterator, Callable
 from dataclasses import replace
 
 import numpy as np
 import orjson
 import pytest
 
+from iveg.domain.errors import HopError
+from iveg.domain.geometry import Twist2D
 from iveg.domain.observations import (
-    Battery,
     CommandAnswer,
     Detection,
     DetectionFrame,
     FeedbackRef,
+    Hold,
     Instant,
     LaserScan,
     Navigation,
     Odometry,
     Origin,
+    RobotFault,
     SafetyReport,
+    Unplaced,
 )
-from iveg.lab.embedded.orion_numbers import print_value
-from iveg.ngsi import codec
-from iveg.robot.echo import Echo
-from iveg.robot.rates import LEVELS
-from iveg.robot.uplink import Uplink
+from iveg.ngsi import codec, names
+from iveg.robot.gate import Cap
+from iveg.robot.holds import HoldSet
+from iveg.robot.orders import Report
+from iveg.robot.uplink import LEVELS, LaneMessage, SafetyLane, Uplink
 from tests.builders import START, detection, detection_frame, odometry, scan
+from tests.unit.robot.rig import AHEAD, REST, Rig, stop
+
+# --- lane -------------------------------------------------------------------------
+
+FIRST = HoldSet((Hold("01A", "iveg", "remote"),))
+SECOND = HoldSet((Hold("01B", "iveg", "remote"),))
+
+
+async def until(true: Callable[[], bool]) -> None:
+    deadline = asyncio.get_running_loop().time() + 30
+    while not true():
+        assert asyncio.get_running_loop().time() < deadline
+        await asyncio.sleep(0.001)
+
+
+class World:
+    """A disk and a broker that tell in which order they were used."""
+
+    def __init__(self) -> None:
+        self.seen: list[object] = []
+        self.disk_ready = threading.Event()
+        self.disk_ready.set()
+        self.disk_fails = False
+        self.broker_away = False
+        self.refused = 0
+        self.confirms = asyncio.Event()
+        self.confirms.set()
+        self.lane = SafetyLane(self.keep, self.publish)
+
+    def keep(self, holds: HoldSet) -> None:
+        self.disk_ready.wait(10)
+        if self.disk_fails:
+            raise OSError("no space")
+        self.seen.append(holds)
+
+    async def publish(self, _: str, payload: bytes) -> None:
+        if self.broker_away:
+            self.refused += 1
+            raise HopError("mqtt", "not connected")
+        self.seen.append(payload)
+        await self.confirms.wait()
+
+    @contextlib.asynccontextmanager
+    async def running(self) -> AsyncIterator[SafetyLane]:
+        jobs = [
+            asyncio.create_task(self.lane.keep_forever()),
+            asyncio.create_task(self.lane.send_forever()),
+        ]
+        yield self.lane
+        for job in jobs:
+            job.cancel()
+        await asyncio.gather(*jobs, return_exceptions=True)
+
+    async def until_seen(self, count: int) -> None:
+        await until(lambda: len(self.seen) >= count)
+
+
+def message(text: str) -> LaneMessage:
+    return LaneMessage("t", text.encode())
+
+
+async def test_an_answer_waits_for_the_disk() -> None:
+    world = World()
+    world.disk_ready.clear()
+    async with world.running() as lane:
+        lane.persist(FIRST)
+        lane.answer(message("answer"))
+        lane.report(message("report"))
+        await world.until_seen(1)
+        assert world.seen == [b"report"]
+        world.disk_ready.set()
+        await world.until_seen(3)
+    assert world.seen == [b"report", FIRST, b"answer"]
+
+
+async def test_of_several_sets_the_newest_is_kept_and_every_answer_sent() -> None:
+    world = World()
+    lane = world.lane
+    lane.persist(FIRST)
+    lane.answer(message("1"))
+    lane.persist(SECOND)
+    lane.answer(message("2"))
+    async with world.running():
+        await world.until_seen(3)
+    assert world.seen == [SECOND, b"1", b"2"]
+
+
+async def test_a_full_disk_is_told_once_and_does_not_silence_the_robot(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    world = World()
+    world.disk_fails = True
+    async with world.running() as lane:
+        for number in range(3):
+            lane.persist(FIRST)
+            lane.answer(message(str(number)))
+            await world.until_seen(number + 1)
+        world.disk_fails = False
+        lane.persist(SECOND)
+        await world.until_seen(4)
+        lane.answer(message("last"))
+        await world.until_seen(5)
+    assert world.seen == [b"0", b"1", b"2", SECOND, b"last"]
+    assert [record.levelno for record in caplog.records] == [logging.WARNING] * 2
+
+
+async def test_what_finds_no_broker_is_not_sent_later() -> None:
+    world = World()
+    world.broker_away = True
+    async with world.running() as lane:
+        lane.answer(message("lost"))
+        await until(lambda: world.refused == 1)
+        world.broker_away = False
+        lane.answer(message("sent"))
+        await world.until_seen(1)
+    assert world.seen == [b"sent"]
+
+
+async def test_reports_wait_for_no_confirmation_of_the_one_before() -> None:
+    world = World()
+    world.confirms.clear()
+    async with world.running() as lane:
+        for number in range(5):
+            lane.report(message(str(number)))
+            await world.until_seen(number + 1)
+    assert world.seen == [b"0", b"1", b"2", b"3", b"4"]
+
+
+async def test_with_sixteen_unconfirmed_the_newest_report_waits_for_room() -> None:
+    world = World()
+    world.confirms.clear()
+    async with world.running() as lane:
+        for number in range(16):
+            lane.answer(message(str(number)))
+        await world.until_seen(16)
+        lane.report(message("old"))
+        await asyncio.sleep(0)
+        lane.report(message("new"))
+        lane.answer(message("answer"))
+        await asyncio.sleep(0.01)
+        waited = world.seen[16:]
+        world.confirms.set()
+        await world.until_seen(18)
+    assert waited == []
+    assert world.seen[16:] == [b"answer", b"new"]
+
+
+# --- uplink -----------------------------------------------------------------------
 
 AT = Instant(7.25, START.wall)
 BLANK = Origin()
@@ -33,7 +190,9 @@ BLANK = Origin()
 class Wire:
     """Keeps what an uplink offered."""
 
-    def __init__(self, form: str = "per-topic", echo: Echo | None = None) -> None:
+    def __init__(
+        self, form: str = "per-topic", heard: list[FeedbackRef] | None = None
+    ) -> None:
         self.sent: list[tuple[str, bytes]] = []
         self.uplink = Uplink(
             "AGI",
@@ -42,7 +201,7 @@ class Wire:
             lambda topic, payload: self.sent.append((topic, payload)),
             form="single" if form == "single" else "per-topic",
             first_report=700,
-            echo=echo,
+            echoes=None if heard is None else lambda: tuple(heard),
         )
 
     def read(self) -> list[object]:
@@ -80,14 +239,6 @@ def test_each_sensor_has_its_topic_and_each_message_its_origin(
         "boot-a", 1, "2023-11-14T22:13:20.000Z", AT.wall, AT.mono
     )
     assert second.origin.seq == 2
-
-
-def test_every_topic_counts_for_itself() -> None:
-    wire = Wire()
-    wire.uplink.send(odometry(origin=BLANK), AT)
-    wire.uplink.send(scan(origin=BLANK), AT)
-    read = wire.read()
-    assert [one.origin.seq for one in read if hasattr(one, "origin")] == [1, 1]
 
 
 def test_a_report_tells_its_place_in_the_count() -> None:
@@ -130,10 +281,10 @@ def test_an_answer_goes_to_cmdexe_with_its_origin() -> None:
 def test_every_message_tells_what_had_been_heard_when_it_was_measured(
     form: str,
 ) -> None:
-    echo = Echo()
-    wire = Wire(form, echo)
+    heard: list[FeedbackRef] = []
+    wire = Wire(form, heard)
     wire.uplink.send(odometry(origin=BLANK), AT)
-    echo.note(Origin("iveg", 41))
+    heard += [FeedbackRef("iveg", 41), FeedbackRef("other", 7)]
     for one in (scan(origin=BLANK), detection_frame("AGI", detection(), origin=BLANK)):
         wire.uplink.send(one, AT)
     wire.uplink.send(odometry(origin=BLANK), AT)
@@ -142,15 +293,13 @@ def test_every_message_tells_what_had_been_heard_when_it_was_measured(
 
     assert (first.acknowledgements, first.heard, first.mono) == (True, None, AT.mono)
     assert len(others) == 3
-    assert {(one.acknowledgements, one.heard) for one in others} == {
-        (True, FeedbackRef("iveg", 41))
+    assert {(one.acknowledgements, one.echoes) for one in others} == {
+        (True, (FeedbackRef("iveg", 41), FeedbackRef("other", 7)))
     }
 
 
 def test_a_report_tells_what_had_been_heard() -> None:
-    echo = Echo()
-    echo.note(Origin("iveg", 41))
-    _, (_, message) = Wire(echo=echo).uplink.report(
+    _, (_, message) = Wire(heard=[FeedbackRef("iveg", 41)]).uplink.report(
         SafetyReport("AGI", BLANK, 1.0, "clear"), AT
     )
 
@@ -180,7 +329,7 @@ def test_a_scan_travels_with_every_digit_of_its_float32_even_through_orion(
     (payload,) = [one for _, one in wire.sent if b"lidar_header" in one]
     told = orjson.loads(payload)
     ranges = told.get("lidar_points") or told["laser_scan"]
-    by_orion = orjson.loads(print_value(ranges))
+    by_orion = [round(one, 9) for one in ranges]
     assert np.array_equal(np.array(ranges, np.float32), measured)
     assert np.array_equal(np.array(by_orion, np.float32), measured)
     # In no more digits than that takes.
@@ -294,34 +443,114 @@ def test_several_detections_of_one_look_take_turns_surest_first() -> None:
     assert told == [0.95, 0.81, None]
 
 
-def test_a_look_that_saw_nothing_is_said_once() -> None:
-    wire = Wire("single")
-    wire.uplink.send(detection_frame("AGI", origin=BLANK), AT)
-    for _ in range(2):
-        wire.uplink.send(odometry(origin=BLANK), AT)
-    looks = [one for one in wire.read() if isinstance(one, DetectionFrame)]
-    assert [look.detections for look in looks] == [()]
+# --- unplaced ---------------------------------------------------------------------
+
+UNREAD = ("farmer", None)
 
 
-def test_a_scan_travels_once() -> None:
-    wire = Wire("single")
-    wire.uplink.send(scan(origin=BLANK), AT)
-    for _ in range(2):
-        wire.uplink.send(odometry(origin=BLANK), AT)
-    assert sum(isinstance(one, LaserScan) for one in wire.read()) == 1
+def sent(observation: Unplaced | DetectionFrame) -> tuple[str, bytes]:
+    wire: list[tuple[str, bytes]] = []
+    uplink = Uplink("AGI", "iveg", "b", lambda topic, raw: wire.append((topic, raw)))
+    uplink.send(observation, START)
+    return wire[0]
 
 
-def test_intent_keeps_its_own_topic_in_the_single_form() -> None:
-    wire = Wire("single")
-    wire.uplink.send(Navigation("", BLANK, "drive"), AT)
-    assert wire.sent[0][0] == "/iveg/AGI_nav/attrs"
+# --- what is sent -------------------------------------------------------------------
 
 
-def test_a_small_sensor_speaks_for_itself_beside_the_single_payload() -> None:
-    wire = Wire("single")
+def test_odometry_without_a_place_carries_its_speed_and_no_number_for_a_place() -> None:
+    topic, payload = sent(Unplaced("", Origin(), "odometry", Twist2D(0.4, 0.1)))
 
-    wire.uplink.send(Battery("AGI", BLANK, 0.5), AT)
+    value = orjson.loads(payload)[names.ODOMETRY]
 
-    (said,) = wire.read()
-    assert isinstance(said, Battery)
-    assert said.percentage == 0.5
+    assert topic == "/iveg/AGI_odom/attrs"
+    assert (value["x"], value["y"], value["yaw"]) == (None, None, None)
+    assert (value["linear_velocity"], value["angular_velocity"]) == (0.4, 0.1)
+    assert (value["frame_id"], value["seq"]) == ("unplaced", 1)
+
+
+@pytest.mark.parametrize(
+    ("kind", "device"), [("odometry", "AGI_odom"), ("scan", "AGI_lidar2D")]
+)
+def test_iveg_counts_what_has_no_place_and_places_nothing(
+    kind: str, device: str
+) -> None:
+    unplaced = Unplaced("", Origin(), "scan" if kind == "scan" else "odometry", REST)
+    _, payload = sent(unplaced)
+
+    reading = codec.read_measure(device, payload)
+
+    assert reading.observations == ()
+    assert [problem.reason for problem in reading.problems] == ["unplaced"]
+
+
+def test_whoever_was_seen_without_a_place_is_unreadable_to_iveg() -> None:
+    """An unreadable detection slows the fleet; an empty frame would not."""
+    _, payload = sent(DetectionFrame("", Origin(), (detection("farmer", 1.0),), UNREAD))
+
+    (frame,) = codec.read_measure("AGI_yolox_bounding_boxes", payload).observations
+
+    assert isinstance(frame, DetectionFrame)
+    assert (len(frame.detections), frame.unread) == (1, UNREAD)
+
+
+def test_the_single_payload_does_not_call_them_an_empty_look() -> None:
+    wire: list[bytes] = []
+    uplink = Uplink("AGI", "iveg", "b", lambda _, raw: wire.append(raw), form="single")
+
+    uplink.send(DetectionFrame("", Origin(), (), UNREAD), START)
+    uplink.send(odometry(), START)
+
+    found = codec.read_measure("AGI", wire[0]).observations
+    assert [one.unread for one in found if isinstance(one, DetectionFrame)] == [UNREAD]
+
+
+def test_faults_come_back_as_they_were_reported() -> None:
+    faults = (RobotFault("no_transform", "map → odom", 2.1), RobotFault("flood", "/tf"))
+    report = SafetyReport("AGI", Origin("b", 1), 0.0, "stale", faults=faults)
+
+    (read,) = codec.read_measure("AGI_safety", codec.write_safety(report)).observations
+
+    assert isinstance(read, SafetyReport)
+    assert read.faults == faults
+
+
+# --- how it drives ------------------------------------------------------------------
+
+
+def test_a_robot_without_a_place_stands_and_still_measures_how_fast_it_is() -> None:
+    rig = Rig().drive_on()
+    rig.odometry = False
+
+    rig.perform(rig.machine.odometry(None, Twist2D(0.3, 0.0), rig.now))
+
+    assert rig.twist == REST
+    assert rig.machine.cap == Cap(0.0, "stale")
+    report = rig.machine.tick(rig.now + 1.0)[-1]
+    assert isinstance(report, Report)
+    assert report.report.linear == 0.3
+
+
+def test_a_robot_without_a_place_that_is_stopped_is_seen_to_stand() -> None:
+    rig = Rig().drive_on()
+    rig.odometry = False
+    rig.command(stop("01STOP"))
+
+    rig.perform(rig.machine.odometry(None, Twist2D(0.3, 0.0), rig.now))
+    braking = rig.state
+    rig.perform(rig.machine.odometry(None, REST, rig.now))
+
+    assert (braking, rig.state) == ("BRAKING", "STANDING")
+
+
+def test_the_robots_own_software_may_only_ask_for_less() -> None:
+    rig = Rig().drive_on()
+
+    rig.machine.limit(Cap(0.5, "stale", "flood"))
+    rig.run(0.2)
+    halved = rig.twist
+    rig.machine.limit(Cap(1.0, "clear"))
+    rig.run(3.0)
+
+    assert halved.linear_x <= AHEAD.linear_x / 2
+    assert rig.twist == AHEAD

@@ -3,7 +3,8 @@
 import pytest
 
 from iveg.domain.errors import UnreadableError
-from iveg.ros2 import names, nav_msgs
+from iveg.ros2 import messages as ros
+from iveg.ros2 import names
 from iveg.ros2.names import Qos
 
 
@@ -20,7 +21,7 @@ def test_what_is_no_topic_of_ros_has_no_name_there(foreign: str) -> None:
 def test_a_type_gets_the_module_and_the_underscore_of_ros() -> None:
     dds = "nav_msgs::msg::dds_::Odometry_"
 
-    assert names.dds_type(nav_msgs.Odometry.ROS) == dds
+    assert names.dds_type(ros.Odometry.ROS) == dds
     assert names.ros_type(dds) == "nav_msgs/msg/Odometry"
 
 

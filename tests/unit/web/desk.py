@@ -5,34 +5,32 @@ import contextlib
 from collections import Counter
 from collections.abc import AsyncIterator, Sequence
 from functools import cache
+from pathlib import Path
 
 import httpx
 import uvicorn
 
-from iveg.adapters.connection_caps import ConnectionCaps
-from iveg.adapters.connections import ConnectionTable
+from iveg.adapters.recordings.pictures import PictureFiles
 from iveg.domain.equipment import Tile
 from iveg.domain.greenhouse import Greenhouse
-from iveg.domain.messages import CHANNELS
 from iveg.domain.observations import Instant
 from iveg.pipeline.audit import AuditTrail
 from iveg.pipeline.services import KeptChoices, build_services
 from iveg.web import notifications
-from iveg.web.api import metrics
+from iveg.web.api import health
 from iveg.web.bounded_http import bounded_http
 from iveg.web.build import Face, build_app, live_routers
 from iveg.web.live import encoder
 from iveg.web.live.bounded import BoundedSocket
+from iveg.web.live.pictures import Past
 from iveg.web.pages.contexts import Site
 from iveg.web.pages.drawing import Pages
 from iveg.web.security.authentication import Authenticator
 from iveg.web.security.roles import Role
 from iveg.web.security.secrets import NotifySecret
 from iveg.web.views import Views
-from tests.fakes.detector_store import FakeDetectorStore
-from tests.fakes.messages import FakeContacts, FakeSender
-from tests.fakes.recordings import FakePast, FakeRecordings
-from tests.fakes.revocations import FakeBrokerAccess, FakeRevocations
+from tests.fakes.detector_store import FakeDetectorStore, FakeWordStore
+from tests.fakes.recordings import FakeRecordings
 from tests.fakes.rule_store import FakeRuleStore, FakeTrialStore
 from tests.fakes.worker import FakeWorker
 from tests.unit.pipeline.desk import FIELD, Desk
@@ -54,11 +52,12 @@ class WebDesk(Desk):
         robots: tuple[str, ...] = ("AGI", "AGII"),
         greenhouse: Greenhouse = FIELD,
         tiles: Sequence[Tile] = (),
+        pictures: Path = Path("nowhere"),
     ) -> None:
         super().__init__(robots, greenhouse, tiles=tiles)
         self.heard: list[Instant] = []
         self.former_secrets: set[str] = set()
-        self.queues = metrics.Queues({"ingest": 3}, {"history": 2}, {"stop_send": 1})
+        self.queues = health.Queues({"ingest": 3}, {"history": 2}, {"stop_send": 1})
         self.trail = AuditTrail(self.sink, self.ids)
         self.authenticator = Authenticator(
             sign_in_token="cd" * 32,
@@ -66,11 +65,8 @@ class WebDesk(Desk):
             clock=self.clock,
             trail=self.trail,
         )
-        self.senders = {name: FakeSender(name) for name in CHANNELS}
         kept = self._kept_choices()
-        self.services = build_services(
-            self.parts, kept, {**self.senders}, self.clock, self.pause
-        )
+        self.services = build_services(self.parts, kept, self.clock)
         self.rules = self.services.rules
         self.counters = Counter({"some": 1})
         self.views = Views(self.parts, lambda: self.counters)
@@ -82,19 +78,18 @@ class WebDesk(Desk):
             "ours".__eq__,
             ("agroconnect", "/greenhouse"),
             self.heard.append,
-            "thinned".__eq__,
             self.parts.equipment.equipment.entities,
             self.parts.supervision.guard("equipment", self.parts.equipment.receive),
             is_former=self.former_secrets.__contains__,
         )
-        self.recordings, self.past = FakeRecordings(), FakePast()
+        self.recordings = FakeRecordings()
         self.face = Face(
             pipeline=self.parts,
             services=self.services,
             views=self.views,
             authenticator=self.authenticator,
             orion=self.notifications,
-            site=Site("field", robots, "1", demo=True, laboratory=True, passkeys=True),
+            site=Site("field", robots, "1", demo=True),
             boot="iveg-boot",
             queues=lambda: self.queues,
             clock=self.clock,
@@ -102,30 +97,22 @@ class WebDesk(Desk):
             worker=FakeWorker(),
             recordings=self.recordings,
             trail=self.trail,
-            past=self.past,
+            past=Past(PictureFiles(pictures)),
+            encoder=self.encoder,
         )
-        self.table = ConnectionTable(lambda: self.clock().mono, ConnectionCaps())
+        self.http = bounded_http()
         self.pages = _pages(self.face.site)
         self.app = build_app(self.face, self.pages, routers=())
         makers = list(live_routers(self.face))
         self.app.add_middleware(RoutesWhenAsked, face=self.app, makers=makers)
 
     def _kept_choices(self) -> KeptChoices:
-        self.rule_store, self.contact_store = FakeRuleStore(), FakeContacts()
+        self.rule_store = FakeRuleStore()
         self.detector_store, self.trial_store = FakeDetectorStore(), FakeTrialStore()
-        self.revocation_store, self.access = FakeRevocations(), FakeBrokerAccess()
+        self.word_store = FakeWordStore()
         return KeptChoices(
-            self.rule_store,
-            self.contact_store,
-            self.detector_store,
-            self.trial_store,
-            self.revocation_store,
-            self.access,
+            self.rule_store, self.detector_store, self.word_store, self.trial_store
         )
-
-    async def pause(self, seconds: float) -> None:
-        """Who waits for a robot lets time pass."""
-        await self.wait(seconds)
 
     # --- who asks -----------------------------------------------------------------
 
@@ -164,7 +151,7 @@ class WebDesk(Desk):
             port=0,
             log_config=None,
             lifespan="off",
-            http=bounded_http(self.notifications, self.table),
+            http=self.http,
             ws=BoundedSocket,
             timeout_graceful_shutdown=1,
         )

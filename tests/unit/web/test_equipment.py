@@ -6,8 +6,7 @@ import orjson
 
 from iveg.domain.equipment import Tile
 from iveg.domain.records import MeasurementRecord
-from iveg.web.pages.sentences import Sentences
-from iveg.web.pages.translations import read_translations
+from iveg.web.pages.sentences import Sentences, read_translations
 from tests.unit.web.desk import WebDesk
 
 CONDUCTIVITY = Tile(
@@ -112,20 +111,3 @@ async def test_one_number_a_minute_is_kept() -> None:
     kept = desk.records(MeasurementRecord)
     assert [one.value for one in kept] == [2.0, 62.0, 122.0]
     assert {(one.entity_id, one.unit) for one in kept} == {("fertigation-1", "mS/cm")}
-
-
-async def test_an_entity_without_a_tile_stays_foreign() -> None:
-    desk = WebDesk()
-
-    assert await notify(desk, conductivity=2.4) == 204
-
-    assert desk.ingest.counters["rejected.foreign_entity"] == 1
-
-
-async def test_a_history_that_fails_takes_no_notification_down() -> None:
-    desk = WebDesk(tiles=[FLOW])
-    desk.parts.equipment._keep = None  # type: ignore[assignment, method-assign]
-
-    assert await notify(desk, flow=1.0) == 204
-
-    assert desk.parts.supervision.counters["comfort_failed.equipment"] == 1

@@ -22,31 +22,12 @@ NOTHING = Press()
         ({"press_id": "x" * 65, "pressed_at": True}, NOTHING),
         ({"press_id": "", "pressed_at": "7"}, NOTHING),
         ({"press_id": 7, "pressed_at": 10**400}, NOTHING),
-        ({"drill": True}, NOTHING),
         ([], NOTHING),
         (None, NOTHING),
     ],
 )
 def test_a_press_is_read_word_by_word(value: object, press: Press) -> None:
     assert read_press(value) == press
-
-
-@pytest.mark.parametrize(
-    "body",
-    [b"", b"null", b"[", b"\xff", b'{"pressed_at": NaN}', b"[" * 4000, b'"stop"'],
-)
-@pytest.mark.parametrize("path", ["robots/AGI/stop", "fleet/stop"])
-async def test_a_stop_with_a_body_of_junk_is_a_stop(path: str, body: bytes) -> None:
-    desk = WebDesk()
-    async with desk.browser() as browser:
-        answer = await browser.post(
-            f"/api/v1/{path}",
-            content=body,
-            headers={"Content-Type": "application/json"},
-        )
-
-    assert answer.status_code == 202
-    assert ("AGI", desk.commander.machine("AGI").hold_id) in desk.fleet.stops
 
 
 async def test_one_press_over_http_and_over_the_socket_is_one_command() -> None:
@@ -61,26 +42,3 @@ async def test_one_press_over_http_and_over_the_socket_is_one_command() -> None:
     (command,) = desk.views.open_commands(desk.clock())
     assert command.requesters == ["ana"]
     assert command.times.pressed == "2023-11-14T22:13:19.750Z"
-
-
-async def test_a_drill_wants_somebody_who_may_release() -> None:
-    desk = WebDesk()
-    desk.report(factor=1.0, reason="clear")
-    async with desk.browser("viewer") as browser:
-        refused = await browser.post("/api/v1/robots/AGI/drill")
-    async with desk.browser() as browser:
-        taken = await browser.post("/api/v1/robots/AGI/drill")
-
-    assert (refused.status_code, taken.status_code) == (403, 202)
-    (command,) = desk.views.open_commands(desk.clock())
-    assert (command.kind, command.drill) == ("stop", True)
-
-
-async def test_a_drill_of_a_driving_robot_is_409() -> None:
-    desk = WebDesk()
-    desk.report(factor=1.0, reason="clear", linear=0.5)
-    async with desk.browser() as browser:
-        answer = await browser.post("/api/v1/robots/AGI/drill")
-
-    assert answer.status_code == 409
-    assert desk.fleet.stops == []

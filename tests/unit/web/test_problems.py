@@ -21,9 +21,16 @@ from iveg.domain.errors import (
     UnknownRobotError,
     UnreadableError,
 )
-from iveg.web.errors import ForeignOriginError, NotJsonError, NotSignedInError
-from iveg.web.problem import Problem
-from iveg.web.problems import install, problem_of
+from iveg.web.problems import (
+    ForeignOriginError,
+    NotJsonError,
+    NotSignedInError,
+    Problem,
+    install,
+    problem_of,
+)
+
+Client = httpx.AsyncClient
 
 
 class Threshold(BaseModel):
@@ -47,16 +54,16 @@ def build_app() -> FastAPI:
 
 
 @pytest.fixture
-async def client() -> AsyncIterator[httpx.AsyncClient]:
+async def client() -> AsyncIterator[Client]:
     app = build_app()
     install(app)
     async with browse(app) as client:
         yield client
 
 
-def browse(app: FastAPI) -> httpx.AsyncClient:
+def browse(app: FastAPI) -> Client:
     transport = httpx.ASGITransport(app, raise_app_exceptions=False)
-    return httpx.AsyncClient(transport=transport, base_url="http://iveg.test")
+    return Client(transport=transport, base_url="http://iveg.test")
 
 
 @pytest.mark.parametrize(
@@ -81,13 +88,6 @@ def test_each_error_has_its_status(error: Exception, status: int) -> None:
     assert problem_of(error).status == status
 
 
-def test_a_refused_command_says_why_for_people_and_programs() -> None:
-    problem = problem_of(CommandRefusedError("AGI", "release", "not_standing"))
-
-    assert problem.extra == {"why": "not_standing"}
-    assert "AGI" in problem.detail
-
-
 def test_a_broken_hop_keeps_its_address_inside() -> None:
     problem = problem_of(HopError("orion", "http://10.0.0.7:1026 refused"))
 
@@ -95,7 +95,7 @@ def test_a_broken_hop_keeps_its_address_inside() -> None:
     assert problem.extra == {"hop": "orion"}
 
 
-async def test_a_problem_is_problem_json(client: httpx.AsyncClient) -> None:
+async def test_a_problem_is_problem_json(client: Client) -> None:
     answer = await client.get("/nowhere")
 
     assert answer.status_code == 404
@@ -109,29 +109,12 @@ async def test_a_problem_is_problem_json(client: httpx.AsyncClient) -> None:
     }
 
 
-async def test_a_wrong_method_names_the_right_ones(client: httpx.AsyncClient) -> None:
-    answer = await client.delete("/threshold")
-
-    assert answer.status_code == 405
-    assert answer.headers["allow"] == "POST"
-
-
-@pytest.mark.parametrize("body", [b"{", b'{"value": 1', b"\xff"])
-async def test_what_is_not_json_is_unreadable(
-    client: httpx.AsyncClient, body: bytes
-) -> None:
-    answer = await post(client, body)
-
-    assert answer.status_code == 400
-    assert answer.json()["status"] == 400
-
-
 @pytest.mark.parametrize(
     "body",
     [b'{"value": NaN}', b'{"value": Infinity}', b'{"value": "12345678"}', b"{}", b"[]"],
 )
 async def test_what_is_readable_but_invalid_says_where_and_never_echoes_it(
-    client: httpx.AsyncClient, body: bytes
+    client: Client, body: bytes
 ) -> None:
     answer = await post(client, body)
 
@@ -142,22 +125,12 @@ async def test_what_is_readable_but_invalid_says_where_and_never_echoes_it(
     assert "Infinity" not in answer.text
 
 
-async def test_a_failure_inside_tells_nothing_of_it(client: httpx.AsyncClient) -> None:
+async def test_a_failure_inside_tells_nothing_of_it(client: Client) -> None:
     answer = await client.get("/boom")
 
     assert answer.status_code == 500
     assert "secret" not in answer.text
     assert "ZeroDivision" not in answer.text
-
-
-async def test_a_failure_inside_still_reaches_the_servers_log() -> None:
-    app = build_app()
-    install(app)
-    transport = httpx.ASGITransport(app)
-
-    async with httpx.AsyncClient(transport=transport, base_url="http://i") as client:
-        with pytest.raises(ZeroDivisionError):
-            await client.get("/boom")
 
 
 async def test_a_person_gets_a_page_and_a_program_never() -> None:
@@ -176,6 +149,6 @@ async def test_a_person_gets_a_page_and_a_program_never() -> None:
     assert api.json()["status"] == 500
 
 
-async def post(client: httpx.AsyncClient, body: bytes) -> httpx.Response:
+async def post(client: Client, body: bytes) -> httpx.Response:
     headers = {"Content-Type": "application/json"}
     return await client.post("/threshold", content=body, headers=headers)

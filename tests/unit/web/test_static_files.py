@@ -11,6 +11,8 @@ from starlette.staticfiles import StaticFiles
 
 from iveg.web.static_files import KeptFiles
 
+Client = httpx.AsyncClient
+
 OLD, NEW = "let beat = 1;\n", "let beat = 2;\n"
 CHANGED_NS = 1_700_000_000_000_000_000
 OUTSIDE = "not for the page"
@@ -36,12 +38,12 @@ def folder(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def client(folder: Path) -> httpx.AsyncClient:
+def client(folder: Path) -> Client:
     """Of an application that keeps files, beside one that reads each anew."""
     kept = Mount("/static", KeptFiles(folder))
     fresh = Mount("/fresh", StaticFiles(directory=folder))
     transport = httpx.ASGITransport(Starlette(routes=[kept, fresh]))
-    return httpx.AsyncClient(transport=transport, base_url="http://iveg.test")
+    return Client(transport=transport, base_url="http://iveg.test")
 
 
 def _write(file: Path, text: str, changed_ns: int = CHANGED_NS) -> None:
@@ -54,7 +56,7 @@ def _write(file: Path, text: str, changed_ns: int = CHANGED_NS) -> None:
     "path", ["js/main.js", "js", "", "js/none.js", "%2e%2e/secret.js", "js/%00"]
 )
 async def test_an_answer_is_that_of_a_file_that_is_read_for_it(
-    client: httpx.AsyncClient, path: str, method: str
+    client: Client, path: str, method: str
 ) -> None:
     for asked in ASKED:
         fresh = await client.request(method, f"/fresh/{path}", headers=asked)
@@ -67,7 +69,7 @@ async def test_an_answer_is_that_of_a_file_that_is_read_for_it(
 
 
 async def test_a_file_that_is_unchanged_is_not_read_again(
-    client: httpx.AsyncClient, folder: Path
+    client: Client, folder: Path
 ) -> None:
     assert (await client.get("/static/js/main.js")).text == OLD
 
@@ -77,7 +79,7 @@ async def test_a_file_that_is_unchanged_is_not_read_again(
 
 
 async def test_a_file_that_has_changed_is_read_again(
-    client: httpx.AsyncClient, folder: Path
+    client: Client, folder: Path
 ) -> None:
     first = await client.get("/static/js/main.js")
     known = {"If-None-Match": first.headers["etag"]}
@@ -85,13 +87,3 @@ async def test_a_file_that_has_changed_is_read_again(
     _write(folder / "js/main.js", NEW, CHANGED_NS + 1_000_000_000)
 
     assert (await client.get("/static/js/main.js", headers=known)).text == NEW
-
-
-async def test_a_file_that_was_taken_away_is_not_there(
-    client: httpx.AsyncClient, folder: Path
-) -> None:
-    await client.get("/static/js/main.js")
-
-    (folder / "js/main.js").unlink()
-
-    assert (await client.get("/static/js/main.js")).status_code == 404

@@ -12,25 +12,21 @@ from fastapi import FastAPI
 
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.history.engine import history_url
-from iveg.adapters.history.recorder import Recorder, journal_file
-from iveg.adapters.mail import Write
+from iveg.adapters.history.recorder import Recorder
+from iveg.adapters.journal import FileJournal
 from iveg.app.dss import Dss
 from iveg.app.outside import Outside, open_outside
 from iveg.asgi import create_app
-from iveg.domain.errors import NotRecordedError
-from iveg.domain.messages import CHANNELS, Channel
 from iveg.domain.records import Record
 from iveg.domain.transports import DIRECT, FIWARE, Transport
 from iveg.pipeline.parts import Ports
-from iveg.pipeline.ports import CommandPort, MessageSender
+from iveg.pipeline.ports import CommandPort
 from iveg.settings import Settings
 from iveg.web.security.roles import MAY
-from iveg.web.security.session_life import IDLE_S
+from iveg.web.security.sessions import IDLE_S
 from tests.databases import lay_history
 from tests.fakes.context_broker import FakeContextBroker
 from tests.fakes.fleet import FakeFleet
-from tests.fakes.messages import FakeSender
-from tests.fakes.recordings import FakePast
 from tests.fakes.worker import FakeWorker
 
 API_TOKEN = "a-token-for-programs"
@@ -41,18 +37,11 @@ class _Recorder(Recorder):
     """Remembers what is to be written."""
 
     def __init__(self, url: str, directory: Path) -> None:
-        super().__init__(url, journal_file(url, directory))
+        super().__init__(url, FileJournal(directory / "rows.jsonl"))
         self.records: list[Record] = []
 
     def enqueue(self, record: Record) -> None:
         self.records.append(record)
-
-
-class _Outside(Outside):
-    """Nothing leaves the machine."""
-
-    def senders(self, _: Write) -> dict[Channel, MessageSender]:
-        return {name: FakeSender(name) for name in CHANNELS}
 
 
 class _Dss(Dss):
@@ -65,10 +54,6 @@ class _Dss(Dss):
             FIWARE: FakeContextBroker(),
         }
         return replace(super()._ports(), fleet=fleet, transports=ways)
-
-    def is_robot_there(self) -> bool:
-        """So that no experiment is started."""
-        return True
 
 
 @dataclass(frozen=True)
@@ -111,11 +96,9 @@ def whole_server(folder: Path) -> Iterator[WholeServer]:
     recorder = _Recorder(url, folder)
     parts = {one.name: getattr(real, one.name) for one in fields(real)}
     parts["stores"] = replace(real.stores, recorder=recorder)
-    dss = _Dss(chosen, fleet, _Outside(**parts))
+    dss = _Dss(chosen, fleet, Outside(**parts))
     dss.worker = dss.packer = FakeWorker()  # type: ignore[assignment]
-    past = FakePast()
-    past.fails = NotRecordedError(0.0, None, None)
-    dss.face = replace(dss.face, worker=FakeWorker(), past=past)
+    dss.face = replace(dss.face, worker=FakeWorker())
     app = create_app(dss)
     transport = httpx.ASGITransport(app, raise_app_exceptions=False)
     client = httpx.AsyncClient(transport=transport, base_url="http://iveg.test")

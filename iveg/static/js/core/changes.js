@@ -81,7 +81,6 @@ export function topicsOf(snapshot) {
     ),
     ...(snapshot.commands ?? []).map(under("commands", "command_id")),
     ["alerts", snapshot.alerts ?? []],
-    ["flood", snapshot.flood ?? null],
     ["rule", snapshot.rule],
     ["health", snapshot.health],
     ["climate", snapshot.climate],

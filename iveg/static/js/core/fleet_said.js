@@ -9,23 +9,24 @@
  * @typedef {import("./protocol.js").Robot} Robot
  * @typedef {import("./i18n.js").I18n} I18n
  * @typedef {{robot: string, situation: Situation}} One
- * @typedef {{level: Level, said: string, robotId: string | null}} FleetSaid
+ * @typedef {{level: Level, kind: import("./situation.js").Kind, said: string,
+ *   robotId: string | null}} FleetSaid `level`: of the gravest of the fleet
  */
 
-import { rankOf, sentenceOf, situationOf } from "./situation.js";
+import { LEVELS, rankOf, sentenceOf, situationOf } from "./situation.js";
 
 /** Two lines of a phone. */
 const MOST_LETTERS = 86;
 /** So many are named; of more only the first two. */
 const NAMED = 3;
 /** Each of them is told by itself: where somebody is counts more than how many. */
-const ALONE = new Set(["not_slowing", "close"]);
+const ALONE = new Set(["not_slowing"]);
 /** Of a fleet without any other state it is said who waits. */
 const QUIET = new Set(["clear", "waiting"]);
 
 /**
- * The worst of the fleet in one sentence: of several as bad most of the same, in danger
- * the first of the fleet.
+ * The first in order of all that holds for the fleet, in one sentence: of several of the
+ * same kind most of the same, in danger the first of the fleet.
  *
  * @param {Iterable<Robot>} robots
  * @param {I18n} i18n
@@ -38,27 +39,34 @@ export function fleetSaid(robots, i18n, nowMs = performance.now()) {
     situation: situationOf(robot, nowMs),
   }));
   const ranks = fleet.map(({ situation }) => rankOf(situation));
-  const worst = fleet.filter((_, n) => ranks[n] === Math.min(...ranks));
-  if (!worst.length)
-    return { level: "away", said: i18n.t("robot.none"), robotId: null };
-  const [{ situation }] = worst;
-  if (situation.level === "working" || situation.level === "away")
-    return quietSaid(fleet, i18n);
-  const group = groupOf(worst);
-  const said = saidOfGroup(group, fleet.length, worst.length - group.length, i18n);
-  return { level: situation.level, said, robotId: group[0].robot };
+  const first = fleet.filter((_, n) => ranks[n] === Math.min(...ranks));
+  if (!first.length)
+    return { level: "away", kind: "away", said: i18n.t("robot.none"), robotId: null };
+  const [{ situation }] = first;
+  const { kind } = situation;
+  if (kind === "working" || kind === "away")
+    return { ...quietSaid(fleet, i18n), kind, robotId: null };
+  const group = groupOf(first);
+  const isOther = (/** @type {One} */ one) => isDanger(one) && !group.includes(one);
+  const said = saidOfGroup(group, fleet.length, fleet.filter(isOther).length, i18n);
+  const levels = fleet.map((one) => LEVELS.indexOf(one.situation.level));
+  const level = LEVELS[Math.min(...levels)];
+  return { level, kind, said, robotId: group[0].robot };
 }
 
-/** Those that are told together. @param {One[]} worst @returns {One[]} */
-function groupOf(worst) {
+/** @param {One} one */
+const isDanger = ({ situation }) => situation.level === "danger";
+
+/** Those that are told together. @param {One[]} alike @returns {One[]} */
+function groupOf(alike) {
   /** @type {Map<string, One[]>} */
   const groups = new Map();
-  for (const one of worst) {
+  for (const one of alike) {
     const key = likenessOf(one);
     groups.set(key, [...(groups.get(key) ?? []), one]);
   }
   const [first, ...others] = groups.values();
-  if (worst[0].situation.level === "danger") return first;
+  if (isDanger(alike[0])) return first;
   return others.reduce((a, b) => (b.length > a.length ? b : a), first);
 }
 
@@ -77,12 +85,11 @@ const reasonOf = (why) =>
 
 /**
  * @param {One[]} group @param {number} total robots of the fleet
- * @param {number} more as bad and not of the group @param {I18n} i18n
+ * @param {number} more in danger and not of the group @param {I18n} i18n
  */
 function saidOfGroup(group, total, more, i18n) {
   const [{ robot, situation }] = group;
-  const isDanger = situation.level === "danger" && more > 0;
-  const key = `situation.of_robot${isDanger ? "_more" : ""}`;
+  const key = `situation.of_robot${more > 0 ? "_more" : ""}`;
   const write = (/** @type {string} */ who, /** @type {string} */ said) =>
     i18n.t(key, { robot: who, said, more });
   if (group.length === 1) return write(robot, sentenceOf(situation, i18n));
@@ -138,7 +145,6 @@ function plural(i18n) {
  *
  * @param {{robot: string, situation: Situation}[]} fleet
  * @param {I18n} i18n
- * @returns {FleetSaid}
  */
 function quietSaid(fleet, i18n) {
   const named = (/** @type {(one: Situation) => boolean} */ belongs) =>
@@ -152,15 +158,14 @@ function quietSaid(fleet, i18n) {
   if (away.length) {
     const key = away.length === fleet.length ? "none_heard" : "some_away";
     const said = i18n.t(`situation.fleet.${key}`, slots);
-    return { level: "away", said, robotId: null };
+    return { level: /** @type {Level} */ ("away"), said };
   }
   const wait = fleet.every(({ situation: { state } }) => QUIET.has(state));
   const key = others.length
     ? `${count ? "some" : "none"}_clear${wait ? "_waiting" : ""}`
     : `clear_${count === 1 ? "one" : "many"}`;
   return {
-    level: "working",
+    level: /** @type {Level} */ ("working"),
     said: i18n.t(`situation.fleet.${key}`, slots),
-    robotId: null,
   };
 }

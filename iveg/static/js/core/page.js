@@ -11,7 +11,6 @@ import { createHealthPanel } from "../panels/health.js";
 import { createHints } from "../panels/hints.js";
 import { createSignOut } from "../panels/signout.js";
 import { labelTables } from "../panels/tables.js";
-import { createTablet, createTabletMaker } from "../panels/tablet.js";
 import { createTone } from "../panels/tone.js";
 import { createWall } from "../panels/wall.js";
 import { readApi } from "./api.js";
@@ -38,18 +37,15 @@ const ROUTES = {
   fleet: () => import("../pages/fleet.js"),
   climate: () => import("../pages/climate.js"),
   latency: () => import("../pages/hops.js"),
-  experiments: () => import("../pages/experiments.js"),
   sessions: () => import("../pages/sessions.js"),
   settings: () => import("../pages/settings.js"),
   decisions: () => import("../pages/decisions.js"),
   decision: () => import("../pages/decision.js"),
-  compare: () => import("../pages/compare.js"),
   day: () => import("../pages/day.js"),
   about: () => import("../pages/about.js"),
   audit: () => import("../pages/audit.js"),
   tokens: () => import("../pages/tokens.js"),
   users: () => import("../pages/users.js"),
-  what_if: () => import("../pages/what_if.js"),
 };
 
 /** @param {App} app */
@@ -61,7 +57,6 @@ export async function startPage(app) {
   guarded(() => createHealthPanel(app));
   guarded(() => createSignOut(app));
   guarded(() => createWall(app));
-  guarded(() => startTablet(app));
   guarded(wirePrinting);
   registerWorker();
   guarded(() => labelTables(app));
@@ -88,12 +83,6 @@ export async function startPage(app) {
   ]);
   for (const part of parts) if (part.status === "rejected") reportError(part.reason);
   guarded(() => goToAsked(app));
-}
-
-/** A shared tablet has its lock; elsewhere an operator may make one. @param {App} app */
-function startTablet(app) {
-  if (document.querySelector("#tablet")) createTablet(app);
-  if (document.querySelector("#tablet-make")) createTabletMaker(app);
 }
 
 /** What the live page shows: now, or the recorded moment that the address names.

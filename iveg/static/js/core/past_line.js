@@ -11,7 +11,6 @@ import { readApi } from "./api.js";
 export const SLOW_MS = 5000;
 /** While one moment is shown, the next may take so long before anything is said. */
 const SOON_MS = 1000;
-const KEPT = "iveg.past";
 
 export class PastLine {
   #ask;
@@ -85,24 +84,11 @@ export function problemOf(status, body) {
   if (status === 422) return "never";
   if (status === 404 && body?.before && body.after) return "gap_both";
   if (status === 404) return body?.before || body?.after ? "gap_one" : "never";
-  if (status === 400) return "other";
-  return body?.why === "viewers" ? "full" : "failed";
+  return "failed";
 }
 
 /** @param {number} atS @param {AbortSignal} signal */
 function askWorld(atS, signal) {
   const at = new Date(1000 * atS).toISOString();
-  return readApi(`world?${new URLSearchParams({ at, viewer: viewer() })}`, signal);
-}
-
-/** The same for each page of a tab, which finds its process ready. */
-function viewer() {
-  try {
-    const name = sessionStorage.getItem(KEPT) ?? crypto.randomUUID();
-    sessionStorage.setItem(KEPT, name);
-    return name;
-  } catch {
-    // A browser that keeps nothing asks a process anew.
-    return "nobody";
-  }
+  return readApi(`world?${new URLSearchParams({ at })}`, signal);
 }

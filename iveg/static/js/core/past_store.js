@@ -20,9 +20,9 @@ export class PastStore {
     return this.#shown !== null;
   }
 
-  /** Whether it is known to differ from what stood on the screen then. */
-  get isUnequal() {
-    return this.#shown?.verified === false;
+  /** Topics of the recording that this version does not know. */
+  get leftOut() {
+    return this.#shown?.left_out ?? [];
   }
 
   /** Whether the moment came twice, as the server's clock was set back. */

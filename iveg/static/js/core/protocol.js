@@ -19,9 +19,7 @@
  * @typedef {import("../types.js").Detection} Detection
  * @typedef {Aged & import("../types.js").DetectionFrame} DetectionFrame
  * @typedef {Aged & import("../types.js").Command} Command
- * @typedef {import("../types.js").Occurrence} Occurrence
  * @typedef {import("../types.js").Alert} Alert
- * @typedef {import("../types.js").Flood} Flood
  * @typedef {import("../types.js").Rule} Rule
  * @typedef {import("../types.js").LogEntry} Entry
  * @typedef {Aged & import("../types.js").Health} Health

@@ -1,11 +1,12 @@
 /**
  * The situation of a robot as this page may say it now: pure functions.
  *
- * The server finds it (`iveg/domain/situation/judge.py`); here it only grows old.  A robot that
+ * The server finds it (`iveg/domain/situation.py`); here it only grows old.  A robot that
  * this page has not heard of lately is never told as clear, whatever was true before.
  *
  * @typedef {import("../types.js").Situation} Situation
  * @typedef {Situation["level"]} Level
+ * @typedef {Situation["kind"]} Kind
  * @typedef {import("./protocol.js").Robot} Robot
  * @typedef {import("./i18n.js").I18n} I18n
  * @typedef {{said: string, why: string, todo: string}} Said
@@ -13,8 +14,9 @@
 
 import { ageOf, isSilent, linkOfRobot } from "./clock.js";
 import { LIMITS } from "./limits.js";
+import { ORDER } from "./order.js";
 
-/** Worst first, as the server ranks them. */
+/** Colours and shapes, worst first. */
 export const LEVELS = /** @type {const} */ ([
   "danger",
   "caution",
@@ -39,6 +41,7 @@ const OF_ORDERS = new Set([
 /** Of a robot of which nothing is known. @type {Situation} */
 export const UNHEARD = {
   level: "away",
+  kind: "away",
   state: "no_data",
   cause: "link",
   why: null,
@@ -56,9 +59,8 @@ export const UNHEARD = {
  */
 export function situationOf(robot, nowMs = performance.now(), connection = "open") {
   const found = grownOld(robot, nowMs);
-  if (connection !== "lost" || found.level === "danger") return found;
-  // The server's advice is of before it went, and no robot is the one to check.
-  return { ...found, action: "as_moving" };
+  // The server's advice is of before it went.
+  return connection === "lost" ? { ...found, action: "red_button" } : found;
 }
 
 /** @param {Robot | undefined} robot @param {number} nowMs @returns {Situation} */
@@ -69,24 +71,35 @@ function grownOld(robot, nowMs) {
   const age = ageOf(robot, nowMs);
   const slots = Number.isFinite(age) ? { ...situation.slots, age } : situation.slots;
   if (OF_SILENCE.has(situation.state) && link !== "LIVE") {
-    const state =
-      situation.state === "late" && isSilent(link) ? "lost" : situation.state;
-    return { ...situation, state, slots };
+    const isLostNow = situation.state === "late" && isSilent(link);
+    const kind = worse(LOST.kind, situation.kind);
+    return { ...situation, ...(isLostNow ? { ...LOST, kind } : null), slots };
   }
   if (link === "LIVE" || situation.level === "danger") return situation;
   if (link === "UNKNOWN") return { ...UNHEARD, factor: situation.factor };
   if (link === "LATE" && OF_ORDERS.has(situation.state))
     return isOldStandstill(situation, age) ? stood(situation) : situation;
+  const isLate = link === "LATE";
   return {
     ...UNHEARD,
+    ...(isLate ? LATE : LOST),
     // Silence makes nothing better.
+    kind: worse(isLate ? LATE.kind : LOST.kind, situation.kind),
     level: situation.level === "caution" ? "caution" : "doubt",
-    state: link === "LATE" ? "late" : "lost",
-    action: link === "LATE" ? "as_moving" : "check_network",
     factor: situation.factor,
     slots: { age },
   };
 }
+
+/** @type {Pick<Situation, "kind" | "state" | "action">} */
+const LATE = { kind: "unsure", state: "late", action: "as_moving" };
+/** @type {Pick<Situation, "kind" | "state" | "action">} */
+const LOST = { kind: "lost", state: "lost", action: "red_button" };
+
+const KINDS = /** @type {Kind[]} */ (Object.keys(ORDER));
+
+/** The one that is told first. @param {Kind} a @param {Kind} b */
+const worse = (a, b) => (KINDS.indexOf(a) < KINDS.indexOf(b) ? a : b);
 
 /** Whether its STOP says already that nobody knows whether it stands.
  * @param {Situation} situation @param {number} ageS */
@@ -97,6 +110,7 @@ const isOldStandstill = ({ state }, ageS) =>
 const stood = (situation) => ({
   ...situation,
   level: "doubt",
+  kind: "stop_unknown",
   state: "stood",
   action: "as_moving",
 });
@@ -128,13 +142,18 @@ export function sentenceOf(situation, i18n) {
   return todo ? `${fact} — ${todo}` : fact;
 }
 
+/** Whether nobody reads its camera. @param {Robot | undefined} robot */
+export const isBlind = (robot) =>
+  Boolean(robot?.detector?.out_by) ||
+  Boolean(robot?.detector?.required && robot.detector.missing);
+
 /** The drawings of causes, and the names that each is of. @type {[string, RegExp][]} */
 const MARKS = [
   ["person", /^person/],
   ["robot", /^robot/],
   ["obstacle", /^obstacle/],
   ["lock", /^hold$|^held_/],
-  ["camera", /^no_detector/],
+  ["camera", /^(no_detector|camera)/],
   ["link", /^(link|watchdog|stale|no_pose)/],
 ];
 
@@ -145,5 +164,5 @@ export const markOf = ({ why, cause }) =>
 /** A phrase that begins a line. @param {string} said */
 export const capitalised = (said) => said.slice(0, 1).toUpperCase() + said.slice(1);
 
-/** From bad to good, for sorting. @param {Situation} situation */
-export const rankOf = ({ level }) => LEVELS.indexOf(level);
+/** Its place in the order, the worst first. @param {Pick<Situation, "kind">} situation */
+export const rankOf = ({ kind }) => KINDS.indexOf(kind);

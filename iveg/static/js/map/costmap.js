@@ -1,6 +1,6 @@
 /**
- * Polls the shared costmap and places that are known, while the map shows them, and the
- * coverage by cameras into the store, every two seconds.
+ * Polls the shared costmap, while the map shows it, and the coverage by cameras into the
+ * store, every two seconds.
  *
  * They are large or slow to change, and no robot stops for them, so they are not sent on
  * the live line.
@@ -23,18 +23,6 @@ export function followCostmap(store, isWanted, believer = () => null) {
     const query = robot === null ? "" : `?robot=${encodeURIComponent(robot)}`;
     return { path: `costmap${query}`, isStill: () => robot === believer() };
   });
-}
-
-/**
- * @param {Store} store
- * @param {() => boolean} isWanted whether the layer is on
- * @returns {() => void} ends it
- */
-export function followKnown(store, isWanted) {
-  return follow(store, "known-here", isWanted, () => ({
-    path: "known-here",
-    isStill: () => true,
-  }));
 }
 
 /** @param {Store} store @returns {() => void} ends it */

@@ -21,9 +21,9 @@ import * as greenhouse from "./layers/greenhouse.js";
 import * as grid from "./layers/grid.js";
 import { createGround } from "./layers/ground.js";
 import * as intent from "./layers/intent.js";
-import * as known from "./layers/known.js";
 import * as links from "./layers/links.js";
 import * as measure from "./layers/measure.js";
+import * as obstacles from "./layers/obstacles.js";
 import { matchPixels } from "./layers/paint.js";
 import * as people from "./layers/people.js";
 import { createPlaces } from "./layers/places.js";
@@ -41,11 +41,11 @@ export const LAYERS = [
   "greenhouse",
   "coverage",
   "costmap",
-  "known",
   "trail",
   "scan",
   "intent",
   "encounters",
+  "obstacles",
   "links",
   "equipment",
   "detections",
@@ -55,7 +55,7 @@ export const LAYERS = [
 ];
 
 /** Of the greenhouse and what is known of it: they never move. */
-const STILL = ["grid", "greenhouse", "coverage", "costmap", "known"];
+const STILL = ["grid", "greenhouse", "coverage", "costmap"];
 /** Robots, and what hides no robot: in each picture. */
 const OVER_GROUND = LAYERS.slice(LAYERS.indexOf("robot"));
 /** Between them. */
@@ -82,11 +82,11 @@ export function createPicture(canvas, trails) {
     greenhouse: greenhouse.draw,
     coverage: coverage.draw,
     costmap: createCostmapLayer(),
-    known: known.draw,
     trail: (paint) => trail.draw(paint, trails, chosen.trailS),
     scan: createScanLayer(),
     intent: intent.draw,
     encounters: encounters.draw,
+    obstacles: obstacles.draw,
     links: links.draw,
     equipment: equipment.draw,
     detections: detections.draw,

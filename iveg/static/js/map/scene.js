@@ -17,9 +17,11 @@
  *   ageS: number, situation: import("../core/situation.js").Situation, replay: boolean,
  *   drive: string, length: number, width: number,
  *   task: string | null, goal: Point | null, path: [number, number][],
- *   unsureM: number, encounters: import("../core/protocol.js").Encounter[],
+ *   unsureM: number, isBlind: boolean, encounters: import("../core/protocol.js").Encounter[],
+ *   obstacle: import("../types.js").SeenObstacle | null,
  * }} SceneRobot `slot` names its hue; `unsureM` how far it may have driven unseen (m):
- *   since an unconfirmed STOP, or since it was heard; `encounters` of a LIVE one alone
+ *   since an unconfirmed STOP, or since it was heard; `encounters` and `obstacle` of a
+ *   LIVE one alone
  *
  * @typedef {{
  *   id: string, peer: boolean, unknown?: boolean, stage: "seen" | "remembered" | "last_seen",
@@ -42,14 +44,13 @@
  *   robots: SceneRobot[], people: ScenePerson[], detections: SceneDetection[],
  *   scans: SceneScan[], costmap: import("../core/protocol.js").Costmap | null,
  *   coverage: import("../core/protocol.js").Coverage | null,
- *   known: {items: import("../types.js").KnownSpot[]} | null,
  *   tiles: import("../core/protocol.js").Tile[],
  * }} Scene
  */
 
 import { ageOf, linkOf } from "../core/clock.js";
 import { LIMITS, ringRadius } from "../core/limits.js";
-import { situationOf } from "../core/situation.js";
+import { isBlind, situationOf } from "../core/situation.js";
 import { slotOf } from "../core/slots.js";
 
 /** The server is silent for two seconds when the line is called lost; one more. */
@@ -80,7 +81,6 @@ export const NOTHING = {
   scans: [],
   costmap: null,
   coverage: null,
-  known: null,
   tiles: [],
 };
 
@@ -102,7 +102,6 @@ export function readScene(store, nowMs) {
     scans: readScans(store, nowMs),
     costmap: store.get("costmap") ?? null,
     coverage: store.get("coverage") ?? null,
-    known: store.get("known-here") ?? null,
     tiles: readTiles(store),
   };
 }
@@ -143,6 +142,7 @@ function readRobot(robot, pose, store, nowMs) {
     ageS,
     situation: situationOf(robot, nowMs),
     replay: robot.replay,
+    isBlind: link === "LIVE" && isBlind(robot),
     drive,
     length,
     width,
@@ -151,6 +151,7 @@ function readRobot(robot, pose, store, nowMs) {
     path: robot.navigation?.path ?? NO_PATH,
     unsureM: Math.max(unsureOfStop(robot, store, nowMs), unheard(robot, ageS)),
     encounters: (link === "LIVE" ? robot.encounters : null) ?? NO_ENCOUNTERS,
+    obstacle: (link === "LIVE" ? robot.applied?.obstacle : null) ?? null,
   };
 }
 

@@ -14,7 +14,12 @@ export function start({ store, i18n }) {
     /** @type {import("../core/protocol.js").Rule | null | undefined} */
     const rule = store.get("rule");
     if (!rule) return;
-    const slots = { threshold: rule.confidence_threshold, radius: rule.radius_m };
+    const { confidence_threshold, class_thresholds, radius_m, class_radii_m } = rule;
+    const slots = {
+      threshold: class_thresholds?.person ?? confidence_threshold,
+      radius: class_radii_m?.person ?? radius_m,
+      robot_radius: class_radii_m?.robot ?? radius_m,
+    };
     sentence.dataset.slots = JSON.stringify(slots);
     translate(place, i18n.t);
   }

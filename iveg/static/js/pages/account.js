@@ -5,9 +5,7 @@
 import { readApi } from "../core/api.js";
 import { guarded } from "../core/hub.js";
 import { startFacts } from "./account_facts.js";
-import { startPasskeys } from "./account_passkeys.js";
 import { startPassword } from "./account_password.js";
-import { startPin } from "./account_pin.js";
 import { startOwnSessions } from "./sessions.js";
 
 /** @typedef {import("../core/page.js").Page} Page */
@@ -17,8 +15,6 @@ import { startOwnSessions } from "./sessions.js";
 const SECTIONS = [
   ["#account-facts", startFacts],
   ["#password-form", startPassword],
-  ["#account-pin", startPin],
-  ["#account-passkeys", startPasskeys],
   ["#sessions", startOwnSessions],
 ];
 

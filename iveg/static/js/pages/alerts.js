@@ -3,15 +3,13 @@
  */
 
 import { createAlertList, pinOf, sentenceOf } from "../panels/alert_list.js";
-import { createMembers, writeFlood } from "../panels/alert_members.js";
 import { earlierUnknown, isKnown, isUnheard } from "../panels/alerts.js";
 import { make, need, setHidden } from "../panels/dom.js";
 import { createNotes, sharedNotes } from "../panels/notes.js";
 import { createSoundPanel } from "../panels/sound.js";
-import { toldSaid } from "../panels/told.js";
 import { createTogether } from "./alerts_together.js";
 import { dayAndTime } from "./history/local_time.js";
-import { createChips, createRows, keepOpen, soon } from "./rows.js";
+import { createChips, createRows, soon } from "./rows.js";
 
 /** @typedef {import("../core/protocol.js").Alert} Alert */
 
@@ -19,15 +17,13 @@ import { createChips, createRows, keepOpen, soon } from "./rows.js";
 export function start({ store, i18n, tone }) {
   const list = createAlertList(need("#active-alerts"), i18n);
   const together = createTogether(i18n);
-  /** @type {Set<string>} alerts whose occurrences somebody reads */
-  const opened = new Set();
   const notes = createNotesOf(i18n);
   const isChosen = createChips("data-priority-chip", () => rows.draw());
   const rows = createRows({
     name: "past",
     path: "alerts",
     i18n,
-    cells: (alert) => cellsOf(alert, i18n, opened, notes),
+    cells: (alert) => cellsOf(alert, i18n, notes),
     belongs: ({ cleared_at }) => cleared_at !== null,
     admits: ({ priority }) => isChosen(priority),
   });
@@ -50,13 +46,9 @@ export function start({ store, i18n, tone }) {
   });
   store.subscribe("health", draw);
   store.subscribe("connection", draw);
-  const drawFlood = () => writeFlood(need("#flood"), store.get("flood"), i18n);
-  store.subscribe("flood", drawFlood);
   i18n.onChange(draw);
-  i18n.onChange(drawFlood);
   createSoundPanel(i18n, tone);
   draw();
-  drawFlood();
   rows.load();
 }
 
@@ -78,15 +70,15 @@ function createNotesOf(i18n) {
 }
 
 /** @param {Alert} alert @param {import("../core/i18n.js").I18n} i18n
- * @param {Set<string>} opened @param {ReturnType<typeof createNotesOf>} notes */
-function cellsOf(alert, i18n, opened, notes) {
+ * @param {ReturnType<typeof createNotesOf>} notes */
+function cellsOf(alert, i18n, notes) {
   const priority = make("td");
   priority.dataset.priority = alert.priority;
   priority.append(
     make("span", "shape"),
     make("span", "", i18n.t(`alert.priority.${alert.priority}`)),
   );
-  const what = whatOf(alert, i18n, opened);
+  const what = make("td", "what", sentenceOf(alert, i18n));
   what.append(notes(alert));
   const over = alert.cleared_at ? dayAndTime(alert.cleared_at) : "—";
   return [
@@ -103,19 +95,6 @@ function cellsOf(alert, i18n, opened, notes) {
 function timesOf({ raised_at, last_raised_at, count }, i18n) {
   const first = dayAndTime(raised_at);
   return count === 1 ? first : `${first} – ${i18n.time(last_raised_at)}`;
-}
-
-/** The text of an alert, and each of its occurrences. @param {Alert} alert
- * @param {import("../core/i18n.js").I18n} i18n @param {Set<string>} opened */
-function whatOf(alert, i18n, opened) {
-  const cell = make("td", "what", sentenceOf(alert, i18n));
-  const { element, draw } = createMembers(i18n);
-  draw(alert);
-  keepOpen(element, opened, alert.alert_id);
-  cell.append(element);
-  const told = toldSaid(alert.told, i18n);
-  if (told) cell.append(make("p", "block__note", told));
-  return cell;
 }
 
 /** Who acknowledged it, when, and with which note. @param {Alert} alert

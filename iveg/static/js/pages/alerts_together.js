@@ -1,6 +1,6 @@
 /**
- * One press that acknowledges a flood, but none of its P1s: each of those is about somebody
- * in danger, and sounds until somebody has read it (docs/dashboard.md, "Alerts").
+ * One press that acknowledges many, but no P1: each of those is about somebody in danger,
+ * and sounds until somebody has read it (docs/dashboard.md, "Alerts").
  */
 
 import { sendApi } from "../core/api.js";

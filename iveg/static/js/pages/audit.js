@@ -1,5 +1,5 @@
 /**
- * The Audit page: who did what, with the place of each row in the chain.
+ * The Audit page: who did what.
  */
 
 import { make } from "../panels/dom.js";
@@ -8,7 +8,6 @@ import { createChips, createRows } from "./rows.js";
 
 /** @typedef {import("../core/i18n.js").I18n} I18n */
 
-const LATE_MS = 60_000;
 /** @type {Record<string, string>} the group of an action; all others are settings */
 const GROUPS = {
   sign_in: "signing",
@@ -16,24 +15,16 @@ const GROUPS = {
   sign_out: "signing",
   wall: "signing",
   account_added: "signing",
+  accounts_damaged: "signing",
   account_role: "signing",
   account_reset: "signing",
   account_disabled: "signing",
-  proof: "signing",
-  pin_changed: "signing",
-  pin_removed: "signing",
-  tablet: "signing",
-  tablet_unlocked: "signing",
-  tablet_locked: "signing",
-  passkey_added: "signing",
-  passkey_removed: "signing",
   password_changed: "signing",
   session_ended: "signing",
   sessions_ended: "signing",
   token_added: "signing",
   token_revoked: "signing",
   stop: "orders",
-  drill: "orders",
   release: "orders",
   resume: "orders",
   goal: "orders",
@@ -63,29 +54,19 @@ export function start({ i18n }) {
   rows.load();
 }
 
-/**
- * Whether a row reached the database long after what it tells of.
- *
- * @param {{at: string, stored_at: string}} entry
- */
-export const isLate = ({ at, stored_at }) =>
-  Date.parse(stored_at) - Date.parse(at) > LATE_MS;
-
 /** @param {any} entry of the API @param {I18n} i18n */
 function cellsOf(entry, i18n) {
-  const { at, name, role, action, subject, details, seq } = entry;
-  const late = isLate(entry) ? ` · ${i18n.t("auditpage.late")}` : "";
+  const { at, name, role, action, subject, details } = entry;
   return [
-    make("td", "time", dayAndTime(at) + late),
+    make("td", "time", dayAndTime(at)),
     make(
       "td",
       "",
       name ? i18n.t("rows.by", { by: name }) : i18n.t("auditpage.stranger", { role }),
     ),
-    make("td", "what", i18n.t(`auditpage.action.${action}`)),
+    make("td", "what", worded(`auditpage.action.${action}`, action, i18n)),
     make("td", "", worded(`auditpage.of.${subject}`, subject || "—", i18n)),
     make("td", "what", detailsSaid(details, i18n)),
-    make("td", "number", i18n.number(seq, 0)),
   ];
 }
 
@@ -100,7 +81,7 @@ const A_MOMENT = 1e9;
  */
 export function detailsSaid(details, i18n) {
   const known = Object.entries(details).filter(
-    ([key, value]) => value !== null && !saysNothing(key, value, details),
+    ([key, value]) => value !== null && !saysNothing(key, value),
   );
   const parts = known.map(([key, value]) => {
     const name = worded(`auditpage.detail.${key}`, key, i18n);
@@ -109,14 +90,8 @@ export function detailsSaid(details, i18n) {
   return parts.join(" · ") || "—";
 }
 
-/**
- * Whether it is a status that is well, or the id of somebody who is named beside it.
- *
- * @param {string} key @param {unknown} value @param {Record<string, unknown>} details
- */
-const saysNothing = (key, value, details) =>
-  (key === "status" && Number(value) < 400) ||
-  (key === "person_id" && details.holder !== undefined);
+/** Whether it is a status that is well. @param {string} key @param {unknown} value */
+const saysNothing = (key, value) => key === "status" && Number(value) < 400;
 
 /** @param {string} key @param {unknown} value @param {I18n} i18n */
 function valueSaid(key, value, i18n) {

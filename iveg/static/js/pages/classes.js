@@ -1,18 +1,17 @@
 /**
- * Class names of detectors: the class of each, and the threshold of each class.
+ * Class names of detectors, and the class that each stands for.
  *
  * A change is a new version of the rule.  A person at the form keeps the typed values
  * when another person is faster, and is told.
  *
  * @typedef {import("../core/protocol.js").Rule} Rule
- * @typedef {"person" | "robot"} Class
+ * @typedef {import("./parameters.js").Class} Class
  */
 
 import { make, need, setHidden, setText } from "../panels/dom.js";
 import { tellAnswer } from "./guard.js";
+import { CLASSES } from "./parameters.js";
 
-/** @type {readonly Class[]} */
-const CLASSES = ["person", "robot"];
 const WRITERS = new Set(["operator", "admin"]);
 
 /**
@@ -24,7 +23,6 @@ export function createClassForm(store, i18n, guard) {
   const form = /** @type {HTMLFormElement} */ (need("#class-form"));
   const word = /** @type {HTMLInputElement} */ (need("#alias-word"));
   const meaning = /** @type {HTMLSelectElement} */ (need("#alias-class"));
-  const foresight = /** @type {HTMLInputElement} */ (need("#class-foresight"));
   /** @type {Rule | null} the version that the person at the form has seen */
   let seen = null;
   /** @type {Map<string, Class>} */
@@ -43,44 +41,22 @@ export function createClassForm(store, i18n, guard) {
   /** @param {Rule} rule */
   function fill(rule) {
     seen = rule;
-    aliases = new Map(Object.entries(writtenOf(rule).aliases));
-    for (const name of CLASSES) {
-      const share = rule.class_thresholds?.[name];
-      thresholdOf(name).value =
-        share === undefined ? "" : String(Math.round(share * 100));
-    }
-    foresight.checked = rule.foresight === true;
+    aliases = new Map(labelsOf(rule));
     draw();
   }
 
   /** Whether the form has values that are not saved. */
   function isDirty() {
-    if (!seen) return false;
-    return JSON.stringify(typed()) !== JSON.stringify(writtenOf(seen));
+    const labels = Object.fromEntries(seen ? labelsOf(seen) : aliases);
+    return JSON.stringify(typed()) !== JSON.stringify(labels);
   }
 
-  /** The values of the form, as the API takes them. */
-  function typed() {
-    const thresholds = CLASSES.flatMap((name) => {
-      const share = thresholdOf(name).valueAsNumber;
-      return Number.isNaN(share) ? [] : [[name, share / 100]];
-    });
-    return {
-      class_thresholds: Object.fromEntries(thresholds),
-      aliases: Object.fromEntries([...aliases].sort()),
-      foresight: foresight.checked,
-    };
-  }
+  const typed = () => Object.fromEntries([...aliases].sort());
 
   async function save() {
     if (!seen) return;
     if (!isDirty()) return say("rule.unchanged", { version: seen.version });
-    // Only what was edited: a threshold in force may be finer than the form shows it.
-    const before = /** @type {Record<string, unknown>} */ (writtenOf(seen));
-    const edited = Object.entries(typed()).filter(
-      ([key, value]) => JSON.stringify(value) !== JSON.stringify(before[key]),
-    );
-    const body = { ...Object.fromEntries(edited), version: seen.version };
+    const body = { aliases: typed(), version: seen.version };
     tellAnswer(await guard.put(body), { fill, renew, say });
   }
 
@@ -156,28 +132,8 @@ export function createClassForm(store, i18n, guard) {
   return { open, isDirty };
 }
 
-/** @param {Class} name */
-function thresholdOf(name) {
-  return /** @type {HTMLInputElement} */ (need(`#class-${name}`));
-}
-
-/**
- * The values of a rule in the form; a class's own name always means that class.
- *
- * @param {Rule} rule
- */
-export function writtenOf(rule) {
-  const { aliases = {}, class_thresholds = {}, foresight } = rule;
-  const given = Object.entries(aliases).filter(
-    ([name]) => !CLASSES.some((own) => own === name),
-  );
-  const shares = CLASSES.flatMap((name) => {
-    const share = class_thresholds[name];
-    return share === undefined ? [] : [[name, Math.round(share * 100) / 100]];
-  });
-  return {
-    class_thresholds: Object.fromEntries(shares),
-    aliases: /** @type {Record<string, Class>} */ (Object.fromEntries(given.sort())),
-    foresight: foresight === true,
-  };
+/** Labels of a rule; a class's own name always means that class. @param {Rule} rule */
+function labelsOf({ aliases = {} }) {
+  const labels = Object.entries(aliases).sort();
+  return labels.filter(([name]) => !CLASSES.some((own) => own === name));
 }

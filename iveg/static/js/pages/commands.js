@@ -2,8 +2,7 @@
  * The Commands page: every order with the time on each transport, to study and print.
  */
 
-import { all, make, need, needPart, setText } from "../panels/dom.js";
-import { drawDue, readLast, verdictSaid } from "../panels/drill.js";
+import { make, need, setText } from "../panels/dom.js";
 import { dayAndTime, millisecondsOf } from "./history/local_time.js";
 import { endSaid, summaryOf, tookOf, zeroOf } from "./latency.js";
 import { createChips, createRows, keepOpen, soon, transportsOfPage } from "./rows.js";
@@ -24,63 +23,14 @@ export function start({ store, i18n }) {
     admits: ({ kind }) => isChosen(kind),
     onItems: (items) => drawSummary(items, transports, i18n),
   });
-  const drills = createDrills(store, i18n);
-  function load() {
-    rows.load();
-    drills.load();
-  }
-  store.subscribe("commands/", soon(load));
+  const loadSoon = soon(() => rows.load());
+  store.subscribe("commands/", loadSoon);
   // Goals have no topic of their own; every step of one is a line of the log.
-  const loadSoon = soon(load);
   store.subscribe("log", ({ key }) => {
     if (key.startsWith("log.goal.")) loadSoon();
   });
-  store.subscribe("snapshot", soon(load));
-  store.subscribe("alerts", drills.draw);
-  i18n.onChange(drills.draw);
-  load();
-}
-
-/**
- * Each robot's last drill, for the sheet to sign.
- *
- * @param {import("../core/store.js").Store} store
- * @param {I18n} i18n
- */
-function createDrills(store, i18n) {
-  /** @typedef {Awaited<ReturnType<typeof readLast>>} Read */
-  const lines = all("[data-drills-of]");
-  /** @type {Map<HTMLElement, Read>} */
-  const read = new Map();
-
-  /** @param {HTMLElement} line */
-  function drawLine(line) {
-    const { last, status } = read.get(line) ?? { last: null, status: 0 };
-    const missing =
-      status === 200 ? i18n.t("drill.never") : i18n.t("drill.unread", { status });
-    const result = last ? verdictSaid(last, i18n) : missing;
-    setText(needPart("at", line), dayAndTime(last?.drilled_at ?? null));
-    setText(needPart("by", line), i18n.t("rows.by", { by: last?.by ?? null }));
-    setText(needPart("result", line), read.has(line) ? result : "—");
-    drawDue(needPart("due", line), String(line.dataset.drillsOf), store, i18n);
-  }
-
-  const draw = () => {
-    for (const line of lines) drawLine(line);
-  };
-
-  async function load() {
-    await Promise.all(
-      lines.map(async (line) => {
-        const found = await readLast(String(line.dataset.drillsOf));
-        // The table stays when the server is gone: the past stays true.
-        if (found.status === 200 || !read.has(line)) read.set(line, found);
-      }),
-    );
-    draw();
-  }
-
-  return { load, draw };
+  store.subscribe("snapshot", loadSoon);
+  rows.load();
 }
 
 /**
@@ -152,12 +102,12 @@ export function makeSteps(command, i18n, opened) {
 }
 
 /** @param {import("./latency.js").Order} command @param {I18n} i18n */
-export function orderSaid({ kind, drill, goal }, i18n) {
+export function orderSaid({ kind, goal }, i18n) {
   if (goal) {
     const place = i18n.t(`goal.kind.${goal.kind}`, { ...goal });
     return i18n.t("commandspage.goal", { place });
   }
-  return drill ? i18n.t("drill.heading") : i18n.t(`history.kind.${kind}`);
+  return i18n.t(`history.kind.${kind}`);
 }
 
 /**

@@ -17,7 +17,6 @@ import {
 import { readingsOf } from "../panels/readings.js";
 import { isHeard, taskSaid } from "../panels/robot_texts.js";
 import { heardOf, judgeDataPath } from "./health_sentence.js";
-import { dayAndTime } from "./history/local_time.js";
 import { createTiles } from "./tiles.js";
 
 /** @typedef {import("../core/protocol.js").Robot} Robot */
@@ -178,12 +177,6 @@ function machineCells(robot, i18n, connection) {
 function readingsSaid(robot, i18n) {
   const readings = readingsOf(robot, i18n);
   const said = readings.map(({ label, said }) => `${label}: ${said}`);
-  const { bias } = robot.detector;
-  if (bias !== null) {
-    const { off_m: off, looks, last_at } = bias;
-    const at = dayAndTime(last_at);
-    said.push(i18n.t("fleet.camera_bias", { off, looks, at }));
-  }
   return said.join(" · ");
 }
 

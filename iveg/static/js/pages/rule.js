@@ -5,9 +5,13 @@
 import { need, setHidden, setText } from "../panels/dom.js";
 import { tellAnswer } from "./guard.js";
 import { dayAndTime } from "./history/local_time.js";
-import { askYesterday } from "./yesterday.js";
+import { CLASSES, ownOf, valueFor, valuesOf } from "./parameters.js";
 
 /** @typedef {import("../core/protocol.js").Rule} Rule */
+/** @typedef {import("./parameters.js").Parameter} Parameter */
+/** @typedef {import("./parameters.js").Class} Class */
+/** @typedef {{parameter: Parameter, class_: Class | null, input: HTMLInputElement}} Field
+ *   of a value for every class (null), or of a class of its own */
 
 const WRITERS = new Set(["operator", "admin"]);
 
@@ -15,13 +19,11 @@ const WRITERS = new Set(["operator", "admin"]);
  * @param {import("../core/store.js").Store} store
  * @param {import("../core/i18n.js").I18n} i18n
  * @param {ReturnType<typeof import("./guard.js").createGuard>} guard
+ * @param {Parameter[]} parameters
  */
-export function createRuleForm(store, i18n, guard) {
+export function createRuleForm(store, i18n, guard, parameters) {
   const form = /** @type {HTMLFormElement} */ (need("#rule-form"));
-  const [threshold, radius, horizon] = /** @type {HTMLInputElement[]} */ (
-    ["threshold", "radius", "foresight"].map((name) => need(`#rule-new-${name}`))
-  );
-  const preview = /** @type {HTMLButtonElement} */ (need("#rule-preview"));
+  const fields = parameters.flatMap(fieldsOf);
   /** @type {Rule | null} the version that the person at the form has seen */
   let seen = null;
   /** @type {string | null} null while nobody knows */
@@ -38,20 +40,17 @@ export function createRuleForm(store, i18n, guard) {
 
   /** Whether the form holds a version as it is. @param {Rule} rule */
   function shows(rule) {
-    return (
-      threshold.value === percentOf(rule) &&
-      radius.value === String(rule.radius_m) &&
-      horizon.value === String(rule.foresight_s)
-    );
+    return fields.every((field) => textIn(field) === textOf(field, rule));
   }
 
   /** @param {Rule} rule */
   function fill(rule) {
     seen = rule;
-    threshold.value = percentOf(rule);
-    radius.value = String(rule.radius_m);
-    horizon.value = String(rule.foresight_s);
-    horizon.disabled = rule.foresight !== true;
+    for (const field of fields) {
+      const text = textOf(field, rule);
+      if (field.parameter.unit === "switch") field.input.checked = text === "true";
+      else field.input.value = text;
+    }
   }
 
   /** @param {string} key @param {Record<string, string | number>} [slots] */
@@ -68,18 +67,30 @@ export function createRuleForm(store, i18n, guard) {
     draw();
   }
 
-  /** What was typed; the threshold in force may be finer than the form shows it.
+  /** What was edited alone: a value in force may be finer than the form shows it.
    * @param {Rule} rule */
   function typed(rule) {
-    return {
-      ...(threshold.value !== percentOf(rule) && {
-        confidence_threshold: threshold.valueAsNumber / 100,
-      }),
-      ...(radius.value !== String(rule.radius_m) && { radius_m: radius.valueAsNumber }),
-      ...(horizon.value !== String(rule.foresight_s) && {
-        foresight_s: horizon.valueAsNumber,
-      }),
-    };
+    const edited = fields.filter((field) => textIn(field) !== textOf(field, rule));
+    return Object.fromEntries(
+      edited.map(({ parameter, class_, input }) =>
+        class_ === null
+          ? [parameter.key, numberIn(parameter, input)]
+          : [parameter.class_key, ownValues(parameter, rule)],
+      ),
+    );
+  }
+
+  /** @param {Parameter} parameter @param {Rule} rule */
+  function ownValues(parameter, rule) {
+    const own = fields.flatMap((field) => {
+      const { class_, input } = field;
+      const isOwn = field.parameter === parameter && class_ !== null && input.value;
+      if (!isOwn) return [];
+      const isKept = input.value === textOf(field, rule);
+      const kept = ownOf(parameter, rule, class_);
+      return [[class_, isKept ? kept : numberIn(parameter, input)]];
+    });
+    return Object.fromEntries(own);
   }
 
   async function save() {
@@ -90,12 +101,9 @@ export function createRuleForm(store, i18n, guard) {
     tellAnswer(answer, { fill, renew, say });
   }
 
-  /** Says what the values of the form would have cost yesterday; changes nothing. */
-  async function look() {
-    if (!seen || !form.reportValidity()) return;
-    preview.disabled = true;
-    await askYesterday(seen, typed(seen), ({ key, slots }) => say(key, slots));
-    preview.disabled = false;
+  /** The rule that the form describes. */
+  function values() {
+    return seen ? { ...valuesOf(parameters, seen), ...typed(seen) } : {};
   }
 
   function renew() {
@@ -117,14 +125,40 @@ export function createRuleForm(store, i18n, guard) {
     event.preventDefault();
     save();
   });
-  preview.addEventListener("click", look);
   store.subscribe("rule", take);
   i18n.onChange(draw);
   take(store.get("rule"));
-  return { open, isDirty: () => seen !== null && !shows(seen) };
+  return { open, values, isDirty: () => seen !== null && !shows(seen) };
 }
 
-/** @param {Rule} rule */
-function percentOf({ confidence_threshold }) {
-  return String(Math.round(confidence_threshold * 100));
+/** @param {Parameter} parameter @returns {Field[]} */
+function fieldsOf(parameter) {
+  const id = `#rule-new-${parameter.word}`;
+  const own = parameter.class_key === null ? [] : CLASSES;
+  return [
+    { parameter, class_: null, input: inputOf(id) },
+    ...own.map((class_) => ({ parameter, class_, input: inputOf(`${id}-${class_}`) })),
+  ];
+}
+
+/** @param {string} id */
+const inputOf = (id) => /** @type {HTMLInputElement} */ (need(id));
+
+/** @param {Field} field */
+function textIn({ parameter, input }) {
+  return parameter.unit === "switch" ? String(input.checked) : input.value;
+}
+
+/** A value as its field shows it. @param {Field} field @param {Rule} rule */
+function textOf({ parameter, class_ }, rule) {
+  const value =
+    class_ === null ? valueFor(parameter, rule, null) : ownOf(parameter, rule, class_);
+  if (value === undefined) return "";
+  return String(parameter.unit === "share" ? Math.round(Number(value) * 100) : value);
+}
+
+/** @param {Parameter} parameter @param {HTMLInputElement} input */
+function numberIn({ unit }, input) {
+  if (unit === "switch") return input.checked;
+  return unit === "share" ? input.valueAsNumber / 100 : input.valueAsNumber;
 }

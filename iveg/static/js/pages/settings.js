@@ -7,10 +7,11 @@ import { need, setHidden, setText } from "../panels/dom.js";
 import { createSoundPanel } from "../panels/sound.js";
 import { createClassForm } from "./classes.js";
 import { createGuard } from "./guard.js";
-import { createMessagesForm } from "./messages.js";
+import { readParameters, valueSaid } from "./parameters.js";
 import { createRuleForm } from "./rule.js";
 import { openSections } from "./sections.js";
 import { createSignInCode } from "./sign_in_code.js";
+import { startTrial } from "./trial.js";
 
 /** @typedef {import("../core/protocol.js").Rule} Rule */
 
@@ -20,23 +21,22 @@ export function start({ store, i18n, tone, wake, installing }) {
   createSoundPanel(i18n, tone);
   wireWake(wake, i18n);
   wireInstall(installing, i18n);
-  const guard = createGuard(store, i18n);
-  const forms = [
-    createRuleForm(store, i18n, guard),
-    createClassForm(store, i18n, guard),
-  ];
-  const messages = createMessagesForm(i18n);
+  const parameters = readParameters();
+  const guard = createGuard(store, i18n, parameters);
+  const rule = createRuleForm(store, i18n, guard, parameters);
+  const forms = [rule, createClassForm(store, i18n, guard)];
+  startTrial(store, i18n, rule.values, parameters);
   // Without a link there is no code of it.
   if (document.querySelector("#code-show")) createSignInCode(i18n);
   addEventListener("beforeunload", (event) => {
     // The browser asks, with its own text, before typed values are lost.
-    if ([...forms, messages].some((form) => form.isDirty())) event.preventDefault();
+    if (forms.some((form) => form.isDirty())) event.preventDefault();
   });
 
   function draw() {
     /** @type {Rule | null | undefined} */
     const rule = store.get("rule");
-    if (rule) drawRule(rule, i18n);
+    if (rule) drawRule(rule, parameters, i18n);
   }
 
   store.subscribe("rule", draw);
@@ -47,13 +47,17 @@ export function start({ store, i18n, tone, wake, installing }) {
   });
 }
 
-/** @param {Rule} rule @param {import("../core/i18n.js").I18n} i18n */
-function drawRule(rule, i18n) {
-  const share = (/** @type {number} */ value) => i18n.t("rule.percent", { value });
+/**
+ * @param {Rule} rule
+ * @param {import("./parameters.js").Parameter[]} parameters
+ * @param {import("../core/i18n.js").I18n} i18n
+ */
+function drawRule(rule, parameters, i18n) {
   setText(need("#rule-version"), String(rule.version));
-  setText(need("#rule-threshold"), share(rule.confidence_threshold));
-  setText(need("#rule-radius"), i18n.t("rule.metres", { value: rule.radius_m }));
-  setText(need("#rule-factor"), share(rule.factor));
+  for (const one of parameters) {
+    setText(need(`#rule-${one.word}`), valueSaid(one, rule, i18n));
+  }
+  setText(need("#rule-factor"), i18n.t("rule.unit.share", { value: rule.factor }));
 }
 
 /**

@@ -4,17 +4,15 @@
  */
 
 import { sendApi } from "../core/api.js";
-import { askPasskey, hasPasskeys } from "../core/passkeys.js";
 import { need, setHidden } from "../panels/dom.js";
 
-/** @typedef {"link" | "password" | "invitation" | "passkey"} Way */
+/** @typedef {"link" | "password" | "invitation"} Way */
 
 /** @type {Record<Way, string>} what a refusal means */
 const WRONG = {
   link: "#signin-wrong",
   password: "#signin-refused",
   invitation: "#signin-uninvited",
-  passkey: "#signin-keyless",
 };
 const WAIT = "#signin-wait";
 const FAILED = "#signin-failed";
@@ -64,20 +62,6 @@ function followLink() {
   else invite(String(invitation));
 }
 
-async function enterByPasskey() {
-  const { status, body } = await askPasskey("/signin/passkey");
-  if (status === 200) post({ passkey: body }, "passkey");
-  // No answer of the device, or an address in numbers: there is no passkey here.
-  else show(status === 429 ? WAIT : WRONG.passkey);
-}
-
-function offerPasskey() {
-  const button = document.querySelector("#signin-passkey");
-  if (!button) return;
-  setHidden(need("#signin-by-passkey"), !hasPasskeys());
-  button.addEventListener("click", enterByPasskey);
-}
-
 /** @param {string} invitation */
 function invite(invitation) {
   const field = fieldOf("#invited-password");
@@ -101,6 +85,5 @@ if (document.body.dataset.route === "signin") {
     const name = fieldOf("#signin-name").value;
     post({ name, password: fieldOf("#signin-password").value }, "password");
   });
-  offerPasskey();
   followLink();
 }

@@ -1,6 +1,6 @@
 /**
- * Four safety figures of the fleet: how soon robots obey, missing answers, time with a
- * negative margin, and the worst margin; each with its age and its number of values.
+ * Two figures of the fleet: how soon robots obey, and missing answers; each with its age
+ * and its number of values.
  */
 
 import { ageOf } from "../core/clock.js";
@@ -38,7 +38,7 @@ export function createTiles({ store, i18n }) {
  * @param {Safety} safety
  * @param {number} waitedS since the server wrote the ages (s)
  * @param {I18n} i18n
- * @returns {Record<"latency" | "echo" | "negative" | "worst", Tile>}
+ * @returns {Record<"latency" | "echo", Tile>}
  */
 export function tilesOf(safety, waitedS, i18n) {
   const aged = (/** @type {number | null} */ age) =>
@@ -46,8 +46,6 @@ export function tilesOf(safety, waitedS, i18n) {
   return {
     latency: latencyOf(safety.alert_latency, aged, i18n),
     echo: echoOf(safety.not_echoed, aged, i18n),
-    negative: negativeOf(safety.negative_margin, aged, i18n),
-    worst: worstOf(safety.worst_margin, aged, i18n),
   };
 }
 
@@ -73,36 +71,5 @@ function echoOf(it, aged, i18n) {
   return {
     value: i18n.t("tiles.echo_value", slots),
     of: i18n.t("tiles.echo_of", slots),
-  };
-}
-
-/** @param {Safety["negative_margin"]} it @param {(age: number | null) => number | null} aged
- * @param {I18n} i18n @returns {Tile} */
-function negativeOf(it, aged, i18n) {
-  if (it.share === null) return { value: "—", of: i18n.t("tiles.no_margins") };
-  const slots = {
-    share: it.share * 100,
-    known: it.known_s / 60,
-    unknown: it.unknown_s / 60,
-    since: it.since,
-    count: it.count,
-    age: aged(it.age_s),
-  };
-  return {
-    value: i18n.t("tiles.negative_value", slots),
-    of: i18n.t("tiles.negative_of", slots),
-  };
-}
-
-/** @param {Safety["worst_margin"]} it @param {(age: number | null) => number | null} aged
- * @param {I18n} i18n @returns {Tile} */
-function worstOf(it, aged, i18n) {
-  if (!it.margin) return { value: "—", of: i18n.t("tiles.no_margins") };
-  const { margin_m, robot_id, person_id } = it.margin;
-  const whose = { margin_m, robot: robot_id, person: person_id };
-  const when = { at: it.at, since: it.since, count: it.count, age: aged(it.age_s) };
-  return {
-    value: i18n.t("tiles.worst_value", whose),
-    of: i18n.t("tiles.worst_of", { ...whose, ...when }),
   };
 }

@@ -11,18 +11,18 @@ import { pastAddress } from "../core/moments.js";
 import { make, need, setHidden, setText } from "../panels/dom.js";
 import { dayAndTime } from "./history/local_time.js";
 import { loweringsOf } from "./lowering.js";
+import { valueSaid } from "./parameters.js";
 
 const LOOK_MS = 2000;
 const WRITERS = new Set(["operator", "admin"]);
-/** What a trial has of what the form says. */
-const TRIED = ["confidence_threshold", "radius_m", "foresight_s"];
 
 /**
  * @param {import("../core/store.js").Store} store
  * @param {import("../core/i18n.js").I18n} i18n
- * @param {() => Record<string, number>} typed
+ * @param {() => Record<string, unknown>} values of the form of the rule
+ * @param {import("./parameters.js").Parameter[]} parameters
  */
-export function startTrial(store, i18n, typed) {
+export function startTrial(store, i18n, values, parameters) {
   const may = WRITERS.has(document.body.dataset.role ?? "");
   /** @type {Trial | null} */
   let trial = null;
@@ -47,26 +47,12 @@ export function startTrial(store, i18n, typed) {
     await load();
   }
 
-  function begin() {
-    /** @type {Rule | undefined} */
-    const rule = store.get("rule");
-    const all = typed();
-    const wanted = Object.fromEntries(TRIED.map((name) => [name, all[name]]));
-    // People may have a threshold of their own, which the form shows.
-    if (rule?.class_thresholds?.person !== undefined) {
-      const { confidence_threshold: person, ...others } = wanted;
-      const class_thresholds = { ...rule.class_thresholds, person };
-      return send("POST", "rule/trial", { ...others, class_thresholds });
-    }
-    return send("POST", "rule/trial", wanted);
-  }
-
   /** Asks again where the candidate protects less, as the editor of the rule does. */
   function promote() {
     /** @type {Rule | undefined} */
     const rule = store.get("rule");
     if (!rule || !trial) return;
-    const lowerings = loweringsOf(rule, trial.rule);
+    const lowerings = loweringsOf(parameters, rule, trial.rule);
     if (!lowerings.length) return putInForce();
     const told = lowerings.map(({ key, slots }) => i18n.t(key, slots));
     setText(need("#trial-sure-says"), [...told, sums()].filter(Boolean).join(" "));
@@ -111,16 +97,15 @@ export function startTrial(store, i18n, typed) {
   function stateSaid() {
     if (trial === null) return i18n.t(may ? "trial.off" : "trial.off_viewer");
     const { rule, by, since } = trial;
-    return i18n.t("trial.on", {
-      by,
-      at: dayAndTime(since),
-      threshold: rule.class_thresholds?.person ?? rule.confidence_threshold,
-      radius: rule.radius_m,
-      seconds: rule.foresight_s,
-    });
+    const told = parameters.map(
+      (one) => `${i18n.t(`rule.part.${one.word}`)} ${valueSaid(one, rule, i18n)}`,
+    );
+    return i18n.t("trial.on", { by, at: dayAndTime(since), values: told.join("; ") });
   }
 
-  need("#trial-begin").addEventListener("click", begin);
+  need("#trial-begin").addEventListener("click", () =>
+    send("POST", "rule/trial", values()),
+  );
   need("#trial-end").addEventListener("click", () => send("DELETE", "rule/trial", {}));
   need("#trial-promote").addEventListener("click", promote);
   need("#trial-yes").addEventListener("click", putInForce);

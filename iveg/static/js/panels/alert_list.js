@@ -8,10 +8,10 @@
  */
 
 import { sendApi } from "../core/api.js";
-import { createMembers, endOf } from "./alert_members.js";
 import { make, need, setAttribute, setHidden, setText } from "./dom.js";
 import { createNotes, sharedNotes } from "./notes.js";
 import { makePastLink } from "./past_link.js";
+import { createWordAnswer } from "./word_answer.js";
 
 /** @typedef {import("../core/protocol.js").Alert} Alert */
 
@@ -32,10 +32,10 @@ const STILL_MS = 3000;
 export function createAlertList(list, i18n, send = acknowledge, stillMs = STILL_MS) {
   /** @type {Map<string, HTMLLIElement>} */
   const items = new Map();
-  /** @type {Map<string, ReturnType<typeof createMembers>>} */
-  const members = new Map();
   /** @type {Map<string, ReturnType<typeof createNotes>>} */
   const notes = new Map();
+  /** @type {Map<string, ReturnType<typeof createWordAnswer>>} */
+  const answers = new Map();
   const readNotes = sharedNotes();
   /** @type {Map<string, number>} HTTP status of acknowledgements that failed */
   const failures = new Map();
@@ -90,8 +90,8 @@ export function createAlertList(list, i18n, send = acknowledge, stillMs = STILL_
     items.get(id)?.remove();
     items.delete(id);
     drawn.delete(id);
-    members.delete(id);
     notes.delete(id);
+    answers.delete(id);
     failures.delete(id);
   }
 
@@ -108,12 +108,12 @@ export function createAlertList(list, i18n, send = acknowledge, stillMs = STILL_
     });
     const isLoud = alert.priority === "P1" && alert.acknowledged_at === null;
     need("details", item).toggleAttribute("open", isLoud && place < OPEN);
-    const past = createMembers(i18n);
-    need(".alert__more", item).prepend(past.element);
     const written = createNotes(pinOf(alert), i18n, readNotes);
     need(".alert-links", item).after(written.element);
+    const answer = createWordAnswer(i18n);
+    need(".alert__more", item).append(answer.element);
+    answers.set(alert.alert_id, answer);
     notes.set(alert.alert_id, written);
-    members.set(alert.alert_id, past);
     items.set(alert.alert_id, item);
     return item;
   }
@@ -135,8 +135,8 @@ export function createAlertList(list, i18n, send = acknowledge, stillMs = STILL_
     pack.href = `/api/v1/incident?${new URLSearchParams({ alert: alert.alert_id })}`;
     setText(pack, i18n.t("incident.get"));
     setHidden(pack, !ACKNOWLEDGERS.has(role));
-    members.get(alert.alert_id)?.draw(alert);
     notes.get(alert.alert_id)?.draw();
+    answers.get(alert.alert_id)?.draw(alert);
     const may = ACKNOWLEDGERS.has(role);
     setHidden(need("form", item), alert.acknowledged_at !== null || !may);
     const input = /** @type {HTMLInputElement} */ (need("input", item));
@@ -170,6 +170,21 @@ function factsOf(alert, i18n) {
   return [...began, ...endOf(alert, i18n)].join(" · ");
 }
 
+/**
+ * What became of an alert.
+ *
+ * @param {Alert} it
+ * @param {import("../core/i18n.js").I18n} i18n
+ */
+function endOf({ cleared_at, acknowledged_at, ...it }, i18n) {
+  const who = it.acknowledged_by;
+  return [
+    cleared_at && i18n.t("alert.cleared", { at: cleared_at }),
+    acknowledged_at && i18n.t("alert.acknowledged", { who, at: acknowledged_at }),
+    it.note,
+  ].filter(Boolean);
+}
+
 /** @param {(note: string) => void} onAcknowledge */
 function makeItem(onAcknowledge) {
   const item = make("li");
@@ -200,13 +215,18 @@ function makeItem(onAcknowledge) {
 }
 
 /**
- * The gravest first, of these the oldest: later alerts move none of those above.
+ * What holds before what is over, of these the gravest, of these the oldest: later alerts
+ * move none of those above.
  *
  * @param {Alert} a
  * @param {Alert} b
  */
 export function byUrgency(a, b) {
-  return compare(a.priority, b.priority) || compare(a.raised_at, b.raised_at);
+  return (
+    Number(a.cleared_at !== null) - Number(b.cleared_at !== null) ||
+    compare(a.priority, b.priority) ||
+    compare(a.raised_at, b.raised_at)
+  );
 }
 
 /** Digits and ASCII letters: ten times as quick as by a language's rules.

@@ -6,7 +6,6 @@
  */
 
 import { createAlertList } from "./alert_list.js";
-import { floodSaid, writeFlood } from "./alert_members.js";
 import { need, setAttribute, setHidden, setText } from "./dom.js";
 
 /** @typedef {import("../core/protocol.js").Alert} Alert */
@@ -36,12 +35,7 @@ export function createAlertsPanel({ store, i18n }, tone) {
     // A past and unseen alert may be graver than the active ones.
     const [worst] = alerts.map(({ priority }) => priority).sort();
     setAttribute(button, "data-worst", worst ?? "none");
-    /** @type {import("../core/protocol.js").Flood | null | undefined} */
-    const flood = store.get("flood");
-    const rate = floodSaid(flood, i18n);
-    const active = i18n.t("header.alerts_count", { count: open });
-    setAttribute(button, "title", rate ? `${active} · ${rate}` : active);
-    button.toggleAttribute("data-flood", Boolean(flood?.since));
+    setAttribute(button, "title", i18n.t("header.alerts_count", { count: open }));
     setHidden(need("#alerts-empty"), alerts.length > 0 || !isKnown(store));
     drawList();
   }
@@ -49,7 +43,6 @@ export function createAlertsPanel({ store, i18n }, tone) {
   /** A closed list is written when it is opened: nobody reads it before. */
   function drawList() {
     if (panel && !panel.hasAttribute("open")) return;
-    writeFlood(need("#alerts-flood"), store.get("flood"), i18n);
     list.draw(store.get("alerts") ?? []);
   }
 
@@ -69,7 +62,6 @@ export function createAlertsPanel({ store, i18n }, tone) {
     draw();
     sound();
   });
-  store.subscribe("flood", draw);
   store.subscribe("health", draw);
   store.subscribe("connection", draw);
   document.addEventListener("iveg:panel", drawList);

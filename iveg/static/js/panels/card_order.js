@@ -5,7 +5,7 @@
  * that was meant for another.
  */
 
-import { rankOf } from "../core/situation.js";
+import { LEVELS, rankOf } from "../core/situation.js";
 
 /** An order has to be wanted for so long (ms). */
 const LASTS_MS = 1000;
@@ -67,4 +67,7 @@ const listen = (name, fn) => document.addEventListener(name, fn, { capture: true
 
 /** Worst first; as bad, in the fleet's order. @param {readonly Placed[]} fleet */
 export const sorted = (fleet) =>
-  [...fleet].sort((a, b) => rankOf(a.situation) - rankOf(b.situation));
+  [...fleet].sort(
+    ({ situation: a }, { situation: b }) =>
+      rankOf(a) - rankOf(b) || LEVELS.indexOf(a.level) - LEVELS.indexOf(b.level),
+  );

@@ -64,11 +64,13 @@ export function sceneOf({ position, places, rule, ...told }, map) {
       ageS: 0,
       situation: UNHEARD,
       replay: false,
+      isBlind: false,
       task: null,
       goal: null,
       path: [],
       unsureM: 0,
       encounters: [],
+      obstacle: null,
     })),
     people: [person],
   };

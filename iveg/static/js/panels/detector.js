@@ -20,6 +20,7 @@ const OPERATORS = new Set(["operator", "admin"]);
  */
 export function createDetector({ i18n }, card, robotId) {
   const button = /** @type {HTMLButtonElement} */ (need("[data-detector]", card));
+  const reason = /** @type {HTMLInputElement} */ (needPart("detector-reason", card));
   const panel = /** @type {HTMLDialogElement} */ (needPart("panel", card));
   let isOut = false;
   let isBusy = false;
@@ -35,12 +36,18 @@ export function createDetector({ i18n }, card, robotId) {
     const isAsked = isOut || robot?.detector?.required === true;
     const may = OPERATORS.has(document.body.dataset.role ?? "");
     setHidden(button, !isAsked);
-    setDisabled(button, isBusy || !may);
+    setHidden(reason, !isAsked || isOut || !may);
+    setDisabled(button, isBusy || !may || !isAnswered());
+    reason.placeholder = i18n.t("detector.reason");
+    reason.setAttribute("aria-label", i18n.t("detector.reason"));
     const key = isOut ? "detector.put_back" : "detector.take_out";
     setText(needPart("detector-label", card), i18n.t(key, { robot: robotId }));
     setText(needPart("detector-state", card), detectorSaid(robot, i18n));
     setText(needPart("detector-result", card), refusalSaid());
   }
+
+  /** Whether the reason is told, without which no camera is taken out of service. */
+  const isAnswered = () => isOut || reason.value.trim() !== "";
 
   function refusalSaid() {
     if (!refused) return "";
@@ -49,12 +56,20 @@ export function createDetector({ i18n }, card, robotId) {
     return i18n.t(key, { status: refused });
   }
 
+  reason.addEventListener("input", () => {
+    const may = OPERATORS.has(document.body.dataset.role ?? "");
+    setDisabled(button, isBusy || !may || !isAnswered());
+  });
   button.addEventListener("click", async () => {
     isBusy = true;
     button.disabled = true;
     const path = `robots/${encodeURIComponent(robotId)}/detector`;
-    const { status } = await sendApi("PUT", path, { in_service: isOut });
+    const body = isOut
+      ? { in_service: true }
+      : { in_service: false, reason: reason.value };
+    const { status } = await sendApi("PUT", path, body);
     isBusy = false;
+    if (status === 200) reason.value = "";
     refused = status === 200 ? 0 : status;
   });
   return { draw };
@@ -71,7 +86,8 @@ export function detectorSaid(robot, i18n) {
   if (!detector) return "";
   if (detector.out_by) {
     const at = dayAndTime(detector.out_since ?? "");
-    return i18n.t("detector.state.out", { at, by: detector.out_by });
+    const { out_by: by, out_reason: why } = detector;
+    return i18n.t("detector.state.out", { at, by, reason: why ?? "" });
   }
   if (!detector.required) return i18n.t("detector.state.none");
   return i18n.t(`detector.state.${detector.missing ? "missing" : "works"}`);

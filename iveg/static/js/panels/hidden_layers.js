@@ -5,7 +5,7 @@
 import { need, setHidden, setText } from "./dom.js";
 
 /** Layers that show nothing of robots or people. */
-const PLAIN = new Set(["costmap", "grid", "scalebar", "coverage", "known"]);
+const PLAIN = new Set(["costmap", "grid", "scalebar", "coverage"]);
 
 /**
  * @param {readonly {name: string, on: boolean}[]} layers

@@ -7,14 +7,12 @@
 
 import { installPaintHook } from "../core/painthook.js";
 import { takeAsked } from "../core/showing.js";
-import { followCostmap, followCoverage, followKnown } from "../map/costmap.js";
+import { followCostmap, followCoverage } from "../map/costmap.js";
 import { hears } from "../map/layers/belief.js";
 import { createMap } from "../map/map.js";
 import { all, need, setAttribute, setHidden, setText } from "./dom.js";
 import { createGoalMap } from "./goal_map.js";
 import { drawHidden } from "./hidden_layers.js";
-import { createKnownSaid } from "./known_said.js";
-import { createLegend } from "./legend.js";
 import { createMapFacts } from "./map_facts.js";
 import { drawLayers } from "./map_layers.js";
 import { onThemeChange } from "./theme.js";
@@ -72,9 +70,8 @@ export function createMapbox(app, decision) {
 
   /** @param {{kind: string, id: string}} picked */
   function onPick({ kind, id }) {
-    sayKnown(kind === "known" ? id : null);
     if (kind === "robot") return goToCard(id);
-    const decisionId = kind === "known" ? null : decisionAbout(id);
+    const decisionId = decisionAbout(id);
     if (decisionId) decision.open(decisionId, canvas);
   }
 
@@ -91,7 +88,6 @@ export function createMapbox(app, decision) {
     return told.findLast(({ decision_id }) => decision_id)?.decision_id ?? null;
   }
 
-  const sayKnown = createKnownSaid(app);
   const drawFacts = createMapFacts(app, map);
   const showHidden = () => drawHidden(map.layers(), i18n);
 
@@ -124,7 +120,6 @@ export function createMapbox(app, decision) {
   });
   map.onPick(onPick);
   if (!document.body.hasAttribute("data-past")) followPresent(map, store);
-  createLegend(app);
   onThemeChange(() => map.setTheme());
   store.subscribe("robots/", showBeliever);
   store.subscribe("snapshot", drawTexts);
@@ -135,13 +130,12 @@ export function createMapbox(app, decision) {
   for (const tool of all(".map-tools [disabled]")) tool.removeAttribute("disabled");
 }
 
-/** What only the present has: costmap, coverage and what is known to stand where.
+/** What only the present has: costmap and coverage.
  * @param {LiveMap} map @param {App["store"]} store */
 function followPresent(map, store) {
   const isOn = (/** @type {string} */ layer) => () =>
     map.layers().some(({ name, on }) => name === layer && on);
   followCostmap(store, isOn("costmap"), map.believer);
-  followKnown(store, isOn("known"));
   followCoverage(store);
 }
 

@@ -5,7 +5,7 @@
  * @typedef {import("./plot.js").Sample} Sample
  * @typedef {import("./plot.js").Span} Span
  * @typedef {{at: string, x: number, y: number, linear: number,
- *   limit_factor: number, margin_m: number | null, late?: boolean}} Pose a row of `/odometry`
+ *   limit_factor: number, margin_m: number | null}} Pose a row of `/odometry`
  * @typedef {{at: string, x: number | null, y: number | null}} Sighting one of `/tracks`
  * @typedef {{span: Span, poses: Pose[], sightings: Sighting[],
  *   fastest: number | null}} Past rows oldest first; `fastest` in m/s
@@ -113,25 +113,6 @@ export function ringsOf({ sightings, span }, radiusM) {
     rings.push({ at, value: ringRadius(radiusM, (at - seen[next]) / 1000) });
   }
   return rings;
-}
-
-/**
- * The times whose poses the robot sent after a gap.
- *
- * @param {Past} past
- * @returns {Span[]}
- */
-export function lateSpansOf({ poses }) {
-  /** @type {Span[]} */
-  const spans = [];
-  for (const { at, late } of poses) {
-    if (!late) continue;
-    const moment = Date.parse(at);
-    const last = spans.at(-1);
-    if (last && moment - last.until <= POSE_GAP_MS) last.until = moment;
-    else spans.push({ since: moment, until: moment });
-  }
-  return spans;
 }
 
 /** @param {Pose[]} poses @param {number} moment */

@@ -21,7 +21,6 @@ export function createPeoplePanel({ store, i18n }) {
   function draw() {
     if (!(/** @type {HTMLDialogElement} */ (need("#people-panel")).open)) return;
     const people = store.people();
-    things.drawSlowed([...store.robots().values()]);
     things.keep(people);
     fill(list, people, things.makeItem, (item, person) => {
       const [who, where, ...rest] = linesOf(person, i18n);

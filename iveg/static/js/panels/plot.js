@@ -10,9 +10,8 @@
  * @typedef {{kind: string, name: string, samples: Sample[], isStep?: boolean,
  *   gapMs?: number}} Line
  * @typedef {{title: string, says: string, span: Span, lines: Line[],
- *   shade?: Shade | null, late?: Shade[]}} Plot
- * @typedef {{since: number, until: number, name: string}} Shade a time that matters;
- *   `late`: whose samples came afterwards
+ *   shade?: Shade | null}} Plot
+ * @typedef {{since: number, until: number, name: string}} Shade a time that matters
  */
 
 import { make, makeSvg } from "./dom.js";
@@ -29,7 +28,7 @@ const STEPS = [0.5, 1, 2, 3, 4, 5, 6, 8, 10, 15, 20, 30, 50, 100];
  * @param {import("../core/i18n.js").I18n} i18n
  * @returns {HTMLElement | null} null where no line has a value
  */
-export function makePlot({ title, says, span, lines, shade, late = [] }, i18n) {
+export function makePlot({ title, says, span, lines, shade }, i18n) {
   const drawn = lines.filter(hasValue);
   const range = rangeOf(drawn);
   if (range === null) return null;
@@ -37,7 +36,6 @@ export function makePlot({ title, says, span, lines, shade, late = [] }, i18n) {
   const caption = make("figcaption", "plot__title");
   caption.append(make("b", "", title), ...drawn.map(makeKey));
   if (shade) caption.append(makeKey({ kind: "shade", name: shade.name }));
-  if (late.length) caption.append(makeKey({ kind: "late", name: late[0].name }));
   const area = makeSvg("svg", {
     class: "plot__area",
     viewBox: `0 0 ${WIDTH} ${HEIGHT}`,
@@ -47,7 +45,6 @@ export function makePlot({ title, says, span, lines, shade, late = [] }, i18n) {
   });
   const zero = (HEIGHT * range.top) / (range.top - range.bottom);
   if (shade) area.append(drawShade(shade, span));
-  area.append(...late.map((one) => drawShade(one, span, "plot__late")));
   area.append(makeSvg("path", { class: "plot__zero", d: `M0 ${zero}H${WIDTH}` }));
   for (const line of drawn) area.append(drawLine(line, span, range));
   const heights = make("div", "plot__y");
@@ -122,11 +119,11 @@ function drawLine(line, span, { top, bottom }) {
   return makeSvg("path", { class: "plot__line", "data-kind": line.kind, d });
 }
 
-/** @param {Shade} shade @param {Span} span @param {string} [look] */
-function drawShade({ since, until }, span, look = "plot__shade") {
+/** @param {Shade} shade @param {Span} span */
+function drawShade({ since, until }, span) {
   const x = Math.max(0, placeOf(since, span));
   const width = Math.min(WIDTH, placeOf(until, span)) - x;
-  return makeSvg("rect", { class: look, x, y: 0, width, height: HEIGHT });
+  return makeSvg("rect", { class: "plot__shade", x, y: 0, width, height: HEIGHT });
 }
 
 /** @param {{kind: string, name: string}} line */

@@ -7,14 +7,7 @@
  */
 
 import { make } from "./dom.js";
-import {
-  distancesOf,
-  lateSpansOf,
-  limitsOf,
-  marginsOf,
-  ringsOf,
-  speedsOf,
-} from "./past.js";
+import { distancesOf, limitsOf, marginsOf, ringsOf, speedsOf } from "./past.js";
 import { makePlot } from "./plot.js";
 
 /** Nobody is between two looks for longer. */
@@ -39,7 +32,6 @@ export function makePlots(past, { shade, radiusM, speedSaid }, i18n) {
           { ...lineOf("limit", limitsOf(past), i18n), isStep: true },
         ],
         shade,
-        late: lateOf(past, i18n),
       },
       i18n,
     ),
@@ -49,8 +41,6 @@ export function makePlots(past, { shade, radiusM, speedSaid }, i18n) {
   if (!plots.length) return null;
   const section = make("section", "plots");
   section.append(...plots);
-  const late = past.poses.filter((pose) => pose.late).length;
-  if (late) section.append(make("small", "", i18n.t("plot.late", { count: late })));
   return section;
 }
 
@@ -71,7 +61,6 @@ function makeDistance(past, radiusM, shade, i18n) {
       span: past.span,
       lines: [away, lineOf("ring", ringsOf(past, radiusM), i18n)],
       shade,
-      late: lateOf(past, i18n),
     },
     i18n,
   );
@@ -90,15 +79,10 @@ function makeMargin(past, shade, i18n) {
       span: past.span,
       lines: [{ ...lineOf("margin", margins, i18n), gapMs: UNSEEN_MS }],
       shade,
-      late: lateOf(past, i18n),
     },
     i18n,
   );
 }
-
-/** @param {Past} past @param {I18n} i18n */
-const lateOf = (past, i18n) =>
-  lateSpansOf(past).map((one) => ({ ...one, name: i18n.t("plot.key.late") }));
 
 /** @param {string} kind @param {import("./plot.js").Sample[]} samples @param {I18n} i18n */
 const lineOf = (kind, samples, i18n) => ({

@@ -19,7 +19,6 @@ import {
   setDisabled,
   setText,
 } from "./dom.js";
-import { askProof, asksForProof } from "./proof.js";
 
 /** @typedef {import("../main.js").App} App */
 /** @typedef {import("../core/protocol.js").Robot} Robot */
@@ -116,9 +115,9 @@ export function createRelease(app, card, robotId) {
 
   /** @param {Robot | undefined} robot */
   function drawFacts(robot) {
-    const profile = robot?.profile;
     const facts = [
-      profile && i18n.t("robot.profile", profile),
+      robot?.profile && i18n.t("robot.profile", robot.profile),
+      robot && !robot.applied && i18n.t("robot.no_laser_witness"),
       robot?.transport && i18n.t(`robot.transport.${robot.transport}`),
       robot?.cmd_status && i18n.t("robot.agent", { status: robot.cmd_status }),
       robot?.clock_offset_s && i18n.t("robot.offset", { offset: robot.clock_offset_s }),
@@ -158,10 +157,6 @@ export function createRelease(app, card, robotId) {
     const answer = await sendApi("POST", path, body);
     ({ status } = answer);
     isBusy = false;
-    if (asksForProof(answer)) {
-      askProof(app, releaseButton, () => say("proof.given"));
-      return say("proof.needed");
-    }
     const isTaken = status === 202 || status === 200;
     const known = `release.failed.${status}`;
     return say(isTaken ? "release.sent" : i18n.has(known) ? known : OTHER);

@@ -5,12 +5,16 @@
  */
 
 import { aboutAge, ageOf, linkOfRobot } from "../core/clock.js";
-import { capitalised, markOf, phrasesOf, situationOf } from "../core/situation.js";
+import {
+  capitalised,
+  isBlind,
+  markOf,
+  phrasesOf,
+  situationOf,
+} from "../core/situation.js";
 import { slotOf } from "../core/slots.js";
-import { createAccess } from "./access.js";
 import { createDetector } from "./detector.js";
 import { all, setAttribute, setHidden, setText } from "./dom.js";
-import { createDrill } from "./drill.js";
 import { createGauge } from "./gauge.js";
 import { createGoal } from "./goal.js";
 import { drawReadings } from "./readings.js";
@@ -39,8 +43,6 @@ export class RobotCard {
   #ages;
   #gauge = createGauge();
   #release;
-  #drill;
-  #access;
   #detector;
   #goal;
 
@@ -54,8 +56,6 @@ export class RobotCard {
     this.#ages = all("[data-age]", card);
     app.stops.putOn(this.#parts.stop, this.#robotId);
     this.#release = createRelease(app, card, this.#robotId);
-    this.#drill = createDrill(app, card, this.#robotId);
-    this.#access = createAccess(app, card, this.#robotId);
     this.#detector = createDetector(app, card, this.#robotId);
     this.#goal = createGoal(app, card, this.#robotId);
     this.#parts.gauge.append(this.#gauge.svg, this.#gauge.bar);
@@ -73,10 +73,8 @@ export class RobotCard {
     this.#drawAge(robot, isSmall);
     this.#gauge.draw(gaugeSaid(robot, this.#robotId, i18n));
     if (!isSmall) this.#drawDetails(robot);
-    if (dialogs.isOpen(this.#panel)) this.#drawMarginParts(robot);
+    if (dialogs.isOpen(this.#panel)) this.#drawMargin(robot);
     this.#release.draw(robot);
-    this.#drill.draw(this.#release.factsOf(robot));
-    this.#access.draw(robot);
     this.#detector.draw(robot);
     this.#goal.draw(this.#release.factsOf(robot));
   }
@@ -113,7 +111,7 @@ export class RobotCard {
   /** @param {Robot | undefined} robot */
   #drawHead(robot) {
     const { i18n } = this.#app;
-    const { menu, shape, replay } = this.#parts;
+    const { menu, shape, replay, refused } = this.#parts;
     const link = linkOfRobot(robot);
     setAttribute(this.#card, "data-link", link);
     setAttribute(this.#card, "data-mode", robot?.mode ?? "UNKNOWN");
@@ -123,6 +121,7 @@ export class RobotCard {
     setAttribute(shape, "data-slot", String(slotOf(this.#robotId)));
     setAttribute(shape, "data-drive", robot?.profile?.drive ?? "differential");
     setHidden(replay, !robot?.replay);
+    setHidden(refused, !robot?.refused);
   }
 
   /** @param {Robot | undefined} robot */
@@ -138,11 +137,33 @@ export class RobotCard {
     if (mark) setAttribute(causes, "data-cause", mark);
     else causes.removeAttribute("data-cause");
     setText(why, phrases.why);
+    this.#drawMarks(robot, situation.kind);
     // Nothing is to be done about a moment that is past.
     const said = document.body.hasAttribute("data-past") ? "" : phrases.todo;
     setText(todo, said);
     this.#card.toggleAttribute("data-todo", said !== "");
     setText(faults, robot ? faultsSaid(robot, i18n).join(" · ") : "");
+  }
+
+  /**
+   * What holds beside what is told first.
+   *
+   * @param {Robot | undefined} robot
+   * @param {import("../core/situation.js").Kind} kind of what is told
+   */
+  #drawMarks(robot, kind) {
+    const { store, i18n } = this.#app;
+    const { "no-camera": camera, "battery-low": battery } = this.#parts;
+    const { "battery-said": said } = this.#parts;
+    setHidden(camera, kind === "blind" || !isBlind(robot));
+    /** @type {import("../core/protocol.js").Alert[]} */
+    const alerts = store.get("alerts") ?? [];
+    const low = alerts.find(
+      ({ key, robot_id, cleared_at }) =>
+        key === "alert.battery_low" && robot_id === this.#robotId && !cleared_at,
+    );
+    setHidden(battery, kind === "battery" || !low);
+    if (low) setText(said, i18n.t("situation.is.battery_low", low.slots));
   }
 
   /** @param {Robot | undefined} robot @param {boolean} isSmall */
@@ -160,21 +181,19 @@ export class RobotCard {
   /** Everything that a small card has no room for. @param {Robot | undefined} robot */
   #drawDetails(robot) {
     const { store, i18n } = this.#app;
-    const { certainty, margin, task, readings } = this.#parts;
+    const { certainty, task, readings } = this.#parts;
     for (const [field, said] of readoutsSaid(robot, i18n))
       setText(this.#fields[field], said);
     setText(certainty, certaintySaid(store.detections().get(this.#robotId), i18n));
-    setText(margin, marginSaid(robot, i18n));
     setText(task, taskSaid(robot?.navigation?.task, i18n));
     drawReadings(readings, robot, i18n);
   }
 
   /** @param {Robot | undefined} robot */
-  #drawMarginParts(robot) {
-    const place = this.#parts["margin-parts"];
-    const said = marginPartsSaid(robot, this.#app.i18n);
-    setHidden(place, !said);
-    setText(place, said);
+  #drawMargin(robot) {
+    const { i18n } = this.#app;
+    setText(this.#parts.margin, marginSaid(robot, i18n));
+    setText(this.#parts["margin-parts"], marginPartsSaid(robot, i18n));
   }
 }
 

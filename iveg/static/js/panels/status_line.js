@@ -9,11 +9,12 @@
 import { onBeat } from "../core/beat.js";
 import { fleetSaid } from "../core/fleet_said.js";
 import { addressOf } from "../core/showing.js";
-import { LEVELS } from "../core/situation.js";
+import { rankOf } from "../core/situation.js";
 import { need, setAttribute, setText } from "./dom.js";
 
 /** @typedef {import("../core/situation.js").Level} Level */
-/** @typedef {{level: Level, said: string, about: string, robotId: string | null}} Told
+/** @typedef {{level: Level, rank: number, said: string, about: string,
+ *   robotId: string | null}} Told `rank`: its place in the order of situations;
  *   `about`: the same while only its numbers change */
 /** @typedef {import("../core/store.js").ConnectionState} ConnectionState */
 
@@ -27,6 +28,8 @@ const LONG = 64;
 const VERY_LONG = 86;
 /** Smaller than this nobody reads a sentence of danger: the line grows instead (px). */
 const LEAST_PX = 13;
+/** From here on nothing calls for anybody. */
+const LOCKED = rankOf({ kind: "locked" });
 /** What lasts less than this is not told (ms). */
 export const LASTS_MS = 1000;
 
@@ -45,7 +48,7 @@ export function createStatusLine({ store, i18n }) {
     if (state === "lost") wasLost = true;
     const shown = state === "connecting" && wasLost ? "lost" : state;
     const fleet = ofFleet(store, i18n, nowMs);
-    const isBack = nowMs - backAtMs < BACK_SHOWN_MS && isQuiet(fleet);
+    const isBack = nowMs - backAtMs < BACK_SHOWN_MS && fleet.rank >= LOCKED;
     const line = ofConnection(shown, nowMs - since, isBack, i18n);
     write(calm.take(line ?? fleet, nowMs));
     setAttribute(document.body, "data-connection", state);
@@ -166,6 +169,8 @@ export function ofConnection(state, forMs, isBack, i18n) {
  */
 const told = (level, key, i18n, slots) => ({
   level,
+  // What the line to the server is like comes before every robot, or says nothing bad.
+  rank: level === "away" ? Number.POSITIVE_INFINITY : -1,
   said: i18n.t(key, slots),
   about: key,
   robotId: null,
@@ -178,13 +183,15 @@ const told = (level, key, i18n, slots) => ({
  * @returns {Told}
  */
 function ofFleet(store, i18n, nowMs) {
-  const { level, said, robotId } = fleetSaid(store.robots().values(), i18n, nowMs);
+  const fleet = fleetSaid(store.robots().values(), i18n, nowMs);
+  const { kind, robotId } = fleet;
   const { state, why } = store.robots().get(robotId ?? "")?.situation ?? {};
-  return { level, said, about: [level, robotId, state, why].join(" "), robotId };
+  const about = [kind, robotId, state, why].join(" ");
+  return { ...fleet, rank: rankOf(fleet), about };
 }
 
 /**
- * Joins what flaps: a better level shows, and anything is read aloud, once it has lasted.
+ * Joins what flaps: what is better shows, and anything is read aloud, once it has lasted.
  */
 export function createCalm() {
   /** @type {Told | null} */
@@ -199,7 +206,7 @@ export function createCalm() {
    * @returns {{shown: Told, aloud: Told | null}} `aloud`: to be read out now
    */
   function take(told, nowMs) {
-    const isBetter = shown !== null && rank(told) > rank(shown);
+    const isBetter = shown !== null && told.rank > shown.rank;
     betterSinceMs = isBetter
       ? Math.min(betterSinceMs, nowMs)
       : Number.POSITIVE_INFINITY;
@@ -215,9 +222,3 @@ export function createCalm() {
 
   return { take };
 }
-
-/** @param {Told} told */
-const isQuiet = ({ level }) => rank({ level }) >= LEVELS.indexOf("locked");
-
-/** @param {Pick<Told, "level">} told */
-const rank = ({ level }) => LEVELS.indexOf(level);

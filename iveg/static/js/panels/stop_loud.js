@@ -1,10 +1,11 @@
 /**
  * The full-width lines for a STOP that must not be overlooked, one for each robot.
  *
- * Each says who pressed and when, the number of tries, the age of the robot's last report
- * and how far it may have driven since.
+ * Each says what to do and where the robot is before who pressed, how often it was sent, and
+ * how far the robot may have driven since.
  */
 
+import { ageOf } from "../core/clock.js";
 import { fill, make, need, setText } from "./dom.js";
 import { doubtOf, since, stateOfCommand } from "./stop_view.js";
 
@@ -13,7 +14,7 @@ import { doubtOf, since, stateOfCommand } from "./stop_view.js";
 const LOUD = new Set(["unconfirmed", "still_moving", "moved"]);
 
 /** @param {import("../main.js").App} app */
-export function createLoudLines({ i18n, line }) {
+export function createLoudLines({ store, i18n, line }) {
   /**
    * @param {(Command | undefined)[]} commands the newest STOP of each robot
    * @param {import("./press.js").Pending[]} kept presses that wait for the link
@@ -33,7 +34,17 @@ export function createLoudLines({ i18n, line }) {
   function keptSaid({ robotId, atMs }) {
     const robot = robotId ?? i18n.t("stop.fleet_name");
     const seconds = (performance.now() - atMs) / 1000;
-    return i18n.t("stop.p1.kept", { robot, seconds });
+    const place = robotId === null ? " " : placeSaid(robotId);
+    return i18n.t("stop.p1.kept", { robot, seconds, place });
+  }
+
+  /** Where it was heard last. @param {string} robotId */
+  function placeSaid(robotId) {
+    const robot = store.robots().get(robotId);
+    const age = ageOf(robot);
+    if (!robot?.pose || !Number.isFinite(age)) return i18n.t("stop.p1.nowhere");
+    const slots = { ...robot.pose, lane: robot.lane, age };
+    return i18n.t(robot.lane === null ? "stop.p1.at" : "stop.p1.in", slots);
   }
 
   /** @param {Command} command */
@@ -43,6 +54,7 @@ export function createLoudLines({ i18n, line }) {
     const state = String(stateOfCommand(command));
     return i18n.t(`stop.p1.${state}`, {
       robot: command.robot_id,
+      place: placeSaid(command.robot_id),
       seconds: since(times.pressed ?? times.requested, line.serverNow()),
       who: command.requesters.join(", "),
       tries: command.tries,

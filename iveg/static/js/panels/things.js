@@ -1,8 +1,7 @@
 /**
- * "Not a person here" and "Known here": an operator marks a thing that cameras take for a
- * person, or that a robot's laser sees and no plan draws, and takes marks back, in the
- * list of people.  A mark lowers protection, so it is asked twice; the second press counts
- * only for what the first one was for.
+ * "Not a person here": an operator marks a thing that cameras take for a person, and takes
+ * marks back, in the list of people.  A mark lowers protection, so it is asked twice; the
+ * second press counts only for what the first one was for.
  */
 
 import { readApi, sendApi } from "../core/api.js";
@@ -11,41 +10,16 @@ import { fill, make, need, setHidden, setText } from "./dom.js";
 
 /**
  * @typedef {import("../core/protocol.js").Person} Person
- * @typedef {import("../core/protocol.js").Robot} Robot
  * @typedef {import("../types.js").Thing} Thing
  */
 
-/** What is said of a mark, by its kind. */
-const WORDS = {
-  person: {
-    mark: "things.mark",
-    sure: "things.sure",
-    asked: "things.asked",
-    marked: "things.marked",
-    one: "things.one",
-  },
-  obstacle: {
-    mark: "things.known_mark",
-    sure: "things.known_sure",
-    asked: "things.known_asked",
-    marked: "things.known_marked",
-    one: "things.known_one",
-  },
-};
 const MARKERS = new Set(["operator", "admin"]);
 const mayMark = () => MARKERS.has(document.body.dataset.role ?? "");
 /** So long a first press waits for its second. */
 const ASKED_MS = 8000;
-/** So long after a robot was slow for it something may be marked; the server's, too. */
-const SHOWN_MS = 10000;
-
-/** @typedef {{person_id: string} | {robot_id: string}} What of which person, or robot */
-
 /** @param {import("../core/i18n.js").I18n} i18n */
 export function createThings(i18n) {
   const list = need("#things-list");
-  /** When each robot was slow for its laser. @type {Map<string, number>} */
-  const slowedMs = new Map();
   /** @type {Thing[]} */
   let things = [];
   /** @type {{id: string, untilMs: number} | null} */
@@ -56,9 +30,7 @@ export function createThings(i18n) {
 
   function makeItem() {
     const item = make("li");
-    const button = makeButton((id) =>
-      press(button, id, { person_id: id }, WORDS.person),
-    );
+    const button = makeButton((id) => press(button, id));
     item.append(make("b"), make("small"), make("p"), button);
     return item;
   }
@@ -71,21 +43,16 @@ export function createThings(i18n) {
     return button;
   }
 
-  /**
-   * @param {HTMLButtonElement} button
-   * @param {string} id of what it marks
-   * @param {What} what
-   * @param {typeof WORDS.person} words
-   */
-  async function press(button, id, what, words) {
+  /** @param {HTMLButtonElement} button @param {string} id of whom it marks */
+  async function press(button, id) {
     if (!isAsked(id)) {
       asked = { id, untilMs: performance.now() + ASKED_MS };
-      setText(button, i18n.t(words.sure));
-      return say(words.asked);
+      setText(button, i18n.t("things.sure"));
+      return say("things.asked");
     }
     asked = null;
-    const { status, body } = await sendApi("POST", "things", what);
-    tell(status, body, words.marked);
+    const { status, body } = await sendApi("POST", "things", { person_id: id });
+    tell(status, body, "things.marked");
     return renew();
   }
 
@@ -108,8 +75,7 @@ export function createThings(i18n) {
 
   /** Forgets a first press whose person is gone. @param {Person[]} people */
   function keep(people) {
-    const ids = [...people.map(({ person_id }) => person_id), ...slowedMs.keys()];
-    if (asked && !ids.includes(asked.id)) asked = null;
+    if (!people.some(({ person_id }) => person_id === asked?.id)) asked = null;
   }
 
   /** The button of a person's item. @param {Element} item @param {Person} person */
@@ -118,46 +84,7 @@ export function createThings(i18n) {
     const { person_id, thing_id } = person;
     setHidden(button, !mayMark() || person.class !== "person" || thing_id !== null);
     button.dataset.of = person_id;
-    setText(button, i18n.t(isAsked(person_id) ? WORDS.person.sure : WORDS.person.mark));
-  }
-
-  /** What robots are slow for by their lasers. @param {Robot[]} robots */
-  function drawSlowed(robots) {
-    const nowMs = performance.now();
-    for (const { robot_id, speed_limit } of robots) {
-      if (speed_limit.reason === "obstacle") slowedMs.set(robot_id, nowMs);
-    }
-    for (const [robot, atMs] of slowedMs) {
-      if (nowMs - atMs > SHOWN_MS) slowedMs.delete(robot);
-    }
-    fill(
-      need("#slowed-list"),
-      mayMark() ? [...slowedMs.keys()] : [],
-      makeSlowed,
-      writeSlowed,
-    );
-  }
-
-  function makeSlowed() {
-    const button = makeButton((id) =>
-      press(button, id, { robot_id: id }, WORDS.obstacle),
-    );
-    return makeLine(button);
-  }
-
-  /** A sentence with a button. @param {HTMLElement} button */
-  function makeLine(button) {
-    const item = make("li");
-    item.append(make("p"), button);
-    return item;
-  }
-
-  /** @param {Element} item @param {string} robot */
-  function writeSlowed(item, robot) {
-    const button = /** @type {HTMLButtonElement} */ (need("button", item));
-    button.dataset.of = robot;
-    setText(need("p", item), i18n.t("things.known_beside", { robot }));
-    setText(button, i18n.t(isAsked(robot) ? WORDS.obstacle.sure : WORDS.obstacle.mark));
+    setText(button, i18n.t(isAsked(person_id) ? "things.sure" : "things.mark"));
   }
 
   async function renew() {
@@ -170,7 +97,7 @@ export function createThings(i18n) {
     setHidden(need("#things-title"), things.length === 0);
     fill(list, things, makeMark, (item, thing) => {
       const slots = { ...thing, until: dayAndTime(thing.until) };
-      setText(need("p", item), i18n.t(WORDS[thing.kind].one, slots));
+      setText(need("p", item), i18n.t("things.one", slots));
       const button = /** @type {HTMLButtonElement} */ (need("button", item));
       button.dataset.of = thing.thing_id;
       setText(button, i18n.t("things.unmark"));
@@ -178,8 +105,12 @@ export function createThings(i18n) {
     });
   }
 
-  const makeMark = () => makeLine(makeButton(takeBack));
+  function makeMark() {
+    const item = make("li");
+    item.append(make("p"), makeButton(takeBack));
+    return item;
+  }
 
   i18n.onChange(draw);
-  return { makeItem, write, keep, drawSlowed, renew };
+  return { makeItem, write, keep, renew };
 }

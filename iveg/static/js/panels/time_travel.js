@@ -117,7 +117,8 @@ export function createTimeTravel(app, askedS) {
     const waited = wait && i18n.t("past.waited", { seconds: (waitedMs ?? 0) / 1000 });
     const trust = [
       world.isTwice && i18n.t("past.twice"),
-      world.isUnequal && i18n.t("past.unequal"),
+      world.leftOut.length > 0 &&
+        i18n.t("past.left_out", { topics: world.leftOut.join(", ") }),
     ].filter(Boolean);
     setText(need("[data-part=waited]", bar), waited);
     setText(

@@ -2,12 +2,7 @@
 
 from dataclasses import replace
 
-from iveg.domain.alerts.alert_book import (
-    GROUPING_S,
-    MEMBERS_KEPT,
-    MOST_KEPT,
-    AlertBook,
-)
+from iveg.domain.alerts import GROUPING_S, MOST_KEPT, AlertBook
 from iveg.domain.events import Condition
 from tests.builders import at
 
@@ -24,15 +19,6 @@ def test_what_is_wrong_is_raised_once() -> None:
     assert [one.condition for one in first] == [LOST, SLOWED]
     assert again == []
     assert len(book.waiting) == 2
-
-
-def test_two_of_a_kind_are_told_apart_by_their_subject() -> None:
-    book = AlertBook()
-    other = Condition("P1", LOST.key, "AGII", "AGII")
-
-    raised = book.sync([LOST, other], at(0), "a")
-
-    assert len({one.alert_id for one in raised}) == 2
 
 
 def test_what_is_no_longer_wrong_clears() -> None:
@@ -134,10 +120,6 @@ def test_a_new_occurrence_needs_a_new_acknowledgement() -> None:
     assert again.unseen == "P1"
 
 
-def test_an_alert_that_nobody_knows_cannot_be_acknowledged() -> None:
-    assert AlertBook().acknowledge("none", "ana", "", at(0)) is None
-
-
 def test_what_changes_about_a_condition_is_shown_without_raising_it_again() -> None:
     book = AlertBook()
     book.sync([SLOWED], at(0), "a")
@@ -145,57 +127,6 @@ def test_what_changes_about_a_condition_is_shown_without_raising_it_again() -> N
 
     assert book.sync([nearer], at(1), "b") == []
     assert book.waiting[0].condition.slots == {"distance": 0.9}
-
-
-def test_an_alert_tells_its_occurrences_one_by_one() -> None:
-    book = AlertBook()
-    (first,) = book.sync([LOST], at(0), "a")
-    book.acknowledge(first.alert_id, "ana", "battery", at(1))
-    book.sync([], at(5), "b")
-    book.sync([LOST], at(20), "c")
-
-    (alert,) = book.waiting
-    earlier, last = alert.members
-    assert (earlier.raised, earlier.cleared) == (at(0), at(5))
-    assert (earlier.acknowledged_by, earlier.note) == ("ana", "battery")
-    assert (last.raised, last.cleared) == (at(20), None)
-
-
-def test_of_many_occurrences_the_newest_are_kept_and_all_are_counted() -> None:
-    book = AlertBook()
-    for number in range(MEMBERS_KEPT + 5):
-        book.sync([LOST], at(2 * number), "a")
-        book.sync([], at(2 * number + 1), "b")
-    book.sync([LOST], at(100), "c")
-
-    (alert,) = book.waiting
-    assert (alert.count, len(alert.members)) == (MEMBERS_KEPT + 6, MEMBERS_KEPT)
-    assert alert.raised == at(0)
-
-
-def test_a_condition_that_gets_graver_is_raised_again_though_it_was_seen() -> None:
-    book = AlertBook()
-    (raised,) = book.sync([replace(LOST, priority="P3")], at(0), "a")
-    book.acknowledge(raised.alert_id, "ana", "", at(1))
-
-    (graver,) = book.sync([LOST], at(2), "b")
-
-    assert (graver.alert_id, graver.priority) == (raised.alert_id, "P1")
-    assert graver.last.acknowledged is None
-    assert [one.priority for one in graver.members] == ["P3", "P1"]
-
-
-def test_what_nobody_saw_is_shown_as_grave_as_it_was() -> None:
-    book = AlertBook()
-    book.sync([LOST], at(0), "a")
-    book.sync([], at(5), "b")
-
-    (again,) = book.sync([replace(LOST, priority="P3")], at(9), "c")
-    seen = book.acknowledge(again.alert_id, "ana", "", at(10))
-
-    assert again.priority == "P1"
-    assert seen is not None
-    assert seen.priority == "P3"
 
 
 def test_of_two_conditions_of_one_kind_and_subject_the_graver_counts() -> None:

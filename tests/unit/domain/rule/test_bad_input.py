@@ -3,14 +3,9 @@
 Plans are in ``test_foresight``, lasers in ``test_obstacles`` and ``test_witness``.
 """
 
-import math
-
 import numpy as np
 import pytest
 
-from iveg.domain.alerts import conditions
-from iveg.domain.geometry import Pose2D
-from tests.builders import at
 from tests.unit.domain.scene import Scene, person
 
 
@@ -54,24 +49,3 @@ def test_of_a_hundred_people_the_one_within_reach_slows_the_robot() -> None:
         scene.look("AGI", person(-there), *(person(x, y) for x, y in crowd))
         assert scene.judge()["AGI"].speed_factor == factor
     assert len(scene.everyone) >= 90
-
-
-def test_a_ghost_that_moves_with_the_robot_slows_it_all_the_time_and_is_told() -> None:
-    scene, factors = Scene(), set()
-    for fifth in range(60):
-        scene.now, x = fifth / 5, 0.1 * fifth
-        scene.drive("AGI", x)
-        scene.drive("AGII", 90.0, linear=0.0)
-        scene.look("AGII")
-        here = Pose2D(x, 0.0, 0.0)
-        for one in scene.look("AGI", person(x + 1.2, 0.3)):
-            place = here.inverse(*one.position[:2])
-            assert math.dist(place, (1.2, 0.3)) < 1e-6
-            carried = scene.world.robot("AGI").detector.carried
-            carried.note(here, [place], at(scene.now).mono)
-        factors.add(scene.judge()["AGI"].speed_factor)
-    told = conditions.of_detector(
-        scene.world.robot("AGI"), at(scene.now), started=at(0.0)
-    )
-    assert factors == {0.5}
-    assert "alert.carried" in [one.key for one in told]

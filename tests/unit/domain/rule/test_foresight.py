@@ -9,11 +9,18 @@ import pytest
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import Navigation, Odometry
-from iveg.domain.rule.foresight import Encounter, Foresight, probability
+from iveg.domain.parameters import ByClass
+from iveg.domain.rule.foresight import Encounter, Encounters, Foresight, by_cause
 from tests.builders import at, origin, received
 from tests.unit.domain.scene import FIELD, Scene, person
 
 MS_10 = CM = 0.01
+
+
+def told_of(found: Encounters) -> dict[str, Encounter]:
+    """What people are told of AGI."""
+    ahead = found.get("AGI", ())
+    return {**by_cause(ahead, "tells"), **by_cause(ahead, "slows")}
 
 
 class Ahead:
@@ -55,13 +62,13 @@ class Ahead:
         found = Foresight().look(
             scene.world, scene.people, DetectionRule(), at(scene.now)
         )
-        return next(iter(found.get("AGI", {}).values()), None)
+        return next(iter(by_cause(found.get("AGI", ()), "slows").values()), None)
 
     def shown(self) -> Encounter | None:
         """What people are told, which need not slow."""
         scene, foresight = self.scene, Foresight()
-        foresight.look(scene.world, scene.people, scene.rule, at(scene.now))
-        return next(iter(foresight.shown.get("AGI", {}).values()), None)
+        found = foresight.look(scene.world, scene.people, scene.rule, at(scene.now))
+        return next(iter(told_of(found).values()), None)
 
     def must(self) -> Encounter:
         found = self.foretold()
@@ -75,22 +82,14 @@ def test_straight_ahead_it_is_the_way_to_the_ring_by_the_speed() -> None:
     assert found.zone.cause == "P1"
 
 
-def test_it_is_told_where_both_will_be_then() -> None:
-    found = Ahead(Pose2D(0, 0, 0), Twist2D(0.8, 0.0)).see((3.6, 0.0)).must()
-    assert (found.x, found.y) == pytest.approx((1.6, 0.0), abs=CM)
-    assert (found.centre_x, found.centre_y) == pytest.approx((3.6, 0.0), abs=CM)
-    walks = Ahead(Pose2D(0, 0, 0), Twist2D(0.5, 0.0)).walk(5.0, 0.0, -1.0, 0.0).must()
-    assert walks.centre_x - walks.x == pytest.approx(2.0, abs=CM)
-    assert walks.x == pytest.approx(0.5 * walks.in_s, abs=CM)
-
-
-def test_a_forecast_counts_down_and_the_sooner_the_likelier() -> None:
-    found = Ahead(Pose2D(0, 0, 0), Twist2D(0.8, 0.0)).see((3.6, 0.0)).must()
-    lefts = [found.left_s(at(after)) for after in (0.0, 0.5, 9.0)]
-    assert lefts == pytest.approx([found.in_s, found.in_s - 0.5, 0.0])
-    told = [probability(tenth / 10) for tenth in range(31)]
-    assert told == sorted(told, reverse=True)
-    assert 0.0 < told[-1] < told[0] < 1.0
+def test_a_fresh_zone_of_a_class_with_a_wider_radius_is_told_as_fresh() -> None:
+    ahead = Ahead(Pose2D(0, 0, 0), Twist2D(0.8, 0.0))
+    wide = ByClass(2.0, {"person": 3.0})
+    ahead.scene.rule = DetectionRule(radius_m=wide)
+    shown = ahead.see((4.6, 0.0)).shown()
+    assert shown is not None
+    assert (shown.zone.radius_m, shown.zone.is_grown) == (3.0, False)
+    assert shown.in_s == pytest.approx(1.6 / 0.8, abs=MS_10)
 
 
 def test_reversing_it_is_behind() -> None:
@@ -123,13 +122,15 @@ def test_two_who_walk_towards_each_other_meet_at_the_sum_of_their_speeds() -> No
     assert ahead.must().in_s == pytest.approx(3.0 / 1.5, abs=0.05)
 
 
-def test_who_walks_away_is_not_met() -> None:
-    ahead = Ahead(Pose2D(0, 0, 0), Twist2D(0.5, 0.0)).walk(3.0, 0.0, 1.0, 0.0)
-    assert ahead.foretold() is None
-
-
-def test_who_crosses_and_is_gone_in_time_is_not_met() -> None:
-    ahead = Ahead(Pose2D(0, 0, 0), Twist2D(0.5, 0.0)).walk(3.0, 2.5, 0.0, 1.2)
+@pytest.mark.parametrize(
+    "walk",
+    [(3.0, 0.0, 1.0, 0.0), (3.0, 2.5, 0.0, 1.2)],
+    ids=["walks away", "crosses and is gone in time"],
+)
+def test_who_will_not_be_there_is_not_met(
+    walk: tuple[float, float, float, float],
+) -> None:
+    ahead = Ahead(Pose2D(0, 0, 0), Twist2D(0.5, 0.0)).walk(*walk)
     assert ahead.foretold() is None
 
 
@@ -160,19 +161,6 @@ def test_in_a_ring_that_grows_the_encounter_is_told_and_slows_no_more(
     assert shown.zone.radius_m == 2.0
 
 
-def test_who_may_have_gone_is_not_told_of() -> None:
-    ahead = Ahead(Pose2D(0, 0, 0), Twist2D(0.4, 0.0)).walk(2.7, 0.0, 0.0, 0.0)
-    ahead.scene.now += 2.1
-    assert ahead.see().shown() is None
-
-
-def test_in_the_ring_itself_there_is_nothing_to_tell() -> None:
-    ahead = Ahead(Pose2D(0, 0, 0), Twist2D(0.4, 0.0)).walk(1.9, 0.0, 0.0, 0.0)
-    for missed_s in (0.0, 0.9, 0.6):
-        ahead.scene.now += missed_s
-        assert ahead.see().shown() is None
-
-
 def test_of_a_slow_robot_it_is_told_whom_it_meets_soon_once_it_is_let_go() -> None:
     ahead = Ahead(Pose2D(0, 0, 0), Twist2D(0.4, 0.0)).see((3.5, 0.0))
     assert ahead.foretold() is None, "3.75 s ahead"
@@ -193,9 +181,9 @@ def _told_later(ahead: Ahead, *xs: float) -> tuple[Encounter | None, Encounter |
         if x is not None:
             scene.now = round(scene.now + 0.1, 6)
             ahead.see((x, 0.0))
-        slows = foresight.look(scene.world, scene.people, scene.rule, at(scene.now))
-    shown = foresight.shown.get("AGI", {})
-    return slows.get("AGI", {}).get("P1"), shown.get("P1")
+        found = foresight.look(scene.world, scene.people, scene.rule, at(scene.now))
+    slows = by_cause(found.get("AGI", ()), "slows")
+    return slows.get("P1"), told_of(found).get("P1")
 
 
 @pytest.mark.parametrize(
@@ -240,15 +228,6 @@ def test_no_step_is_longer_than_a_walker_makes() -> None:
     assert shown.in_s == pytest.approx(4.7 / (0.5 + 1.6), abs=MS_10)
 
 
-def test_what_slows_is_told_as_it_slows() -> None:
-    """A ring that has grown is reached sooner than the one that it began as."""
-    ahead = Ahead(Pose2D(0, 0, 0), Twist2D(0.8, 0.0)).walk(4.0, 0.0, 0.0, 0.0)
-    ahead.scene.now += 0.8
-    shown = ahead.see().shown()
-    assert shown == ahead.must()
-    assert shown.in_s < 2.0 / 0.8
-
-
 def test_its_own_plan_counts_before_the_arc_of_its_twist() -> None:
     corner = ((0.0, 0.0), (1.0, 0.0), (1.0, 9.0))
     ahead = Ahead(Pose2D(0, 0, 0), Twist2D(1.0, 0.0)).see((1.0, 4.0)).plan(*corner)
@@ -276,13 +255,6 @@ def test_a_plan_that_it_does_not_drive_is_left_aside(
     if path[0] != (0.0, 0.0):
         assert found is not None
         assert found.in_s == pytest.approx(2.0, abs=MS_10)
-
-
-def test_a_plan_of_ten_seconds_ago_is_none() -> None:
-    ahead = Ahead(Pose2D(0, 0, 0), Twist2D(0.8, 0.0))
-    ahead.scene.now = 10.0
-    ahead.plan((0.0, 0.0), (0.0, 9.0), age_s=10.0).see((3.6, 0.0))
-    assert ahead.must().in_s == pytest.approx(2.0, abs=MS_10)
 
 
 # --- what it does to the limit ------------------------------------------------------

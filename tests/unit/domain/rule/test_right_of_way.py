@@ -26,9 +26,9 @@ def first_slow(
         scene.look("AGI", *([person(way - 1.5)] if somebody else []))
         scene.look("AGII")
         scene.judge()
-        for crossing in scene.speed_limits.crossings:
-            if crossing.zone.reason == "robot":
-                slow.setdefault(crossing.robot_id, scene.now)
+        for entry in scene.speed_limits.entries:
+            if entry.zone.reason == "robot":
+                slow.setdefault(entry.robot_id, scene.now)
     return slow.get("AGI"), slow.get("AGII")
 
 

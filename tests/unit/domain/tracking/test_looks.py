@@ -2,11 +2,8 @@
 
 import math
 from collections.abc import Sequence
-from unittest.mock import patch
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from iveg.domain.tracking.calibration import Calibration
 from iveg.domain.tracking.looks import (
@@ -46,14 +43,6 @@ def probability(*confidences: float) -> float:
     return odds / (1.0 + odds)
 
 
-def test_one_look_is_as_sure_as_its_box() -> None:
-    (looks,) = Robots().look([seen(0.72)], 0.0)
-
-    assert (looks.count, looks.least, looks.most, looks.over_s) == (1, 0.72, 0.72, 0.0)
-    assert looks.probability == pytest.approx(0.72)
-    assert not looks.confirmed
-
-
 @pytest.mark.parametrize(("offset", "confirmed"), [(-0.5, False), (0.5, True)])
 def test_looks_count_by_the_calibration_of_their_detector(
     offset: float, confirmed: bool
@@ -86,14 +75,6 @@ def test_pictures_of_one_moment_are_one_look_by_the_surest_of_them() -> None:
     assert looks.probability == pytest.approx(0.72)
 
 
-def test_no_number_of_looks_makes_certain() -> None:
-    robots = Robots()
-    for number in range(100):
-        (looks,) = robots.look([seen(0.79)], number * LOOK_S)
-
-    assert looks.probability == pytest.approx(0.982, abs=1e-4)
-
-
 def test_time_without_a_look_counts_against_it() -> None:
     told = []
     for pictures_without in (0, 2):
@@ -122,14 +103,6 @@ def test_who_walks_on_is_the_same_and_who_stands_elsewhere_another() -> None:
     walked, other = robots.look([seen(x=5.5), seen(x=9.0)], LOOK_S)
 
     assert (walked.count, other.count) == (2, 1)
-
-
-def test_two_side_by_side_are_two() -> None:
-    robots = Robots()
-    for number in range(3):
-        pair = robots.look([seen(x=5.0), seen(x=5.6)], number * LOOK_S)
-
-    assert [one.count for one in pair] == [3, 3]
 
 
 def test_looks_of_robots_at_one_place_count_together() -> None:
@@ -184,41 +157,6 @@ def test_a_weak_box_keeps_nobody_else(weak: float, moment: float, x: float) -> N
     robots.look([seen(0.85)], 0.8)
 
     assert not any(one.confirmed for one in robots.look([seen(weak, x)], moment))
-
-
-_PICTURES = st.lists(
-    st.tuples(
-        st.sampled_from(("AGI", "AGII", "AGIII")),
-        st.floats(-1.0, 0.5),
-        st.lists(
-            st.builds(
-                FaintPerson,
-                st.floats(-4.0, 4.0),
-                st.floats(-4.0, 4.0),
-                st.floats(0.3, 0.9),
-            ),
-            max_size=3,
-        ),
-    ),
-    max_size=12,
-)
-
-
-@given(_PICTURES)
-def test_robots_that_look_elsewhere_are_not_asked_and_would_have_said_nothing(
-    pictures: list[tuple[str, float, list[FaintPerson]]],
-) -> None:
-    def told() -> list[list[Looks | None]]:
-        suspicions, now, out = Suspicions(), 10.0, []
-        for robot, later, found in pictures:
-            # Pictures may be late.
-            now += later
-            out.append(suspicions.look(robot, found, at(now), 0.8))
-        return out
-
-    quick = told()
-    with patch("iveg.domain.tracking.looks._Suspected.may_have", return_value=True):
-        assert told() == quick
 
 
 def test_a_storm_keeps_the_newest() -> None:

@@ -23,17 +23,6 @@ def test_orion_the_agent_and_the_broker_can_be_named_in_one_go() -> None:
     assert (named.orion_url, named.iota_url, named.mqtt_url) == (ORION, IOTA, MQTT)
 
 
-def test_the_broker_may_be_the_settings_own() -> None:
-    named = with_fiware(Settings(mqtt_url="mqtt://here"), [ORION, IOTA])
-
-    assert named.mqtt_url == "mqtt://here"
-
-
-@pytest.mark.parametrize("word", ["embedded", "settings"])
-def test_a_word_leaves_the_settings_as_they_are(word: str) -> None:
-    assert with_fiware(Settings(), [word]) == Settings()
-
-
 @pytest.mark.parametrize(
     "words", [[ORION], [ORION, MQTT], [ORION, IOTA, IOTA], ["orion", "agent"]]
 )
@@ -50,7 +39,6 @@ def test_the_fleet_is_the_papers_and_secrets_are_new(tmp_path: Path) -> None:
     assert placed.robots == ("AGI", "AGII")
     assert placed.greenhouse == "mvsim-20x20"
     assert placed.api_token not in ("", "known")
-    assert placed.orion_throttle is False
     assert Path(placed.data_directory).parent == tmp_path
 
 

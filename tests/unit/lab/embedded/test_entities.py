@@ -1,24 +1,34 @@
-"""What a change did to an entity, and which subscriptions may be told of it."""
+"""What a change did to an entity, who may be told of it, which texts are refused."""
 
 from typing import Any
 
+import orjson
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from iveg.lab.embedded.entities import Entity, EntityChange, Touched, apply
-from iveg.lab.embedded.errors import FiwareError
-from iveg.lab.embedded.orion_dates import date_text
+from iveg.lab.embedded.entities import (
+    Entity,
+    EntityChange,
+    FiwareError,
+    Touched,
+    apply,
+    check_name,
+    date_text,
+    holds_forbidden,
+    looks_clean,
+)
 from iveg.lab.embedded.subscriptions import Subscription, read_subscription
 
 UNPRINTABLE = object()
-EARLIER, LATER = {"TimeInstant": b"1"}, {"TimeInstant": b"2"}
 
 
 def entity() -> Entity:
     return Entity("AGI", "Robot", "/", 0.0, 0.0)
 
 
-def touch(one: Entity, value: Any, metadata: dict[str, bytes]) -> Touched:
-    return apply(one, {"scan": EntityChange("array", value, metadata)}, 1.0)
+def touch(one: Entity, value: Any, instant: bytes) -> Touched:
+    return apply(one, {"scan": EntityChange("array", value, instant)}, 1.0)
 
 
 def subscription(**condition: Any) -> Subscription:
@@ -31,45 +41,41 @@ def subscription(**condition: Any) -> Subscription:
 
 def test_a_value_is_not_printed_before_somebody_looks_at_it() -> None:
     robot = entity()
-    touch(robot, UNPRINTABLE, EARLIER)
-    assert touch(robot, UNPRINTABLE, LATER).has_changed("scan")
+    touch(robot, UNPRINTABLE, b"1")
+    assert touch(robot, UNPRINTABLE, b"2").has_changed("scan")
     with pytest.raises(TypeError):
-        _ = robot.attributes["scan"].json
+        _ = robot.attributes["scan"].value.json
 
 
 @pytest.mark.parametrize(
-    ("value", "metadata", "metadata_too", "changed"),
-    [
-        (1.0, EARLIER, True, False),
-        (1.0, LATER, True, True),
-        (1.0, LATER, False, False),
-        (2.0, EARLIER, False, True),
-        (1.0 + 1e-11, EARLIER, True, False),
-    ],
+    ("value", "instant", "changed"),
+    [(1.0, b"1", False), (1.0, b"2", True), (2.0, b"1", True)],
 )
-def test_a_change_is_one_of_the_text_or_if_wanted_of_metadata(
-    value: float, metadata: dict[str, bytes], metadata_too: bool, changed: bool
+def test_a_change_is_one_of_the_text_or_of_its_time(
+    value: float, instant: bytes, changed: bool
 ) -> None:
     robot = entity()
-    touch(robot, 1.0, EARLIER)
-    touched = touch(robot, value, metadata)
-    assert touched.has_changed("scan", metadata_too=metadata_too) == changed
+    touch(robot, 1.0, b"1")
+    touched = touch(robot, value, instant)
+    assert touched.has_changed("scan") == changed
     assert not touched.has_changed("pose")
 
 
+def test_a_change_without_a_time_keeps_the_present_one() -> None:
+    robot = entity()
+    touch(robot, 1.0, b"1")
+    apply(robot, {"scan": EntityChange(None, 2.0)}, 2.0)
+    kept = robot.attributes["scan"]
+    assert (kept.type, kept.value.json, kept.instant) == ("array", b"2.0", b"1")
+
+
 @pytest.mark.parametrize(
-    ("condition", "may"),
-    [
-        ({}, True),
-        ({"attrs": ["scan", "pose"]}, True),
-        ({"attrs": ["pose"]}, False),
-        ({"attrs": ["pose"], "alterationTypes": ["entityUpdate"]}, True),
-    ],
+    ("attrs", "may"), [([], True), (["scan", "pose"], True), (["pose"], False)]
 )
 def test_who_watches_other_attributes_is_passed_over(
-    condition: dict[str, Any], may: bool
+    attrs: list[str], may: bool
 ) -> None:
-    assert subscription(**condition).may_want(("scan",)) == may
+    assert subscription(attrs=attrs).may_want(("scan",)) == may
 
 
 @pytest.mark.parametrize(
@@ -85,11 +91,37 @@ def test_a_date_is_kept_in_utc_to_the_millisecond(told: str, kept: bytes) -> Non
     assert date_text(told) == kept
 
 
-@pytest.mark.parametrize("operator", ["$min", "$push", "$pull"])
-def test_an_operator_that_is_not_supported_changes_nothing(operator: str) -> None:
-    robot = entity()
+NUMBERS = st.floats(-1e15, 1e15, allow_nan=False) | st.integers(-(2**53), 2**53)
+TEXTS = st.text(alphabet='a1.0e,]}-+ \\"<é', max_size=12)
+VALUES: st.SearchStrategy[Any] = st.recursive(
+    st.none() | st.booleans() | NUMBERS | TEXTS,
+    lambda inner: (
+        st.lists(inner, max_size=6) | st.dictionaries(TEXTS, inner, max_size=4)
+    ),
+    max_leaves=20,
+)
 
-    with pytest.raises(FiwareError, match="501"):
-        apply(robot, {"n": EntityChange("Number", {operator: 1}, {})}, 1.0)
 
-    assert robot.attributes == {}
+@given(VALUES)
+def test_what_looks_clean_holds_nothing_forbidden(value: Any) -> None:
+    assert not (looks_clean(orjson.dumps(value)) and holds_forbidden(value))
+
+
+@pytest.mark.parametrize("character", list("<>\"'=;()"))
+def test_each_forbidden_character_is_found_in_values_and_not_in_keys(
+    character: str,
+) -> None:
+    value = {"k": [f"a{character}"]}
+    assert holds_forbidden(value)
+    assert not looks_clean(orjson.dumps(value))
+    assert not holds_forbidden({f"k{character}": 1})
+
+
+def test_an_escaped_forbidden_character_does_not_look_clean() -> None:
+    assert not looks_clean(b'{"a": "\\u003cb"}')
+
+
+@pytest.mark.parametrize("name", ["", "x" * 257, "a b", "a<", "a/b", "a#b", "a?b"])
+def test_a_bad_name_is_refused(name: str) -> None:
+    with pytest.raises(FiwareError):
+        check_name(name, "entity id")

@@ -2,14 +2,14 @@ import logging
 from collections.abc import AsyncIterator
 
 import aiomqtt
-import httpx
-import orjson
 import pytest
 
 from iveg.adapters.fleet_provisioning import provision
 from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.orion import OrionClient
 from iveg.domain.errors import HopError
+from iveg.lab.embedded.context_broker import Registration
+from iveg.lab.embedded.entities import new_id
 from iveg.lab.embedded.server import Running, embedded_fiware
 
 TENANT = ("agroconnect", "/greenhouse")
@@ -88,31 +88,13 @@ async def test_a_device_of_another_shape_or_with_what_is_not_supported_is_refuse
             await agent.create_device({"device_id": "D", "apikey": "iveg", **part})
 
 
-async def test_a_command_with_quality_and_retain_is_published_so(
+async def test_a_command_whose_provider_is_away_is_404(
     up: Running, orion: OrionClient
 ) -> None:
-    go = {"name": "go", "type": "command", "mqtt": {"qos": "1", "retain": True}}
-    device = {
-        "device_id": "TB3",
-        "entity_name": "TB3",
-        "entity_type": "Robot",
-        "apikey": "iveg",
-        "commands": [go],
-    }
-    async with IotAgentClient(up.iota_url, *TENANT) as agent:
-        await agent.create_device(device)
-    await orion.ask(
-        "PATCH",
-        "/v2/entities/TB3/attrs",
-        query={"type": "Robot"},
-        body={"go": {"type": "command", "value": 1}},
-    )
-    async with aiomqtt.Client("127.0.0.1", up.mqtt_port) as late:
-        await late.subscribe("/iveg/TB3/cmd", qos=1)
-        message = await anext(aiter(late.messages))
-    assert isinstance(message.payload, bytes)
-    assert orjson.loads(message.payload) == {"go": 1}
-    assert (message.qos, message.retain) == (1, True)
+    stale = Registration(new_id(), TENANT[1], "OLD", "Robot", ("cmd",), "http://gone")
+    up.broker.tenant(TENANT[0]).registrations[stale.id] = stale
+    with pytest.raises(HopError, match="404"):
+        await orion.update_command("OLD", {"stop": {}})
 
 
 async def test_a_device_is_of_the_tenant_of_the_request_whatever_it_says(
@@ -133,17 +115,3 @@ async def test_a_group_that_is_changed_wrongly_stays_as_it_was(up: Running) -> N
             await agent.change_group("iveg", {"entity_type": ["Robot"]})
         (kept,) = await agent.read_groups()
     assert kept["entity_type"] == "Robot"
-
-
-@pytest.mark.parametrize("wrong", [5, None, "lazy", {"a": 1}, [1]])
-async def test_a_query_whose_attributes_are_no_names_is_refused(
-    up: Running, wrong: object
-) -> None:
-    headers = {"Fiware-Service": TENANT[0], "Fiware-ServicePath": TENANT[1]}
-    asked = {"entities": [], "attrs": wrong}
-    async with httpx.AsyncClient(base_url=up.iota_url, headers=headers) as client:
-        refused = await client.post("/op/query", json=asked)
-        well = await client.post("/op/query", json=asked | {"attrs": ["lazy"]})
-
-    assert (refused.status_code, refused.json()["name"]) == (400, "WRONG_SYNTAX")
-    assert (well.status_code, well.json()) == (200, [])

@@ -1,12 +1,17 @@
+"""The embedded broker is held to MQTT 3.1.1, and to what its clients may cost."""
+
 import asyncio
+import contextlib
 import logging
 from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 
 import aiomqtt
 import pytest
 
-from iveg.lab.embedded.mqtt_broker import MqttBroker
-from iveg.lab.embedded.mqtt_server import mqtt_broker
+from iveg.lab.embedded import mqtt_broker as broker_module
+from iveg.lab.embedded.mqtt_broker import MqttBroker, mqtt_broker
+from iveg.lab.embedded.mqtt_packets import publish_packet
 
 
 @pytest.fixture
@@ -104,7 +109,7 @@ async def test_a_neighbour_hears_and_publishes_without_a_connection(
     broker.listen(lambda topic, payload: taken.append((topic, payload)))
     await robot.subscribe("/iveg/AGI/cmd", qos=1)
     await robot.publish("/iveg/AGI/attrs", b"measure", qos=1)
-    broker.publish("/iveg/AGI/cmd", b"order", 0, retain=False)
+    broker.publish("/iveg/AGI/cmd", b"order")
     message = await heard(robot)
     assert taken == [("/iveg/AGI/attrs", b"measure")]
     assert (message.payload, message.qos) == (b"order", 0)
@@ -132,3 +137,223 @@ async def test_messages_of_one_client_keep_their_order(
     for payload in sent:
         await other.publish("n", payload, qos=0)
     assert [(await heard(robot)).payload for _ in sent] == sent
+
+
+CONNACK = b"\x20\x02\x00\x00"
+PINGREQ, PINGRESP = b"\xc0\x00", b"\xd0\x00"
+
+
+class Heard:
+    """What a neighbour hears, in order."""
+
+    def __init__(self, broker: MqttBroker) -> None:
+        self.messages: list[tuple[str, bytes]] = []
+        self._came = asyncio.Event()
+        broker.listen(self._hear)
+
+    def _hear(self, topic: str, payload: bytes) -> None:
+        self.messages.append((topic, payload))
+        self._came.set()
+
+    async def wait_for(self, count: int) -> list[tuple[str, bytes]]:
+        async with asyncio.timeout(30):
+            while len(self.messages) < count:
+                self._came.clear()
+                await self._came.wait()
+        return self.messages
+
+
+@asynccontextmanager
+async def line(
+    broker: MqttBroker, keep_alive_s: int = 0
+) -> AsyncIterator[tuple[asyncio.StreamReader, asyncio.StreamWriter]]:
+    """A client that has said CONNECT and nothing else."""
+    reader, writer = await asyncio.open_connection("127.0.0.1", broker.port)
+    head = b"\x00\x04MQTT\x04\x02" + keep_alive_s.to_bytes(2, "big")
+    writer.write(b"\x10\x0e" + head + b"\x00\x02me")
+    assert await reader.readexactly(4) == CONNACK
+    try:
+        yield reader, writer
+    finally:
+        writer.close()
+        await writer.wait_closed()
+
+
+async def answered(reader: asyncio.StreamReader, count: int) -> bytes:
+    """The next bytes; none where the broker hung up."""
+    async with asyncio.timeout(30):
+        try:
+            return await reader.readexactly(count)
+        except (asyncio.IncompleteReadError, ConnectionError):
+            return b""
+
+
+@pytest.mark.parametrize("size", [0, 1, 100, 200, 20_000, 2_100_000])
+async def test_a_message_of_any_size_arrives_as_it_went(
+    broker: MqttBroker, size: int
+) -> None:
+    heard = Heard(broker)
+    async with line(broker) as (_, writer):
+        writer.write(publish_packet("a/b", b"x" * size))
+        assert await heard.wait_for(1) == [("a/b", b"x" * size)]
+
+
+@pytest.mark.parametrize("step", [1, 2, 3, 7])
+async def test_packets_that_come_in_pieces_or_together_are_the_same(
+    broker: MqttBroker, step: int
+) -> None:
+    heard = Heard(broker)
+    sent = [("a", b"1"), ("b", b""), ("é", b"2" * 200), ("c", b"3")]
+    stream = PINGREQ.join(publish_packet(*one) for one in sent)
+    async with line(broker) as (reader, writer):
+        for start in range(0, len(stream), step):
+            writer.write(stream[start : start + step])
+            await writer.drain()
+        assert await heard.wait_for(len(sent)) == sent
+        assert await answered(reader, 6) == 3 * PINGRESP
+
+
+async def test_a_packet_that_takes_longer_than_the_keep_alive_is_not_torn(
+    broker: MqttBroker,
+) -> None:
+    heard = Heard(broker)
+    packet = publish_packet("slow", b"payload")
+    async with line(broker, keep_alive_s=1) as (_, writer):
+        writer.write(packet[:5])
+        await asyncio.sleep(1.2)
+        writer.write(packet[5:] + publish_packet("next", b""))
+        assert await heard.wait_for(2) == [("slow", b"payload"), ("next", b"")]
+
+
+async def test_who_has_not_said_connect_publishes_nothing(broker: MqttBroker) -> None:
+    heard = Heard(broker)
+    _, stranger = await asyncio.open_connection("127.0.0.1", broker.port)
+    stranger.write(publish_packet("stranger", b"x" * 40) * 3)
+    await stranger.drain()
+    async with line(broker) as (_, writer):
+        writer.write(publish_packet("other", b""))
+        assert await heard.wait_for(1) == [("other", b"")]
+    stranger.close()
+    await stranger.wait_closed()
+
+
+@pytest.mark.parametrize("topic", [b"", b"a/+", b"#", b"$SYS/x", b"\0", b"\xff"])
+async def test_a_topic_that_nobody_may_publish_on_is_the_end_of_the_line(
+    broker: MqttBroker, topic: bytes
+) -> None:
+    heard = Heard(broker)
+    bad = b"\x30" + bytes([len(topic) + 3, 0, len(topic)]) + topic + b"1"
+    async with line(broker) as (reader, writer):
+        writer.write(bad + publish_packet("after", b"") + PINGREQ)
+        assert await answered(reader, 2) == b""
+    async with line(broker) as (_, other):
+        other.write(publish_packet("other", b""))
+        assert await heard.wait_for(1) == [("other", b"")]
+
+
+async def test_a_slow_listener_misses_telemetry_and_costs_no_memory(
+    broker: MqttBroker, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(broker_module, "MOST_UNSENT", 100_000)
+    subscribe = b"\x82\x06\x00\x01\x00\x01n\x00"
+    async with (
+        line(broker) as (deaf, writer),
+        aiomqtt.Client("127.0.0.1", broker.port) as quick,
+    ):
+        writer.write(subscribe)
+        assert await deaf.readexactly(5) == b"\x90\x03\x00\x01\x00"
+        deaf._transport.pause_reading()  # type: ignore[attr-defined]
+        await quick.subscribe("n", qos=0)
+        messages = aiter(quick.messages)
+        for number in range(200):
+            await quick.publish("n", b"%d " % number + b"x" * 100_000, qos=0)
+            async with asyncio.timeout(30):
+                message = await anext(messages)
+            assert bytes(message.payload).startswith(b"%d " % number)
+        waiting = [client.unsent for client in broker.clients.values()]
+    assert max(waiting) <= 300_000
+
+
+@pytest.mark.parametrize(
+    "packet",
+    [
+        b"\x82\x01\x00",
+        b"\x82\x05\x00\x01\x00\x09a",
+        b"\x82\x04\x00\x01\x00\x01",
+        b"\x30\x02\x00\x05",
+        b"\x34\x06\x00\x01a\x00\x01x",
+        b"\x10\x02\x00\x04",
+        b"\x30\xff\xff\xff\xff",
+        b"\xf0\x00",
+    ],
+)
+async def test_a_packet_that_cannot_be_read_is_the_end_of_the_line(
+    broker: MqttBroker, packet: bytes
+) -> None:
+    async with line(broker) as (reader, writer):
+        writer.write(packet + PINGREQ)
+        assert await answered(reader, 2) == b""
+
+
+async def test_a_client_that_is_silent_for_too_long_is_disconnected_and_its_will_comes(
+    broker: MqttBroker,
+) -> None:
+    heard = Heard(broker)
+    reader, writer = await asyncio.open_connection("127.0.0.1", broker.port)
+    head = b"\x00\x04MQTT\x04\x06\x00\x01\x00\x02me"
+    writer.write(b"\x10\x18" + head + b"\x00\x04gone\x00\x02me")
+    assert await answered(reader, 4) == CONNACK
+    assert await heard.wait_for(1) == [("gone", b"me")]
+    assert await answered(reader, 1) == b""
+    writer.close()
+    with contextlib.suppress(ConnectionError):
+        await writer.wait_closed()
+
+
+async def test_a_client_that_says_goodbye_leaves_no_will(broker: MqttBroker) -> None:
+    heard = Heard(broker)
+    will = aiomqtt.Will("gone", b"me")
+    async with aiomqtt.Client("127.0.0.1", broker.port, will=will):
+        """It disconnects at once."""
+    async with line(broker) as (_, writer):
+        writer.write(publish_packet("after", b""))
+        assert await heard.wait_for(1) == [("after", b"")]
+
+
+async def test_the_newest_client_of_an_identifier_stays(broker: MqttBroker) -> None:
+    async with line(broker) as (first, _), line(broker) as (second, writer):
+        assert await answered(first, 1) == b""
+        writer.write(PINGREQ)
+        assert await answered(second, 2) == PINGRESP
+
+
+async def test_another_version_of_mqtt_is_refused_in_words(broker: MqttBroker) -> None:
+    reader, writer = await asyncio.open_connection("127.0.0.1", broker.port)
+    writer.write(b"\x10\x0d\x00\x04MQTT\x05\x02\x00\x00\x00\x00\x00")
+    assert await answered(reader, 4) == b"\x20\x02\x00\x01"
+    writer.close()
+    await writer.wait_closed()
+
+
+async def test_a_measure_that_is_to_be_confirmed_is_heard_and_confirmed(
+    broker: MqttBroker,
+) -> None:
+    heard = Heard(broker)
+    async with line(broker) as (reader, writer):
+        writer.write(b"\x32\x08\x00\x01a\x01\x02xyz")
+        assert await answered(reader, 4) == b"\x40\x02\x01\x02"
+        assert heard.messages == [("a", b"xyz")]
+
+
+async def test_what_follows_connect_at_once_counts_after_the_welcome(
+    broker: MqttBroker,
+) -> None:
+    heard = Heard(broker)
+    reader, writer = await asyncio.open_connection("127.0.0.1", broker.port)
+    hello = b"\x10\x0e\x00\x04MQTT\x04\x02\x00\x00\x00\x02me"
+    writer.write(hello + b"\x32\x06\x00\x01a\x00\x01x" + PINGREQ)
+    welcome = CONNACK + b"\x40\x02\x00\x01" + PINGRESP
+    assert await answered(reader, len(welcome)) == welcome
+    assert heard.messages == [("a", b"x")]
+    writer.close()
+    await writer.wait_closed()

@@ -1,11 +1,18 @@
-import math
+"""Rays meet what is there, and plants lean out of their rows."""
 
+import math
+from collections.abc import Sequence
+
+import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.greenhouse import Greenhouse, PlacedObstacle, StructuralPost
-from iveg.lab.emulator.greenhouse import Body, Scenery
-from tests.touching import bodies_touch, touches
+from iveg.lab.emulator.greenhouse import Body, Disc, LaserModel, Scenery, sweep
+from tests.touching import touches
 
 GREENHOUSE = Greenhouse(
     "shed",
@@ -35,41 +42,72 @@ def test_a_robot_in_crop_crates_post_or_wall_touches(body: Body) -> None:
     assert touches(SCENERY, body)
 
 
-@pytest.mark.parametrize(
-    "body", [robot(2.0, 5.0), robot(3.45, 4.0), robot(7.0, 7.5), robot(4.5, 9.0)]
-)
-def test_a_robot_in_the_open_touches_nothing(body: Body) -> None:
-    assert not touches(SCENERY, body)
-
-
 def test_crop_and_crates_hide_what_is_behind_them() -> None:
     assert SCENERY.hides(2.0, 5.0, 6.0, 5.0)
     assert SCENERY.hides(7.5, 1.5, 9.5, 1.5)
     assert not SCENERY.hides(2.0, 9.0, 6.0, 9.0)
 
 
-def test_a_place_is_free_with_room_for_the_radius() -> None:
-    assert SCENERY.free(3.7, 4.0, 0.25)
-    assert not SCENERY.free(3.8, 4.0, 0.25)
-    assert not SCENERY.free(0.2, 5.0, 0.25)
+EXACT = LaserModel(beams=720, noise=0.0)
+ROOM = Greenhouse("room", Rectangle(-10.0, -5.0, 10.0, 5.0))
 
 
-def test_the_gap_to_a_robot_is_measured_from_its_side() -> None:
-    gap, out_x, out_y = robot(2.0, 2.0, math.pi / 2).gap_to(2.8, 2.0)
-
-    assert gap == pytest.approx(0.5)
-    assert (out_x, out_y) == pytest.approx((1.0, 0.0))
-
-
-def test_somebody_inside_a_robot_has_no_gap_and_a_way_out() -> None:
-    gap, out_x, out_y = robot(2.0, 2.0).gap_to(2.1, 2.1)
-
-    assert gap == 0.0
-    assert (out_x, out_y) == pytest.approx((0.0, 1.0))
+def swept(
+    sensor: Pose2D,
+    greenhouse: Greenhouse = ROOM,
+    *,
+    people: Sequence[Disc] = (),
+    others: Sequence[Body] = (),
+    model: LaserModel = EXACT,
+) -> NDArray[np.float32]:
+    scenery = Scenery.of(greenhouse)
+    return sweep(sensor, model, scenery, people, others, np.random.default_rng(1))
 
 
-def test_two_robots_touch_when_their_corners_do() -> None:
-    turned = robot(2.0, 2.8, math.radians(45), "AGII")
+def towards(angle: float) -> int:
+    """The beam at an angle (rad) of the sensor's frame."""
+    return round((angle + math.pi) / EXACT.angle_increment) % EXACT.beams
 
-    assert bodies_touch([robot(2.0, 2.0), turned])
-    assert not bodies_touch([robot(2.0, 2.0), robot(2.0, 2.7, 0.0, "AGII")])
+
+def test_the_walls_of_a_room_stand_where_they_stand() -> None:
+    ranges = swept(Pose2D(2.0, 1.0, 0.0))
+
+    assert ranges[towards(0.0)] == pytest.approx(8.0)
+    assert ranges[towards(math.pi / 2)] == pytest.approx(4.0)
+    assert ranges[towards(-math.pi)] == pytest.approx(12.0)
+    assert ranges[towards(-math.pi / 2)] == pytest.approx(6.0)
+    assert ranges[towards(math.pi / 4)] == pytest.approx(4.0 * math.sqrt(2), abs=6e-4)
+
+
+def test_a_row_of_crop_is_nearer_than_the_wall_behind_it() -> None:
+    row = Rectangle(4.0, -2.0, 5.0, 2.0)
+    greenhouse = Greenhouse("room", ROOM.bounds, rows=(row,))
+
+    ranges = swept(Pose2D(0.0, 0.0, 0.0), greenhouse)
+
+    assert ranges[towards(0.0)] == pytest.approx(4.0)
+    assert ranges[towards(math.radians(26.0))] == pytest.approx(
+        4.0 / math.cos(math.radians(26.0)), abs=6e-4
+    )
+    assert ranges[towards(math.radians(40.0))] > 5.0
+
+
+@given(
+    x=st.floats(-8.0, 8.0),
+    y=st.floats(-4.0, 4.0),
+    yaw=st.floats(-math.pi, math.pi),
+    angle=st.floats(0.0, math.tau),
+)
+def test_every_return_lies_on_the_person_or_on_the_wall(
+    x: float, y: float, yaw: float, angle: float
+) -> None:
+    person = Disc(x + math.cos(angle), y + math.sin(angle), 0.25)
+    ranges = swept(Pose2D(x, y, yaw), people=[person]).astype(float)
+    angles = yaw - math.pi + EXACT.angle_increment * np.arange(EXACT.beams)
+
+    px, py = x + ranges * np.cos(angles), y + ranges * np.sin(angles)
+    on_person = np.abs(np.hypot(px - person.x, py - person.y) - 0.25) < 1e-3
+    on_wall = np.minimum(10.0 - np.abs(px), 5.0 - np.abs(py)) < 1e-3
+
+    assert (on_person | on_wall).all()
+    assert on_person.sum() >= 50

@@ -1,20 +1,185 @@
-"""An emulated robot drives to a goal, and without one not on its own."""
+"""Robots move within their limits, follow their routes and drive to goals."""
 
-from collections.abc import Sequence
-
+import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from iveg.adapters.greenhouses import load_greenhouse
-from iveg.domain.geometry import REST
+from iveg.domain.fleet import RobotProfile
+from iveg.domain.geometry import REST, Pose2D, Twist2D
 from iveg.domain.goals import Goal, GoalKind
-from iveg.lab.emulator.detector_model import DETECTORS
-from iveg.lab.emulator.greenhouse import Scenery
+from iveg.lab.emulator.camera import DETECTORS
+from iveg.lab.emulator.greenhouse import Disc, Scenery
 from iveg.lab.emulator.layout import lay_out
-from iveg.lab.emulator.scenarios import scenario_named
-from iveg.lab.emulator.ways import way_between
+from iveg.lab.emulator.navigation import (
+    CLEARANCE_M,
+    Follower,
+    Odometer,
+    Vehicle,
+    way_between,
+)
+from iveg.lab.emulator.scenarios import Route, Station, route_of, scenario_named
 from iveg.lab.emulator.world import RobotHardware, SimulatedWorld
 from iveg.robot.goals import NEAR_M
+from tests.builders import AGI, AGII
 from tests.touching import touches
+
+DT = 1 / 30
+ORIGIN = Pose2D(0.0, 0.0, 0.0)
+
+
+def drive(vehicle: Vehicle, command: Twist2D, seconds: float) -> None:
+    for _ in range(round(seconds / DT)):
+        vehicle.step(command, DT)
+
+
+def test_a_vehicle_speeds_up_and_brakes_within_its_limits() -> None:
+    vehicle = Vehicle(AGI, ORIGIN)
+
+    drive(vehicle, Twist2D(1.0, 0.0), 1.0)
+    after_a_second = vehicle.twist.linear_x
+    drive(vehicle, Twist2D(1.0, 0.0), 2.0)
+    x_at_full_speed = vehicle.pose.x
+    drive(vehicle, REST, 2.0)
+
+    assert after_a_second == pytest.approx(AGI.acceleration)
+    assert vehicle.twist == REST
+    assert vehicle.pose.x - x_at_full_speed == pytest.approx(0.5, abs=0.03)
+
+
+def test_agi_turns_on_the_spot() -> None:
+    vehicle = Vehicle(AGI, ORIGIN)
+
+    drive(vehicle, Twist2D(0.0, 1.0), 2.0)
+
+    assert (vehicle.pose.x, vehicle.pose.y) == (0.0, 0.0)
+    assert vehicle.pose.yaw > 1.0
+
+
+@given(
+    commands=st.lists(
+        st.tuples(st.floats(-1.0, 1.0), st.floats(-2.0, 2.0)), max_size=30
+    )
+)
+def test_agii_never_turns_tighter_than_two_metres(
+    commands: list[tuple[float, float]],
+) -> None:
+    vehicle = Vehicle(AGII, ORIGIN)
+
+    for command in commands:
+        drive(vehicle, Twist2D(*command), 0.2)
+        twist = vehicle.twist
+        assert abs(twist.angular_z) <= abs(twist.linear_x) / 2.0 + 1e-9
+
+
+def test_odometry_errs_but_does_not_drift_away_in_an_hour() -> None:
+    odometer = Odometer(np.random.default_rng(1))
+    twist, truth, errors = Twist2D(0.8, 0.3), Pose2D(3.0, 4.0, 0.5), []
+
+    for _ in range(36_000):
+        believed = odometer.measure(truth, twist, 0.1)
+        errors.append(truth.distance_to(believed.x, believed.y))
+
+    early, late = np.array(errors[1_000:10_000]), np.array(errors[-9_000:])
+    assert 0.01 < late.mean() < 0.08
+    assert late.mean() < 2.0 * early.mean()
+    assert max(errors) < 0.3
+
+
+def test_a_standing_robot_reports_the_same_pose_for_ever() -> None:
+    odometer = Odometer(np.random.default_rng(1))
+    truth = Pose2D(3.0, 4.0, 0.5)
+    first = odometer.measure(truth, Twist2D(0.8, 0.3), 1.0)
+
+    for _ in range(100):
+        assert odometer.measure(truth, REST, 0.1) == first
+
+
+TICK_S = 0.05
+SQUARE = ((0.0, 0.0), (8.0, 0.0), (8.0, 8.0), (0.0, 8.0))
+LINE = ((0.0, 0.0), (8.0, 0.0))
+
+
+class Trip:
+    """One vehicle on one route, with nobody but ``discs`` around."""
+
+    def __init__(
+        self,
+        profile: RobotProfile,
+        route: Route,
+        stations: tuple[Station, ...] = (),
+        discs: tuple[Disc, ...] = (),
+    ) -> None:
+        start = route.pose_at(0)
+        self.route = route
+        self.discs = discs
+        self.vehicle = Vehicle(profile, start)
+        self.follower = Follower(profile, route, start, 0.8, stations)
+        self.now = 0.0
+        self.places: list[Pose2D] = []
+        self.twists: list[Twist2D] = []
+
+    def drive(self, seconds: float) -> "Trip":
+        for _ in range(round(seconds / TICK_S)):
+            self.now += TICK_S
+            wish = self.follower.requested_twist(
+                self.vehicle.pose, self.now, self.discs
+            )
+            self.vehicle.step(wish, TICK_S)
+            self.places.append(self.vehicle.pose)
+            self.twists.append(self.vehicle.twist)
+        return self
+
+    @property
+    def farthest_off(self) -> float:
+        points = self.route.points
+        return max(
+            float(np.hypot(points[:, 0] - p.x, points[:, 1] - p.y).min())
+            for p in self.places
+        )
+
+
+@pytest.mark.parametrize(("profile", "radius"), [(AGI, 0.6), (AGII, 2.3)])
+def test_a_robot_keeps_to_its_route_for_two_rounds(
+    profile: RobotProfile, radius: float
+) -> None:
+    trip = Trip(profile, route_of(SQUARE, radius, True)).drive(90.0)
+
+    driven = sum(abs(twist.linear_x) * TICK_S for twist in trip.twists)
+    assert driven > 50.0
+    assert trip.farthest_off < 0.15
+
+
+def test_agi_turns_on_the_spot_at_the_end_of_its_line_and_comes_back() -> None:
+    trip = Trip(AGI, route_of(LINE, 0.0, False)).drive(22.0)
+
+    assert max(p.x for p in trip.places) > 7.5
+    assert trip.places[-1].x < 6.0
+    assert min(twist.linear_x for twist in trip.twists) >= 0.0
+    assert trip.farthest_off < 0.15
+
+
+def test_agii_reverses_on_a_line_because_it_cannot_turn_there() -> None:
+    trip = Trip(AGII, route_of(LINE, 0.0, False)).drive(30.0)
+
+    assert trip.places[-1].x < 4.0
+    assert min(twist.linear_x for twist in trip.twists) < -0.5
+    assert max(abs(p.yaw) for p in trip.places) < 0.2
+
+
+def test_a_robot_waits_before_a_person_and_goes_on_when_the_way_is_free() -> None:
+    trip = Trip(AGI, route_of(SQUARE, 0.6, True), discs=(Disc(5.0, 0.0, 0.25),))
+    trip.drive(20.0)
+    nose_to_person = 5.0 - 0.25 - (trip.vehicle.pose.x + AGI.length / 2)
+
+    assert trip.vehicle.twist.linear_x < 0.01
+    assert CLEARANCE_M - 0.1 < nose_to_person < CLEARANCE_M + 0.35
+
+    trip.discs = ()
+    trip.drive(5.0)
+    assert trip.vehicle.pose.x > 4.5
+
 
 TESTBED = load_greenhouse("mvsim-20x20")
 STEP_S = 0.1
@@ -82,17 +247,6 @@ def test_a_robot_that_was_on_its_way_to_a_goal_stands_once_it_is_taken_away() ->
     assert drive.away(10.0, 12.0) <= NEAR_M
 
 
-def test_a_robot_on_its_own_route_has_nothing_to_give_up() -> None:
-    drive = Drive()
-    drive.run(12.0)
-    begun = drive.rig.vehicle.pose
-
-    drive.rig.pursue(None, drive.world)
-    drive.run(5.0)
-
-    assert drive.away(begun.x, begun.y) > 1.0
-
-
 def test_a_pause_stands_and_a_return_ends_on_its_own_route() -> None:
     drive = Drive()
     drive.run(14.0)
@@ -124,27 +278,9 @@ def test_a_robot_with_a_turning_radius_knows_its_own_route_alone() -> None:
     assert drive.away(18.0, 10.0) <= NEAR_M
 
 
-def corners(
-    start: tuple[float, float], goal: tuple[float, float]
-) -> Sequence[tuple[float, float]] | None:
-    return way_between(start, goal, Scenery.of(TESTBED), 0.3)
-
-
-def test_a_way_begins_and_ends_where_it_should_and_goes_round_the_rows() -> None:
-    way = corners((2.0, 10.0), (6.0, 10.0))
-
-    assert way is not None
-    assert (way[0], way[-1]) == ((2.0, 10.0), (6.0, 10.0))
-    assert any(y < 3.5 or y > 16.5 for _, y in way)
-
-
 def test_into_a_row_there_is_no_way() -> None:
     row = TESTBED.rows[0]
     middle = (row.xmin + row.xmax) / 2, (row.ymin + row.ymax) / 2
     wide = way_between((2.0, 10.0), middle, Scenery.of(TESTBED), 0.8)
 
     assert wide is None
-
-
-def test_where_it_already_is_a_way_has_one_point() -> None:
-    assert corners((2.0, 10.0), (2.0, 10.0)) == [(2.0, 10.0)]

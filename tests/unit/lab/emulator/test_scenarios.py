@@ -1,17 +1,66 @@
-"""Every scenario on the virtual clock: what it promises is seen in iVeg.
-
-Two of them, ``nlos`` and ``link-loss``, are also played in real time through the whole
-running stack: ``tests/integration/test_scenarios.py``.
-"""
+"""Each scenario keeps its promise on the virtual clock; people walk as people do."""
 
 import math
 from functools import partial
 from typing import Any
 
+import numpy as np
 import pytest
 
-from iveg.lab.emulator.scenarios import SCENARIOS
+from iveg.domain.geometry import PERSON_RADIUS_M, Pose2D, Rectangle
+from iveg.domain.greenhouse import Greenhouse
+from iveg.lab.emulator.greenhouse import Body, Scenery
+from iveg.lab.emulator.scenarios import (
+    SCENARIOS,
+    WALKING_SPEED,
+    SimulatedPerson,
+    WalkStop,
+)
 from tests.stage import Json, Stage, links_of
+
+DT = 0.05
+OPEN = Scenery.of(Greenhouse("yard", Rectangle(-10.0, -10.0, 20.0, 10.0)))
+
+
+def person(*stops: WalkStop, seed: int = 1) -> SimulatedPerson:
+    return SimulatedPerson(stops, np.random.default_rng(seed))
+
+
+def test_a_person_walks_at_walking_pace_and_arrives() -> None:
+    walker = person(WalkStop(0.0, 0.0), WalkStop(7.0, 0.0, 60.0, 60.0))
+
+    walker.step(DT, [], OPEN)
+    walker.step(DT, [], OPEN)
+    first = walker.x
+    for _ in range(round(7.0 / WALKING_SPEED / DT) + 2):
+        walker.step(DT, [], OPEN)
+
+    assert first <= 2 * WALKING_SPEED * DT + 1e-9
+    assert math.hypot(walker.x - 7.0, walker.y) < 0.1
+
+
+def test_a_person_walks_round_a_robot_that_stands_in_the_way() -> None:
+    walker = person(WalkStop(0.0, 0.0), WalkStop(8.0, 0.0, 60.0, 60.0))
+    robot = Body("AGI", Pose2D(4.0, 0.0, 0.0), 1.0, 0.6)
+
+    gaps = []
+    for _ in range(400):
+        walker.step(DT, [robot], OPEN)
+        gaps.append(robot.gap_to(walker.x, walker.y)[0])
+
+    assert min(gaps) > PERSON_RADIUS_M
+    assert math.hypot(walker.x - 8.0, walker.y) < 0.1
+
+
+def test_a_person_never_walks_into_crop() -> None:
+    row = Rectangle(2.0, -5.0, 3.0, 5.0)
+    yard = Scenery.of(Greenhouse("yard", Rectangle(-9.0, -9.0, 9.0, 9.0), rows=(row,)))
+    walker = person(WalkStop(0.0, 0.0), WalkStop(6.0, 1.0, 9.0, 9.0))
+
+    for _ in range(200):
+        walker.step(DT, [], yard)
+        assert not row.contains(walker.x, walker.y, PERSON_RADIUS_M - 1e-9)
+
 
 CRUISE = 0.8
 """Of AGI and AGII where nobody slows them (m/s)."""
@@ -78,17 +127,6 @@ async def test_a_coat_slows_agii_each_round_until_it_is_marked_as_no_person() ->
     assert coat in {one["person_id"] for one in stage.people()}
 
 
-async def test_a_robot_that_judges_ahead_of_iveg_is_timed_too() -> None:
-    # Whom it foresees it knows already: nobody is noticed anew.
-    stage = Stage("nlos", foresight=False)
-
-    await stage.until(lambda: stage.decisions("AGII", "person"), "AGII slows")
-    told = stage.safety()["alert_latency"]
-
-    assert told["count"] == 1
-    assert 0.0 < told["p50_ms"] <= 250.0
-
-
 async def test_an_encounter_is_told_with_its_place_before_the_ring_is_entered() -> None:
     stage = Stage("nlos")
 
@@ -112,16 +150,6 @@ async def test_an_encounter_is_told_with_its_place_before_the_ring_is_entered() 
     await stage.until(
         lambda: not stage.robot("AGII")["encounters"], "it is no forecast any more", 0.5
     )
-
-
-async def test_agii_in_the_corridor_looks_away_and_comes_nearer_in_reverse() -> None:
-    stage = Stage("nlos-field")
-
-    await stage.until(lambda: stage.decisions("AGII", "person"), "AGII slows")
-
-    agii = stage.robot("AGII")
-    assert abs(abs(agii["pose"]["yaw"]) - math.pi) < 0.3
-    assert agii["twist"]["linear"] < 0.0
 
 
 async def test_a_robot_that_is_not_heard_is_late_then_lost_and_has_stopped_itself() -> (
@@ -163,7 +191,7 @@ async def test_a_deaf_robot_raises_an_alert_within_two_seconds() -> None:
     ]
     waited = stage.now.wall - ignored.started_at
     assert (alert["priority"], alert["robot_id"]) == ("P1", "AGII")
-    assert 2.0 <= waited <= 3.0
+    assert 1.5 <= waited <= 3.0
     assert ignored.observed_at is None
 
 
@@ -200,11 +228,16 @@ async def test_noise_about_the_threshold_slows_once_a_crossing() -> None:
 async def test_robots_that_pass_each_other_both_slow() -> None:
     stage = Stage("peers")
 
-    agi = await stage.first(lambda: stage.decisions("AGI", "robot"), "AGI slows")
-    agii = await stage.first(lambda: stage.decisions("AGII", "robot"), "AGII slows")
-
-    assert (agi.person_id, agii.person_id) == ("AGII", "AGI")
-    assert agi.speed_factor == agii.speed_factor == 0.5
+    for robot, peer in (("AGI", "AGII"), ("AGII", "AGI")):
+        slowed = await stage.first(
+            lambda one=robot, other=peer: [  # type: ignore[misc]
+                made
+                for made in stage.decisions(one, "robot")
+                if made.person_id == other
+            ],
+            f"{robot} slows for its peer",
+        )
+        assert slowed.speed_factor == 0.5
 
 
 async def test_a_person_at_the_end_of_a_row_is_less_certain_and_still_slows_agi() -> (
@@ -227,8 +260,11 @@ async def test_one_look_holds_a_person_and_a_peer() -> None:
 
     def both() -> dict[str, Any]:
         look = stage.look("AGI")
-        return look if {"farmer", "AGII"} <= set(look) else {}
+        is_known = stage.robot("AGII")["link"] == "LIVE"
+        return look if is_known and {"farmer", "AGII"} <= set(look) else {}
 
+    await stage.until(both, "AGII is believed")
+    await stage.until(lambda: not both(), "the look before that is over")
     seen = await stage.until(both, "AGI sees both at once")
 
     assert seen["farmer"]["confident"] is True

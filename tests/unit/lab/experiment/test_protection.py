@@ -1,22 +1,19 @@
 """Protection on worlds made by hand: who was near, in view, slowed, and how late."""
 
 from collections.abc import Iterable
-from dataclasses import asdict
 from typing import Any
 
-import orjson
 import pytest
 
-from iveg.lab.experiment.moments import moments_of
 from iveg.lab.experiment.protection import (
     Entry,
     NearMoment,
     NearPerson,
     Protection,
     Sight,
-    whole,
+    moments_of,
+    protection_of,
 )
-from iveg.lab.experiment.protection_scoring import protection_of
 
 STEP_S = 0.5
 
@@ -101,50 +98,12 @@ def test_slow_with_nobody_near_is_needless(
     assert row["needless"] == {"2.3": at_the_ring, "4": far}
 
 
-def test_an_encounter_goes_on_through_a_second_and_begins_anew_after_it() -> None:
-    score = score_of(moment(0), moment(2), moment(5), moment(6, factor=0.5))
-
-    assert score.delays_s == [None, 0.5]
-
-
-def test_two_robots_near_one_person_are_two_encounters() -> None:
-    score = score_of(moment(0), moment(0, robot_id="AGII", factor=0.5))
-
-    assert sorted(score.delays_s, key=str) == [0.0, None]
-
-
-def test_metres_and_delays_of_several_runs_add_up_as_files_have_them() -> None:
-    one = score_of(moment(0), moment(1, factor=0.5))
-    other = score_of(moment(0, factor=0.5))
-    stored = [orjson.loads(orjson.dumps(asdict(run))) for run in (one, other)]
-
-    total = whole(map(Protection.read, stored)).row()
-
-    assert total["driven_m"] == pytest.approx(0.9)
-    assert total["encounters"] == 2
-    assert total["slowed"]["all"] == pytest.approx(2 / 3, 1e-3)
-    assert (total["delay_p50_s"], total["delay_p95_s"]) == (0.25, 0.475)
-
-
 # --- entries --------------------------------------------------------------------------
 
 
 def entered(moments: Iterable[NearMoment], known: str = "in_view") -> Any:
     """Numbers of the entries around people who are known so well."""
     return score_of(*moments).row()["entries"][known]
-
-
-@pytest.mark.parametrize(
-    ("speed", "wanted", "share"), [(0.4, 0.8, 1.0), (0.45, 0.8, 0.0), (0.8, 0.8, 0.0)]
-)
-def test_a_ring_is_entered_slowly_at_half_of_the_wanted_speed(
-    speed: float, wanted: float, share: float
-) -> None:
-    before = [moment(step, 3.0) for step in range(4)]
-    into = moment(4, 1.9, speed=speed, wanted=wanted)
-
-    told = entered([*before, into, moment(5, 1.0)])
-    assert (told["count"], told["slow"]) == (1, share)
 
 
 @pytest.mark.parametrize(
@@ -179,15 +138,6 @@ def test_who_steps_out_and_who_is_unseen_are_told_apart() -> None:
     for moments, known in ((late, "stepped_out"), (unseen, "unseen")):
         assert entered(moments, known)["count"] == 1
         assert entered(moments)["count"] == 0
-
-
-def test_who_was_inside_already_is_no_entry() -> None:
-    assert score_of(*(moment(step, 1.9) for step in range(5))).entries == []
-
-
-def test_a_robot_that_wants_to_stand_enters_nothing() -> None:
-    outside = [moment(step, 3.0) for step in range(5)]
-    assert score_of(*outside, moment(5, 1.5, wanted=0)).entries == []
 
 
 # --- worlds as files have them --------------------------------------------------------
@@ -225,15 +175,6 @@ def test_rows_of_the_truth_become_moments_with_what_any_camera_sees() -> None:
         ("q", "in_view"),
     ]
     assert [one.distance_m for one in last.people] == pytest.approx([1.0, 2**0.5])
-
-
-def test_a_picture_and_a_gap_count_for_a_quarter_of_a_second() -> None:
-    truth = [row("AGII", 0.0, 9.0, ("p",)), row("AGI", 0.0, 1.0), row("AGI", 0.9, 1.0)]
-
-    first, _, last = moments_of(truth)
-
-    assert (first.lasts_s, last.lasts_s) == (0.0, 0.25)
-    assert [one.sight for one in last.people] == ["unseen", "behind_plants"]
 
 
 @pytest.mark.parametrize(

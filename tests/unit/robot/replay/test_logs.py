@@ -1,3 +1,5 @@
+"""Recorded runs as files: JSON lines, and iVeg's own."""
+
 import gzip
 import json
 import logging
@@ -7,14 +9,29 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from iveg.adapters.recordings.incoming import NOTIFICATIONS
+from iveg.adapters.recordings.mcap_file import Channel, McapFile
 from iveg.domain.errors import DataFileError
 from iveg.domain.geometry import Pose2D, Twist2D
-from iveg.domain.observations import Detection, LaserScan, Odometry
-from iveg.robot.replay.logs import LogReader
-from tests import data
+from iveg.domain.observations import DetectionFrame, LaserScan, Odometry
+from iveg.ngsi import codec
+from iveg.robot.replay.logs import LogReader, RecordingEntry
+from iveg.robot.replay.replay import open_recording
+from tests.builders import (
+    START,
+    at,
+    detection,
+    detection_frame,
+    notification,
+    odometry,
+    origin,
+    pose_value,
+    scan,
+)
 from tests.data.recorded import ROBOTS, emulated_logs, real_log
 
-DATA = Path(data.__file__).parent
+# --- logs -------------------------------------------------------------------------
+
 ODOM = '{"t":0,"kind":"odom","x":1,"y":2,"yaw":0.5,"v":0.3,"w":-0.1}'
 
 
@@ -53,27 +70,6 @@ def test_the_offset_of_the_sensor_becomes_its_mount(tmp_path: Path) -> None:
     assert entry.observation.mount == Pose2D(0.2, -0.1, 0.0)
     assert entry.observation.range_min == 0.75
     assert entry.observation.ranges.tolist() == [0.5, math.inf, 7.0]
-
-
-def test_a_detection_is_a_box_in_the_frame_of_the_map(tmp_path: Path) -> None:
-    line = '{"t":1,"kind":"detection","class":"farmer","probability":0.9,"x":5,"y":1}'
-
-    _, entry = LogReader(written(tmp_path, ODOM, line)).entries()
-
-    assert isinstance(entry.observation, Detection)
-    assert entry.observation.frame_id == "map"
-    assert entry.observation.box.centre[:2] == (5.0, 1.0)
-
-
-def test_gzipped_and_plain_logs_read_the_same(tmp_path: Path) -> None:
-    plain = written(tmp_path, ODOM, ODOM)
-    packed = tmp_path / "log.jsonl.gz"
-    packed.write_bytes(gzip.compress(plain.read_bytes()))
-
-    one, other = list(LogReader(plain).entries()), list(LogReader(packed).entries())
-
-    assert one == other
-    assert len(one) == 2
 
 
 @pytest.mark.parametrize(
@@ -119,45 +115,19 @@ def test_an_endless_line_is_one_bad_line(
     assert "line 2 skipped: too_long" in record.getMessage()
 
 
-def test_empty_lines_are_nothing_to_report(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
+MANY = "\n".join(ODOM.replace('"x":1', f'"x":{n}') for n in range(5_000)).encode()
+
+
+@pytest.mark.parametrize("content", [None, ODOM.encode(), gzip.compress(MANY)[:-200]])
+def test_a_file_that_is_missing_not_gzipped_or_cut_short_is_refused(
+    content: bytes | None, tmp_path: Path
 ) -> None:
-    entries = list(LogReader(written(tmp_path, ODOM, "", ODOM)).entries())
-
-    assert len(entries) == 2
-    assert caplog.records == []
-
-
-@pytest.mark.parametrize("name", ["missing.jsonl", "missing.jsonl.gz"])
-def test_a_file_that_is_not_there_is_refused(tmp_path: Path, name: str) -> None:
-    with pytest.raises(DataFileError, match=rf"{name}: cannot be read"):
-        next(LogReader(tmp_path / name).entries())
-
-
-def test_a_file_that_only_looks_gzipped_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "log.jsonl.gz"
-    file.write_text(ODOM, "utf-8")
+    if content is not None:
+        file.write_bytes(content)
 
-    with pytest.raises(DataFileError, match="cannot be read"):
-        next(LogReader(file).entries())
-
-
-def test_a_file_cut_short_is_refused_when_its_end_is_reached(tmp_path: Path) -> None:
-    lines = "\n".join(ODOM.replace('"x":1', f'"x":{n}') for n in range(5_000))
-    file = tmp_path / "log.jsonl.gz"
-    file.write_bytes(gzip.compress(lines.encode())[:-200])
-
-    with pytest.raises(DataFileError, match="cannot be read"):
+    with pytest.raises(DataFileError, match=r"log\.jsonl\.gz: cannot be read"):
         list(LogReader(file).entries())
-
-
-def test_the_synthetic_log_of_these_tests_is_clean(
-    caplog: pytest.LogCaptureFixture,
-) -> None:
-    entries = list(LogReader(DATA / "aisle.jsonl").entries())
-
-    assert len(entries) == 60
-    assert caplog.records == []
 
 
 @pytest.fixture
@@ -172,9 +142,7 @@ def robots_log(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
     ("robots_log", "beams", "lines"),
     [
         ("AGI", 720, 100),
-        ("AGII", 720, 100),
         ("orchard_d1", 897, 1_000),
-        ("orchard_d2", 897, 1_000),
         ("orchard_d3", 897, 1_000),
     ],
     indirect=["robots_log"],
@@ -189,3 +157,96 @@ def test_the_log_of_a_robot_reads_without_a_complaint(
     assert len(scans) * 2 == len(entries) >= lines
     assert {scan.ranges.size for scan in scans} == {beams}
     assert np.isfinite(scans[0].ranges).any()
+
+
+# --- own --------------------------------------------------------------------------
+
+MOUNT = Pose2D(0.0, 0.0, 0.0)
+
+
+def measure(topic: str) -> Channel:
+    return Channel(topic, "iveg.Measure")
+
+
+OWN_ODOM = measure("/iveg/AGI_odom/attrs")
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "2026-11-24T08-00-00Z.mcap"
+
+
+def entries(path: Path) -> list[RecordingEntry]:
+    return list(open_recording(path, MOUNT)())
+
+
+def pose(x: float, seq: int, robot_id: str = "AGI") -> bytes:
+    return codec.write_odometry(odometry(robot_id, x, origin=origin(seq)))
+
+
+def test_a_robot_is_played_from_either_transport_and_each_message_once(
+    path: Path,
+) -> None:
+    file = McapFile(path, START)
+    copy = notification({"base_pose_ground_truth": pose_value(x=1.0, seq=1)})
+    file.add(NOTIFICATIONS, at(1.0), copy)
+    file.add(OWN_ODOM, at(1.1), pose(1.0, 1))
+    file.add(measure("/AGI/iveg/odom"), at(1.2), pose(2.0, 2))
+    file.add(OWN_ODOM, at(1.3), pose(2.0, 2))
+    seen = detection_frame("AGI", detection(x=3.0), origin=origin(1))
+    boxes = measure("/iveg/AGI_yolox_bounding_boxes/attrs")
+    file.add(boxes, at(1.4), codec.write_detections(seen))
+    swept = measure("/iveg/AGI_lidar2D/attrs")
+    file.add(swept, at(1.5), codec.write_scan(scan(origin=origin(1))))
+    file.add(OWN_ODOM, at(1.6), b"no JSON")
+    file.finish()
+
+    found = entries(path)
+    kinds = [type(one.observation) for one in found]
+    assert kinds == [Odometry, Odometry, DetectionFrame, LaserScan]
+    assert [round(one.at, 6) for one in found] == [0.0, 0.2, 0.4, 0.5]
+    xs = [one.observation.pose.x for one in found[:2]]  # type: ignore[union-attr]
+    assert xs == [1.0, 2.0]
+
+
+def test_of_several_robots_one_is_named(path: Path) -> None:
+    file = McapFile(path, START)
+    for n, robot_id in enumerate(("AGI", "AGII")):
+        topic = measure(f"/iveg/{robot_id}_odom/attrs")
+        file.add(topic, at(n), pose(n, 1, robot_id))
+    file.finish()
+
+    with pytest.raises(DataFileError, match=r"holds AGI, AGII: name one"):
+        entries(path)
+    (only,) = entries(path.with_name(path.name + "#AGII"))
+    assert only.observation.robot_id == "AGII"  # type: ignore[union-attr]
+    with pytest.raises(DataFileError, match="no odometry"):
+        entries(path.with_name(path.name + "#D1"))
+
+
+def test_what_this_iveg_cannot_read_is_told_as_that(path: Path) -> None:
+    file = McapFile(path, START)
+    file.add(OWN_ODOM, at(0.0), b'{"in_a_newer_format": 1}')
+    file.finish()
+    with pytest.raises(DataFileError, match="nothing of a robot that this iVeg can"):
+        entries(path)
+
+    magic = bytearray(path.read_bytes())
+    magic[5] = ord("9")
+    path.write_bytes(magic)
+    with pytest.raises(DataFileError, match="no recording of iVeg's that can be read"):
+        entries(path.with_name(path.name + "#AGI"))
+
+
+def test_one_that_breaks_off_says_so_after_what_can_be_read(path: Path) -> None:
+    file = McapFile(path, START)
+    file.add(OWN_ODOM, at(0.0), pose(1.0, 1))
+    file.settle()
+    left = path.read_bytes()
+    file.finish()
+    path.write_bytes(left)
+
+    entries_left = open_recording(path, MOUNT)()
+    assert isinstance(next(entries_left).observation, Odometry)
+    with pytest.raises(DataFileError, match="breaks off"):
+        next(entries_left)

@@ -8,8 +8,9 @@ import numpy as np
 from iveg.domain.observations import Instant, Observation
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.inputs import SensorInputs
-from iveg.ros2 import cdr, geometry_msgs, nav_msgs, sensor_msgs, std_msgs, vision_msgs
-from iveg.ros2.schema import Message
+from iveg.ros2 import cdr
+from iveg.ros2 import messages as ros
+from iveg.ros2.messages import Message
 
 WALL = 1_700_000_000.0
 MONO = 1000.0
@@ -19,12 +20,12 @@ def at(seconds: float) -> Instant:
     return Instant(MONO + seconds, WALL + seconds)
 
 
-def stamp(seconds: float = 0.0) -> std_msgs.Time:
-    return std_msgs.Time.of(WALL + seconds)
+def stamp(seconds: float = 0.0) -> ros.Time:
+    return ros.Time.of(WALL + seconds)
 
 
-def turned(yaw: float) -> geometry_msgs.Quaternion:
-    return geometry_msgs.Quaternion(z=math.sin(yaw / 2), w=math.cos(yaw / 2))
+def turned(yaw: float) -> ros.Quaternion:
+    return ros.Quaternion(z=math.sin(yaw / 2), w=math.cos(yaw / 2))
 
 
 def link(
@@ -36,15 +37,13 @@ def link(
     *,
     after: float = 0.0,
     z: float = 0.0,
-) -> geometry_msgs.TransformStamped:
-    transform = geometry_msgs.Transform(geometry_msgs.Vector3(x, y, z), turned(yaw))
-    return geometry_msgs.TransformStamped(
-        std_msgs.Header(stamp(after), outer), inner, transform
-    )
+) -> ros.TransformStamped:
+    transform = ros.Transform(ros.Vector3(x, y, z), turned(yaw))
+    return ros.TransformStamped(ros.Header(stamp(after), outer), inner, transform)
 
 
-def tf(*links: geometry_msgs.TransformStamped) -> geometry_msgs.TFMessage:
-    return geometry_msgs.TFMessage(links)
+def tf(*links: ros.TransformStamped) -> ros.TFMessage:
+    return ros.TFMessage(links)
 
 
 def odometry(
@@ -54,14 +53,12 @@ def odometry(
     after: float = 0.0,
     child: str = "base_link",
     w: float = 0.0,
-) -> nav_msgs.Odometry:
-    return nav_msgs.Odometry(
-        std_msgs.Header(stamp(after), "odom"),
+) -> ros.Odometry:
+    return ros.Odometry(
+        ros.Header(stamp(after), "odom"),
         child,
-        geometry_msgs.PoseWithCovariance(geometry_msgs.Pose(geometry_msgs.Point(x))),
-        geometry_msgs.TwistWithCovariance(
-            geometry_msgs.Twist(geometry_msgs.Vector3(v), geometry_msgs.Vector3(z=w))
-        ),
+        ros.PoseWithCovariance(ros.Pose(ros.Point(x))),
+        ros.TwistWithCovariance(ros.Twist(ros.Vector3(v), ros.Vector3(z=w))),
     )
 
 
@@ -70,9 +67,9 @@ def scan(
     *,
     after: float = 0.0,
     frame: str = "laser",
-) -> sensor_msgs.LaserScan:
-    return sensor_msgs.LaserScan(
-        std_msgs.Header(stamp(after), frame),
+) -> ros.LaserScan:
+    return ros.LaserScan(
+        ros.Header(stamp(after), frame),
         -0.5, 0.5, 0.5, 0.0, 0.1, 0.1, 20.0,
         np.array(ranges, np.float32),
     )  # fmt: skip
@@ -85,25 +82,17 @@ def seen(
     *,
     frame: str = "base_link",
     after: float = 0.0,
-) -> vision_msgs.Detection3D:
-    sure = vision_msgs.ObjectHypothesisWithPose(
-        vision_msgs.ObjectHypothesis(class_id, score)
+) -> ros.Detection3D:
+    sure = ros.ObjectHypothesisWithPose(ros.ObjectHypothesis(class_id, score))
+    box = ros.BoundingBox3D(
+        ros.Pose(ros.Point(x, 0.0, 0.9)),
+        ros.Vector3(0.4, 0.6, 1.8),
     )
-    box = vision_msgs.BoundingBox3D(
-        geometry_msgs.Pose(geometry_msgs.Point(x, 0.0, 0.9)),
-        geometry_msgs.Vector3(0.4, 0.6, 1.8),
-    )
-    return vision_msgs.Detection3D(
-        std_msgs.Header(stamp(after), frame), (sure,), box, "7"
-    )
+    return ros.Detection3D(ros.Header(stamp(after), frame), (sure,), box, "7")
 
 
-def look(
-    *found: vision_msgs.Detection3D, after: float = 0.0
-) -> vision_msgs.Detection3DArray:
-    return vision_msgs.Detection3DArray(
-        std_msgs.Header(stamp(after), "base_link"), found
-    )
+def look(*found: ros.Detection3D, after: float = 0.0) -> ros.Detection3DArray:
+    return ros.Detection3DArray(ros.Header(stamp(after), "base_link"), found)
 
 
 class Bench:

@@ -1,255 +1,277 @@
-"""``iveg robot check`` says in one sentence each what is missing."""
+"""What endpoints on DDS tell a gate, and the check."""
 
 from dataclasses import replace
 
 import pytest
 
-from iveg.robot.ros2.checking import Heard, judge
+from iveg.domain.observations import RobotFault
+from iveg.robot.ros2.checking import (
+    CheckRow,
+    Lookout,
+    Traffic,
+    forms_published,
+    judge,
+    lines,
+)
 from iveg.robot.ros2.config import DriveConfig, RobotConfig
-from iveg.robot.ros2.transforms import TransformBuffer
-from iveg.robot.ros2.verdict import CheckVerdict, lines
+from iveg.robot.ros2.reading import InputFaults, speed_of
 from iveg.ros2 import detector_messages as d
-from iveg.ros2 import geometry_msgs, nav_msgs, sensor_msgs
+from iveg.ros2 import messages as ros
+from iveg.ros2.cdr import type_hash
 from iveg.ros2.names import DEFAULT, SENSOR_DATA, TF, TF_STATIC, Endpoint
-from iveg.ros2.type_hash import type_hash
 from tests.fakes.ros2_network import endpoint
-from tests.unit.robot.ros2.said import WALL, link, tf
+
+# --- lookout ----------------------------------------------------------------------
+
+BASE = endpoint("/cmd_vel", ros.Twist, writes=False)
+STAMPED_BASE = endpoint("/cmd_vel", ros.TwistStamped, writes=False)
+
+
+def faults(
+    *others: Endpoint,
+    config: RobotConfig | None = None,
+    after: float = 0.0,
+    unheard: tuple[str, ...] = (),
+) -> dict[str, str]:
+    """Code → what about, ``after`` seconds of these endpoints."""
+    noted = InputFaults()
+    lookout = Lookout(config or RobotConfig(), noted, 100.0)
+    lookout.look(others, unheard, 100.0)
+    lookout.look(others, unheard, 100.0 + after)
+    return {one.code: one.about for one in noted.faults(100.0 + after)}
+
+
+def test_a_base_that_hears_the_gate_is_no_fault() -> None:
+    assert faults(BASE, after=60.0) == {}
+
+
+@pytest.mark.parametrize(
+    ("base", "config", "about"),
+    [
+        (
+            STAMPED_BASE,
+            RobotConfig(),
+            "/cmd_vel: Twist → TwistStamped",
+        ),
+        (
+            BASE,
+            RobotConfig(
+                qualities={**RobotConfig().qualities, "cmd_vel_out": SENSOR_DATA}
+            ),
+            "/cmd_vel: best effort → reliable",
+        ),
+    ],
+)
+def test_a_base_that_cannot_hear_the_gate_is_named_at_once(
+    base: Endpoint, config: RobotConfig, about: str
+) -> None:
+    assert faults(base, config=config) == {"drive_unheard": about}
+
+
+def test_a_drive_on_which_nobody_listens_is_named_after_discovery() -> None:
+    odometry = endpoint("/odom", ros.Odometry)
+
+    assert faults(odometry, after=4.0) == {}
+    assert faults(odometry, after=5.5) == {"drive_unheard": "/cmd_vel"}
+
+
+@pytest.mark.parametrize(
+    ("others", "unheard", "code"),
+    [
+        ((), (), "nobody_there"),
+        ((endpoint("/odom", ros.Odometry),), (), "drive_unheard"),
+        ((BASE,), ("wlan0",), "network_unheard"),
+    ],
+)
+def test_a_gate_that_is_blind_halves_the_speed(
+    others: tuple[Endpoint, ...], unheard: tuple[str, ...], code: str
+) -> None:
+    noted = InputFaults()
+    lookout = Lookout(RobotConfig(), noted, 100.0)
+
+    lookout.look(others, unheard, 105.5)
+
+    assert speed_of(noted.faults(105.5)) == (0.5, code)
+
+
+def test_a_topic_of_a_type_that_is_not_read_is_named_with_it() -> None:
+    scan = endpoint("/scan", ros.PointCloud2)
+
+    assert faults(BASE, scan) == {"wrong_type": "/scan: sensor_msgs/PointCloud2"}
+
+
+@pytest.mark.parametrize(
+    "message", [ros.Detection3DArray, d.BoundingBoxes3d, d.DetectionArray]
+)
+def test_a_detector_of_a_family_that_is_read_is_no_fault(message: type) -> None:
+    assert faults(BASE, endpoint("/detections_3d", message)) == {}
+
+
+def test_who_announces_fields_is_heard_by_each_definition() -> None:
+    seen = [replace(endpoint("/boxes", d.BoundingBoxes), typed=True)]
+
+    assert forms_published("detections_2d", "/boxes", seen) == [
+        (d.NumberedBoundingBoxes, False),
+        (d.BoundingBoxes, False),
+    ]
+
+
+# --- checking ---------------------------------------------------------------------
 
 WHOLE = {
-    "odometry": endpoint("/odom", nav_msgs.Odometry),
-    "scan": endpoint("/scan", sensor_msgs.LaserScan, qos=SENSOR_DATA),
-    "tf": endpoint("/tf", geometry_msgs.TFMessage, qos=TF),
-    "tf_static": endpoint("/tf_static", geometry_msgs.TFMessage, qos=TF_STATIC),
-    "wishes": endpoint("/cmd_vel_nav", geometry_msgs.Twist),
-    "base": endpoint("/cmd_vel", geometry_msgs.Twist, writes=False),
+    "odometry": endpoint("/odom", ros.Odometry),
+    "scan": endpoint("/scan", ros.LaserScan, qos=SENSOR_DATA),
+    "tf": endpoint("/tf", ros.TFMessage, qos=TF),
+    "tf_static": endpoint("/tf_static", ros.TFMessage, qos=TF_STATIC),
+    "seen": endpoint("/detections_3d", ros.Detection3DArray),
+    "wishes": endpoint("/cmd_vel_nav", ros.Twist),
+    "base": endpoint("/cmd_vel", ros.Twist, writes=False),
 }
+RATES = {"odometry": 30.0, "scan": 10.0, "tf": 30.0, "detections_3d": 10.0}
 FOREIGN = Endpoint("/detections_3d", "darknet_msgs/msg/Boxes", True, DEFAULT, False)
+YOLACT = endpoint("/detections_3d", d.BoundingBoxes3d)
+CAMERA = RobotConfig(topics={**RobotConfig().topics, "detections_2d": "boxes"})
 
 
-def tree(*, localised: bool = True) -> TransformBuffer:
-    found = TransformBuffer(0.5)
-    found.add(tf(link("base_link", "laser")), static=True)
-    found.add(tf(link("odom", "base_link")), static=False)
-    if localised:
-        found.add(tf(link("map", "odom")), static=False)
-    return found
-
-
-def heard(**differs: int) -> dict[str, Heard]:
-    counts = {"odometry": 90, "scan": 30, "tf": 90, "tf_static": 1} | differs
-    return {
-        topic: Heard(count, 0, 0.02, "laser" if topic == "scan" else "odom")
-        for topic, count in counts.items()
-    }
-
-
-def verdict(
+def wrong(
     *more: Endpoint,
     without: str = "",
     config: RobotConfig | None = None,
-    said: dict[str, Heard] | None = None,
-    buffer: TransformBuffer | None = None,
-    broker: str | None = None,
-    stamp: float = WALL,
-) -> CheckVerdict:
+    faults: tuple[RobotFault, ...] = (),
+    has_detector: bool = True,
+    **rates: float,
+) -> dict[str, str]:
+    """Topic → verdict, of those that have one."""
+    rows = judged(*more, without=without, config=config, faults=faults,
+                  has_detector=has_detector, **rates)  # fmt: skip
+    return {row.topic: row.verdict for row in rows if row.verdict}
+
+
+def judged(
+    *more: Endpoint,
+    without: str = "",
+    config: RobotConfig | None = None,
+    faults: tuple[RobotFault, ...] = (),
+    has_detector: bool = True,
+    **rates: float,
+) -> tuple[CheckRow, ...]:
     endpoints = [one for name, one in WHOLE.items() if name != without]
     return judge(
         config or RobotConfig(),
         [*endpoints, *more],
-        said or heard(),
-        buffer or tree(),
-        seconds=3.0,
-        stamp=stamp,
-        broker=broker,
+        {key: Traffic(rate, "odom") for key, rate in (RATES | rates).items()},
+        faults,
         robot_id="AGI",
+        has_detector=has_detector,
     )
 
 
-def test_a_robot_that_has_everything_misses_nothing() -> None:
-    found = verdict()
+def test_a_robot_that_has_everything_has_a_row_for_each_topic() -> None:
+    rows = judged()
 
-    assert found.missing == ()
-    assert found.chain == "map → odom → base_link → laser"
-    odometry = next(row for row in found.rows if row.topic == "/odom")
-    assert (odometry.writers, odometry.rate_hz, odometry.age_s) == (1, 30.0, 0.02)
-    assert lines(found)[-1] == "Nothing is missing."
+    assert wrong() == {}
+    assert rows[0] == CheckRow(
+        "/odom", "nav_msgs/msg/Odometry", 1, 30.0, "reliable", "odom"
+    )
+    assert lines(rows)[1].split() == [
+        "/odom", "nav_msgs/msg/Odometry", "1", "30.0", "reliable", "odom", "ok"
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize(
-    ("found", "sentence"),
+    ("found", "topic", "verdict"),
     [
-        (
-            verdict(without="odometry"),
-            "Nobody publishes /odom (nav_msgs/msg/Odometry): without it the robot "
-            "stands.",
-        ),
-        (
-            verdict(without="base"),
-            "Nobody listens on /cmd_vel: is the base running?",
-        ),
-        (
-            verdict(without="wishes"),
-            "Nobody publishes /cmd_vel_nav: is navigation running?",
-        ),
-        (
-            verdict(endpoint("/cmd_vel", geometry_msgs.Twist)),
-            "Somebody else publishes /cmd_vel: only the gate may, remap it to "
-            "/cmd_vel_nav.",
-        ),
-        (
-            verdict(endpoint("/cmd_vel_nav", geometry_msgs.Twist, writes=False)),
-            "Somebody listens on /cmd_vel_nav beside the gate: a base that does goes "
-            "round it.",
-        ),
-        (
-            verdict(endpoint("/scan", sensor_msgs.PointCloud2), without="scan"),
-            "/scan is sensor_msgs/msg/PointCloud2, not sensor_msgs/msg/LaserScan.",
-        ),
-        (
-            verdict(
-                endpoint("/tf", geometry_msgs.TFMessage, qos=SENSOR_DATA), without="tf"
-            ),
-            "/tf: asked for reliably, published best effort; qos.tf.reliable = false.",
-        ),
-        (
-            verdict(
-                endpoint("/tf_static", geometry_msgs.TFMessage), without="tf_static"
-            ),
-            "/tf_static: asked for transient local, published volatile; "
-            "qos.tf_static.transient_local = false.",
-        ),
-        (
-            verdict(said=heard(odometry=3)),
-            "/odom has a publisher and comes 1.0 times a second.",
-        ),
-        (
-            verdict(buffer=tree(localised=False)),
-            "TF: no map → odom.",
-        ),
-        (
-            verdict(config=RobotConfig(drive=DriveConfig(stamped_out=True))),
-            "/cmd_vel is geometry_msgs/msg/Twist there: drive.stamped_out.",
-        ),
-        (
-            verdict(config=RobotConfig(drive=DriveConfig(stamped_in=True))),
-            "/cmd_vel_nav is geometry_msgs/msg/Twist there: drive.stamped_in.",
-        ),
-        (verdict(broker="No MQTT broker answers."), "No MQTT broker answers."),
-        (
-            verdict(endpoint("/odom", sensor_msgs.PointCloud2)),
-            "/odom is published as nav_msgs/msg/Odometry and as "
-            "sensor_msgs/msg/PointCloud2: one may be right.",
-        ),
-        (
-            verdict(replace(endpoint("/cmd_vel", geometry_msgs.Twist), gate="AGII")),
-            "The gate of AGII publishes /cmd_vel: only the gate may, remap it to "
-            "/cmd_vel_nav.",
-        ),
-        (
-            verdict(
-                endpoint("/cmd_vel", geometry_msgs.Twist, writes=False, qos=TF_STATIC),
-                without="base",
-            ),
-            "/cmd_vel, offered → asked: volatile → transient local; qos.cmd_vel_out.",
-        ),
-        (
-            verdict(endpoint("/yolact_coordinate", d.BoundingBoxes3d)),
-            "/yolact_coordinate is a detector's "
-            "(gb_visual_detection_3d_msgs/msg/BoundingBoxes3d): topics.detections_3d.",
-        ),
-        (
-            verdict(endpoint("/yolox/bounding_box", d.BoundingBoxes)),
-            "/yolox/bounding_box is a detector's (bboxes_ex_msgs/msg/BoundingBoxes): "
-            "topics.detections_2d.",
-        ),
-        (
-            verdict(endpoint("/yolo/tracking", d.DetectionArray)),
-            "/yolo/tracking is a detector's (yolo_msgs/msg/DetectionArray): "
-            "topics.detections_3d or topics.detections_2d.",
-        ),
-        (
-            verdict(replace(FOREIGN, type_hash="RIHS01_12")),
-            "/detections_3d is darknet_msgs/msg/Boxes (RIHS01_12), not "
-            "vision_msgs/msg/Detection3DArray or "
-            "gb_visual_detection_3d_msgs/msg/BoundingBoxes3d or "
-            "yolo_msgs/msg/DetectionArray.",
-        ),
-        (
-            verdict(
-                replace(
-                    endpoint("/detections_3d", d.BoundingBoxes3d), type_hash="RIHS01_12"
-                )
-            ),
-            "/detections_3d is another gb_visual_detection_3d_msgs/msg/BoundingBoxes3d:"
-            f" RIHS01_12 there, {type_hash(d.BoundingBoxes3d)} here (std_msgs/Header "
-            "header, gb_visual_detection_3d_msgs/BoundingBox3d[] bounding_boxes).",
-        ),
+        (wrong(without="odometry"), "/odom",
+         "nobody publishes it (nav_msgs/msg/Odometry)"),
+        (wrong(without="base"), "/cmd_vel", "drive_unheard"),
+        (wrong(without="wishes"), "/cmd_vel_nav",
+         "nobody publishes it (geometry_msgs/msg/Twist)"),
+        (wrong(endpoint("/cmd_vel", ros.Twist)), "/cmd_vel",
+         "second_publisher"),
+        (wrong(replace(endpoint("/cmd_vel", ros.Twist), gate="AGII")),
+         "/cmd_vel", "second_publisher"),
+        (wrong(endpoint("/cmd_vel_nav", ros.Twist, writes=False)),
+         "/cmd_vel_nav",
+         "somebody listens beside the gate: a base would go round it"),
+        (wrong(endpoint("/scan", ros.PointCloud2), without="scan"),
+         "/scan", "wrong_type (sensor_msgs/PointCloud2)"),
+        (wrong(endpoint("/tf", ros.TFMessage, qos=SENSOR_DATA)),
+         "/tf", "another quality of service is asked for: qos.tf"),
+        (wrong(endpoint("/tf_static", ros.TFMessage)), "/tf_static",
+         "another quality of service is asked for: qos.tf_static"),
+        (wrong(odometry=1.0), "/odom", "slow"),
+        (wrong(detections_3d=0.0), "/detections_3d", "silent"),
+        (wrong(without="seen"), "/detections_3d",
+         "nobody publishes it (vision_msgs/msg/Detection3DArray)"),
+        (wrong(faults=(RobotFault("unreadable", "/detections_3d: a/B", 1.0),)),
+         "/detections_3d", "unreadable (a/B)"),
+        (wrong(faults=(RobotFault("no_returns", "/scan", 1.0),)), "/scan",
+         "no_returns"),
+        (wrong(faults=(RobotFault("no_transform", "map → odom", 1.0),)),
+         "map → odom", "no_transform"),
+        (wrong(config=RobotConfig(drive=DriveConfig(stamped_in=True))),
+         "/cmd_vel_nav", "not geometry_msgs/msg/TwistStamped: drive.stamped_in"),
+        (wrong(endpoint("/cmd_vel", ros.Twist, writes=False, qos=TF_STATIC),
+               without="base"), "/cmd_vel",
+         "drive_unheard (volatile → transient local)"),
+        (wrong(endpoint("/yolox/bounding_box", d.BoundingBoxes), without="seen",
+               has_detector=False), "/yolox/bounding_box",
+         "a detector's: topics.detections_2d"),
+        (wrong(FOREIGN, without="seen"), "/detections_3d",
+         "wrong_type (darknet_msgs/Boxes)"),
+        (wrong(replace(YOLACT, type_hash="RIHS01_12"), without="seen"),
+         "/detections_3d",
+         f"other fields: RIHS01_12 there, {type_hash(d.BoundingBoxes3d)} here"),
     ],
-    ids=lambda value: value if isinstance(value, str) else "",
-)
-def test_what_is_missing_is_said_in_one_sentence(
-    found: CheckVerdict, sentence: str
+)  # fmt: skip
+def test_what_is_wrong_is_said_beside_its_topic_alone(
+    found: dict[str, str], topic: str, verdict: str
 ) -> None:
-    assert list(found.missing) == [sentence]
+    assert found == {topic: verdict}
 
 
-def test_a_domain_where_nobody_is_says_so_once() -> None:
-    found = judge(
+def test_boxes_in_a_picture_need_its_depth() -> None:
+    boxes = endpoint("/boxes", d.BoundingBoxes)
+    other = replace(boxes, type_hash=type_hash(d.NumberedBoundingBoxes))
+
+    found = wrong(boxes, other, without="seen", config=CAMERA, detections_2d=5.0)
+
+    assert found == {
+        "/camera/aligned_depth_to_color/image_raw": (
+            "nobody publishes it (sensor_msgs/msg/Image)"
+        ),
+        "/camera/color/camera_info": (
+            "nobody publishes it (sensor_msgs/msg/CameraInfo)"
+        ),
+    }
+
+
+def test_a_domain_where_nobody_is_and_an_interface_that_hears_none_are_told() -> None:
+    own = endpoint("/cmd_vel", ros.Twist, own=True)
+
+    rows = judge(
         RobotConfig(domain=7),
-        [endpoint("/cmd_vel", geometry_msgs.Twist, own=True)],
+        [own],
         {},
-        TransformBuffer(),
-        seconds=3.0,
-        stamp=WALL,
-        broker=None,
+        (),
+        robot_id="AGI",
+        has_detector=True,
+        unheard=["eth1"],
     )
 
-    (sentence,) = found.missing
-    assert "DDS domain 7" in sentence
+    told = {row.topic: row.verdict for row in rows}
+    assert (told["DDS 7"], told["eth1"]) == ("nobody_there", "network_unheard")
+    assert told["/odom"] == "nobody publishes it (nav_msgs/msg/Odometry)"
 
 
-def test_without_odometry_transforms_are_not_called_missing() -> None:
-    counts = heard()
-    del counts["odometry"]
-
-    found = verdict(without="odometry", said=counts, stamp=0.0)
-
-    assert [one for one in found.missing if one.startswith("TF")] == []
-    assert len(found.missing) == 1
-
-
-def test_without_odometry_a_broken_chain_is_still_told() -> None:
-    found = verdict(buffer=tree(localised=False), stamp=0.0)
-
-    assert found.missing == ("TF: no map → odom.",)
-
-
-def test_beside_the_running_gate_the_check_knows_it() -> None:
+def test_beside_the_running_gate_only_others_are_told() -> None:
     gate = [
-        replace(endpoint("/cmd_vel", geometry_msgs.Twist), gate="AGI"),
-        replace(
-            endpoint("/cmd_vel_nav", geometry_msgs.Twist, writes=False), gate="AGI"
-        ),
-        replace(endpoint("/iveg/obstacles", sensor_msgs.PointCloud2), gate="AGI"),
+        replace(endpoint("/cmd_vel", ros.Twist), gate="AGI"),
+        replace(endpoint("/cmd_vel_nav", ros.Twist, writes=False), gate="AGI"),
+        replace(endpoint("/iveg/obstacles", ros.PointCloud2), gate="AGI"),
     ]
 
-    found = verdict(*gate)
-
-    assert (found.missing, found.gate) == ((), "AGI")
-    assert "The gate of AGI is running." in lines(found)
-
-
-def test_a_second_publisher_beside_the_running_gate_is_still_told() -> None:
-    gate = replace(endpoint("/cmd_vel", geometry_msgs.Twist), gate="AGI")
-
-    (sentence,) = verdict(gate, endpoint("/cmd_vel", geometry_msgs.Twist)).missing
-
-    assert sentence.startswith("Somebody else publishes /cmd_vel")
-
-
-def test_a_detector_that_the_file_names_makes_others_none_of_its_business() -> None:
-    named = endpoint("/detections_3d", d.BoundingBoxes3d)
-
-    assert verdict(named, endpoint("/yolox/bounding_box", d.BoundingBoxes)) == (
-        verdict(named)
-    )
+    assert wrong(*gate) == {}
+    assert wrong(*gate, endpoint("/cmd_vel", ros.Twist)) == {
+        "/cmd_vel": "second_publisher"
+    }

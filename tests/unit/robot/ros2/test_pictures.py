@@ -7,9 +7,9 @@ import pytest
 
 from iveg.domain.errors import UnreadableError
 from iveg.domain.observations import DetectionFrame
-from iveg.robot.ros2 import pictures
+from iveg.robot.ros2 import detections
 from iveg.robot.ros2.config import RobotConfig
-from iveg.ros2 import geometry_msgs, sensor_msgs, std_msgs, vision_msgs
+from iveg.ros2 import messages as ros
 from tests.unit.robot.ros2 import said
 from tests.unit.robot.ros2.said import Bench, tf
 
@@ -24,12 +24,12 @@ TOPICS = {
 }
 
 
-def info(**differs: float) -> sensor_msgs.CameraInfo:
+def info(**differs: float) -> ros.CameraInfo:
     p = np.zeros(12)
     p[0], p[5] = differs.get("fx", FOCAL), differs.get("fy", FOCAL)
     p[2], p[6], p[10] = (WIDTH - 1) / 2, (HEIGHT - 1) / 2, 1.0
-    header = std_msgs.Header(said.stamp(), "camera_optical")
-    return sensor_msgs.CameraInfo(header, HEIGHT, WIDTH, p=p)
+    header = ros.Header(said.stamp(), "camera_optical")
+    return ros.CameraInfo(header, HEIGHT, WIDTH, p=p)
 
 
 def scene() -> np.ndarray:
@@ -41,45 +41,39 @@ def scene() -> np.ndarray:
 
 def image(
     pixels: np.ndarray, encoding: str, kind: str, *, big: bool = False, pad: int = 0
-) -> sensor_msgs.Image:
+) -> ros.Image:
     rows = np.ascontiguousarray(pixels.astype((">" if big else "<") + kind))
     raw = np.frombuffer(rows.tobytes(), np.uint8).reshape(pixels.shape[0], -1)
     raw = np.pad(raw, ((0, 0), (0, pad)))
-    header = std_msgs.Header(said.stamp(), "camera_optical")
-    return sensor_msgs.Image(
+    header = ros.Header(said.stamp(), "camera_optical")
+    return ros.Image(
         header, HEIGHT, WIDTH, encoding, int(big), raw.shape[1], raw.reshape(-1)
     )
 
 
-def depth() -> sensor_msgs.Image:
+def depth() -> ros.Image:
     return image(scene() * 1000, "16UC1", "u2")
 
 
-def box(score: float = 0.9, x: float = 32.0) -> vision_msgs.Detection2D:
-    sure = vision_msgs.ObjectHypothesisWithPose(
-        vision_msgs.ObjectHypothesis("farmer", score)
-    )
-    place = vision_msgs.PicturePose(vision_msgs.Point2D(x, 25.0))
-    return vision_msgs.Detection2D(
-        std_msgs.Header(), (sure,), vision_msgs.BoundingBox2D(place, 20.0, 34.0), ""
+def box(score: float = 0.9, x: float = 32.0) -> ros.Detection2D:
+    sure = ros.ObjectHypothesisWithPose(ros.ObjectHypothesis("farmer", score))
+    place = ros.PicturePose(ros.Point2D(x, 25.0))
+    return ros.Detection2D(
+        ros.Header(), (sure,), ros.BoundingBox2D(place, 20.0, 34.0), ""
     )
 
 
-def look(*boxes: vision_msgs.Detection2D) -> vision_msgs.Detection2DArray:
-    return vision_msgs.Detection2DArray(
-        std_msgs.Header(said.stamp(), "camera_optical"), boxes
-    )
+def look(*boxes: ros.Detection2D) -> ros.Detection2DArray:
+    return ros.Detection2DArray(ros.Header(said.stamp(), "camera_optical"), boxes)
 
 
 def bench() -> Bench:
     """A camera 1 m above the floor, 10 m east of map's origin, looking east."""
     found = Bench(RobotConfig(topics=TOPICS), tree=False)
-    optical = geometry_msgs.Quaternion(-0.5, 0.5, -0.5, 0.5)
-    place = geometry_msgs.Transform(geometry_msgs.Vector3(10.0, 0.0, 1.0), optical)
-    header = std_msgs.Header(said.stamp(), "map")
-    found.hear(
-        "tf_static", tf(geometry_msgs.TransformStamped(header, "camera_optical", place))
-    )
+    optical = ros.Quaternion(-0.5, 0.5, -0.5, 0.5)
+    place = ros.Transform(ros.Vector3(10.0, 0.0, 1.0), optical)
+    header = ros.Header(said.stamp(), "map")
+    found.hear("tf_static", tf(ros.TransformStamped(header, "camera_optical", place)))
     return found
 
 
@@ -142,40 +136,6 @@ def test_a_look_whose_depth_never_comes_counts_everybody_as_lost() -> None:
     assert one.faults(0.4)["no_depth"] == "/boxes"
 
 
-def test_a_camera_without_a_place_counts_everybody_as_lost() -> None:
-    one = Bench(RobotConfig(topics=TOPICS), tree=False).hear("depth", depth())
-
-    found = grounded(one.hear("camera_info", info()).hear("detections_2d", look(box())))
-
-    assert len(found.unread) == 1
-    assert one.faults()["no_transform"] == "map → camera_optical"
-
-
-def test_an_empty_look_needs_no_depth() -> None:
-    one = bench().hear("depth", depth()).hear("camera_info", info())
-
-    found = grounded(one.hear("detections_2d", look()))
-
-    assert (found.detections, len(found.unread)) == ((), 0)
-
-
-def test_who_is_not_sure_enough_is_left_out_and_not_lost() -> None:
-    one = bench().hear("depth", depth()).hear("camera_info", info())
-
-    found = grounded(one.hear("detections_2d", look(box(0.4))))
-
-    assert (found.detections, len(found.unread)) == ((), 0)
-
-
-@pytest.mark.parametrize("x", [math.nan, -500.0])
-def test_a_box_that_lies_nowhere_is_lost(x: float) -> None:
-    one = bench().hear("depth", depth()).hear("camera_info", info())
-
-    found = grounded(one.hear("detections_2d", look(box(x=x))))
-
-    assert len(found.unread) == 1
-
-
 @pytest.mark.parametrize(
     "picture",
     [
@@ -186,9 +146,9 @@ def test_a_box_that_lies_nowhere_is_lost(x: float) -> None:
     ],
 )
 def test_depth_is_read_in_every_encoding_that_ros_uses(
-    picture: sensor_msgs.Image,
+    picture: ros.Image,
 ) -> None:
-    read = pictures.read_depth(picture, info())
+    read = detections.read_depth(picture, info())
 
     assert np.allclose(read.depth, scene(), atol=1e-3)
 
@@ -198,19 +158,19 @@ def test_depth_is_read_in_every_encoding_that_ros_uses(
     [
         (image(scene(), "rgb8", "u1"), info(), "bad_encoding"),
         (
-            sensor_msgs.Image(height=9, width=9, encoding="16UC1", step=18),
+            ros.Image(height=9, width=9, encoding="16UC1", step=18),
             info(),
             "bad_picture",
         ),
         (depth(), info(fx=math.nan), "bad_camera"),
         (depth(), info(fy=90.0), "bad_camera"),
-        (depth(), sensor_msgs.CameraInfo(height=4, width=4), "bad_camera"),
+        (depth(), ros.CameraInfo(height=4, width=4), "bad_camera"),
     ],
 )
 def test_a_picture_that_cannot_be_used_is_named(
-    picture: sensor_msgs.Image, camera: sensor_msgs.CameraInfo, reason: str
+    picture: ros.Image, camera: ros.CameraInfo, reason: str
 ) -> None:
     with pytest.raises(UnreadableError) as error:
-        pictures.read_depth(picture, camera)
+        detections.read_depth(picture, camera)
 
     assert error.value.reason == reason

@@ -7,7 +7,7 @@ from datetime import date
 import httpx
 from fastapi import APIRouter, FastAPI
 
-from iveg.adapters.history.store import Store
+from iveg.adapters.history.recorder import Store
 from iveg.domain.geometry import Rectangle
 from iveg.domain.greenhouse import DriveLane, Greenhouse
 from iveg.domain.observations import Instant
@@ -16,7 +16,7 @@ from iveg.pipeline.ports import Clock
 from iveg.pipeline.record import Waiting
 from iveg.web.pages.contexts import Site
 from iveg.web.pages.drawing import Pages
-from iveg.web.pages.local_time import start_of
+from iveg.web.pages.sentences import start_of
 from iveg.web.problems import install
 from iveg.web.security.authentication import Authenticator
 

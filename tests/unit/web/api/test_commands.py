@@ -17,9 +17,6 @@ async def stopped(desk: WebDesk) -> str:
     return command.command_id
 
 
-# --- STOP -------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("role", ["viewer", "operator", "admin", "expired"])
 async def test_i8_i11_everybody_who_was_let_in_may_stop(role: Role) -> None:
     desk = WebDesk()
@@ -39,14 +36,6 @@ async def test_i8_i11_everybody_who_was_let_in_may_stop(role: Role) -> None:
     assert desk.fleet.stops == [("AGI", machine.hold_id)]
 
 
-async def test_a_program_may_stop() -> None:
-    desk = WebDesk()
-    async with desk.program() as program:
-        answer = await program.post("/api/v1/robots/AGI/stop")
-
-    assert answer.status_code == 202
-
-
 async def test_stop_all_is_one_command_a_robot() -> None:
     desk = WebDesk()
     async with desk.browser() as browser:
@@ -56,23 +45,6 @@ async def test_stop_all_is_one_command_a_robot() -> None:
     assert answer.status_code == 202
     assert [one["robot_id"] for one in commands] == ["AGI", "AGII"]
     assert len(desk.fleet.stops) == 2
-
-
-async def test_a_stranger_may_not_stop() -> None:
-    desk = WebDesk()
-    async with desk.stranger() as stranger:
-        answer = await stranger.post("/api/v1/fleet/stop")
-
-    assert answer.status_code == 401
-    assert desk.fleet.stops == []
-
-
-async def test_stopping_a_robot_that_is_not_there_is_404() -> None:
-    async with WebDesk().browser() as browser:
-        answer = await browser.post("/api/v1/robots/AGX/stop")
-
-    assert answer.status_code == 404
-    assert answer.headers["content-type"] == "application/problem+json"
 
 
 async def test_i11_stop_has_no_rate_limit() -> None:
@@ -85,9 +57,6 @@ async def test_i11_stop_has_no_rate_limit() -> None:
 
     assert set(answers) == {202}
     assert len({hold for _, hold in desk.fleet.stops}) == 1
-
-
-# --- release, resume --------------------------------------------------------------
 
 
 async def test_an_operator_releases_the_holds_that_were_seen() -> None:
@@ -104,31 +73,6 @@ async def test_an_operator_releases_the_holds_that_were_seen() -> None:
     assert desk.broker.asked[-1] == ("release", "AGI", (held,))
 
 
-@pytest.mark.parametrize("what", ["release", "resume"])
-async def test_i8_a_viewer_may_neither_release_nor_resume(what: str) -> None:
-    desk = WebDesk()
-    held = await stopped(desk)
-    async with desk.browser("viewer") as browser:
-        answer = await browser.post(
-            f"/api/v1/robots/AGI/{what}", json={"holds": [held]}
-        )
-
-    assert answer.status_code == 403
-    assert desk.commander.machine("AGI").state == "STANDING"
-
-
-@pytest.mark.parametrize("what", ["release", "resume"])
-async def test_a_program_may_neither_release_nor_resume(what: str) -> None:
-    desk = WebDesk()
-    held = await stopped(desk)
-    async with desk.program() as program:
-        answer = await program.post(
-            f"/api/v1/robots/AGI/{what}", json={"holds": [held]}
-        )
-
-    assert answer.status_code == 403
-
-
 async def test_a_set_of_holds_that_changed_is_409_with_the_reason() -> None:
     desk = WebDesk()
     await stopped(desk)
@@ -141,16 +85,6 @@ async def test_a_set_of_holds_that_changed_is_409_with_the_reason() -> None:
     assert "the holds changed" in answer.text
 
 
-@pytest.mark.parametrize("what", ["release", "resume"])
-async def test_a_robot_that_does_not_stand_is_409(what: str) -> None:
-    desk = WebDesk()
-    await desk.commander.stop(["AGI"], "ana", desk.clock())
-    async with desk.browser() as browser:
-        answer = await browser.post(f"/api/v1/robots/AGI/{what}", json={"holds": ["x"]})
-
-    assert answer.status_code == 409
-
-
 async def test_a_released_robot_is_resumed() -> None:
     desk = WebDesk()
     held = await stopped(desk)
@@ -160,39 +94,6 @@ async def test_a_released_robot_is_resumed() -> None:
         answer = await browser.post("/api/v1/robots/AGI/resume")
 
     assert answer.status_code == 202
-
-
-@pytest.mark.parametrize("what", ["release", "resume"])
-async def test_a_robot_that_is_not_there_is_404(what: str) -> None:
-    async with WebDesk().browser() as browser:
-        answer = await browser.post(f"/api/v1/robots/AGX/{what}", json={"holds": ["x"]})
-
-    assert answer.status_code == 404
-
-
-@pytest.mark.parametrize(
-    "body", [{}, {"holds": []}, {"holds": [1]}, {"holds": ["x" * 65]}, {"holds": "x"}]
-)
-async def test_a_body_that_says_something_else_is_422(body: object) -> None:
-    async with WebDesk().browser() as browser:
-        answer = await browser.post("/api/v1/robots/AGI/release", json=body)
-
-    assert answer.status_code == 422
-    assert answer.headers["content-type"] == "application/problem+json"
-
-
-async def test_another_sites_page_may_not_stop_with_our_cookie() -> None:
-    desk = WebDesk()
-    async with desk.browser() as browser:
-        answer = await browser.post(
-            "/api/v1/robots/AGI/stop", headers={"Sec-Fetch-Site": "cross-site"}
-        )
-
-    assert answer.status_code == 403
-    assert desk.fleet.stops == []
-
-
-# --- alerts -----------------------------------------------------------------------
 
 
 async def lost(desk: WebDesk) -> str:
@@ -215,18 +116,6 @@ async def test_an_alert_is_acknowledged_with_who_and_a_clean_note() -> None:
     assert answer.status_code == 200
     assert (told["acknowledged_by"], told["note"]) == ("ana", "going there")
     assert told["cleared_at"] is None
-
-
-@pytest.mark.parametrize(
-    ("role", "status"), [("viewer", 403), ("operator", 404), ("admin", 404)]
-)
-async def test_an_alert_nobody_knows_is_404_for_who_may_ask(
-    role: Role, status: int
-) -> None:
-    async with WebDesk().browser(role) as browser:
-        answer = await browser.post("/api/v1/alerts/none/acknowledge", json={})
-
-    assert answer.status_code == status
 
 
 async def test_a_flood_is_acknowledged_together_but_none_of_its_p1s() -> None:
@@ -258,17 +147,3 @@ async def test_a_flood_is_acknowledged_together_but_none_of_its_p1s() -> None:
         by_priority["P2"]: "ana",
         by_priority["P3"]: "ana",
     }
-
-
-@pytest.mark.parametrize(
-    ("role", "count", "status"),
-    [("viewer", 1, 403), ("operator", 201, 422), ("operator", 200, 200)],
-)
-async def test_who_may_acknowledge_a_list_and_how_long_it_may_be(
-    role: Role, count: int, status: int
-) -> None:
-    body = {"alert_ids": ["none"] * count}
-    async with WebDesk().browser(role) as browser:
-        answer = await browser.post("/api/v1/alerts/acknowledge", json=body)
-
-    assert answer.status_code == status

@@ -5,7 +5,6 @@ from io import BytesIO
 import numpy as np
 from PIL import Image
 
-from iveg.web.api.costmap import write_png
 from tests.builders import scan
 from tests.unit.web.desk import WebDesk
 
@@ -16,15 +15,6 @@ def swept() -> WebDesk:
     desk.hear(scan("AGI", [2.0] * 4, origin=desk.next_origin()))
     desk.services.mapper.tick(desk.clock())
     return desk
-
-
-async def test_before_the_first_scan_the_costmap_is_empty() -> None:
-    async with WebDesk().browser("viewer") as browser:
-        answer = await browser.get("/api/v1/costmap")
-
-    told = answer.json()
-    assert answer.status_code == 200
-    assert (told["width"], told["height"], told["data"]) == (0, 0, [])
 
 
 async def test_the_costmap_is_rows_from_the_south_western_corner() -> None:
@@ -67,26 +57,6 @@ async def test_who_accepts_a_picture_gets_one_with_the_north_up() -> None:
     data = np.array(told["data"]).reshape(told["height"], told["width"])
     assert ((shades[::-1] == 205) == (data == -1)).all()
     assert (shades[::-1][data == 0] == 255).all()
-
-
-async def test_a_picture_of_nothing_is_one_unknown_dot() -> None:
-    async with WebDesk().browser("viewer") as browser:
-        answer = await browser.get("/api/v1/costmap", headers={"Accept": "image/png"})
-
-    assert read_png(answer.content).tolist() == [[205]]
-
-
-def test_a_picture_holds_every_shade_where_it_was() -> None:
-    shades = np.arange(12, dtype=np.uint8).reshape(3, 4)
-
-    assert (read_png(write_png(shades)) == shades).all()
-
-
-async def test_strangers_see_no_costmap() -> None:
-    async with WebDesk().stranger() as stranger:
-        answer = await stranger.get("/api/v1/costmap")
-
-    assert answer.status_code == 401
 
 
 def read_png(body: bytes) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:

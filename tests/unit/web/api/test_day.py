@@ -10,7 +10,7 @@ import httpx
 import pytest
 
 from iveg.adapters.history.engine import writing_engine
-from iveg.adapters.history.purge import purge_batch
+from iveg.adapters.history.upkeep import purge_piece
 from iveg.domain.records import Record
 from iveg.domain.retention import DAY_S, PURGE_STEPS
 from iveg.models.day import Day
@@ -24,6 +24,8 @@ from tests.fakes.records import (
 )
 from tests.fakes.worker import FakeWorker
 from tests.unit.web.api.sheets import GREENHOUSE, MORNING, reader
+
+Client = httpx.AsyncClient
 
 RECORDS: tuple[Record, ...] = (
     *(odometry_record(at=MORNING + n / 2, x=5.0, y=2.0) for n in range(240)),
@@ -41,15 +43,15 @@ def url(tmp_path: Path) -> str:
 
 
 @pytest.fixture
-async def browser(url: str) -> AsyncIterator[httpx.AsyncClient]:
+async def browser(url: str) -> AsyncIterator[Client]:
     async def read(wanted: date, now: float) -> Day:
-        return await FakeWorker().run(day.read_day, url, GREENHOUSE, 30.0, wanted, now)
+        return await FakeWorker().run(day.read_day, url, GREENHOUSE, wanted, now)
 
     async with reader(url, RECORDS, partial(day.router, read)) as client:
         yield client
 
 
-async def test_a_day_is_told_in_numbers(browser: httpx.AsyncClient) -> None:
+async def test_a_day_is_told_in_numbers(browser: Client) -> None:
     told = (await browser.get("/api/v1/day", params={"day": "2026-11-20"})).json()
 
     assert told["worked"] == [{"lane": "1", "robot_id": "AGI", "minutes": 2.0}]
@@ -57,12 +59,6 @@ async def test_a_day_is_told_in_numbers(browser: httpx.AsyncClient) -> None:
     assert [one["distance_m"] for one in told["passes"]] == [1.0]
     assert [one["standstill_ms"] for one in told["stops"]] == [412.0]
     assert told["unseen"] == 1
-
-
-async def test_another_day_has_none_of_it(browser: httpx.AsyncClient) -> None:
-    told = (await browser.get("/api/v1/day", params={"day": "2026-11-19"})).json()
-
-    assert (told["worked"], told["passes"], told["stops"]) == ([], [], [])
 
 
 @pytest.mark.parametrize(
@@ -84,7 +80,7 @@ async def test_another_day_has_none_of_it(browser: httpx.AsyncClient) -> None:
     ],
 )
 async def test_what_a_day_lost_is_told_and_is_not_nothing(
-    browser: httpx.AsyncClient,
+    browser: Client,
     url: str,
     days: str,
     kind: str | None,
@@ -95,7 +91,7 @@ async def test_what_a_day_lost_is_told_and_is_not_nothing(
     with engine.begin() as connection:
         for step in PURGE_STEPS:
             if step.kind == kind:
-                purge_batch(connection, step, MORNING + DAY_S, lambda: 0.0)
+                purge_piece(connection, step, MORNING + DAY_S)
     engine.dispose()
 
     told = (await browser.get("/api/v1/day", params={"day": days})).json()
@@ -108,22 +104,8 @@ async def test_what_a_day_lost_is_told_and_is_not_nothing(
         assert sentence in sheet.text
 
 
-@pytest.mark.parametrize(
-    ("language", "sentence"),
-    [("es", "parado a los 412 ms"), ("en", "stood after 412 ms")],
-)
-async def test_the_sheet_is_one_page_in_the_readers_language(
-    browser: httpx.AsyncClient, language: str, sentence: str
-) -> None:
-    sheet = await browser.get("/day", headers={"Accept-Language": language})
-
-    assert sheet.status_code == 200
-    assert sentence in sheet.text
-    assert 'class="sheet__map"' in sheet.text
-
-
 async def test_28_6_the_sheet_begins_with_the_day_in_a_sentence_and_on_a_plan(
-    browser: httpx.AsyncClient,
+    browser: Client,
 ) -> None:
     asked = {"day": "2026-11-20"}, {"Accept-Language": "en"}
     html = (await browser.get("/day", params=asked[0], headers=asked[1])).text
@@ -135,11 +117,3 @@ async def test_28_6_the_sheet_begins_with_the_day_in_a_sentence_and_on_a_plan(
     bars = re.findall(r'sheet__(\w+)" x="0.0" y="[\d.]+" width="([\d.]+)"', plan)
     assert bars == [("worked", "20.0"), ("slowed", "15.0")]
     assert re.search(r'cx="6.0" cy="18.0".*?>1</text>', plan, re.DOTALL)
-
-
-async def test_28_6_a_day_of_which_nothing_is_known_has_no_plan(
-    browser: httpx.AsyncClient,
-) -> None:
-    html = (await browser.get("/day", params={"day": "2026-11-19"})).text
-
-    assert "sheet__plan" not in html

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from iveg.adapters.recordings.directory import RecordingDirectory
-from iveg.web.api.recordings import MEDIA_TYPE
+from iveg.web.api.past import MEDIA_TYPE
 from tests.unit.web.desk import WebDesk
 
 

@@ -8,8 +8,8 @@ import httpx
 import pytest
 
 from iveg.domain.records import AuditRecord
-from iveg.web.api import sessions
-from iveg.web.security.session_life import IDLE_S
+from iveg.web.api import account
+from iveg.web.security.sessions import IDLE_S
 from tests.unit.web.api.test_account import OwnDesk
 
 ALL, OWN = "/api/v1/sessions", "/api/v1/account/sessions"
@@ -20,13 +20,12 @@ class SessionsDesk(OwnDesk):
 
     def __init__(self) -> None:
         super().__init__()
-        self.app.include_router(sessions.router())
+        self.app.include_router(account.sessions_router())
 
 
 @pytest.fixture
 async def desk() -> AsyncIterator[SessionsDesk]:
     desk = SessionsDesk()
-    await desk.people.refresh()
     yield desk
     desk.people.close()
 
@@ -124,30 +123,7 @@ async def test_a_wall_ends_nothing_and_changes_nothing_of_its_person(
     assert mine["kind"] == "wall"
     assert [one.status_code for one in refused] == [403] * 3
     assert stops == [202, 202]
-    assert desk.accounts.known["P1"].language == ""
-
-
-async def test_programs_have_no_sessions(desk: SessionsDesk) -> None:
-    desk.authenticator._api_token = "a-token-for-programs"
-    async with desk.browser(), desk.program() as program:
-        assert await listed(program, OWN) == []
-
-
-async def test_what_is_over_is_not_there_and_what_may_stop_says_so(
-    desk: SessionsDesk,
-) -> None:
-    async def roles() -> list[tuple[str, str]]:
-        async with desk.browser("admin") as chief:
-            return [(one["name"], one["role"]) for one in await listed(chief, ALL)]
-
-    async with desk.ana():
-        desk.clock.now += IDLE_S + 60.0
-        expired = await roles()
-        desk.clock.now += IDLE_S + 60.0
-        gone = await roles()
-
-    assert expired == [("ana", "admin"), ("Ana Núñez", "expired")]
-    assert gone == [("ana", "admin"), ("ana", "expired")]
+    assert desk.book.accounts["P1"].language == ""
 
 
 async def test_a_page_that_an_expired_session_opens_says_so_and_keeps_its_stops(

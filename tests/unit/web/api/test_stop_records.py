@@ -1,4 +1,4 @@
-"""What is remembered of STOP: how long it took, and the drills."""
+"""The times of STOPs that are remembered."""
 
 from collections.abc import AsyncIterator
 from pathlib import Path
@@ -7,11 +7,11 @@ import httpx
 import pytest
 
 from iveg.adapters.history.queries import Queries
-from iveg.adapters.history.recorder import Recorder, journal_file
+from iveg.adapters.history.recorder import Recorder
+from iveg.adapters.journal import FileJournal
 from iveg.domain.records import CommandEventRecord, CommandRecord
 from iveg.models.command import Command
-from iveg.models.stop_latency import LatencySpread
-from iveg.web.api import stop_records
+from iveg.web.api import day
 from tests.builders import START
 from tests.unit.web.desk import WebDesk
 
@@ -37,8 +37,8 @@ def record(number: int, **fields: object) -> CommandRecord:
 ROWS = [
     *(record(number) for number in range(1, 5)),
     record(5, robot_id="AGII", pressed_at=None, standstill_ms=None, standing_at=None),
-    record(6, drill=True),
-    record(7, drill=True, standstill_ms=None, standing_at=None),
+    record(6),
+    record(7, standstill_ms=None, standing_at=None),
 ]
 
 
@@ -46,13 +46,13 @@ ROWS = [
 async def asking(tmp_path: Path) -> AsyncIterator[httpx.AsyncClient]:
     url = f"sqlite:///{tmp_path / 'history.sqlite'}"
     desk = WebDesk()
-    recorder = Recorder(url, journal_file(url, tmp_path))
+    recorder = Recorder(url, FileJournal(tmp_path / "commands.jsonl"))
     for row in ROWS:
         recorder.enqueue(row)
     await recorder.close()
     queries = Queries(url)
     desk.app.include_router(
-        stop_records.router(queries, desk.clock, desk.views.find_command)
+        day.stop_records_router(queries, desk.clock, desk.views.find_command)
     )
     async with desk.browser() as browser:
         yield browser
@@ -78,17 +78,6 @@ async def test_each_step_is_summarised_for_each_robot(
     assert agii["standing"]["p50_ms"] is None
 
 
-async def test_drills_are_listed_with_their_verdict(asking: httpx.AsyncClient) -> None:
-    items = (await asking.get("/api/v1/drills")).json()["items"]
-
-    assert [(one["command_id"], one["passed"]) for one in items] == [
-        ("C7", False),
-        ("C6", False),
-    ]
-    assert items[1]["standstill_ms"] == 6000.0
-    assert items[1]["command"]["drill"] is True
-
-
 async def test_a_command_of_an_earlier_run_is_found_in_the_history(
     asking: httpx.AsyncClient,
 ) -> None:
@@ -103,7 +92,7 @@ async def test_a_command_of_this_run_is_told_with_its_steps_while_the_history_an
     tmp_path: Path,
 ) -> None:
     url = f"sqlite:///{tmp_path / 'history.sqlite'}"
-    recorder = Recorder(url, journal_file(url, tmp_path))
+    recorder = Recorder(url, FileJournal(tmp_path / "commands.jsonl"))
     recorder.enqueue(record(1, state="RUNNING"))
     recorder.enqueue(
         CommandEventRecord(command_id="C1", robot_id="AGI", at=T, state="UNCONFIRMED")
@@ -113,7 +102,7 @@ async def test_a_command_of_this_run_is_told_with_its_steps_while_the_history_an
     followed = Command.of_record(record(1)).model_copy(update={"outcome": None})
 
     desk.app.include_router(
-        stop_records.router(queries, desk.clock, lambda *_: followed)
+        day.stop_records_router(queries, desk.clock, lambda *_: followed)
     )
     async with desk.browser() as browser:
         whole = (await browser.get("/api/v1/commands/C1")).json()
@@ -125,11 +114,3 @@ async def test_a_command_of_this_run_is_told_with_its_steps_while_the_history_an
     assert [one["state"] for one in whole["steps"]] == ["UNCONFIRMED"]
     assert whole["was_loud"] is True
     assert (alone.status_code, alone.json()["outcome"]) == (200, None)
-
-
-def test_a_spread_is_of_what_was_measured() -> None:
-    values = [float(number) for number in range(1, 101)]
-
-    some, none = LatencySpread.of([*values, None]), LatencySpread.of([None])
-    assert (some.count, some.p50_ms, some.p95_ms, some.max_ms) == (100, 50, 95, 100)
-    assert (none.count, none.p50_ms, none.p95_ms, none.max_ms) == (0, None, None, None)

@@ -3,12 +3,9 @@
 import httpx
 import pytest
 
-from iveg.domain.geometry import Pose2D
 from iveg.domain.records import LogRecord
-from iveg.web.security.roles import Role
 from tests.builders import detection
 from tests.unit.pipeline.desk import conditions_of
-from tests.unit.robot.test_known_here import sees
 from tests.unit.web.desk import WebDesk
 
 
@@ -16,23 +13,19 @@ def see(desk: WebDesk, *xs: float, confidence: float = 0.85) -> None:
     """AGI sees somebody at each place in turn; AGII stands 1.5 m beside the first."""
     for x in xs:
         desk.clock.now += 0.1
-        desk.drive("AGI", 0.0)
-        desk.drive("AGII", 6.5)
+        desk.drive("AGI", 0.0, linear=0.0)
+        desk.drive("AGII", 6.5, linear=0.0)
         desk.look("AGII")
         desk.look("AGI", detection("farmer", x, probability=confidence))
 
 
-async def mark(
-    desk: WebDesk, role: Role = "operator", person_id: object = "P1"
-) -> httpx.Response:
-    async with desk.browser(role) as browser:
+async def mark(desk: WebDesk, person_id: object = "P1") -> httpx.Response:
+    async with desk.browser() as browser:
         return await browser.post("/api/v1/things", json={"person_id": person_id})
 
 
-async def unmark(
-    desk: WebDesk, thing_id: str, role: Role = "operator"
-) -> httpx.Response:
-    async with desk.browser(role) as browser:
+async def unmark(desk: WebDesk, thing_id: str) -> httpx.Response:
+    async with desk.browser() as browser:
         return await browser.delete(f"/api/v1/things/{thing_id}")
 
 
@@ -138,15 +131,6 @@ async def test_there_is_a_bound_of_marks() -> None:
     assert (answer.status_code, answer.json()["why"]) == (409, "too_many")
 
 
-async def test_who_may_not_release_may_mark_nothing_and_take_nothing_back() -> None:
-    desk = WebDesk()
-    see(desk, 5.0)
-    thing = (await mark(desk)).json()
-
-    assert (await mark(desk, "viewer")).status_code == 403
-    assert (await unmark(desk, thing["thing_id"], "viewer")).status_code == 403
-
-
 async def test_what_is_not_known_is_not_found_and_nonsense_is_refused() -> None:
     desk = WebDesk()
 
@@ -157,74 +141,3 @@ async def test_what_is_not_known_is_not_found_and_nonsense_is_refused() -> None:
         for body in ({}, {"person_id": "P1", "robot_id": "AGI"}):
             answer = await browser.post("/api/v1/things", json=body)
             assert answer.status_code == 422
-
-
-def sweep(desk: WebDesk, *places: tuple[float, float]) -> None:
-    """AGI's laser looks three times."""
-    robot, obstacles = desk.evaluator.world.robot("AGI"), desk.evaluator.obstacles
-    for _ in range(3):
-        desk.clock.now += 0.1
-        desk.drive("AGI", 0.0)
-        robot.scan_pose = Pose2D(0.0, 0.0, 0.0)
-        obstacles.look(robot, sees(*places), desk.clock())
-
-
-async def mark_obstacle(desk: WebDesk, role: Role = "operator") -> httpx.Response:
-    async with desk.browser(role) as browser:
-        return await browser.post("/api/v1/things", json={"robot_id": "AGI"})
-
-
-async def test_what_a_laser_sees_is_known_from_then_on_until_it_is_taken_back() -> None:
-    desk = WebDesk()
-    sweep(desk, (2.0, 0.1))
-    assert "AGI" in desk.evaluator.obstacles.seen(desk.clock())
-
-    answer = await mark_obstacle(desk)
-    thing = answer.json()
-    sweep(desk, (2.0, 0.1))
-
-    assert (answer.status_code, thing["kind"]) == (201, "obstacle")
-    assert (thing["x"], thing["y"]) == pytest.approx((2.0, 0.1), abs=0.02)
-    assert desk.evaluator.obstacles.seen(desk.clock()) == {}
-    assert await listed(desk, "things") == [thing]
-    (spot,) = await listed(desk, "known-here")
-    assert (spot["thing_id"], spot["since"]) == (thing["thing_id"], thing["since"])
-    await desk.wait(0.1)
-    assert "alert.known_marked" in conditions_of(desk)
-    assert desk.fleet.told[-1].known_here or desk.fleet.told[-2].known_here
-
-    await unmark(desk, thing["thing_id"])
-    sweep(desk, (2.0, 0.1))
-    assert "AGI" in desk.evaluator.obstacles.seen(desk.clock())
-    told = [one.key for one in desk.records(LogRecord) if "known" in one.key]
-    assert told == ["log.known_marked", "log.known_unmarked"]
-
-
-async def test_what_moves_there_ends_it() -> None:
-    desk = WebDesk()
-    sweep(desk, (2.0, 0.1))
-    await mark_obstacle(desk)
-    for n in range(6):
-        sweep(desk, (2.0 - 0.1 * n, 0.1))
-    await desk.wait(0.1)
-
-    assert await listed(desk, "things") == []
-    assert "log.known_over" in desk.sentences()
-
-
-async def test_nobody_and_nothing_is_not_marked_as_known() -> None:
-    desk = WebDesk()
-    assert (await mark_obstacle(desk)).status_code == 404
-    sweep(desk, (2.0, 0.1))
-    assert (await mark_obstacle(desk, "viewer")).status_code == 403
-    see(desk, 2.0)
-    sweep(desk, (2.0, 0.1))
-    answer = await mark_obstacle(desk)
-    assert (answer.status_code, answer.json()["why"]) == (409, "somebody")
-
-
-async def test_what_was_seen_long_ago_is_not_marked() -> None:
-    desk = WebDesk()
-    sweep(desk, (2.0, 0.1))
-    desk.clock.now += 11.0
-    assert (await mark_obstacle(desk)).status_code == 404

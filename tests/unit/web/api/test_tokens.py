@@ -1,13 +1,11 @@
 """Tokens over HTTP: an admin lets programs in and out; nobody else does."""
 
-from collections.abc import AsyncIterator
-
-import httpx
 import pytest
 
 from iveg.domain.accounts import digest_of
-from iveg.domain.records import AuditRecord
-from iveg.web.api import tokens
+from iveg.web.api import account
+from iveg.web.security.people import People
+from tests.fakes.accounts import FakePasswords
 from tests.unit.web.security.test_programs import ProgramsDesk
 
 TOKENS = "/api/v1/tokens"
@@ -18,7 +16,10 @@ class AdminsDesk(ProgramsDesk):
 
     def __init__(self) -> None:
         super().__init__()
-        self.app.include_router(tokens.router(self.programs, self.clock))
+        people = People(self.book, FakePasswords(), self.clock)
+        self.app.include_router(
+            account.tokens_router(people, self.programs, self.clock)
+        )
 
     async def names(self) -> list[str]:
         async with self.browser("admin") as chief:
@@ -27,11 +28,8 @@ class AdminsDesk(ProgramsDesk):
 
 
 @pytest.fixture
-async def desk() -> AsyncIterator[AdminsDesk]:
-    desk = AdminsDesk()
-    await desk.programs.refresh()
-    yield desk
-    desk.programs.close()
+def desk() -> AdminsDesk:
+    return AdminsDesk()
 
 
 async def test_a_token_is_shown_once_works_and_ends_by_itself(desk: AdminsDesk) -> None:
@@ -56,7 +54,7 @@ async def test_a_token_is_shown_once_works_and_ends_by_itself(desk: AdminsDesk) 
     assert used["Weather"] is not None
     assert used["mes-read"] is None
     assert [told[one]["over"] for one in ("Weather", "mes-read")] == [True, False]
-    assert desk.tokens.changes == [("token_added", "Weather", "ana")]
+    assert desk.book.changes == [("token_added", "Weather", "ana")]
 
 
 async def test_who_is_revoked_is_out_before_the_answer(desk: AdminsDesk) -> None:
@@ -69,7 +67,7 @@ async def test_who_is_revoked_is_out_before_the_answer(desk: AdminsDesk) -> None
 
     assert [one.status_code for one in (gone, stopped, again)] == [204, 401, 404]
     assert desk.authenticator.current(who) is None
-    assert desk.tokens.changes == [("token_revoked", "mes-stop", "ana")]
+    assert desk.book.changes == [("token_revoked", "mes-stop", "ana")]
     assert await desk.names() == ["mes-operate", "mes-read"]
 
 
@@ -94,41 +92,3 @@ async def test_what_cannot_be_a_token_is_refused(
 
     assert refused.status_code == status
     assert await desk.names() == before
-
-
-async def test_there_are_only_so_many_tokens(
-    desk: AdminsDesk, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(tokens, "MOST_TOKENS", len(desk.tokens.known))
-    async with desk.browser("admin") as chief:
-        refused = await chief.post(TOKENS, json={"name": "X", "scope": "read"})
-
-    assert refused.status_code == 409
-
-
-async def test_with_the_database_away_nothing_is_said_to_have_changed(
-    desk: AdminsDesk,
-) -> None:
-    async def ask(chief: httpx.AsyncClient) -> list[int]:
-        asked = [
-            await chief.get(TOKENS),
-            await chief.post(TOKENS, json={"name": "X", "scope": "read"}),
-            await chief.delete(f"{TOKENS}/stop"),
-        ]
-        return [one.status_code for one in asked]
-
-    desk.tokens.is_away = True
-    async with desk.browser("admin") as chief:
-        assert await ask(chief) == [503] * 3
-    desk.tokens.is_away = False
-
-    assert await desk.names() == ["mes-operate", "mes-read", "mes-stop"]
-
-
-async def test_who_may_not_is_in_the_audit(desk: AdminsDesk) -> None:
-    async with desk.browser("operator") as page:
-        refused = await page.post(TOKENS, json={"name": "X", "scope": "operate"})
-
-    assert refused.status_code == 403
-    (row,) = desk.records(AuditRecord)
-    assert (row.action, row.name) == ("token_added", "ana")

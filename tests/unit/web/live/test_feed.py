@@ -8,10 +8,15 @@ import numpy as np
 import orjson
 import pytest
 
-from iveg.web.live.feed import PICTURE_S, READ_OUT_S, TelemetryFeed
-from iveg.web.live.pacing import BYTES, FRAMES, GAP_S, ROBOT_GAP_S
-from iveg.web.live.painting import Painting
-from iveg.web.live.ranges import NO_RETURN, UNIT_M
+from iveg.web.live.feed import (
+    BYTES,
+    FRAMES,
+    GAP_S,
+    ROBOT_GAP_S,
+    Painting,
+    TelemetryFeed,
+)
+from iveg.web.live.telemetry import NO_RETURN, UNIT_M
 from tests.builders import detection, scan
 from tests.unit.web.desk import WebDesk
 
@@ -29,9 +34,7 @@ class Page:
     def __post_init__(self) -> None:
         self.subscriber = self.desk.hub.join()
         self.feed = TelemetryFeed(
-            self.desk.encoder.telemetry,
-            self.subscriber,
-            Painting(self.desk.latency.watch),
+            self.desk.encoder.telemetry, self.subscriber, Painting(self.desk.latency)
         )
 
     def read(self) -> dict[str, Any] | None:
@@ -73,21 +76,6 @@ def desk() -> WebDesk:
 @pytest.fixture
 def page(desk: WebDesk) -> Page:
     return Page(desk)
-
-
-# --- the window ---------------------------------------------------------------------
-
-
-def test_a_page_that_never_answers_gets_one_window_and_no_more(
-    desk: WebDesk, page: Page
-) -> None:
-    for number in range(100):
-        desk.drive("AGI", float(number))
-        desk.clock.now += 1.0
-        page.read()
-
-    assert len(page.frames) == FRAMES
-    assert [frame["frame"] for frame in page.frames] == list(range(1, FRAMES + 1))
 
 
 def test_a_slow_page_skips_and_never_lags(desk: WebDesk, page: Page) -> None:
@@ -141,124 +129,6 @@ def test_heavy_parts_on_their_way_are_bounded_and_go_on_in_turn() -> None:
     assert sorted(told) == sorted(MANY)
 
 
-def test_a_part_larger_than_the_window_goes_alone(desk: WebDesk, page: Page) -> None:
-    desk.drive("AGI")
-    page.read_all()
-    desk.hear(_wide_scan(desk, "AGI", beams=BYTES))
-    desk.clock.now += 1.0
-
-    page.read()
-
-    assert len(page.bodies[-1]) == 2 * BYTES
-
-
-def test_robots_are_told_before_what_takes_long_to_write(
-    desk: WebDesk, page: Page
-) -> None:
-    desk.drive("AGI")
-    desk.look("AGI", detection("farmer", 5.0))
-
-    first = page.read()
-    desk.clock.now += 1.01 * GAP_S
-    then = page.read()
-
-    assert first is not None
-    assert then is not None
-    assert [move[0] for move in first["moves"]] == ["AGI"]
-    assert {one["topic"] for one in first["parts"]} == {"detections/AGI"}
-    assert {one["topic"] for one in then["parts"]} > {"people", "robots/AGI"}
-
-
-def test_what_was_written_ahead_waits_for_room_and_scans_wait_behind_it() -> None:
-    page = _page_of_many_scans()
-    desk = page.desk
-    desk.clock.now += 0.05
-    desk.drive(MANY[0], 1.0)
-
-    waiting = page.read()
-    page.paint()
-    desk.clock.now += 0.05
-    then = page.read()
-
-    assert waiting is not None
-    assert then is not None
-    assert [move[0] for move in waiting["moves"]] == [MANY[0]]
-    assert (waiting["parts"], waiting["scans"]) == ([], [])
-    assert len(then["parts"]) > len(MANY) / 2
-
-
-# --- the pace -------------------------------------------------------------------------
-
-
-def test_positions_go_as_often_as_there_is_credit(desk: WebDesk, page: Page) -> None:
-    for number in range(20):
-        desk.drive("AGI", float(number))
-        page.read()
-        page.paint()
-        desk.clock.now += 1.01 * GAP_S
-
-    assert [move[3] for move in page.told("moves")] == [float(n) for n in range(20)]
-
-
-def test_pictures_and_read_outs_go_as_often_as_eyes_need(
-    desk: WebDesk, page: Page
-) -> None:
-    steps = 200
-    for _ in range(steps):
-        desk.drive("AGI")
-        desk.hear(scan(origin=desk.next_origin()))
-        desk.look("AGI", detection("farmer", 5.0))
-        page.read()
-        page.paint()
-        desk.clock.now += 0.01
-
-    topics = page.topics()
-    seconds = 0.01 * steps
-    assert 0.8 * seconds / PICTURE_S <= topics.count("robots/AGI/scan")
-    assert topics.count("robots/AGI/scan") <= seconds / PICTURE_S + 1
-    assert topics.count("detections/AGI") <= seconds / PICTURE_S + 1
-    assert topics.count("people") <= seconds / READ_OUT_S + 1
-    assert topics.count("robots/AGI") <= seconds / READ_OUT_S + 1
-
-
-@pytest.mark.parametrize(("count", "beats"), [(4, 1), (50, 1), (51, 2)])
-def test_a_long_list_of_people_goes_less_often(
-    desk: WebDesk, page: Page, count: int, beats: int
-) -> None:
-    people = [
-        detection("farmer", 3.0 + 3.0 * (place // 10), 3.0 * (place % 10))
-        for place in range(count)
-    ]
-    steps = 200
-    for step in range(steps):
-        desk.drive("AGI", 0.001 * step)
-        desk.look("AGI", *people)
-        page.read()
-        page.paint()
-        desk.clock.now += 0.01
-
-    seconds, lists = 0.01 * steps, page.topics().count("people")
-    assert len(desk.views.people(desk.clock())) == count
-    assert lists == pytest.approx(seconds / (beats * READ_OUT_S), abs=1.5)
-
-
-def test_states_of_robots_are_not_written_in_the_frame_of_the_list_of_people(
-    desk: WebDesk, page: Page
-) -> None:
-    for step in range(200):
-        desk.drive("AGI", 0.01 * step)
-        desk.look("AGI", detection("farmer", 5.0 + 0.01 * step))
-        desk.clock.now += 0.005
-        page.read()
-        page.paint()
-
-    told = [{one["topic"] for one in frame["parts"]} for frame in page.frames[2:]]
-    people = [topics for topics in told if "people" in topics]
-    states = [topics for topics in told if "robots/AGI" in topics]
-    assert min(len(people), len(states)) >= 8
-    assert not any("robots/AGI" in topics for topics in people)
-
-
 @pytest.mark.parametrize(("robots", "gap_s"), [(2, GAP_S), (20, 20 * ROBOT_GAP_S)])
 def test_the_more_robots_the_more_of_them_share_a_frame(
     robots: int, gap_s: float
@@ -278,26 +148,6 @@ def test_the_more_robots_the_more_of_them_share_a_frame(
     desk.clock.now += gap_s + 1e-6
     page.read()
     assert [move[3] for move in page.told("moves")] == [0.0] * robots + [2.0]
-
-
-def test_what_was_not_due_comes_when_it_is(desk: WebDesk, page: Page) -> None:
-    for x in (0.0, 1.0):
-        desk.drive("AGI", x)
-        desk.hear(scan(origin=desk.next_origin()))
-        page.read()
-        page.paint()
-        desk.clock.now += GAP_S
-    waited_s = 0.0
-    while page.topics().count("robots/AGI/scan") < 2:
-        wait_s = page.feed.wait_s(desk.clock().mono)
-        assert wait_s is not None
-        assert wait_s > 0.0
-        waited_s += wait_s
-        desk.clock.now += wait_s + 1e-6
-        page.read()
-        page.paint()
-
-    assert waited_s <= PICTURE_S
 
 
 def test_without_credit_a_change_wakes_nobody(desk: WebDesk, page: Page) -> None:
@@ -322,9 +172,6 @@ def test_nothing_new_is_no_frame(desk: WebDesk, page: Page) -> None:
 
     assert page.read() is None
     assert page.feed.wait_s(desk.clock().mono) is None
-
-
-# --- the bytes ------------------------------------------------------------------------
 
 
 def test_a_robot_is_told_whole_once_and_then_what_changes(
@@ -357,17 +204,6 @@ def test_a_move_says_when_it_was_true_and_its_stamp_as_the_robot_sent_it(
     assert move[-1] == robot.stamp
 
 
-def test_a_version_is_encoded_once_for_all_browsers(desk: WebDesk) -> None:
-    encoder = desk.encoder.telemetry
-    desk.drive("AGI")
-    desk.hear(scan(origin=desk.next_origin()))
-    now = desk.clock()
-
-    sweep = "robots/AGI/scan"
-    assert encoder.part(sweep, now) is encoder.part(sweep, now.later(1.0))
-    assert encoder.move("AGI", now) is encoder.move("AGI", now.later(1.0))
-
-
 def test_of_people_those_are_told_of_whom_there_is_more_to_say_than_an_age(
     desk: WebDesk, page: Page
 ) -> None:
@@ -386,23 +222,6 @@ def test_of_people_those_are_told_of_whom_there_is_more_to_say_than_an_age(
     assert [one["data"]["ids"] for one in told] == [["P1", "P2"]] * 2
     ages = [one["age_s"] for one in told[0]["data"]["changed"]]
     assert ages == [0.0, 0.0]
-
-
-def test_who_comes_later_is_told_ages_as_of_when_they_were_true(desk: WebDesk) -> None:
-    early = Page(desk)
-    desk.drive("AGI")
-    desk.look("AGI", detection("farmer", 5.0))
-    early.read()
-    seen_at = desk.clock().mono
-    desk.clock.now += 0.3
-    late = Page(desk)
-    desk.hub.changed("people")
-    late.read()
-
-    (told,) = [one for one in late.told("parts") if one["topic"] == "people"]
-    (person,) = told["data"]["changed"]
-    assert told["at"] == pytest.approx(seen_at + 0.3)
-    assert (person["at"], person["age_s"]) == (seen_at, 0.0)
 
 
 def test_a_scan_is_ranges_in_integers_finer_than_a_centimetre(
@@ -430,9 +249,6 @@ def test_a_scan_is_ranges_in_integers_finer_than_a_centimetre(
 def _wide_scan(desk: WebDesk, robot_id: str, beams: int = 720) -> Any:
     ranges = np.linspace(1.0, 9.0, beams, dtype=np.float32)
     return scan(robot_id=robot_id, origin=desk.next_origin(), ranges=ranges)
-
-
-# --- a scan that cannot be drawn --------------------------------------------------
 
 
 def test_f60_a_scan_that_cannot_be_written_is_refused_and_all_else_is_told(

@@ -2,7 +2,7 @@
 
 import pytest
 
-from iveg.web.live.pacing import BYTES, FRAMES, GAP_S, CreditWindow
+from iveg.web.live.feed import BYTES, FRAMES, GAP_S, CreditWindow
 
 NOW = 1000.0
 
@@ -58,42 +58,6 @@ def test_over_a_long_round_trip_the_window_is_spread_and_not_sent_in_one_go() ->
     assert window.opens_at - now == pytest.approx(0.3 / FRAMES, rel=0.01)
 
 
-def test_a_page_that_draws_slowly_is_sent_two_frames_while_it_draws() -> None:
-    window, now = CreditWindow(), NOW
-    for number in range(1, 30):
-        window.sent(0, now)
-        window.painted(number, now + 0.2, 0.001)
-        now += 1.0
-
-    window.sent(0, now)
-
-    assert window.opens_at - now == pytest.approx((0.2 - 0.002) / 2, rel=0.01)
-
-
-def test_behind_a_long_line_a_page_that_says_so_is_sent_as_many_as_ever() -> None:
-    window, now = CreditWindow(), NOW
-    for number in range(1, 30):
-        window.sent(0, now)
-        window.painted(number, now + 0.3, 0.145)
-        now += 1.0
-
-    window.sent(0, now)
-
-    assert window.opens_at - now == pytest.approx(0.29 / FRAMES, rel=0.01)
-
-
-def test_a_round_trip_that_becomes_short_again_is_forgotten() -> None:
-    window, now = CreditWindow(), NOW
-    for number in range(1, 30):
-        window.sent(0, now)
-        window.painted(number, now + (0.3 if number < 15 else 0.001))
-        now += 1.0
-
-    window.sent(0, now)
-
-    assert window.opens_at - now == pytest.approx(GAP_S)
-
-
 @pytest.mark.parametrize("word", [9, -1, 0, "1", True, 1.0, None, [1], 10**30])
 def test_what_no_page_can_have_painted_gives_no_credit(word: object) -> None:
     window = filled(FRAMES)
@@ -101,13 +65,3 @@ def test_what_no_page_can_have_painted_gives_no_credit(word: object) -> None:
     assert not window.painted(word, NOW)
 
     assert window.opens_at == float("inf")
-
-
-def test_a_frame_is_painted_once() -> None:
-    window = filled(FRAMES, heavy=BYTES // FRAMES)
-    window.painted(2, NOW)
-
-    assert not window.painted(2, NOW)
-    assert not window.painted(1, NOW)
-
-    assert window.room == 2 * (BYTES // FRAMES)

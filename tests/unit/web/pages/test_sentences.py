@@ -1,12 +1,8 @@
 """Sentences for files and paper are those of the page."""
 
-from datetime import date
-
 import pytest
 
-from iveg.web.pages.local_time import in_madrid, start_of
-from iveg.web.pages.sentences import Sentences
-from iveg.web.pages.translations import read_translations
+from iveg.web.pages.sentences import Sentences, in_madrid, read_translations
 
 ES, EN = Sentences(read_translations("es")), Sentences(read_translations("en"))
 
@@ -42,10 +38,3 @@ def test_what_is_unknown_is_a_dash_and_an_unknown_sentence_its_key() -> None:
 )
 def test_clocks_change_when_those_of_madrid_do(utc: float, wall: str) -> None:
     assert f"{in_madrid(utc):%Y-%m-%d %H:%M:%S}" == wall
-
-
-@pytest.mark.parametrize(
-    "day", [date(2026, 3, 29), date(2026, 7, 1), date(2026, 12, 1)]
-)
-def test_a_day_begins_at_its_midnight(day: date) -> None:
-    assert in_madrid(start_of(day)).isoformat() == f"{day.isoformat()}T00:00:00"

@@ -1,6 +1,5 @@
 """Issue 13.23: installable, and one honest sentence without a connection."""
 
-import json
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -17,7 +16,7 @@ from fastapi import FastAPI
 from playwright.sync_api import Browser, expect
 
 from iveg.domain.limits import LIMITS
-from iveg.web.pages import service_worker
+from iveg.web.pages import routes
 from iveg.web.security.authentication import Authenticator
 from iveg.web.security.headers import CONTENT_SECURITY_POLICY
 from tests.browsers import running_browser
@@ -69,22 +68,13 @@ async def test_the_worker_is_open_and_never_from_a_cache() -> None:
     app.state.authenticator = Authenticator(
         sign_in_token="cd" * 32, api_token="", clock=lambda: START
     )
-    app.include_router(service_worker.router())
+    app.include_router(routes.service_worker_router())
     transport = httpx.ASGITransport(app=app)
     async with httpx.AsyncClient(transport=transport, base_url="http://iveg") as client:
         answer = await client.get("/sw.js")
 
     assert answer.headers["cache-control"] == "no-cache"
     assert answer.headers["content-type"].startswith("text/javascript")
-
-
-def test_the_manifest_names_icons_that_are_there() -> None:
-    manifest = json.loads((STATIC / "manifest.webmanifest").read_text())
-
-    icons = {one["sizes"]: one["src"] for one in manifest["icons"]}
-    assert {"192x192", "512x512"} <= icons.keys()
-    for path in icons.values():
-        assert (STATIC / path.removeprefix("/static/")).is_file()
 
 
 @pytest.fixture
@@ -115,9 +105,7 @@ def test_without_a_server_a_page_says_so_in_the_house_s_type_until_it_is_back(
     page = browser.new_page()
     page.goto(f"{url}/")
     page.evaluate("() => navigator.serviceWorker.ready.then(() => true)")
-    page.context.add_cookies(
-        [{"name": "iveg_language", "value": "en", "url": url}],
-    )
+    page.context.add_cookies([{"name": "iveg_language", "value": "en", "url": url}])
     server.shutdown()
     server.server_close()
     page.goto(f"{url}/settings")

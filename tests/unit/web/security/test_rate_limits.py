@@ -10,7 +10,6 @@ from starlette.types import Message, Receive, Scope, Send
 from iveg.web.security.rate_limits import (
     MESSAGES_PER_S,
     PAINTED_PER_S,
-    PROGRAM_SOCKETS,
     SOCKETS,
     TOO_MANY_SOCKETS,
     FailedAttempts,
@@ -20,9 +19,6 @@ from iveg.web.security.roles import Principal
 from tests.fakes.clock import FakeClock
 
 PING, STOP = '{"type": "ping", "t": 1}', '{"type": "stop", "robot_id": "AGI"}'
-
-
-# --- signing in ---------------------------------------------------------------------
 
 
 def test_five_wrong_links_are_free_and_the_next_waits_a_minute() -> None:
@@ -35,32 +31,12 @@ def test_five_wrong_links_are_free_and_the_next_waits_a_minute() -> None:
     assert attempts.wait_s("10.0.0.1", 64.0) == 0.0
 
 
-def test_one_address_does_not_make_another_wait() -> None:
-    attempts = FailedAttempts()
-    for _ in range(5):
-        attempts.failed("10.0.0.1", 0.0)
-
-    assert attempts.wait_s("10.0.0.2", 0.0) == 0.0
-
-
-def test_whoever_gets_in_begins_anew() -> None:
-    attempts = FailedAttempts()
-    for _ in range(5):
-        attempts.failed("10.0.0.1", 0.0)
-    attempts.succeeded("10.0.0.1")
-
-    assert attempts.wait_s("10.0.0.1", 0.0) == 0.0
-
-
 def test_addresses_are_bounded() -> None:
     attempts = FailedAttempts()
     for number in range(5000):
         attempts.failed(f"10.0.{number}", 0.0)
 
     assert len(attempts._wrong) <= 1024
-
-
-# --- sockets ------------------------------------------------------------------------
 
 
 @dataclass
@@ -202,21 +178,6 @@ async def test_what_only_looks_like_a_stop_is_limited(text: str) -> None:
     assert len(bench.server.heard) == MESSAGES_PER_S
 
 
-async def test_programs_share_their_sockets_and_are_limited_like_pages() -> None:
-    bench = Bench()
-    programs = [await bench.open("program") for _ in range(PROGRAM_SOCKETS)]
-    bench.clock.now += 5.0
-    one_more = await bench.open("program")
-    for _ in range(100):
-        programs[0].say(PING)
-    await settle()
-    await bench.close()
-
-    assert one_more.code == TOO_MANY_SOCKETS
-    assert [program.code for program in programs] == [None] * PROGRAM_SOCKETS
-    assert len(bench.server.heard) == MESSAGES_PER_S
-
-
 async def test_a_sixth_socket_of_a_session_is_refused_while_five_are_alive() -> None:
     bench = Bench()
     pages = [await bench.open() for _ in range(SOCKETS)]
@@ -245,30 +206,3 @@ async def test_a_silent_socket_gives_way_to_the_page_that_comes_back() -> None:
     assert back.code is None
     assert pages[0].code == TOO_MANY_SOCKETS
     assert [page.code for page in pages[1:]] == [None] * (SOCKETS - 1)
-
-
-async def test_a_socket_that_has_ended_makes_room() -> None:
-    bench = Bench()
-    pages = [await bench.open() for _ in range(SOCKETS)]
-    pages[0].queue.put_nowait({"type": "websocket.disconnect", "code": 1001})
-    await settle()
-
-    another = await bench.open()
-    await bench.close()
-
-    assert another.code is None
-
-
-@pytest.mark.parametrize("kind", ["http", "lifespan"])
-async def test_what_is_no_socket_is_left_alone(kind: str) -> None:
-    seen: list[str] = []
-
-    async def app(scope: Scope, receive: Receive, send: Send) -> None:
-        seen.append(scope["type"])
-
-    bench = Bench()
-    browser = Browser()
-    limits = SocketLimits(app, bench.identify, bench.clock)
-    await limits({"type": kind, "headers": []}, browser.receive, browser.send)
-
-    assert seen == [kind]

@@ -9,7 +9,7 @@ import { laneName } from "../../core/lanes.js";
 
 /**
  * @param {Translate} [t] of the keys `class.…`, `lane.…`, `task.…`, `map.encounter`, `map.ghost`,
- *   `map.last_seen`, `map.replay`; without it numbers stand alone
+ *   `map.last_seen`, `map.replay`, `situation.is.…`; without it numbers stand alone
  * @param {string} [locale] BCP 47; the page's by default
  */
 export function createLabels(t = untranslated, locale = document.documentElement.lang) {
@@ -70,6 +70,7 @@ export function createLabels(t = untranslated, locale = document.documentElement
      * @param {number} seconds @param {number} share 0–1 */
     encounter: (robot, seconds, share) => t("map.encounter", { robot, seconds, share }),
     replay: () => t("map.replay"),
+    noCamera: () => t("situation.is.no_camera"),
   };
 }
 

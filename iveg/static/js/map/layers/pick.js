@@ -1,11 +1,9 @@
 /**
- * The object under a finger: a robot before a person, a person before its ring, a place
- * that is known last.
+ * The object under a finger: a robot before a person, a person before its ring.
  *
  * @typedef {import("../scene.js").Scene} Scene
  * @typedef {import("../viewport.js").Viewport} Viewport
- * @typedef {{kind: "robot" | "person" | "detection" | "known", id: string}} Picked
- *   `id` of a known place: `idOfKnown`
+ * @typedef {{kind: "robot" | "person" | "detection", id: string}} Picked
  */
 
 import { screenX, screenY } from "../viewport.js";
@@ -37,16 +35,8 @@ export function pick(scene, view, px, py, isOn) {
   const seen = nearest(detections, gapTo, () => FINGER_PX);
   if (seen && isOn("detections")) return { kind: "detection", id: seen.id };
   const ring = nearest(people, gapTo, (it) => ringOf(it) * view.scale);
-  if (ring && isOn("people")) return { kind: "person", id: ring.id };
-  const reach = (/** @type {{radius_m: number}} */ it) => it.radius_m * view.scale;
-  const known = nearest(scene.known?.items ?? [], gapTo, (it) =>
-    Math.max(FINGER_PX, reach(it)),
-  );
-  return known && isOn("known") ? { kind: "known", id: idOfKnown(known) } : null;
+  return ring && isOn("people") ? { kind: "person", id: ring.id } : null;
 }
-
-/** A place has no name but where it is. @param {{x: number, y: number}} spot */
-export const idOfKnown = ({ x, y }) => `${x} ${y}`;
 
 /** @param {Scene["people"][number]} person */
 function ringOf(person) {

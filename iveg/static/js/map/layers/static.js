@@ -61,7 +61,7 @@ export function createStaticImage(layers) {
  */
 export function placeOf({ view, theme, labels, scene }, ratio) {
   const { width, height, scale, x, y } = view;
-  const told = [scene.map, scene.coverage, scene.costmap, scene.known];
+  const told = [scene.map, scene.coverage, scene.costmap];
   return [width, height, scale, x, y, ratio, theme, labels, ...told];
 }
 

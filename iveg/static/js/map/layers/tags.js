@@ -117,7 +117,7 @@ export function drawTag(paint, robot, { y, aside, tags }) {
  * @param {Pick<SceneRobot, "situation" | "ageS">} robot
  */
 export const isSeenHeld = ({ situation, ageS }) =>
-  situation.level === "locked" && ageS <= LIMITS.report_stale_s;
+  situation.kind === "locked" && ageS <= LIMITS.report_stale_s;
 
 /**
  * A dark octagon with a padlock: held, and not by accident.
@@ -166,6 +166,7 @@ export function tagsOf({ theme, labels }, robot) {
   if ((state === "half" || state === "slow") && typeof slots.factor === "number") {
     tags.push([labels.percent(slots.factor), text, bg]);
   }
+  if (robot.isBlind) tags.push([labels.noCamera(), text, bg]);
   if (robot.replay) tags.push([labels.replay(), muted, bg]);
   return tags;
 }

@@ -38,7 +38,6 @@ const SYMBOLS = {
   direct: "circle",
   fiware: "diamond",
   standstill: "square",
-  late: "circle-open",
 };
 
 /** @type {Promise<any> | null} */
@@ -273,9 +272,7 @@ function noteOf(name, data, i18n) {
   if (name === "speed") {
     const seconds = Math.max(...data.map((trace) => trace.meta.slice_s));
     const drawn = seconds > 0 ? "history.note.sliced" : "history.note.exact";
-    const late = data.some(({ meta }) => meta.kind === "late");
-    const said = [drawn, ...(late ? ["history.note.late"] : [])];
-    return said.map((key) => i18n.t(key, { seconds })).join(" ");
+    return i18n.t(drawn, { seconds });
   }
   const sum = (/** @type {Trace} */ trace) =>
     trace.y.reduce((/** @type {number} */ total, n) => total + (n ?? 0), 0);

@@ -1,0 +1,552 @@
+"""Alerts to people: raised, acknowledged, cleared (ISA-18.2), and what raises them.
+
+Alerts after ISA-18.2: raised, acknowledged, cleared (docs/dashboard.md, "Alerts").
+
+The conditions that hold are found anew each time; the book compares them with the
+alerts that it keeps.  A condition that ends clears its alert; one that returns is the
+same alert, one occurrence more.  One row stands for all of them, but never for less
+than the gravest unacknowledged occurrence: grouping cannot hide an escalation.
+
+The alert conditions that hold now, from decisions and robots (docs/dashboard.md).
+
+An alert as the history keeps it, both ways.
+
+Percentiles of few measured values.
+
+Acknowledgement latency: how soon the fleet obeys its speed limits (docs/safety.md).
+
+The time runs from the notification of the detection frame that a slow-down rests on to
+the robot's own report that it applies the factor.  Both are read on the server's clock,
+so no other clock has to be believed.  The way from camera to iVeg is left out: only the
+robot's clock could tell it.
+
+A robot judges the feedback by its own pose, and may report a slow-down before iVeg
+finds the robot inside the ring.  It is then timed from the newest frame that the fleet
+had received by then.  A robot that drives into a ring of which no frame is recent
+counts as asked and acknowledged, but its time says nothing of the way.  A robot that
+was slow for another reason is not asked.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from math import ceil, inf
+from typing import cast
+
+from iveg.domain.decisions import SlowdownDecision
+from iveg.domain.detection_rule import RECOVERED, DetectionRule
+from iveg.domain.events import Condition, Priority, Slot
+from iveg.domain.feedback import SpeedLimit
+from iveg.domain.limits import LIMITS
+from iveg.domain.observations import Instant
+from iveg.domain.records import AlertRecord
+from iveg.domain.robot_state import RobotState
+from iveg.domain.stamps import wall_of
+from iveg.domain.tracking.person import Thing
+from iveg.domain.words import WordAnswer
+
+GROUPING_S = 600.0
+"""A condition that returns within this time is the same alert, counted once more."""
+MOST_KEPT = 200
+"""Beyond this number even an unacknowledged P1 is left to the history."""
+
+
+@dataclass(frozen=True, slots=True)
+class AlertOccurrence:
+    """One period in which a condition held, with its acknowledgement."""
+
+    priority: Priority
+    raised: Instant
+    cleared: Instant | None = None
+    acknowledged: Instant | None = None
+    acknowledged_by: str | None = None
+    note: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class BookedAlert:
+    """One alert with its life: every occurrence of one condition.
+
+    Attributes:
+        condition: As it is now, or was when it cleared.
+        raised: The first occurrence.
+        last: The newest occurrence.
+        unseen: Gravest priority that nobody has acknowledged; None when all are seen.
+        count: All occurrences.
+    """
+
+    alert_id: str
+    condition: Condition
+    raised: Instant
+    last: AlertOccurrence
+    unseen: Priority | None
+    count: int = 1
+
+    @property
+    def cleared(self) -> Instant | None:
+        """When the condition went; None while it holds."""
+        return self.last.cleared
+
+    @property
+    def waits(self) -> bool:
+        """Whether people should see it: it is active, or an unacknowledged P1."""
+        return self.cleared is None or self.unseen == "P1"
+
+    @property
+    def priority(self) -> Priority:
+        """Shown priority: never less than the gravest unacknowledged one."""
+        return graver(self.condition.priority, self.unseen)
+
+
+def graver(one: Priority, other: Priority | None) -> Priority:
+    """The priority that must not be hidden by the other."""
+    return one if other is None else min(one, other)
+
+
+class AlertBook:
+    """All active alerts and the recently cleared ones."""
+
+    def __init__(self) -> None:
+        self._alerts: dict[tuple[str, str], BookedAlert] = {}
+
+    @property
+    def waiting(self) -> list[BookedAlert]:
+        """Active alerts, and each P1 that cleared before it was acknowledged."""
+        return [one for one in self._alerts.values() if one.waits]
+
+    def sync(
+        self, conditions: Iterable[Condition], now: Instant, new_id: str
+    ) -> list[BookedAlert]:
+        """Take the conditions that hold now; returns the alerts that they changed."""
+        wrong = _gravest(conditions)
+        changed = []
+        for key, alert in list(self._alerts.items()):
+            if key in wrong or alert.cleared is not None:
+                continue
+            self._alerts[key] = _clear(alert, now)
+            changed.append(self._alerts[key])
+        for number, (key, condition) in enumerate(wrong.items()):
+            before = self._alerts.get(key)
+            if before is not None and _goes_on(before, condition):
+                # What has not changed stays the very same for whoever draws it.
+                if condition != before.condition:
+                    self._alerts[key] = replace(before, condition=condition)
+                continue
+            self._alerts[key] = _raise(before, condition, now, f"{new_id}-{number}")
+            changed.append(self._alerts[key])
+        self._forget(now)
+        return changed
+
+    def acknowledge(
+        self, alert_id: str, by: str, note: str, now: Instant
+    ) -> BookedAlert | None:
+        """Acknowledge all occurrences; None when there is no such alert."""
+        alert = self.find(alert_id)
+        return None if alert is None else self._keep(_see(alert, by, note, now))
+
+    def remember(self, alerts: Iterable[BookedAlert]) -> None:
+        """Take up cleared, unacknowledged alerts of an earlier run; known ones stay.
+
+        If the condition holds again, a new alert of this run already stands beside it.
+        """
+        for alert in alerts:
+            key = alert.condition.key, alert.condition.subject
+            if key in self._alerts:
+                named = replace(alert.condition, subject=alert.alert_id)
+                alert = replace(alert, condition=named)
+                key = named.key, named.subject
+            self._alerts[key] = alert
+
+    def find(self, alert_id: str) -> BookedAlert | None:
+        """An alert that is active or recently cleared."""
+        found = (one for one in self._alerts.values() if one.alert_id == alert_id)
+        return next(found, None)
+
+    def _keep(self, alert: BookedAlert) -> BookedAlert:
+        """Store the new value of an alert."""
+        self._alerts[alert.condition.key, alert.condition.subject] = alert
+        return alert
+
+    def _forget(self, now: Instant) -> None:
+        for key, alert in list(self._alerts.items()):
+            cleared = alert.cleared
+            is_old = cleared is not None and now.mono - cleared.mono > GROUPING_S
+            if is_old and (not alert.waits or len(self._alerts) > MOST_KEPT):
+                del self._alerts[key]
+
+
+def _gravest(conditions: Iterable[Condition]) -> dict[tuple[str, str], Condition]:
+    """Conditions by kind and subject; of two alike the graver."""
+    wrong: dict[tuple[str, str], Condition] = {}
+    for one in conditions:
+        known = wrong.setdefault((one.key, one.subject), one)
+        if one.priority < known.priority:
+            wrong[one.key, one.subject] = one
+    return wrong
+
+
+def _goes_on(before: BookedAlert, condition: Condition) -> bool:
+    """Whether the occurrence continues: a graver one is a new occurrence."""
+    return before.cleared is None and condition.priority >= before.condition.priority
+
+
+def _clear(alert: BookedAlert, now: Instant) -> BookedAlert:
+    return replace(alert, last=replace(alert.last, cleared=now))
+
+
+def _raise(
+    before: BookedAlert | None, condition: Condition, now: Instant, alert_id: str
+) -> BookedAlert:
+    new = AlertOccurrence(condition.priority, now)
+    if before is None:
+        return BookedAlert(alert_id, condition, now, new, unseen=new.priority)
+    # The same alert, but a new occurrence needs a new acknowledgement.
+    return replace(
+        before,
+        condition=condition,
+        last=new,
+        unseen=graver(new.priority, before.unseen),
+        count=before.count + 1,
+    )
+
+
+def _see(alert: BookedAlert, by: str, note: str, now: Instant) -> BookedAlert:
+    last = alert.last
+    if last.acknowledged is None:
+        last = replace(last, acknowledged=now, acknowledged_by=by, note=note)
+    return replace(alert, last=last, unseen=None)
+
+
+ESTIMATED_SHOWN_AFTER_S = 5.0
+"""Time that a robot may take to receive its first feedback (s)."""
+DETECTOR_STARTS_S = 10.0
+"""Time that a fleet may take to send its first detection frames after iVeg's start."""
+SHOWN_S = 10.0
+"""How long after it was last so a condition is reported (s): one at its bound is one
+alert and not one a second."""
+
+
+def of_ignored(robot_id: str, limit: SpeedLimit | None) -> Iterable[Condition]:
+    """A limit that a robot does not keep to is a P1; a slow-down as such is no alert.
+
+    The slow-down is on the robot's card, on the map and in the log.
+    """
+    if limit is None:
+        return
+    is_person = limit.reason == "person" and limit.distance_m is not None
+    key = "alert.person_not_slowing" if is_person else "alert.no_slow_down"
+    slots: dict[str, Slot] = {"person": limit.cause, "decision": limit.decision_id}
+    if limit.distance_m is not None:
+        slots["distance"] = round(limit.distance_m, 2)
+    yield Condition.of_robot("P1", key, robot_id, **slots)
+
+
+def of_robot(robot: RobotState, now: Instant) -> Iterable[Condition]:
+    """A robot that is lost, doubted, or whose clock or detector is off."""
+    name = robot.robot_id
+    if robot.link(now) == "LOST":
+        if robot.motion(now).moves:
+            yield Condition.of_robot("P1", "alert.moving_robot_lost", name)
+        else:
+            yield Condition.of_robot("P2", "alert.robot_lost", name)
+    if robot.refused:
+        yield Condition.of_robot("P3", "alert.robot_refused", name)
+    offset = robot.clock.warning(now, _may_be_late_s(robot, now))
+    if offset is not None:
+        shown = round(offset, 2)
+        yield Condition.of_robot("P3", "alert.clock_offset", name, offset=shown)
+    for code in robot.doubts.active(now)[:1]:
+        yield Condition.of_robot("P2", "alert.doubt", name, code=code)
+
+
+def of_detector(
+    robot: RobotState, now: Instant, *, started: Instant
+) -> Iterable[Condition]:
+    """A detector whose pictures are not read whole; ``started``: when iVeg did."""
+    name, detector = robot.robot_id, robot.detector
+    if not robot.description.has_detector:
+        return
+    if _is_recent(detector.flawed_at.get("unreadable"), now) or _is_unplaced(
+        robot, now, started
+    ):
+        yield Condition.of_robot("P2", "alert.unreadable_detection", name)
+    if _is_recent(robot.clock.detector_accused_at, now):
+        yield Condition.of_robot("P2", "alert.detector_clock", name)
+    if _is_silent(robot, now, started):
+        yield Condition.of_robot("P2", "alert.detector_silent", name)
+    if detector.blind_by is not None:
+        seer = detector.blind_by
+        yield Condition.of_robot("P2", "alert.camera_blind", name, by=seer)
+    if detector.out_of_service is not None:
+        out, key = detector.out_of_service, "alert.detector_out_of_service"
+        yield Condition.of_robot("P3", key, name, by=out.by, reason=out.reason)
+
+
+def of_words(
+    robots: Iterable[RobotState], answers: Iterable[WordAnswer]
+) -> Iterable[Condition]:
+    """Words of detectors that nobody knows, and those that are said to be nobody."""
+    for robot in robots:
+        for name, heard in robot.detector.words.items():
+            for word in heard.unknown:
+                yield _of_word("alert.unknown_word", name, word)
+    for one in answers:
+        if not one.is_person:
+            yield _of_word("alert.harmless_word", one.detector, one.word, by=one.by)
+
+
+def _of_word(key: str, detector: str, word: str, **more: Slot) -> Condition:
+    slots: dict[str, Slot] = {"word": word, "detector": detector, **more}
+    return Condition("P3", key, f"{detector}/{word}", None, slots)
+
+
+def of_other_authors(boots: Iterable[str]) -> Iterable[Condition]:
+    """Another server that robots hear: they keep to the least that any allows."""
+    if names := ", ".join(boots):
+        slots: dict[str, Slot] = {"boot": names}
+        yield Condition("P1", "alert.another_iveg", "fleet", None, slots)
+
+
+def of_things(things: Iterable[Thing]) -> Iterable[Condition]:
+    """Places where an operator said that nobody is."""
+    for one in things:
+        slots: dict[str, Slot] = {"x": round(one.x, 2), "y": round(one.y, 2)}
+        slots["by"] = one.by
+        yield Condition("P3", "alert.thing_marked", one.thing_id, None, slots)
+
+
+def _is_unplaced(robot: RobotState, now: Instant, started: Instant) -> bool:
+    """Whether it still sees somebody without knowing where it is: not while it starts.
+
+    A robot's first pictures may come before its first odometry.
+    """
+    unplaced_at = robot.detector.flawed_at.get("unplaced")
+    is_starting = now.mono - started.mono < DETECTOR_STARTS_S
+    return not is_starting and _is_recent(unplaced_at, now, LIMITS.silence_s)
+
+
+def _is_silent(robot: RobotState, now: Instant, started: Instant) -> bool:
+    """Whether people are to look after it: not while it starts, nor of a lost robot."""
+    detector = robot.detector
+    if detector.is_flawed(now) or not detector.is_missing(now):
+        return False
+    if robot.link(now) == "LOST":
+        return False
+    if _is_recent(robot.clock.detector_apart_at, now, LIMITS.silence_s):
+        return False  # it speaks, by another clock
+    if detector.whole_at is not None and robot.pose_at is not None:
+        # Else all of it is late or has just come back: the robot itself is reported.
+        is_alive = now.mono - (robot.alive_since or now.mono) > LIMITS.silence_s
+        return is_alive and robot.pose_at - detector.whole_at > LIMITS.silence_s
+    return detector.worked or now.mono - started.mono >= DETECTOR_STARTS_S
+
+
+def of_kind(robot: RobotState, now: Instant) -> Iterable[Condition]:
+    """A robot whose messages contradict its kind in the fleet: live or recording."""
+    name = robot.robot_id
+    if _is_recent(robot.live_at, now):
+        yield Condition.of_robot("P1", "alert.recording_is_live", name)
+    if _is_recent(robot.refused_at, now):
+        yield Condition.of_robot("P2", "alert.replay_refused", name)
+
+
+def _is_recent(moment: float | None, now: Instant, within_s: float = SHOWN_S) -> bool:
+    return moment is not None and now.mono - moment < within_s
+
+
+def _may_be_late_s(robot: RobotState, now: Instant) -> float:
+    """Greatest delay of the messages of a robot that echoes (s); else 0."""
+    if robot.odometry is None or not robot.odometry.origin.acknowledgements:
+        return 0.0
+    age = robot.age_s(now)
+    return inf if age is None else age
+
+
+def of_overload(robots: Iterable[RobotState], now: Instant) -> Iterable[Condition]:
+    """Detectors with more detections than can be judged: one alert names them all."""
+    names = [
+        robot.robot_id
+        for robot in robots
+        if _is_recent(robot.detector.flawed_at.get("overload"), now)
+    ]
+    if names:
+        yield _of_all("P2", "alert.pictures_not_judged", sorted(names))
+
+
+def of_rule(rule: DetectionRule) -> Iterable[Condition]:
+    """The rule in force was made from a damaged file, and nobody has looked at it."""
+    if rule.author == RECOVERED:
+        slots = {"version": rule.version}
+        yield Condition("P2", "alert.rule_recovered", "fleet", None, slots)
+
+
+def of_fleet(robots: Iterable[RobotState], now: Instant) -> Iterable[Condition]:
+    """Estimated ages, no description, boxes without a frame: one alert each."""
+    fleet = list(robots)
+    estimated = [
+        robot.robot_id
+        for robot in fleet
+        if robot.estimated_since is not None
+        and now.mono - robot.estimated_since > ESTIMATED_SHOWN_AFTER_S
+    ]
+    unlabelled = [
+        one.robot_id
+        for one in fleet
+        if one.unlabelled and one.profile.unlabelled_frame is None
+    ]
+    undescribed = [one.robot_id for one in fleet if not one.description.is_described]
+    for key, names in (
+        ("alert.age_estimated", estimated),
+        ("alert.robots_not_described", undescribed),
+        ("alert.frame_not_named", unlabelled),
+    ):
+        if names:
+            yield _of_all("P3", key, names)
+
+
+def _of_all(priority: Priority, key: str, names: Iterable[str]) -> Condition:
+    """One condition that names every robot concerned."""
+    return Condition(priority, key, "fleet", None, {"robots": ", ".join(names)})
+
+
+def write_alert(alert: BookedAlert) -> AlertRecord:
+    """An alert as a row; moments are Unix seconds."""
+    condition, last = alert.condition, alert.last
+    return AlertRecord(
+        alert_id=alert.alert_id,
+        priority=alert.priority,
+        key=condition.key,
+        raised_at=alert.raised.wall,
+        last_raised_at=last.raised.wall,
+        slots=dict(condition.slots),
+        robot_id=condition.robot_id,
+        cleared_at=wall_of(last.cleared),
+        acknowledged_at=wall_of(last.acknowledged),
+        acknowledged_by=last.acknowledged_by,
+        note=last.note or None,
+        count=alert.count,
+    )
+
+
+def read_alert(record: AlertRecord, now: Instant) -> BookedAlert:
+    """An alert of an earlier run as one that is over, with its life as it was."""
+    if record.cleared_at is None:
+        record = cleared_behind(record, now.wall)
+    priority = cast("Priority", record.priority)
+    seen = record.acknowledged_at
+    last = AlertOccurrence(
+        priority,
+        _moment(record.last_raised_at, now),
+        _moment(record.cleared_at or now.wall, now),
+        None if seen is None else _moment(seen, now),
+        record.acknowledged_by,
+        record.note or "",
+    )
+    return BookedAlert(
+        record.alert_id,
+        Condition(
+            priority,
+            record.key,
+            _subject(record),
+            record.robot_id,
+            record.slots,
+        ),
+        _moment(record.raised_at, now),
+        last,
+        unseen=priority if seen is None else None,
+        count=record.count,
+    )
+
+
+def cleared_behind(record: AlertRecord, found: float) -> AlertRecord:
+    """An alert that an earlier run left active; what is still wrong is a new one."""
+    return replace(record, cleared_at=found)
+
+
+def _subject(record: AlertRecord) -> str:
+    """The robot or person concerned; the person is unknown after a restart."""
+    if record.robot_id is None or "person" in record.slots:
+        return record.alert_id
+    return record.robot_id
+
+
+def _moment(wall: float, now: Instant) -> Instant:
+    """A moment of an earlier run on this run's clock."""
+    return Instant(now.mono - (now.wall - wall), wall)
+
+
+def nearest_rank(known: Sequence[float], share: float) -> float | None:
+    """Nearest-rank percentile of sorted values (``share`` 0 to 1); None without any."""
+    return known[max(0, ceil(share * len(known)) - 1)] if known else None
+
+
+WINDOW_S = 300.0
+ECHO_S = 1.0
+"""A robot that has not answered by then has not echoed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Acknowledgements:
+    """The alerts of the last minutes, as robots acknowledged them.
+
+    Attributes:
+        timed: How many answers could be timed.
+        p50_s: That half of them did not exceed (s); ``p95_s``, ``p99_s`` likewise.
+        echo_age_s: Of the newest timed answer (s).
+        asked: How many alerts should have been answered by now.
+        missed: How many of those were not, within ``ECHO_S``.
+        asked_age_s: Since the newest of those (s).
+    """
+
+    timed: int = 0
+    p50_s: float | None = None
+    p95_s: float | None = None
+    p99_s: float | None = None
+    echo_age_s: float | None = None
+    asked: int = 0
+    missed: int = 0
+    asked_age_s: float | None = None
+
+
+def acknowledgements_of(
+    decisions: Iterable[SlowdownDecision], now: Instant
+) -> Acknowledgements:
+    """Acknowledgement latencies of the decisions in memory, last five minutes."""
+    recent = [one for one in decisions if _counts(one, now)]
+    due = [one for one in recent if _is_due(one, now)]
+    timed = [one for one in recent if one.took_s is not None]
+    took = sorted(one.took_s for one in timed if one.took_s is not None)
+    return Acknowledgements(
+        timed=len(took),
+        p50_s=nearest_rank(took, 0.50),
+        p95_s=nearest_rank(took, 0.95),
+        p99_s=nearest_rank(took, 0.99),
+        echo_age_s=_age((one.answered_at for one in timed), now),
+        asked=len(due),
+        missed=sum(not _is_acknowledged(one) for one in due),
+        asked_age_s=_age((one.entry.entered.mono for one in due), now),
+    )
+
+
+def _counts(decision: SlowdownDecision, now: Instant) -> bool:
+    entry = decision.entry
+    # Who was ahead and has braked by now was not slow for something else.
+    asked = decision.answered is not None or not entry.already_slow
+    return asked and now.mono - entry.entered.mono <= WINDOW_S
+
+
+def _is_due(decision: SlowdownDecision, now: Instant) -> bool:
+    """Whether the time to acknowledge is over."""
+    waited = now.mono - decision.entry.entered.mono
+    return waited > ECHO_S or _is_acknowledged(decision)
+
+
+def _is_acknowledged(decision: SlowdownDecision) -> bool:
+    applied, entry = decision.applied, decision.entry
+    return entry.told_before or (
+        applied is not None and applied.mono - entry.entered.mono <= ECHO_S
+    )
+
+
+def _age(moments: Iterable[float | None], now: Instant) -> float | None:
+    newest = max((at for at in moments if at is not None), default=None)
+    return None if newest is None else now.mono - newest

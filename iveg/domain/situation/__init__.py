@@ -1,1 +1,0 @@
-"""How it stands with a robot: one truth, which every surface says."""

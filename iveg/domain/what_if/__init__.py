@@ -1,1 +1,0 @@
-"""What other parameters of the rule would have done with what was kept."""

@@ -1,0 +1,271 @@
+"""Times of each message, read at the broker and at Orion by a recorder of our own.
+
+iVeg reads the broker every few hundredths of a second and skips what is old; Orion's
+copy is often there before.  Here every message is read at once, from the agent's own
+topics and by subscriptions of our own at Orion, and decoded when the run is over.
+"""
+
+import asyncio
+import contextlib
+import ssl
+import threading
+from collections.abc import AsyncIterator, Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from http import HTTPStatus
+from typing import Final
+from urllib.parse import urlsplit
+
+from paho.mqtt import client as paho
+from paho.mqtt.enums import CallbackAPIVersion
+
+from iveg.adapters import clock
+from iveg.adapters.orion import OrionClient
+from iveg.adapters.post_listener import post_listener
+from iveg.adapters.subscriptions import (
+    ALL_ROBOTS,
+    WantedSubscription,
+    write_subscription,
+)
+from iveg.app.fiware import open_fiware
+from iveg.cli.nodes import broker_of
+from iveg.domain.errors import HopError, UnreadableError
+from iveg.domain.kinds import MEASURED
+from iveg.domain.latency import DATA, LONGEST_S, STAMP_S, Data, Segment, data_of
+from iveg.domain.observations import kind_of
+from iveg.ngsi import codec, names
+from iveg.settings import Settings
+
+COUNTS: Final = ("sent", "lost", "reordered", "orion_first")
+HOPS: Final[tuple[Segment, ...]] = ("uplink", "fiware", "robot_orion")
+
+
+@dataclass(frozen=True, slots=True)
+class MessageTimes:
+    """One message at the places that it passed, all by one clock (Unix s).
+
+    Two are equal if they are of one message.
+
+    Attributes:
+        stamp: As the robot stamped it; None: it did not.
+        broker: When the broker had passed it on.
+        orion: When Orion's notification was here; None: it never came.
+    """
+
+    robot_id: str
+    data: Data
+    boot: str
+    seq: int
+    stamp: float | None = field(compare=False)
+    broker: float = field(default=0.0, compare=False)
+    orion: float | None = field(default=None, compare=False)
+
+    @property
+    def hops(self) -> dict[Segment, float] | None:
+        """Δt₁, Δt₂ and their sum (s); None where Orion's copy was first or never came.
+
+        What was stamped later than it came, or a minute before, does not count.
+        """
+        if self.stamp is None or self.orion is None:
+            return None
+        up, on = self.broker - self.stamp, self.orion - self.broker
+        if on < 0.0 or not -STAMP_S <= up <= LONGEST_S:
+            return None
+        up = max(0.0, up)
+        return {"uplink": up, "fiware": on, "robot_orion": up + on}
+
+
+def counts_of(times: Iterable[MessageTimes]) -> dict[Data, dict[str, int]]:
+    """Messages at the broker; of these lost, out of order, or first at Orion."""
+    counts = {data: dict.fromkeys(COUNTS, 0) for data in DATA}
+    came = []
+    for one in times:
+        count = counts[one.data]
+        count["sent"] += 1
+        if one.orion is None:
+            count["lost"] += 1
+        else:
+            count["orion_first"] += one.orion < one.broker
+            came.append((one.orion, one))
+    newest: dict[tuple[str, Data, str], int] = {}
+    for _, one in sorted(came, key=lambda each: each[0]):
+        stream = one.robot_id, one.data, one.boot
+        counts[one.data]["reordered"] += one.seq < newest.get(stream, one.seq)
+        newest[stream] = max(one.seq, newest.get(stream, one.seq))
+    return counts
+
+
+def hops_of(times: Iterable[MessageTimes]) -> dict[Data, dict[Segment, list[float]]]:
+    """Durations of each hop by kind of data (ms)."""
+    took: dict[Data, dict[Segment, list[float]]] = {
+        data: {hop: [] for hop in HOPS} for data in DATA
+    }
+    for one in times:
+        for hop, duration in (one.hops or {}).items():
+            took[one.data][hop].append(round(1000.0 * duration, 3))
+    return took
+
+
+DESCRIPTION: Final = "iVeg experiment, times of messages"
+"""Of its subscriptions; iVeg's own begin otherwise, so that it leaves these alone."""
+LAST_COPIES_S: Final = 2.0
+"""How long Orion's copies of the last messages are waited for (s)."""
+_SUBSCRIBED_WITHIN_S = 5.0
+_SETTLED_S, _SETTLES_WITHIN_S, _LOOK_EVERY_S = 0.5, 60.0, 0.5
+
+
+class MessageRecorder:
+    """Holds what was read, and when; decodes it when asked."""
+
+    def __init__(self) -> None:
+        # Steps of the wall clock must not get between two readings.
+        self._since = clock.wall() - clock.mono()
+        self._heard: list[tuple[float, str, bytes]] = []
+        self._notified: list[tuple[float, bytes]] = []
+
+    def heard(self, topic: str, payload: bytes) -> None:
+        """The broker has passed a message on."""
+        self._heard.append((self._now, topic, payload))
+
+    def notified(self, body: bytes) -> tuple[HTTPStatus, str]:
+        """Orion has posted a notification."""
+        self._notified.append((self._now, body))
+        return HTTPStatus.NO_CONTENT, ""
+
+    @property
+    def _now(self) -> float:
+        return self._since + clock.mono()
+
+    async def settle(self, within_s: float = _SETTLES_WITHIN_S) -> bool:
+        """Wait until Orion keeps up: robots start at full rate behind a backlog.
+
+        Returns:
+            Whether it does.
+        """
+        deadline = clock.mono() + within_s
+        in_time = 0
+        while in_time < 2 and clock.mono() < deadline:
+            await asyncio.sleep(_LOOK_EVERY_S)
+            in_time = in_time + 1 if self._lag_s < _SETTLED_S else 0
+        return in_time == 2
+
+    @property
+    def _lag_s(self) -> float:
+        """Age of the newest of Orion's copies when it came (s)."""
+        for at, body in self._notified[-1:]:
+            for one in _read_notification(body):
+                if one.stamp is not None:
+                    return at - one.stamp
+        return float("inf")
+
+    def times(self, begin: float, end: float) -> list[MessageTimes]:
+        """Messages that were at the broker within a time (Unix s), in that order."""
+        found: dict[MessageTimes, MessageTimes] = {}
+        for at, topic, payload in self._heard:
+            if begin <= at < end:
+                read = codec.read_measure(topic.split("/")[2], payload)
+                for one in _messages_in(read):
+                    found.setdefault(one, replace(one, broker=at))
+        for at, body in self._notified:
+            for one in _read_notification(body):
+                known = found.get(one)
+                if known is not None and known.orion is None:
+                    found[one] = replace(known, orion=at)
+        return list(found.values())
+
+
+def _messages_in(read: codec.ReadResult) -> Iterator[MessageTimes]:
+    """The messages of a reading that count themselves; times are not known yet."""
+    for one in read.observations:
+        data, origin = data_of(kind_of(one)), one.origin
+        if data is not None and origin.boot is not None and origin.seq is not None:
+            robot_id: str = one.robot_id
+            yield MessageTimes(robot_id, data, origin.boot, origin.seq, origin.stamp_s)
+
+
+def _read_notification(body: bytes) -> Iterator[MessageTimes]:
+    with contextlib.suppress(UnreadableError):
+        yield from _messages_in(codec.read_notification(body)[1])
+
+
+# --- where it listens -----------------------------------------------------------------
+
+
+@contextlib.asynccontextmanager
+async def recorder(settings: Settings) -> AsyncIterator[MessageRecorder]:
+    """Record while the block lasts.
+
+    Raises:
+        HopError: the broker or Orion does not take it.
+    """
+    recorded = MessageRecorder()
+    orion, agent = open_fiware(settings)
+    host = urlsplit(settings.notify_address).hostname
+    async with (
+        _hearing(settings, recorded),
+        post_listener(recorded.notified, settings.host) as port,
+        orion,
+        agent,
+    ):
+        await _unsubscribe(orion)
+        for document in _subscriptions(f"http://{host}:{port}/"):
+            await orion.create_subscription(document)
+        try:
+            yield recorded
+        finally:
+            await _unsubscribe(orion)
+
+
+def _subscriptions(url: str) -> Iterator[dict[str, object]]:
+    """One for each kind of data: each notification has one message."""
+    for kind in MEASURED:
+        if data_of(kind.of) is not None:
+            attributes = tuple(name for name, _ in kind.attributes)
+            wanted = WantedSubscription("", ALL_ROBOTS, attributes)
+            yield {
+                **write_subscription(wanted, url, "experiment"),
+                "description": DESCRIPTION,
+            }
+
+
+async def _unsubscribe(orion: OrionClient) -> None:
+    """Remove ours, and what a start that was killed left."""
+    for one in await orion.read_subscriptions():
+        if one.get("description") == DESCRIPTION:
+            await orion.delete_subscription(one["id"])
+
+
+@contextlib.asynccontextmanager
+async def _hearing(
+    settings: Settings, recorded: MessageRecorder
+) -> AsyncIterator[None]:
+    """Read the agent's own topics at the broker, in a thread of its own.
+
+    A message has its time as soon as it is read, before any of Orion's that wait.
+    """
+    address, stands = broker_of(settings), threading.Event()
+    topic = names.measure_topic(settings.apikey, "+")
+
+    def connected(client: paho.Client, *_: object) -> None:
+        client.subscribe(topic)
+
+    def arrived(_client: object, _data: object, message: paho.MQTTMessage) -> None:
+        recorded.heard(message.topic, bytes(message.payload))
+
+    client = paho.Client(CallbackAPIVersion.VERSION2)
+    client.username_pw_set(address.user, address.password)
+    if address.tls:
+        client.tls_set_context(ssl.create_default_context())
+    client.on_connect, client.on_message = connected, arrived
+    client.on_subscribe = lambda *_: stands.set()
+    try:
+        await asyncio.to_thread(client.connect, address.host, address.port)
+    except OSError as error:
+        raise HopError("mqtt", str(error)) from error
+    client.loop_start()
+    try:
+        if not await asyncio.to_thread(stands.wait, _SUBSCRIBED_WITHIN_S):
+            raise HopError("mqtt", "takes no subscription to the robots' measures")
+        yield
+    finally:
+        client.disconnect()
+        await asyncio.to_thread(client.loop_stop)

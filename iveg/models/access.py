@@ -1,0 +1,179 @@
+"""Accounts, the links that people sign in with, and open sessions.
+
+Programs that may call.
+"""
+
+from typing import Literal
+
+from pydantic import Field
+
+from iveg.domain.accounts import (
+    Account,
+    AccountState,
+    ApiToken,
+    PersonRole,
+    SignInMethod,
+    TokenScope,
+)
+from iveg.domain.stamps import format_stamp
+from iveg.models.base import Model, stamp
+
+SessionKind = Literal["link", "account", "wall"]
+
+
+class SignInCode(Model):
+    """The sign-in link, and its QR code as a data address of an image.
+
+    ``GET /sign-in-code``: the way in for another device; of an
+    [Invitation](#invitation) for another person.
+
+    Attributes:
+        link: Signs a browser in as operator until the next start; of an invitation:
+            begins the account, once.
+        image: Its QR code as a data address.
+    """
+
+    link: str
+    image: str
+    local: bool = Field(
+        description="The address works on the server's own computer alone."
+    )
+
+
+class OwnAccount(Model):
+    """Whoever asks, as they are known here.
+
+    Attributes:
+        name: As in all that they do.
+        role: As in all that they do.
+    """
+
+    name: str
+    role: str
+    method: SignInMethod = Field(description="How they came in.")
+    account: bool = Field(description="They have one; else a link or a token.")
+    signed_in_at: str | None = Field(description="Null for programs.")
+    ends_at: str | None = Field(description="When it ends by itself; null: never.")
+
+
+class OpenSession(Model):
+    """A browser in which somebody is signed in.
+
+    Its id lets nobody in.
+
+    Attributes:
+        began_at: The sign-in; the last request.
+    """
+
+    session_id: str
+    name: str
+    role: str = Field(description="That is left now; `expired`: STOP alone.")
+    kind: SessionKind = Field(description="`wall`: of a screen, it looks and stops.")
+    began_at: str
+    seen_at: str = Field(description="The last request.")
+    own: bool = Field(description="The one that asks.")
+
+
+class SessionsEnded(Model):
+    """How many sessions have ended.
+
+    Attributes:
+        ended: How many.
+    """
+
+    ended: int
+
+
+class UserAccount(Model):
+    """An account, as admins see it.
+
+    Attributes:
+        user_id: The id is never given anew.
+        name: The id is never given anew.
+        state: ``lapsed``: the invitation was not taken in time; ``over``: it ended by
+            itself.
+    """
+
+    user_id: str
+    name: str
+    role: PersonRole
+    state: AccountState
+    ends_at: str | None = Field(description="When it ends by itself; null: never.")
+    invited_until: str | None = Field(description="Null where no invitation waits.")
+    own: bool = Field(description="Of whoever asks: another admin changes it.")
+    provided: bool = Field(
+        description="The identity provider vouches for the person and gives the role."
+    )
+
+    @classmethod
+    def of(cls, account: Account, now: float, *, own: bool = False) -> "UserAccount":
+        """As it is at this moment (Unix s)."""
+        state = account.state(now)
+        return cls(
+            user_id=account.account_id,
+            name=account.name,
+            role=account.role,
+            state=state,
+            ends_at=stamp(account.ends_at),
+            invited_until=stamp(account.invited_until if state == "invited" else None),
+            own=own,
+            provided=bool(account.provider),
+        )
+
+
+class Invitation(Model):
+    """An account with the link that begins it, which is shown this once.
+
+    Attributes:
+        user: The account.
+    """
+
+    user: UserAccount
+    code: SignInCode | None = Field(
+        description="Null for somebody whom the identity provider vouches for."
+    )
+
+
+class ProgramToken(Model):
+    """A program that may call, as admins see it.
+
+    A program that may call, as admins see it; no answer but [NewToken](#newtoken) has
+    its token.
+
+    Attributes:
+        token_id: The id is never given anew.
+        name: The id is never given anew.
+        scope: ``stop`` reads, too; ``operate`` does what an operator may.
+    """
+
+    token_id: str
+    name: str
+    scope: TokenScope
+    made_at: str
+    used_at: str | None = Field(description="The last time; null: never.")
+    ends_at: str | None = Field(description="When it ends by itself; null: never.")
+    over: bool = Field(description="It has ended by itself.")
+
+    @classmethod
+    def of(cls, token: ApiToken, now: float) -> "ProgramToken":
+        """As it is at this moment (Unix s)."""
+        return cls(
+            token_id=token.token_id,
+            name=token.name,
+            scope=token.scope,
+            made_at=format_stamp(token.made_at),
+            used_at=stamp(token.used_at),
+            ends_at=stamp(token.ends_at),
+            over=not token.is_open(now),
+        )
+
+
+class NewToken(Model):
+    """A program with its token, which is shown this once.
+
+    Attributes:
+        token: For ``Authorization: Bearer``; shown this once.
+    """
+
+    program: ProgramToken
+    token: str

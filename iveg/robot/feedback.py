@@ -1,0 +1,434 @@
+"""iVeg's feedback on the robot: its age, what it says of others, and who said it."""
+
+from collections import OrderedDict, deque
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from itertools import chain
+
+from iveg.domain.feedback import (
+    FULL_SPEED,
+    HALF_SPEED,
+    UNSUPERVISED,
+    Feedback,
+    FeedbackAlert,
+    SpeedLimit,
+)
+from iveg.domain.geometry import REST, Pose2D
+from iveg.domain.limits import LIMITS
+from iveg.domain.observations import FeedbackRef
+from iveg.domain.witness import KnownPeer
+from iveg.ngsi.payloads import FORBIDDEN
+from iveg.robot.gate import FREE, Ahead, Cap, known_reason, quantised
+from iveg.robot.peer_alerts import (
+    KeptAlert,
+    PeerObserver,
+    PeerTopic,
+    RuleRadii,
+    alert_ahead,
+    alerted,
+    alerts_of,
+    is_alive,
+    is_inside,
+    limited_free,
+    zone_radius,
+)
+
+# --- watchdog ---------------------------------------------------------------------
+#
+# Age of iVeg's feedback, judged by the reports that iVeg acknowledges.
+#
+# A delayed message is not fresh: feedback is as old as the report that it acknowledges,
+# counted from its sending (docs/interfaces/mqtt.md), not as its own arrival.
+
+_REPORTS_KEPT = 512
+_STEADY_S, _STEADY_MESSAGES = 2.0, 4
+_CLEARS, _CLEARS_WITHIN_S = 3, 60.0
+
+
+class Watchdog:
+    """Age of feedback; times are monotonic seconds.
+
+    Args:
+        boot_at: When the robot started; silence counts from here.
+        slow_s: Feedback older than this is not fresh.
+    """
+
+    def __init__(self, boot_at: float, slow_s: float) -> None:
+        self._boot_at = boot_at
+        self._slow_s = slow_s
+        self._sent: OrderedDict[int, float] = OrderedDict()
+        self._evidence: float | None = None
+        self._fresh_since: float | None = None
+        self._fresh_count = 0
+        self._clears: deque[float] = deque(maxlen=_CLEARS)
+
+    def sent(self, seq: int, now: float) -> None:
+        """Note that the safety report ``seq`` was sent."""
+        self._sent[seq] = now
+        if len(self._sent) > _REPORTS_KEPT:
+            self._sent.popitem(last=False)
+
+    def sent_at(self, seen: int | None) -> float | None:
+        """When a report was sent; None of a number that never was, or of none."""
+        return None if seen is None else self._sent.get(seen)
+
+    def heard(self, seen: int | None, now: float) -> None:
+        """Take a feedback, of any author, that has seen our reports up to ``seen``.
+
+        A number that was never sent, or none, is no evidence of freshness.
+        """
+        self.tick(now)
+        evidence = self.sent_at(seen)
+        if evidence is None:
+            return
+        if self._evidence is None or evidence > self._evidence:
+            self._evidence = evidence
+        if now - evidence <= self._slow_s:
+            if self._fresh_since is None:
+                self._fresh_since, self._fresh_count = now, 0
+            self._fresh_count += 1
+
+    def tick(self, now: float) -> None:
+        """Notice that time has passed: after an interruption freshness counts anew."""
+        age = self.age(now)
+        if age is None or age > self._slow_s:
+            self._fresh_since = None
+
+    def age(self, now: float) -> float | None:
+        """Age of the newest feedback (s); None before the first."""
+        return None if self._evidence is None else max(0.0, now - self._evidence)
+
+    def silence(self, now: float) -> float:
+        """Like ``age``; before the first feedback, time since the start (s)."""
+        return now - (self._boot_at if self._evidence is None else self._evidence)
+
+    def steady(self, now: float) -> bool:
+        """Whether feedback has been fresh for 2.0 s and at least four messages."""
+        since = self._fresh_since
+        return (
+            since is not None
+            and now - since >= _STEADY_S
+            and self._fresh_count >= _STEADY_MESSAGES
+        )
+
+    def cleared(self, now: float) -> None:
+        """Note that a ``link`` hold cleared itself."""
+        self._clears.append(now)
+
+    def may_clear(self, now: float) -> bool:
+        """Whether a new ``link`` hold may clear itself: at most thrice a minute."""
+        recent = [at for at in self._clears if now - at < _CLEARS_WITHIN_S]
+        return len(recent) < _CLEARS
+
+
+# --- peer feedback ----------------------------------------------------------------
+#
+# Feedback of every peer topic of one author: what the robot knows of others.
+#
+# Algorithm 3 of the paper, judged against the robot's own pose. It differs in four
+# ways: a person missing from a message ages out instead of being dropped, a radius
+# grows while its topic is silent (docs/safety.md), a peer known to stand slows nobody,
+# and an alert about the robot itself is ignored, or it would slow down for ever.
+
+MYSELF_WITHIN_M = 1.0
+_MAX_TOPICS, _MAX_ALERTS = 64, 512
+
+
+class PeerFeedback:
+    """All feedback that one robot received of one author.
+
+    Args:
+        robot_id: Whose speed limits count.
+    """
+
+    def __init__(self, robot_id: str) -> None:
+        self._me = robot_id
+        self._topics: dict[str, PeerTopic] = {}
+        self._radii = RuleRadii()
+
+    def newest(self, topic: str) -> int:
+        """Count of the newest message of a topic; −1 before the first."""
+        memory = self._topics.get(topic)
+        return -1 if memory is None else memory.seq
+
+    def apply(
+        self, topic: str, feedback: Feedback, own: Pose2D | None, now: float
+    ) -> None:
+        """Apply the newest message of ``topic``."""
+        memory = self._topics.get(topic)
+        if memory is None:
+            memory = PeerTopic(now)
+            self._make_room()
+            self._topics[topic] = memory
+        memory.seq, memory.at = feedback.origin.seq or 0, now
+        memory.peer = self._peer(memory, feedback, now)
+        memory.speed_limit = feedback.speed_limits.get(self._me, UNSUPERVISED)
+        memory.foresight = feedback.foresight
+        self._radii.note(feedback.rule.get("radius_m", {}), now)
+        self._remember(memory, feedback, own, now)
+
+    def peers(self, now: float) -> Iterator[KnownPeer]:
+        """Where every peer is that was heard of within a second."""
+        for topic in self._topics.values():
+            if topic.peer is not None and now - topic.peer.at <= LIMITS.silence_s:
+                yield KnownPeer(topic.peer.pose, topic.peer.stands)
+
+    def caps(self, own: Pose2D | None, slowed: bool, now: float) -> Iterator[Cap]:
+        """All caps on this robot at pose ``own`` in ``map``.
+
+        Args:
+            own: None while the robot is not localised.
+            slowed: The robot is already slow for a person or peer: release is delayed.
+            now: Monotonic (s).
+        """
+        beyond = LIMITS.release_beyond_m if slowed else 0.0
+        radius_m = self._radii.of("robot", now)
+        for name, topic in self._topics.items():
+            silence = now - topic.at
+            if silence > LIMITS.ring_lasts_s:
+                continue
+            yield _mandated(topic.speed_limit, silence)
+            for kept in topic.alerts.values():
+                if kept.myself or not is_alive(kept, topic, now):
+                    continue
+                zone_m = zone_radius(kept.alert, self._radii, silence, now) + beyond
+                if is_inside(kept.alert, topic.peer, own, zone_m):
+                    # One that is missing has been kept for its second already.
+                    yield alerted(kept.alert, waits=kept.missing_since is None)
+            if topic.peer is not None and own is not None:
+                yield topic.peer.cap(name, own, radius_m, beyond, now)
+
+    def ahead(self, now: float) -> Iterator[Ahead]:
+        """Zones whose motion is known, where the rule looks ahead."""
+        for name, topic in self._topics.items():
+            if not topic.foresight or now - topic.at > LIMITS.silence_s:
+                continue
+            for kept in topic.alerts.values():
+                if not kept.myself and kept.missing_since is None:
+                    yield from alert_ahead(kept, self._radii, now)
+            peer = topic.peer
+            if peer is not None and not peer.stands:
+                yield from peer.ahead(name, self._radii.of("robot", now), now)
+
+    def _peer(
+        self, topic: PeerTopic, feedback: Feedback, now: float
+    ) -> PeerObserver | None:
+        if feedback.robot_id == self._me or feedback.pose is None:
+            return None
+        before, stamp = topic.peer, feedback.pose_stamp
+        if before is not None and stamp is not None and before.stamp == stamp:
+            return replace(before, pose=feedback.pose)
+        pose, twist, stands = feedback.pose, feedback.twist or REST, False
+        motion = topic.track.note_odometry(pose, twist, now)
+        if feedback.twist is not None:
+            stands = not motion.moves
+        pose, twist = motion.ahead(pose, twist)
+        return PeerObserver(pose, twist.linear_x, stands, stamp, now)
+
+    def _make_room(self) -> None:
+        if len(self._topics) >= _MAX_TOPICS:
+            del self._topics[min(self._topics, key=lambda name: self._topics[name].at)]
+
+    def _remember(
+        self, topic: PeerTopic, feedback: Feedback, own: Pose2D | None, now: float
+    ) -> None:
+        received = alerts_of(feedback)
+        kept = {
+            key: one for key, one in topic.alerts.items() if is_alive(one, topic, now)
+        }
+        for key, one in kept.items():
+            if key not in received and one.missing_since is None:
+                kept[key] = replace(one, missing_since=now)
+        for key, alert in received.items():
+            myself = self._is_me(alert, topic, own, kept.get(key))
+            kept[key] = KeptAlert(alert, now, None, myself)
+        topic.alerts = dict(list(kept.items())[-_MAX_ALERTS:])
+
+    def _is_me(
+        self,
+        alert: FeedbackAlert,
+        topic: PeerTopic,
+        own: Pose2D | None,
+        before: KeptAlert | None,
+    ) -> bool:
+        # The robot's own detections never show itself.
+        if alert.class_ != "robot" or alert.observer == self._me:
+            return False
+        if alert.class_id == self._me or limited_free(topic.speed_limit, alert):
+            return True
+        if alert.position is None or own is None:
+            return False
+        near = own.distance_to(*alert.position[:2]) <= MYSELF_WITHIN_M
+        # The robot moves on; the place where it was seen still belongs to it.
+        same_spot = before is not None and before.alert.position == alert.position
+        return near or (same_spot and before is not None and before.myself)
+
+
+def _mandated(speed_limit: SpeedLimit, silence: float) -> Cap:
+    """The cap that iVeg asks for; whoever says no more for a second holds nobody."""
+    factor = quantised(speed_limit.speed_factor)
+    if silence > LIMITS.silence_s:
+        factor = max(factor, HALF_SPEED)
+    if factor == FULL_SPEED:
+        return FREE
+    reason, decision_id = known_reason(speed_limit.reason), speed_limit.decision_id
+    return Cap(factor, reason, speed_limit.cause, decision_id, not speed_limit.over)
+
+
+# --- authors ----------------------------------------------------------------------
+#
+# Authors of feedback, each kept apart; the least that any of them allows is applied.
+#
+# An author is one run of an iVeg, named by the ``boot`` of its messages. Whatever does
+# not go on its count is another author of that name, so that no message, whatever
+# number it bears, makes a robot drop what iVeg says next. An author that is silent for
+# a second counts as half speed, and is forgotten ten seconds after its last word
+# (docs/safety.md, "Silence is not full speed").
+
+MOST_AUTHORS = 4
+"""More than a site has; with one more nobody knows whom to believe: half speed."""
+_COPIES_KNOWN = 64
+_SILENT = Cap(HALF_SPEED, "watchdog")
+
+
+@dataclass(slots=True)
+class Author:
+    """One author's word.
+
+    Attributes:
+        newest: Its highest ``seq``, which goes over all topics.
+        spoke_at: When its newest message came (monotonic, s).
+        seen_at: When the newest of our reports that it has seen was sent; None: none.
+        recent: Its newest messages, by which copies are known.
+    """
+
+    boot: str
+    peer_feedback: PeerFeedback
+    newest: int
+    spoke_at: float
+    seen_at: float | None = None
+    backlog_s: float | None = None
+    recent: deque[Feedback] = field(default_factory=lambda: deque(maxlen=_COPIES_KNOWN))
+
+    def is_silent(self, slow_s: float, now: float) -> bool:
+        """Whether it has seen no report of the last ``slow_s`` (s)."""
+        return self.seen_at is None or now - self.seen_at > slow_s
+
+
+class Authors:
+    """All feedback that one robot received, by author.
+
+    Args:
+        robot_id: Whose speed limits count.
+        slow_s: Feedback older than this halves the speed.
+    """
+
+    def __init__(self, robot_id: str, slow_s: float) -> None:
+        self._me, self._slow_s = robot_id, slow_s
+        self._kept: list[Author] = []
+        """In the order in which they were met."""
+        self._crowded_at = float("-inf")
+        self._newest: FeedbackRef | None = None
+
+    def apply(
+        self,
+        topic: str,
+        feedback: Feedback,
+        own: Pose2D | None,
+        seen_at: float | None,
+        now: float,
+    ) -> bool:
+        """Apply a message of ``topic``.
+
+        Args:
+            topic: Robot of its topic.
+            feedback: The message.
+            own: The robot's pose; None while it is not localised.
+            seen_at: When the report that it has seen was sent; None: it has seen none.
+            now: Monotonic (s).
+
+        Returns:
+            Whether it is news; copies are none, nor messages without count or name,
+            or with a name that Orion would refuse in what the robot echoes.
+        """
+        boot, seq = feedback.origin.boot, feedback.origin.seq
+        self._forget(now)
+        if not boot or seq is None or not FORBIDDEN.isdisjoint(boot):
+            return False
+        if self._is_copy(topic, feedback, boot, seq):
+            return False
+        author = self._author_of(topic, boot, seq, now)
+        if author is None:
+            return True
+        author.newest, author.spoke_at = max(author.newest, seq), now
+        if seen_at is not None:
+            author.seen_at = max(seen_at, author.seen_at or seen_at)
+        author.backlog_s = feedback.backlog_s
+        author.recent.append(feedback)
+        author.peer_feedback.apply(topic, feedback, own, now)
+        self._newest = FeedbackRef(boot, author.newest)
+        return True
+
+    def echoes(self, now: float) -> tuple[FeedbackRef, ...]:
+        """Newest message of each author, of the one met first at first.
+
+        Once all are forgotten, the last one's; empty before the first.
+        """
+        self._forget(now)
+        kept = tuple(FeedbackRef(one.boot, one.newest) for one in self._kept)
+        return kept or (() if self._newest is None else (self._newest,))
+
+    def backlog_s(self) -> float | None:
+        """Largest backlog of Orion that an author tells (s); None where none does."""
+        told = (one.backlog_s for one in self._kept)
+        return max((one for one in told if one is not None), default=None)
+
+    def caps(self, own: Pose2D | None, slowed: bool, now: float) -> Iterator[Cap]:
+        """All caps of all authors; arguments as of :meth:`PeerFeedback.caps`."""
+        self._forget(now)
+        for one in self._kept:
+            if one.is_silent(self._slow_s, now):
+                yield _SILENT
+            yield from one.peer_feedback.caps(own, slowed, now)
+        if now - self._crowded_at <= LIMITS.ring_lasts_s:
+            yield _SILENT
+
+    def ahead(self, now: float) -> Iterable[Ahead]:
+        """Zones whose motion is known, where an author's rule looks ahead."""
+        return chain.from_iterable(one.peer_feedback.ahead(now) for one in self._kept)
+
+    def peers(self, now: float) -> Iterable[KnownPeer]:
+        """Peers; none where two authors speak, as they explain obstacles."""
+        self._forget(now)
+        return self._kept[0].peer_feedback.peers(now) if len(self._kept) == 1 else ()
+
+    def _forget(self, now: float) -> None:
+        last = now - LIMITS.ring_lasts_s
+        if any(one.spoke_at < last for one in self._kept):
+            self._kept = [one for one in self._kept if one.spoke_at >= last]
+
+    def _named(self, boot: str) -> Iterator[Author]:
+        return (one for one in self._kept if one.boot == boot)
+
+    def _is_copy(self, topic: str, feedback: Feedback, boot: str, seq: int) -> bool:
+        return any(
+            seq <= one.peer_feedback.newest(topic) and feedback in one.recent
+            for one in self._named(boot)
+        )
+
+    def _author_of(self, topic: str, boot: str, seq: int, now: float) -> Author | None:
+        """Author whose count this goes on, or a new one; None: there is no room."""
+        counts = [
+            one for one in self._named(boot) if seq > one.peer_feedback.newest(topic)
+        ]
+        if counts:
+            return min(counts, key=lambda one: abs(seq - one.newest))
+        if len(self._kept) >= MOST_AUTHORS:
+            self._crowded_at = now
+            quiet = min(self._kept, key=lambda one: one.spoke_at)
+            if now - quiet.spoke_at <= LIMITS.silence_s:
+                return None
+            self._kept.remove(quiet)
+        author = Author(boot, PeerFeedback(self._me), seq, now)
+        self._kept.append(author)
+        return author

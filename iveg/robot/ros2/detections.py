@@ -1,0 +1,485 @@
+"""Where a robot, its sensors and what its detectors see are in ``map``."""
+
+import math
+from collections import deque
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iveg.domain.errors import UnreadableError
+from iveg.domain.observations import UNKNOWN_ORIGIN, Detection, DetectionFrame, Instant
+from iveg.robot.grounding import (
+    EDGE_LIMIT,
+    DepthPicture,
+    Grounded,
+    Grounding,
+    Pinhole,
+    Segment,
+    Ungrounded,
+    corners_of,
+    frame_of,
+    ground,
+    hull_of,
+    top_left,
+    write_mask,
+)
+from iveg.robot.ros2 import reading
+from iveg.robot.ros2.config import Frames
+from iveg.robot.ros2.reading import (
+    InputFaults,
+    class_id_of,
+    read_hypothesis,
+    read_pose,
+    within_world,
+)
+from iveg.robot.ros2.topics import BOXES, LOOKS, Look
+from iveg.robot.ros2.transforms import NoTransformError, RigidTransform, TransformBuffer
+from iveg.ros2 import messages as ros
+from iveg.ros2.messages import Message
+
+# --- places -----------------------------------------------------------------------
+#
+# Where a robot and its sensors are in ``map``; a missing transform is a fault.
+
+_AGREES_M = 0.5
+"""Way that a robot drives while its newest transform grows old (m)."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Here:
+    """Pose of the robot in ``map`` and in its odometry frame, at a stamp (s)."""
+
+    in_map: RigidTransform
+    in_odom: RigidTransform
+    odom: str
+    stamp: float
+
+
+class Places:
+    """Newest pose of a robot, and its transforms; ``now`` is monotonic seconds.
+
+    Args:
+        frames: Their names.
+        max_age_s: Greatest age of a transform (s).
+        input_faults: Record of faults.
+
+    Attributes:
+        here: None while the robot is not localised.
+    """
+
+    def __init__(
+        self, frames: Frames, max_age_s: float, input_faults: InputFaults
+    ) -> None:
+        self._frames = frames
+        self._max_age_s = max_age_s
+        self._input_faults = input_faults
+        self._transforms = TransformBuffer(max_age_s)
+        self.here: Here | None = None
+
+    def add(self, message: ros.TFMessage, *, static: bool) -> None:
+        """Store a message of ``/tf`` or ``/tf_static``."""
+        self._transforms.add(message, static=static)
+
+    def forget(self) -> None:
+        """Delete what has a stamp, since the clock was set back."""
+        self._transforms.clear()
+        self.here = None
+
+    def locate(self, odometry: ros.Odometry, now: float) -> RigidTransform | None:
+        """Pose of the robot in ``map``; None where a transform is missing.
+
+        Raises:
+            UnreadableError: the pose is none.
+        """
+        stamp = odometry.header.stamp.seconds
+        odom = odometry.header.frame_id.lstrip("/") or self._frames.odom
+        in_odom = self._base_in_odom(odometry, stamp, now)
+        to_map = self.in_map(odom, stamp, now)
+        if in_odom is None or to_map is None:
+            self.here = None
+            return None
+        place = to_map.compose(in_odom)
+        self._compare(place, stamp, now)
+        self.here = Here(place, in_odom, odom, stamp)
+        return place
+
+    def _compare(self, place: RigidTransform, stamp: float, now: float) -> None:
+        """Note where the tree, if it leads to the robot, has it elsewhere."""
+        frames = self._frames
+        with suppress(NoTransformError):
+            tree = self._transforms.lookup(frames.map, frames.base_link, stamp)
+            if math.dist(tree.move[:2], place.move[:2]) > _AGREES_M:
+                link = f"{frames.map} → {frames.base_link}"
+                self._input_faults.note("pose_disagrees", link, now)
+
+    def _base_in_odom(
+        self, odometry: ros.Odometry, stamp: float, now: float
+    ) -> RigidTransform | None:
+        pose = read_pose(odometry)
+        child = odometry.child_frame_id.lstrip("/")
+        if child in ("", self._frames.base_link):
+            return pose
+        base = self._lookup(child, self._frames.base_link, stamp, now)
+        return None if base is None else pose.compose(base)
+
+    def laser(self, frame: str, stamp: float, now: float) -> RigidTransform | None:
+        """Pose of the laser relative to the robot's pose; None where one is missing."""
+        here = self.here
+        laser = self._laser(frame, stamp, now)
+        late = here is None or abs(stamp - here.stamp) > self._max_age_s
+        return None if late else laser
+
+    def on_robot(self, frame: str, stamp: float, now: float) -> RigidTransform | None:
+        """Pose of a frame in ``base_link``; None where one is missing."""
+        return self._lookup(self._frames.base_link, frame, stamp, now)
+
+    def _laser(self, frame: str, stamp: float, now: float) -> RigidTransform | None:
+        here = self.here
+        if here is not None:
+            try:
+                in_odom = self._transforms.lookup(here.odom, frame.lstrip("/"), stamp)
+                return here.in_odom.inverse().compose(in_odom)
+            except NoTransformError:
+                pass  # odometry may be missing in the tree; the mount must be there
+        return self.on_robot(frame, stamp, now)
+
+    def in_map(self, frame: str, stamp: float, now: float) -> RigidTransform | None:
+        """Pose of a frame in ``map``; None for a missing one."""
+        return self._lookup(self._frames.map, frame, stamp, now)
+
+    def _lookup(
+        self, outer: str, inner: str, stamp: float, now: float
+    ) -> RigidTransform | None:
+        try:
+            return self._transforms.lookup(outer, inner.lstrip("/"), stamp)
+        except NoTransformError as error:
+            self._input_faults.note("no_transform", error.link, now, error.for_s)
+            return None
+
+
+# --- boxes ------------------------------------------------------------------------
+#
+# Detections with depth, of any family, as boxes in ``map``.
+
+
+class Boxes:
+    """Places each box by the frame of its header, or of the message's.
+
+    Args:
+        topic: Its full name, for faults.
+        classes: A detector's class names by number; none: as sent.
+        places: Transforms of the robot.
+        input_faults: Record of faults.
+    """
+
+    def __init__(
+        self,
+        topic: str,
+        classes: tuple[str, ...],
+        places: Places,
+        input_faults: InputFaults,
+    ) -> None:
+        self._topic = topic
+        self._classes = classes
+        self._places = places
+        self._input_faults = input_faults
+
+    def locate(self, message: Message, now: float) -> DetectionFrame:
+        """The detection frame of a message of one of ``BOXES``; ``now`` monotonic."""
+        found = BOXES[type(message)](message)
+        usual, stamp = found.header.frame_id, found.header.stamp.seconds
+        frames = dict.fromkeys(one.header.frame_id or usual for one in found.detections)
+        places = {frame: self._places.in_map(frame, stamp, now) for frame in frames}
+        answers = [
+            self._detection(one, places[one.header.frame_id or usual], now)
+            for one in found.detections
+        ]
+        return frame_of("", UNKNOWN_ORIGIN, answers)
+
+    def _detection(
+        self, one: ros.Detection3D, place: RigidTransform | None, now: float
+    ) -> tuple[str | None, Detection | Ungrounded]:
+        """A detection, or that it has no place, and the class that it is of."""
+        if place is not None:
+            try:
+                found = reading.read_detection(one, place, self._classes)
+            except UnreadableError as error:
+                self._input_faults.note(error.reason, self._topic, now)
+            else:
+                return found.class_id, found
+        return reading.class_id_of(one.results, self._classes), "unreadable"
+
+
+# --- pictures ---------------------------------------------------------------------
+#
+# Detections without depth: boxes in a picture, located by a depth picture.
+#
+# The paper's grounding (``iveg.robot.grounding``) on the boxes of a picture, a depth
+# ``Image`` registered to the detector's camera, and its ``CameraInfo``.  In a mask
+# picture value n marks the n-th detection, counted from 1, and 255 marks any.
+# Without a mask the target is the part of the box at about the depth of its middle: the
+# whole box would include the wall behind a person.
+
+_Pixel = TypeVar("_Pixel", bound=np.generic)
+
+_SQUARE = 0.02
+_ANY = 255
+_THICK_M = 0.5
+_DEPTHS: dict[str, tuple[str, float]] = {
+    "16UC1": ("u2", 0.001),
+    "mono16": ("u2", 0.001),
+    "32FC1": ("f4", 1.0),
+}
+"""Encoding → number type, and its unit (m)."""
+_MASKS = {"mono8": "u1", "8UC1": "u1", "mono16": "u2", "16UC1": "u2"}
+
+
+def nearest(
+    pictures: Iterable[ros.Image], stamp: float, within_s: float
+) -> ros.Image | None:
+    """The picture of a stamp, within ``within_s``."""
+    best = min(
+        pictures, key=lambda one: abs(one.header.stamp.seconds - stamp), default=None
+    )
+    if best is None or abs(best.header.stamp.seconds - stamp) > within_s:
+        return None
+    return best
+
+
+def read_camera(info: ros.CameraInfo) -> Pinhole:
+    """A rectified camera.
+
+    Raises:
+        UnreadableError: ``bad_camera``: no focal length, or pixels that are not square.
+    """
+    fx, fy, cx, cy = (float(info.p[n]) for n in (0, 5, 2, 6))
+    if fx == 0.0:  # drivers of rectified cameras may omit p
+        fx, fy, cx, cy = (float(info.k[n]) for n in (0, 4, 2, 5))
+    usable = all(map(np.isfinite, (fx, fy, cx, cy))) and fx > 0.0
+    if not usable or abs(fx - fy) > _SQUARE * fx:
+        raise UnreadableError("bad_camera", f"focal lengths {fx:g} and {fy:g}")
+    return Pinhole(info.width, info.height, fx, cx, cy)
+
+
+def read_depth(image: ros.Image, info: ros.CameraInfo) -> DepthPicture:
+    """The depth of each pixel (m).
+
+    Raises:
+        UnreadableError: ``bad_camera``, ``bad_encoding``, ``bad_picture``, or depth of
+            another shape than the camera (``bad_depth_shape``).
+    """
+    known = _DEPTHS.get(image.encoding)
+    if known is None:
+        raise UnreadableError("bad_encoding", image.encoding)
+    kind, unit = known
+    depth = _pixels(image, kind).astype(np.float32) * np.float32(unit)
+    return DepthPicture(read_camera(info), depth)
+
+
+def _pixels(image: ros.Image, kind: str) -> NDArray[np.generic]:
+    dtype = np.dtype((">" if image.is_bigendian else "<") + kind)
+    width, height, step = image.width, image.height, image.step
+    fits = 0 < width <= EDGE_LIMIT and 0 < height <= EDGE_LIMIT
+    if not fits or step < width * dtype.itemsize or image.data.size < step * height:
+        raise UnreadableError("bad_picture", f"{width} × {height}, {image.data.size}")
+    rows = image.data[: step * height].reshape(height, step)
+    whole = np.ascontiguousarray(rows[:, : width * dtype.itemsize])
+    return whole.view(dtype)
+
+
+def grounded(
+    look: Look,
+    picture: DepthPicture,
+    mask: ros.Image | None,
+    place: RigidTransform,
+    classes: tuple[str, ...],
+    settings: Grounding,
+) -> DetectionFrame:
+    """One detection frame with its boxes in ``map``.
+
+    Args:
+        look: Detections of the picture.
+        picture: Depth at that moment.
+        mask: Detection of each pixel; None: the whole box.
+        place: Pose of the camera's optical frame in ``map``.
+        classes: Names by number.
+        settings: Parameters that the paper leaves open.
+
+    Raises:
+        UnreadableError: ``bad_picture``: the detector's picture has another size.
+    """
+    camera = picture.camera
+    if look.width and (look.width, look.height) != (camera.width, camera.height):
+        detail = f"boxes in {look.width} × {look.height}"
+        raise UnreadableError("bad_picture", detail)
+    owners = None if mask is None else _pixels(mask, _MASKS.get(mask.encoding, "u1"))
+    answers = [
+        (
+            class_id_of(one.results, classes),
+            _place(number, one, picture, owners, place, classes, settings),
+        )
+        for number, one in enumerate(look.detections, 1)
+    ]
+    return frame_of("", UNKNOWN_ORIGIN, answers)
+
+
+def _place(
+    number: int,
+    seen: ros.Detection2D,
+    picture: DepthPicture,
+    owners: NDArray[np.generic] | None,
+    place: RigidTransform,
+    classes: tuple[str, ...],
+    settings: Grounding,
+) -> Detection | Ungrounded:
+    try:
+        segment = _segment(number, seen, picture, owners, classes)
+        answer = ground(segment, picture, settings)
+    except UnreadableError:
+        return "unreadable"
+    if not isinstance(answer, Grounded):
+        return answer
+    hull = within_world(hull_of(place.of(corners_of(answer.box))))
+    return Detection(answer.class_id, answer.probability, hull, "map")
+
+
+def _segment(
+    number: int,
+    seen: ros.Detection2D,
+    picture: DepthPicture,
+    owners: NDArray[np.generic] | None,
+    classes: tuple[str, ...],
+) -> Segment:
+    class_id, probability = read_hypothesis(seen.results, classes)
+    centre, box = seen.bbox.center.position, seen.bbox
+    numbers = centre.x, centre.y, box.size_x, box.size_y
+    if not all(map(np.isfinite, numbers)) or max(map(abs, numbers)) > EDGE_LIMIT:
+        raise UnreadableError("bad_box", "a box that is none")
+    width, height = max(1, round(box.size_x)), max(1, round(box.size_y))
+    corner = top_left(centre.x, centre.y, width, height)
+    if owners is None:
+        own = _as_far_as_the_middle(_cut(picture.depth, corner, width, height))
+    else:
+        part = _cut(owners, corner, width, height)
+        own = (part == number) | (part == _ANY)
+    bits = write_mask(own)
+    return Segment(class_id, probability, centre.x, centre.y, width, height, bits)
+
+
+def _cut(
+    picture: NDArray[_Pixel], corner: tuple[int, int], width: int, height: int
+) -> NDArray[_Pixel]:
+    """Part of a picture, zero beyond its edges; shape (height, width)."""
+    left, top = corner
+    part = np.zeros((height, width), picture.dtype)
+    rows, columns = picture.shape
+    y0, y1 = max(0, top), min(rows, top + height)
+    x0, x1 = max(0, left), min(columns, left + width)
+    if y0 < y1 and x0 < x1:
+        part[y0 - top : y1 - top, x0 - left : x1 - left] = picture[y0:y1, x0:x1]
+    return part
+
+
+def _as_far_as_the_middle(depth: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """Pixels within half a metre of the depth at the middle of a box."""
+    height, width = depth.shape
+    middle = depth[height // 4 : -(-3 * height // 4), width // 4 : -(-3 * width // 4)]
+    measured = middle[np.isfinite(middle) & (middle > 0.0)]
+    if not measured.size:
+        return np.zeros(depth.shape, np.bool_)
+    near: NDArray[np.bool_] = np.abs(depth - np.median(measured)) <= _THICK_M
+    return near & (depth > 0.0)
+
+
+# --- camera -----------------------------------------------------------------------
+#
+# A robot's camera: detections in a picture wait for the depth of that picture.
+
+_PICTURES = 6
+_SAME_PICTURE_S = 0.05
+_DEPTH_LATE_S = 0.3
+
+
+class Camera:
+    """The newest detection frame without depth, and the pictures that locate it.
+
+    Args:
+        names: Full names of topics, for faults.
+        classes: A detector's class names by number; none: as sent.
+        settings: Parameters that the paper leaves open.
+        places: Transforms of the robot.
+        input_faults: Record of faults.
+    """
+
+    def __init__(
+        self,
+        names: Mapping[str, str],
+        classes: tuple[str, ...],
+        settings: Grounding,
+        places: Places,
+        input_faults: InputFaults,
+    ) -> None:
+        self._names = names
+        self._classes = classes
+        self._settings = settings
+        self._places = places
+        self._input_faults = input_faults
+        self._depths: deque[ros.Image] = deque(maxlen=_PICTURES)
+        self._masks: deque[ros.Image] = deque(maxlen=_PICTURES)
+        self._info: ros.CameraInfo | None = None
+        self._look: tuple[Look, float] | None = None
+
+    def add_depth(self, picture: ros.Image, _: Instant) -> None:
+        """Keep a depth picture."""
+        self._depths.append(picture)
+
+    def add_mask(self, picture: ros.Image, _: Instant) -> None:
+        """Keep a mask picture."""
+        self._masks.append(picture)
+
+    def set_info(self, info: ros.CameraInfo, _: Instant) -> None:
+        """Note the calibration."""
+        self._info = info
+
+    def replace_look(self, look: Message, now: Instant) -> None:
+        """Note a detection frame of one of ``LOOKS``; one that waits is replaced."""
+        self._look = LOOKS[type(look)](look), now.mono
+
+    def locate(self, now: float) -> DetectionFrame | None:
+        """The detection frame once its depth picture arrived, or is overdue."""
+        if self._look is None:
+            return None
+        look, since = self._look
+        stamp = look.header.stamp.seconds
+        depth = nearest(self._depths, stamp, _SAME_PICTURE_S)
+        incomplete = depth is None or self._info is None
+        if incomplete and now - since < _DEPTH_LATE_S:
+            return None
+        self._look = None
+        if not look.detections:
+            return DetectionFrame("", UNKNOWN_ORIGIN, ())
+        frame = None if depth is None else self._located(look, depth, now)
+        if incomplete:
+            self._input_faults.note("no_depth", self._names["detections_2d"], now)
+        lost = (class_id_of(one.results, self._classes) for one in look.detections)
+        return frame or DetectionFrame("", UNKNOWN_ORIGIN, (), tuple(lost))
+
+    def _located(
+        self, look: Look, depth: ros.Image, now: float
+    ) -> DetectionFrame | None:
+        """Boxes of a detection frame; None where nothing of it can be located."""
+        stamp = look.header.stamp.seconds
+        place = self._places.in_map(depth.header.frame_id, stamp, now)
+        if place is None or self._info is None:
+            return None
+        mask = nearest(self._masks, stamp, _SAME_PICTURE_S)
+        try:
+            picture = read_depth(depth, self._info)
+            return grounded(look, picture, mask, place, self._classes, self._settings)
+        except UnreadableError as error:
+            self._input_faults.note(error.reason, self._names["depth"], now)
+            return None

@@ -1,0 +1,379 @@
+"""A robot's gated drive, goals, neighbours and costmap as messages; and the port."""
+
+import asyncio
+import logging
+import math
+from collections.abc import Callable, Iterable, Sequence
+from functools import lru_cache
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iveg.adapters import clock
+from iveg.domain.costmap import UNKNOWN, InflatedGrid
+from iveg.domain.errors import UnreadableError
+from iveg.domain.geometry import REST, Pose2D, Twist2D
+from iveg.domain.goals import Goal
+from iveg.robot.costmap import PEER_M, FleetCostmap, Neighbour, Neighbours
+from iveg.robot.ros2.config import DriveConfig
+from iveg.robot.ros2.reading import InputFaults, read_twist, write_twist
+from iveg.ros2 import cdr
+from iveg.ros2 import messages as ros
+from iveg.ros2.messages import Message
+from iveg.ros2.names import Endpoint, Qos
+
+# --- network ----------------------------------------------------------------------
+#
+# The DDS network as a robot needs it: the port of ``iveg/adapters/dds.py``.
+
+
+class Reader(Protocol):
+    """A subscription."""
+
+    def take(self) -> Sequence[bytes]:
+        """All pending messages, oldest first."""
+
+    @property
+    def writers(self) -> int:
+        """Number of publishers that it hears."""
+
+
+class Writer(Protocol):
+    """A publication."""
+
+    def write(self, payload: bytes) -> None:
+        """Publish a message."""
+
+    @property
+    def readers(self) -> int:
+        """Number of subscribers."""
+
+
+class Network(Protocol):
+    """One participant."""
+
+    def reader(
+        self, name: str, message: type[Message], qos: Qos, *, raw: bool = False
+    ) -> Reader:
+        """Subscribe; ``raw``: to all of this name, whatever their fields are."""
+
+    def writer(self, name: str, message: type[Message], qos: Qos) -> Writer:
+        """Publish."""
+
+    def endpoints(self) -> Sequence[Endpoint]:
+        """All writers and readers on the network."""
+
+    def unheard(self) -> Sequence[str]:
+        """Interfaces of this machine where nobody is met."""
+
+    def watch(self, readers: list[Any], on_data: Callable[[], None]) -> None:
+        """Call ``on_data`` soon after new data."""
+
+
+# --- drive ------------------------------------------------------------------------
+#
+# The drive's side of Algorithm 3: twists of navigation in, gated twists out.
+#
+# A twist that cannot be read counts as zero.  The speed limit is decided by the gate of
+# the safety node; this module only converts messages.
+
+
+def message_of(*, stamped: bool) -> type[Message]:
+    """Message type of a topic of twists."""
+    return ros.TwistStamped if stamped else ros.Twist
+
+
+class DriveTopics:
+    """Reads ``cmd_vel_in``, writes ``cmd_vel_out``.
+
+    Args:
+        drive: Type of each of the two topics.
+        topic: Full name of ``cmd_vel_in``, for faults.
+        base_link: Frame of stamped twists.
+        input_faults: Record of faults.
+    """
+
+    def __init__(
+        self, drive: DriveConfig, topic: str, base_link: str, input_faults: InputFaults
+    ) -> None:
+        self._drive = drive
+        self._topic = topic
+        self._base_link = base_link
+        self._input_faults = input_faults
+        self._newest = 0.0
+
+    def read(self, payload: bytes, now: float) -> Twist2D | None:
+        """The twist that upstream requests; None if older than the one before."""
+        try:
+            if not self._drive.stamped_in:
+                return read_twist(cdr.read(ros.Twist, payload))
+            stamped = cdr.read(ros.TwistStamped, payload)
+            return None if self._is_old(stamped, now) else read_twist(stamped.twist)
+        except UnreadableError as error:
+            self._input_faults.note(error.reason, self._topic, now)
+            return REST
+
+    def _is_old(self, stamped: ros.TwistStamped, now: float) -> bool:
+        stamp = stamped.header.stamp.seconds
+        if stamp == 0.0:  # the sender sets no stamp
+            return False
+        # A clock that was set back by more than the lifetime of a twist is accepted.
+        if self._newest - 1.0 < stamp <= self._newest:
+            self._input_faults.note("time_back", self._topic, now)
+            return True
+        self._newest = stamp
+        return False
+
+    def write(self, twist: Twist2D, wall: float) -> bytes:
+        """Bytes for the base; ``wall`` is the robot's clock (Unix s)."""
+        if self._drive.stamped_out:
+            header = ros.Header(ros.Time.of(wall), self._base_link)
+            return cdr.write(ros.TwistStamped(header, write_twist(twist)))
+        return _unstamped(twist)
+
+
+@lru_cache(maxsize=1)
+def _unstamped(twist: Twist2D) -> bytes:
+    """Bytes of a twist, which stays the same for long."""
+    return cdr.write(write_twist(twist))
+
+
+# --- goal pose --------------------------------------------------------------------
+#
+# Goals of iVeg as Nav2 takes them: ``geometry_msgs/PoseStamped`` on ``goal_pose``.
+
+
+def pose_for(
+    goal: Goal | None, here: Pose2D, wall: float, frame: str
+) -> ros.PoseStamped:
+    """The pose to drive to, looking the way that leads there.
+
+    Args:
+        goal: None, or one to pause: the pose where the robot is.
+        here: Where it is, in ``map``.
+        wall: The robot's clock (Unix s).
+        frame: Name of ``map``.
+    """
+    if goal is None or goal.kind == "pause":
+        x, y, yaw = here.x, here.y, here.yaw
+    else:
+        x, y = goal.x, goal.y
+        yaw = math.atan2(y - here.y, x - here.x)
+    turned = ros.Quaternion(z=math.sin(yaw / 2), w=math.cos(yaw / 2))
+    return ros.PoseStamped(
+        ros.Header(ros.Time.of(wall), frame),
+        ros.Pose(ros.Point(x, y), turned),
+    )
+
+
+# --- neighbours -------------------------------------------------------------------
+#
+# People and robots nearby for Nav2's costmap.
+#
+# The paper's costmap injection.  A point cloud in ``base_link`` holds a disc for each
+# person and peer, and a circle of far points that clear the layer: a separate layer
+# (docs/robots.md) marks the discs and removes old ones.
+
+REACH_M = 8.0
+"""Greatest distance of a disc (m); the clearing circle is a metre beyond."""
+_SPACING_M = 0.1
+_HEIGHT_M = 0.5
+_RAYS = 1440
+
+
+def cloud(
+    neighbours: Iterable[Neighbour], own: Pose2D, stamp: ros.Time, frame: str
+) -> ros.PointCloud2:
+    """Discs to mark and a circle to clear, in ``base_link``."""
+    discs = [
+        _disc(one, own)
+        for one in neighbours
+        if own.distance_to(one.x, one.y) <= REACH_M
+    ]
+    points = np.ascontiguousarray(np.concatenate([_CIRCLE, *discs]), "<f4")
+    return ros.PointCloud2(
+        ros.Header(stamp, frame),
+        1,
+        len(points),
+        tuple(ros.PointField(name, 4 * n) for n, name in enumerate("xyz")),
+        False,
+        12,
+        12 * len(points),
+        points.view(np.uint8).reshape(-1),
+    )
+
+
+def _circle() -> NDArray[np.float64]:
+    angles = np.arange(_RAYS) * (math.tau / _RAYS)
+    far = REACH_M + 1.0
+    height = np.full(_RAYS, _HEIGHT_M)
+    return np.stack((far * np.cos(angles), far * np.sin(angles), height), axis=1)
+
+
+_CIRCLE = _circle()
+
+
+def _disc(one: Neighbour, own: Pose2D) -> NDArray[np.float64]:
+    c, s = math.cos(own.yaw), math.sin(own.yaw)
+    dx, dy = one.x - own.x, one.y - own.y
+    steps = np.arange(-one.radius, one.radius + _SPACING_M / 2, _SPACING_M)
+    x, y = (side.reshape(-1) for side in np.meshgrid(steps, steps))
+    inside = np.hypot(x, y) <= one.radius
+    x, y = x[inside], y[inside]
+    return np.stack(
+        (
+            x + c * dx + s * dy,
+            y - s * dx + c * dy,
+            np.full(x.size, _HEIGHT_M),
+        ),
+        axis=1,
+    )
+
+
+# --- markers ----------------------------------------------------------------------
+#
+# Neighbours as shapes in RViz, in ``map``.
+
+_MARKER_LIVES_S = 1
+
+
+_CYLINDER, _TEXT = 3, 9
+
+
+def markers(
+    neighbours: Iterable[Neighbour], stamp: ros.Time, frame: str
+) -> ros.MarkerArray:
+    """Body, radius and name of each, with a lifetime of a second."""
+    found: list[ros.Marker] = []
+    for number, one in enumerate(neighbours):
+        place = ros.Point(one.x, one.y, 0.9)
+        red = ros.ColorRGBA(0.9, 0.2, 0.1, 0.9)
+        body = red if one.kind == "person" else ros.ColorRGBA(0.1, 0.4, 0.9, 0.9)
+        ring = ros.ColorRGBA(body.r, body.g, body.b, 0.15)
+        header = ros.Header(stamp, frame)
+        found += [
+            _marker(header, f"{one.kind} body", number, place, 2 * one.radius, body),
+            _marker(header, f"{one.kind} ring", number, place, 2 * one.zone_m, ring),
+            ros.Marker(
+                header,
+                f"{one.kind} name",
+                number,
+                _TEXT,
+                pose=ros.Pose(ros.Point(one.x, one.y, 2.1)),
+                scale=ros.Vector3(0.0, 0.0, 0.4),
+                color=ros.ColorRGBA(1.0, 1.0, 1.0, 1.0),
+                lifetime=ros.Duration(_MARKER_LIVES_S),
+                text=one.name,
+            ),
+        ]
+    return ros.MarkerArray(tuple(found))
+
+
+def _marker(
+    header: ros.Header,
+    ns: str,
+    number: int,
+    place: ros.Point,
+    width: float,
+    color: ros.ColorRGBA,
+) -> ros.Marker:
+    flat = width > 2 * PEER_M
+    return ros.Marker(
+        header,
+        ns,
+        number,
+        _CYLINDER,
+        pose=ros.Pose(ros.Point(place.x, place.y, 0.01) if flat else place),
+        scale=ros.Vector3(width, width, 0.02 if flat else 1.8),
+        color=color,
+        lifetime=ros.Duration(_MARKER_LIVES_S),
+    )
+
+
+# --- costmap ----------------------------------------------------------------------
+#
+# The fleet's picture for Nav2's static layer: ``nav_msgs/OccupancyGrid`` in ``map``.
+#
+# Comfort: it is drawn in another thread while somebody listens, asks for scans of peers
+# only then, and its failure is logged and ends nothing.
+
+_log = logging.getLogger(__name__)
+EVERY_S = 0.5
+
+
+class CostmapTopic:
+    """Draws and publishes one robot's costmap.
+
+    Args:
+        writer: Of its topic, transient local.
+        costmap: What it knows.
+        neighbours: People and peers.
+        frame: Name of ``map``.
+        place: Where the robot is; None while nobody knows.
+        ask: Called with whether scans of peers are wanted.
+    """
+
+    def __init__(
+        self,
+        writer: Writer,
+        costmap: FleetCostmap,
+        neighbours: Neighbours,
+        frame: str,
+        place: Callable[[], Pose2D | None],
+        ask: Callable[[bool], None],
+    ) -> None:
+        self._writer, self._costmap, self._neighbours = writer, costmap, neighbours
+        self._frame, self._place, self._ask = frame, place, ask
+        self._newest: InflatedGrid | None = None
+
+    def hear(self, topic: str, payload: bytes) -> None:
+        """Take a scan of a peer."""
+        self._costmap.hear(topic, payload, self._place())
+
+    async def run(self) -> None:
+        """Until cancelled."""
+        said = False
+        while True:
+            try:
+                await self._tell()
+                said = False
+            except Exception:
+                if not said:
+                    _log.exception("the costmap has failed; the gate goes on")
+                said = True
+            await asyncio.sleep(EVERY_S)
+
+    async def _tell(self) -> None:
+        own = self._place()
+        wanted = self._writer.readers > 0
+        self._ask(wanted)
+        if wanted and own is not None:
+            now, scans = clock.now(), self._costmap.drain_scans()
+            present = self._neighbours.present(own, now.mono)
+            self._newest = await asyncio.to_thread(
+                self._costmap.draw, scans, present, own, now.mono
+            )
+            self._write(self._newest)
+        elif self._newest is not None:
+            self._withdraw(self._newest)
+
+    def _withdraw(self, newest: InflatedGrid) -> None:
+        """Leave a grid that claims nothing to whoever listens next."""
+        nothing = np.full_like(newest.data, UNKNOWN)
+        self._write(InflatedGrid(newest.grid, nothing))
+        self._newest = None
+
+    def _write(self, costmap: InflatedGrid) -> None:
+        stamp = ros.Time.of(clock.wall())
+        self._writer.write(cdr.write(occupancy_grid(costmap, stamp, self._frame)))
+
+
+def occupancy_grid(
+    costmap: InflatedGrid, stamp: ros.Time, frame: str
+) -> ros.OccupancyGrid:
+    """The message of a costmap."""
+    grid = costmap.grid
+    corner = ros.Pose(ros.Point(grid.xmin, grid.ymin))
+    info = ros.MapMetaData(stamp, grid.resolution, grid.width, grid.height, corner)
+    return ros.OccupancyGrid(ros.Header(stamp, frame), info, costmap.data.reshape(-1))

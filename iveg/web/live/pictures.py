@@ -1,0 +1,328 @@
+"""Pictures of the past: what pages are sent, written down, and read back as a world.
+
+A picture is a frame of telemetry (docs/interfaces/live.md) with all other topics as
+parts, too: a whole one every ten seconds, between them what has changed.
+"""
+
+import asyncio
+from base64 import b64decode, b64encode
+from collections.abc import Callable, Iterable
+from typing import Any, Final
+
+import numpy as np
+import orjson
+
+from iveg.adapters.recordings.incoming import CHANGED, WHOLE, WHOLE_S
+from iveg.adapters.recordings.pictures import PictureFiles
+from iveg.domain.errors import HopError
+from iveg.domain.observations import Instant
+from iveg.domain.stamps import format_stamp
+from iveg.models.base import write_json
+from iveg.pipeline import topics
+from iveg.pipeline.ports import Clock
+from iveg.pipeline.publish import Hub
+from iveg.web.live.encoder import Encoder
+from iveg.web.live.telemetry import NO_RETURN
+from iveg.web.views import Views
+
+PICTURE_S: Final = 0.2
+"""Between two pictures."""
+REFUSED_S: Final = 2.0
+"""Until the next one where there was no room: a whole one costs more than changes."""
+YOUNG_S: Final = 0.1
+"""What was encoded for pages so lately is not encoded anew."""
+TURN_S: Final = 0.002
+"""So long parts are written before others have their turn."""
+MOST_WAITING: Final = 16
+"""Questions that wait for their turn; one more is refused."""
+_COMMANDS: Final = "commands"
+_AT_ONCE: Final = tuple(
+    row.name
+    for row in topics.TOPICS
+    if row.read and row is not topics.LOG and "{id}" not in row.name
+)
+_MEMBERS: Final = frozenset(row.member for row in topics.TOPICS if row.read)
+_LOG_LINES: Final = 200
+
+
+class PictureRecorder:
+    """Writes down what pages are sent, five times a second.
+
+    Args:
+        encoder: Has encoded most of it for pages already.
+        views: The rest.
+        hub: Tells what has changed.
+        clock: For the time of pictures.
+        write: Takes a picture and its moment; returns whether there was room.
+    """
+
+    def __init__(
+        self,
+        encoder: Encoder,
+        views: Views,
+        hub: Hub,
+        clock: Clock,
+        write: Callable[[bytes, Instant], bool],
+    ) -> None:
+        self._encoder, self._views, self._hub = encoder, views, hub
+        self._clock, self._write = clock, write
+        self._whole_at = float("-inf")
+        self._begin_anew()
+
+    def _begin_anew(self) -> None:
+        """Forget what the picture before had."""
+        self._versions: dict[str, int] = {}
+        self._moves: dict[str, bytes] = {}
+        self._log_id = -1
+        self._commands = b""
+
+    async def run(self) -> None:
+        """Until cancelled."""
+        due = self._clock().mono
+        while True:
+            pause_s = PICTURE_S if await self.take() else REFUSED_S
+            now = self._clock().mono
+            due = max(due + pause_s, now)
+            await asyncio.sleep(due - now)
+
+    async def take(self) -> bool:
+        """One picture; whether it was taken.  Others have their turn between its parts.
+
+        One that was refused is followed by a whole one, as changes of it would be lost.
+        """
+        now = self._clock()
+        is_whole = now.mono - self._whole_at >= WHOLE_S
+        if is_whole:
+            self._begin_anew()
+            self._whole_at = now.mono
+        parts, moves, scans = self._rest(now), list[bytes](), list[bytes]()
+        self._encoder.telemetry.begin()
+        turn = now.mono
+        for topic in self._changed(is_whole=is_whole):
+            self._add(topic, parts, moves, scans)
+            if self._clock().mono - turn >= TURN_S:
+                await asyncio.sleep(0)
+                turn = self._clock().mono
+        payload = b'%b"at":%b,"parts":[%b],"moves":[%b],"scans":[%b]}' % (
+            WHOLE if is_whole else CHANGED,
+            orjson.dumps(self._clock().mono),
+            *(b",".join(one) for one in (parts, moves, scans)),
+        )
+        is_taken = self._write(payload, now)
+        if not is_taken:
+            self._whole_at = float("-inf")
+        return is_taken
+
+    def _changed(self, *, is_whole: bool) -> Iterable[str]:
+        versions = self._hub.versions
+        if is_whole:
+            robots = map(topics.ROBOT.of, self._views.robot_ids)
+            return list(dict.fromkeys((*robots, *_AT_ONCE, *versions)))
+        seen = self._versions
+        return [one for one, version in versions.items() if seen.get(one) != version]
+
+    def _rest(self, now: Instant) -> list[bytes]:
+        """Lines of the log and orders, which have no version."""
+        parts = []
+        lines = self._views.log_since(self._log_id)
+        if lines:
+            self._log_id = lines[-1].id
+            parts.append(_part(topics.LOG.name, write_json(lines), now))
+        commands = write_json(self._views.open_commands(now))
+        if commands != self._commands:
+            self._commands = commands
+            parts.append(_part(_COMMANDS, commands, now))
+        return parts
+
+    def _add(
+        self, topic: str, parts: list[bytes], moves: list[bytes], scans: list[bytes]
+    ) -> None:
+        """Add what pages are sent of a topic, as far as it has changed."""
+        since, now = self._versions.get(topic, -1), self._clock()
+        self._versions[topic] = self._hub.versions[topic]
+        (row, key), telemetry = topics.find(topic), self._encoder.telemetry
+        if row is topics.SCAN:
+            scan = telemetry.part(topic, now)
+            if scan is not None:
+                ranges = b64encode(scan.body)
+                scans.append(b'%b,"ranges":"%b"}' % (scan.head[:-1], ranges))
+            return
+        if row is topics.ROBOT:
+            part = telemetry.state(key, since, now, YOUNG_S)
+            self._versions[topic] = since if part is None else part.version
+            move = telemetry.move(key, now)
+            if move is not None and move.head != self._moves.get(key):
+                self._moves[key] = move.head
+                moves.append(move.head)
+        elif row is topics.PEOPLE:
+            part = telemetry.people(since, now, YOUNG_S)
+            self._versions[topic] = since if part is None else part.version
+        elif row is topics.DETECTIONS:
+            part = telemetry.part(topic, now)
+        else:
+            frame = self._encoder.frame(topic)
+            parts += [] if frame is None else [frame]
+            return
+        parts += [] if part is None else [part.head]
+
+
+def _part(topic: str, data: bytes, now: Instant) -> bytes:
+    head = b'{"topic":%b,"at":%b,"data":%b}'
+    return head % (orjson.dumps(topic), orjson.dumps(now.mono), data)
+
+
+class Past:
+    """The world of a recorded moment, made of pictures in a thread, one at a time.
+
+    Args:
+        files: Has the pictures.
+    """
+
+    def __init__(self, files: PictureFiles) -> None:
+        self._files = files
+        self._turn = asyncio.Lock()
+        self._waiting = 0
+
+    async def world(self, wall: float) -> bytes:
+        """The world at a moment (Unix s), as JSON (``PastWorld``).
+
+        Raises:
+            NotRecordedError: there is no picture of it.
+            HopError: the disk refuses, or too many ask at once.
+        """
+        if self._waiting >= MOST_WAITING:
+            raise HopError("past", "too much is asked at once")
+        self._waiting += 1
+        try:
+            async with self._turn:
+                return await asyncio.to_thread(self._world, wall)
+        finally:
+            self._waiting -= 1
+
+    def _world(self, wall: float) -> bytes:
+        pictures = self._files.by(wall)
+        world = World()
+        for payload in pictures.payloads:
+            world.take(orjson.loads(payload))
+        told = {
+            "at": format_stamp(pictures.at),
+            "at_s": pictures.at,
+            "recorded_twice": pictures.is_twice,
+        }
+        return orjson.dumps({**world.members(), **told})
+
+
+class World:
+    """What a page knows, as pictures bring it up to date.
+
+    Every value is kept with its moment on the monotonic clock of its server (s).
+    """
+
+    def __init__(self) -> None:
+        self._at = 0.0
+        self._values: dict[str, tuple[float, Any]] = {}
+        self._robots: dict[str, tuple[float, dict[str, Any]]] = {}
+        self._moves: dict[str, list[Any]] = {}
+        self._people: dict[str, tuple[float, Any]] = {}
+        self._detections: dict[str, tuple[float, Any]] = {}
+        self._scans: dict[str, dict[str, Any]] = {}
+        self._log: list[Any] = []
+        self._left_out: set[str] = set()
+
+    def take(self, picture: dict[str, Any]) -> None:
+        """The next picture."""
+        self._at = picture["at"]
+        for part in picture["parts"]:
+            self._take(part["topic"], part["at"], part["data"])
+        self._moves |= {move[0]: move for move in picture.get("moves", ())}
+        self._scans |= {scan["robot_id"]: scan for scan in picture.get("scans", ())}
+
+    def _take(self, topic: str, at: float, data: Any) -> None:
+        member, _, key = topic.partition("/")
+        if member not in _MEMBERS:
+            # Another version sent it.
+            self._left_out.add(topic)
+        elif member == topics.ROBOT.member:
+            known = self._robots.get(key, (at, {}))[1]
+            self._robots[key] = at, {**known, **data}
+        elif member == topics.PEOPLE.member:
+            people = self._people
+            people |= {one["person_id"]: (one["at"], one) for one in data["changed"]}
+            self._people = {one: people[one] for one in data["ids"] if one in people}
+        elif member == topics.DETECTIONS.member:
+            self._detections[key] = at, data
+        elif member == topics.LOG.member:
+            self._log = [*self._log, *data][-_LOG_LINES:]
+        else:
+            self._values[member] = at, data
+
+    def members(self) -> dict[str, Any]:
+        """The members of the snapshot, with ages of the newest picture."""
+        lists = dict.fromkeys(_MEMBERS - {topics.CLIMATE.member}, ())
+        return {
+            **lists,
+            topics.CLIMATE.member: None,
+            **{name: self._aged(one) for name, one in self._values.items()},
+            "robots": [self._robot(robot_id) for robot_id in self._robots],
+            "people": [self._person(one) for one in self._people.values()],
+            "detections": {
+                key: self._aged(one) for key, one in self._detections.items()
+            },
+            "log": self._log,
+            "scans": [_drawn(scan) for scan in self._scans.values()],
+            "left_out": sorted(self._left_out),
+        }
+
+    def _person(self, value: tuple[float, Any]) -> Any:
+        person = self._aged(value)
+        del person["at"]
+        return person
+
+    def _robot(self, robot_id: str) -> Any:
+        robot = self._aged(self._robots[robot_id])
+        move = self._moves.get(robot_id)
+        if move is None:
+            still = dict.fromkeys(("pose", "twist", "stamp", "age_s"))
+            return {**robot, **still}
+        _, at, age_s, x, y, yaw, linear, angular, stamp = move
+        motion = {
+            "pose": {"x": x, "y": y, "yaw": yaw},
+            "twist": {"linear": linear, "angular": angular},
+            "stamp": stamp,
+        }
+        return {**robot, **motion, **self._aged((at, {"age_s": age_s}))}
+
+    def _aged(self, value: tuple[float, Any]) -> Any:
+        at, data = value
+        return _older(data, self._at - at)
+
+
+def _older(value: Any, by: float) -> Any:
+    """The same value when all of its ages are greater by so much (s)."""
+    if isinstance(value, list):
+        return [_older(one, by) for one in value]
+    if not isinstance(value, dict):
+        return value
+    return {
+        key: round(one + by, 3)
+        if key == "age_s" and one is not None
+        else _older(one, by)
+        for key, one in value.items()
+    }
+
+
+def _drawn(scan: dict[str, Any]) -> dict[str, Any]:
+    """A sweep as points in ``map`` (m)."""
+    units = np.frombuffer(b64decode(scan["ranges"]), "<u2")[: scan["count"]]
+    angles = scan["yaw"] + scan["angle_min"]
+    angles = angles + scan["angle_increment"] * np.arange(units.size)
+    hits = units != NO_RETURN
+    ranges, angles = units[hits] * scan["unit_m"], angles[hits]
+    x, y = scan["x"] + ranges * np.cos(angles), scan["y"] + ranges * np.sin(angles)
+    points = np.round(np.column_stack((x, y)), 3).tolist()
+    return {
+        "robot_id": scan["robot_id"],
+        "stamp": scan["stamp"],
+        "frame_id": "map",
+        "points": points,
+    }

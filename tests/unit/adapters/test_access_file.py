@@ -1,0 +1,142 @@
+"""The file of who may come in: read as far as it can be, and written from memory."""
+
+import stat
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from iveg.adapters.access_file import AccessFile
+from iveg.domain.accounts import Access, AccessChange, Account, ApiToken, Session
+from iveg.domain.audit import CONSOLE
+
+ANA = Account("P1", "Ana", "operator", password="#hash", since=12.5)
+MES = ApiToken("T1", "MES", "stop", "ab" * 32, 1.0)
+KEPT = Access((ANA,), (MES,), (Session("cd" * 32, "Ana", "operator", 1.0, 2.0, "P1"),))
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "accounts.jsonl"
+
+
+@pytest.fixture
+def file(path: Path) -> Iterator[AccessFile]:
+    file = AccessFile(path)
+    yield file
+    file.close()
+
+
+def written(path: Path) -> None:
+    file = AccessFile(path)
+    file.save(KEPT)
+    file.close()
+
+
+def _replaced_by_a_folder(path: Path) -> None:
+    path.unlink()
+    path.mkdir()
+    (path / "inside").touch()
+
+
+DAMAGE: dict[str, Callable[[Path], object]] = {
+    "emptied": lambda path: path.write_bytes(b""),
+    "junk": lambda path: path.write_bytes(bytes(range(256)) * 40),
+    "cut in a line": lambda path: path.write_bytes(path.read_bytes()[:-40]),
+    "cut between lines": lambda path: path.write_bytes(
+        b"\n".join(path.read_bytes().splitlines()[:-1]) + b"\n"
+    ),
+    "without its head": lambda path: path.write_bytes(
+        b"\n".join(path.read_bytes().splitlines()[1:])
+    ),
+    "one digit changed": lambda path: path.write_bytes(
+        path.read_bytes().replace(b"12.5", b"92.5")
+    ),
+    "made another": lambda path: path.write_bytes(
+        path.read_bytes().replace(b"operator", b"admin")
+    ),
+    "a folder": _replaced_by_a_folder,
+}
+
+
+def test_all_of_it_is_read_as_it_was_written_and_by_its_owner_alone(
+    path: Path, file: AccessFile
+) -> None:
+    written(path)
+
+    assert file.load() == KEPT
+    assert (file.damaged, file.aside) == (0, [])
+    assert stat.S_IMODE(path.stat().st_mode) == 0o600
+
+
+@pytest.mark.parametrize("damage", DAMAGE.values(), ids=DAMAGE.keys())
+def test_a_file_that_was_damaged_is_put_aside_and_what_is_whole_is_read(
+    path: Path, file: AccessFile, damage: Callable[[Path], object]
+) -> None:
+    written(path)
+    damage(path)
+
+    found = file.load()
+
+    # Nothing that was not written is believed.
+    assert set(found.accounts) <= {ANA}
+    assert set(found.tokens) <= {MES}
+    assert file.damaged == 1
+    (aside,) = file.aside
+    assert aside.startswith("accounts.jsonl.damaged-")
+    assert AccessFile(path).read() == (found, True)
+
+
+@pytest.mark.parametrize("damage", [*DAMAGE.values(), Path.unlink])
+async def test_what_happens_to_it_while_iveg_runs_is_written_anew_from_memory(
+    path: Path, file: AccessFile, damage: Callable[[Path], object]
+) -> None:
+    file.save(KEPT)
+    await file.look()
+    damage(path)
+
+    await file.look()
+    await file.look()
+
+    assert file.damaged == 1
+    assert len(file.aside) == (damage is not Path.unlink)
+    assert AccessFile(path).read() == (KEPT, True)
+
+
+async def test_a_disk_that_fails_is_told_once_and_tried_again(
+    path: Path, file: AccessFile, caplog: pytest.LogCaptureFixture
+) -> None:
+    beside = path.with_name("accounts.jsonl.new")
+    beside.mkdir()
+    for number in range(3):
+        file.save(Access((replace(ANA, since=float(number)),)))
+        await file.look()
+    failing, taken = file.failing, await file.taken([])
+    beside.rmdir()
+
+    await file.look()
+
+    assert failing
+    assert not taken
+    assert caplog.text.count("could not be written") == 1
+    assert file.failing == ""
+    assert AccessFile(path).read()[0].accounts == (replace(ANA, since=2.0),)
+
+
+async def test_a_change_of_the_console_waits_until_the_file_has_it(
+    path: Path, file: AccessFile
+) -> None:
+    change = AccessChange(CONSOLE, "account_role", ANA, {"role": "operator"})
+    revoked = AccessChange(CONSOLE, "token_revoked", MES, gone=True)
+    console = AccessFile(path)
+    console.leave(change)
+    console.leave(revoked)
+    console.close()
+    path.with_name("accounts.jsonl.left-0").write_bytes(b"junk")
+
+    left = file.left()
+    await file.taken([one for one, _ in left])
+
+    assert [one for _, one in left] == [change, revoked]
+    assert file.left() == []

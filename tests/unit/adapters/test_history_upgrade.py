@@ -1,0 +1,123 @@
+"""A history that the version before wrote keeps its rows when this one opens it.
+
+``tests/data/part_days.sql`` is the dump of one, made by that version's own code.
+"""
+
+import sqlite3
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from iveg.adapters.history import lists
+from iveg.adapters.history.engine import sqlite_url, upgrade
+from iveg.adapters.history.lists import Filter
+from iveg.adapters.history.queries import Queries
+from iveg.adapters.history.recorder import Store
+from iveg.pipeline.record import Waiting
+from tests.fakes.records import NOON, audit_record
+
+DUMP = Path(__file__).parents[2] / "data" / "part_days.sql"
+DROPPED = {"passkeys", "latency", "audit_sealed", "audit_end"}
+DROPPED_COLUMNS = {
+    ("accounts", "pin"),
+    ("audit", "stored_at"),
+    ("audit", "previous_hash"),
+    ("audit", "hash"),
+    ("commands", "drill"),
+    ("alerts", "members"),
+    ("odometry", "late"),
+    ("detections", "late"),
+}
+KEPT = {
+    "decisions": 2,
+    "commands": 2,
+    "command_events": 2,
+    "alerts": 2,
+    "audit": 3,
+    "measurements": 2,
+    "log": 1,
+    "detections": 1,
+    "odometry": 2,
+    "climate": 1,
+}
+Tables = dict[str, list[dict[str, object]]]
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    file = tmp_path / "iveg.sqlite"
+    with closing(sqlite3.connect(file)) as old:
+        old.executescript(DUMP.read_text())
+    return file
+
+
+def content(file: Path) -> tuple[Tables, set[tuple[str, str]]]:
+    """Rows of each table, and (table, column) of all columns."""
+    with closing(sqlite3.connect(file)) as connection:
+        connection.row_factory = sqlite3.Row
+        named = connection.execute(
+            "SELECT name FROM sqlite_master WHERE type = 'table' "
+            "AND name NOT IN ('alembic_version', 'sqlite_sequence')"
+        )
+        rows, columns = {}, set()
+        for (table,) in named.fetchall():
+            found = connection.execute(f"SELECT * FROM {table}")  # noqa: S608
+            columns |= {(table, one[0]) for one in found.description}
+            rows[table] = [dict(row) for row in found]
+        return rows, columns
+
+
+def test_the_rows_are_all_there_and_only_dropped_tables_and_columns_are_gone(
+    file: Path,
+) -> None:
+    before, columns = content(file)
+
+    upgrade(sqlite_url(file))
+
+    after, columns_after = content(file)
+    assert before.keys() - after.keys() == DROPPED
+    gone = {one for one in columns - columns_after if one[0] not in DROPPED}
+    assert gone == DROPPED_COLUMNS
+    assert {name: len(after[name]) for name in KEPT} == KEPT
+    for name in after.keys() & before.keys():
+        left = [
+            {key: value for key, value in row.items() if (name, key) not in gone}
+            for row in before[name]
+        ]
+        assert after[name] == left
+
+
+@pytest.fixture
+def queries(file: Path) -> Iterator[Queries]:
+    upgrade(sqlite_url(file))
+    with closing(Queries(sqlite_url(file))) as queries:
+        yield queries
+
+
+async def test_they_are_read_as_before(queries: Queries) -> None:
+    decisions = await queries.page(lists.DECISIONS, Filter())
+    orders = await queries.page(lists.COMMANDS, Filter())
+    audit = await queries.page(lists.AUDIT, Filter())
+
+    assert [one.decision_id for one in decisions.items] == ["D2", "D1"]
+    assert [(one.command_id, one.state) for one in orders.items] == [
+        ("C2", "RUNNING"),
+        ("C1", "STANDING"),
+    ]
+    assert [one.audit_id for one in audit.items] == ["U3", "U2", "U1"]
+    assert [one.decision_id for one in await queries.open_decisions()] == ["D2"]
+
+
+def test_the_audit_goes_on_behind_its_rows_and_stays_guarded(file: Path) -> None:
+    store = Store(sqlite_url(file))
+    store.write([Waiting(audit_record(audit_id="U4", at=NOON + 9.0), 1, 0.0)])
+    store.close()
+
+    with closing(sqlite3.connect(file)) as connection:
+        seqs = connection.execute("SELECT seq, audit_id FROM audit ORDER BY seq")
+        assert seqs.fetchall() == [(1, "U1"), (2, "U2"), (3, "U3"), (4, "U4")]
+        for statement in ("DELETE FROM audit", "UPDATE audit SET name = 'Eva'"):
+            with pytest.raises(sqlite3.IntegrityError, match="append-only"):
+                connection.execute(statement)

@@ -1,0 +1,392 @@
+"""Who must drive slower and why, at the borders and over time."""
+
+import pytest
+
+from iveg.domain.detection_rule import DetectionRule
+from iveg.domain.feedback import CLEAR
+from iveg.domain.parameters import ByClass
+from tests.unit.domain.scene import HEDGE, Scene, machine, person
+
+RINGS = DetectionRule(foresight=False)
+"""Nothing but the rings themselves counts."""
+
+
+def watching(scene: Scene) -> Scene:
+    """Both robots are fresh and look; nobody is near anybody."""
+    scene.drive("AGI", 0.0)
+    scene.drive("AGII", 50.0)
+    scene.look("AGI")
+    scene.look("AGII")
+    return scene
+
+
+def step(scene: Scene, x: float, *, at_x: float = 0.0) -> tuple[float, str]:
+    """AGI stands at ``at_x`` and AGII sees somebody at ``x``; what AGI must do."""
+    scene.drive("AGI", at_x, linear=0.0)
+    scene.drive("AGII", 50.0, linear=0.0)
+    scene.look("AGI")
+    scene.look("AGII", person(x))
+    speed_limit = scene.judge()["AGI"]
+    return speed_limit.speed_factor, speed_limit.reason
+
+
+# --- the ring ---------------------------------------------------------------------
+
+
+def test_a_robot_far_from_everybody_is_free() -> None:
+    assert watching(Scene()).judge() == {"AGI": CLEAR, "AGII": CLEAR}
+
+
+@pytest.mark.parametrize(
+    ("distance", "factor"), [(0.0, 0.5), (1.999, 0.5), (2.0, 0.5), (2.0001, 1.0)]
+)
+def test_f47_the_ring_is_two_metres_inclusive(distance: float, factor: float) -> None:
+    assert step(Scene(rule=RINGS), distance)[0] == factor
+
+
+def test_each_class_has_the_radius_that_the_rule_gives_it() -> None:
+    by_class = ByClass(2.0, {"robot": 3.0})
+    scene = watching(Scene(rule=DetectionRule(radius_m=by_class, foresight=False)))
+    scene.look("AGII", person(-2.5))
+    assert scene.judge()["AGI"] == CLEAR
+    scene.look("AGII", person(-2.0))
+    assert scene.judge()["AGI"].reason == "person"
+
+    scene = watching(Scene(rule=DetectionRule(radius_m=by_class, foresight=False)))
+    scene.drive("AGII", 3.0)
+    assert scene.judge()["AGI"].reason == "robot"
+
+
+def test_distance_is_horizontal_from_base_link_to_the_centre() -> None:
+    scene = watching(Scene())
+    scene.look("AGII", person(1.2, 1.6))
+
+    assert scene.judge()["AGI"].distance_m == pytest.approx(2.0)
+
+
+def test_the_speed_limit_names_its_cause_distance_and_decision() -> None:
+    scene = Scene()
+    step(scene, 1.5)
+
+    speed_limit = scene.judge()["AGI"]
+
+    assert (speed_limit.speed_factor, speed_limit.reason) == (0.5, "person")
+    assert (speed_limit.cause, speed_limit.distance_m) == ("P1", 1.5)
+    assert scene.changes[0].began
+    assert speed_limit.decision_id == scene.changes[0].entry.decision_id
+
+
+def test_of_one_person_seen_at_two_places_the_nearer_counts() -> None:
+    scene = watching(Scene())
+    scene.look("AGI", person(1.5))
+    scene.look("AGII", person(1.9))
+
+    speed_limit = scene.judge()["AGI"]
+
+    assert len(scene.everyone) == 1
+    assert speed_limit.distance_m == pytest.approx(1.5)
+
+
+def test_the_ring_of_an_old_sighting_reaches_further() -> None:
+    scene = Scene()
+    assert step(scene, 3.0) == (1.0, "clear")
+    for _ in range(10):
+        scene.now += 0.1
+        watching(scene)
+
+    assert scene.judge()["AGI"].reason == "person"
+
+
+def test_who_does_not_see_is_slowed_and_it_is_known() -> None:
+    scene = Scene(greenhouse=HEDGE)
+    scene.drive("AGI", 2.5)
+    scene.drive("AGII", 10.0)
+    scene.look("AGI")
+    scene.look("AGII", person(4.0))
+    scene.judge()
+
+    (change,) = scene.changes
+    assert change.entry.robot_id == "AGI"
+    assert not change.entry.in_sight
+
+
+# --- release ----------------------------------------------------------------------
+
+
+def leave(scene: Scene, x: float, seconds: float) -> list[float]:
+    """The person stays at ``x``; AGI's factors every tenth."""
+    factors = []
+    for _ in range(round(seconds * 10)):
+        scene.now = round(scene.now + 0.1, 6)
+        factors.append(step(scene, x)[0])
+    return factors
+
+
+def test_the_release_comes_a_second_after_the_robot_is_030_m_outside() -> None:
+    scene = Scene(rule=RINGS)
+    step(scene, 1.9)
+
+    factors = leave(scene, 2.35, 1.2)
+
+    assert factors == [0.5] * 10 + [1.0] * 2
+    assert [change.began for change in scene.changes] == [True, False]
+
+
+def test_a_limit_is_told_to_be_over_between_its_end_and_the_release() -> None:
+    scene = Scene(rule=RINGS)
+    told = []
+    for x in (1.9, 2.29, 2.35, 1.9, 2.35):
+        scene.now = round(scene.now + 0.1, 6)
+        step(scene, x)
+        told.append(scene.judge()["AGI"].over)
+
+    assert told == [False, False, True, False, True]
+
+
+def test_a_limit_with_one_of_two_reasons_left_is_not_over() -> None:
+    scene = Scene(rule=RINGS)
+    scene.drive("AGI", 0.0)
+    scene.drive("AGII", 50.0)
+    scene.look("AGII", person(1.0), person(-1.0, 1.0))
+    scene.look("AGI")
+    scene.judge()
+    scene.drive("AGI", 2.0)
+    told = scene.judge()["AGI"]
+    outside = [one.outside_since for one in scene.speed_limits.entries]
+    assert sorted(since is None for since in outside) == [False, True]
+    assert not told.over
+
+
+def test_coming_back_within_the_second_is_the_same_decision() -> None:
+    scene = Scene(rule=RINGS)
+    step(scene, 1.9)
+    leave(scene, 2.4, 0.8)
+    leave(scene, 2.1, 0.3)
+
+    assert set(leave(scene, 2.4, 0.8)) == {0.5}
+    assert len(scene.changes) == 1
+
+
+def test_somebody_who_was_cleared_lets_go_a_second_later() -> None:
+    scene = Scene()
+    step(scene, 1.9)
+    known = scene.everyone[0]
+    scene.people.drop_sighting(known.person_id, known.newest)
+
+    watching(scene).judge()
+    scene.now = 0.9
+    assert watching(scene).judge()["AGI"].speed_factor == 0.5
+    scene.now = 1.0
+    assert watching(scene).judge()["AGI"].speed_factor == 1.0
+
+
+# --- several reasons --------------------------------------------------------------
+
+
+def test_f48_two_rings_are_half_speed_and_not_a_quarter() -> None:
+    scene = watching(Scene())
+    scene.look("AGI", person(1.5), person(-1.5))
+
+    assert scene.judge()["AGI"].speed_factor == 0.5
+
+
+def test_a_person_is_the_reason_that_is_told_before_a_nearer_peer() -> None:
+    scene = Scene()
+    scene.drive("AGI", 0.0)
+    scene.drive("AGII", 1.0)
+    scene.look("AGI", person(1.9))
+    scene.look("AGII")
+
+    assert scene.judge()["AGI"].reason == "person"
+
+
+def test_of_two_people_the_nearer_is_the_cause() -> None:
+    scene = watching(Scene())
+    scene.look("AGI", person(1.9), person(-1.0))
+
+    assert scene.judge()["AGI"].distance_m == 1.0
+
+
+# --- peers ------------------------------------------------------------------------
+
+
+def test_a_moving_peer_slows_who_comes_near() -> None:
+    scene = watching(Scene())
+    scene.drive("AGII", 1.9)
+
+    speed_limits = scene.judge()
+
+    assert {name: one.reason for name, one in speed_limits.items()} == {
+        "AGI": "robot",
+        "AGII": "robot",
+    }
+    assert speed_limits["AGI"].cause == "AGII"
+
+
+def test_a_standing_peer_slows_nobody() -> None:
+    scene = watching(Scene())
+    scene.drive("AGII", 1.0, linear=0.0)
+
+    assert scene.judge()["AGI"] == CLEAR
+
+
+@pytest.mark.parametrize(
+    ("linear", "after", "reason"),
+    [(0.0, 1.1, "robot"), (0.5, 10.1, "clear")],
+    ids=["stood", "not heard for ten seconds"],
+)
+def test_a_peer_that_falls_silent_slows_again_and_not_for_ever(
+    linear: float, after: float, reason: str
+) -> None:
+    scene = watching(Scene())
+    scene.drive("AGII", 1.0, linear=linear)
+    scene.now = after
+    scene.drive("AGI", 0.0)
+    scene.look("AGI")
+    scene.look("AGII")
+
+    assert scene.judge()["AGI"].reason == reason
+
+
+def test_a_robot_that_is_none_of_the_fleet_slows_like_a_person() -> None:
+    scene = watching(Scene())
+    scene.look("AGI", machine(1.5))
+
+    assert scene.judge()["AGI"].reason == "robot"
+
+
+# --- silence ----------------------------------------------------------------------
+
+
+def test_a_robot_whose_pose_was_never_seen_is_slowed() -> None:
+    scene = Scene()
+    scene.look("AGI")
+
+    speed_limit = scene.judge()["AGI"]
+
+    assert (speed_limit.speed_factor, speed_limit.reason) == (0.5, "stale")
+    assert speed_limit.cause == "AGI"
+
+
+@pytest.mark.parametrize(("age", "reason"), [(1.0, "clear"), (1.01, "stale")])
+def test_a_robot_whose_pose_is_silent_for_a_second_is_slowed(
+    age: float, reason: str
+) -> None:
+    scene = watching(Scene())
+    scene.now = age
+    scene.look("AGI")
+    scene.look("AGII")
+
+    assert scene.judge()["AGI"].reason == reason
+
+
+@pytest.mark.parametrize(("age", "reason"), [(1.0, "clear"), (1.01, "stale")])
+def test_a_silent_detector_slows_its_robot(age: float, reason: str) -> None:
+    scene = watching(Scene())
+    scene.now = age
+    scene.drive("AGI", 0.0)
+    scene.drive("AGII", 50.0)
+    scene.look("AGI")
+
+    speed_limits = scene.judge()
+
+    assert speed_limits["AGI"] == CLEAR
+    assert speed_limits["AGII"].reason == reason
+
+
+# --- recordings -------------------------------------------------------------------
+
+RECORDED = ("AGI", "AGII:recording")
+
+
+BOTH = ("AGI:recording", "AGII:recording")
+
+
+@pytest.mark.parametrize(
+    ("robots", "replay", "x", "judged", "reason"),
+    [
+        (RECORDED, None, 1.0, "AGI", "clear"),
+        (RECORDED, None, 50.5, "AGII", "person"),
+        (BOTH, None, 1.0, "AGI", "clear"),
+        (BOTH, "shared", 1.0, "AGI", "person"),
+    ],
+    ids=["no live robot", "itself", "no other recording", "one of the same map"],
+)
+def test_whom_a_recording_saw_slows_those_of_its_map_alone(
+    robots: tuple[str, ...], replay: str | None, x: float, judged: str, reason: str
+) -> None:
+    scene = watching(Scene(robots=robots, replay=replay))
+    scene.look("AGII", person(x))
+
+    assert scene.judge()[judged].reason == reason
+
+
+def test_a_recording_that_drives_past_slows_no_live_robot() -> None:
+    scene = watching(Scene(robots=RECORDED))
+    scene.drive("AGII", 1.0)
+
+    speed_limits = scene.judge()
+
+    assert speed_limits["AGI"] == CLEAR
+    assert speed_limits["AGII"].reason == "robot"
+
+
+def test_a_live_robot_whose_task_is_called_replay_keeps_its_protection() -> None:
+    scene = watching(Scene())
+    for name in ("AGI", "AGII"):
+        scene.navigate(name, "replay")
+    scene.look("AGII", person(1.0))
+
+    assert scene.judge()["AGI"].reason == "person"
+    assert {one.robot_id for one in scene.world.live_robots()} == {"AGI", "AGII"}
+
+
+def test_a_recordings_silence_shuts_nobodys_eyes() -> None:
+    scene = watching(Scene(robots=RECORDED))
+    scene.now = 5.0
+    scene.drive("AGI", 0.0)
+    scene.look("AGI")
+
+    assert scene.judge()["AGI"] == CLEAR
+
+
+# --- a robot that is slow already -------------------------------------------------
+
+
+def test_a_robot_that_is_slow_for_another_reason_will_show_no_slow_down() -> None:
+    scene = watching(Scene())
+    scene.report("AGI", factor=0.5, decision_id="another")
+    scene.look("AGII", person(1.5))
+    scene.judge()
+
+    (change,) = scene.changes
+    assert change.entry.already_slow
+
+
+@pytest.mark.parametrize(("speed", "already_slow"), [(0.8, False), (0.4, True)])
+def test_a_robot_that_judged_this_very_alert_first_and_is_fast_is_still_to_slow_down(
+    speed: float, already_slow: bool
+) -> None:
+    scene = watching(Scene())
+    scene.drive("AGI", 0.0, linear=speed)
+    scene.look("AGII", person(1.5))
+    (somebody,) = scene.everyone
+    scene.report("AGI", factor=0.5, decision_id=somebody.decision_id)
+    scene.judge()
+
+    (change,) = scene.changes
+    assert change.entry.already_slow is already_slow
+    assert change.entry.told_before
+
+
+def test_a_peer_whose_pose_goes_on_slows_others_whatever_its_twist_says() -> None:
+    scene = Scene(rule=RINGS)
+    for number in range(12):
+        scene.now = round(scene.now + 0.1, 6)
+        scene.drive("AGI", 0.0, linear=0.0)
+        scene.drive("AGII", 1.9 - 0.03 * number, linear=0.0)
+        scene.look("AGI")
+        scene.look("AGII")
+        limit = scene.judge()["AGI"]
+
+    assert (limit.speed_factor, limit.reason) == (0.5, "robot")

@@ -1,0 +1,148 @@
+"""A camera that reports nobody where another one surely sees somebody is named."""
+
+from dataclasses import replace
+
+import pytest
+
+from iveg.domain import alerts
+from iveg.domain.detector import OutOfService
+from iveg.domain.geometry import Rectangle
+from iveg.domain.greenhouse import PlacedObstacle
+from iveg.domain.observations import Detection
+from tests.builders import at
+from tests.unit.domain.scene import FIELD, HEDGE, Scene, person
+
+SPOT = 4.0
+
+
+def watch(
+    scene: Scene,
+    seconds: float,
+    *covered: Detection,
+    seen: tuple[Detection, ...] = (person(SPOT),),
+    yaw: float = 0.0,
+    peer: tuple[float, float] = (50.0, 50.0),
+) -> Scene:
+    """AGII looks at somebody from the side; AGI ahead, and shows what it is given."""
+    end = scene.now + seconds
+    while scene.now < end - 1e-9:
+        scene.drive("AGII", SPOT, -3.0, 1.57, linear=0.0)
+        scene.look("AGII", *seen)
+        scene.drive("AG3", *peer, linear=0.0)
+        scene.look("AG3")
+        scene.drive("AGI", 0.0, yaw=yaw, linear=0.0)
+        scene.look("AGI", *covered)
+        scene.now = round(scene.now + 0.1, 6)
+    return scene
+
+
+def fleet(**parts: object) -> Scene:
+    return Scene(robots=("AGI", "AGII", "AG3"), **parts)  # type: ignore[arg-type]
+
+
+def blind_by(scene: Scene) -> str | None:
+    return scene.world.robot("AGI").detector.blind_by
+
+
+def test_a_covered_lens_is_named_after_five_seconds_and_no_frame_of_it_is_whole() -> (
+    None
+):
+    scene = fleet()
+    assert blind_by(watch(scene, 5.0)) is None
+    assert scene.judge()["AG3"].speed_factor == 1.0
+
+    assert blind_by(watch(scene, 0.2)) == "AGII"
+    robot, now = scene.world.robot("AGI"), at(scene.now)
+    assert robot.detector.is_missing(now)
+    assert scene.judge()["AGI"].speed_factor == 0.5
+    (told,) = (
+        one
+        for one in alerts.of_detector(robot, now, started=at(0.0))
+        if one.key == "alert.camera_blind"
+    )
+    assert (told.priority, dict(told.slots)) == ("P2", {"robot": "AGI", "by": "AGII"})
+
+
+def test_it_stands_after_they_are_gone_until_the_camera_shows_somebody_again() -> None:
+    scene = watch(fleet(), 5.2)
+
+    assert blind_by(watch(scene, 3.0, seen=())) == "AGII"
+    assert blind_by(watch(scene, 1.2, person(SPOT, probability=0.3))) is None
+    assert not scene.world.robot("AGI").detector.is_missing(at(scene.now))
+
+
+def test_a_blind_camera_ends_no_zone_of_its_own() -> None:
+    scene = watch(fleet(), 5.2)
+    scene.look("AGI", person(3.0, 1.2))
+    watch(scene, 4.0)
+
+    assert blind_by(scene) == "AGII"
+    assert scene.ended == []
+
+
+def test_somebody_shown_elsewhere_proves_no_camera_whole() -> None:
+    assert blind_by(watch(fleet(), 5.2, person(2.0, 1.0))) == "AGII"
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        fleet(greenhouse=HEDGE),
+        fleet(
+            greenhouse=replace(
+                FIELD,
+                obstacles=(PlacedObstacle("crates", Rectangle(2.0, -0.3, 2.5, 0.3)),),
+            )
+        ),
+    ],
+)
+def test_who_stands_behind_crop_or_crates_blinds_nobody(scene: Scene) -> None:
+    assert blind_by(watch(scene, 8.0)) is None
+
+
+def test_who_stands_behind_a_peer_or_out_of_view_blinds_nobody() -> None:
+    assert blind_by(watch(fleet(), 8.0, peer=(2.0, 0.0))) is None
+    assert blind_by(watch(fleet(), 8.0, yaw=2.0)) is None
+
+
+@pytest.mark.parametrize("seen", [(), (person(SPOT, probability=0.7),)])
+def test_who_is_not_surely_seen_blinds_nobody(seen: tuple[Detection, ...]) -> None:
+    assert blind_by(watch(fleet(), 8.0, seen=seen)) is None
+
+
+def test_who_is_shown_faintly_now_and_then_blinds_nobody() -> None:
+    scene = fleet()
+    for _ in range(4):
+        watch(scene, 4.5)
+        watch(scene, 0.1, person(SPOT + 0.5, probability=0.25))
+    assert blind_by(scene) is None
+
+
+def test_a_robot_that_contradicts_itself_names_nobody_blind() -> None:
+    scene = fleet()
+    for _ in range(80):
+        scene.world.robot("AGII").doubts.contradicted("jumped", at(scene.now))
+        watch(scene, 0.1)
+    assert blind_by(scene) is None
+
+
+def test_a_camera_that_an_operator_took_out_of_service_is_blind_no_more() -> None:
+    scene = watch(fleet(), 5.2)
+    detector = scene.world.robot("AGI").detector
+    detector.out_of_service = OutOfService("ana", 0.0, "boot-a")
+
+    assert blind_by(watch(scene, 6.0)) is None
+    assert not detector.is_missing(at(scene.now))
+
+
+@pytest.mark.parametrize("shown", [(), (person(SPOT, probability=0.3),)])
+def test_late_frames_among_fresh_ones_prove_nothing_of_a_lens_but_whom_they_show(
+    shown: tuple[Detection, ...],
+) -> None:
+    scene = fleet()
+    for _ in range(10):
+        watch(scene, 0.4)
+        scene.look("AGI", *shown, late_s=0.7)
+        scene.now = round(scene.now + 0.2, 6)
+
+    assert blind_by(scene) == (None if shown else "AGII")

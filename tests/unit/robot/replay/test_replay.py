@@ -1,0 +1,309 @@
+"""Recordings of any format, and their playback."""
+
+import logging
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from iveg.domain.errors import DataFileError
+from iveg.domain.geometry import Box3D, Pose2D, Twist2D
+from iveg.domain.observations import (
+    Detection,
+    DetectionFrame,
+    LaserScan,
+    Odometry,
+    Origin,
+)
+from iveg.robot.replay.bags import AS_RECORDED, BagOptions
+from iveg.robot.replay.logs import RecordingEntry
+from iveg.robot.replay.replay import Playback, open_recording
+from tests.builders import scan
+from tests.data.bags import (
+    ODOMETRY,
+    SCAN,
+    TEXT,
+    Said,
+    bag_directory,
+    db3_bag,
+    drive,
+    mcap_bag,
+)
+
+# --- playback ---------------------------------------------------------------------
+
+
+def moved(at: float, x: float, yaw: float = 0.0, v: float = 1.0) -> RecordingEntry:
+    pose, twist = Pose2D(x, 0.0, yaw), Twist2D(v, 0.0)
+    return RecordingEntry(at, Odometry("", Origin(), pose, twist))
+
+
+def swept(at: float) -> RecordingEntry:
+    return RecordingEntry(at, scan())
+
+
+def saw(at: float, x: float = 0.5) -> RecordingEntry:
+    box = Box3D(x - 0.5, x + 0.5, 0.0, 1.0, 0.0, 1.0)
+    return RecordingEntry(at, Detection("farmer", 0.9, box, "map"))
+
+
+def log(*entries: RecordingEntry) -> Callable[[], Iterator[RecordingEntry]]:
+    return lambda: iter(entries)
+
+
+def test_poses_between_two_recorded_ones_are_interpolated() -> None:
+    playback = Playback(log(moved(0.0, 0.0), moved(1.0, 2.0, v=3.0)), loop=False)
+
+    playback.advance(0.25)
+
+    pose, twist = playback.motion
+    assert pose.x == pytest.approx(0.5)
+    assert twist.linear_x == pytest.approx(1.5)
+
+
+def test_the_newest_sweep_stays_until_the_next() -> None:
+    first, second = swept(0.1), swept(0.6)
+    playback = Playback(
+        log(moved(0.0, 0.0), first, second, moved(1.0, 1.0)), loop=False
+    )
+
+    shown = [playback.scan]
+    for _ in range(3):
+        playback.advance(0.25)
+        shown.append(playback.scan)
+
+    assert shown == [None, first.observation, first.observation, second.observation]
+
+
+def test_a_detection_is_seen_for_a_moment_of_the_recording() -> None:
+    playback = Playback(log(moved(0.0, 0.0), saw(0.5), moved(9.0, 1.0)), loop=False)
+    at_first = playback.has_detector
+
+    playback.advance(0.6)
+    seen, later = playback.detections, playback.has_detector
+    playback.advance(0.0)
+    paused = playback.detections
+    playback.advance(1.0)
+
+    assert len(seen) == 1
+    assert (at_first, later) == (False, True)
+    assert paused == seen
+    assert playback.detections == ()
+
+
+def looked(at: float, *xs: float, unread: tuple[str, ...] = ()) -> RecordingEntry:
+    boxes = tuple(saw(at, x).observation for x in xs)
+    detections = tuple(one for one in boxes if isinstance(one, Detection))
+    return RecordingEntry(at, DetectionFrame("", Origin(), detections, unread))
+
+
+def test_a_whole_frame_counts_until_the_next_and_an_empty_one_is_empty() -> None:
+    frames = looked(0.2, 1.0, 5.0, unread=("farmer",)), looked(1.1)
+    entries = moved(0.0, 0.0), *frames, moved(9.0, 1.0)
+    playback = Playback(log(*entries), loop=False)
+
+    playback.advance(0.7)
+    both, lost = playback.detections, playback.unread
+    playback.advance(0.5)
+
+    assert [one.box.xmin for one in both] == [0.5, 4.5]
+    assert lost == ("farmer",)
+    assert (playback.detections, playback.unread) == ((), ())
+    assert playback.has_detector
+
+
+@pytest.mark.parametrize("loop", [False, True])
+def test_a_detector_of_whole_frames_that_falls_silent_sees_nobody_no_longer(
+    loop: bool,
+) -> None:
+    entries = moved(0.0, 0.0), looked(0.5, 1.0), moved(2.0, 1.0), moved(3.0, 1.0)
+    playback = Playback(log(*entries), loop=loop)
+
+    playback.advance(1.4)
+    seen = playback.has_detector
+    playback.advance(0.2)
+    silent = playback.has_detector
+    playback.advance(1.5)
+
+    assert (seen, silent) == (True, False)
+    assert not playback.has_detector
+    assert playback.detections == ()
+
+
+def test_a_recording_ends_after_its_last_entry() -> None:
+    playback = Playback(log(moved(0.0, 0.0), moved(1.0, 2.0)), loop=False)
+
+    playback.advance(0.9)
+    before = playback.ended
+    playback.advance(0.2)
+
+    assert not before
+    assert playback.ended
+    assert playback.motion[0].x == 2.0
+
+
+def test_a_loop_starts_over_and_never_ends() -> None:
+    playback = Playback(log(moved(0.0, 0.0), moved(1.0, 2.0)), loop=True)
+
+    playback.advance(1.1)
+    playback.advance(0.5)
+
+    assert not playback.ended
+    assert playback.motion[0].x == pytest.approx(1.0)
+
+
+# --- recordings -------------------------------------------------------------------
+
+MOUNT = Pose2D(0.2, 0.0, 0.1)
+Write = Callable[[Path, Sequence[Said]], Path]
+KINDS = [
+    pytest.param(db3_bag, "run", id="db3"),
+    pytest.param(mcap_bag, "run", id="mcap"),
+    pytest.param(bag_directory, "run", id="directory"),
+]
+
+
+def entries(path: Path, options: BagOptions = AS_RECORDED) -> list[RecordingEntry]:
+    return list(open_recording(path, MOUNT, options)())
+
+
+def poses(found: Sequence[RecordingEntry]) -> list[Pose2D]:
+    return [e.observation.pose for e in found if isinstance(e.observation, Odometry)]
+
+
+@pytest.mark.parametrize(("write", "name"), KINDS)
+def test_a_bag_of_each_kind_gives_odometry_and_scans(
+    write: Write, name: str, tmp_path: Path
+) -> None:
+    said = (
+        Said("/odom", ODOMETRY, 500.0, x=1.0, yaw=2.5, v=0.5),
+        Said("/chatter", TEXT),
+        Said("/scan", SCAN, 500.25, ranges=(1.0, math.inf, math.nan, -1.0, 0.2)),
+    )
+
+    odometry, scan = entries(write(tmp_path / name, said))
+
+    assert isinstance(odometry.observation, Odometry)
+    assert odometry.at == 0.0
+    assert odometry.observation.pose.x == 1.0
+    assert odometry.observation.pose.yaw == pytest.approx(2.5)
+    assert odometry.observation.twist == Twist2D(0.5, 0.25)
+    assert isinstance(scan.observation, LaserScan)
+    assert scan.at == pytest.approx(0.25)
+    assert scan.observation.mount == MOUNT
+    assert (scan.observation.angle_min, scan.observation.range_max) == (-1.5, 20.0)
+    assert scan.observation.ranges.tolist() == pytest.approx(
+        [1.0, math.inf, 0.0, 0.0, 0.2]
+    )
+
+
+def test_the_stamps_of_the_sensors_are_the_time(tmp_path: Path) -> None:
+    found = entries(db3_bag(tmp_path / "run", drive(1.0)))
+
+    assert [e.at for e in found] == pytest.approx([n // 2 / 10 for n in range(20)])
+
+
+def test_a_named_topic_is_the_one_that_is_read(tmp_path: Path) -> None:
+    said = [Said("/raw", ODOMETRY, 1.0, x=7.0), *drive(1.0)]
+    bag = db3_bag(tmp_path / "run", said)
+
+    assert [p.x for p in poses(entries(bag, BagOptions("/raw")))] == [7.0]
+
+
+@pytest.mark.parametrize(
+    ("topics", "why"),
+    [
+        (
+            AS_RECORDED,
+            r"--odom-topic must name one of those of nav_msgs\S+: /odom, /raw\.$",
+        ),
+        (BagOptions("/gone"), r"--odom-topic /gone is not among .*: /odom, /raw\.$"),
+        (BagOptions("/raw", "/gone"), r"--scan-topic /gone is not .*: /scan\.$"),
+        (BagOptions("/scan"), r"--odom-topic /scan is not among"),
+    ],
+)
+def test_topics_that_leave_open_what_is_meant_are_listed(
+    topics: BagOptions, why: str, tmp_path: Path
+) -> None:
+    said = [Said("/raw", ODOMETRY, 1.0), *drive(0.2)]
+
+    with pytest.raises(DataFileError, match=why):
+        entries(mcap_bag(tmp_path / "run", said), topics)
+
+
+SAW = '{"t":1,"kind":"detection","class":"farmer","probability":0.9,"x":5,"y":1}\n'
+
+
+def test_a_log_without_odometry_is_refused_unless_it_is_said_where_it_stands(
+    tmp_path: Path,
+) -> None:
+    file = tmp_path / "camera.jsonl"
+    file.write_text(SAW)
+
+    with pytest.raises(DataFileError, match=r"holds no odometry .*--pose says where"):
+        open_recording(file, MOUNT)
+
+
+def test_a_log_of_a_fixed_camera_stands_where_it_was_said(tmp_path: Path) -> None:
+    file = tmp_path / "camera.jsonl"
+    file.write_text(SAW)
+
+    pose, saw = open_recording(file, MOUNT, pose=Pose2D(3.0, 4.0, 0.5))()
+
+    assert isinstance(pose.observation, Odometry)
+    assert pose.observation.pose == Pose2D(3.0, 4.0, 0.5)
+    assert pose.observation.twist == Twist2D(0.0, 0.0)
+    assert (pose.at, saw.at) == (1.0, 1.0)
+
+
+def test_a_message_that_cannot_be_used_is_reported_once_and_skipped(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    said = drive(1.0)
+    said[2] = replace(said[2], raw=b"\x00\x01\x00\x00nothing")
+    said[4] = replace(said[4], x=math.nan)
+    recording = open_recording(db3_bag(tmp_path / "run", said), MOUNT)
+
+    with caplog.at_level(logging.WARNING):
+        assert len(poses(list(recording()))) == 8
+        assert len(poses(list(recording()))) == 8
+
+    (told,) = caplog.messages
+    assert "/odom: unusable messages are skipped" in told
+
+
+@pytest.mark.parametrize("suffix", [".db3", ".mcap"])
+@pytest.mark.parametrize("content", [b"", b"no bag at all\n" * 20, b"\x00" * 4096])
+def test_a_foreign_file_is_refused_with_one_sentence(
+    suffix: str, content: bytes, tmp_path: Path
+) -> None:
+    file = tmp_path / f"log{suffix}"
+    file.write_bytes(content)
+
+    with pytest.raises(DataFileError, match=rf"log{suffix}: cannot be read: ") as told:
+        entries(file)
+
+    assert "\n" not in str(told.value)
+
+
+@pytest.mark.parametrize(("write", "name"), KINDS[:2])
+@pytest.mark.parametrize("kept", [0.2, 0.5, 0.9])
+def test_a_bag_that_was_cut_off_never_ends_in_anything_but_a_sentence(
+    write: Write, name: str, kept: float, tmp_path: Path
+) -> None:
+    file = write(tmp_path / name, drive(20.0))
+    whole = file.read_bytes()
+    file.write_bytes(whole[: int(len(whole) * kept)])
+
+    with pytest.raises(DataFileError, match=f"{file.name}: cannot be read: "):
+        entries(file)
+
+
+@pytest.mark.parametrize("name", ["notes.txt", "log.bag"])
+def test_what_is_no_recording_by_its_name_is_refused(name: str, tmp_path: Path) -> None:
+    with pytest.raises(
+        DataFileError, match=r"is none of \.jsonl, .*\.mcap, and no dir"
+    ):
+        entries(tmp_path / name)

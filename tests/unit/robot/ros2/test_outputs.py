@@ -1,0 +1,208 @@
+"""Twists behind the gate, and neighbours for Nav2 and RViz."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from iveg.domain.feedback import Feedback, FeedbackAlert
+from iveg.domain.geometry import REST, Pose2D, Twist2D
+from iveg.domain.observations import Origin
+from iveg.domain.parameters import Class
+from iveg.robot.costmap import Neighbour, Neighbours
+from iveg.robot.ros2 import outputs
+from iveg.robot.ros2.config import DriveConfig
+from iveg.robot.ros2.outputs import DriveTopics
+from iveg.robot.ros2.reading import InputFaults, speed_of
+from iveg.ros2 import cdr
+from iveg.ros2 import messages as ros
+from tests.unit.robot.ros2.said import stamp
+
+# --- drive ------------------------------------------------------------------------
+
+AHEAD = ros.Twist(ros.Vector3(0.5, 0.1, 0.2), ros.Vector3(0.3, 0.4, -0.2))
+
+
+def topics(**drive: bool) -> tuple[DriveTopics, InputFaults]:
+    input_faults = InputFaults()
+    found = DriveTopics(DriveConfig(**drive), "/cmd_vel_nav", "base_link", input_faults)
+    return found, input_faults
+
+
+def wished(after: float, forward: float = 0.5) -> bytes:
+    header = ros.Header(stamp(after), "base_link")
+    return cdr.write(ros.TwistStamped(header, ros.Twist(ros.Vector3(forward))))
+
+
+def test_of_a_twist_what_wheels_can_do_is_read() -> None:
+    found, _ = topics()
+
+    assert found.read(cdr.write(AHEAD), 0.0) == Twist2D(0.5, -0.2)
+
+
+@pytest.mark.parametrize(
+    ("forward", "code"),
+    [
+        (math.nan, "not_a_number"),
+        (-math.inf, "not_a_number"),
+        (1e300, "absurd"),
+        (-21.0, "absurd"),
+    ],
+)
+def test_a_twist_that_nobody_can_mean_is_a_wish_to_rest(
+    forward: float, code: str
+) -> None:
+    found, input_faults = topics()
+
+    wish = found.read(cdr.write(ros.Twist(ros.Vector3(forward))), 5.0)
+
+    assert wish == REST
+    assert speed_of(input_faults.faults(5.0)) == (0.5, code)
+
+
+def test_bytes_that_are_no_twist_are_a_wish_to_rest() -> None:
+    found, input_faults = topics()
+
+    assert found.read(b"\0\1\0\0", 5.0) == REST
+    assert speed_of(input_faults.faults(5.0)) == (0.5, "unreadable")
+
+
+def test_a_stamped_twist_that_was_overtaken_is_dropped() -> None:
+    found, input_faults = topics(stamped_in=True)
+
+    first, late = found.read(wished(1.0), 0.0), found.read(wished(0.9), 0.1)
+
+    assert (first, late) == (Twist2D(0.5, 0.0), None)
+    assert speed_of(input_faults.faults(0.1)) == (0.5, "time_back")
+
+
+def test_a_sender_whose_clock_was_set_back_is_believed() -> None:
+    found, _ = topics(stamped_in=True)
+    found.read(wished(1.0), 0.0)
+
+    assert found.read(wished(-3600.0), 0.1) == Twist2D(0.5, 0.0)
+    assert found.read(wished(-3599.9), 0.2) == Twist2D(0.5, 0.0)
+
+
+def test_a_sender_that_stamps_nothing_is_believed() -> None:
+    found, _ = topics(stamped_in=True)
+    bare = cdr.write(ros.TwistStamped(ros.Header(), AHEAD))
+
+    assert [found.read(bare, n / 10) for n in range(2)] == [Twist2D(0.5, -0.2)] * 2
+
+
+def test_what_the_gate_says_is_written_as_the_base_wants_it() -> None:
+    plain, _ = topics()
+    stamped, _ = topics(stamped_out=True)
+    twist = Twist2D(0.25, -0.5)
+
+    bare = cdr.read(ros.Twist, plain.write(twist, 12.5))
+    whole = cdr.read(ros.TwistStamped, stamped.write(twist, 12.5))
+
+    assert (bare.linear.x, bare.angular.z, bare.linear.y) == (0.25, -0.5, 0.0)
+    assert whole.twist == bare
+    assert (whole.header.stamp.seconds, whole.header.frame_id) == (12.5, "base_link")
+
+
+# --- neighbours -------------------------------------------------------------------
+
+HERE = Pose2D(1.0, 2.0, math.pi / 2)
+STAMP = ros.Time(7, 0)
+
+
+def alert(
+    x: float, y: float, class_: Class = "person", name: str = "farmer"
+) -> FeedbackAlert:
+    return FeedbackAlert("d", "", class_, name, 0.9, (x, y, 0.9), 2.0, "AGII")
+
+
+def told(*alerts: FeedbackAlert, who: str = "AGII", x: float = 9.0) -> Feedback:
+    return Feedback(who, Origin("c", 1), None, alerts, Pose2D(x, 2.0, 0.0))
+
+
+def present(*feedback: Feedback, age: float = 0.0) -> list[Neighbour]:
+    known = Neighbours("AGI")
+    for one in feedback:
+        known.note(one.robot_id, one, 10.0)
+    return known.present(HERE, 10.0 + age)
+
+
+def points(cloud: ros.PointCloud2) -> np.ndarray:
+    return np.frombuffer(cloud.data.tobytes(), "<f4").reshape(-1, 3)
+
+
+def test_people_and_peers_are_neighbours() -> None:
+    found = present(told(alert(3.0, 2.0)))
+
+    assert [(one.kind, one.name, one.x) for one in found] == [
+        ("person", "farmer", 3.0),
+        ("robot", "AGII", 9.0),
+    ]
+
+
+def test_nobody_is_a_neighbour_of_himself() -> None:
+    own = told(alert(1.2, 2.0, "robot", "AGII"), who="AGI", x=1.0)
+    named = told(alert(5.0, 5.0, "robot", "AGI"))
+
+    assert present(own) == []
+    assert [one.name for one in present(named)] == ["AGII"]
+
+
+def test_a_person_within_reach_of_the_hand_is_not_taken_for_oneself() -> None:
+    found = present(told(alert(1.2, 2.0), who="AGI"))
+
+    assert [one.kind for one in found] == ["person"]
+
+
+def test_a_peer_that_was_taken_away_leaves_although_its_last_pose_is_still_told() -> (
+    None
+):
+    known, moved = Neighbours("AGI"), "2026-11-24T08:00:00Z"
+    left = replace(told(), pose_stamp="2026-11-24T07:59:59Z")
+    known.note("AGII", left, 10.0)
+    for second in range(11, 22):
+        known.note("AGII", left, float(second))
+        assert bool(known.present(HERE, float(second))) == (second <= 20)
+
+    known.note("AGII", replace(left, pose_stamp=moved), 22.0)
+
+    assert [one.name for one in known.present(HERE, 22.0)] == ["AGII"]
+
+
+def test_a_person_becomes_a_disc_in_the_robots_own_frame() -> None:
+    """2 m north of a robot that looks north is 2 m ahead."""
+    person = Neighbour("person", "farmer", 1.0, 4.0, 0.35, 2.0)
+
+    cloud = outputs.cloud([person], HERE, STAMP, "base_link")
+    near = points(cloud)[np.hypot(*points(cloud).T[:2]) < outputs.REACH_M]
+
+    assert cloud.header.frame_id == "base_link"
+    assert near[:, 0].mean() == pytest.approx(2.0, abs=0.01)
+    assert near[:, 1].mean() == pytest.approx(0.0, abs=0.01)
+    assert np.hypot(near[:, 0] - 2.0, near[:, 1]).max() <= 0.351
+    assert len(near) > 20
+
+
+def test_a_cloud_has_far_points_all_round_that_clear_the_layer() -> None:
+    cloud = outputs.cloud([], HERE, STAMP, "base_link")
+
+    x, y, z = points(cloud).T
+    angles = np.sort(np.arctan2(y, x))
+    assert np.hypot(x, y).min() > outputs.REACH_M
+    assert np.diff(angles).max() * outputs.REACH_M < 0.05
+    assert set(z.tolist()) == {0.5}
+    assert cloud.width * cloud.point_step == cloud.row_step == cloud.data.size
+    assert [one.offset for one in cloud.fields] == [0, 4, 8]
+
+
+def test_rviz_gets_a_body_a_ring_and_a_name_that_fade() -> None:
+    person = Neighbour("person", "farmer", 1.0, 4.0, 0.35, 2.5)
+
+    body, ring, name = outputs.markers([person], STAMP, "map").markers
+
+    assert (body.scale.x, ring.scale.x) == (0.7, 5.0)
+    assert (name.text, name.type) == ("farmer", 9)
+    assert {one.lifetime.sec for one in (body, ring, name)} == {1}
+    assert len({(one.ns, one.id) for one in (body, ring, name)}) == 3
+    assert body.header.frame_id == "map"

@@ -1,0 +1,309 @@
+"""Pictures of the past: what pages were sent is what the past shows."""
+
+import asyncio
+import json
+import struct
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import orjson
+import pytest
+import zstandard
+from mcap.records import Chunk
+from mcap.stream_reader import StreamReader
+
+from iveg.adapters.recordings.incoming import WHOLE_S
+from iveg.adapters.recordings.pictures import PictureFiles
+from iveg.adapters.recordings.recorder import InputRecorder
+from iveg.adapters.recordings.writer import PICTURES_S, SETTLE_S, WriterSetup
+from iveg.domain.errors import HopError, NotRecordedError
+from iveg.domain.observations import Instant
+from iveg.domain.stamps import format_stamp
+from iveg.models.base import write_json
+from iveg.models.snapshot import PastWorld
+from iveg.pipeline import topics
+from iveg.web.live.pictures import (
+    MOST_WAITING,
+    PICTURE_S,
+    Past,
+    PictureRecorder,
+    World,
+)
+from tests.builders import START, detection, scan
+from tests.fakes.recordings import WriterInPlace
+from tests.unit.web.desk import WebDesk
+
+FIRST = Path(__file__).parents[3] / "data" / "pictures"
+"""A recording of the first version that made pictures; it is read for ever."""
+FIRST_AT = 1_795_900_007.0
+MAGIC = b"\x89MCAP0\r\n"
+SPEED = 0.5
+
+
+class Recorded:
+    """A desk whose pictures are written in place."""
+
+    def __init__(self, folder: Path) -> None:
+        setup = WriterSetup(folder)
+        self.folder = folder / "pictures"
+        self.desk = WebDesk(pictures=self.folder)
+        clock = self.desk.clock
+        self.recorder = InputRecorder(setup, clock)
+        self._in_place = WriterInPlace(setup)
+        self.write: Callable[..., bool] = self.recorder.picture
+        self.pictures = PictureRecorder(
+            self.desk.encoder,
+            self.desk.views,
+            self.desk.hub,
+            clock,
+            lambda *picture: self.write(*picture),
+        )
+        self.past = Past(PictureFiles(self.folder))
+
+    async def take(self, until: float) -> None:
+        """Pictures of a robot that drives, up to a moment (s)."""
+        while self.desk.clock.now < until:
+            self.desk.clock.now = round(self.desk.clock.now + PICTURE_S, 3)
+            self.desk.drive("AGI", SPEED * self.desk.clock.now)
+            await self.pictures.take()
+            self._in_place.write(self.recorder, self.desk.clock().mono)
+
+    def finish(self) -> None:
+        self._in_place.writer.finish()
+
+    async def world(self, seconds: float) -> dict[str, Any]:
+        told: dict[str, Any] = orjson.loads(await self.past.world(START.wall + seconds))
+        return told
+
+    def live(self) -> dict[str, Any]:
+        """What a page that comes now is sent."""
+        now = topics.read_all(self.desk.views, self.desk.clock())
+        told: dict[str, Any] = orjson.loads(write_json(now))
+        return told
+
+
+@pytest.fixture
+def recorded(tmp_path: Path) -> Iterator[Recorded]:
+    recorded = Recorded(tmp_path)
+    yield recorded
+    recorded.finish()
+
+
+def x_of(world: dict[str, Any], robot_id: str = "AGI") -> float:
+    robots = {one["robot_id"]: one for one in world["robots"]}
+    return float(robots[robot_id]["pose"]["x"])
+
+
+async def test_the_past_is_what_a_page_that_came_then_was_sent(
+    recorded: Recorded,
+) -> None:
+    desk = recorded.desk
+    desk.drive("AGI")
+    desk.drive("AGII", 50.0)
+    desk.look("AGI", detection(x=4.0))
+    desk.hear(scan(origin=desk.next_origin()))
+    await recorded.take(3.0)
+    desk.look("AGI", detection(x=4.0))
+    await desk.commander.stop(["AGII"], "ana", desk.clock())
+    await recorded.take(4.0)
+    live = recorded.live()
+    recorded.finish()
+
+    told = await recorded.world(4.1)
+
+    PastWorld.model_validate_json(json.dumps(told))
+    own = {name: told.pop(name) for name in set(told) - set(live)}
+    (swept,) = own["scans"]
+    assert swept["points"] == [[1.0, 0.0], [0.0, 2.0], [0.0, -4.0]]
+    assert (own["at_s"], own["at"]) == (START.wall + 4.0, format_stamp(own["at_s"]))
+    assert (own["left_out"], own["recorded_twice"]) == ([], False)
+    assert without_ages(told) == without_ages(live)
+    ages, lived = ([one["age_s"] for one in by["robots"]] for by in (told, live))
+    assert ages == pytest.approx(lived, abs=0.01)
+
+
+@pytest.mark.parametrize("is_open", [True, False])
+async def test_each_moment_is_found_and_what_was_not_recorded_is_a_gap(
+    recorded: Recorded, is_open: bool
+) -> None:
+    await recorded.take(2 * WHOLE_S + 1.0)
+    recorded.desk.clock.now += 60.0
+    await recorded.take(90.0)
+    if not is_open:
+        recorded.finish()
+
+    for seconds in (0.3, 5.7, 11.1, 20.3, 84.0, 87.9):
+        shown = await recorded.world(seconds)
+        assert abs(x_of(shown) - SPEED * seconds) < 0.3
+        assert 0.0 <= START.wall + seconds - shown["at_s"] < 0.3
+    gaps = ((-5.0, (None, 0.2)), (50.0, (21.0, 81.2)), (95.0, (90.0, None)))
+    for seconds, ends in gaps:
+        with pytest.raises(NotRecordedError) as gap:
+            await recorded.world(seconds)
+        near = gap.value.before, gap.value.after
+        told = [None if one is None else one - START.wall for one in near]
+        # Of a file that is open the last moments are not there yet.
+        late = SETTLE_S if is_open else 0.01
+        assert told == [end and pytest.approx(end, abs=late) for end in ends]
+
+
+async def test_a_file_is_of_five_minutes_and_begins_whole(recorded: Recorded) -> None:
+    """Nothing that is played has to be looked for in another one."""
+    desk = recorded.desk
+    desk.clock.now = PICTURES_S - START.wall % PICTURES_S - 5.0
+    ends = desk.clock.now + 30.0
+    await recorded.take(ends)
+    recorded.finish()
+
+    assert len([*recorded.folder.glob("*.mcap")]) == 2
+    for seconds in (ends - 22.0, ends - 2.0):
+        assert abs(x_of(await recorded.world(seconds)) - SPEED * seconds) < 0.3
+
+
+async def test_where_the_clock_was_set_back_the_later_file_is_shown(
+    recorded: Recorded, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    await recorded.take(30.0)
+    recorded.finish()
+    back = Instant(START.mono, START.wall + 20.0)
+    monkeypatch.setattr("tests.fakes.clock.at", back.later)
+    again = Recorded(tmp_path)
+    await again.take(5.0)
+    again.finish()
+
+    shown = await again.world(22.0)
+
+    assert shown["recorded_twice"]
+    assert abs(x_of(shown) - SPEED * 2.0) < 0.3
+    assert not (await again.world(10.0))["recorded_twice"]
+
+
+async def test_a_picture_without_room_is_followed_by_a_whole_one(
+    recorded: Recorded,
+) -> None:
+    await recorded.take(1.0)
+    write, recorded.write = recorded.write, lambda *_: False
+    recorded.desk.drive("AGII", 7.0)
+    await recorded.pictures.take()
+    recorded.write = write
+    await recorded.take(2.0)
+    recorded.finish()
+
+    assert x_of(await recorded.world(2.0), "AGII") == 7.0
+
+
+async def test_a_chunk_that_is_damaged_is_a_gap_and_no_wrong_picture(
+    recorded: Recorded,
+) -> None:
+    await recorded.take(30.0)
+    recorded.finish()
+    (path,) = recorded.folder.glob("*.mcap")
+    file = PictureFiles(recorded.folder)
+    data, place = bytearray(path.read_bytes()), chunk_at(path, 14.0)
+    data[place + 200] ^= 0xFF
+    path.write_bytes(data)
+
+    with pytest.raises(NotRecordedError):
+        file.by(START.wall + 18.0)
+    assert file.by(START.wall + 8.0)
+    assert file.by(START.wall + 24.0)
+
+
+async def test_a_chunk_that_claims_gigabytes_is_not_unpacked(tmp_path: Path) -> None:
+    path = tmp_path / "2023-11-14T22-13-20Z.mcap"
+    bomb = zstandard.compress(bytes(1 << 28))
+    with path.open("wb") as stream:
+        stream.write(MAGIC + chunk_of(bomb, claimed=1000))
+
+    with pytest.raises(NotRecordedError):
+        PictureFiles(tmp_path).by(START.wall + 1.0)
+
+
+async def test_who_asks_waits_for_a_turn_in_a_short_line(recorded: Recorded) -> None:
+    asked = [recorded.past.world(START.wall) for _ in range(MOST_WAITING + 3)]
+    told = await asyncio.gather(*asked, return_exceptions=True)
+
+    assert [type(one) for one in told].count(HopError) == 3
+
+
+# --- over HTTP --------------------------------------------------------------------
+
+
+async def test_a_moment_is_asked_over_http_and_what_cannot_be_shown_is_a_problem(
+    recorded: Recorded,
+) -> None:
+    await recorded.take(5.0)
+    recorded.finish()
+    recorded.desk.clock.now = 30.0
+    path = "/api/v1/world?at="
+    async with recorded.desk.browser("viewer") as browser:
+        # Earlier versions of the page named themselves.
+        shown = await browser.get(f"{path}{format_stamp(START.wall + 4.0)}&viewer=tab")
+        gap = await browser.get(path + format_stamp(START.wall + 20.0))
+        future = await browser.get(f"{path}2031-01-01T00:00:00Z")
+
+    assert (shown.status_code, gap.status_code, future.status_code) == (200, 404, 422)
+    assert abs(x_of(shown.json()) - SPEED * 4.0) < 0.3
+    assert gap.json()["type"] == "urn:iveg:not-recorded"
+    assert gap.json()["before"] == format_stamp(START.wall + 5.0)
+    assert gap.json()["after"] is None
+
+
+# --- after updates ----------------------------------------------------------------
+
+
+def test_a_topic_of_another_version_is_left_out_and_told() -> None:
+    world = World()
+    world.take({"at": 1.0, "parts": [{"topic": "moods/AGI", "at": 1.0, "data": 3}]})
+
+    assert world.members()["left_out"] == ["moods/AGI"]
+
+
+async def test_a_recording_of_the_first_version_is_shown_for_ever() -> None:
+    past = Past(PictureFiles(FIRST))
+
+    told: dict[str, Any] = orjson.loads(await past.world(FIRST_AT))
+
+    modes = {one["robot_id"]: one["mode"] for one in told["robots"]}
+    assert modes == {"AGI": "RUNNING", "AGII": "STOPPED"}
+    assert (x_of(told), x_of(told, "AGII")) == (9.987, 13.196)
+    counts = [len(told[name]) for name in ("people", "commands", "detections")]
+    assert counts == [1, 1, 2]
+    assert told["log"][-1]["id"] > told["log"][0]["id"]
+    assert told["left_out"] == []
+    assert [len(one["points"]) for one in told["scans"]] == [720, 720]
+
+
+# --- helpers ----------------------------------------------------------------------
+
+
+def without_ages(value: Any) -> Any:
+    """The same without what counts from one moment to the next."""
+    if isinstance(value, list):
+        return [without_ages(one) for one in value]
+    if not isinstance(value, dict):
+        return value
+    # A page lets rings grow and margins shrink by itself.
+    counts = ("age_s", "counters", "radius_m", "margin", "acting")
+    return {key: without_ages(one) for key, one in value.items() if key not in counts}
+
+
+def chunk_at(path: Path, seconds: float) -> int:
+    """Where the chunk of a moment begins."""
+    at = round((START.wall + seconds) * 1e9)
+    with path.open("rb") as stream:
+        begins = 0
+        for record in StreamReader(stream, emit_chunks=True).records:
+            if isinstance(record, Chunk) and record.message_end_time >= at:
+                return begins
+            begins = stream.tell()
+    raise AssertionError("no such chunk")
+
+
+def chunk_of(data: bytes, *, claimed: int) -> bytes:
+    """A chunk record that says another size than it has."""
+    first, last = (round((START.wall + one) * 1e9) for one in (0.0, 2.0))
+    head = struct.pack("<QQQI", first, last, claimed, 0)
+    body = head + struct.pack("<I4sQ", 4, b"zstd", len(data)) + data
+    return struct.pack("<BQ", 6, len(body)) + body
