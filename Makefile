@@ -28,7 +28,7 @@ test: test-needs $(DEV) ; $(BIN)/python -m pytest $(SIDE_BY_SIDE)
 quick: $(DEV) ; IVEG_HYPOTHESIS=quick IVEG_STOP_EXAMPLES=20 $(BIN)/python -m pytest $(SIDE_BY_SIDE) -m "not real and not slow"
 setup: $(DEV)
 format: $(DEV) ; $(BIN)/ruff format . && $(BIN)/ruff check --fix .
-check: check-needs $(DEV) node_modules ; $(BIN)/ruff format --check . && $(BIN)/ruff check . && $(BIN)/mypy && $(BIN)/lint-imports && npm run --silent check
+check: check-needs $(DEV) node_modules ; $(BIN)/ruff format --check . && $(BIN)/ruff check . && $(BIN)/mypy && $(BIN)/mypy deploy/make-secrets && $(BIN)/lint-imports && npm run --silent check
 bench: test-needs $(DEV) ; $(BIN)/python -m benchmarks
 deep: $(DEV) ; IVEG_HYPOTHESIS=thorough IVEG_STOP_EXAMPLES=20000 IVEG_LIAR_STEPS=100000 IVEG_OPENAPI_EXAMPLES=1000 $(BIN)/python -m pytest $(FOR_HOURS) -o timeout=3600 tests/properties tests/liar
 chaos: test-needs $(DEV) ; IVEG_CHAOS_DISK=on IVEG_CHAOS_RECORDER_KILLS=$(or $(KILLS),50) IVEG_CHAOS_SEED=$(or $(SEED),1) IVEG_CHAOS_KILLS=$(or $(KILLS),200) IVEG_CHAOS_TIMES=$(or $(TIMES),20) $(BIN)/python -m pytest $(FOR_HOURS) tests/chaos/test_kills.py tests/chaos/test_backlog.py tests/chaos/test_network.py tests/chaos/test_ros2_kills.py tests/chaos/test_recording_kills.py tests/chaos/test_disk_full.py
