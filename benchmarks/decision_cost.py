@@ -28,6 +28,7 @@ import orjson
 from iveg.adapters import clock
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
+from iveg.comfort.mapping import Mapper
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import Feedback
 from iveg.domain.observations import Instant, Received
@@ -36,12 +37,11 @@ from iveg.domain.records import Record
 from iveg.domain.tracking.people import People
 from iveg.domain.world import World
 from iveg.ngsi import codec
-from iveg.pipeline.evaluate import Evaluator
-from iveg.pipeline.event_log import EventLog
-from iveg.pipeline.mapping import Mapper
-from iveg.pipeline.publish import Hub
-from iveg.pipeline.record import RecordSink
-from iveg.pipeline.supervision import Supervision
+from iveg.vital.evaluate import Evaluator
+from iveg.vital.event_log import EventLog
+from iveg.vital.publish import Hub
+from iveg.vital.record import RecordSink
+from iveg.vital.supervision import Supervision
 
 BEAMS = 720
 ODOMETRY_HZ, SCAN_HZ, LOOK_HZ, SAFETY_HZ = 20, 10, 10, 2

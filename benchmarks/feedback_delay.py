@@ -28,13 +28,12 @@ from iveg.adapters.clock import new_id
 from iveg.adapters.direct import DirectReader
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
+from iveg.comfort.mapping import Mapper
 from iveg.domain.feedback import Feedback
 from iveg.domain.observations import Received
 from iveg.domain.transports import DIRECT, FIWARE
 from iveg.ngsi import codec, names
-from iveg.pipeline.build import build
-from iveg.pipeline.mapping import Mapper
-from iveg.pipeline.parts import Choices, Pipeline, Ports
+from iveg.pipeline import Choices, Pipeline, Ports, build
 from tests.fakes.journal import FakeJournal
 
 RATE_HZ = 30

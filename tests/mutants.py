@@ -155,7 +155,7 @@ MUTANTS = (
         "STOP: a restart asserts a hold that a release has named",
         "if self.hold_id in self.named:",
         "if self.hold_id in self.asked[1:]:",
-        ("unit/pipeline/test_command.py",),
+        ("unit/vital/test_command.py",),
     ),
     Mutant(
         "rule: exactly the threshold is no longer enough",
@@ -257,7 +257,7 @@ MUTANTS = (
         "clear: a frame that a full queue drops is as if it never came",
         "if kind is DetectionFrame:\n            self._refused[robot_id] = replace(",
         "if False:\n            self._refused[robot_id] = replace(",
-        ("unit/pipeline/test_ingest.py",),
+        ("unit/vital/test_ingest.py",),
     ),
     Mutant(
         "clear: a frame that cannot be read is as if it never came",
@@ -269,7 +269,7 @@ MUTANTS = (
         "STOP: a report of unknown age confirms a release",
         "if isinf(age_s) and hold_id not in {hold.id for hold in report.holds}:",
         "if False:",
-        ("unit/pipeline/test_age.py",),
+        ("unit/vital/test_age.py",),
     ),
     Mutant(
         "freshness: feedback of another start of iVeg proves an age",
@@ -293,25 +293,25 @@ MUTANTS = (
         "STOP: a standstill is told by reports however old they are",
         "if self.evidence_age(at) > LIMITS.report_stale_s:",
         "if False:",
-        ("unit/pipeline/test_age.py",),
+        ("unit/vital/test_age.py",),
     ),
     Mutant(
         "STOP: a hold is adopted from a report however old it is",
         "self.evidence.ours[-1:] if age_s <= LIMITS.report_stale_s else []",
         "self.evidence.ours[-1:]",
-        ("unit/pipeline/test_earlier_boots.py",),
+        ("unit/vital/test_earlier_boots.py",),
     ),
     Mutant(
         "STOP: what an earlier boot reported acts",
         "return not present_boot.is_past(origin.boot, proven_at)",
         "return True",
-        ("unit/pipeline/test_earlier_boots.py",),
+        ("unit/vital/test_earlier_boots.py",),
     ),
     Mutant(
         "freshness: a straggler of an earlier boot holds up the present one",
         "if proven_at is not None and proven_at > self._began and not self._is_proven:",
         "if False:",
-        ("unit/pipeline/test_earlier_boots.py",),
+        ("unit/vital/test_earlier_boots.py",),
     ),
     Mutant(
         "STOP: motion from before the rest contradicts it when it comes late",
@@ -330,7 +330,7 @@ MUTANTS = (
         "vital: a failure of comfort is its caller's",
         "                self.failed(part, error)\n\n        return guarded",
         "                raise\n\n        return guarded",
-        ("unit/pipeline/test_supervision.py",),
+        ("unit/vital/test_supervision.py",),
     ),
     Mutant(
         "vital: a part ends without a last word to the robots",
@@ -342,7 +342,7 @@ MUTANTS = (
         "vital: a scan that cannot be taken in ends the rule loop",
         "if kind(observation).vital:",
         "if True:",
-        ("unit/pipeline/test_supervision.py",),
+        ("unit/vital/test_supervision.py",),
     ),
     Mutant(
         "rule: a box without a frame counts in base_link alone",
@@ -360,7 +360,7 @@ MUTANTS = (
         "rule: somebody without a place slows nobody",
         "self.unplaced += _may_be_somebody(detection, rule)",
         "self.unplaced += 0",
-        ("unit/pipeline/test_frames.py",),
+        ("unit/vital/test_frames.py",),
     ),
     Mutant(
         "rule: the second place of a box is counted as somebody else",

@@ -14,10 +14,10 @@ from iveg.lab.emulator.scenarios import scenario_named
 from iveg.lab.emulator.world import SimulatedWorld
 from iveg.lab.experiment import stage as staging
 from iveg.lab.experiment.stage import STEP_S
-from iveg.pipeline.parts import Pipeline
-from iveg.pipeline.things import ThingMarks
+from iveg.pipeline import Pipeline
+from iveg.vital.things import ThingMarks
 from iveg.web.views import Views
-from tests.unit.pipeline.desk import Desk, settle
+from tests.unit.vital.desk import Desk, settle
 
 Json = dict[str, Any]
 T = TypeVar("T")

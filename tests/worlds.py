@@ -10,7 +10,7 @@ from iveg.domain.greenhouse import DriveLane, Greenhouse
 from iveg.domain.observations import Hold
 from iveg.web.views import Views
 from tests.builders import detection
-from tests.unit.pipeline.desk import Desk, settle
+from tests.unit.vital.desk import Desk, settle
 
 ROBOTS = ("AGI", "AGII")
 HOLDS = (

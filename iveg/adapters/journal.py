@@ -22,7 +22,7 @@ from iveg.domain.errors import DataFileError
 from iveg.domain.observations import Instant
 from iveg.domain.records import RECORD_TYPES, Json
 from iveg.domain.stop import DesiredRecord
-from iveg.pipeline.record import Waiting
+from iveg.vital.record import Waiting
 
 _log = logging.getLogger(__name__)
 

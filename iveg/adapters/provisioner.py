@@ -24,8 +24,8 @@ from iveg.domain.errors import HopError, NoAnswerError
 from iveg.domain.observations import HeartbeatProbe, Instant, Origin, Received
 from iveg.domain.transports import FIWARE
 from iveg.ngsi import codec, names
-from iveg.pipeline.health_monitor import PROBE_PERIOD_S, HealthMonitor, Pace
-from iveg.pipeline.ingest import Ingest
+from iveg.vital.health_monitor import PROBE_PERIOD_S, HealthMonitor, Pace
+from iveg.vital.ingest import Ingest
 
 _log = logging.getLogger(__name__)
 _ASK_PERIOD_S, _REPAIR_PERIOD_S = 1.0, 4.0

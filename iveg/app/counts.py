@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 
 from iveg.adapters.history.recorder import Recorder
 from iveg.adapters.mqtt import MqttLink
-from iveg.pipeline.parts import Pipeline
+from iveg.pipeline import Pipeline
 from iveg.web.api import health
 
 

@@ -22,10 +22,10 @@ from iveg.domain.accounts import (
 from iveg.domain.audit import CONSOLE, ITSELF
 from iveg.domain.errors import HopError, NameTakenError
 from iveg.domain.events import Condition, Slot
-from iveg.pipeline.audit import AuditTrail
-from iveg.pipeline.ports import Clock
-from iveg.pipeline.supervision import Supervision
 from iveg.settings import Settings
+from iveg.vital.audit import AuditTrail
+from iveg.vital.ports import Clock
+from iveg.vital.supervision import Supervision
 from iveg.web.security.authentication import Authenticator
 from iveg.web.security.people import People, Programs
 from iveg.web.security.single_sign_on import SingleSignOn

@@ -30,20 +30,18 @@ from iveg.app.door import PART as ACCOUNTS
 from iveg.app.door import Door
 from iveg.app.life import Work, live
 from iveg.app.outside import Outside
+from iveg.comfort.equipment import PART as EQUIPMENT
+from iveg.comfort.messenger import Messenger
+from iveg.comfort.restore import remember
+from iveg.comfort.retention import PART as RETENTION
+from iveg.comfort.retention import HistoryUpkeep
 from iveg.domain.errors import VitalPartError
 from iveg.domain.fleet import FleetDescription
 from iveg.domain.observations import Instant
 from iveg.domain.transports import DIRECT, FIWARE
-from iveg.pipeline.audit import AuditTrail
-from iveg.pipeline.build import build
-from iveg.pipeline.equipment import PART as EQUIPMENT
-from iveg.pipeline.messenger import Messenger
-from iveg.pipeline.parts import Choices, Ports
-from iveg.pipeline.restore import remember
-from iveg.pipeline.retention import PART as RETENTION
-from iveg.pipeline.retention import HistoryUpkeep
-from iveg.pipeline.services import build_services
+from iveg.pipeline import Choices, Ports, build, build_services
 from iveg.settings import Settings
+from iveg.vital.audit import AuditTrail
 from iveg.web.build import Face
 from iveg.web.live.encoder import Encoder
 from iveg.web.live.pictures import Past, PictureRecorder

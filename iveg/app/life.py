@@ -10,7 +10,7 @@ import logging
 from collections.abc import Awaitable, Callable, Mapping
 
 from iveg.domain.errors import VitalPartError
-from iveg.pipeline.supervision import Supervision
+from iveg.vital.supervision import Supervision
 
 _log = logging.getLogger(__name__)
 Work = Callable[[], Awaitable[object]]

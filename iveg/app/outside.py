@@ -29,9 +29,9 @@ from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.detector import OutOfService
 from iveg.domain.fleet import FleetDescription
 from iveg.domain.words import WordAnswer
-from iveg.pipeline.health_monitor import HopState
-from iveg.pipeline.services import KeptChoices
+from iveg.pipeline import KeptChoices
 from iveg.settings import Settings
+from iveg.vital.health_monitor import HopState
 
 ACCOUNTS = "accounts.jsonl"
 _log = logging.getLogger(__name__)

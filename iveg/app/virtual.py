@@ -17,8 +17,7 @@ from iveg.domain.peer_scan import PeerScan
 from iveg.domain.records import DecisionRecord, Record
 from iveg.domain.transports import DIRECT
 from iveg.ngsi import codec
-from iveg.pipeline.build import build
-from iveg.pipeline.parts import Choices, Ports
+from iveg.pipeline import Choices, Ports, build
 
 START = Instant(0.0, 1_700_000_000.0)
 

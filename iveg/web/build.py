@@ -11,11 +11,10 @@ from iveg.domain.observations import Instant
 from iveg.domain.stamps import format_stamp
 from iveg.domain.stop import Press
 from iveg.models.snapshot import Server, Snapshot, User
-from iveg.pipeline import topics
-from iveg.pipeline.audit import AuditTrail
-from iveg.pipeline.parts import Pipeline
-from iveg.pipeline.ports import Clock, Ids
-from iveg.pipeline.services import Services
+from iveg.pipeline import Pipeline, Services
+from iveg.vital import topics
+from iveg.vital.audit import AuditTrail
+from iveg.vital.ports import Clock, Ids
 from iveg.web import notifications, problems
 from iveg.web.api import (
     alerts,

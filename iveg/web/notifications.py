@@ -16,8 +16,8 @@ from iveg.domain.errors import UnreadableError
 from iveg.domain.observations import EntityReading, Instant, Observation, Received
 from iveg.domain.transports import FIWARE
 from iveg.ngsi.codec import UNREAD, read_notification
-from iveg.pipeline.ingest import Ingest
-from iveg.pipeline.ports import Clock
+from iveg.vital.ingest import Ingest
+from iveg.vital.ports import Clock
 from iveg.web.problems import Problem, problem_of
 from iveg.web.security.headers import MAX_BODY, NOTIFICATIONS_PATH, TOO_LONG
 from iveg.web.security.roles import Action

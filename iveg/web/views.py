@@ -4,6 +4,7 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable
 from itertools import islice, takewhile
 
+from iveg.comfort.situations import Situations, fresh_report
 from iveg.domain import margins as margins_
 from iveg.domain.alerts import BookedAlert, acknowledgements_of
 from iveg.domain.geometry import Pose2D
@@ -41,9 +42,8 @@ from iveg.models.robot import (
 )
 from iveg.models.rule import Rule
 from iveg.ngsi.names import ROBOT_DEVICES
-from iveg.pipeline.health_monitor import HopHealth
-from iveg.pipeline.parts import Pipeline
-from iveg.pipeline.situations import Situations, fresh_report
+from iveg.pipeline import Pipeline
+from iveg.vital.health_monitor import HopHealth
 
 _FIRST_LINES = 200
 

@@ -115,7 +115,7 @@ from iveg.models.robot import Device
 from iveg.models.robot import Robot
 from iveg.ngsi import codec, names
 from iveg.robot.uplink import Uplink
-from tests.unit.pipeline.desk import Desk, conditions_of
+from tests.unit.vital.desk import Desk, conditions_of
 import asyncio
 
 sent = {}

@@ -3,7 +3,7 @@
 import pytest
 
 from iveg.models.snapshot import Snapshot
-from iveg.pipeline.topics import ROBOT_STATE, TOPICS, Topic, find, is_telemetry
+from iveg.vital.topics import ROBOT_STATE, TOPICS, Topic, find, is_telemetry
 from tests.architecture import documents
 
 _INSIDE_A_CONNECTION = {"pong", "problem", "map", ROBOT_STATE.name}

@@ -23,8 +23,8 @@ from iveg.domain.events import Condition
 from iveg.domain.observations import Climate, Instant, Navigation, RobotFault
 from iveg.domain.records import Record
 from iveg.models.base import write_json
-from iveg.pipeline.publish import Subscriber
-from iveg.pipeline.record import Waiting
+from iveg.vital.publish import Subscriber
+from iveg.vital.record import Waiting
 from iveg.web.api import day, history
 from iveg.web.live.feed import Painting, TelemetryFeed
 from iveg.web.security.roles import Principal

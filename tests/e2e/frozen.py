@@ -19,7 +19,7 @@ from iveg.adapters.history.recorder import Store
 from iveg.domain.records import Record
 from iveg.lab.emulator.fleet import climate_at
 from iveg.ngsi.codec import format_stamp
-from iveg.pipeline.record import Waiting
+from iveg.vital.record import Waiting
 from tests.fakes.records import (
     alert_record,
     climate_record,

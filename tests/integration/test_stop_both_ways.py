@@ -11,7 +11,7 @@ from iveg.domain.errors import HopError
 from iveg.domain.transports import DIRECT
 from tests.fakes.context_broker import FakeContextBroker
 from tests.http_servers import Request, Response, http_server
-from tests.unit.pipeline.desk import Desk, settle
+from tests.unit.vital.desk import Desk, settle
 
 TENANT = ("agroconnect", "/greenhouse")
 ORION_SLOW_S = 5.0

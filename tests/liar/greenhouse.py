@@ -25,7 +25,7 @@ from iveg.lab.emulator.world import RobotHardware, SimulatedWorld, in_view
 from iveg.lab.experiment.stage import Stage
 from iveg.ngsi import codec
 from tests.builders import notification
-from tests.unit.pipeline.desk import settle
+from tests.unit.vital.desk import settle
 from tests.unit.web.desk import WebDesk
 
 HONEST = ("AGI", "AGII")

@@ -23,7 +23,7 @@ from iveg.domain.observations import (
 from iveg.domain.rule.clear import unmet_conditions
 from iveg.domain.world import World
 from tests.builders import at, detection, detection_frame, odometry, origin, received
-from tests.unit.pipeline.desk import Desk
+from tests.unit.vital.desk import Desk
 
 STEP_S = 0.1
 PLACES = {"AGI": 0.0, "AGII": 5.0, "R0": 60.0}

@@ -17,7 +17,7 @@ from iveg.domain.observations import FeedbackRef, Hold, Odometry, Origin, Safety
 from iveg.domain.transports import FIWARE
 from tests.builders import odometry, origin, safety_report
 from tests.fakes.echo import Echo
-from tests.unit.pipeline.desk import Desk
+from tests.unit.vital.desk import Desk
 
 STEP_S = 0.1
 LATE_S = (0.0, 0.3, 0.3, 5.0, 60.0, 200.0)

@@ -28,8 +28,8 @@ from iveg.domain.observations import (
 from iveg.ngsi import codec, names
 from iveg.robot.node import NodeSettings, RobotNode
 from tests.builders import odometry, safety_report
-from tests.unit.pipeline.desk import Desk, settle
 from tests.unit.robot.rig import AHEAD, REST, release, resume, stop
+from tests.unit.vital.desk import Desk, settle
 
 STEP_S = 0.05
 COMMANDS = names.command_topic("iveg", "AGI")

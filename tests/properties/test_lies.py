@@ -25,7 +25,7 @@ from iveg.domain.observations import (
     SafetyReport,
 )
 from tests.builders import detection, detection_frame, odometry, origin
-from tests.unit.pipeline.desk import Desk, settle
+from tests.unit.vital.desk import Desk, settle
 
 STEP_S = 0.1
 PLACES = {"AGI": 0.0, "AGII": 5.0}

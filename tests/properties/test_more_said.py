@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from iveg.domain.geometry import Box3D
 from iveg.domain.observations import Detection
 from tests.builders import detection
-from tests.unit.pipeline.desk import Desk
+from tests.unit.vital.desk import Desk
 
 ROBOTS = {"AGI": 0.0, "AGII": 5.0}
 OBSERVER = "AG3"

@@ -8,7 +8,7 @@ from iveg.domain.parameters import ByClass
 from iveg.domain.rule.trial import Trial
 from iveg.ngsi import codec
 from tests.builders import detection
-from tests.unit.pipeline.desk import Desk
+from tests.unit.vital.desk import Desk
 
 _CANDIDATE = st.builds(
     DetectionRule,

@@ -18,7 +18,7 @@ from iveg.domain.observations import Hold
 from iveg.domain.records import CommandEventRecord, CommandRecord, Record
 from iveg.domain.stop import DesiredRecord
 from tests.fakes.journal import FakeJournal
-from tests.unit.pipeline.desk import Desk, settle
+from tests.unit.vital.desk import Desk, settle
 
 pytestmark = pytest.mark.slow
 TOLD = (

@@ -46,7 +46,7 @@ from iveg.domain.records import (
     Record,
     is_order,
 )
-from iveg.pipeline.record import CAPACITY, RecordQueue, Waiting
+from iveg.vital.record import CAPACITY, RecordQueue, Waiting
 
 _log = logging.getLogger(__name__)
 _Row = dict[str, object]

@@ -28,8 +28,8 @@ from iveg.domain.observations import Instant, Observation
 from iveg.domain.recordings import RecordingFile
 from iveg.domain.records import Record, is_telemetry
 from iveg.domain.retention import DiskSpace
-from iveg.pipeline.ports import Clock
-from iveg.pipeline.record import RecordSink
+from iveg.vital.ports import Clock
+from iveg.vital.record import RecordSink
 
 _log = logging.getLogger(__name__)
 _T = TypeVar("_T")

@@ -25,13 +25,13 @@ from iveg.lab.experiment.messages import MessageTimes
 from iveg.lab.experiment.plan import ROBOTS, PlannedRun
 from iveg.lab.experiment.scoring import Picture, SeenObject
 from iveg.ngsi import codec
-from iveg.pipeline.ingest import Ingest
-from iveg.pipeline.loop import RuleLoop
 from iveg.robot.holds import HoldSet
 from iveg.robot.judgement import Limits
 from iveg.robot.orders import Drive, Effect, Report, SendAnswer
 from iveg.robot.safety import SafetyMachine
 from iveg.robot.uplink import Uplink
+from iveg.vital.ingest import Ingest
+from iveg.vital.loop import RuleLoop
 from iveg.web.views import Views
 
 Row = Json

@@ -53,7 +53,7 @@ from iveg.models.access import (
     UserAccount,
 )
 from iveg.models.base import Body, Listing, stamp
-from iveg.pipeline.ports import Clock
+from iveg.vital.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.cookies import keep_language
 from iveg.web.problems import Problem

@@ -20,8 +20,8 @@ from iveg.domain.observations import Instant
 from iveg.models.alert import AcknowledgedAlerts, Alert, Note
 from iveg.models.base import Listing
 from iveg.ngsi.payloads import clean_text, legible
-from iveg.pipeline.evaluate import Evaluator
-from iveg.pipeline.ports import Clock
+from iveg.vital.evaluate import Evaluator
+from iveg.vital.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.api.history_filters import Moment, Span, seconds
 from iveg.web.pages.sentences import local_stamp

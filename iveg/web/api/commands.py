@@ -10,8 +10,8 @@ from fastapi import APIRouter, Request, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from iveg.models.command import FleetPressed, Pressed
-from iveg.pipeline.command import Commander
-from iveg.pipeline.ports import Clock
+from iveg.vital.command import Commander
+from iveg.vital.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.presses import DESCRIBED, press_of
 from iveg.web.refusals import refusals

@@ -48,7 +48,7 @@ from iveg.models.base import GreenhouseMap, Point, rounded, write_json
 from iveg.models.command import Command, Latency, LatencySpread, RobotLatency
 from iveg.models.day import Day, Encounters, Pass, Slowed, Worked
 from iveg.models.equipment import ClimateReading
-from iveg.pipeline.ports import Clock
+from iveg.vital.ports import Clock
 from iveg.web.api.answers import Apart, Json
 from iveg.web.api.exports import MEDIA_TYPES
 from iveg.web.api.history_filters import HistoryDay, Range, Span, range_of

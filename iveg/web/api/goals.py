@@ -5,10 +5,10 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Response
 from pydantic import BaseModel, ConfigDict, Field
 
+from iveg.comfort.goals import GoalDispatcher
 from iveg.domain.goals import GoalWish
 from iveg.models.robot import Goal
-from iveg.pipeline.goals import GoalDispatcher
-from iveg.pipeline.ports import Clock
+from iveg.vital.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.refusals import refusals
 from iveg.web.security.requirements import Operator

@@ -19,7 +19,7 @@ from prometheus_client.registry import Collector
 from iveg.domain.latency import LatencyWatch, Sketch, merged
 from iveg.domain.observations import Instant
 from iveg.models.health import Health
-from iveg.pipeline.ports import Clock
+from iveg.vital.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.security.requirements import require
 

@@ -30,7 +30,7 @@ from iveg.models.dictionary import DictionaryColumn, dictionary_columns
 from iveg.models.equipment import Measurement
 from iveg.models.people import DetectionRow
 from iveg.models.robot import OdometryRow
-from iveg.pipeline.ports import Clock
+from iveg.vital.ports import Clock
 from iveg.web.api import day, exports
 from iveg.web.api.answers import FEW_ROWS, Apart, Json
 from iveg.web.api.exports import MEDIA_TYPES, Form

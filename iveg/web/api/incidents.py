@@ -29,7 +29,7 @@ from iveg.domain.observations import Instant
 from iveg.domain.records import Record
 from iveg.domain.stamps import format_stamp
 from iveg.models.rule import Rule
-from iveg.pipeline.ports import Clock
+from iveg.vital.ports import Clock
 from iveg.web.api.answers import Apart
 from iveg.web.api.history_filters import Span
 from iveg.web.pages.drawing import appearance_of

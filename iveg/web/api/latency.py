@@ -29,7 +29,7 @@ from iveg.domain.observations import Instant
 from iveg.domain.stamps import format_stamp
 from iveg.models.base import write_json
 from iveg.models.health import LatencyClock, LatencyRow, LatencyTable, SegmentSpread
-from iveg.pipeline.ports import Clock
+from iveg.vital.ports import Clock
 from iveg.web.api.answers import Apart
 from iveg.web.api.exports import MEDIA_TYPES, cell, csv_lines, form_of
 from iveg.web.pages import charts

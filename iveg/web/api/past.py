@@ -14,7 +14,7 @@ from iveg.domain.recordings import RecordingFile
 from iveg.models.base import Listing
 from iveg.models.health import Recording
 from iveg.models.snapshot import PastWorld
-from iveg.pipeline.ports import Clock
+from iveg.vital.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.api.history_filters import Moment
 from iveg.web.live.pictures import Past

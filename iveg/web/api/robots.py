@@ -20,6 +20,8 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 from numpy.typing import NDArray
 from PIL import Image
 
+from iveg.comfort.coverage import CoverageMonitor
+from iveg.comfort.mapping import Mapper
 from iveg.domain.costmap import UNKNOWN, InflatedGrid
 from iveg.domain.coverage import RECENT_S
 from iveg.domain.observations import Instant
@@ -39,10 +41,8 @@ from iveg.models.equipment import Climate, Tile
 from iveg.models.health import Health
 from iveg.models.people import Person
 from iveg.models.robot import Device, Robot
-from iveg.pipeline.coverage import CoverageMonitor
-from iveg.pipeline.evaluate import Evaluator
-from iveg.pipeline.mapping import Mapper
-from iveg.pipeline.ports import Clock
+from iveg.vital.evaluate import Evaluator
+from iveg.vital.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.refusals import refusals
 from iveg.web.security.requirements import require

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from fastapi import APIRouter, Depends, Response
 from pydantic import Field, create_model, field_validator
 
+from iveg.comfort.trials import Trials
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import VersionMissingError
 from iveg.domain.parameters import PARAMETERS, Class
@@ -13,9 +14,8 @@ from iveg.models.rule import Rule as RuleModel
 from iveg.models.rule import Trial as TrialModel
 from iveg.models.rule import parameter_fields
 from iveg.ngsi.payloads import clean_text
-from iveg.pipeline.ports import Clock
-from iveg.pipeline.rules import Rules
-from iveg.pipeline.trials import Trials
+from iveg.vital.ports import Clock
+from iveg.vital.rules import Rules
 from iveg.web.api.answers import Json
 from iveg.web.refusals import refusals
 from iveg.web.security.requirements import Operator, require

@@ -24,8 +24,8 @@ from typing import Final, NamedTuple
 
 from iveg.domain.latency import Data, LatencyWatch
 from iveg.domain.observations import Instant
-from iveg.pipeline import topics
-from iveg.pipeline.publish import Subscriber
+from iveg.vital import topics
+from iveg.vital.publish import Subscriber
 from iveg.web.live.telemetry import Part, TelemetryEncoder, write_frame
 from iveg.web.presses import read_number
 

@@ -18,9 +18,9 @@ from iveg.domain.errors import HopError
 from iveg.domain.observations import Instant
 from iveg.domain.stamps import format_stamp
 from iveg.models.base import write_json
-from iveg.pipeline import topics
-from iveg.pipeline.ports import Clock
-from iveg.pipeline.publish import Hub
+from iveg.vital import topics
+from iveg.vital.ports import Clock
+from iveg.vital.publish import Hub
 from iveg.web.live.encoder import Encoder
 from iveg.web.live.telemetry import NO_RETURN
 from iveg.web.views import Views

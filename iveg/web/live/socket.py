@@ -24,9 +24,9 @@ from iveg.domain.stop import Press
 from iveg.models.snapshot import Snapshot
 from iveg.ngsi.codec import load_json
 from iveg.ngsi.payloads import legible
-from iveg.pipeline import topics
-from iveg.pipeline.ports import Clock
-from iveg.pipeline.publish import Hub, Subscriber
+from iveg.vital import topics
+from iveg.vital.ports import Clock
+from iveg.vital.publish import Hub, Subscriber
 from iveg.web.live.encoder import Encoder, frame_text
 from iveg.web.live.feed import SUBPROTOCOL, Painting, TelemetryFeed
 from iveg.web.presses import read_press

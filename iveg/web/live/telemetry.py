@@ -18,8 +18,8 @@ from iveg.domain.observations import Instant, LaserScan, Odometry
 from iveg.models.base import rounded, write_json
 from iveg.models.people import Person
 from iveg.models.robot import Robot
-from iveg.pipeline import topics
-from iveg.pipeline.publish import Hub
+from iveg.vital import topics
+from iveg.vital.publish import Hub
 from iveg.web.views import Views
 
 UNIT_M: Final = 0.005

@@ -36,7 +36,7 @@ from iveg.domain.feedback import FULL_SPEED
 from iveg.domain.fleet import FleetDescription
 from iveg.domain.latency import DATA, Cell, Segment, Sketch
 from iveg.domain.transports import TRANSPORTS
-from iveg.pipeline.record import ODOMETRY_PERIOD_S
+from iveg.vital.record import ODOMETRY_PERIOD_S
 
 Trace = Mapping[str, object]
 

@@ -25,8 +25,8 @@ from datetime import UTC, date, datetime, timedelta
 from importlib.resources import files
 from typing import Final
 
+from iveg.comfort.messenger import Write
 from iveg.domain.events import AlertItem, Language, MessageText
-from iveg.pipeline.messenger import Write
 
 _HOUR = timedelta(hours=1)
 

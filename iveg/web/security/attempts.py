@@ -14,8 +14,8 @@ from typing import TypeVar
 from starlette.requests import Request
 
 from iveg.domain.audit import STRANGER, Actor
-from iveg.pipeline.audit import AuditTrail
-from iveg.pipeline.ports import Clock
+from iveg.vital.audit import AuditTrail
+from iveg.vital.ports import Clock
 from iveg.web.problems import Problem
 from iveg.web.security.csrf import refuse_forgery, refuse_other_bodies
 from iveg.web.security.rate_limits import (

@@ -19,8 +19,8 @@ from iveg.domain.errors import UnreadableError
 from iveg.domain.parameters import Parameters, by_keys
 from iveg.ngsi.codec import load_json
 from iveg.ngsi.payloads import all_legible, clean_text
-from iveg.pipeline.audit import AuditTrail
-from iveg.pipeline.ports import Clock
+from iveg.vital.audit import AuditTrail
+from iveg.vital.ports import Clock
 from iveg.web.security.roles import Principal
 
 

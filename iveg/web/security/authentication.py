@@ -20,8 +20,8 @@ from starlette.websockets import WebSocket
 
 from iveg.domain.accounts import DEFAULT_NAME, AccessBook, Account, name_key
 from iveg.domain.errors import NotAllowedError
-from iveg.pipeline.audit import AuditTrail
-from iveg.pipeline.ports import Clock
+from iveg.vital.audit import AuditTrail
+from iveg.vital.ports import Clock
 from iveg.web.cookies import keep_language, session_cookie
 from iveg.web.problems import NotSignedInError, Problem
 from iveg.web.security.attempts import Attempts

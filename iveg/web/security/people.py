@@ -19,7 +19,7 @@ from iveg.domain.accounts import (
     name_key,
 )
 from iveg.domain.audit import Actor, NamedActor
-from iveg.pipeline.ports import Clock
+from iveg.vital.ports import Clock
 from iveg.web.security.roles import Principal, Role
 
 

@@ -21,7 +21,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from iveg.domain.errors import UnreadableError
 from iveg.ngsi.codec import load_json
-from iveg.pipeline.ports import Clock
+from iveg.vital.ports import Clock
 from iveg.web.problems import Problem
 from iveg.web.security.roles import Principal
 

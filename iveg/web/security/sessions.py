@@ -26,7 +26,7 @@ from iveg.domain.accounts import (
     Session,
     SignInMethod,
 )
-from iveg.pipeline.ports import Clock
+from iveg.vital.ports import Clock
 from iveg.web.security.roles import Principal, Role
 
 IDLE_S, ABSOLUTE_S, STOP_ONLY_S = 12 * 3600.0, 24 * 3600.0, 12 * 3600.0

@@ -26,8 +26,8 @@ from iveg.domain.accounts import Account, ClaimReading, ProvenIdentity
 from iveg.domain.audit import STRANGER, Actor, NamedActor
 from iveg.domain.errors import HopError, SignOnError
 from iveg.domain.observations import Instant
-from iveg.pipeline.audit import AuditTrail
-from iveg.pipeline.ports import Clock
+from iveg.vital.audit import AuditTrail
+from iveg.vital.ports import Clock
 from iveg.web.security.authentication import Authenticator
 from iveg.web.security.people import People
 from iveg.web.security.rate_limits import REFUSED_ROWS, Allowance, FailedAttempts

@@ -11,7 +11,7 @@ from iveg.adapters.history.recorder import Store
 from iveg.adapters.history.upkeep import purge_piece
 from iveg.domain.audit import ITSELF
 from iveg.domain.retention import PurgeStep
-from iveg.pipeline.record import Waiting
+from iveg.vital.record import Waiting
 from tests.fakes.records import NOON, audit_record
 
 STEP = PurgeStep("audit", "audit")

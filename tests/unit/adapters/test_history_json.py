@@ -13,7 +13,7 @@ from iveg.adapters.history.lists import Filter
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.recorder import Store
 from iveg.domain.records import Record
-from iveg.pipeline.record import Waiting
+from iveg.vital.record import Waiting
 from tests.fakes.records import (
     NOON,
     alert_record,

@@ -19,7 +19,7 @@ from iveg.adapters.history.upkeep import RecordedHistory, purge_piece, recorded_
 from iveg.adapters.journal import FileJournal
 from iveg.domain.records import ReadingRecord, Record
 from iveg.domain.retention import DAY_S, PURGE_STEPS, PurgeStep
-from iveg.pipeline.record import Waiting
+from iveg.vital.record import Waiting
 from tests.fakes.records import (
     NOON,
     alert_record,

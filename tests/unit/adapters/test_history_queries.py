@@ -15,7 +15,7 @@ from iveg.adapters.history.series import (
 )
 from iveg.domain.errors import HopError, UnreadableError
 from iveg.domain.records import DetectionRecord, Record
-from iveg.pipeline.record import Waiting
+from iveg.vital.record import Waiting
 from tests.fakes.records import (
     NOON,
     alert_record,

@@ -15,7 +15,7 @@ from iveg.adapters.history.engine import sqlite_url, upgrade
 from iveg.adapters.history.lists import Filter
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.recorder import Store
-from iveg.pipeline.record import Waiting
+from iveg.vital.record import Waiting
 from tests.fakes.records import NOON, audit_record
 
 DUMP = Path(__file__).parents[2] / "data" / "part_days.sql"

@@ -14,7 +14,7 @@ import pytest
 
 from iveg.adapters.journal import FileJournal
 from iveg.domain.stop import DesiredRecord
-from iveg.pipeline.record import Waiting
+from iveg.vital.record import Waiting
 from tests.builders import START
 from tests.fakes.disk import files_no_longer_than
 from tests.fakes.records import command_event_record, command_record, log_record

@@ -18,8 +18,8 @@ from iveg.adapters.subscriptions import ensure_subscriptions, wanted_for
 from iveg.domain.observations import Odometry, Origin, Received
 from iveg.lab.embedded.server import Running, embedded_fiware
 from iveg.ngsi import codec, names
-from iveg.pipeline.health_monitor import HealthMonitor
-from iveg.pipeline.ingest import Ingest
+from iveg.vital.health_monitor import HealthMonitor
+from iveg.vital.ingest import Ingest
 from tests.builders import odometry
 from tests.http_servers import Request, Response, http_server
 from tests.ports import free_ports

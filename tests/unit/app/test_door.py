@@ -14,8 +14,8 @@ from iveg.domain.accounts import AccessChange, Account, ApiToken
 from iveg.domain.audit import CONSOLE
 from iveg.domain.errors import HopError
 from iveg.domain.records import AuditRecord
-from iveg.pipeline.audit import AuditTrail
-from iveg.pipeline.supervision import Supervision
+from iveg.vital.audit import AuditTrail
+from iveg.vital.supervision import Supervision
 from tests.databases import lay_history, put_into_tables
 from tests.fakes.clock import FakeClock
 from tests.fakes.recorder import FakeRecorder

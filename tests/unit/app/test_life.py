@@ -6,7 +6,7 @@ import pytest
 
 from iveg.app.life import live
 from iveg.domain.errors import VitalPartError
-from iveg.pipeline.supervision import Supervision
+from iveg.vital.supervision import Supervision
 from tests.fakes.clock import FakeClock
 
 

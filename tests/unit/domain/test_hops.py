@@ -3,7 +3,7 @@
 import pytest
 
 from iveg.domain.probe import Hop
-from iveg.pipeline.health_monitor import HealthMonitor
+from iveg.vital.health_monitor import HealthMonitor
 from iveg.web.pages.sentences import LANGUAGES, read_translations
 from tests.builders import at
 

@@ -14,8 +14,8 @@ from iveg.adapters.recordings.pictures import PictureFiles
 from iveg.domain.equipment import Tile
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import Instant
-from iveg.pipeline.audit import AuditTrail
-from iveg.pipeline.services import KeptChoices, build_services
+from iveg.pipeline import KeptChoices, build_services
+from iveg.vital.audit import AuditTrail
 from iveg.web import notifications
 from iveg.web.api import health
 from iveg.web.bounded_http import bounded_http
@@ -33,7 +33,7 @@ from tests.fakes.detector_store import FakeDetectorStore, FakeWordStore
 from tests.fakes.recordings import FakeRecordings
 from tests.fakes.rule_store import FakeRuleStore, FakeTrialStore
 from tests.fakes.worker import FakeWorker
-from tests.unit.pipeline.desk import FIELD, Desk
+from tests.unit.vital.desk import FIELD, Desk
 from tests.unit.web.when_asked import RoutesWhenAsked
 
 HOST = "iveg.test"

@@ -19,9 +19,9 @@ from iveg.app.outside import Outside, open_outside
 from iveg.asgi import create_app
 from iveg.domain.records import Record
 from iveg.domain.transports import DIRECT, FIWARE, Transport
-from iveg.pipeline.parts import Ports
-from iveg.pipeline.ports import CommandPort
+from iveg.pipeline import Ports
 from iveg.settings import Settings
+from iveg.vital.ports import CommandPort
 from iveg.web.security.roles import MAY
 from iveg.web.security.sessions import IDLE_S
 from tests.databases import lay_history

@@ -12,8 +12,8 @@ from iveg.domain.geometry import Rectangle
 from iveg.domain.greenhouse import DriveLane, Greenhouse
 from iveg.domain.observations import Instant
 from iveg.domain.records import Record
-from iveg.pipeline.ports import Clock
-from iveg.pipeline.record import Waiting
+from iveg.vital.ports import Clock
+from iveg.vital.record import Waiting
 from iveg.web.pages.contexts import Site
 from iveg.web.pages.drawing import Pages
 from iveg.web.pages.sentences import start_of

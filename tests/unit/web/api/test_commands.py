@@ -5,7 +5,7 @@ import pytest
 from iveg.domain.events import Condition
 from iveg.domain.records import AlertRecord
 from iveg.web.security.roles import Role
-from tests.unit.pipeline.desk import settle
+from tests.unit.vital.desk import settle
 from tests.unit.web.desk import WebDesk
 
 

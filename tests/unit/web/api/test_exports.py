@@ -9,7 +9,7 @@ from iveg.adapters.history.recorder import Store
 from iveg.cli import main
 from iveg.models import dictionary
 from iveg.models.dictionary import LISTS, columns_of
-from iveg.pipeline.record import Waiting
+from iveg.vital.record import Waiting
 from iveg.web.api import exports
 from tests.fakes.records import NOON, odometry_record
 from tests.processes import ROOT

@@ -7,8 +7,8 @@ import pytest
 
 from iveg.domain.goals import REASONS
 from iveg.domain.observations import Hold
-from tests.unit.pipeline.desk import settle
-from tests.unit.pipeline.test_goals import free, say
+from tests.unit.comfort.test_goals import free, say
+from tests.unit.vital.desk import settle
 from tests.unit.web.desk import WebDesk
 
 GOAL = "/api/v1/robots/AGI/goal"

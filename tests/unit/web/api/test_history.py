@@ -18,7 +18,7 @@ from iveg.adapters.history.recorder import Store
 from iveg.domain.observations import Instant
 from iveg.domain.records import DecisionRecord, ReadingRecord, Record
 from iveg.models.alert import Alert
-from iveg.pipeline.record import Waiting
+from iveg.vital.record import Waiting
 from iveg.web import problems
 from iveg.web.api import exports
 from iveg.web.api.history import router

@@ -20,8 +20,8 @@ from iveg.domain.events import LogEvent
 from iveg.domain.observations import Instant
 from iveg.domain.records import Record
 from iveg.domain.stamps import format_stamp
-from iveg.pipeline.record import Waiting
 from iveg.settings import Settings
+from iveg.vital.record import Waiting
 from iveg.web import problems
 from iveg.web.api import alerts
 from iveg.web.api.incidents import Sources, router

@@ -4,8 +4,8 @@ import httpx
 import pytest
 
 from iveg.domain.records import DetectionRecord
-from iveg.pipeline import newest_detections
-from iveg.pipeline.newest_detections import JudgedDetection
+from iveg.vital import newest_detections
+from iveg.vital.newest_detections import JudgedDetection
 from tests.builders import detection
 from tests.unit.web.desk import WebDesk
 

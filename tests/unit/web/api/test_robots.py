@@ -6,7 +6,7 @@ import pytest
 
 from iveg.domain.observations import Battery, Detection, Hold
 from tests.builders import detection
-from tests.unit.pipeline.desk import settle
+from tests.unit.vital.desk import settle
 from tests.unit.web.desk import WebDesk
 
 

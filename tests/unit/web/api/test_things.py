@@ -5,7 +5,7 @@ import pytest
 
 from iveg.domain.records import LogRecord
 from tests.builders import detection
-from tests.unit.pipeline.desk import conditions_of
+from tests.unit.vital.desk import conditions_of
 from tests.unit.web.desk import WebDesk
 
 

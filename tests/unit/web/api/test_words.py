@@ -4,7 +4,7 @@ import httpx
 
 from iveg.domain.records import LogRecord
 from iveg.domain.words import WordAnswer
-from iveg.pipeline.detectors import Detectors
+from iveg.vital.detectors import Detectors
 from tests.builders import detection
 from tests.unit.web.desk import WebDesk
 

@@ -22,7 +22,7 @@ from iveg.domain.observations import Instant
 from iveg.domain.stamps import format_stamp
 from iveg.models.base import write_json
 from iveg.models.snapshot import PastWorld
-from iveg.pipeline import topics
+from iveg.vital import topics
 from iveg.web.live.pictures import (
     MOST_WAITING,
     PICTURE_S,

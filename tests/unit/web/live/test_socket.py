@@ -14,12 +14,12 @@ from websockets.typing import Subprotocol
 
 from iveg.domain.observations import Climate
 from iveg.domain.parameters import ByClass
-from iveg.pipeline.publish import MAX_PENDING
+from iveg.vital.publish import MAX_PENDING
 from iveg.web.live.feed import BYTES, FRAMES, SUBPROTOCOL, Painting, TelemetryFeed
 from iveg.web.live.socket import Line
 from iveg.web.security.roles import Role
 from tests.builders import detection, scan
-from tests.unit.pipeline.desk import settle
+from tests.unit.vital.desk import settle
 from tests.unit.web.desk import WebDesk
 
 PROTOCOLS = [Subprotocol(SUBPROTOCOL)]

@@ -1,0 +1,79 @@
+"""Watches other equipment, beside the rule loop: no rule rests on any of it.
+
+What Orion notifies of an equipment's entity comes straight here and never waits with
+robots' observations.
+"""
+
+import asyncio
+
+from iveg.domain.equipment import Equipment, State, Tile
+from iveg.domain.observations import EntityReading, Instant
+from iveg.domain.records import MeasurementRecord
+from iveg.vital import topics
+from iveg.vital.event_log import READING_PERIOD_S, EventLog
+from iveg.vital.ports import Clock
+from iveg.vital.record import RecordSink
+from iveg.vital.supervision import Supervision
+
+PART = "equipment"
+TICK_S = 1.0
+
+
+class EquipmentMonitor:
+    """Takes in values of equipment, keeps them, and reports what is wrong with it.
+
+    Attributes:
+        equipment: All tiles with what is known of them.
+    """
+
+    def __init__(
+        self,
+        equipment: Equipment,
+        sink: RecordSink,
+        event_log: EventLog,
+        supervision: Supervision,
+    ) -> None:
+        self.equipment = equipment
+        self._sink = sink
+        self._event_log = event_log
+        self._supervision = supervision
+        self._kept_at: dict[str, float] = {}
+        self._states: tuple[State, ...] = ()
+
+    def receive(self, reading: EntityReading, at: Instant) -> None:
+        """Take in what Orion says of an entity."""
+        for tile in self.equipment.read(reading.entity_id, reading.attributes, at):
+            self._keep(tile, at)
+        self._event_log.changed(topics.EQUIPMENT.name)
+
+    async def run(self, clock: Clock) -> None:
+        """Until cancelled."""
+        while self.equipment.tiles:
+            self.tick(clock())
+            await asyncio.sleep(TICK_S)
+
+    def tick(self, now: Instant) -> None:
+        """Let time pass: what is silent or beyond a limit becomes an alert."""
+        self._supervision.report(PART, self.equipment.conditions(now))
+        states = tuple(self.equipment.state(one, now) for one in self.equipment.tiles)
+        if states != self._states:
+            self._states = states
+            self._event_log.changed(topics.EQUIPMENT.name)
+
+    def _keep(self, tile: Tile, at: Instant) -> None:
+        """Record a number, once a minute."""
+        value = self.equipment.status(tile).value
+        kept_at = self._kept_at.get(tile.key, float("-inf"))
+        # Devices that send every minute are late as often as early.
+        if value is None or at.mono - kept_at < 0.9 * READING_PERIOD_S:
+            return
+        self._kept_at[tile.key] = at.mono
+        self._sink.enqueue(
+            MeasurementRecord(
+                at=at.wall,
+                entity_id=tile.entity_id,
+                attribute=tile.attribute,
+                value=value,
+                unit=tile.unit,
+            )
+        )

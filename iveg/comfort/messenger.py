@@ -1,0 +1,139 @@
+"""Messages to people outside iVeg: beside everything, in the way of nothing.
+
+``enqueue_raised`` is called where alerts are raised and only fills bounded queues.
+Each address has a task of its own, which sends what waits as one message and rests.
+What was not taken waits on: the message says since when.
+"""
+
+import asyncio
+import logging
+from collections import Counter, deque
+from collections.abc import Callable, Iterable, Sequence
+from typing import Final
+
+from iveg.domain.alerts import BookedAlert
+from iveg.domain.events import Address, AlertItem, MessagePlan, MessageText
+from iveg.vital.ports import Clock, MessageSender
+
+_log = logging.getLogger(__name__)
+
+Write = Callable[[Sequence[AlertItem], bool], MessageText]
+
+MOST_WAITING: Final = 100
+"""Alerts that wait for one address; the oldest gives way and is counted."""
+REST_S: Final = 30.0
+"""Between two messages to one address: a flood of alerts is two messages a minute."""
+LIMIT_S: Final = 60.0
+"""A message that takes longer is told as failed, while its end is awaited."""
+_LOOK_S: Final = 5.0
+
+
+class _Line:
+    """What waits for one address."""
+
+    def __init__(self, address: Address) -> None:
+        self.address = address
+        self.items: deque[AlertItem] = deque(maxlen=MOST_WAITING)
+        self.filled = asyncio.Event()
+
+
+class Messenger:
+    """Sends alerts to the addresses of a plan.
+
+    Args:
+        waiting: Active alerts, and each P1 that nobody has acknowledged.
+
+    Attributes:
+        counters: Messages that were taken and not, alerts that were dropped.
+    """
+
+    def __init__(
+        self,
+        plan: MessagePlan,
+        sender: MessageSender,
+        write: Write,
+        waiting: Callable[[], Sequence[BookedAlert]],
+        clock: Clock,
+        rest_s: float = REST_S,
+        limit_s: float = LIMIT_S,
+    ) -> None:
+        self.counters: Counter[str] = Counter()
+        self._lines = [_Line(one) for one in plan.addresses]
+        self._escalate_after_s = plan.escalate_after_s
+        self._sender, self._write = sender, write
+        self._waiting, self._clock = waiting, clock
+        self._rest_s, self._limit_s = rest_s, limit_s
+        self._since: dict[str, float] = {}
+        self._escalated: set[str] = set()
+        self._logged: set[tuple[str, str]] = set()
+
+    def enqueue_raised(self, raised: Iterable[BookedAlert]) -> None:
+        """Queue alerts that were raised for every address that wants them."""
+        for alert in raised:
+            self._enqueue(AlertItem(alert.last.priority, alert.last.raised))
+
+    def escalate(self) -> None:
+        """Queue for the second list whatever nobody has acknowledged for too long."""
+        now = self._clock().mono
+        unseen = {one.alert_id: one for one in self._waiting() if one.unseen}
+        self._since = {name: self._since.get(name, now) for name in unseen}
+        self._escalated &= unseen.keys()
+        for name, since in self._since.items():
+            alert, is_late = unseen[name], now - since >= self._escalate_after_s
+            if is_late and name not in self._escalated and alert.unseen:
+                self._escalated.add(name)
+                self._enqueue(AlertItem(alert.unseen, alert.raised), escalates=True)
+
+    async def run(self) -> None:
+        """Send for ever, to each address by itself."""
+        async with asyncio.TaskGroup() as tasks:
+            for line in self._lines:
+                tasks.create_task(self._serve(line))
+            while True:
+                self.escalate()
+                await asyncio.sleep(_LOOK_S)
+
+    def _enqueue(self, item: AlertItem, *, escalates: bool = False) -> None:
+        for line in self._lines:
+            to = line.address
+            if to.escalates == escalates and item.priority <= to.least:
+                self.counters["messages.dropped"] += len(line.items) == MOST_WAITING
+                line.items.append(item)
+                line.filled.set()
+
+    async def _serve(self, line: _Line) -> None:
+        while True:
+            await line.filled.wait()
+            items = list(line.items)
+            line.items.clear()
+            line.filled.clear()
+            if not await self._is_taken(line.address, items):
+                line.items.extendleft(reversed(items))
+                line.filled.set()
+            await asyncio.sleep(self._rest_s)
+
+    async def _is_taken(self, to: Address, items: Sequence[AlertItem]) -> bool:
+        sending = asyncio.ensure_future(self._send(to, items))
+        done, _ = await asyncio.wait([sending], timeout=self._limit_s)
+        if not done:
+            self._failed(to, "no answer")
+        failed = await sending
+        if failed is not None:
+            self._failed(to, failed)
+            return False
+        self.counters["messages.sent"] += 1
+        self._logged = {one for one in self._logged if one[0] != to.name}
+        return True
+
+    async def _send(self, to: Address, items: Sequence[AlertItem]) -> str | None:
+        try:
+            return await self._sender.send(to, self._write(items, to.escalates))
+        except Exception as error:
+            # Of the error nothing more: it may name the address.
+            return type(error).__name__
+
+    def _failed(self, to: Address, why: str) -> None:
+        self.counters["messages.failed"] += 1
+        if (to.name, why) not in self._logged:
+            self._logged.add((to.name, why))
+            _log.warning("messages to %s fail: %s", to.name, why)

@@ -1,0 +1,84 @@
+"""Alerts: raised, cleared, acknowledged, logged."""
+
+from collections.abc import Callable, Iterable, Sequence
+
+from iveg.domain.alerts import AlertBook, BookedAlert
+from iveg.domain.events import Condition, LogEvent, Slot
+from iveg.domain.observations import Instant
+from iveg.vital import topics
+from iveg.vital.event_log import EventLog
+from iveg.vital.log_messages import alert_line
+from iveg.vital.ports import Ids
+
+
+class Alerting:
+    """Raises, clears and acknowledges alerts, and records each step.
+
+    Attributes:
+        on_raised: Given every alert that is raised; must neither wait nor fail.
+    """
+
+    def __init__(self, event_log: EventLog, new_id: Ids) -> None:
+        self.on_raised: Callable[[Sequence[BookedAlert]], None] = lambda _: None
+        self._event_log = event_log
+        self._new_id = new_id
+        self._book = AlertBook()
+
+    @property
+    def waiting(self) -> list[BookedAlert]:
+        """Active alerts, and each P1 that cleared before anybody saw it."""
+        return self._book.waiting
+
+    def knows(self, alert_id: str) -> bool:
+        """Whether an alert is of this run, active or recently cleared."""
+        return self._book.find(alert_id) is not None
+
+    def remember(self, earlier: Iterable[BookedAlert]) -> None:
+        """Take up unacknowledged alerts of an earlier run."""
+        self._book.remember(one for one in earlier if not self.knows(one.alert_id))
+        self._event_log.changed(topics.ALERTS.name)
+
+    def sync(self, wrong: Iterable[Condition], now: Instant) -> None:
+        """Take the conditions that hold now."""
+        changed = self._book.sync(wrong, now, self._new_id())
+        for alert in changed:
+            self._event_log.alert(alert)
+            self._event_log.log(alert_line(alert), now)
+            if alert.condition.robot_id is not None:
+                # A P1 is part of its situation.
+                self._event_log.changed(topics.ROBOT.of(alert.condition.robot_id))
+        raised = [one for one in changed if one.cleared is None]
+        if raised:
+            self.on_raised(raised)
+
+    def acknowledge(
+        self, alert_id: str, by: str, note: str, now: Instant
+    ) -> BookedAlert | None:
+        """A person acknowledges an alert; None when there is no such alert."""
+        alert = self._book.acknowledge(alert_id, by, note, now)
+        if alert is not None:
+            self._event_log.alert(alert)
+            slots: dict[str, Slot] = {
+                **alert.condition.slots,
+                "alert": alert.condition.key,
+                "by": by,
+                "priority": alert.priority,
+            }
+            self._event_log.log(LogEvent("alert", "log.alert.acknowledged", slots), now)
+        return alert
+
+    def acknowledge_together(
+        self, alert_ids: Iterable[str], by: str, note: str, now: Instant
+    ) -> list[BookedAlert]:
+        """A person acknowledges a list but its P1s; those that are now.
+
+        Each P1 is about somebody in danger: it sounds until it was read by itself.
+        """
+        found = (self._book.find(one) for one in alert_ids)
+        lesser = [
+            one.alert_id
+            for one in found
+            if one is not None and one.priority != "P1" and not one.last.acknowledged
+        ]
+        seen = (self.acknowledge(one, by, note, now) for one in lesser)
+        return [one for one in seen if one is not None]

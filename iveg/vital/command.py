@@ -1,0 +1,365 @@
+"""STOP, release and resume: from a person's press to the robot's own answer.
+
+The machines of ``domain/stop`` decide; ``sending`` carries their orders; this module
+stands between the two and informs people, disk and browsers of each step.
+"""
+
+import asyncio
+import logging
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Literal
+
+from iveg.domain.errors import UnknownRobotError
+from iveg.domain.events import Condition, LogEvent, Slot
+from iveg.domain.motion import UNMOVED, Motion
+from iveg.domain.observations import (
+    CommandAnswer,
+    Instant,
+    Odometry,
+    Received,
+    SafetyReport,
+)
+from iveg.domain.records import CommandRecord
+from iveg.domain.stop import (
+    Changed,
+    Closed,
+    DesiredRecord,
+    Effect,
+    FollowedCommand,
+    OffTable,
+    Press,
+    SendOnce,
+    SendStop,
+    SetDesiredState,
+    StopMachine,
+)
+from iveg.domain.stop import machine as stop_conditions
+from iveg.domain.transports import Transport
+from iveg.vital import topics
+from iveg.vital.event_log import EventLog
+from iveg.vital.ports import Clock, CommandPort, FleetPort, Ids, StopJournal
+from iveg.vital.presses import Presses
+from iveg.vital.sending import IsCut, OrderSender
+
+_log = logging.getLogger(__name__)
+_KEPT = 200
+_PLAIN = Press()
+
+_JOURNALLED: Mapping[str, Literal["stopped", "run"]] = {
+    "ready": "run",
+    "adopted": "stopped",
+    "reasserted": "stopped",
+    "moved": "stopped",
+    "release_unconfirmed": "stopped",
+}
+"""Changes of what is wanted that no person's call has written down already."""
+
+
+class Commander:
+    """Keeps one STOP machine for each robot and carries out its effects.
+
+    Args:
+        robots: The fleet.
+        ports: The transports that carry orders, each with its way out.
+        fleet: Keeps the desired state of each robot.
+        journal: Outlives a crash.
+        event_log: Tells people and the history.
+        new_id: Makes ULIDs.
+        clock: Reads both clocks.
+        agent_lag_s: How far the IoT Agent is behind (s); None where nobody knows.
+        is_cut: Whether what lies behind a transport is known to pass nothing on.
+    """
+
+    def __init__(
+        self,
+        robots: Iterable[str],
+        ports: Mapping[Transport, CommandPort],
+        fleet: FleetPort,
+        journal: StopJournal,
+        event_log: EventLog,
+        new_id: Ids,
+        clock: Clock,
+        *,
+        agent_lag_s: Callable[[Instant], float | None],
+        is_cut: IsCut,
+    ) -> None:
+        self.machines: Mapping[str, StopMachine] = {
+            robot_id: StopMachine(robot_id, ports) for robot_id in robots
+        }
+        self.commands: dict[str, FollowedCommand] = {}
+        self.counters: Counter[str] = Counter()
+        self._mistakes: dict[str, OffTable] = {}
+        """Robots whose machine once had no step: shown until iVeg starts again."""
+        self._presses = Presses()
+        by_id = {transport.id: port for transport, port in ports.items()}
+        self._sender = OrderSender(
+            by_id, fleet, journal, event_log, clock, self._came_back, is_cut
+        )
+        self._agent_lag_s = agent_lag_s
+        self._journal = journal
+        self._event_log = event_log
+        self._new_id = new_id
+
+    def machine(self, robot_id: str) -> StopMachine:
+        """One robot's machine.
+
+        Raises:
+            UnknownRobotError: not in the fleet.
+        """
+        try:
+            return self.machines[robot_id]
+        except KeyError:
+            raise UnknownRobotError(robot_id) from None
+
+    # --- people -------------------------------------------------------------------
+
+    async def stop(
+        self, robots: Iterable[str], by: str, at: Instant, press: Press = _PLAIN
+    ) -> list[FollowedCommand]:
+        """STOP these robots, in parallel; returns when it is sent and on disk."""
+        machines = [self.machine(robot_id) for robot_id in robots]
+        pressed = [self._press(machine, by, at, press) for machine in machines]
+        return await self._write_down(pressed, by, at)
+
+    def _press(
+        self, machine: StopMachine, by: str, at: Instant, press: Press
+    ) -> FollowedCommand:
+        """Begin or join an episode; a repeated press is the same press."""
+        known = self._presses.find(by, press, machine.robot_id, at)
+        earlier = None if known is None else self.commands.get(known)
+        if earlier is not None and not machine.follows(earlier):
+            # That press has had its life: a late copy of it is no new wish.
+            return earlier
+        self._perform(machine, machine.press(by, at, self._new_id(), press=press), at)
+        assert machine.stop is not None  # noqa: S101 - a press begins an episode
+        command_id = machine.stop.command_id
+        self._presses.note(by, press, machine.robot_id, command_id, at)
+        return machine.stop
+
+    async def _write_down(
+        self, pressed: Sequence[FollowedCommand], by: str, at: Instant
+    ) -> list[FollowedCommand]:
+        """Write the desired state and its author to disk before the press is accepted.
+
+        Returns:
+            The commands as they are by then.
+        """
+        # Let every send reach its socket before the disk is asked for anything.
+        await asyncio.sleep(0)
+        stands = [one for one in pressed if self.machine(one.robot_id).follows(one)]
+        await asyncio.gather(
+            self._event_log.flushed(),
+            *(
+                self._journal.log_desired(one.robot_id, "stopped", one.hold_id, by, at)
+                for one in stands
+            ),
+        )
+        return [self.commands.get(one.command_id, one) for one in pressed]
+
+    async def release(
+        self, robot_id: str, seen: Iterable[str], by: str, at: Instant
+    ) -> FollowedCommand:
+        """Lift the holds that a person saw.
+
+        Raises:
+            CommandRefusedError: it must not happen now.
+        """
+        machine = self.machine(robot_id)
+        effects = machine.release(by, seen, at, self._new_id())
+        return self._once(machine, effects, at)
+
+    async def resume(self, robot_id: str, by: str, at: Instant) -> FollowedCommand:
+        """Let a released robot drive.
+
+        Raises:
+            CommandRefusedError: it must not happen now.
+        """
+        machine = self.machine(robot_id)
+        return self._once(machine, machine.resume(by, at, self._new_id()), at)
+
+    def _once(
+        self, machine: StopMachine, effects: list[Effect], at: Instant
+    ) -> FollowedCommand:
+        self._perform(machine, effects, at)
+        assert machine.once is not None  # noqa: S101 - just begun
+        return machine.once
+
+    # --- what comes back ----------------------------------------------------------
+
+    def apply(
+        self, received: Received, age_s: float = 0.0, motion: Motion = UNMOVED
+    ) -> None:
+        """Apply a new observation to the machine of its robot.
+
+        Args:
+            received: What is new.
+            age_s: How old it was at most when it came (s); infinite where unknown.
+            motion: Of the robot by all that is known.
+        """
+        observation, at = received.observation, received.at
+        machine = self.machines.get(observation.robot_id)
+        if machine is None:
+            return
+        effects: list[Effect] = []
+        match observation:
+            case SafetyReport():
+                effects = machine.reported(
+                    observation,
+                    at,
+                    received.transport,
+                    self._new_id(),
+                    age_s,
+                    sparse=received.sparse,
+                )
+            case CommandAnswer():
+                effects = machine.answered(
+                    observation, at, received.transport, self._new_id()
+                )
+            case Odometry():
+                effects = machine.odometry(
+                    observation, at, self._new_id(), age_s, motion
+                )
+        self._perform(machine, effects, at)
+
+    def tick(self, now: Instant) -> None:
+        """Deadlines, and orders that must be sent again."""
+        for machine in self.machines.values():
+            self._perform(machine, machine.tick(now, self._new_id()), now)
+
+    def restore(self, wanted: Mapping[str, DesiredRecord], now: Instant) -> None:
+        """After a restart: stop every robot again that was to stand."""
+        for robot_id, one in wanted.items():
+            machine = self.machines.get(robot_id)
+            if machine is not None:
+                self._perform(machine, machine.restore(one, now, self._new_id()), now)
+
+    def close_earlier(self, left: Iterable[CommandRecord], now: Instant) -> None:
+        """Close the rows that an earlier run left open; nobody follows them any more.
+
+        The row of a STOP that was asserted again names its successor; of every other
+        row the end is unknown.
+        """
+        for row in left:
+            if row.command_id in self.commands or row.kind == "goal":
+                continue
+            machine = self.machines.get(row.robot_id)
+            heir = None
+            # One that waited for its resume had been released: nothing took its place.
+            stood = row.kind == "stop" and row.state != "READY"
+            if machine is not None and machine.wants_stop and stood:
+                heir = None if machine.stop is None else machine.stop.command_id
+            self._event_log.left_over(row, heir, now)
+        self._sender.start(self._event_log.flushed(), "audit-earlier")
+
+    def broker_back(self) -> None:
+        """Publish every desired state again: the broker is connected."""
+        self._sender.publish_desired_states()
+
+    def conditions(self, now: Instant) -> Iterable[Condition]:
+        """Alert conditions of STOP."""
+        yield from stop_conditions.of_machines(self.machines.values(), now)
+        yield from stop_conditions.of_mistakes(self._mistakes.values())
+
+    # --- effects ------------------------------------------------------------------
+
+    def _perform(
+        self, machine: StopMachine, effects: Iterable[Effect], at: Instant
+    ) -> None:
+        for effect in effects:
+            match effect:
+                case SendStop():
+                    machine.note_lag(self._agent_lag_s(at))
+                    self._sender.send_stop(machine, effect)
+                    # A silent robot says nothing that would carry the new count.
+                    self._show(machine)
+                case SendOnce():
+                    machine.note_lag(self._agent_lag_s(at))
+                    self._sender.send_once(machine, effect)
+                case SetDesiredState():
+                    self._sender.set_desired_state(effect)
+                case Changed():
+                    self._record(machine, effect, at)
+                    self._sender.start(
+                        self._event_log.flushed(), f"audit-{machine.robot_id}"
+                    )
+                case Closed():
+                    self.commands[effect.command.command_id] = effect.command
+                    self._event_log.closed(effect, at)
+                case OffTable():
+                    self._note_mistake(effect)
+        for command in machine.commands:
+            if command.command_id in self.commands:
+                self.commands[command.command_id] = command
+
+    def _note_mistake(self, effect: OffTable) -> None:
+        """A mistake of the program in STOP: logged once, counted each time, shown."""
+        self.counters["stop.off_table"] += 1
+        if self._mistakes.get(effect.robot_id) != effect:
+            _log.error("STOP: no step for %s", effect)
+        self._mistakes[effect.robot_id] = effect
+
+    def _came_back(
+        self, machine: StopMachine, effects: list[Effect], at: Instant
+    ) -> None:
+        """A transport took the order or failed: the command's display changes."""
+        self._perform(machine, effects, at)
+        self._show(machine)
+
+    def _show(self, machine: StopMachine) -> None:
+        self._event_log.changed(topics.ROBOT.of(machine.robot_id))
+
+    def _record(self, machine: StopMachine, changed: Changed, at: Instant) -> None:
+        # What is open may know more than this step did: how late the agent is.
+        known = (*changed.commands, *machine.commands)
+        self.commands |= {one.command_id: one for one in known}
+        while len(self.commands) > _KEPT:
+            del self.commands[next(iter(self.commands))]
+        command = self.commands.get(changed.command_id)
+        if command is not None:
+            self._event_log.command(command, changed, at)
+            if changed.key in ("ready", "running"):
+                self._note_end(command, at)
+        desired = _JOURNALLED.get(changed.key)
+        if desired is not None:
+            by = "iveg" if command is None else command.requesters[0]
+            self._sender.start(
+                self._journal.log_desired(
+                    machine.robot_id, desired, machine.hold_id, by, at
+                ),
+                f"journal-{machine.robot_id}",
+            )
+        self._log_line(machine, command, changed, at)
+        self._show(machine)
+
+    def _note_end(self, command: FollowedCommand, at: Instant) -> None:
+        """A release or resume that was confirmed also moves the STOP on."""
+        for earlier in reversed(self.commands.values()):
+            if earlier.robot_id == command.robot_id and earlier.kind == "stop":
+                if earlier is not command:
+                    self._event_log.command(earlier, None, at)
+                return
+
+    def _log_line(
+        self,
+        machine: StopMachine,
+        command: FollowedCommand | None,
+        changed: Changed,
+        at: Instant,
+    ) -> None:
+        slots: dict[str, Slot] = {"robot": machine.robot_id, "why": changed.why}
+        if command is not None:
+            slots["by"] = ", ".join(command.requesters)
+            slots["tries"] = command.tries
+            took = command.standstill_ms
+            if changed.key == "delivered":
+                took = 1000.0 * (at.mono - command.times.requested.mono)
+            if took is not None:
+                slots["ms"] = round(took)
+        self._event_log.log(
+            LogEvent("command", f"log.stop.{changed.key}", slots, machine.robot_id), at
+        )
+
+    async def close(self) -> None:
+        """Cancel the sends that are under way."""
+        await self._sender.close()

@@ -1,0 +1,389 @@
+"""The rule at work: observations change the world, the world changes speed limits.
+
+``apply`` takes one observation and ``settle`` judges the fleet, once for all that was
+taken; ``tick`` does what time alone brings: silence, expiry, overdue links.  The
+heartbeat to the fleet is sent from here and nowhere else, so that a loop that hangs
+falls silent and slows the robots.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+
+from iveg.domain import alerts
+from iveg.domain.decisions import Decisions, SlowdownDecision
+from iveg.domain.detection_rule import DetectionRule
+from iveg.domain.events import Condition, LogEvent, Slot
+from iveg.domain.feedback import UNSUPERVISED, SpeedLimit
+from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.kinds import kind
+from iveg.domain.limits import LIMITS
+from iveg.domain.low_values import LowValues
+from iveg.domain.observations import (
+    Climate,
+    DetectionFrame,
+    Instant,
+    Odometry,
+    Origin,
+    Received,
+    SafetyReport,
+)
+from iveg.domain.records import AlertRecord, DecisionRecord
+from iveg.domain.robot_state import Obedience, slow_below
+from iveg.domain.rule.clear import ClearCondition
+from iveg.domain.rule.foresight import Encounter
+from iveg.domain.rule.judge import SpeedLimits
+from iveg.domain.rule.zones import LimitChange, ZoneEntry
+from iveg.domain.tracking.people import People
+from iveg.domain.world import World
+from iveg.vital import topics
+from iveg.vital.alerting import Alerting
+from iveg.vital.detections import DetectionTracking
+from iveg.vital.event_log import EventLog
+from iveg.vital.evidence import places_of, record_of
+from iveg.vital.feedback import FeedbackPublisher
+from iveg.vital.log_messages import evidence_of, speed_line
+from iveg.vital.ports import FleetPort, Ids
+from iveg.vital.staleness import Staleness
+
+HEARTBEAT_S, _EARLY_S = 0.1, 0.02
+"""Between two heartbeats; so early one goes rather than a whole tick late."""
+
+
+_TOPIC_OF = {
+    "robot": topics.ROBOT,
+    "scan": topics.SCAN,
+    "climate": topics.CLIMATE,
+}
+
+
+class Evaluator:
+    """Keeps the world and decides for the fleet.
+
+    Args:
+        boot: Random, new at each start: identity of our feedback.
+
+    Attributes:
+        rule: The version in force; a new one counts from the next judgement on.
+        aged: Comfort, called with each tick.
+        judged: The same with each judgement: the rule, limits, changes, and when.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        greenhouse: Greenhouse,
+        people: People,
+        rule: DetectionRule,
+        fleet: FleetPort,
+        event_log: EventLog,
+        new_id: Ids,
+        boot: str,
+        backlog: Callable[[Instant], float | None] = lambda _: None,
+    ) -> None:
+        self.world = world
+        self.greenhouse = greenhouse
+        self.rule = rule
+        self.aged: Callable[[Instant], None] = lambda _: None
+        self.judged: Callable[
+            [DetectionRule, Mapping[str, SpeedLimit], Sequence[LimitChange], Instant],
+            None,
+        ] = lambda *_: None
+        self.people = people
+        self.decisions = Decisions()
+        self.alerts = Alerting(event_log, new_id)
+        self.speed_limits: dict[str, SpeedLimit] = dict.fromkeys(
+            world.robots, UNSUPERVISED
+        )
+        self.protected_unseen = 0
+        """How often a robot slowed for a person or peer out of its own sight."""
+        self._speed_limits = SpeedLimits(greenhouse)
+        self.tracking = DetectionTracking(world, people, greenhouse, event_log, new_id)
+        self._staleness = Staleness(world, people, greenhouse, event_log)
+        self._feedback_publisher = FeedbackPublisher(
+            world,
+            self.people,
+            self.tracking.other,
+            fleet,
+            boot,
+            backlog,
+        )
+        self._event_log = event_log
+        self._new_id = new_id
+        self._applied: dict[str, float] = {}
+        self._low = LowValues()
+        self._obedience = Obedience()
+        self._moved: dict[str, Odometry] = {}
+        self._unjudged: Instant | None = None
+        self._is_urgent = False
+        self._started: Instant | None = None
+        self._untold = False
+
+    def beginning(self) -> tuple[People, SpeedLimits]:
+        """Who is known and what slows robots now, for another rule to begin with."""
+        return self.people.copy(), self._speed_limits.copy()
+
+    @property
+    def entries(self) -> Iterable[ZoneEntry]:
+        """Every robot that is inside a zone now, with the zone."""
+        return self._speed_limits.entries
+
+    def encounters(self, robot_id: str, now: Instant) -> Sequence[Encounter]:
+        """Rings that a robot will reach, the soonest first; forecasts grow old, too."""
+        ahead = self._speed_limits.encounters_told(robot_id).values()
+        young = (one for one in ahead if now.mono - one.at <= LIMITS.silence_s)
+        return sorted(young, key=lambda one: one.in_s)
+
+    def unmet(self, robot_id: str) -> Sequence[ClearCondition]:
+        """What the claim "clear" lacks for a robot now, the reason first."""
+        return self._speed_limits.unmet.get(robot_id, ())
+
+    def decision_record(self, decision_id: str) -> DecisionRecord | None:
+        """A decision that is still in memory."""
+        decision = self.decisions.get(decision_id)
+        return None if decision is None else record_of(decision)
+
+    def live_decisions(self) -> Iterable[SlowdownDecision]:
+        """Decisions in memory about live robots, without recordings."""
+        robots = self.world.robots
+        return (
+            one
+            for one in self.decisions.known
+            if not robots[one.entry.robot_id].is_replay
+        )
+
+    # --- what arrives -------------------------------------------------------------
+
+    def apply(self, received: Received) -> bool:
+        """Apply one observation; :meth:`settle` judges what follows from it.
+
+        Returns:
+            Whether it became part of the state.
+        """
+        verdict = self.world.apply(received)
+        if verdict == "refused":
+            return False
+        observation = received.observation
+        if isinstance(observation, DetectionFrame):
+            self.tracking.track_frame(observation, received, verdict, self.rule)
+            self.decisions.seen(
+                self.tracking.people_of(observation.robot_id), received.at
+            )
+        if verdict != "new":
+            return False
+        row, robot_id = kind(observation), observation.robot_id
+        if row.changes is not None:
+            self._event_log.changed(_TOPIC_OF[row.changes].of(robot_id))
+        if row.sensor is not None:
+            self._event_log.reading(row, observation, received.at)
+        match observation:
+            case Odometry():
+                self._drove(observation, received.at)
+            case Climate():
+                self._event_log.climate(observation, received.at)
+            case SafetyReport():
+                self._reported(observation, received.at, is_kept=received.asked)
+            case DetectionFrame():
+                self._await_judgement(received.at, is_urgent=True)
+        return True
+
+    @property
+    def is_unjudged(self) -> bool:
+        """Whether something was taken that :meth:`settle` has not judged yet."""
+        return self._unjudged is not None
+
+    @property
+    def is_urgent(self) -> bool:
+        """Whether something new of people or obstacles is among it."""
+        return self._is_urgent
+
+    def _await_judgement(self, at: Instant, *, is_urgent: bool) -> None:
+        if self._unjudged is None or at.mono >= self._unjudged.mono:
+            self._unjudged = at
+        self._is_urgent |= is_urgent
+
+    def settle(self) -> None:
+        """Judge the fleet once for everything that was taken since the last time."""
+        if self._unjudged is not None:
+            self._settle(self._unjudged)
+
+    def _settle(self, now: Instant) -> None:
+        self._unjudged, self._is_urgent = None, False
+        self._judge(now)
+        for robot_id, odometry in self._moved.items():
+            robot, speed_limit = self.world.robot(robot_id), self.speed_limits[robot_id]
+            self._event_log.odometry(
+                odometry, robot, speed_limit.speed_factor, robot.link(now), now
+            )
+        self._moved.clear()
+
+    def _drove(self, odometry: Odometry, at: Instant) -> None:
+        robot = self.world.robot(odometry.robot_id)
+        speed, slow = robot.motion(at).speed, slow_below(robot.profile)
+        moved = self.decisions.moved(robot.robot_id, speed, at, is_slow=speed <= slow)
+        self._event_log.decisions(moved)
+        self._await_judgement(at, is_urgent=False)
+        self._moved[odometry.robot_id] = odometry
+
+    def _reported(self, report: SafetyReport, at: Instant, *, is_kept: bool) -> None:
+        """Take a report; one that Orion kept says nothing of now and is no news."""
+        published_at = self._feedback_publisher.published_at
+        changed = self.decisions.reported(report, published_at, at)
+        self._event_log.decisions(changed)
+        if is_kept:
+            return
+        measured_at = self.world.robot(report.robot_id).safety_received
+        if self.tracking.witness(report, measured_at or at):
+            self._await_judgement(at, is_urgent=True)
+        if report.speed_factor != self._applied.get(report.robot_id):
+            self._applied[report.robot_id] = report.speed_factor
+            self._log_speed(report, at)
+
+    # --- judgement ----------------------------------------------------------------
+
+    def _judge(self, now: Instant) -> None:
+        speed_limits, changes = self._speed_limits.evaluate(
+            self.world, self.people, self.rule, now, self._new_id()
+        )
+        for change in changes:
+            self._crossed(change, now)
+        before, self.speed_limits = self.speed_limits, speed_limits
+        # Mostly all are the very same, and this is asked at each judgement.
+        perhaps = () if speed_limits is before else speed_limits.items()
+        changed = [
+            robot_id
+            for robot_id, speed_limit in perhaps
+            if speed_limit is not (was := before[robot_id])
+            and (speed_limit.speed_factor, speed_limit.reason, speed_limit.cause)
+            != (was.speed_factor, was.reason, was.cause)
+        ]
+        for robot_id in changed:
+            self._event_log.changed(topics.ROBOT.of(robot_id))
+            if self.world.robots[robot_id].safety is None:
+                self._log_speed_limit(
+                    robot_id, before[robot_id], speed_limits[robot_id], now
+                )
+        slower = any(
+            speed_limits[robot_id].speed_factor < before[robot_id].speed_factor
+            for robot_id in changed
+        )
+        self._untold = self._untold or bool(changed or changes)
+        # A slow-down never waits; other news waits until robots can use more.
+        if slower or (self._untold and self._feedback_publisher.may_publish(now)):
+            self.publish(now)
+        self.judged(self.rule, speed_limits, changes, now)
+
+    def _crossed(self, change: LimitChange, now: Instant) -> None:
+        entry = change.entry
+        if not change.began:
+            ended = self.decisions.end(entry.decision_id, now)
+            self._event_log.decisions(ended)
+            return
+        self.protected_unseen += not entry.in_sight
+        if entry.zone.sighting is not None:
+            self.tracking.kept.keep_evidence(entry.zone.cause, entry.zone.sighting)
+        places = places_of(entry, self.world)
+        begun = self.decisions.begin(entry, self.rule, places)
+        self._event_log.decisions([begun])
+
+    def publish(self, now: Instant) -> None:
+        """Publish feedback to the fleet (Algorithm 2, line 13)."""
+        self._untold = False
+        self._feedback_publisher.publish(self.speed_limits, self.rule, now)
+        self._obedience.published(self.speed_limits, now)
+        self._event_log.decisions(self.decisions.published(now))
+
+    # --- time ---------------------------------------------------------------------
+
+    def age(self, now: Instant) -> None:
+        """Let time pass for the world; ``tick`` judges it then."""
+        self._started = self._started or now
+        self._staleness.tick(now)
+        self._log_returned_detectors(now)
+        self.tracking.forget(now)
+        self.aged(now)
+
+    def tick(self, now: Instant, more: Iterable[Condition] = ()) -> None:
+        """Judge a world that has aged: limits, heartbeat, decisions, alerts."""
+        self._settle(now)
+        if now.mono - self._feedback_publisher.published_at >= HEARTBEAT_S - _EARLY_S:
+            self.publish(now)
+        aged = self.decisions.age(self._heard_s, self.people.known)
+        self._event_log.decisions(aged)
+        self.alerts.sync([*self._conditions(now), *more], now)
+
+    def _log_returned_detectors(self, now: Instant) -> None:
+        returned = self.world.returned_detectors
+        for robot_id in returned:
+            slots: dict[str, Slot] = {"robot": robot_id}
+            event = LogEvent("system", "log.detector_booted", slots, robot_id)
+            self._event_log.log(event, now)
+        returned.clear()
+
+    def _conditions(self, now: Instant) -> Iterable[Condition]:
+        for robot in self.world.live_robots():
+            ignored = self._obedience.ignored(robot, now)
+            yield from alerts.of_ignored(robot.robot_id, ignored)
+            yield from alerts.of_robot(robot, now)
+            yield from alerts.of_detector(robot, now, started=self._started or now)
+            yield from self._low.conditions(robot)
+            yield from alerts.of_kind(robot, now)
+        yield from alerts.of_fleet(self.world.live_robots(), now)
+        yield from alerts.of_overload(self.world.robots.values(), now)
+        yield from alerts.of_other_authors(self.world.other_authors.speaking(now))
+        yield from alerts.of_rule(self.rule)
+        yield from alerts.of_things(self.people.things.known.values())
+        answers = self.world.word_answers.known.values()
+        yield from alerts.of_words(self.world.live_robots(), answers)
+
+    def _heard_s(self, entry: ZoneEntry) -> float:
+        robot = self.world.robot(entry.robot_id)
+        return robot.heard_for_s(entry.entered.mono)
+
+    def close_earlier(
+        self,
+        decisions: Iterable[DecisionRecord],
+        alerts: Iterable[AlertRecord],
+        now: Instant,
+    ) -> None:
+        """Close the rows that an earlier run left open; nobody follows them any more.
+
+        Their ids are random, so a row that is not in memory is not of this run.
+        """
+        self._event_log.left_behind(
+            [one for one in decisions if self.decisions.get(one.decision_id) is None],
+            [one for one in alerts if not self.alerts.knows(one.alert_id)],
+            now,
+        )
+
+    def leave(self, now: Instant) -> None:
+        """Break off open decisions when iVeg stops, so that the record says so."""
+        self._event_log.decisions(self.decisions.break_off(now))
+
+    def leave_unsupervised(self, now: Instant) -> None:
+        """Tell every robot to slow, once: a part without which nobody watches ended."""
+        limits = dict.fromkeys(self.world.robots, UNSUPERVISED)
+        self._feedback_publisher.publish(limits, self.rule, now)
+
+    # --- words --------------------------------------------------------------------
+
+    def _log_speed(self, report: SafetyReport, at: Instant) -> None:
+        known = self.decisions, self.people, self.world, self.greenhouse
+        unmet = self.unmet(report.robot_id)
+        self._event_log.write(
+            lambda: speed_line(report, evidence_of(report, *known), unmet), at
+        )
+
+    def _log_speed_limit(
+        self, robot_id: str, before: SpeedLimit, after: SpeedLimit, at: Instant
+    ) -> None:
+        """Log the speed limit of a robot that sends no reports."""
+        if before.speed_factor == after.speed_factor:
+            return
+        report = SafetyReport(
+            robot_id,
+            Origin(),
+            after.speed_factor,
+            after.reason,
+            after.cause,
+            after.decision_id,
+        )
+        self._log_speed(report, at)

@@ -1,0 +1,357 @@
+"""The event log: events and changes for people at once, and rows for the history.
+
+One place turns domain values into log lines and history records, so that the page, the
+API and the database agree.
+"""
+
+from collections import deque
+from collections.abc import Callable, Iterable
+from dataclasses import fields, replace
+from functools import wraps
+from typing import Concatenate, ParamSpec
+
+from iveg.domain.alerts import BookedAlert, cleared_behind, write_alert
+from iveg.domain.decisions import SlowdownDecision
+from iveg.domain.events import LogEvent
+from iveg.domain.geometry import Box3D
+from iveg.domain.goals import FollowedGoal
+from iveg.domain.kinds import Kind
+from iveg.domain.observations import (
+    Climate,
+    DetectionFrame,
+    Instant,
+    Observation,
+    Odometry,
+    Received,
+)
+from iveg.domain.quantities import value_of
+from iveg.domain.records import (
+    AlertRecord,
+    ClimateRecord,
+    CommandEventRecord,
+    CommandRecord,
+    DecisionRecord,
+    DetectionRecord,
+    LogRecord,
+    OdometryRecord,
+    ReadingRecord,
+)
+from iveg.domain.robot_state import RobotState
+from iveg.domain.stamps import wall_of
+from iveg.domain.stop import Changed, Closed, FollowedCommand
+from iveg.domain.tracking.people import Placed
+from iveg.vital import topics
+from iveg.vital.evidence import left_behind, record_of
+from iveg.vital.publish import Hub
+from iveg.vital.record import OdometryThinner, RecordSink
+from iveg.vital.supervision import Supervision
+
+_KEPT_LINES = 500
+# ``asdict`` takes four times as long, for each box of each picture that is kept.
+_SIDES = tuple(one.name for one in fields(Box3D))
+READING_PERIOD_S = 60.0
+"""Air and batteries change slowly: a day is 1,440 rows."""
+_P = ParamSpec("_P")
+
+
+def _guarded(
+    write: Callable[Concatenate["EventLog", _P], None],
+) -> Callable[Concatenate["EventLog", _P], None]:
+    """The same, whose failure is the history's and not that of what is recorded."""
+
+    @wraps(write)
+    def guarded(log: "EventLog", /, *args: _P.args, **kwargs: _P.kwargs) -> None:
+        try:
+            write(log, *args, **kwargs)
+        except Exception as error:
+            log.failed("history", error)
+
+    return guarded
+
+
+class EventLog:
+    """Writes log lines and history records, and tells browsers what changed.
+
+    Attributes:
+        changed: Marks a topic as changed for every browser (``Hub.changed``).
+        failed: Told of a part of comfort and its failure.
+        lines: The newest log lines, oldest first.
+        margin_of: The newest margin of a robot (m), which its pose is kept with.
+    """
+
+    def __init__(
+        self, hub: Hub, sink: RecordSink, start: Instant, supervision: Supervision
+    ) -> None:
+        self.changed = supervision.guard("live", hub.changed)
+        self.failed = supervision.failed
+        self.margin_of: Callable[[str, Instant], float | None] = lambda *_: None
+        self._hub = hub
+        self._sink = sink
+        self._thinner = OdometryThinner()
+        # The last reading of each robot and kind; the air is of no robot.
+        self._kept: dict[tuple[str, type[Observation]], float] = {}
+        # Starting at the clock keeps ids growing over restarts without asking anyone.
+        self._next_id = int(start.wall * 1000)
+        self.lines: deque[LogRecord] = deque(maxlen=_KEPT_LINES)
+
+    @_guarded
+    def log(self, event: LogEvent, at: Instant) -> None:
+        """One line of the log."""
+        self._next_id += 1
+        record = LogRecord(
+            id=self._next_id,
+            at=at.wall,
+            kind=event.kind,
+            robot_id=event.robot_id,
+            key=event.key,
+            slots=dict(event.slots),
+            class_=event.class_,
+            decision_id=event.decision_id,
+        )
+        self.lines.append(record)
+        self._sink.enqueue(record)
+        self._hub.append(topics.LOG.name, record)
+
+    @_guarded
+    def write(self, event: Callable[[], LogEvent], at: Instant) -> None:
+        """One line of the log, whose facts are looked up here and not by the caller."""
+        self.log(event(), at)
+
+    @_guarded
+    def recall(self, earlier: Iterable[LogRecord]) -> None:
+        """Put lines of an earlier run before those of this one; any order."""
+        first = self.lines[0].id if self.lines else self._next_id + 1
+        before = sorted(
+            (one for one in earlier if one.id < first), key=lambda one: one.id
+        )
+        before = before[-(_KEPT_LINES - len(self.lines)) :]
+        if before and len(self.lines) < _KEPT_LINES:
+            self.lines.extendleft(reversed(before))
+            self._hub.append(topics.EARLIER_LOG.name, before)
+
+    @_guarded
+    def decisions(self, changed: Iterable[SlowdownDecision]) -> None:
+        """Record decisions that are new or have a new link."""
+        for decision in changed:
+            self._sink.enqueue(record_of(decision))
+
+    @_guarded
+    def left_behind(
+        self,
+        decisions: Iterable[DecisionRecord],
+        alerts: Iterable[AlertRecord],
+        now: Instant,
+    ) -> None:
+        """Close decisions and alerts that an earlier run left open."""
+        for decision in decisions:
+            self._sink.enqueue(left_behind(decision, now.wall))
+        for alert in alerts:
+            self._sink.enqueue(cleared_behind(alert, now.wall))
+
+    @_guarded
+    def detection(self, one: Placed, frame: DetectionFrame, received: Received) -> None:
+        """Record one detection."""
+        self._sink.enqueue(detection_of(one, frame, received))
+
+    @_guarded
+    def odometry(
+        self, read: Odometry, robot: RobotState, limit: float, link: str, at: Instant
+    ) -> None:
+        """Record a pose, if it is one of the two a second that are kept."""
+        pose, twist = read.pose, read.twist
+        record = self._thinner.thin(
+            OdometryRecord(
+                at=at.wall,
+                robot_id=robot.robot_id,
+                x=pose.x,
+                y=pose.y,
+                yaw=pose.yaw,
+                linear=twist.linear_x,
+                angular=twist.angular_z,
+                limit_factor=limit,
+                applied_factor=None
+                if robot.safety is None
+                else robot.safety.speed_factor,
+                link=link,
+                margin_m=self.margin_of(robot.robot_id, at),
+            )
+        )
+        if record is not None:
+            self._sink.enqueue(record)
+
+    @_guarded
+    def command(
+        self, command: FollowedCommand, changed: Changed | None, at: Instant
+    ) -> None:
+        """Record a command that is new or has taken a step."""
+        times = command.times
+        self._sink.enqueue(
+            CommandRecord(
+                command_id=command.command_id,
+                robot_id=command.robot_id,
+                kind=command.kind,
+                state=command.state,
+                requested_by=command.requesters[0],
+                requested_at=times.requested.wall,
+                sent_at={one: at.wall for one, at in times.sent.items()},
+                answer_at={one: at.wall for one, at in times.answered.items()},
+                standing_at=wall_of(times.standing),
+                standstill_ms=command.standstill_ms,
+                tries=command.tries,
+                reason=command.reason,
+                pressed_at=times.pressed,
+            )
+        )
+        if changed is not None:
+            self._audit(command, changed.state, changed.why or changed.key, at)
+        self._hub.append(topics.COMMAND.of(command.command_id), command)
+
+    @_guarded
+    def goal(self, goal: FollowedGoal, step: str | None, at: Instant) -> None:
+        """Record a goal that is new, has taken a step or came to be known better."""
+        meant = goal.goal
+        record = CommandRecord(
+            command_id=meant.goal_id,
+            robot_id=goal.robot_id,
+            kind="goal",
+            state=goal.state,
+            requested_by=goal.by,
+            requested_at=goal.sent.wall,
+            sent_at={one: at.wall for one, at in goal.left.items()},
+            answer_at={one: at.wall for one, at in goal.words.items()},
+            tries=1,
+            reason=goal.why,
+            goal={"kind": meant.kind, "x": meant.x, "y": meant.y, "aisle": goal.aisle},
+        )
+        self._sink.enqueue(record)
+        if step is not None:
+            self._audit(record, goal.state, step, at)
+
+    @_guarded
+    def closed(self, closed: Closed, at: Instant) -> None:
+        """Record the end of a command that is no longer followed."""
+        command = closed.command
+        self.command(command, None, at)
+        self._audit(command, command.state, closed.key, at)
+
+    @_guarded
+    def left_over(self, row: CommandRecord, heir: str | None, at: Instant) -> None:
+        """Close a command of an earlier run.
+
+        Args:
+            row: As the crash left it.
+            heir: The STOP that was asserted again in its place, if one was.
+            at: This moment.
+        """
+        state = "EXPIRED" if heir is None else "REPLACED"
+        self._sink.enqueue(replace(row, state=state, reason="restarted"))
+        fate = "followed no more" if heir is None else f"asserted again under {heir}"
+        self._audit(row, state, f"server restarted; {fate}", at)
+
+    async def flushed(self) -> None:
+        """Return when every command and audit row so far is durable.
+
+        A history that fails holds up no STOP: the journal has the desired state.
+        """
+        try:
+            await self._sink.flushed()
+        except Exception as error:
+            self.failed("history", error)
+
+    @_guarded
+    def rule(self, event: LogEvent, at: Instant) -> None:
+        """Log a new version of the rule; its zones change, too."""
+        self.log(event, at)
+        for topic in (topics.RULE, topics.PEOPLE):
+            self.changed(topic.name)
+
+    def _audit(
+        self,
+        command: FollowedCommand | CommandRecord,
+        state: str,
+        why: str,
+        at: Instant,
+    ) -> None:
+        self._sink.enqueue(
+            CommandEventRecord(
+                command_id=command.command_id,
+                robot_id=command.robot_id,
+                at=at.wall,
+                state=state,
+                why=why,
+            )
+        )
+
+    @_guarded
+    def climate(self, read: Climate, at: Instant) -> None:
+        """Record a climate reading, once a minute."""
+        if self._is_due("", Climate, at):
+            self._sink.enqueue(
+                ClimateRecord(
+                    at=at.wall,
+                    temperature=read.temperature,
+                    relative_humidity=read.relative_humidity,
+                    co2=read.co2,
+                )
+            )
+
+    @_guarded
+    def reading(self, kind: Kind, read: Observation, at: Instant) -> None:
+        """Record a reading of a small sensor, as often as the history keeps one."""
+        period_s = kind.sensor.kept_every_s if kind.sensor else READING_PERIOD_S
+        if not self._is_due(read.robot_id, type(read), at, period_s):
+            return
+        self._sink.enqueue(
+            ReadingRecord(
+                at=at.wall,
+                robot_id=read.robot_id,
+                kind=kind.name,
+                value=value_of(read),
+            )
+        )
+
+    def _is_due(
+        self,
+        robot_id: str,
+        kind: type[Observation],
+        at: Instant,
+        period_s: float = READING_PERIOD_S,
+    ) -> bool:
+        """Whether a period has passed since the last one; the next counts from now."""
+        kept = self._kept.get((robot_id, kind), float("-inf"))
+        # Devices that send every minute are late as often as early.
+        is_due = at.mono - kept >= 0.9 * period_s
+        if is_due:
+            self._kept[robot_id, kind] = at.mono
+        return is_due
+
+    @_guarded
+    def alert(self, alert: BookedAlert) -> None:
+        """Record an alert that was raised, acknowledged or cleared."""
+        self._sink.enqueue(write_alert(alert))
+        self.changed(topics.ALERTS.name)
+
+
+def detection_of(
+    one: Placed, frame: DetectionFrame, received: Received
+) -> DetectionRecord:
+    """One detection of a frame as a row."""
+    x, y, z = one.position
+    return DetectionRecord(
+        at=received.at.wall,
+        robot_id=frame.robot_id,
+        class_id=one.detection.class_id,
+        probability=one.detection.probability,
+        x=x,
+        y=y,
+        z=z,
+        confident=one.kind != "faint",
+        transport=received.transport,
+        stamp=frame.origin.stamp,
+        class_=one.class_,
+        person_id=None if one.person is None else one.person.person_id,
+        box={
+            **{side: getattr(one.framed.box, side) for side in _SIDES},
+            "frame_id": one.framed.frame_id,
+        },
+    )

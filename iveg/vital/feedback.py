@@ -1,0 +1,137 @@
+"""Feedback to the fleet (Algorithm 2, line 13): one message for each observer."""
+
+from collections.abc import Callable, Iterable, Mapping
+
+from iveg.domain.detection_rule import DetectionRule
+from iveg.domain.feedback import Feedback, FeedbackAlert, SpeedLimit
+from iveg.domain.limits import LIMITS
+from iveg.domain.observations import Instant, Origin
+from iveg.domain.parameters import sent_to_robots
+from iveg.domain.robot_state import RobotState
+from iveg.domain.stamps import format_stamp
+from iveg.domain.tracking.people import People
+from iveg.domain.world import World
+from iveg.vital.ports import FleetPort
+
+USED_HZ, BURST = 20.0, 8.0
+"""Greatest mean rate of feedback that slows nobody, and size of a burst (1/s, 1)."""
+MOST_ALERTS = 256
+"""A robot refuses feedback with more."""
+
+
+class FeedbackPublisher:
+    """Writes the feedback and hands it to the fleet.
+
+    One count goes over all topics of a boot of iVeg, so that what a robot echoes names
+    one message (docs/interfaces/mqtt.md).
+
+    Args:
+        other: When each robot's newest confident object of another class came.
+        boot: Random, new at each start: identity of our feedback.
+        backlog: How far Orion is behind (s); None where nobody knows.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        people: People,
+        other: Mapping[str, Instant],
+        fleet: FleetPort,
+        boot: str,
+        backlog: Callable[[Instant], float | None] = lambda _: None,
+    ) -> None:
+        self.published_at = float("-inf")
+        self._world = world
+        self._people = people
+        self._other = other
+        self._fleet = fleet
+        self._boot = boot
+        self._backlog = backlog
+        self._seq = 0
+        self._left = BURST
+
+    def may_publish(self, now: Instant) -> bool:
+        """Whether robots can use one more: 20 Hz in the mean, a few close together."""
+        return self._allowance(now) >= 1.0
+
+    def _allowance(self, now: Instant) -> float:
+        since = max(0.0, now.mono - self.published_at)
+        return min(BURST, self._left + USED_HZ * since)
+
+    def publish(
+        self, speed_limits: Mapping[str, SpeedLimit], rule: DetectionRule, now: Instant
+    ) -> None:
+        """Send every robot what the fleet must know."""
+        self._left = max(0.0, self._allowance(now) - 1.0)
+        self.published_at = now.mono
+        alerts = _newest(tuple(self._alerts(rule, now)))
+        seen = {
+            robot.robot_id: robot.safety.origin.seq
+            for robot in self._world.robots.values()
+            if robot.safety is not None and robot.safety.origin.seq is not None
+        }
+        robots = self._world.robots
+        first, last = self._seq + 1, self._seq + len(robots)
+        # Before any robot has received it: a moment too early makes no age younger.
+        self._world.ledger.composed(self._boot, first, last, now.mono)
+        for robot in robots.values():
+            self._seq += 1
+            self._fleet.publish_feedback(
+                self._feedback(robot, alerts, speed_limits, seen, rule, now)
+            )
+
+    def _feedback(
+        self,
+        robot: RobotState,
+        alerts: tuple[FeedbackAlert, ...],
+        speed_limits: Mapping[str, SpeedLimit],
+        seen: Mapping[str, int],
+        rule: DetectionRule,
+        now: Instant,
+    ) -> Feedback:
+        mine = [one for one in alerts if one.observer == robot.robot_id]
+        newest = max(mine, key=lambda one: one.stamp, default=None)
+        if newest is None and robot.robot_id in self._other:
+            stamp = format_stamp(self._other[robot.robot_id].wall)
+            newest = FeedbackAlert("", stamp)
+        odometry = None if robot.is_replay else robot.odometry
+        return Feedback(
+            robot.robot_id,
+            Origin(self._boot, self._seq, format_stamp(now.wall)),
+            newest,
+            alerts,
+            None if odometry is None else odometry.pose,
+            None if odometry is None else odometry.twist,
+            None if odometry is None else odometry.origin.stamp,
+            speed_limits,
+            seen,
+            self._backlog(now),
+            rule.foresight,
+            sent_to_robots(rule),
+        )
+
+    def _alerts(self, rule: DetectionRule, now: Instant) -> Iterable[FeedbackAlert]:
+        for person in self._people.known.values():
+            for sighting, radius in self._people.zone_radii(person, rule, now):
+                # What a recording saw long ago must not slow a robot of today.
+                if self._world.robots[sighting.observer].is_replay:
+                    continue
+                is_seen = sighting.age_s(now) <= LIMITS.seen_s
+                yield FeedbackAlert(
+                    person.decision_id,
+                    format_stamp(sighting.at.wall),
+                    person.class_,
+                    sighting.class_id,
+                    sighting.confidence,
+                    (sighting.x, sighting.y, sighting.z),
+                    radius,
+                    sighting.observer,
+                    (sighting.vx, sighting.vy) if is_seen else None,
+                )
+
+
+def _newest(alerts: tuple[FeedbackAlert, ...]) -> tuple[FeedbackAlert, ...]:
+    """The newest alerts, as many as a robot reads; speed limits count all of them."""
+    if len(alerts) <= MOST_ALERTS:
+        return alerts
+    return tuple(sorted(alerts, key=lambda one: one.stamp)[-MOST_ALERTS:])

@@ -1,0 +1,260 @@
+"""The input of the pipeline: a bounded queue that prefers what safety needs.
+
+All transports end here.  When more comes than can be taken, the oldest telemetry of the
+same robot and kind is dropped and counted, or of the stream that has most waiting;
+safety reports, answers and detection frames only where they are most of what waits, or
+no telemetry does.  So a robot that floods drops its own.  A detection frame that is
+dropped counts as one that could not be read: somebody may have been in it.
+"""
+
+import asyncio
+import logging
+from collections import Counter, deque
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+
+from iveg.domain.errors import UnknownRobotError
+from iveg.domain.kinds import KIND_OF, KINDS
+from iveg.domain.observations import (
+    DetectionFrame,
+    Observation,
+    Overtaken,
+    Received,
+    RefusedFrame,
+    kind_of,
+)
+from iveg.vital.waiting import wait_set
+
+_log = logging.getLogger(__name__)
+
+MAX_QUEUED = 2000
+_LINKED = tuple(kind.of for kind in KINDS if kind.speaks_alone)
+_GOES_ON = -1
+"""Below every count."""
+_MOST_BOOTS = 1000
+_MOST_LOGGED = 500
+"""Kinds of rejections that are logged of one robot, or of all strangers together."""
+
+
+class Ingest:
+    """Holds what has arrived until the rule loop takes it.
+
+    Args:
+        known: Whether a robot id belongs to the fleet.
+        rejected: Called once for each new kind of rejection, with source and reason.
+        is_past: Whether a message is too old to be read.
+        passed: Called with each copy of a message of the fleet, before it is queued.
+        is_refused_robot: Whether a setting says that a robot is not heard.
+        misplaced: Name of the frame that odometry is in, if that is not its robot's.
+    """
+
+    def __init__(
+        self,
+        known: Callable[[str], bool],
+        rejected: Callable[[str, str], None] = lambda _source, _reason: None,
+        is_past: Callable[[str, type[Observation], str, int], bool] = lambda *_: False,
+        passed: Callable[[Received], None] = lambda _: None,
+        is_refused_robot: Callable[[str], bool] = lambda _: False,
+        misplaced: Callable[[Observation], str | None] = lambda _: None,
+    ) -> None:
+        self._is_refused_robot = is_refused_robot
+        self._misplaced = misplaced
+        self._known = known
+        self._passed = passed
+        self._is_past = is_past
+        self._rejected = rejected
+        self._queue: deque[tuple[Received, _Stream]] = deque()
+        self._refused: dict[str, Received] = {}
+        """By robot, that one of its detection frames was dropped."""
+        self._identities: set[_Identity] = set()
+        """Of what waits and was counted by its sender."""
+        self._waiting: Counter[_Stream] = Counter()
+        """How much waits, by robot and kind."""
+        self._first: dict[tuple[str, type[Observation], str | None], int] = {}
+        """By robot, kind and boot: the count of the first, until another came."""
+        self._wake = asyncio.Event()
+        self._named: set[tuple[str, str]] = set()
+        self._logged: Counter[str | None] = Counter()
+        self.counters: Counter[str] = Counter()
+
+    def enqueue(self, received: Received) -> None:
+        """Queue one observation; never blocks."""
+        robot_id = received.observation.robot_id
+        if robot_id and not self._known(robot_id):
+            self.reject(robot_id, "unknown_robot", str(UnknownRobotError(robot_id)))
+            return
+        if self._is_refused_robot(robot_id):
+            self.reject(robot_id, "refused_robot", "is not heard, by a setting")
+            return
+        if (frame := self._misplaced(received.observation)) is not None:
+            self.reject(robot_id, "unknown_frame", f"odometry: {frame}")
+            return
+        name = kind_of(received.observation).__name__
+        # What we asked for is no message: it would hide that one was lost.
+        way = "asked" if received.asked else received.transport
+        self.counters[f"{way}.{name}"] += 1
+        if received.alone:
+            self.counters[f"alone.{name}"] += 1
+            if not isinstance(received.observation, DetectionFrame):
+                return
+        elif not isinstance(received.observation, RefusedFrame):
+            self._passed(received)
+        if _is_twin_of_a_picture(received.observation):
+            self.counters[f"{name}.duplicate"] += 1
+            return
+        stream = _stream(received)
+        if len(self._queue) >= MAX_QUEUED and not self._make_room(received, stream):
+            return
+        self._queue.append((received, stream))
+        if not received.asked:
+            self._identities.add(_identity(received.observation))
+        self._waiting[stream] += 1
+        self._wake.set()
+
+    def enqueue_copy(self, received: Received) -> None:
+        """Queue what FIWARE brought, from the second of a boot on.
+
+        An agent that starts is given what the broker kept, and tells nobody so: one
+        message is a claim, and two that count on are a link.  Boxes slow at once.
+        """
+        identity = _identity(received.observation)
+        is_alone = identity[1] in _LINKED and self._is_alone(*identity)
+        self.enqueue(replace(received, alone=True) if is_alone else received)
+
+    def _is_alone(
+        self,
+        robot_id: str,
+        kind: type[Observation],
+        boot: str | None,
+        seq: int | None,
+    ) -> bool:
+        """Whether it is the first of its boot, or that again."""
+        stream = robot_id, kind, None if seq is None else boot
+        first = self._first.get(stream)
+        if first is None:
+            if len(self._first) >= _MOST_BOOTS:
+                del self._first[next(iter(self._first))]
+            self._first[stream] = _GOES_ON if seq is None else seq
+            return True
+        if (seq or 0) > first:
+            self._first[stream] = _GOES_ON
+        return (seq or 0) <= first
+
+    def is_past(
+        self, robot_id: str, kind: type[Observation], boot: str, seq: int
+    ) -> bool:
+        """Whether a message cannot be news: it is here, or a later one was taken."""
+        waits = (robot_id, kind, boot, seq) in self._identities
+        return waits or self._is_past(robot_id, kind, boot, seq)
+
+    def reject(self, source: str, reason: str, detail: str = "") -> None:
+        """Count something that cannot be used; say so once for each source."""
+        self.counters[f"rejected.{reason}"] += 1
+        key = (source, reason)
+        if key in self._named or not self._may_log(source):
+            return
+        self._named.add(key)
+        _log.warning("rejected from %s: %s %s", source, reason, detail)
+        self._rejected(source, reason)
+
+    def _may_log(self, source: str) -> bool:
+        """Whether there is room: whoever uses up the own leaves that of others."""
+        robot_id = source.partition("_")[0]
+        owner = robot_id if self._known(robot_id) else None
+        self._logged[owner] += 1
+        return self._logged[owner] <= _MOST_LOGGED
+
+    @property
+    def waiting(self) -> int:
+        """Number of pending messages."""
+        return len(self._queue)
+
+    def drain(self) -> Iterable[Received]:
+        """Everything that waits, oldest first."""
+        while self._queue:
+            received, stream = self._queue.popleft()
+            self._forget(received, stream)
+            yield received
+        refused, self._refused = self._refused, {}
+        yield from refused.values()
+
+    async def wait(self, timeout_s: float) -> None:
+        """Return when something waits, or after a while."""
+        await wait_set(self._wake, timeout_s)
+
+    def _make_room(self, received: Received, stream: "_Stream") -> bool:
+        """Drop the oldest of a stream; whether there is room for what comes.
+
+        Nothing that matters is dropped for telemetry, nor telemetry of others for a
+        stream that has enough waiting itself.
+        """
+        victim = self._victim_for(stream)
+        if victim is None:
+            self._note_dropped(received, stream)
+            return False
+        index = next(
+            number for number, (_, one) in enumerate(self._queue) if one == victim
+        )
+        dropped, _ = self._queue[index]
+        del self._queue[index]
+        self._forget(dropped, victim)
+        self._note_dropped(dropped, victim)
+        return True
+
+    def _victim_for(self, stream: "_Stream") -> "_Stream | None":
+        """The stream that loses its oldest; None: what comes is itself dropped."""
+        count = self._waiting.__getitem__
+        largest = max(self._waiting, key=count)
+        if count(stream) and (_may_drop(stream) or stream == largest):
+            return stream
+        telemetry = max(filter(_may_drop, self._waiting), key=count, default=None)
+        if telemetry is not None or _may_drop(stream):
+            return telemetry
+        return stream if count(stream) else largest
+
+    def _note_dropped(self, received: Received, stream: "_Stream") -> None:
+        robot_id, kind = stream
+        self.counters[f"dropped.{kind.__name__}"] += 1
+        if kind is DetectionFrame:
+            self._refused[robot_id] = replace(
+                received, observation=RefusedFrame(robot_id)
+            )
+
+    def _forget(self, received: Received, stream: "_Stream") -> None:
+        self._identities.discard(_identity(received.observation))
+        self._waiting[stream] -= 1
+        if not self._waiting[stream]:
+            del self._waiting[stream]
+
+
+_Stream = tuple[str, type[Observation]]
+_Identity = tuple[str, type[Observation], str | None, int | None]
+
+
+def _identity(observation: Observation) -> _Identity:
+    """Identity of a message, where its sender counts."""
+    origin = observation.origin
+    return observation.robot_id, kind_of(observation), origin.boot, origin.seq
+
+
+def _is_twin_of_a_picture(observation: Observation) -> bool:
+    """Whether nothing follows from it but a count.
+
+    A copy of odometry or of a scan says which transport feeds the robot; one that calls
+    itself a replay is refused, and an alert says so.
+    """
+    if not isinstance(observation, Overtaken) or observation.origin.replay is not None:
+        return False
+    return observation.kind is DetectionFrame
+
+
+def _stream(received: Received) -> _Stream:
+    """Robot and kind of a message."""
+    observation = received.observation
+    return observation.robot_id, type(observation)
+
+
+def _may_drop(stream: _Stream) -> bool:
+    """Whether it is telemetry, of which the newest says all, or a copy or refusal."""
+    row = KIND_OF.get(stream[1])
+    return row is None or row.may_drop

@@ -1,0 +1,199 @@
+"""The rule loop: takes arrived observations, lets time pass, is the only heartbeat.
+
+If this loop hangs, feedback stops and every robot slows down by itself (fault F14).
+"""
+
+import asyncio
+from collections.abc import Callable, Iterable, Sequence
+from itertools import chain
+
+from iveg.domain.events import LogEvent
+from iveg.domain.kinds import kind
+from iveg.domain.motion import UNMOVED
+from iveg.domain.observations import (
+    CommandAnswer,
+    GoalAnswer,
+    HeartbeatProbe,
+    Instant,
+    Received,
+    kind_of,
+)
+from iveg.domain.transports import TransportId
+from iveg.vital import topics
+from iveg.vital.command import Commander
+from iveg.vital.evaluate import Evaluator
+from iveg.vital.event_log import EventLog
+from iveg.vital.health_monitor import HealthMonitor, HopHealth, HopState
+from iveg.vital.ingest import Ingest
+from iveg.vital.ports import Clock
+from iveg.vital.supervision import Supervision
+
+TICK_S = 0.05
+"""Time passes, and the fleet is judged, at least so often (s)."""
+POSES_S = 0.02
+"""After poses alone the fleet is judged at most so often (s)."""
+URGENT_S = 0.01
+"""The same after a detection frame or a robot's obstacle (s)."""
+_EARLY_S = 0.001
+_ANSWERS = (CommandAnswer, GoalAnswer)
+_HEALTH_PERIOD_S = 1.0
+
+
+class RuleLoop:
+    """Runs ingest, assess and command in one order, in one task.
+
+    Args:
+        supervision: Names what of comfort is down.
+        decided: Comfort that measures: called with what a judgement was made of.
+        ticks: Comfort that lets time pass, called with each tick; all of it guarded.
+        goals: Comfort, likewise: called with each new word on a goal; with each tick.
+    """
+
+    def __init__(
+        self,
+        ingest: Ingest,
+        evaluator: Evaluator,
+        commander: Commander,
+        health_monitor: HealthMonitor,
+        event_log: EventLog,
+        clock: Clock,
+        supervision: Supervision,
+        decided: Callable[[Iterable[Received], Instant], None],
+        ticks: Sequence[Callable[[Instant], None]],
+        goals: tuple[
+            Callable[[GoalAnswer, Instant, TransportId], None],
+            Callable[[Instant], None],
+        ],
+    ) -> None:
+        self._ingest = ingest
+        self._evaluator = evaluator
+        self._commander = commander
+        self._health_monitor = health_monitor
+        self._event_log = event_log
+        self._clock = clock
+        self._supervision = supervision
+        self._decided = decided
+        self._goal_heard, tick_goals = goals
+        self._ticks = (tick_goals, *ticks)
+        self._ticked = self._judged = float("-inf")
+        self._health_at = float("-inf")
+        self._taken: list[Received] = []
+        """Observations taken since the last judgement."""
+        self._states: dict[str, HopState] = {}
+        self._broken: set[str] = set()
+
+    async def run(self) -> None:
+        """Until cancelled; the only loop."""
+        while True:
+            await self._ingest.wait(max(0.0, self._due_at - self._clock().mono))
+            self.take(self._ingest.drain())
+            # Pages are sent what was taken before the fleet is judged by it.
+            await asyncio.sleep(0)
+            now = self._clock()
+            if now.mono >= self._due_at:
+                self.judge(now)
+
+    @property
+    def _due_at(self) -> float:
+        """When the fleet is judged next (monotonic, s)."""
+        ticks_at = self._ticked + TICK_S - _EARLY_S
+        if not self._evaluator.is_unjudged:
+            return ticks_at
+        apart_s = URGENT_S if self._evaluator.is_urgent else POSES_S
+        return min(ticks_at, self._judged + apart_s)
+
+    def step(self, arrived: Iterable[Received], now: Instant) -> None:
+        """Take everything that arrived, and judge the fleet."""
+        self.take(arrived)
+        self.judge(now)
+
+    def take(self, arrived: Iterable[Received]) -> None:
+        """Take facts; the next judgement draws what follows from them."""
+        for received in arrived:
+            self._hear(received)
+
+    def judge(self, now: Instant) -> None:
+        """Judge the fleet once for all that was taken; let time pass if it is due."""
+        self._judged = now.mono
+        ticks = now.mono - self._ticked >= TICK_S - _EARLY_S
+        if ticks:
+            self._ticked = now.mono
+            self._tick(now)
+        else:
+            self._evaluator.settle()
+        if self._taken:
+            self._decided(self._taken, self._clock())
+            self._taken.clear()
+        if ticks:
+            self._watch_chain(now)
+            for tick in self._ticks:
+                tick(now)
+
+    def _hear(self, received: Received) -> None:
+        fresh = self._apply(received)
+        if fresh:
+            self._taken.append(received)
+        if isinstance(received.observation, HeartbeatProbe):
+            self._health_monitor.received(received.observation.origin, received.at)
+        # The second transport's answer is no news, but its time is kept.
+        if not fresh and not isinstance(received.observation, _ANSWERS):
+            return
+        if self._evaluator.world.may_act(received):
+            self._act(received)
+
+    def _tick(self, now: Instant) -> None:
+        """Let time pass for what is vital; the fleet is judged with it."""
+        self._commander.tick(now)
+        self._evaluator.age(now)
+        commanded = self._commander.conditions(now)
+        supervised = self._supervision.conditions(now)
+        self._evaluator.tick(now, chain(commanded, supervised))
+
+    def _act(self, received: Received) -> None:
+        """Hand an observation to whoever follows an order."""
+        observation = received.observation
+        if isinstance(observation, GoalAnswer):
+            self._goal_heard(observation, received.at, received.transport)
+        else:
+            world = self._evaluator.world
+            robot = world.robots.get(observation.robot_id)
+            motion = UNMOVED if robot is None else robot.motion(received.at)
+            self._commander.apply(received, world.age_then(received), motion)
+
+    def _apply(self, received: Received) -> bool:
+        """Whether it became part of the state.
+
+        What only comfort reads is refused where it fails, and hurts no neighbour.
+        """
+        observation = received.observation
+        try:
+            return self._evaluator.apply(received)
+        except Exception as error:
+            if kind(observation).vital:
+                raise
+            source, of = observation.robot_id or "?", kind_of(observation)
+            self._ingest.reject(source, f"unusable_{of.__name__}", repr(error))
+            return False
+
+    def _watch_chain(self, now: Instant) -> None:
+        hops = self._health_monitor.hops(now)
+        for hop in hops:
+            self._log_change(hop, now)
+        before, self._states = self._states, {hop.name: hop.state for hop in hops}
+        overdue = now.mono - self._health_at >= _HEALTH_PERIOD_S
+        if overdue or self._states != before:
+            self._health_at = now.mono
+            self._event_log.changed(topics.HEALTH.name)
+
+    def _log_change(self, hop: HopHealth, now: Instant) -> None:
+        """A loss once, and its end once; what is merely late or unknown is neither."""
+        if hop.state == "down" and hop.name not in self._broken:
+            self._broken.add(hop.name)
+            key = "log.hop.down"
+        elif hop.state == "ok" and hop.name in self._broken:
+            self._broken.remove(hop.name)
+            key = "log.hop.back"
+        else:
+            return
+        slots = {"hop": hop.name.value, "detail": hop.detail}
+        self._event_log.log(LogEvent("system", key, slots), now)

@@ -1,0 +1,140 @@
+"""Keeps comfort away from what is vital: a part that fails is named and comes back.
+
+Vital is what a STOP or a speed limit needs; everything else is comfort
+(docs/architecture.md, "Vital and comfort").  Vital code is given comfort as calls that
+are guarded here and never imports it, so that no drawing, statistic or row of the
+history can end a STOP::
+
+    runs ── fails ──> down, P3 ── after a pause that doubles ──> runs
+"""
+
+import asyncio
+import logging
+from collections import Counter
+from collections.abc import Awaitable, Callable, Iterable
+from functools import wraps
+from itertools import chain
+from typing import ParamSpec
+
+from iveg.domain.alerts import SHOWN_S
+from iveg.domain.events import Condition, Slot
+from iveg.domain.observations import Instant
+from iveg.vital.ports import Clock
+
+_log = logging.getLogger(__name__)
+_P = ParamSpec("_P")
+
+FIRST_PAUSE_S, LONGEST_PAUSE_S = 1.0, 60.0
+"""Between the first failure of a part and its restart, and at most."""
+LONGEST_TURN_S = 0.25
+"""CPU that one turn of the loop may take; more delays STOP and feedback."""
+
+
+class Supervision:
+    """Comfort parts by name: what failed when, and what holds up the loop.
+
+    Args:
+        clock: Reads both clocks.
+        first_pause_s: Before the first restart of a part.
+
+    Attributes:
+        counters: Failures and long turns since the start, by part.
+    """
+
+    def __init__(self, clock: Clock, first_pause_s: float = FIRST_PAUSE_S) -> None:
+        self.counters: Counter[str] = Counter()
+        self._clock = clock
+        self._first_pause_s = first_pause_s
+        self._failed_at: dict[str, float] = {}
+        self._stopped: set[str] = set()
+        """Parts that wait for their restart."""
+        self._minute = 0
+        self._longest_s = 0.0, 0.0
+        """Of this minute, and of the one before."""
+        self._long_turns: dict[str, tuple[float, float]] = {}
+        """Part → when its newest long turn ended (monotonic, s), and its CPU (s)."""
+        self._found: dict[str, tuple[Condition, ...]] = {}
+
+    def guard(self, part: str, call: Callable[_P, object]) -> Callable[_P, None]:
+        """The same call, whose failure is the part's and not its caller's."""
+
+        @wraps(call)
+        def guarded(*args: _P.args, **kwargs: _P.kwargs) -> None:
+            try:
+                call(*args, **kwargs)
+            except Exception as error:
+                self.failed(part, error)
+
+        return guarded
+
+    def failed(self, part: str, error: BaseException) -> None:
+        """Count a failure of a part; logged once, until the part is well again."""
+        now = self._clock()
+        self.counters[f"comfort_failed.{part}"] += 1
+        if not self._is_down(part, now):
+            _log.error("%s has failed; what is vital goes on", part, exc_info=error)
+        self._failed_at[part] = now.mono
+
+    async def keep_running(
+        self, part: str, work: Callable[[], Awaitable[object]]
+    ) -> None:
+        """Run a part until it returns; after each failure again, ever later."""
+        pause_s = self._first_pause_s
+        while True:
+            began = self._clock().mono
+            try:
+                await work()
+                return
+            except Exception as error:
+                self.failed(part, error)
+            if self._clock().mono - began > LONGEST_PAUSE_S:
+                pause_s = self._first_pause_s
+            self._stopped.add(part)
+            await asyncio.sleep(pause_s)
+            self._stopped.discard(part)
+            pause_s = min(LONGEST_PAUSE_S, 2.0 * pause_s)
+
+    def report(self, part: str, wrong: Iterable[Condition]) -> None:
+        """What a part has found wrong, in the place of what it found before."""
+        self._found[part] = tuple(wrong)
+
+    def note_turn(self, part: str, cpu_s: float) -> None:
+        """One turn of the loop is over, which took so much CPU (s)."""
+        now = self._clock()
+        self._pass_minutes(now)
+        this, before = self._longest_s
+        self._longest_s = max(this, cpu_s), before
+        if cpu_s > LONGEST_TURN_S:
+            self.counters[f"long_turn.{part}"] += 1
+            self._long_turns[part] = now.mono, cpu_s
+
+    def longest_turn_s(self, now: Instant) -> float:
+        """CPU of the longest turn of this minute and of the one before (s)."""
+        self._pass_minutes(now)
+        return max(self._longest_s)
+
+    def _pass_minutes(self, now: Instant) -> None:
+        minute = int(now.mono // 60.0)
+        for _ in range(min(2, minute - self._minute)):
+            self._longest_s = 0.0, self._longest_s[0]
+        self._minute = minute
+
+    def conditions(self, now: Instant) -> Iterable[Condition]:
+        """A P3 for each part that is down, a P2 for each that held up the loop.
+
+        Beside them, what parts have reported.
+        """
+        yield from chain.from_iterable(self._found.values())
+        for part in self._failed_at:
+            if self._is_down(part, now):
+                yield Condition("P3", "alert.part_down", part, None, {"part": part})
+        for part, (at, cpu_s) in self._long_turns.items():
+            if now.mono - at < SHOWN_S:
+                slots: dict[str, Slot] = {"part": part, "ms": round(1000.0 * cpu_s)}
+                yield Condition("P2", "alert.loop_held_up", part, None, slots)
+
+    def _is_down(self, part: str, now: Instant) -> bool:
+        """Whether it waits for its restart, or failed so recently that it may again."""
+        failed_at = self._failed_at.get(part)
+        recent = failed_at is not None and now.mono - failed_at < SHOWN_S
+        return recent or part in self._stopped

@@ -1,0 +1,107 @@
+"""Scans go on to robots that ask, the newest of each peer and one at a time."""
+
+import math
+from dataclasses import replace
+
+from iveg.comfort.peer_scans import PeerScans
+from iveg.comfort.scans import ScanReader
+from iveg.domain.geometry import Pose2D
+from iveg.domain.peer_scan import PeerScan
+from tests.builders import at, safety_report, scan
+from tests.unit.domain.scene import Scene
+
+
+class Field(Scene):
+    """Robots that sweep, and what goes on to their peers."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.told: list[PeerScan] = []
+        self.refused: list[tuple[str, str, str]] = []
+        reader = ScanReader(lambda *one: self.refused.append(one))
+        self.part = PeerScans(self.world, reader, self.told.append, "b")
+
+    def laser(self, robot_id: str, *, placed: bool = True) -> None:
+        robot = self.world.robot(robot_id)
+        robot.scan = scan(robot_id, [3.0] * 360, angle_increment=math.tau / 360)
+        robot.scan_received = at(self.now)
+        robot.scan_pose = Pose2D(1.0, 2.0, 0.0) if placed else None
+
+    def tell(self, robot_id: str, *, asks: bool) -> None:
+        robot = self.world.robot(robot_id)
+        robot.safety = replace(safety_report(robot_id), peer_scans=asks)
+        robot.safety_received = at(self.now)
+
+    def pass_s(self, seconds: float) -> None:
+        for _ in range(round(seconds / 0.05)):
+            self.now += 0.05
+            self.part.tick(at(self.now))
+
+    def heard(self) -> list[str]:
+        found = [one.robot_id for one in self.told]
+        self.told.clear()
+        return found
+
+
+def test_while_nobody_asks_nothing_is_sent() -> None:
+    field = Field()
+    field.laser("AGI")
+    field.tell("AGI", asks=False)
+    field.tell("AGII", asks=False)
+    field.pass_s(1.0)
+
+    assert field.heard() == []
+
+
+def test_who_asks_is_told_of_its_peers_and_not_of_itself() -> None:
+    field = Field()
+    field.laser("AGI")
+    field.laser("AGII")
+    field.tell("AGII", asks=True)
+    field.pass_s(0.2)
+
+    (one,) = field.told
+    assert (one.robot_id, one.origin.boot, one.origin.seq) == ("AGI", "b", 1)
+    assert one.pose == Pose2D(1.0, 2.0, 0.0)
+    assert 0.04 < one.age_s < 0.2
+
+
+def test_a_peer_is_told_of_twice_a_second_at_most_and_each_scan_once() -> None:
+    field = Field()
+    for _ in range(40):
+        field.laser("AGI")
+        field.tell("AGII", asks=True)
+        field.pass_s(0.05)
+    often = len(field.heard())
+    field.pass_s(1.0)
+
+    assert 3 <= often <= 4
+    assert len(field.heard()) <= 1
+
+
+def test_a_scan_without_a_place_or_long_ago_is_not_sent() -> None:
+    field = Field()
+    field.laser("AGI", placed=False)
+    field.tell("AGII", asks=True)
+    field.pass_s(0.2)
+    field.laser("AGI")
+    field.now += 1.5
+    field.tell("AGII", asks=True)
+    field.pass_s(0.2)
+
+    assert field.heard() == []
+
+
+def test_a_scan_that_cannot_be_thinned_is_refused_and_others_go_on() -> None:
+    field = Field()
+    field.laser("AGI")
+    robot = field.world.robot("AGI")
+    robot.scan = scan("AGI", [1.0, 2.0], angle_increment=0.0)
+    field.tell("AGI", asks=True)
+    field.tell("AGII", asks=True)
+    field.pass_s(0.2)
+    field.laser("AGII")
+    field.pass_s(0.2)
+
+    assert field.heard() == ["AGII"]
+    assert [reason for _, reason, _ in field.refused] == ["undrawable_scan"]

@@ -1,0 +1,124 @@
+"""Issue 13.6: a restart forgets neither a P1 that nobody saw nor the log."""
+
+import asyncio
+from dataclasses import replace
+from typing import cast
+
+from iveg.comfort.restore import History, remember
+from iveg.domain.alerts import read_alert
+from iveg.domain.errors import HopError
+from iveg.domain.records import AlertRecord, LogRecord
+from tests.builders import at
+from tests.fakes.records import alert_record, log_record
+from tests.unit.vital.desk import Desk
+
+
+class LeftBehind:
+    """A history that answers at the n-th time that it is asked."""
+
+    def __init__(
+        self,
+        alerts: tuple[AlertRecord, ...] = (),
+        lines: tuple[LogRecord, ...] = (),
+        silent_times: int = 0,
+    ) -> None:
+        self._alerts, self._lines = alerts, lines
+        self._silent_times = silent_times
+
+    async def open_commands(self) -> tuple[()]:
+        self._silent_times -= 1
+        if self._silent_times >= 0:
+            raise HopError("database", "away")
+        return ()
+
+    async def open_decisions(self) -> tuple[()]:
+        return ()
+
+    async def open_alerts(self) -> tuple[AlertRecord, ...]:
+        return tuple(one for one in self._alerts if one.cleared_at is None)
+
+    async def unseen_alerts(self, most: int) -> tuple[AlertRecord, ...]:
+        return self._alerts[:most]
+
+    async def newest_lines(self, most: int) -> tuple[LogRecord, ...]:
+        return self._lines[:most]
+
+
+async def take_up(desk: Desk, left: LeftBehind) -> None:
+    await remember(
+        cast("History", left),
+        desk.commander,
+        desk.parts.goals,
+        desk.evaluator,
+        desk.event_log,
+        desk.health_monitor,
+        desk.clock,
+    )
+
+
+def unseen(alert_id: str, cleared_at: float | None = None) -> AlertRecord:
+    return alert_record(
+        alert_id=alert_id,
+        priority="P1",
+        cleared_at=cleared_at,
+        acknowledged_at=None,
+        acknowledged_by=None,
+    )
+
+
+async def test_unacknowledged_p1s_come_back_and_can_be_acknowledged() -> None:
+    desk = Desk()
+    await take_up(desk, LeftBehind((unseen("A1", at(-60).wall), unseen("A2"))))
+
+    back = {one.alert_id for one in desk.evaluator.alerts.waiting}
+    desk.evaluator.alerts.acknowledge("A1", "ana", "seen", desk.clock())
+
+    assert back == {"A1", "A2"}
+    assert [one.alert_id for one in desk.evaluator.alerts.waiting] == ["A2"]
+    assert desk.records(AlertRecord)[-1].acknowledged_by == "ana"
+
+
+async def test_the_log_goes_on_where_it_broke_off_for_open_pages_too() -> None:
+    desk = Desk()
+    page = desk.hub.join()
+    lines = [log_record(id=number, at=at(-number).wall) for number in (3, 2, 1)]
+
+    await take_up(desk, LeftBehind(lines=tuple(lines)))
+
+    assert [one.id for one in desk.event_log.lines] == [1, 2, 3]
+    assert [topic for topic, _ in page.drain_events()] == ["log/earlier"]
+
+
+def test_an_alert_keeps_its_life_over_the_restart() -> None:
+    desk = Desk()
+    desk.evaluator.alerts.remember([read_alert(unseen("A1", at(-60).wall), at(0))])
+    desk.evaluator.alerts.acknowledge("A1", "ana", "battery", at(1))
+    kept = desk.records(AlertRecord)[-1]
+
+    again = read_alert(kept, at(5))
+
+    assert (again.unseen, again.count) == (None, kept.count)
+    assert (again.last.acknowledged_by, again.last.note) == ("ana", "battery")
+    assert replace(kept).cleared_at == at(-60).wall
+
+
+def test_without_the_history_earlier_alerts_are_unknown_after_two_seconds() -> None:
+    health_monitor = Desk().health_monitor
+
+    assert [health_monitor.earlier(at(now)) for now in (0.0, 1.9, 2.0)] == [
+        "reading",
+        "reading",
+        "unknown",
+    ]
+
+
+async def test_stop_serves_while_the_history_is_silent() -> None:
+    desk = Desk()
+    left = LeftBehind((unseen("A1"),), silent_times=10**6)
+    waiting = asyncio.create_task(take_up(desk, left))
+
+    await desk.commander.stop(["AGI"], "ana", desk.clock())
+
+    waiting.cancel()
+    assert desk.commander.machine("AGI").stop is not None
+    assert not desk.health_monitor.earlier_read

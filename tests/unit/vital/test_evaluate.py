@@ -1,0 +1,536 @@
+"""The rule at work: feedback, log, alerts and the heartbeat of the fleet."""
+
+from dataclasses import replace
+
+import pytest
+
+from iveg.domain.detection_rule import DetectionRule
+from iveg.domain.detector import CLASS_NAMES
+from iveg.domain.geometry import Rectangle
+from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.margins import LeastMargins
+from iveg.domain.observations import Hold, Origin
+from iveg.domain.records import (
+    AlertRecord,
+    DecisionRecord,
+    DetectionRecord,
+    OdometryRecord,
+)
+from iveg.models.decision import Decision
+from tests.builders import detection, detection_frame, safety_report
+from tests.fakes.records import alert_record
+from tests.unit.vital.desk import Desk, conditions_of
+
+HEDGE = Greenhouse(
+    "hedge", Rectangle(-100, -100, 100, 100), rows=(Rectangle(2.9, -50, 3.1, 50),)
+)
+
+
+def watched(desk: Desk) -> Desk:
+    """Both robots are there, look, and report that they drive."""
+    desk.drive("AGI", 0.0)
+    desk.drive("AGII", 50.0)
+    desk.look("AGI")
+    desk.look("AGII")
+    desk.report("AGI", factor=1.0, reason="clear", linear=0.5)
+    desk.report("AGII", factor=1.0, reason="clear", linear=0.5)
+    return desk
+
+
+def meet(desk: Desk, x: float = 1.5) -> None:
+    """AGII sees a farmer ``x`` metres before AGI."""
+    desk.look("AGII", detection("farmer", x))
+
+
+def test_13_13_a_decision_remembers_where_the_robots_were() -> None:
+    desk = watched(Desk())
+
+    meet(desk)
+
+    view = Decision.of_record(desk.records(DecisionRecord)[-1])
+    assert {one.robot_id for one in view.places} == {"AGI", "AGII"}
+    assert isinstance(view.rule.parameters, dict)
+    assert "places" not in view.rule.parameters
+
+
+def test_feedback_tells_how_people_go_on_for_as_long_as_they_are_seen() -> None:
+    desk = watched(Desk())
+    meet(desk)
+    [told] = desk.fleet.told[-1].alerts
+    assert (told.velocity, desk.fleet.told[-1].foresight) == ((0.0, 0.0), True)
+
+    desk.clock.now += 1.5
+    desk.drive("AGI", 0.0)
+    desk.evaluator.rule = replace(desk.evaluator.rule, foresight=False)
+    desk.evaluator.publish(desk.clock())
+    [told] = desk.fleet.told[-1].alerts
+    assert (told.velocity, desk.fleet.told[-1].foresight) == (None, False)
+
+
+def test_a_sighting_is_told_to_the_fleet_at_once() -> None:
+    desk = watched(Desk())
+    desk.fleet.told.clear()
+
+    meet(desk)
+
+    told = {one.robot_id: one for one in desk.fleet.told}
+    assert set(told) == {"AGI", "AGII"}
+    assert told["AGI"].speed_limits["AGI"].reason == "person"
+    assert told["AGII"].alert is not None
+    assert told["AGII"].alert.class_id == "farmer"
+    assert told["AGII"].alert.radius_m == pytest.approx(2.0)
+    assert told["AGI"].alert is None
+    assert len(told["AGI"].alerts) == 1
+
+
+def test_feedback_says_where_iveg_believes_each_robot_to_be() -> None:
+    desk = watched(Desk())
+    meet(desk)
+
+    newest = {one.robot_id: one for one in desk.fleet.told}
+    assert newest["AGII"].pose is not None
+    assert newest["AGII"].pose.x == 50.0
+    assert newest["AGII"].pose_stamp is not None
+
+
+def test_feedback_says_which_report_of_each_robot_was_seen() -> None:
+    desk = watched(Desk())
+    desk.report("AGI", factor=0.5, reason="stale")
+    seen = desk.seq
+
+    meet(desk)
+
+    assert desk.fleet.told[-1].seen["AGI"] == seen
+
+
+def test_every_message_to_the_fleet_has_a_number_of_its_own() -> None:
+    desk = watched(Desk())
+    meet(desk)
+
+    numbers = [one.origin.seq for one in desk.fleet.told]
+    assert len(set(numbers)) == len(numbers)
+    assert {one.origin.boot for one in desk.fleet.told} == {"iveg-boot"}
+
+
+def test_every_robot_is_told_how_far_orion_is_behind() -> None:
+    desk = watched(Desk())
+    desk.health_monitor.sent(Origin("iveg-boot", 1), desk.clock())
+    desk.clock.now += 7.0
+
+    desk.evaluator.publish(desk.clock())
+
+    assert [one.backlog_s for one in desk.fleet.told[-2:]] == [7.0, 7.0]
+
+
+def test_another_confident_object_is_told_as_a_stamp_alone() -> None:
+    desk = watched(Desk())
+    desk.look("AGII", detection("crate", 9.0))
+    desk.evaluator.publish(desk.clock())
+
+    alert = next(one for one in desk.fleet.told[::-1] if one.robot_id == "AGII").alert
+    assert alert is not None
+    assert (alert.class_, alert.position) == (None, None)
+    assert alert.stamp
+
+
+def test_a_decision_is_written_down_with_its_feedback() -> None:
+    desk = watched(Desk())
+
+    meet(desk)
+
+    newest = desk.records(DecisionRecord)[-1]
+    assert (newest.robot_id, newest.observer) == ("AGI", "AGII")
+    assert newest.feedback_at is not None
+    assert newest.rule_parameters["threshold"] == 0.8
+    verdicts = {one["link"]: one["verdict"] for one in newest.links}
+    assert verdicts["feedback"] == "ok"
+
+
+def test_what_the_robot_applies_and_shows_completes_the_decision() -> None:
+    desk = watched(Desk())
+    meet(desk)
+    speed_limit = desk.evaluator.speed_limits["AGI"]
+
+    desk.report(
+        "AGI",
+        factor=0.5,
+        reason="person",
+        decision_id=speed_limit.decision_id,
+        linear=0.2,
+    )
+    desk.drive("AGI", 0.0, linear=0.2)
+
+    decision = desk.evaluator.decisions.get(speed_limit.decision_id or "")
+    assert decision is not None
+    assert decision.applied is not None
+    assert decision.speed_after == 0.2
+
+
+async def test_the_end_of_a_crossing_ends_its_decision() -> None:
+    desk = watched(Desk())
+    meet(desk)
+    for tenth in range(30):
+        await desk.wait(0.1)
+        desk.drive("AGI", 0.0)
+        desk.drive("AGII", 50.0)
+        desk.look("AGI")
+        desk.look("AGII", detection("farmer", 1.5 + 0.1 * tenth))
+
+    assert list(desk.evaluator.decisions.open) == []
+    newest = desk.records(DecisionRecord)[-1]
+    assert newest.ended_at is not None
+
+
+def test_a_robot_that_slows_for_somebody_it_cannot_see_is_counted() -> None:
+    desk = Desk(greenhouse=HEDGE)
+    desk.drive("AGI", 2.0)
+    desk.drive("AGII", 50.0)
+
+    desk.look("AGII", detection("farmer", 3.9))
+
+    assert desk.evaluator.protected_unseen == 1
+
+
+async def test_13_10_a_slow_down_that_the_rule_asked_for_is_no_alert() -> None:
+    desk = watched(Desk())
+    meet(desk)
+    await desk.wait(0.1)
+
+    assert conditions_of(desk) == []
+    assert "log.alert.raised" not in desk.sentences()
+
+
+async def test_a_robot_that_does_not_slow_down_raises_a_grave_alert() -> None:
+    desk = watched(Desk())
+    for number in range(22):
+        meet(desk)
+        desk.drive("AGI", 0.08 * number, linear=0.8)
+        desk.drive("AGII", 50.0, linear=0.0)
+        desk.look("AGI")
+        await desk.wait(0.1)
+
+    assert "alert.person_not_slowing" in conditions_of(desk)
+    assert "log.alert.raised" in desk.sentences()
+
+
+async def test_a_moving_robot_that_is_lost_raises_and_its_return_clears() -> None:
+    desk = watched(Desk())
+    await desk.wait(3.2)
+    assert "alert.moving_robot_lost" in conditions_of(desk)
+
+    watched(desk)
+    await desk.wait(0.1)
+
+    assert all(one.cleared for one in desk.evaluator.alerts.waiting)
+    assert desk.sentences().count("log.alert.cleared") == 2
+
+
+async def test_acknowledging_is_written_down_and_told() -> None:
+    desk = watched(Desk())
+    await desk.wait(3.2)
+    (first, *_) = desk.evaluator.alerts.waiting
+
+    desk.evaluator.alerts.acknowledge(first.alert_id, "ana", "seen", desk.clock())
+
+    newest = desk.records(AlertRecord)[-1]
+    assert (newest.acknowledged_by, newest.note) == ("ana", "seen")
+    assert desk.sentences()[-1] == "log.alert.acknowledged"
+
+
+def stored_verdicts(desk: Desk) -> set[str]:
+    """Verdicts of the newest row of the newest decision."""
+    newest = desk.records(DecisionRecord)[-1]
+    return {one["verdict"] for one in newest.links}
+
+
+async def test_the_stored_decision_says_missing_as_soon_as_it_is() -> None:
+    desk = watched(Desk())
+    meet(desk)
+    assert "open" in stored_verdicts(desk)
+
+    for number in range(6):
+        desk.drive("AGI", 0.36 * number, linear=0.8)
+        meet(desk)
+        await desk.wait(0.45)
+
+    assert "alert.person_not_slowing" in conditions_of(desk)
+    assert desk.evaluator.decisions.open
+    assert stored_verdicts(desk) == {"ok", "missing"}
+
+
+async def drive_on(desk: Desk, seconds: float) -> None:
+    """AGI drives on at 0.8 m/s, to and fro, and is heard; it reports nothing."""
+    for number in range(round(seconds / 0.1)):
+        desk.drive("AGI", 0.08 * number, linear=0.8)
+        meet(desk)
+        await desk.wait(0.1)
+
+
+async def test_a_robot_that_nobody_can_hear_is_not_judged_until_it_is_heard_again() -> (
+    None
+):
+    desk = watched(Desk())
+    meet(desk)
+    await desk.wait(5.0)
+    told = ["alert.person_not_slowing" in conditions_of(desk)]
+    for _ in range(3):
+        await drive_on(desk, 1.0)
+        told.append("alert.person_not_slowing" in conditions_of(desk))
+
+    assert told == [False, False, True, True]
+
+
+async def test_a_decision_that_waits_is_not_stored_again_and_again() -> None:
+    desk = watched(Desk())
+    meet(desk)
+    for _ in range(10):
+        desk.drive("AGI", 0.0)
+        meet(desk)
+        await desk.wait(0.45)
+
+    assert len(desk.records(DecisionRecord)) <= 4
+
+
+def test_a_decision_that_is_open_when_iveg_goes_away_says_so() -> None:
+    desk = watched(Desk())
+    meet(desk)
+
+    desk.evaluator.leave(desk.clock())
+
+    newest = desk.records(DecisionRecord)[-1]
+    assert newest.ended_at == desk.clock().wall
+    assert stored_verdicts(desk) == {"ok", "unknown"}
+
+
+def test_what_a_crash_left_open_is_closed_and_says_that_nobody_knows() -> None:
+    crashed, desk = watched(Desk()), Desk()
+    meet(crashed)
+    left = crashed.records(DecisionRecord)[-1]
+
+    desk.evaluator.close_earlier([left], [alert_record()], desk.clock())
+
+    (closed,), (cleared,) = desk.records(DecisionRecord), desk.records(AlertRecord)
+    assert closed.decision_id == left.decision_id
+    assert closed.ended_at == cleared.cleared_at == desk.clock().wall
+    assert stored_verdicts(desk) == {"ok", "unknown"}
+    assert closed.links[-1]["link"] == "interrupted"
+
+
+async def test_what_this_run_has_open_is_left_alone() -> None:
+    desk = watched(Desk())
+    meet(desk)
+    await drive_on(desk, 2.5)
+    decisions, alerts = desk.records(DecisionRecord), desk.records(AlertRecord)
+    before = len(desk.sink.records)
+
+    desk.evaluator.close_earlier(
+        [one for one in decisions if isinstance(one, DecisionRecord)],
+        [one for one in alerts if isinstance(one, AlertRecord)],
+        desk.clock(),
+    )
+
+    assert alerts
+    assert len(desk.sink.records) == before
+
+
+async def test_a_link_that_comes_and_goes_is_told_once_each_time() -> None:
+    desk = watched(Desk())
+    await desk.wait(4.0)
+
+    links = [line.key for line in desk.event_log.lines if line.robot_id == "AGI"]
+    assert [key for key in links if key.startswith("log.link")] == [
+        "log.link.live",
+        "log.link.late",
+        "log.link.lost",
+    ]
+
+
+def test_a_speed_change_is_told_with_who_saw_whom() -> None:
+    desk = watched(Desk())
+    meet(desk)
+    speed_limit = desk.evaluator.speed_limits["AGI"]
+
+    desk.report("AGI", factor=0.5, reason="person", decision_id=speed_limit.decision_id)
+
+    line = desk.event_log.lines[-1]
+    slots = line.slots
+    assert line.key == "log.speed_down.person"
+    assert (slots["observer"], slots["distance"]) == ("AGII", 1.5)
+
+
+def test_a_robot_that_reports_nothing_is_told_by_its_speed_limit() -> None:
+    desk = Desk()
+    desk.drive("AGI", 0.0)
+    desk.drive("AGII", 50.0)
+    desk.look("AGI")
+    desk.look("AGII")
+
+    meet(desk)
+
+    assert desk.sentences()[-1] == "log.speed_down.person"
+
+
+def test_a_long_sighting_is_one_line_and_two_rows_a_second() -> None:
+    desk = watched(Desk())
+    for _ in range(50):
+        desk.clock.now = round(desk.clock.now + 0.1, 6)
+        desk.look("AGII", detection("farmer", 80.0))
+
+    assert desk.sentences().count("log.detection") == 1
+    assert len(desk.records(DetectionRecord)) == 10
+
+
+@pytest.mark.parametrize(
+    ("class_id", "probability", "key"),
+    [("farmer", 0.6, "log.detection_faint"), ("crate", 0.9, "log.detection_unmapped")],
+)
+def test_faint_and_unmapped_detections_are_never_silently_ignored(
+    class_id: str, probability: float, key: str
+) -> None:
+    desk = watched(Desk())
+
+    desk.look("AGII", detection(class_id, 80.0, probability=probability))
+
+    assert desk.sentences()[-1] == key
+
+
+async def test_a_person_who_is_not_seen_any_more_is_remembered_then_expired() -> None:
+    desk = watched(Desk())
+    meet(desk, 80.0)
+    await desk.wait(11.0)
+
+    told = [key for key in desk.sentences() if key.startswith("log.person")]
+    assert told == ["log.person_remembered", "log.person_expired"]
+
+
+async def test_a_spot_that_was_looked_at_in_vain_is_told() -> None:
+    desk = watched(Desk())
+    desk.look("AGI", detection("farmer", 4.0))
+    for _ in range(30):
+        await desk.wait(0.1)
+        desk.drive("AGI", 0.0, linear=0.0)
+        desk.look("AGI")
+
+    assert "log.person_cleared" in desk.sentences()
+
+
+def test_a_person_beyond_the_walls_slows_who_saw_them_and_is_told_as_doubtful() -> None:
+    desk = watched(Desk())
+
+    desk.look("AGI", detection("farmer", 150.0))
+
+    assert "log.detection_doubtful" in desk.sentences()
+    assert desk.evaluator.speed_limits["AGI"].reason == "person"
+    alert = desk.fleet.told[-1].alerts[0]
+    assert alert.position is not None
+    assert alert.position[:2] == (0.0, 0.0)
+    assert alert.radius_m == 8.0
+
+
+def test_a_possible_person_is_told_as_such_where_the_rule_counts_them() -> None:
+    desk = watched(Desk())
+    desk.evaluator.rule = DetectionRule(possible_people=True)
+    # Faint looks at one spot are told once; the possible one is another line.
+    for confidence in (0.7, 0.68, 0.75):
+        desk.clock.now += 0.3
+        desk.look("AGI", detection("farmer", 5.0, probability=confidence))
+
+    assert desk.sentences().count("log.detection_faint") == 1
+    assert desk.sentences().count("log.detection_possible") == 1
+    (line,) = [
+        one for one in desk.event_log.lines if one.key == "log.detection_possible"
+    ]
+    told = [line.slots[name] for name in ("looks", "least", "most", "over")]
+    assert told == [2, 0.68, 0.7, 0.3]
+    assert line.slots["probability"] == 0.8322
+
+
+def test_looks_at_ever_new_things_do_not_fill_the_memory() -> None:
+    desk = watched(Desk())
+    for number in range(5):
+        things = [detection(f"thing-{number}-{n}", 80.0) for n in range(220)]
+        desk.look("AGII", *things)
+
+    assert desk.evaluator.tracking.subjects == CLASS_NAMES + 1
+
+
+def test_28_6_a_pose_is_kept_with_its_margin_while_that_is_measured() -> None:
+    desk = watched(Desk())
+    for tenth in range(1, 60):
+        desk.clock.now = tenth / 10
+        if tenth < 10 or tenth >= 40:
+            meet(desk, 6.0)
+        desk.drive("AGI", 0.0, linear=0.5 if tenth < 50 else 0.0)
+
+    rows = [one for one in desk.records(OdometryRecord) if one.robot_id == "AGI"]
+    start = desk.clock().wall - desk.clock.now
+
+    def kept(seconds: float) -> float | None:
+        return [one.margin_m for one in rows if one.at - start <= seconds][-1]
+
+    robot, people = desk.world.robot("AGI"), desk.evaluator.people.known.values()
+    least = LeastMargins([robot], people, desk.clock()).of_robot("AGI")
+    assert least is not None
+    margin_m = kept(1.0)
+    assert margin_m is not None
+    assert 2.0 < least.gap_m - margin_m < 4.0
+    # Measured; nobody has looked for a second; somebody looks; the robot stands.
+    states = [kept(at) is not None for at in (1.0, 1.5, 3.0, 3.5, 4.5, 5.8)]
+    assert states == [True, True, False, False, True, False]
+
+
+def test_a_late_look_still_protects_whom_it_saw_and_leaves_the_page_alone() -> None:
+    desk = watched(Desk())
+    late = desk.next_origin()
+    desk.look("AGII")
+
+    desk.hear(detection_frame("AGII", detection("farmer", 1.0), origin=late))
+    desk.loop.step([], desk.clock())
+    desk.clock.now = 0.1
+    desk.loop.step([], desk.clock())
+
+    assert desk.evaluator.speed_limits["AGI"].reason == "person"
+    assert desk.evaluator.tracking.placed["AGII"] == []
+
+
+def test_what_orion_kept_of_yesterday_makes_nobody_appear() -> None:
+    desk = watched(Desk())
+    kept = Origin("yesterday", 5, None, None)
+
+    desk.hear(
+        detection_frame("AGII", detection("farmer", 1.0), origin=kept), asked=True
+    )
+
+    assert desk.evaluator.people.known == {}
+
+
+def test_f46_somebody_whose_observer_died_still_slows_who_comes_near() -> None:
+    desk = watched(Desk())
+    meet(desk, 5.5)
+    desk.clock.now = 2.9
+    desk.drive("AGI", 0.0)
+    desk.look("AGI")
+
+    assert desk.evaluator.speed_limits["AGI"].reason == "person"
+
+
+def test_a_held_robot_says_so_in_the_log_once() -> None:
+    desk = watched(Desk())
+    for _ in range(3):
+        desk.report("AGI", Hold("hw-1", "hw", "local"), factor=0.0, reason="hold")
+
+    assert desk.sentences().count("log.speed_down.hold") == 1
+
+
+def test_what_orion_kept_of_an_earlier_run_slows_nobody_in_the_log() -> None:
+    desk = Desk()
+    kept = safety_report(
+        "AGI", speed_factor=0.5, reason="stale", origin=desk.next_origin()
+    )
+    desk.hear(kept, asked=True)
+    before = desk.sentences()
+
+    desk.report("AGI", factor=0.5, reason="stale")
+
+    assert not any(key.startswith("log.speed") for key in before)
+    assert desk.sentences()[-1].startswith("log.speed_down")

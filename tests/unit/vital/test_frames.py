@@ -1,0 +1,132 @@
+"""Boxes without a frame and in unknown ones, from the wire to alerts and limits."""
+
+from dataclasses import replace
+
+import orjson
+
+from iveg.domain.observations import Detection
+from iveg.ngsi import codec
+from iveg.web.views import Views
+from tests.builders import detection
+from tests.unit.vital.desk import Desk, conditions_of
+
+ALERT = "alert.frame_not_named"
+LISTING_1 = {
+    "class_id": "farmer",
+    "probability": 0.945,
+    "position": {
+        "xmin": 0.4506,
+        "xmax": 0.7936,
+        "ymin": -0.3154,
+        "ymax": 0.1137,
+        "zmin": -0.2596,
+        "zmax": 0.1051,
+    },
+}
+"""The box of the paper, which names no frame."""
+
+
+def unlabelled(x: float, class_id: str = "farmer") -> Detection:
+    return replace(detection(class_id, x), frame_id=None)
+
+
+def parked(*robots: str) -> Desk:
+    """AGI and AGII stand ten metres apart, both see nothing."""
+    desk = Desk(robots or ("AGI", "AGII"))
+    for number, robot_id in enumerate(robots or ("AGI", "AGII")):
+        desk.drive(robot_id, 10.0 * number, linear=0.0)
+        desk.look(robot_id)
+    return desk
+
+
+def factors(desk: Desk) -> list[float]:
+    return [one.speed_factor for one in desk.evaluator.speed_limits.values()]
+
+
+async def test_a_robot_that_names_no_frame_is_a_notice_as_long_as_it_names_none() -> (
+    None
+):
+    desk = parked()
+    desk.look("AGI", unlabelled(4.0))
+    await desk.wait(0.1)
+    (told,) = (
+        one.condition
+        for one in desk.evaluator.alerts.waiting
+        if one.condition.key == ALERT
+    )
+    assert (told.priority, told.slots) == ("P3", {"robots": "AGI"})
+    desk.look("AGI")
+    await desk.wait(0.1)
+    assert ALERT in conditions_of(desk)
+    desk.look("AGI", detection(x=4.0))
+    await desk.wait(0.1)
+    assert ALERT not in conditions_of(desk)
+
+
+async def test_a_robot_whose_frame_the_fleet_names_is_no_notice() -> None:
+    desk = parked()
+    robot = desk.world.robot("AGI")
+    profile = replace(robot.profile, unlabelled_frame="camera_link")
+    robot.description = replace(robot.description, profile=profile)
+
+    desk.look("AGI", unlabelled(4.0))
+    await desk.wait(0.1)
+
+    assert ALERT not in conditions_of(desk)
+
+
+async def test_the_papers_box_is_one_person_at_two_places_on_the_page() -> None:
+    desk = parked()
+    views = Views(desk.parts)
+    measure = orjson.dumps({"bounding_boxes": [LISTING_1]})
+    (frame,) = codec.read_measure("AGI_yolox_bounding_boxes", measure).observations
+
+    desk.hear(frame)
+
+    (known,) = views.people(desk.clock())
+    shown = views.frame("AGI", desk.clock())
+    assert shown is not None
+    assert [one.person_id for one in shown.items] == [known.person_id] * 2
+    assert [round(one.position.x, 2) for one in shown.items] == [0.62, 1.02]
+    assert {one.box.frame_id for one in shown.items if one.box} == {"base_link"}
+    told = desk.fleet.told[-1].alerts
+    assert {round(one.position[0], 2) for one in told if one.position} == {0.62, 1.02}
+
+
+def test_a_person_in_an_unknown_frame_slows_who_is_near_for_a_second() -> None:
+    desk = parked("AGI", "AGII")
+
+    desk.look("AGI", replace(detection(x=4.0), frame_id="odom"))
+    assert factors(desk) == [0.5, 0.5]
+
+    desk.clock.now = 1.01
+    for robot_id, x in (("AGI", 0.0), ("AGII", 10.0)):
+        desk.drive(robot_id, x, linear=0.0)
+        desk.look(robot_id, detection(x=-90.0))
+    assert factors(desk) == [1.0, 1.0]
+
+
+async def test_a_box_before_the_first_pose_slows_and_is_no_alert_yet() -> None:
+    desk = Desk(("AGI", "AGII"))
+    desk.drive("AGII", 10.0, linear=0.0)
+    desk.look("AGII")
+    desk.look("AGI", replace(detection(x=4.0), frame_id="base_link"))
+    await desk.wait(0.1)
+
+    assert factors(desk) == [0.5, 0.5]
+    assert "alert.unreadable_detection" not in conditions_of(desk)
+
+
+def test_a_robot_that_invents_frames_fills_neither_the_log_nor_the_room_of_others() -> (
+    None
+):
+    desk = parked()
+    for number in range(300):
+        desk.clock.now += 0.05
+        desk.look("AGI", replace(detection(x=4.0), frame_id=f"frame-{number}"))
+
+    desk.look("AGII", replace(detection(x=4.0), frame_id="odom"))
+
+    lines = [one for one in desk.event_log.lines if one.key == "log.unknown_frame"]
+    assert [one.robot_id for one in lines] == ["AGI"] * 20 + ["AGII"]
+    assert desk.world.counters["detections.unknown_frame"] == 301

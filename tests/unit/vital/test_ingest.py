@@ -1,0 +1,240 @@
+"""The door of the pipeline: bounded, and never at the cost of safety."""
+
+from dataclasses import replace
+
+import pytest
+
+from iveg.domain.observations import (
+    CommandAnswer,
+    DetectionFrame,
+    Observation,
+    Odometry,
+    Origin,
+    Overtaken,
+    Received,
+    RefusedFrame,
+    SafetyReport,
+)
+from iveg.domain.transports import DIRECT
+from iveg.vital.ingest import MAX_QUEUED, Ingest
+from tests.builders import (
+    detection_frame,
+    odometry,
+    origin,
+    received,
+    safety_report,
+    scan,
+)
+
+
+def ingest() -> Ingest:
+    return Ingest({"AGI", "AGII"}.__contains__)
+
+
+def test_what_arrives_leaves_in_the_same_order() -> None:
+    queue = ingest()
+    for seq in range(5):
+        queue.enqueue(received(odometry(origin=origin(seq))))
+
+    left = [one.observation for one in queue.drain()]
+
+    assert left == [odometry(origin=origin(seq)) for seq in range(5)]
+    assert list(queue.drain()) == []
+
+
+def test_the_queue_is_bounded_and_the_oldest_telemetry_gives_way() -> None:
+    queue = ingest()
+    for seq in range(MAX_QUEUED + 10):
+        queue.enqueue(received(odometry(x=float(seq))))
+
+    left = [one.observation for one in queue.drain()]
+
+    assert len(left) == MAX_QUEUED
+    assert left[0] == odometry(x=10.0)
+    assert queue.counters["dropped.Odometry"] == 10
+
+
+def test_safety_reports_answers_and_looks_never_give_way() -> None:
+    queue = ingest()
+    answer = CommandAnswer("AGI", Origin(), "id", "LATCHED")
+    precious: list[Observation] = [safety_report(), answer, detection_frame()]
+    for one in precious:
+        queue.enqueue(received(one))
+    for _ in range(MAX_QUEUED + 100):
+        queue.enqueue(received(scan()))
+
+    left = [one.observation for one in queue.drain()]
+
+    assert left[:3] == precious
+
+
+def test_f24_a_flood_of_telemetry_holds_back_no_safety_report() -> None:
+    queue = ingest()
+    for number in range(5000):
+        queue.enqueue(received(odometry()))
+        for _ in range(number % 100 == 0):
+            queue.enqueue(received(safety_report()))
+
+    kept = [isinstance(one.observation, SafetyReport) for one in queue.drain()]
+    assert kept.count(True) == 50
+
+
+def test_a_queue_of_nothing_but_safety_keeps_the_newest_of_each_robot() -> None:
+    queue = ingest()
+    queue.enqueue(received(safety_report("AGII")))
+    for seq in range(MAX_QUEUED + 5):
+        queue.enqueue(received(safety_report(origin=origin(seq))))
+
+    left = [one.observation for one in queue.drain()]
+
+    assert len(left) == MAX_QUEUED
+    assert left[0] == safety_report("AGII")
+    assert left[-1] == safety_report(origin=origin(MAX_QUEUED + 4))
+
+
+def test_a_flood_of_frames_keeps_the_newest_and_says_that_others_were_not_read() -> (
+    None
+):
+    queue = ingest()
+    for seq in range(50_000):
+        queue.enqueue(received(detection_frame(origin=origin(seq))))
+
+    assert queue.waiting == MAX_QUEUED
+    left = [one.observation for one in queue.drain()]
+    assert left[-2:] == [detection_frame(origin=origin(49_999)), RefusedFrame("AGI")]
+    assert list(queue.drain()) == []
+
+
+def test_a_flood_of_one_robots_frames_costs_no_other_robot_anything() -> None:
+    queue = ingest()
+    others = detection_frame("AGII"), odometry("AGII")
+    for one in others:
+        queue.enqueue(received(one))
+    for seq in range(MAX_QUEUED + 5):
+        queue.enqueue(received(detection_frame(origin=origin(seq))))
+
+    left = [one.observation for one in queue.drain()]
+    assert left[:2] == [*others]
+    assert RefusedFrame("AGII") not in left
+
+
+def test_an_unknown_robot_is_counted_each_time_and_logged_once(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    told: list[tuple[str, str]] = []
+    queue = Ingest({"AGI"}.__contains__, lambda *one: told.append(one))
+    for _ in range(10):
+        queue.enqueue(received(odometry("AGX")))
+
+    assert list(queue.drain()) == []
+    assert queue.counters["rejected.unknown_robot"] == 10
+    assert told == [("AGX", "unknown_robot")]
+    assert len(caplog.records) == 1
+
+
+async def test_who_waits_is_woken_by_what_arrives() -> None:
+    queue = ingest()
+    queue.enqueue(received(odometry()))
+
+    await queue.wait(timeout_s=60.0)
+
+    assert len(list(queue.drain())) == 1
+
+
+def test_what_was_asked_for_is_counted_apart_from_what_was_sent() -> None:
+    queue = ingest()
+
+    queue.enqueue(replace(received(odometry()), asked=True))
+    queue.enqueue(received(odometry()))
+    queue.enqueue(received(safety_report(), transport=DIRECT.id))
+
+    counted = {"asked.Odometry": 1, "fiware.Odometry": 1, "direct.SafetyReport": 1}
+    assert queue.counters == counted
+
+
+def test_a_robot_that_floods_drops_its_own_telemetry_and_no_other_robots() -> None:
+    queue = ingest()
+    quiet = [odometry("AGII", float(x)) for x in range(3)]
+    for one in quiet:
+        queue.enqueue(received(one))
+    for _ in range(MAX_QUEUED + 50):
+        queue.enqueue(received(odometry("AGI")))
+    queue.enqueue(received(safety_report("AGI")))
+
+    left = [one.observation for one in queue.drain()]
+
+    assert [one for one in left if one in quiet] == quiet
+    assert isinstance(left[-1], SafetyReport)
+    assert queue.counters["dropped.Odometry"] == 54
+
+
+def test_telemetry_drops_nothing_of_a_queue_that_holds_safety_alone() -> None:
+    queue = ingest()
+    for _ in range(MAX_QUEUED):
+        queue.enqueue(received(safety_report()))
+
+    queue.enqueue(received(odometry()))
+
+    assert len(list(queue.drain())) == MAX_QUEUED
+    assert queue.counters["dropped.Odometry"] == 1
+
+
+def test_a_message_that_waits_is_known_and_one_that_has_left_is_the_worlds() -> None:
+    queue = ingest()
+    queue.enqueue(received(detection_frame(origin=origin(7))))
+    waiting = queue.is_past("AGI", DetectionFrame, "boot-a", 7)
+    others = [
+        queue.is_past("AGI", DetectionFrame, "boot-a", 6),
+        queue.is_past("AGI", Odometry, "boot-a", 7),
+        queue.is_past("AGII", DetectionFrame, "boot-a", 7),
+    ]
+    list(queue.drain())
+
+    assert (waiting, others) == (True, [False] * 3)
+    assert not queue.is_past("AGI", DetectionFrame, "boot-a", 7)
+
+
+def test_what_orion_was_asked_for_hides_no_message() -> None:
+    queue = ingest()
+    queue.enqueue(replace(received(odometry(origin=origin(7))), asked=True))
+
+    assert not queue.is_past("AGI", Odometry, "boot-a", 7)
+
+
+def test_the_twin_of_a_picture_is_timed_and_counted_and_waits_for_nobody() -> None:
+    timed: list[Received] = []
+    queue = Ingest({"AGI"}.__contains__, passed=timed.append)
+    twin = received(Overtaken("AGI", origin(7), DetectionFrame))
+
+    queue.enqueue(twin)
+
+    assert (timed, queue.waiting) == ([twin], 0)
+    assert queue.counters["DetectionFrame.duplicate"] == 1
+
+
+@pytest.mark.parametrize(
+    "copy",
+    [
+        Overtaken("AGI", origin(7), Odometry),
+        Overtaken("AGI", replace(origin(7), replay="map"), DetectionFrame),
+    ],
+)
+def test_a_copy_that_the_world_must_know_of_waits_for_it(copy: Overtaken) -> None:
+    queue = ingest()
+
+    queue.enqueue(received(copy))
+
+    assert queue.waiting == 1
+
+
+def test_nobody_who_is_rejected_often_hides_the_rejection_of_another() -> None:
+    told: list[tuple[str, str]] = []
+    queue = Ingest({"AGI", "AGII"}.__contains__, lambda *one: told.append(one))
+    for number in range(600):
+        queue.reject(f"stranger-{number}", "bad_robot_id")
+        queue.reject(f"AGI_{number}", "bad_robot_id")
+
+    queue.reject("AGII_odom", "not_json")
+
+    assert len(told) == 1001
+    assert told[-1] == ("AGII_odom", "not_json")

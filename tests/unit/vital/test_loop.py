@@ -1,0 +1,194 @@
+"""One loop, one order: take what came, then let time pass."""
+
+import asyncio
+import itertools
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import Any
+
+import pytest
+
+from iveg.domain.observations import (
+    CommandAnswer,
+    HeartbeatProbe,
+    Origin,
+    Received,
+)
+from iveg.domain.transports import DIRECT, FIWARE
+from iveg.vital.evaluate import HEARTBEAT_S
+from iveg.vital.loop import TICK_S
+from iveg.vital.publish import MAX_PENDING
+from tests.builders import detection, detection_frame, odometry, origin
+from tests.unit.vital.desk import Desk, settle
+
+
+@asynccontextmanager
+async def running(desk: Desk) -> AsyncIterator[asyncio.Task[None]]:
+    """The loop of it, for as long as the test looks."""
+    task = asyncio.create_task(desk.loop.run())
+    yield task
+    task.cancel()
+    await asyncio.gather(task, return_exceptions=True)
+
+
+async def test_the_loop_takes_what_waits_without_being_called() -> None:
+    desk = Desk()
+    async with running(desk):
+        desk.ingest.enqueue(Received(odometry(), desk.clock()))
+
+        browser = desk.hub.join()
+        async with asyncio.timeout(30):
+            await browser.news()
+
+        assert "robots/AGI" in browser.drain_telemetry()
+
+
+def test_what_is_taken_is_shown_at_once_and_judged_with_the_next_judgement() -> None:
+    desk = Desk()
+    desk.drive("AGI")
+    desk.drive("AGII", 50.0)
+    desk.look("AGI")
+    near = detection_frame("AGI", detection(x=1.0), origin=desk.next_origin())
+    desk.hub.versions.clear()
+
+    desk.loop.take([Received(near, desk.clock())])
+    shown, limit = (
+        "detections/AGI" in desk.hub.versions,
+        desk.evaluator.speed_limits["AGI"],
+    )
+    desk.loop.step([], desk.clock())
+
+    assert (shown, limit.speed_factor) == (True, 1.0)
+    assert desk.evaluator.speed_limits["AGI"].speed_factor == 0.5
+
+
+async def test_pages_are_shown_what_came_before_the_fleet_is_judged() -> None:
+    desk = Desk()
+    browser = desk.hub.join()
+    desk.ingest.enqueue(Received(odometry(), desk.clock()))
+    async with running(desk):
+        async with asyncio.timeout(30):
+            await browser.news()
+        was_unjudged = desk.evaluator.is_unjudged
+        await settle()
+
+        assert (was_unjudged, desk.evaluator.is_unjudged) == (True, False)
+
+
+async def test_the_fleet_is_judged_however_much_comes_all_the_time(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    desk = Desk()
+    enqueue, apply = desk.ingest.enqueue, desk.evaluator.apply
+    shown = desk.hub.join()
+    numbers = itertools.count(1)
+
+    def more(*args: Any) -> bool:
+        said = odometry(origin=Origin("b", next(numbers)))
+        asyncio.get_running_loop().call_soon(enqueue, Received(said, desk.clock()))
+        return apply(*args)
+
+    monkeypatch.setattr(desk.evaluator, "apply", more)
+    enqueue(Received(odometry(origin=Origin("b", 0)), desk.clock()))
+    async with running(desk):
+        for _ in range(100):
+            await asyncio.sleep(0)
+
+        assert "robots/AGI" in shown.drain_telemetry()
+        assert desk.fleet.told
+
+
+def test_heartbeats_keep_their_pace_while_ticks_come_now_late_now_in_time() -> None:
+    desk = Desk()
+    desk.drive("AGI")
+    began, told = desk.clock().mono, len(desk.fleet.told)
+    for number in range(40):
+        desk.clock.now = began + number * TICK_S + 0.012 * (number % 4 < 2)
+        desk.loop.step([], desk.clock())
+
+    heartbeats = (len(desk.fleet.told) - told) / len(desk.evaluator.world.robots)
+    assert heartbeats == pytest.approx(40 * TICK_S / HEARTBEAT_S, abs=1)
+
+
+def test_time_passes_once_in_a_tick_however_much_arrives() -> None:
+    desk = Desk()
+    desk.drive("AGI")
+    ticked = len(desk.fleet.told)
+    for _ in range(20):
+        desk.loop.step([], desk.clock())
+
+    assert len(desk.fleet.told) == ticked
+
+
+async def test_the_second_transports_copy_of_an_answer_keeps_its_time() -> None:
+    desk = Desk()
+    (command,) = await desk.commander.stop(["AGI"], "ana", desk.clock())
+    await settle()
+    answer = CommandAnswer("AGI", Origin("b", 1), command.command_id, "LATCHED")
+    desk.hear(answer, DIRECT.id)
+    desk.clock.now = 0.3
+    desk.hear(answer, FIWARE.id)
+
+    assert desk.now(command).times.answered.get(DIRECT.id) is not None
+    assert desk.now(command).times.answered[FIWARE.id] == desk.clock()
+
+
+def test_the_heartbeat_that_came_back_is_evidence_for_the_chain() -> None:
+    desk = Desk()
+    desk.clock.now = 1.0
+
+    desk.hear(HeartbeatProbe(origin()))
+
+    assert desk.health_monitor.received_at == desk.clock().mono
+
+
+async def test_a_hop_that_breaks_and_mends_is_told_once_each_time() -> None:
+    desk = Desk()
+    desk.health_monitor.mqtt_connected = True
+    await desk.wait(0.1)
+    desk.health_monitor.mqtt_connected = False
+    await desk.wait(1.0)
+    desk.health_monitor.mqtt_connected = True
+    await desk.wait(1.0)
+
+    hops = [line.key for line in desk.event_log.lines if line.key.startswith("log.hop")]
+    assert hops == ["log.hop.down", "log.hop.back"]
+
+
+async def test_health_is_told_every_second() -> None:
+    desk = Desk()
+    before = desk.hub.versions["health"]
+
+    await desk.wait(5.0)
+
+    assert desk.hub.versions["health"] - before >= 5
+
+
+def test_a_browser_gets_the_newest_of_each_topic_and_every_event() -> None:
+    hub = Desk().hub
+    browser = hub.join()
+    for number in range(3):
+        hub.changed("robots/AGI")
+        hub.append("log", number)
+
+    assert browser.drain_events() == [("log", 0), ("log", 1), ("log", 2)]
+    assert browser.drain_telemetry() == ["robots/AGI"]
+
+
+async def test_a_browser_that_lets_events_pile_up_is_marked_and_keeps_no_more() -> None:
+    hub = Desk().hub
+    browser = hub.join()
+    for number in range(MAX_PENDING + 1):
+        hub.append("log", number)
+
+    assert browser.overflowed
+    assert len(browser.pending) == MAX_PENDING
+
+
+def test_log_numbers_grow_also_over_a_restart() -> None:
+    first, later = Desk(), Desk()
+    first.drive("AGI")
+    later.event_log._next_id = int(1000 * (first.clock().wall + 10))
+    later.drive("AGI")
+
+    assert later.event_log.lines[0].id > first.event_log.lines[-1].id

@@ -1,0 +1,142 @@
+import dataclasses
+
+from iveg.domain.records import RECORD_TYPES, Record, is_telemetry
+from iveg.vital.record import OdometryThinner, RecordQueue, Waiting
+from tests.fakes.records import (
+    NOON,
+    alert_record,
+    audit_record,
+    climate_record,
+    command_event_record,
+    command_record,
+    decision_record,
+    detection_record,
+    log_record,
+    measurement_record,
+    odometry_record,
+)
+
+KEPT = (
+    alert_record(),
+    audit_record(),
+    command_event_record(),
+    command_record(),
+    decision_record(),
+    log_record(),
+)
+
+
+def waiting(record: Record, since: float = 0.0) -> Waiting:
+    return Waiting(record, 1, since)
+
+
+def queue_of(capacity: int, *records: Record) -> RecordQueue:
+    queue = RecordQueue(capacity)
+    for since, record in enumerate(records):
+        queue.enqueue(waiting(record, float(since)))
+    return queue
+
+
+def records(batch: list[Waiting]) -> list[Record]:
+    return [one.record for one in batch]
+
+
+def test_only_telemetry_may_be_dropped() -> None:
+    assert is_telemetry(odometry_record())
+    assert is_telemetry(detection_record())
+    assert is_telemetry(climate_record())
+    assert not any(is_telemetry(record) for record in KEPT)
+    assert is_telemetry(measurement_record())
+    assert len(RECORD_TYPES) == len(KEPT) + 5
+
+
+def test_a_full_queue_drops_its_oldest_telemetry_and_counts_it() -> None:
+    queue = queue_of(2, odometry_record(x=1.0), odometry_record(x=2.0))
+
+    queue.enqueue(waiting(odometry_record(x=3.0)))
+
+    assert queue.dropped == 1
+    assert records(queue.dequeue(10)) == [
+        odometry_record(x=2.0),
+        odometry_record(x=3.0),
+    ]
+
+
+def test_telemetry_makes_room_for_what_may_not_be_lost() -> None:
+    queue = queue_of(2, odometry_record(), detection_record(), *KEPT)
+
+    assert {*map(type, records(queue.dequeue(10)))} <= {*map(type, KEPT)}
+    assert queue.dropped == len(KEPT)
+
+
+def test_orders_stay_even_when_there_is_no_room() -> None:
+    queue = queue_of(1, *KEPT)
+
+    assert records(queue.dequeue(10)) == [command_event_record(), command_record()]
+    assert queue.dropped == len(KEPT) - 2
+
+
+def test_what_may_not_be_lost_is_taken_first() -> None:
+    queue = queue_of(10, odometry_record(), command_record())
+
+    assert records(queue.dequeue(1)) == [command_record()]
+    assert records(queue.dequeue(1)) == [odometry_record()]
+    assert queue.dequeue(1) == []
+
+
+def test_what_is_put_back_stands_where_it_stood() -> None:
+    queue = queue_of(
+        10, odometry_record(x=1.0), odometry_record(x=2.0), odometry_record(x=3.0)
+    )
+
+    queue.put_back(queue.dequeue(2))
+
+    xs = [getattr(record, "x", None) for record in records(queue.dequeue(10))]
+    assert xs == [1.0, 2.0, 3.0]
+
+
+def test_the_queue_knows_how_long_its_oldest_record_waits() -> None:
+    queue = queue_of(10, odometry_record(), command_record())
+
+    assert queue.oldest_since() == 0.0
+    queue.dequeue(2)
+    assert queue.oldest_since() is None
+
+
+def test_odometry_is_thinned_to_two_a_second_for_each_robot() -> None:
+    thinner = OdometryThinner()
+    ticks = [
+        odometry_record(robot_id=robot, at=NOON + tick / 20)
+        for tick in range(201)
+        for robot in ("AGI", "AGII")
+    ]
+
+    kept = [one for one in ticks if thinner.thin(one) is not None]
+
+    assert sum(one.robot_id == "AGI" for one in kept) == 21
+    assert sum(one.robot_id == "AGII" for one in kept) == 21
+
+
+def test_every_change_of_what_a_robot_is_told_or_applies_is_kept() -> None:
+    thinner = OdometryThinner()
+    first = odometry_record(at=NOON)
+    changes = [
+        dataclasses.replace(first, at=NOON + 0.01, limit_factor=0.5),
+        dataclasses.replace(
+            first, at=NOON + 0.02, limit_factor=0.5, applied_factor=0.5
+        ),
+        dataclasses.replace(
+            first, at=NOON + 0.03, limit_factor=0.5, applied_factor=0.5, link="LATE"
+        ),
+    ]
+
+    kept = [thinner.thin(one) for one in [first, *changes, changes[-1]]]
+
+    assert kept == [first, *changes, None]
+
+
+def test_a_clock_that_was_set_back_does_not_silence_a_robot() -> None:
+    thinner = OdometryThinner()
+    thinner.thin(odometry_record(at=NOON))
+
+    assert thinner.thin(odometry_record(at=NOON - 3600.0)) is not None

@@ -1,0 +1,108 @@
+"""Many messages at once, and a detector that says more than can be judged."""
+
+import pytest
+
+from iveg.domain.observations import Observation, Received
+from iveg.vital.feedback import MOST_ALERTS
+from tests.builders import START, detection, detection_frame, odometry
+from tests.unit.vital.desk import Desk, conditions_of
+
+ALERT = "alert.pictures_not_judged"
+
+
+def driving(desk: Desk) -> Desk:
+    for robot_id, x in (("AGI", 0.0), ("AGII", 10.0)):
+        desk.drive(robot_id, x)
+        desk.look(robot_id)
+    return desk
+
+
+def stormed() -> Desk:
+    """AGI sends a hundred pictures within a tenth of a second."""
+    desk = driving(Desk())
+    for _ in range(100):
+        desk.clock.now += 0.001
+        desk.look("AGI")
+    return desk
+
+
+def arrive(desk: Desk, *observations: Observation) -> None:
+    now = desk.clock()
+    desk.loop.step([Received(one, now) for one in observations], now)
+
+
+def test_what_arrives_together_is_judged_and_told_once() -> None:
+    desk = driving(Desk())
+    desk.clock.now = 0.01
+    before = len(desk.fleet.told)
+    somebody = detection(x=0.5, y=0.0)
+    arrive(
+        desk,
+        odometry("AGI", 0.1, origin=desk.next_origin()),
+        odometry("AGII", 1.0, origin=desk.next_origin()),
+        detection_frame("AGI", somebody, origin=desk.next_origin()),
+        detection_frame("AGII", somebody, origin=desk.next_origin()),
+    )
+    assert len(desk.fleet.told) - before == len(desk.world.robots)
+    assert {one.speed_factor for one in desk.evaluator.speed_limits.values()} == {0.5}
+
+
+def test_who_must_slow_down_is_told_at_once_and_the_rest_thirty_times_a_second() -> (
+    None
+):
+    desk = driving(Desk())
+    told = []
+    for tick in range(200):
+        desk.clock.now = 0.1 + tick * 0.005
+        before = len(desk.fleet.told)
+        desk.look("AGI", detection(x=0.5 + 0.004 * tick, y=100.0 * (tick % 2)))
+        told.append(len(desk.fleet.told) > before)
+    slowed_at = next(one.entered.mono for one in desk.evaluator.entries)
+    assert slowed_at == pytest.approx(START.mono + 0.1)
+    assert told[0]
+    assert sum(told) <= 8 + 31
+
+
+async def test_a_storm_slows_who_is_near_raises_one_alert_and_is_counted() -> None:
+    desk = stormed()
+    await desk.wait(0.05)
+    assert [one.speed_factor for one in desk.evaluator.speed_limits.values()] == [
+        0.5,
+        0.5,
+    ]
+    assert desk.evaluator.speed_limits["AGII"].cause == "AGI"
+    assert list(conditions_of(desk)).count(ALERT) == 1
+    assert desk.world.counters["pictures.not_judged"] >= 40
+
+
+async def test_it_is_over_a_second_after_the_last_that_was_not_judged() -> None:
+    desk = stormed()
+    await desk.wait(1.05)
+    for robot_id, x in (("AGI", 0.0), ("AGII", 10.0)):
+        desk.drive(robot_id, x)
+        desk.look(robot_id)
+    await desk.wait(0.05)
+    assert [one.speed_factor for one in desk.evaluator.speed_limits.values()] == [
+        1.0,
+        1.0,
+    ]
+    assert ALERT in conditions_of(desk)
+    await desk.wait(9.5)
+    assert ALERT not in conditions_of(desk)
+
+
+async def test_nobody_who_is_known_is_dropped_and_robots_can_read_what_they_hear() -> (
+    None
+):
+    desk = driving(Desk())
+    desk.look("AGI", detection(x=0.5, y=0.0))
+    for turn in range(40):
+        desk.clock.now += 0.05
+        crowd = (detection(x=3.0 * n, y=10.0 + 7.0 * turn) for n in range(20))
+        desk.look("AGII", *crowd)
+    await desk.wait(0.1)
+    known = desk.evaluator.people.known
+    assert next(iter(known)) == "P1"
+    assert desk.world.counters["people.turned_away"] > 0
+    assert len(desk.fleet.told[-1].alerts) <= MOST_ALERTS
+    assert ALERT in conditions_of(desk)
