@@ -83,6 +83,7 @@ class Field:
             desk.ingest.enqueue,
             desk.ingest.reject,
             is_past=desk.ingest.is_past,
+            is_early=desk.ingest.is_early,
         )
         self.stage = Stage(
             self.world,
