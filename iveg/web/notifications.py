@@ -4,6 +4,7 @@ Hundreds come in a second, so this is plain ASGI beside the layers that pages ne
 its own limit and secret.  Refusals look like those of the rest of the application.
 """
 
+import asyncio
 from collections.abc import Callable, Container, Mapping, Sequence
 from functools import partial
 from typing import Final
@@ -24,6 +25,9 @@ from iveg.web.security.roles import Action
 from iveg.web.security.secrets import NotifySecret
 
 Recorded = Callable[[bytes, Instant, Sequence[Observation]], None]
+A_TURN: Final = 4
+"""Read in one turn of the loop, which reads one message of each MQTT connection: what
+comes straight from a robot must not wait behind copies."""
 _TAKEN = Response(status_code=204)
 _FORGED = Problem(401, "The notification secret is wrong.")
 
@@ -70,6 +74,7 @@ class NotificationEndpoint:
         self._measured = measured
         self._recorded = recorded
         self._is_former = is_former
+        self._turn = asyncio.Semaphore(A_TURN)
 
     def route(self) -> Route:
         """Its place in the application's table of routes."""
@@ -86,8 +91,12 @@ class NotificationEndpoint:
             body = await _body(receive)
             if body is None:
                 return
-            is_too_long = len(body) > MAX_BODY
-            problem = Problem(413, TOO_LONG) if is_too_long else self.receive(body)
+            if len(body) > MAX_BODY:
+                problem = Problem(413, TOO_LONG)
+            else:
+                async with self._turn:
+                    await asyncio.sleep(0)
+                    problem = self.receive(body)
         answer = _TAKEN if problem is None else problem.response()
         await answer(scope, receive, send)
 
