@@ -20,8 +20,6 @@ HORIZON_S = FORESIGHT_MOST_S
 _STEP_S = 0.1
 AHEAD_S: _Floats = np.arange(0.0, HORIZON_S + _STEP_S / 2, _STEP_S)
 """The moments of a path (s)."""
-HOLDS_S = 2.0
-"""A robot that is slow for a zone stays so while it lies so far ahead (s)."""
 EVERY_S = 0.2
 """Encounters are looked for five times a second."""
 MOVES_M_S = 0.05
