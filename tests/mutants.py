@@ -237,7 +237,7 @@ MUTANTS = (
     ),
     Mutant(
         "clear: a frame of another clock proves that a detector works",
-        "if abs(transit - odometry.newest) > LIMITS.ring_lasts_s:",
+        "if abs(transit - odometry.newest) > LIMITS.zone_lasts_s:",
         "if False:",
         ("unit/domain/test_clocks.py",),
     ),

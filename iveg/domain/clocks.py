@@ -201,7 +201,7 @@ class RobotClock:
         if odometry is None or odometry.newest is None or origin.stamp_s is None:
             return 0.0
         transit = now - origin.stamp_s
-        if abs(transit - odometry.newest) > LIMITS.ring_lasts_s:
+        if abs(transit - odometry.newest) > LIMITS.zone_lasts_s:
             return None
         return max(
             0.0, transit - (transit if odometry.least is None else odometry.least)

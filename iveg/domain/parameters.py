@@ -136,12 +136,12 @@ class Parameters:
         word="threshold",
     )
     radius_m: ByClass = _row(
-        ByClass(LIMITS.ring_default_m),
+        ByClass(LIMITS.zone_default_m),
         key="radius_m",
         class_key="class_radii_m",
         unit="m",
-        least=LIMITS.ring_least_m,
-        most=LIMITS.ring_most_m,
+        least=LIMITS.zone_least_m,
+        most=LIMITS.zone_most_m,
         protects="more",
         variable="IVEG_SAFETY_RADIUS_M",
         says="Zone round a person or peer while fresh, inclusive (m).",

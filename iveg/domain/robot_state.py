@@ -262,7 +262,7 @@ class RobotState:
         if not poses:
             return None
         newest_s = poses[-1][0]
-        if stamp_s is None or not newest_s - LIMITS.ring_lasts_s <= stamp_s < newest_s:
+        if stamp_s is None or not newest_s - LIMITS.zone_lasts_s <= stamp_s < newest_s:
             return poses[-1][1]
         index = bisect_left(poses, stamp_s, key=lambda entry: entry[0])
         if index == 0:

@@ -318,7 +318,7 @@ class Witness:
         """Returns near the robot that nothing explains; shape (n, 2), in ``map``."""
         x, y = scan.points(Pose2D(0.0, 0.0, 0.0)).astype(np.float64).T
         gap = self._outline.gap_to(x, y)
-        near = (gap > 0.0) & (gap <= LIMITS.ring_default_m)
+        near = (gap > 0.0) & (gap <= LIMITS.zone_default_m)
         away = np.hypot(x, y)[near]
         farthest = float(away.max(initial=0.0))
         x, y = _moved(x[near], y[near], pose)

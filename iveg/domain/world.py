@@ -314,7 +314,7 @@ class OtherAuthors:
                 boot
                 for one in self._heard.values()
                 if one.news[1] - one.news[0] >= SPOKEN_FOR_S
-                and now.mono - one.news[1] <= LIMITS.ring_lasts_s
+                and now.mono - one.news[1] <= LIMITS.zone_lasts_s
                 for boot in one.others
             }
         )

@@ -100,7 +100,7 @@ class DetectionTracking:
         detector, has_pose = robot.detector, robot.odometry is not None
         seen_at = robot.sighted_at or received.at
         late = verdict == "late" and not received.asked
-        protects = late and received.at.mono - seen_at.mono <= LIMITS.ring_lasts_s
+        protects = late and received.at.mono - seen_at.mono <= LIMITS.zone_lasts_s
         if verdict != "new" and not protects:
             return
         if not detector.admits_frame(received.at):
@@ -249,7 +249,7 @@ class DetectionTracking:
             self._logged_at = {
                 key: at
                 for key, at in self._logged_at.items()
-                if now.mono - at < LIMITS.ring_lasts_s
+                if now.mono - at < LIMITS.zone_lasts_s
             }
 
 

@@ -85,7 +85,7 @@ class _Unmet:
             _condition(reason, observer.robot_id),
             observer.recording,
             observer.possible_poses(),
-            observer.profile.camera_range + LIMITS.ring_most_m,
+            observer.profile.camera_range + LIMITS.zone_most_m,
         )
 
     def concerns(

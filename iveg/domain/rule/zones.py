@@ -97,7 +97,7 @@ def _zone_of_peer(
     age = max(0.0, now.mono - since)
     known = peer.age_s(now)
     at_rest = peer.stands and known is not None and known <= LIMITS.silence_s
-    if at_rest or age > LIMITS.ring_lasts_s:
+    if at_rest or age > LIMITS.zone_lasts_s:
         return
     pose, name, radius = peer.odometry.pose, peer.robot_id, rule.radius_at(age, "robot")
     fresh_m = rule.radius_m.of("robot")

@@ -117,7 +117,7 @@ class Sighting:
     @property
     def lasts_s(self) -> float:
         """Age up to which it has a zone (s)."""
-        return LASER_LASTS_S if self.laser else LIMITS.ring_lasts_s
+        return LASER_LASTS_S if self.laser else LIMITS.zone_lasts_s
 
     def age_s(self, now: Instant) -> float:
         """Seconds since the sighting."""

@@ -321,7 +321,7 @@ class Tracker:
             for earlier in person.sightings
             if earlier.observer == observer
             and earlier.chain > 0
-            and earlier.age_s(at) <= LIMITS.ring_lasts_s
+            and earlier.age_s(at) <= LIMITS.zone_lasts_s
         ]
         for is_live in (True, False):
             wanting = [index for index in first_places(picture) if out[index] is None]
@@ -426,7 +426,7 @@ class Tracker:
         kept = tuple(
             earlier
             for earlier in person.sightings
-            if earlier.age_s(at) <= LIMITS.ring_lasts_s
+            if earlier.age_s(at) <= LIMITS.zone_lasts_s
             and not is_replaced(earlier, sighting, at)
         )
         later = sighting.at.mono > person.newest.at.mono
@@ -434,7 +434,7 @@ class Tracker:
         is_beside = sighting.laser and not person.newest.laser
         is_beside &= person.age_s(at) <= LIMITS.seen_s
         newest = sighting if later and not is_beside else person.newest
-        had_ring = person.age_s(at) <= LIMITS.ring_lasts_s
+        had_ring = person.age_s(at) <= LIMITS.zone_lasts_s
         decision_id = person.decision_id if had_ring else one.decision_id
         self.known[track] = person.seen_as(newest, (*kept, sighting), decision_id)
         return track

@@ -11,7 +11,7 @@ from iveg.domain.rule.clear import ClearCondition
 from tests.builders import at
 from tests.unit.domain.scene import Scene
 
-REACH_M = 8.0 + LIMITS.ring_most_m
+REACH_M = 8.0 + LIMITS.zone_most_m
 """Of AGI's camera, and beyond."""
 
 
