@@ -195,8 +195,8 @@ MUTANTS = (
     ),
     Mutant(
         "freshness: a robot that is not seen keeps its speed",
-        "return age is not None and age <= LIMITS.silence_s",
-        "return age is not None",
+        "if age is None or age > LIMITS.silence_s:",
+        "if age is None:",
         ("unit/domain/rule/test_judge.py",),
     ),
     Mutant(
@@ -219,8 +219,8 @@ MUTANTS = (
     ),
     Mutant(
         "clear: what is missing concerns its own robot alone",
-        "if self.observer is robot:\n            return True",
-        "if True:\n            return self.observer is robot",
+        "if observer is robot:\n        return True",
+        "if True:\n        return observer is robot",
         ("unit/domain/rule/test_clear.py",),
     ),
     Mutant(
@@ -358,8 +358,8 @@ MUTANTS = (
     ),
     Mutant(
         "rule: the second place of a box is counted as somebody else",
-        "return index if self.same_as is None else self.same_as",
-        "return index",
+        "first.setdefault(out[index].index, number),",
+        "number,",
         ("unit/domain/tracking/test_frames.py",),
     ),
     Mutant(

@@ -14,10 +14,9 @@ from iveg.domain.limits import LIMITS
 from iveg.domain.observations import DetectionFrame, Instant, Received, SafetyReport
 from iveg.domain.robot_state import RobotState
 from iveg.domain.stream_order import OrderVerdict
-from iveg.domain.tracking.blind import BlindCameras
 from iveg.domain.tracking.people import People, Placed
 from iveg.domain.tracking.person import TrackedPerson
-from iveg.domain.tracking.sight import Look, OwnSight
+from iveg.domain.tracking.sight import BlindCameras, Look, OwnSight
 from iveg.domain.words import HeardWords, meaning_of, name_numbers, plain
 from iveg.domain.world import World
 from iveg.vital import topics

@@ -22,11 +22,12 @@ from iveg.domain.observations import (
 )
 from iveg.domain.parameters import Class
 from iveg.domain.robot_state import RobotState
-from iveg.domain.tracking.calibration import Calibration, Calibrations
 from iveg.domain.tracking.looks import (
     FAINT_FROM,
     KEPT_FROM,
     MOST_SUSPECTS,
+    Calibration,
+    Calibrations,
     FaintPerson,
     Looks,
     Suspicions,
@@ -224,20 +225,7 @@ class People:
         self.turned_away = tracks.count(None)
         for index, track in zip(wanting, tracks, strict=True):
             if track is not None:
-                one = out[index]
-                # For each box of each picture: ``replace`` takes twice as long.
-                out[index] = Placed(
-                    one.detection,
-                    one.framed,
-                    one.index,
-                    one.position,
-                    one.kind,
-                    one.class_,
-                    self.known[track],
-                    looks=one.looks,
-                    possible=one.possible,
-                    doubtful=one.doubtful,
-                )
+                out[index] = replace(out[index], person=self.known[track])
         return out
 
     def witness(
@@ -252,7 +240,7 @@ class People:
             return None
         name, x, y = report.robot_id, found.x, found.y
         seen = Sighting(name, x, y, _HEIGHT_M, at, LASER, EVEN, None, laser=True)
-        picture = [PlacedDetection("person", seen, f"{new_id}-0")]
+        picture = [PlacedDetection("person", seen, f"{new_id}-0", 0)]
         (track,) = self._tracker.track_picture(picture, at)
         return None if track is None else self.known[track]
 
@@ -297,17 +285,7 @@ def _looked_at(one: Placed, looks: Looks | None) -> Placed:
         return one
     possible = one.kind == "faint" and looks.confirmed
     kind = "alert" if possible else one.kind
-    # For each person of each picture: ``replace`` takes twice as long.
-    return Placed(
-        one.detection,
-        one.framed,
-        one.index,
-        one.position,
-        kind,
-        one.class_,
-        looks=looks,
-        possible=possible,
-    )
+    return replace(one, kind=kind, looks=looks, possible=possible)
 
 
 def _is_possible(one: Placed) -> bool:

@@ -130,26 +130,9 @@ class Sighting:
         vx, vy = (0.0, 0.0) if before is None else self._going_on(before)
         x, y = self.x, self.y
         extent = Extent(Rectangle(x, y, x, y), self.confidence, math.hypot(vx, vy))
-        # Made for each box of each picture: ``replace`` takes three times as long.
-        return Sighting(
-            self.observer,
-            self.x,
-            self.y,
-            self.z,
-            self.at,
-            self.class_id,
-            self.confidence,
-            self.looks,
-            self.reach_m,
-            chain,
-            self.recording,
-            vx,
-            vy,
-            self.possible,
-            self.laser,
-            extent if before is None else extent.joined(before.extent),
-            beyond_m=self.beyond_m,
-        )
+        if before is not None:
+            extent = extent.joined(before.extent)
+        return replace(self, chain=chain, vx=vx, vy=vy, extent=extent)
 
     def in_track(self, person: "TrackedPerson") -> "Sighting":
         """The same, of a chain that begins in a track that is known."""
@@ -167,13 +150,8 @@ class Sighting:
         gain = after_s / (_SMOOTHED_S + after_s)
         vx = before.vx + gain * ((self.x - before.x) / after_s - before.vx)
         vy = before.vy + gain * ((self.y - before.y) / after_s - before.vy)
-        return of_a_walker(vx, vy)
-
-
-def of_a_walker(vx: float, vy: float) -> tuple[float, float]:
-    """A velocity, no faster than anybody walks (m/s)."""
-    least = min(1.0, LIMITS.walking_m_s / max(math.hypot(vx, vy), 1e-9))
-    return vx * least, vy * least
+        least = min(1.0, LIMITS.walking_m_s / max(math.hypot(vx, vy), 1e-9))
+        return vx * least, vy * least
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,7 +161,6 @@ class TrackedPerson:
     Attributes:
         person_id: Of the track: the same person as long as iVeg can tell.
         sightings: The newest of each chain of sightings; each has a zone of its own.
-        number: Counts tracks in the order of their appearance.
     """
 
     person_id: str
@@ -192,7 +169,6 @@ class TrackedPerson:
     first_seen: Instant
     newest: Sighting
     sightings: tuple[Sighting, ...]
-    number: int = 0
 
     def age_s(self, now: Instant) -> float:
         """Seconds since the newest sighting by any robot."""
@@ -216,29 +192,6 @@ class TrackedPerson:
         """Whether every zone is one of looks alone."""
         zones = self.sightings
         return bool(zones) and all(one.possible for one in zones)
-
-    def seen_as(
-        self,
-        newest: Sighting,
-        sightings: tuple[Sighting, ...],
-        decision_id: str | None = None,
-    ) -> "TrackedPerson":
-        """The same person, seen otherwise.
-
-        Args:
-            newest: The newest sighting.
-            sightings: The newest of each chain.
-            decision_id: Of a new alert, if any.
-        """
-        return TrackedPerson(
-            self.person_id,
-            self.class_,
-            decision_id or self.decision_id,
-            self.first_seen,
-            newest,
-            sightings,
-            self.number,
-        )
 
     def stage(self, now: Instant) -> Stage:
         """The stage of life of the newest sighting."""
