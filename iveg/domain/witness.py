@@ -1,4 +1,4 @@
-"""The laser as a second witness: what stands near a robot and nobody has explained.
+"""The laser as a second witness: obstacles near a robot that nobody has explained.
 
 A camera sees less than half of the people beside a robot; its laser sees most of the
 others.  Of a scan those returns count that are within two metres of the robot's outline
@@ -8,8 +8,6 @@ plan draws what stands there only the robot's own path counts, or every row woul
 it.
 
 A witness only adds: it lifts no limit, and finds no spot empty.
-
-Something near a robot that its laser sees and nobody explains.
 """
 
 import math
@@ -37,24 +35,6 @@ tows, nor the part of a wall that it sees as it passes."""
 _WALKS_M_S = (0.3, 2.5)
 _STANDS_S = 10.0
 """Who walked and stands since is still somebody, for as long as a ring lasts."""
-
-
-@dataclass(frozen=True, slots=True)
-class Body:
-    """Neighbouring returns of one scan that nobody explained.
-
-    Attributes:
-        x: Their middle in ``map`` (m); ``y`` likewise.
-        size_m: From the first to the last.
-        gap_m: From the robot's outline to the nearest.
-        beside: Their middle in the robot's ``base_link`` (m).
-    """
-
-    x: float
-    y: float
-    size_m: float
-    gap_m: float
-    beside: tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,12 +67,6 @@ class Obstacle:
     passed_m: float = 0.0
     walked_at: float = -math.inf
 
-    @classmethod
-    def new(cls, body: Body, now: float) -> "Obstacle":
-        """Something that is seen for the first time."""
-        x, y = body.x, body.y
-        return cls(x, y, x, y, body.size_m, body.gap_m, now, now, body.beside)
-
     @property
     def way_m(self) -> float:
         """How far it is from where it was first (m)."""
@@ -120,22 +94,22 @@ class Obstacle:
             and least <= math.hypot(self.vx, self.vy) <= most
         )
 
-    def seen_again(self, body: Body, now: float) -> "Obstacle":
-        """The same, seen again."""
-        gain = (now - self.at) / (_SMOOTHED_S + now - self.at)
-        after_s = max(now - self.at, 1e-3)
+    def seen_again(self, found: "Obstacle") -> "Obstacle":
+        """The obstacle with what a later scan found of it."""
+        after_s = found.at - self.at
+        gain, apart_s = after_s / (_SMOOTHED_S + after_s), max(after_s, 1e-3)
         seen = replace(
             self,
-            x=body.x,
-            y=body.y,
-            size_m=body.size_m,
-            gap_m=body.gap_m,
-            at=now,
-            vx=self.vx + gain * ((body.x - self.x) / after_s - self.vx),
-            vy=self.vy + gain * ((body.y - self.y) / after_s - self.vy),
-            passed_m=math.dist(body.beside, self.first_seen),
+            x=found.x,
+            y=found.y,
+            size_m=found.size_m,
+            gap_m=found.gap_m,
+            at=found.at,
+            vx=self.vx + gain * ((found.x - self.x) / apart_s - self.vx),
+            vy=self.vy + gain * ((found.y - self.y) / apart_s - self.vy),
+            passed_m=math.dist(found.first_seen, self.first_seen),
         )
-        return replace(seen, walked_at=now) if seen.walks else seen
+        return replace(seen, walked_at=found.at) if seen.walks else seen
 
     @property
     def fits(self) -> bool:
@@ -214,15 +188,6 @@ class Plan:
             nearest = np.minimum(nearest, _from_posts(self.posts, x, y).min(0))
         return nearest
 
-    def about(self, pose: Pose2D, reach_m: float) -> "Plan":
-        """The part of it that is within reach of a place."""
-        x, y = np.array([pose.x]), np.array([pose.y])
-        return Plan(
-            self.bounds,
-            self.rectangles[_from_areas(self.rectangles, x, y)[:, 0] <= reach_m],
-            self.posts[_from_posts(self.posts, x, y)[:, 0] <= reach_m],
-        )
-
 
 def _from_areas(areas: _Floats, x: _Floats, y: _Floats) -> _Floats:
     """How far points are from rectangles (m); shape (rectangles, points)."""
@@ -293,7 +258,8 @@ class Witness:
         if self._plan is None or not self._plan.is_drawn:
             bodies = [one for one in bodies if self._is_ahead(one, pose, twist)]
         earlier = [one for one in self._known if now - one.at <= GONE_S]
-        seen = [self._joined(body, earlier, pose, now) for body in bodies]
+        found = [self._measured(body, pose, now) for body in bodies]
+        seen = [self._joined(one, earlier) for one in found]
         self._known = (*seen, *earlier)
 
     def present(self, now: float) -> list[Obstacle]:
@@ -320,13 +286,11 @@ class Witness:
         gap = self._outline.gap_to(x, y)
         near = (gap > 0.0) & (gap <= LIMITS.zone_default_m)
         away = np.hypot(x, y)[near]
-        farthest = float(away.max(initial=0.0))
         x, y = _moved(x[near], y[near], pose)
         left = np.ones(x.shape, np.bool_)
         if self._plan is not None:
             blurred = PLAN_M + abs(twist.angular_z) * _TURN_S * away
-            plan = self._plan.about(pose, farthest + 2 * PLAN_M)
-            left = plan.distance_to(x, y) > blurred
+            left = self._plan.distance_to(x, y) > blurred
         for one in known:
             ahead, aside = _seen_from(one.pose, np.column_stack((x, y)))
             if one.stands:
@@ -341,35 +305,31 @@ class Witness:
         ahead = (x > 0.0) == (twist.linear_x >= 0.0)
         return bool(np.any(ahead & (np.abs(y) <= self._outline.width / 2 + _BESIDE_M)))
 
-    def _joined(
-        self, body: _Floats, earlier: list[Obstacle], pose: Pose2D, now: float
-    ) -> Obstacle:
-        """A body as the nearest earlier obstacle that it may be, or a new one.
+    def _joined(self, found: Obstacle, earlier: list[Obstacle]) -> Obstacle:
+        """The nearest earlier obstacle that it may be, seen again; else it is new.
 
         That one is taken out of ``earlier``.
         """
-        found = self._measured(body, pose)
-        x, y = found.x, found.y
-        near = min(
-            earlier, key=lambda one: math.hypot(one.x - x, one.y - y), default=None
-        )
-        if near is not None:
-            reach = _APART_M + LIMITS.walking_m_s * (now - near.at)
-            if math.hypot(near.x - x, near.y - y) <= reach:
-                earlier.remove(near)
-                return near.seen_again(found, now)
-        return Obstacle.new(found, now)
 
-    def _measured(self, body: _Floats, pose: Pose2D) -> Body:
+        def away(one: Obstacle) -> float:
+            return math.hypot(one.x - found.x, one.y - found.y)
+
+        near = min(earlier, key=away, default=None)
+        if near is None:
+            return found
+        if away(near) > _APART_M + LIMITS.walking_m_s * (found.at - near.at):
+            return found
+        earlier.remove(near)
+        return near.seen_again(found)
+
+    def _measured(self, body: _Floats, pose: Pose2D, now: float) -> Obstacle:
+        """Neighbouring returns as an obstacle that is seen for the first time."""
         x, y = (float(one) for one in body.mean(0))
         ahead, aside = _seen_from(pose, body)
-        return Body(
-            x,
-            y,
-            float(np.hypot(*np.ptp(body, axis=0))),
-            float(self._outline.gap_to(ahead, aside).min()),
-            (float(ahead.mean()), float(aside.mean())),
-        )
+        size_m = float(np.hypot(*np.ptp(body, axis=0)))
+        gap_m = float(self._outline.gap_to(ahead, aside).min())
+        beside = float(ahead.mean()), float(aside.mean())
+        return Obstacle(x, y, x, y, size_m, gap_m, now, now, beside)
 
 
 def _moved(x: _Floats, y: _Floats, frame: Pose2D) -> tuple[_Floats, _Floats]:
