@@ -59,8 +59,6 @@ class TrackNumbers:
 
 _NEVER = 1e9
 """Stands for a pair that cannot be; far above any sum of distances (m)."""
-_PLAINLY = 1e-3
-"""So much cheaper (m) is cheaper, however sums beside ``_NEVER`` are rounded."""
 _FREE = -1
 
 
@@ -75,34 +73,12 @@ def assign(costs: Sequence[Sequence[float]]) -> list[tuple[int, int]]:
     """
     if not costs or not costs[0]:
         return []
-    plain = _undisputed(costs)
-    if plain is not None:
-        return plain
     table = np.minimum(np.array(costs), _NEVER)
     if len(costs) > len(costs[0]):
         pairs = sorted((row, column) for column, row in _matched(table.T))
     else:
         pairs = _matched(table)
     return [(row, column) for row, column in pairs if math.isfinite(costs[row][column])]
-
-
-def _undisputed(costs: Sequence[Sequence[float]]) -> list[tuple[int, int]] | None:
-    """The pairs where each row has what is plainly its cheapest, no two the same.
-
-    Else None.  No other pairs are as many and as cheap: a row that had another column,
-    or none, would cost more.  So it is nearly always: each person in a picture is near
-    one place.
-    """
-    pairs = []
-    for row, offers in enumerate(costs):
-        least = min(offers)
-        if least >= _NEVER:
-            continue
-        if sum([cost < least + _PLAINLY for cost in offers]) > 1:
-            return None
-        pairs.append((row, offers.index(least)))
-    taken = {column for _, column in pairs}
-    return pairs if len(taken) == len(pairs) else None
 
 
 def _matched(costs: NDArray[np.float64]) -> list[tuple[int, int]]:
