@@ -129,11 +129,6 @@ def test_the_own_pose_is_told_before_a_doubt_and_a_doubt_before_a_detector() -> 
     )
 
 
-def test_the_first_that_is_missing_is_the_reason() -> None:
-    limit = doubted(fleet(5.0)).judge()["R0"]
-    assert (limit.reason, limit.cause) == ("doubt", "AGI")
-
-
 def test_what_a_recording_lacks_slows_recordings_of_its_frame_alone() -> None:
     scene = blinded(fleet(3.0, observer="AGI:recording"))
     assert factors(scene) == [0.5, 1.0]
