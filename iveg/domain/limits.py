@@ -175,7 +175,7 @@ def grown_radius(
     least: Callable[..., Any] = min,
     most: Callable[..., Any] = max,
 ) -> _OneOrMany:
-    """How wide the zone of a sighting is that is ``age_s`` old (m).
+    """Radius of the zone of a sighting that is ``age_s`` old (m).
 
     It keeps its size for as long as a healthy way takes, grows as fast as a person
     walks, and never shrinks.  ``numpy.minimum`` and ``numpy.maximum`` as ``least`` and

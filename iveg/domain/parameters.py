@@ -102,7 +102,7 @@ class Parameter:
         )
 
     def strictest(self, several: Iterable[Value]) -> Value:
-        """What protects as much as each of them, for whichever class."""
+        """The value that protects as much as each of them, for any class."""
         all_ = [one for value in several for one in values_of(value)]
         found = max(all_) if self.protects == "more" else min(all_)
         return ByClass(found) if self.class_key is not None else found

@@ -24,17 +24,17 @@ from iveg.domain.limits import LIMITS
 from iveg.domain.observations import LaserScan
 
 LASTS_S = 0.2
-"""What is shorter is noise, or an insect."""
+"""Anything shorter is noise, or an insect."""
 _LARGEST_M = 1.0
 """Two people side by side; what is larger is counted once it moves."""
 _MOVED_M = 0.4
 _SMOOTHED_S = 0.4
 _WALKED_M, _WALKED_S, _PASSED_M = 0.5, 0.5, 0.3
-"""Who walks goes so far, for so long, and so far as seen from the robot: not so what it
-tows, nor the part of a wall that it sees as it passes."""
+"""Least way, time, and way as seen from the robot, of somebody who walks: more than of
+what it tows, or of the part of a wall that it sees as it passes."""
 _WALKS_M_S = (0.3, 2.5)
 _STANDS_S = 10.0
-"""Who walked and stands since is still somebody, for as long as a ring lasts."""
+"""Somebody who walked and stands since counts for as long as a zone lasts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +69,7 @@ class Obstacle:
 
     @property
     def way_m(self) -> float:
-        """How far it is from where it was first (m)."""
+        """Distance from where it was seen first (m)."""
         return math.hypot(self.x - self.first_x, self.y - self.first_y)
 
     @property
@@ -138,7 +138,7 @@ _APART_M = 0.3
 """Returns of one body are not farther apart."""
 _LEAST_RETURNS = 2
 _BESIDE_M = 0.2
-"""Of the robot's own path, where there is no plan."""
+"""Margin beside the robot's own path, where there is no plan."""
 _TURN_OF_ONE_S = 0.1
 _EVERY_S = 0.09
 """Ten sweeps a second are enough, and leave the robot's processor alone."""
@@ -146,7 +146,7 @@ _EVERY_S = 0.09
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Plan:
-    """What stands in the greenhouse, in ``map`` (m).
+    """Outlines of the greenhouse and its rows, posts and obstacles, in ``map`` (m).
 
     Attributes:
         bounds: The outer wall.
@@ -176,7 +176,7 @@ class Plan:
         return len(self.rectangles) + len(self.posts) > 0
 
     def distance_to(self, x: _Floats, y: _Floats) -> _Floats:
-        """How far points, shape (n,), are from the nearest thing drawn (m)."""
+        """Distances of points, shape (n,), from the nearest thing drawn (m)."""
         area = self.bounds
         inside = np.minimum.reduce(
             (x - area.xmin, area.xmax - x, y - area.ymin, area.ymax - y)
@@ -190,7 +190,7 @@ class Plan:
 
 
 def _from_areas(areas: _Floats, x: _Floats, y: _Floats) -> _Floats:
-    """How far points are from rectangles (m); shape (rectangles, points)."""
+    """Distances of points from rectangles (m); shape (rectangles, points)."""
     xmin, ymin, xmax, ymax = areas.T[..., None]
     aside = np.maximum(np.maximum(xmin - x, x - xmax), 0.0)
     along = np.maximum(np.maximum(ymin - y, y - ymax), 0.0)
@@ -199,7 +199,7 @@ def _from_areas(areas: _Floats, x: _Floats, y: _Floats) -> _Floats:
 
 
 def _from_posts(posts: _Floats, x: _Floats, y: _Floats) -> _Floats:
-    """How far points are from posts (m); shape (posts, points)."""
+    """Distances of points from posts (m); shape (posts, points)."""
     post_x, post_y, radius = posts.T[..., None]
     away: _Floats = np.hypot(x - post_x, y - post_y) - radius
     return away
@@ -213,7 +213,7 @@ class Outline:
     width: float = CAUTIOUS.width
 
     def gap_to(self, x: _Floats, y: _Floats) -> _Floats:
-        """How far points in ``base_link``, shape (n,), are from it (m)."""
+        """Distances of points in ``base_link``, shape (n,), from it (m)."""
         ahead = np.maximum(np.abs(x) - self.length / 2, 0.0)
         aside = np.maximum(np.abs(y) - self.width / 2, 0.0)
         gap: _Floats = np.hypot(ahead, aside)
@@ -229,7 +229,7 @@ class KnownPeer:
 
 
 class Witness:
-    """What one robot's laser sees beside it.
+    """Laser tracks of the obstacles beside one robot.
 
     Args:
         outline: The robot's body.
@@ -263,7 +263,7 @@ class Witness:
         self._known = (*seen, *earlier)
 
     def present(self, now: float) -> list[Obstacle]:
-        """What counts and was there within the last half second."""
+        """Obstacles that count and were there within the last half second."""
         return [one for one in self._known if one.counts and now - one.at <= GONE_S]
 
     def obstacle(self, now: float) -> Obstacle | None:

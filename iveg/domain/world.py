@@ -94,7 +94,7 @@ class FeedbackLedger:
 SILENT_S = 1.0
 """A direct copy older than this is missed."""
 OVERTAKES_S = 0.2
-"""What comes through FIWARE that much after the last direct message is no twin."""
+"""A message through FIWARE so long after the last direct one is no twin."""
 
 
 @dataclass(slots=True)
@@ -136,7 +136,7 @@ class Feed:
 # and reordering are no contradictions.  docs/safety.md, "Doubt", has the table.
 
 Code = Literal["pose_outside", "too_fast", "jumped"]
-"""Beside those of :mod:`~iveg.domain.motion`."""
+"""Contradictions, beside those of :mod:`~iveg.domain.motion`."""
 
 ANY_ROBOT_M_S, ANY_ROBOT_RAD_S = 10.0, 10.0
 """Faster than any robot in a greenhouse: the bound of one that nobody described."""
@@ -159,7 +159,7 @@ class _Anchor:
     at: float
 
     def passed_s(self, later: Origin, now: float) -> float:
-        """How long ago it was measured at most, when ``later`` was (s)."""
+        """Longest time since it was measured, when ``later`` was (s)."""
         earlier, arrived = self.said.origin, now - self.at
         if earlier.seq is None or later.seq is None:
             return arrived + _LATE_S  # whoever does not count may come in any order
@@ -242,7 +242,7 @@ SPOKEN_FOR_S = 3.0
 
 @dataclass(frozen=True, slots=True)
 class _Heard:
-    """What one robot hears of others: the newest, and its first and last news.
+    """Feedback of others that one robot hears: newest counts, first and last news.
 
     Attributes:
         news: When it first heard of them (monotonic, s), and last anything new.
@@ -294,7 +294,7 @@ class OtherAuthors:
 # --- the world --------------------------------------------------------------------
 
 _NO_MESSAGE = Climate, HeartbeatProbe, RefusedFrame
-"""What is in no robot's stream of messages."""
+"""Observations that are in no robot's stream of messages."""
 _ASKED_AGE_S = LIMITS.late_s + 0.1
 
 
@@ -476,7 +476,7 @@ class World:
     def _likely_age(
         self, robot: RobotState, received: Received, origin: Origin
     ) -> float | None:
-        """How old a message was when it came, by its stamp and our probe (s)."""
+        """Age of a message when it came, by its stamp and our probe (s)."""
         at = received.at
         if received.asked:
             return _age_when_asked(origin, at)
@@ -502,7 +502,7 @@ class World:
         return min(moment, now - (_ASKED_AGE_S if received.asked else 0.0))
 
     def age_then(self, received: Received) -> float:
-        """How old the newest of its kind was at most when it came (s).
+        """Greatest age of the newest of its kind when it came (s).
 
         Infinite where nobody knows, and for odometry whose age is only estimated: an
         estimate proves nothing.
@@ -562,6 +562,6 @@ class World:
 
 
 def _age_when_asked(origin: Origin, at: Instant) -> float:
-    """How old Orion's answer is at least (s): nothing that was asked for looks live."""
+    """Least age of Orion's answer (s): nothing that was asked for looks live."""
     stamped = 0.0 if origin.stamp_s is None else at.wall - origin.stamp_s
     return max(stamped, _ASKED_AGE_S)

@@ -57,7 +57,7 @@ class Encounter:
     centre_y: float
 
     def left_s(self, now: Instant) -> float:
-        """How soon from now (s)."""
+        """Time left from now (s)."""
         return max(0.0, self.in_s - (now.mono - self.at))
 
 

@@ -47,14 +47,14 @@ class SpeedLimits:
     def __init__(self, greenhouse: Greenhouse) -> None:
         self._greenhouse = greenhouse
         self._open: dict[str, dict[str, ZoneEntry]] = {}
-        """By robot and cause."""
+        """Entries by robot and cause."""
         self.unmet: Mapping[str, tuple[ClearCondition, ...]] = {}
         self.encounters: Encounters = {}
         self._looked_at = -math.inf
         self._fastest: dict[str, float] = {}
         """Speed of slow robots, before and since (m/s)."""
         self._limits: dict[str, SpeedLimit] = {}
-        """Of the last judgement."""
+        """Limits of the last judgement."""
 
     def copy(self) -> "SpeedLimits":
         """Another with the same entries and encounters."""

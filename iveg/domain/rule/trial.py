@@ -138,7 +138,7 @@ class Account:
         return kind
 
     def trial(self) -> Trial:
-        """As it stands."""
+        """The trial with its account so far."""
         differences = (*self._ended, *self._open.values())
         so_far = self._so_far
         if so_far is not None:
@@ -155,7 +155,7 @@ class Account:
 def _with(
     done: Doings, limits: Limits, changes: Iterable[LimitChange], passed_s: float
 ) -> Doings:
-    """What a version did by now, after one more judgement."""
+    """Sums of a version after one more judgement."""
     slowed_s = defaultdict(float, done.slowed_s)
     for limit in filter(_slows, limits.values()):
         slowed_s[limit.reason] += passed_s

@@ -18,7 +18,7 @@ from iveg.domain.tracking.person import Sighting, TrackedPerson
 from iveg.domain.world import World
 
 _ROUNDING_M = 0.01
-"""So far outside a zone nobody can be inside, whatever rounding does."""
+"""Rounding moves no robot that is farther outside a zone into it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +113,7 @@ class Distance(NamedTuple):
 
 
 Distances = dict[str, Distance]
-"""By cause: to that of its zones in which the robot is deepest."""
+"""Cause → distance to that of its zones in which the robot is deepest."""
 
 
 def distances_to_zones(

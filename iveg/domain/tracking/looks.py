@@ -40,7 +40,7 @@ SUREST = 4.0
 """Bound of the log-odds: no number of looks makes certain (0.982)."""
 _NEAR_M = 1.0
 MOST_SUSPECTS = 64
-"""Of each robot; the one not seen for longest gives way."""
+"""Suspects of each robot; the one not seen for longest gives way."""
 
 
 ANY = ""
@@ -79,7 +79,7 @@ class Calibration:
         return cls(min(FARTHEST, max(-FARTHEST, offset)))
 
     def log_odds(self, confidence: float) -> float:
-        """Of one look (confidence 0 to 1)."""
+        """Log-odds of one look (confidence 0 to 1)."""
         return logit(confidence) + self.offset
 
 
@@ -107,7 +107,7 @@ def logit(probability: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Looks:
-    """What is known of one suspected person.
+    """All looks at one suspected person.
 
     Attributes:
         count: Number of looks; ``least`` and ``most`` sure of them (0 to 1).
@@ -185,14 +185,14 @@ class _Suspect:
         return now - self.seen_at > FORGOTTEN_S or self.odds + self.look < 0.0
 
     def reaches(self, one: FaintPerson, now: float) -> float | None:
-        """How far from it a detection is (m); None: too far to be the same."""
+        """Distance of a detection from it (m); None: too far to be the same."""
         apart = math.hypot(one.x - self.x, one.y - self.y)
         walked = LIMITS.walking_m_s * abs(now - self.seen_at)
         return apart if apart <= _NEAR_M + walked else None
 
     @property
     def log_odds(self) -> float:
-        """As they stand, without other robots' looks."""
+        """Log-odds now, without other robots' looks."""
         return min(SUREST, self.odds + self.look)
 
 
@@ -201,7 +201,7 @@ class Suspicions:
     """Everybody whom robots suspect."""
 
     _of: dict[tuple[str | None, str], list[_Suspect]] = field(default_factory=dict)
-    """By recording (None: of today) and robot."""
+    """Suspects by recording (None: of today) and robot."""
 
     def look(
         self,
@@ -281,7 +281,7 @@ def _nearest(
 def _judged(
     suspect: _Suspect, others: Sequence[_Suspect | None], least: float
 ) -> Looks:
-    """What all who look at a suspect know, which may confirm it.
+    """Looks of all robots at a suspect, which may confirm it.
 
     What a robot's own looks make of it is the same whoever else looks.
     """

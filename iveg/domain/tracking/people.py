@@ -280,7 +280,7 @@ def _placed(
 
 
 def _looked_at(one: Placed, looks: Looks | None) -> Placed:
-    """The same with all looks at it; a faint one counts if these confirm it."""
+    """A detection with all looks at it; a faint one counts if these confirm it."""
     if looks is None:
         return one
     possible = one.kind == "faint" and looks.confirmed
@@ -313,23 +313,23 @@ def _match_peer(one: Placed, observer: RobotState, world: World, at: Instant) ->
     """
     if one.class_ != "robot":
         return one
-    nearest: tuple[float, str] | None = None
+    x, y, _ = one.position
+    near = list[tuple[float, str]]()
     for peer in world.robots.values():
-        age = peer.age_s(at)
         if peer is observer or peer.odometry is None or not peer.is_believed(at):
             continue
         if peer.recording != observer.recording:
             continue
-        reach = LIMITS.uncertainty_m
+        reach, age = LIMITS.uncertainty_m, peer.age_s(at)
         if peer.description.is_described:
             # Of a body of unknown size one sighting more is safer than one less.
             reach += peer.profile.length / 2
         if age is not None and not peer.stands:
             reach += LIMITS.walking_m_s * age
-        residual = peer.odometry.pose.distance_to(one.position[0], one.position[1])
-        if residual <= reach and (nearest is None or residual < nearest[0]):
-            nearest = (residual, peer.robot_id)
-    return one if nearest is None else replace(one, peer=nearest[1])
+        residual = peer.odometry.pose.distance_to(x, y)
+        if residual <= reach:
+            near.append((residual, peer.robot_id))
+    return replace(one, peer=min(near)[1]) if near else one
 
 
 def _sighting(one: Placed, observer: RobotState, at: Instant) -> Sighting:

@@ -5,19 +5,8 @@
     seen (<= 1 s) ──> remembered (<= 10 s, zone grows) ──> last seen (<= 600 s, no zone)
       ^________________________|                                 └──> gone
 
-Who was only glimpsed is gone sooner, and as soon as the place was seen to be empty.
-
-How far one who is tracked was ever from one spot, and how sure and fast they were.
-
-Extents are only ever joined: what one sighting of a track knew no other forgets.
-
-Things that are taken for a person: an operator's word "not a person here".
-
-A thing is a place, half a metre around it, until the end of the day at the latest.  It
-takes the zones of a track whose every sighting, and every sighting that these were ever
-taken to continue, is of a thing: inside the circle from the first on, never as fast as
-somebody who walks, and never as sure as 0.95.  So who walks in, who moves and who is
-surely seen is protected as without it (docs/safety.md, "Not a person here").
+A person who was only glimpsed is gone sooner, and as soon as the place was seen to be
+empty.
 """
 
 import math
@@ -35,7 +24,9 @@ from iveg.domain.tracking.looks import Looks
 
 @dataclass(frozen=True, slots=True)
 class Extent:
-    """Of some sightings.
+    """Places, confidence and speed of some sightings.
+
+    Extents are only ever joined: no sighting of a track forgets what another one knew.
 
     Attributes:
         around: The box in ``map`` that holds every place of theirs.
@@ -60,10 +51,10 @@ class Extent:
 
 _SMOOTHED_S = 0.4
 MISTAKEN_S = 2.5
-"""What is seen for longer is no mistake of a detector, of which most last 2 s."""
+"""Longest mistake of a detector; most of them last 2 s."""
 LASER_LASTS_S = 3.0
-"""So long somebody whom only a laser saw is remembered: who or what it was is a guess,
-and beside a robot that passes, a zone that grows for longer slows it for nothing."""
+"""Memory of somebody whom only a laser saw.  It is a guess what that was, and a zone
+that grows for longer slows a robot that passes for nothing."""
 Stage = Literal["seen", "remembered", "last_seen", "gone"]
 
 
@@ -109,7 +100,7 @@ class Sighting:
 
     @property
     def kind(self) -> tuple[bool, bool, bool]:
-        """What it counts by; a chain is of one kind."""
+        """Evidence that it counts by: looks, laser, others' looks; one for a chain."""
         looks = self.looks
         is_lent = self.possible and looks is not None and looks.lent
         return self.possible, self.laser, is_lent
@@ -126,7 +117,7 @@ class Sighting:
         return age_s if age_s > 0.0 else 0.0
 
     def in_chain(self, chain: int, before: "Sighting | None" = None) -> "Sighting":
-        """The same sighting as the newest of a chain, after the one ``before``."""
+        """This sighting as the newest of a chain, after the one ``before``."""
         vx, vy = (0.0, 0.0) if before is None else self._going_on(before)
         x, y = self.x, self.y
         extent = Extent(Rectangle(x, y, x, y), self.confidence, math.hypot(vx, vy))
@@ -135,7 +126,7 @@ class Sighting:
         return replace(self, chain=chain, vx=vx, vy=vy, extent=extent)
 
     def in_track(self, person: "TrackedPerson") -> "Sighting":
-        """The same, of a chain that begins in a track that is known."""
+        """This sighting as the begin of a chain in a track that is known."""
         extent = self.extent
         if extent is not None:
             for earlier in (person.newest, *person.sightings):
@@ -181,7 +172,7 @@ class TrackedPerson:
 
     @property
     def middle(self) -> tuple[float, float]:
-        """Of the places where it has been, in ``map`` (m)."""
+        """Middle of the places where they have been, in ``map`` (m)."""
         extent = self.newest.extent
         if extent is None:
             return self.newest.x, self.newest.y
@@ -239,7 +230,13 @@ LONGEST_S = 86_400.0
 
 @dataclass(frozen=True, slots=True)
 class Thing:
-    """One word of an operator.
+    """One word of an operator: "not a person here".
+
+    A thing is a place, half a metre around it, until the end of the day at the latest.
+    It takes the zones of a track if all its sightings, and all that these were ever
+    taken to continue, are of the thing: within half a metre from the first on, slower
+    than a walker, less sure than 0.95.  A person who walks in, moves or is surely seen
+    is protected as without it (docs/safety.md, "Not a person here").
 
     Attributes:
         x: Of its middle in ``map`` (m); ``y`` likewise.

@@ -29,9 +29,9 @@ from iveg.domain.world import World
 
 CLEAR_S, CLEAR_FRAMES = 1.0, 5
 SUSPECT_M = 1.0
-"""So near to a place a box may be of whoever was there."""
+"""A box so near to a place may be of the person who was there."""
 _EDGE_RAD = math.radians(5.0)
-"""So far inside the picture that a person there would be seen whole."""
+"""Margin inside the picture within which a person is seen whole."""
 _NEAR_M, _RANGE_SHARE = 1.0, 0.75
 _FRESH_S = 0.5
 """A frame that took longer, or came so long after the one before, proves nothing."""
@@ -44,7 +44,7 @@ _NONE = np.empty(0, np.intp)
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """What one frame of a camera shows.
+    """Content of one frame of a camera.
 
     Attributes:
         camera: Where it was made, in ``map``; None: it proves nothing to be empty.
@@ -97,7 +97,7 @@ class Look:
         return any(math.dist(one, (x, y)) <= within_m for one in self.people)
 
     def shows(self, person: TrackedPerson, x: float, y: float) -> bool:
-        """The same of a person or robot that was seen there; an unknown word counts."""
+        """Whether a box may be of this person or robot; an unknown word counts."""
         others = (*self.unknown, *(self.robots if person.class_ == "robot" else ()))
         near = any(math.dist(one, (x, y)) <= SUSPECT_M for one in others)
         return near or self.shows_person_at(x, y)
@@ -186,7 +186,7 @@ class _Watch:
     frames: int = 0
 
     def going_on(self, at: float) -> "_Watch":
-        """With one more frame that shows nobody."""
+        """The watch after one more frame that shows nobody."""
         is_first = self.frames == 0 or at - self.newest > _FRESH_S
         since, frames = (at, 1) if is_first else (self.since, self.frames + 1)
         return replace(self, since=since, newest=at, frames=frames)
@@ -204,7 +204,7 @@ class OwnSight:
     def __init__(self, greenhouse: Greenhouse) -> None:
         self._greenhouse = greenhouse
         self._watched: dict[str, Mapping[int, _Watch]] = {}
-        """By robot and chain."""
+        """Watches by robot and chain."""
 
     def take(self, look: Look, people: People) -> list[TrackedPerson]:
         """Take a frame that ``people`` has taken in; returns whose zones it ended."""
@@ -337,7 +337,7 @@ class BlindCameras:
     def __init__(self, greenhouse: Greenhouse) -> None:
         self._greenhouse = greenhouse
         self._missing: dict[str, dict[int, _Spell]] = {}
-        """By robot and chain of the other one."""
+        """Spells by robot, and chain of the other one."""
 
     def take(self, look: Look, people: People, world: World) -> None:
         """Take a frame that ``people`` has taken in.
@@ -368,7 +368,7 @@ class BlindCameras:
     def _sought(
         self, look: Look, people: People, world: World
     ) -> Iterator[tuple[Sighting, bool]]:
-        """Whom another camera surely sees in view of this one; whether it does, too."""
+        """People in view whom another camera surely sees, and whether this one does."""
         camera, reach_m = look.camera, look.robot.profile.camera_range
         seen = [
             one
@@ -422,7 +422,7 @@ def _peers(look: Look, world: World) -> Iterator[tuple[float, float, float]]:
 
 
 def _off(place: _Place, start: _Place, end: _Place) -> float:
-    """How far a place is from the line between two others (m)."""
+    """Distance of a place from the line between two others (m)."""
     dx, dy = end[0] - start[0], end[1] - start[1]
     along = (place[0] - start[0]) * dx + (place[1] - start[1]) * dy
     share = min(1.0, max(0.0, along / max(dx * dx + dy * dy, 1e-9)))

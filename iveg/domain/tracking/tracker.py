@@ -294,7 +294,7 @@ class Tracker:
         ]
 
     def _beside(self, first: _Chain | None) -> _Chain | None:
-        """What a further place replaces: the one beside what its first replaces."""
+        """The sighting that a further place replaces: beside that of its first."""
         if first is None:
             return None
         track, replaced = first
