@@ -7,7 +7,7 @@ from pydantic import Field
 
 from iveg.adapters.toml_files import Table, complaint, read_table, read_text
 from iveg.domain.parameters import Class
-from iveg.domain.tracking.calibration import ANY, Calibration, Calibrations
+from iveg.domain.tracking.looks import ANY, Calibration, Calibrations
 
 PAPER = "paper"
 """Name of the file with the counts of the paper's field test."""

@@ -106,7 +106,7 @@ class LeastMargins:
             (person.person_id, look)
             for person in people
             for look in person.sightings
-            if look.age_s(now) <= LIMITS.ring_lasts_s
+            if look.age_s(now) <= LIMITS.zone_lasts_s
         ]
         self._persons = [person_id for person_id, _ in seen]
         self._row = {one.robot_id: row for row, (one, *_) in enumerate(self._robots)}

@@ -4,7 +4,7 @@ from iveg.adapters.calibration_files import (
     read_calibrations,
 )
 from iveg.domain.errors import DataFileError
-from iveg.domain.tracking.calibration import FARTHEST, PLAIN, logit
+from iveg.domain.tracking.looks import FARTHEST, PLAIN, logit
 
 ONE = """\
 [[calibrations]]
