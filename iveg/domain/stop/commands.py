@@ -1,12 +1,9 @@
 """State of one STOP, RELEASE or RESUME at one moment, with the time of each step.
 
 A STOP's times are the press on the browser's clock, accepted (``requested``), sent and
-answered on each transport, and standing (docs/interfaces/resources.md).
-
-Outcome of an order, for readers of the history (docs/interfaces/resources.md).
-
-A row keeps the state of the machine when the order was no longer followed, and that is
-the robot's state: "running" does not say how a STOP ended.
+answered on each transport, and standing.  ``outcome_of`` reads the rows of the history:
+a row keeps the robot's state when the order was no longer followed, and "running" does
+not say how a STOP ended.  Both are described in docs/interfaces/resources.md.
 """
 
 from collections.abc import Iterable, Mapping
@@ -83,7 +80,7 @@ class Times:
     standing: Instant | None = None
 
     @classmethod
-    def of(cls, at: Instant, press: Press) -> "Times":
+    def from_press(cls, at: Instant, press: Press) -> "Times":
         """A command accepted now; its press as the page sent it, if plausible."""
         pressed = believe(press.pressed_at, at)
         doubted = pressed is None and press.pressed_at is not None
