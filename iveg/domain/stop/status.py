@@ -291,7 +291,7 @@ Effect = SendStop | SendOnce | SetDesiredState | Changed | Closed | OffTable
 
 FIWARE_PAUSE_S = 2.0
 STANDING_RESEND_S = 5.0
-_PAUSE_S: Mapping[State, float] = {
+_PAUSE_S: Mapping[str, float] = {
     "DELIVERED": 1.0,
     "STILL_MOVING": 1.0,
     "STANDING": STANDING_RESEND_S,
