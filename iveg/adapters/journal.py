@@ -82,7 +82,7 @@ class FileJournal:
         self._newest: dict[str, _Wish] = {}
         """Each robot's newest line of this run, without its author and time."""
         self._waiting: list[_Line] = []
-        """What is not on disk yet, oldest first."""
+        """Lines that are not on disk yet, oldest first."""
         self._compacts_at = _LEAST_COMPACTED
 
     # --- at the start -------------------------------------------------------------

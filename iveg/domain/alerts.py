@@ -200,8 +200,8 @@ ESTIMATED_SHOWN_AFTER_S = 5.0
 DETECTOR_STARTS_S = 10.0
 """Time that a fleet may take to send its first detection frames after iVeg's start."""
 SHOWN_S = 10.0
-"""How long after it was last so a condition is reported (s): one at its bound is one
-alert and not one a second."""
+"""Time for which a condition is reported after it last held (s): one at its bound is
+one alert and not one a second."""
 
 
 def of_ignored(robot_id: str, limit: SpeedLimit | None) -> Iterable[Condition]:

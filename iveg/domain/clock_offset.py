@@ -1,4 +1,4 @@
-"""How far a robot's clock is from ours, within bounds that its echoes prove.
+"""Offset of a robot's clock from ours, within bounds that its echoes prove.
 
 A message was measured after the feedback that its robot had received was composed (F),
 and before it arrived (R).  Its stamp S therefore bounds the offset θ = robot − server::

@@ -125,7 +125,7 @@ def _stretch(low: float, high: float) -> tuple[float, float]:
 
 _HIT, _MISS = 0.85, -0.4
 _PARTS = 4
-"""Of a cell along each axis: places that a sensor may have, each worked out once."""
+"""Places of a sensor in a cell along each axis, each worked out once."""
 _REACH_M = 15.0
 
 

@@ -73,7 +73,7 @@ class Tile:
 
 @dataclass(slots=True)
 class TileStatus:
-    """What is known of one tile.
+    """Newest knowledge of one tile.
 
     Attributes:
         value: The newest number; None before the first.
@@ -109,7 +109,7 @@ class Equipment:
         return frozenset((one.entity_id, one.entity_type) for one in self.tiles)
 
     def status(self, tile: Tile) -> TileStatus:
-        """What is known of a tile."""
+        """Newest knowledge of a tile."""
         return self._status[tile.key]
 
     def read(
@@ -148,7 +148,7 @@ class Equipment:
         return status.beyond or "ok"
 
     def conditions(self, now: Instant) -> Iterator[Condition]:
-        """What is wrong with tiles now."""
+        """Conditions of tiles that are silent, unreadable or beyond a limit."""
         for tile in self.tiles:
             state, beyond = self.state(tile, now), self._status[tile.key].beyond
             if state in ("silent", "unreadable"):

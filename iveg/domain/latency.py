@@ -61,7 +61,7 @@ def data_of(kind: type[Observation]) -> Data | None:
 # --- durations in little room ---------------------------------------------------------
 
 _SHORTEST_S, _LONGEST_S = 1e-6, 600.0
-"""What is shorter or longer counts as these, which bounds the bins to 1,012."""
+"""Shorter and longer ones count as these, which bounds the bins to 1,012."""
 _GAMMA: Final = 1.01 / 0.99
 """Ratio of neighbouring bins: a quantile is off by 1 % of itself at most."""
 _LOG_GAMMA: Final = float(np.log(_GAMMA))
@@ -238,8 +238,8 @@ class Stream:
         self._boot: str | None = None
         self._stamps: dict[Segment, float] = {}
         self._copies: dict[int, tuple[float, float | None] | None] = {}
-        """Of each ``seq``, oldest first: when it was at the broker (monotonic, s) and
-        its Δt₁ (s), while Orion's copy is still to come; None after that."""
+        """By ``seq``, oldest first: its moment at the broker (monotonic, s) and its Δt₁
+        (s), while Orion's copy is still to come; None after that."""
 
     def read_from_broker(
         self, origin: Origin, at: Instant, composed_at: float | None

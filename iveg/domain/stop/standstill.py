@@ -300,7 +300,7 @@ class StopEvidence:
         return self.report_age(now) + self._age_then_s
 
     def moved_m(self, now: Instant) -> float:
-        """How far the robot may have driven since its newest report (m)."""
+        """Distance that the robot may have driven since its newest report (m)."""
         if self.report is None:
             return 0.0
         age = self.evidence_age(now)

@@ -112,7 +112,7 @@ class Attempt:
     def verdict(
         self, report: SafetyReport, hold_id: str | None
     ) -> Literal["running", "ready", "refused"] | None:
-        """What a report makes of it, if that decides it.
+        """Decision of a report on it; None where it decides nothing.
 
         Args:
             report: The robot's newest.
