@@ -1,5 +1,4 @@
 import { createI18n, translate } from "../../iveg/static/js/core/i18n.js";
-import { laneName } from "../../iveg/static/js/core/lanes.js";
 import { equal, test } from "./harness.js";
 
 const BLOCKS = {
@@ -48,23 +47,6 @@ test("markup in a value stays text", async () => {
   translate(place, t);
   equal(line.childElementCount, 0);
   equal(line.textContent, "<img src=x> y $&");
-});
-
-test("a lane that iVeg named is named in the reader's words", () => {
-  /** @param {string} key @param {Record<string, string>} [slots] */
-  const t = (key, slots) => `${key} ${slots?.n}`.trim();
-  equal(
-    ["Pasillo 1", "12", "Pasillo 3 sur", "Pasillo central", "Cabecera norte"].map(
-      (label) => laneName(label, t),
-    ),
-    [
-      "lane.number 1",
-      "lane.number 12",
-      "lane.number_south 3",
-      "lane.central",
-      "lane.end_north",
-    ],
-  );
 });
 
 test("13.9 a share below a threshold is never written as the threshold", async () => {

@@ -32,10 +32,6 @@ const order = (differs = {}) =>
     ...differs,
   });
 
-test("a whole chain is said to work", () => {
-  equal(judgeDataPath(hops({}), LIVE, true).key, "fleet.whole");
-});
-
 test("of several broken hops the one nearest to the robots is named", () => {
   const found = judgeDataPath(
     hops({ notifications: "down", iot_agent: "down" }),
@@ -44,10 +40,6 @@ test("of several broken hops the one nearest to the robots is named", () => {
   );
   equal(found.key, "health.hop.iot_agent.down");
   equal(found.hop, "iot_agent");
-});
-
-test("a dead broker explains silent robots", () => {
-  equal(judgeDataPath(hops({ mqtt: "down" }), [LOST], true).hop, "mqtt");
 });
 
 test("each transport is measured from the press on, and silence is no number", () => {

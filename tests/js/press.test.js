@@ -116,22 +116,6 @@ test("Enter and Space press once however long they are held", () => {
   equal(told.count, 2);
 });
 
-test("the right mouse button does not press", () => {
-  const { button, told } = control();
-  button.dispatchEvent(new PointerEvent("pointerdown", { button: 2 }));
-  equal(told.count, 0);
-});
-
-test("every new touch is a new press", () => {
-  const { button, told } = control();
-  for (let n = 0; n < 3; n += 1) {
-    pointer(button, "pointerdown");
-    pointer(button, "pointerup");
-    button.click();
-  }
-  equal(told.count, 3);
-});
-
 test("13.12 a press that nobody took survives a reload and is sent as the same STOP", async () => {
   const kept = memory();
   const cut = createPresser(fakeLine(), nothing, () => new Promise(nothing), kept);

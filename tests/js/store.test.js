@@ -117,17 +117,6 @@ test("telemetry is told as often as it can be read, other state in the next fram
   equal(told.length - readings > readings, true);
 });
 
-test("log entries and command events are told one by one, at once", () => {
-  const { store, heard, hear } = storeByHand();
-  hear("log");
-  hear("commands/");
-  store.apply("log", entry(1));
-  store.apply("log", entry(2));
-  store.apply("commands/c1", command());
-  store.apply("commands/c1", command({ state: "STANDING" }));
-  equal(heard, ["log", "log", "commands/c1", "commands/c1"]);
-});
-
 test("a command that follows a snapshot is told after it, and after the snapshot's own", () => {
   const { store } = storeByHand();
   /** @type {string[]} */

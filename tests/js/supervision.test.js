@@ -3,7 +3,6 @@ import { believedBy } from "../../iveg/static/js/map/layers/belief.js";
 import { createTogether, lesser } from "../../iveg/static/js/pages/alerts_together.js";
 import { createAlertList } from "../../iveg/static/js/panels/alert_list.js";
 import { createAlertsPanel } from "../../iveg/static/js/panels/alerts.js";
-import { faultsSaid } from "../../iveg/static/js/panels/robot_texts.js";
 import { createTone } from "../../iveg/static/js/panels/tone.js";
 import { createWordAnswer } from "../../iveg/static/js/panels/word_answer.js";
 import { equal, test, until } from "./harness.js";
@@ -52,25 +51,6 @@ const i18n = /** @type {import("../../iveg/static/js/core/i18n.js").I18n} */ (
     onChange: () => undefined,
   })
 );
-
-test("a robot's card says what the robot finds wrong with its own data", () => {
-  const robot = /** @type {import("../../iveg/static/js/core/protocol.js").Robot} */ (
-    /** @type {unknown} */ ({
-      applied: {
-        faults: [
-          { code: "no_transform", about: "map → odom", for_s: 2.1 },
-          { code: "unheard_of", about: "/scan", for_s: null },
-        ],
-      },
-    })
-  );
-  const known = (/** @type {string} */ key) => key === "robot.fault.no_transform";
-  equal(faultsSaid(robot, { ...i18n, has: known }), [
-    "robot.fault_for robot.fault.no_transform no_transform map → odom 2.1",
-    "robot.fault.other unheard_of /scan",
-  ]);
-  equal(faultsSaid({ ...robot, applied: null }, i18n), []);
-});
 
 const SCENE = /** @type {import("../../iveg/static/js/map/scene.js").Scene} */ (
   /** @type {unknown} */ ({
