@@ -95,13 +95,6 @@ def test_a_robot_that_has_the_stop_is_sent_it_once_a_second_until_it_stands() ->
     assert bench.stop.tries == 5
 
 
-def test_one_fiware_request_is_in_flight_at_a_time() -> None:
-    bench = Bench()
-    effects = bench.press() + bench.wait(5.0)
-
-    assert len(sends(effects, "fiware")) == 1
-
-
 def test_the_next_fiware_request_leaves_two_seconds_after_the_last_came_back() -> None:
     bench = pressed()
     bench.wait(0.1)
