@@ -404,28 +404,29 @@ def write_alert(alert: BookedAlert) -> AlertRecord:
 
 def read_alert(record: AlertRecord, now: Instant) -> BookedAlert:
     """An alert of an earlier run as one that is over, with its life as it was."""
-    priority, seen = cast("Priority", record.priority), record.acknowledged_at
-    # The person concerned is unknown after a restart.
-    is_robots = record.robot_id is not None and "person" not in record.slots
-    subject = record.robot_id if is_robots else None
+    if record.cleared_at is None:
+        record = cleared_behind(record, now.wall)
+    priority = cast("Priority", record.priority)
+    seen = record.acknowledged_at
+    last = AlertOccurrence(
+        priority,
+        _moment(record.last_raised_at, now),
+        _moment(record.cleared_at or now.wall, now),
+        None if seen is None else _moment(seen, now),
+        record.acknowledged_by,
+        record.note or "",
+    )
     return BookedAlert(
         record.alert_id,
         Condition(
             priority,
             record.key,
-            subject or record.alert_id,
+            _subject(record),
             record.robot_id,
             record.slots,
         ),
         _moment(record.raised_at, now),
-        AlertOccurrence(
-            priority,
-            _moment(record.last_raised_at, now),
-            _moment(record.cleared_at or now.wall, now),
-            None if seen is None else _moment(seen, now),
-            record.acknowledged_by,
-            record.note or "",
-        ),
+        last,
         unseen=priority if seen is None else None,
         count=record.count,
     )
@@ -434,6 +435,13 @@ def read_alert(record: AlertRecord, now: Instant) -> BookedAlert:
 def cleared_behind(record: AlertRecord, found: float) -> AlertRecord:
     """An alert that an earlier run left active; what is still wrong is a new one."""
     return replace(record, cleared_at=found)
+
+
+def _subject(record: AlertRecord) -> str:
+    """The robot or person concerned; the person is unknown after a restart."""
+    if record.robot_id is None or "person" in record.slots:
+        return record.alert_id
+    return record.robot_id
 
 
 def _moment(wall: float, now: Instant) -> Instant:

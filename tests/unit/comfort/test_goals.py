@@ -88,6 +88,31 @@ async def test_a_goal_is_a_row_of_the_commands_with_answer_and_progress() -> Non
     assert outcome_of(told) == "reached"
 
 
+@pytest.mark.parametrize(
+    ("result", "state", "outcome"),
+    [("REFUSED", "REFUSED", "refused"), ("DROPPED", "CANCELLED", "cancelled")],
+)
+async def test_the_row_of_a_goal_says_how_it_ended(
+    result: str, state: str, outcome: str
+) -> None:
+    desk = await sent()
+    say(desk, result, "no_way")
+
+    assert (row(desk).state, row(desk).reason) == (state, "no_way")
+    assert outcome_of(row(desk)) == outcome
+
+
+async def test_a_goal_that_no_transport_took_has_no_time_of_it() -> None:
+    desk = Desk()
+    desk.fleet.fails = True
+    desk.broker.refuse()
+    free(desk)
+    desk.parts.goals.give("AGI", THERE, "ana", desk.clock())
+    await settle()
+
+    assert (row(desk).state, row(desk).sent_at) == ("SENT", {})
+
+
 async def test_goals_of_an_earlier_run_are_closed_and_ours_are_not() -> None:
     desk = await sent()
     ours = row(desk)
@@ -118,6 +143,14 @@ async def test_a_stop_deletes_the_goal_at_once(answer: str | None) -> None:
 
     assert newest(desk).state == "DELETED"
     assert "log.goal.held" in desk.sentences()
+
+
+async def test_the_robots_own_hold_deletes_the_goal_too() -> None:
+    desk = await sent()
+    free(desk, Hold("hw-1", "hw", "local"))
+    await desk.wait(0.1)
+
+    assert newest(desk).state == "DELETED"
 
 
 async def test_a_release_and_a_resume_bring_no_goal_back() -> None:
@@ -164,6 +197,13 @@ async def test_a_cancellation_names_the_goal_and_waits_for_the_robot() -> None:
     assert desk.fleet.goals[-1] == ("AGI", CancelOrder(goal_id))
     say(desk, "DROPPED", "cancelled")
     assert newest(desk).state == "CANCELLED"
+
+
+async def test_words_of_another_goal_change_nothing() -> None:
+    desk = await sent()
+    desk.hear(GoalAnswer("AGI", counted(desk), "01OTHER", "REACHED"))
+
+    assert newest(desk).state == "SENT"
 
 
 async def test_an_answer_that_orion_kept_changes_nothing() -> None:
