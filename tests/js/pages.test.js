@@ -51,19 +51,6 @@ test("each transport is measured from the press on, and silence is no number", (
   });
 });
 
-test("13.7: a STOP pressed while the server was dead has one zero: the press", () => {
-  const { times } = order();
-  const took = tookOf(
-    order({
-      times: { ...times, pressed: "2026-11-20T11:59:20.000Z" },
-      standstill_ms: 40412,
-    }),
-    ["direct", "fiware"],
-  );
-  equal([took.accepted, took.sent[0], took.answer[1]], [40000, 40002, 40050]);
-  equal(took.standing, 40412);
-});
-
 test("13.5 a chain that nobody has heard of, or without robots, is not said to work", () => {
   equal(judgeDataPath([], [], true).key, "fleet.unknown");
   const silent = judgeDataPath(hops({}), [LOST, heard("AGII")], true);

@@ -1,15 +1,6 @@
-import {
-  ProtocolError,
-  readFrame,
-  readText,
-  writeStop,
-} from "../../iveg/static/js/core/protocol.js";
+import { ProtocolError, readFrame } from "../../iveg/static/js/core/protocol.js";
 import { telemetryFrame } from "./builders.js";
-import { equal, test, throws } from "./harness.js";
-
-test("a text frame is its topic and data", () => {
-  equal(readText('{"topic":"people","data":[]}'), { topic: "people", data: [] });
-});
+import { test, throws } from "./harness.js";
 
 test("frames that break the contract are refused as such", () => {
   const long = telemetryFrame({ frame: 1 });
@@ -21,13 +12,4 @@ test("frames that break the contract are refused as such", () => {
   for (const bad of [new ArrayBuffer(2), long, headless, 5]) {
     throws(() => readFrame(bad), ProtocolError);
   }
-});
-
-test("a stop names robot, press and time", () => {
-  equal(JSON.parse(writeStop(null, "p", 12.5)), {
-    type: "stop",
-    robot_id: null,
-    press_id: "p",
-    pressed_at: 12.5,
-  });
 });

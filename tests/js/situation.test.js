@@ -1,6 +1,6 @@
 import { fleetSaid } from "../../iveg/static/js/core/fleet_said.js";
 import { createI18n } from "../../iveg/static/js/core/i18n.js";
-import { isBlind, situationOf } from "../../iveg/static/js/core/situation.js";
+import { situationOf } from "../../iveg/static/js/core/situation.js";
 import { createCardOrder, sorted } from "../../iveg/static/js/panels/card_order.js";
 import {
   createCalm,
@@ -84,17 +84,6 @@ test("card and fleet page say the same of a robot without the server", async () 
   const { robots } = await all([heard(0.1, STANDING)], 9, "", [], "lost");
   equal(robots[0].row.toLowerCase(), robots[0].line.toLowerCase());
   equal(robots[0].row.includes("situation.do.red_button"), true);
-});
-
-test("a camera that is out of service or not being read is none", () => {
-  const works = { required: true, missing: false, out_by: null };
-  const blind = [
-    works,
-    { ...works, missing: true },
-    { ...works, required: false, missing: false, out_by: "Ana" },
-    { ...works, required: false, missing: true },
-  ].map((detector) => isBlind(robot({ detector: /** @type {any} */ (detector) })));
-  equal(blind, [false, true, true, false]);
 });
 
 /** @param {import("./builders.js").Robot[]} fleet */

@@ -191,20 +191,6 @@ def _wait_for_state(page: Page, state: str, within_ms: float = _PATIENCE_MS) -> 
     )
 
 
-def test_a_killed_server_is_noticed_and_found_again_with_a_fresh_snapshot(
-    page: Page, live: LiveServer
-) -> None:
-    page.evaluate("() => { window.first = window.store.get('snapshot'); }")
-
-    live.stop()
-    _wait_for_state(page, "lost")
-    page.clock.run_for(4000)  # long enough for the slowest pace of retries
-    live.start()
-
-    _wait_for_state(page, "open")
-    assert page.evaluate("() => window.store.get('snapshot') !== window.first")
-
-
 def test_a_line_that_falls_silent_is_lost_within_three_seconds(
     page: Page, live: LiveServer
 ) -> None:
@@ -252,16 +238,6 @@ def test_an_ended_session_is_told_and_not_tried_again(
     page.clock.run_for(1500)  # several retries long
     page.evaluate("() => fetch('/')")  # and what they would have asked is out
     assert live.attempts == attempts
-
-
-def test_a_stop_goes_out_at_once_and_only_once(page: Page, live: LiveServer) -> None:
-    sent = page.evaluate("() => window.line.sendStop('AGI', 'press-1', 12.5)")
-
-    page.wait_for_function("() => window.line.pressesWaiting() === 0")
-    assert sent is True
-    assert live.heard == [
-        {"type": "stop", "robot_id": "AGI", "press_id": "press-1", "pressed_at": 12.5}
-    ]
 
 
 def test_a_stop_without_a_line_goes_out_when_the_line_is_back(
