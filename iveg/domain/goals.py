@@ -121,26 +121,23 @@ def place_of(
         start: Where it belongs; None where nobody knows.
     """
     keep_off_m = profile.width / 2
+    place = wish.x, wish.y
     match wish.kind:
         case "pause":
             return pose.x, pose.y
         case "return":
-            place = None if start is None else (start.x, start.y)
+            if start is None:
+                return "no_start"
+            place = start.x, start.y
         case "aisle":
             lanes = (one for one in greenhouse.lanes if one.label == wish.aisle)
             lane = next(lanes, None)
             if lane is None:
                 return "no_such_aisle"
-            free = (
-                one
-                for one in _from_the_middle(lane.area)
-                if _obstructed(greenhouse, *one, keep_off_m) is None
-            )
-            place = next(free, None)
-        case "here":
-            place = wish.x, wish.y
-    if place is None:
-        return "no_start" if wish.kind == "return" else "obstacle"
+            for place in _from_the_middle(lane.area):
+                if _obstructed(greenhouse, *place, keep_off_m) is None:
+                    return place
+            return "obstacle"
     return _obstructed(greenhouse, *place, keep_off_m) or place
 
 

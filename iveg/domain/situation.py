@@ -150,6 +150,11 @@ class RobotFacts:
         return 0.0 if self.report.holds else self.report.speed_factor
 
     @property
+    def is_silent(self) -> bool:
+        """Whether nothing is heard of it, now or ever."""
+        return self.link in ("LOST", "UNKNOWN")
+
+    @property
     def is_held(self) -> bool:
         """Whether it reports a hold, or waits for its resume."""
         report = self.report
@@ -221,14 +226,6 @@ def _state(facts: RobotFacts) -> str:
     if facts.applied <= 0.0:
         return "stands" if facts.stands else "told"
     return "half" if facts.applied == HALF_SPEED else "slow"
-
-
-def nearest(facts: RobotFacts) -> Near | None:
-    """Somebody or something near that the robot is slow for; None: nobody."""
-    for near in (facts.near, facts.told_near):
-        if near is not None and near.kind in HAZARDS:
-            return near
-    return None
 
 
 def _slow(
@@ -347,7 +344,8 @@ _KINDS, _LEVELS = list(ORDER), get_args(Level)
 
 def situation_of(facts: RobotFacts) -> Situation:
     """The first of all that holds for a robot."""
-    holding = [*_alerted(facts), *(_silent if _is_silent(facts) else _heard)(facts)]
+    found = _silent(facts) if facts.is_silent else _present(facts)
+    holding = [*_alerted(facts), *found]
     first = min(holding, key=lambda one: _KINDS.index(one.kind))
     level = min((ORDER[one.kind] for one in holding), key=_LEVELS.index)
     if facts.link == "LATE" and first.state not in OF_STOPS:
@@ -355,11 +353,7 @@ def situation_of(facts: RobotFacts) -> Situation:
     return replace(first, level=level, factor=facts.factor)
 
 
-def _is_silent(facts: RobotFacts) -> bool:
-    return facts.link in ("LOST", "UNKNOWN")
-
-
-def _heard(facts: RobotFacts) -> Iterator[Situation]:
+def _present(facts: RobotFacts) -> Iterator[Situation]:
     """All that holds for a robot that is heard; its work if nothing else does."""
     yield from locked(facts)
     yield from stopping(facts)
@@ -396,7 +390,7 @@ def told_of(alerts: Iterable[Condition]) -> list[Condition]:
 def _alerted(facts: RobotFacts) -> Iterator[Situation]:
     for alert in facts.alerts:
         kind, state, action = ALERTED[alert.key]
-        if state == "lost_moving" and not _is_silent(facts):
+        if state == "lost_moving" and not facts.is_silent:
             continue  # It is heard again; the alert clears with the next tick.
         slots = {name: alert.slots[name] for name in _SLOTS if name in alert.slots}
         found = Situation(kind, state, "alarm", action=action, slots=slots)
@@ -447,16 +441,13 @@ def _doubted(facts: RobotFacts) -> Iterator[Situation]:
         yield Situation(
             "contradiction", "contradicts", "doubt", action="check_robot", slots=slots
         )
-    elif not _says_clear(facts):
+        return
+    report, owes_none = facts.report, facts.stop != "RUNNING" or facts.is_replay
+    if owes_none or facts.applied < FULL_SPEED:
+        return
+    # "Clear" needs the robot's own word.
+    if report is None or report.reason != "clear":
         yield Situation("unsure", "unreported", "link", action="check_robot")
-
-
-def _says_clear(facts: RobotFacts) -> bool:
-    """Whether it reports itself that nothing limits it, or owes no such report."""
-    if facts.stop != "RUNNING" or facts.is_replay:
-        return True
-    report = facts.report
-    return report is not None and (report.reason == "clear" or facts.applied < 1.0)
 
 
 def _blind(facts: RobotFacts) -> Iterator[Situation]:
@@ -473,8 +464,11 @@ def _blind(facts: RobotFacts) -> Iterator[Situation]:
     blind = Situation(
         "blind", "no_camera", "camera", why, None, "check_camera", None, slots
     )
-    near = nearest(facts)
-    yield blind if near is None else because_of(blind, near)
+    for near in (facts.near, facts.told_near):
+        if near is not None and near.kind in HAZARDS:
+            blind = because_of(blind, near)
+            break
+    yield blind
 
 
 def _at_work(facts: RobotFacts) -> Situation:

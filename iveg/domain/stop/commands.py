@@ -195,6 +195,7 @@ Outcome = Literal[
     "cancelled",
     "deleted",
 ]
+_CLOSED: Mapping[str, Outcome] = {"EXPIRED": "expired", "REPLACED": "replaced"}
 _OF_GOALS: Mapping[str, Outcome] = {
     "REACHED": "reached",
     "REFUSED": "refused",
@@ -206,25 +207,19 @@ LOUD = frozenset({"UNCONFIRMED", "STILL_MOVING"})
 
 def outcome_of(record: CommandRecord) -> Outcome:
     """Outcome of an order; ``open`` while it is followed."""
-    if record.state == "EXPIRED":
-        return "expired"
-    if record.state == "REPLACED":
-        return "replaced"
-    if record.kind == "stop":
-        return _of_stop(record)
+    if record.state in _CLOSED:
+        return _CLOSED[record.state]
     if record.kind == "goal":
         return _OF_GOALS.get(record.state, "open")
+    if record.kind == "stop":
+        if record.state not in ("RUNNING", "READY"):
+            return "open"
+        return "not_seen_standing" if record.standing_at is None else "stood"
     if record.state == "RELEASING":
         return "open"
     if record.reason is not None:
         return "refused"
     return "released" if record.kind == "release" else "resumed"
-
-
-def _of_stop(record: CommandRecord) -> Outcome:
-    if record.state not in ("RUNNING", "READY"):
-        return "open"
-    return "not_seen_standing" if record.standing_at is None else "stood"
 
 
 def was_loud(states: Iterable[str]) -> bool:
