@@ -40,15 +40,6 @@ def test_a_transport_that_took_it_makes_it_sent(transport: TransportId) -> None:
     assert bench.state == "SENT"
 
 
-def test_orions_204_is_no_evidence_and_the_brokers_word_is_little() -> None:
-    bench = pressed()
-
-    bench.sent(DIRECT.id)
-    bench.sent(FIWARE.id)
-
-    assert bench.stop.transports == {"direct": "ok", "fiware": "pending"}
-
-
 def test_the_robots_answer_through_orion_is_evidence_that_204_does_not_undo() -> None:
     bench = pressed()
     bench.answer(transport=FIWARE.id)
@@ -56,17 +47,6 @@ def test_the_robots_answer_through_orion_is_evidence_that_204_does_not_undo() ->
     bench.sent(FIWARE.id)
 
     assert bench.stop.transports[FIWARE.id] == "ok"
-
-
-def test_a_204_while_the_agent_is_known_to_be_cut_off_is_not_even_sent() -> None:
-    bench = pressed()
-    stop = bench.machine.stop
-    assert stop is not None
-
-    bench.machine.sent(FIWARE.id, stop.command_id, at(0.1), ok=True, doubtful=True)
-
-    assert bench.stop.transports[FIWARE.id] == "unknown"
-    assert bench.state == "REQUESTED"
 
 
 def test_direct_sends_come_at_0_250_500_1000_ms_and_then_every_half_second() -> None:
@@ -346,17 +326,6 @@ def test_a_stale_robot_must_stand_a_second_before_it_is_believed() -> None:
 # --- people -----------------------------------------------------------------------
 
 
-def test_f38_fifty_people_make_one_episode_with_fifty_lines_in_the_audit() -> None:
-    bench = Bench()
-    for number in range(50):
-        bench.press(f"operator-{number}")
-
-    assert bench.machine.stop is not None
-    assert len(bench.stop.requesters) == 50
-    assert {one.hold_id for one in sends(bench.log)} == {bench.ours.id}
-    assert bench.changes() == ["requested"] * 50
-
-
 def test_a_second_press_of_the_same_person_sends_again_at_once() -> None:
     bench = pressed()
     bench.wait(0.1)
@@ -401,16 +370,3 @@ def test_after_a_step_without_a_row_stop_stays_wanted_and_is_sent_on() -> None:
     assert OffTable("AGI", "REQUESTED", "unconfirmed") in bench.log
     assert bench.machine.wants_stop
     assert sends(bench.wait(1.2), "direct")
-
-
-def test_a_release_that_no_row_can_end_is_sent_as_a_stop_again() -> None:
-    bench = without(("RELEASING", "release_unconfirmed"))
-    bench.press()
-    bench.stand()
-    bench.release(bench.ours.id)
-
-    bench.wait(2.1)
-
-    assert OffTable("AGI", "RELEASING", "release_unconfirmed") in bench.log
-    assert sends(bench.wait(1.2), "direct")
-    assert bench.machine.wants_stop
