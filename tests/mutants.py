@@ -51,13 +51,13 @@ class Mutant:
 MUTANTS = (
     Mutant(
         "STOP: standing is believed before it has lasted",
-        "and (moment.since(self._began) or 0.0) >= LIMITS.standing_for_s",
-        "",
+        "return enough and lasted >= LIMITS.standing_for_s",
+        "return enough",
         ("unit/domain/test_stop.py",),
     ),
     Mutant(
         "STOP: odometry that still moves does not contradict a standstill",
-        "and not self._moved_lately(moment, at)",
+        "and not self._wheels_moved(moment, at)",
         "",
         ("unit/domain/test_stop.py",),
     ),
@@ -309,7 +309,7 @@ MUTANTS = (
     ),
     Mutant(
         "STOP: motion from before the rest contradicts it when it comes late",
-        "if began is None or since is None or moment.boot is None:",
+        "if moment.boot is None or after is None:",
         "if True:",
         ("unit/domain/test_standstill.py",),
     ),

@@ -4,17 +4,12 @@ Positions go as often as the page paints.  Other parts go as often as eyes need:
 or a detection frame is looked at, not measured, and digits that change more than ten
 times a second cannot be read.
 
-Credit: how much telemetry may be on its way to one browser.
-
 Buffers of the kernel, of the server and of the browser are queues without a size, and
 telemetry that waits in them shows the past.  So the page says which frame it has
 painted, and no more than a window of unpainted frames is ever sent: further changes
-wait in slots, where the newest wins.
-
-Δt₄: frames that a page reports as drawn, compared with their content.
-
-Only frames that the server sent itself are measured, so a page can be wrong about the
-moment alone; an impossible moment is not used.
+wait in slots, where the newest wins.  The same reports tell Δt₄, from the decision to
+the drawn frame.  Only frames that the server sent itself are measured, so a page can be
+wrong about the moment alone; an impossible moment is not used.
 """
 
 import math
@@ -35,11 +30,11 @@ SUBPROTOCOL: Final = "iveg.2"
 FRAMES: Final = 8
 """Spread over the round trip: 300 ms away a page still gets 26 frames a second."""
 BYTES: Final = 24_576
-"""Of what is heavy in them (scans, detections, people): 0.2 s of a line of 1 Mbit/s."""
+"""Heavy content in them (scans, detections, people): 0.2 s of a line of 1 Mbit/s."""
 GAP_S: Final = 0.002
 """Frames nearer to each other would cost more than the freshness that they bring."""
 ROBOT_GAP_S: Final = 0.0002
-"""The same for each robot of the fleet, where that is more: 4 ms with twenty."""
+"""Gap for each robot of the fleet, where that is more: 4 ms with twenty."""
 SLOW_FRAME_S: Final = 0.03
 """A page that draws for longer than this twice is slow."""
 
@@ -245,7 +240,7 @@ class TelemetryFeed:
             self._subscriber.wake()
 
     def wait_s(self, now: float) -> float | None:
-        """How long until there may be a frame (s); None: until something changes.
+        """Time until there may be a frame (s); None: until something changes.
 
         Meanwhile a change of telemetry wakes nobody unless it could be sent at once.
         """
@@ -432,5 +427,5 @@ def _next_beat(sent_at: float, apart_s: float) -> float:
 
 
 def _next_state(sent_at: float) -> float:
-    """The same of the state of a robot."""
+    """When the state of a robot may be sent again (monotonic, s)."""
     return _next_beat(sent_at - STATES_AFTER_S, STATE_S) + STATES_AFTER_S

@@ -1,10 +1,8 @@
 """Parts of telemetry frames, each version encoded once for all browsers.
 
-A part is JSON, and for a scan also its integers; docs/interfaces/live.md has their
-shapes.  Browsers differ in when they take a part, never in its bytes: each part carries
-the moment of its truth (``at``, the server's monotonic clock).
-
-Ranges of a scan as the integers that a browser draws.
+A part is JSON, and for a scan also its ranges as integers; docs/interfaces/live.md has
+their shapes.  Browsers differ in when they take a part, never in its bytes: each part
+carries the moment of its truth (``at``, the server's monotonic clock).
 """
 
 import math
@@ -109,8 +107,7 @@ class TelemetryEncoder:
     ) -> Part | None:
         """Other members of a robot that have changed since a version; None for none.
 
-        Those of which the newest was encoded less than ``young_s`` ago are not encoded
-        anew.
+        A state that was encoded less than ``young_s`` ago is not encoded anew.
         """
         topic = topics.ROBOT.of(robot_id)
         state = self._states.setdefault(robot_id, _RobotState())
@@ -248,7 +245,7 @@ class _People:
 
     @property
     def count(self) -> int:
-        """How many there are."""
+        """Number of people."""
         return len(self._ids)
 
     def changes(self, since: int) -> Part | None:
