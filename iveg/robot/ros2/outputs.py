@@ -16,7 +16,7 @@ from iveg.domain.errors import UnreadableError
 from iveg.domain.geometry import REST, Pose2D, Twist2D
 from iveg.domain.goals import Goal
 from iveg.robot.costmap import PEER_M, FleetCostmap, Neighbour, Neighbours
-from iveg.robot.ros2.config import DriveConfig
+from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.reading import InputFaults, read_twist, write_twist
 from iveg.ros2 import cdr
 from iveg.ros2 import messages as ros
@@ -85,21 +85,12 @@ def message_of(*, stamped: bool) -> type[Message]:
 
 
 class DriveTopics:
-    """Reads ``cmd_vel_in``, writes ``cmd_vel_out``.
+    """Reads ``cmd_vel_in``, writes ``cmd_vel_out``; notes what is wrong."""
 
-    Args:
-        drive: Type of each of the two topics.
-        topic: Full name of ``cmd_vel_in``, for faults.
-        base_link: Frame of stamped twists.
-        input_faults: Record of faults.
-    """
-
-    def __init__(
-        self, drive: DriveConfig, topic: str, base_link: str, input_faults: InputFaults
-    ) -> None:
-        self._drive = drive
-        self._topic = topic
-        self._base_link = base_link
+    def __init__(self, config: RobotConfig, input_faults: InputFaults) -> None:
+        self._drive = config.drive
+        self._topic = config.full_topics["cmd_vel_in"]
+        self._base_link = config.frames.base_link
         self._input_faults = input_faults
         self._newest = 0.0
 

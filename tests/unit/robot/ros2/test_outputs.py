@@ -12,7 +12,7 @@ from iveg.domain.observations import Origin
 from iveg.domain.parameters import Class
 from iveg.robot.costmap import Neighbour, Neighbours
 from iveg.robot.ros2 import outputs
-from iveg.robot.ros2.config import DriveConfig
+from iveg.robot.ros2.config import DriveConfig, RobotConfig
 from iveg.robot.ros2.outputs import DriveTopics
 from iveg.robot.ros2.reading import InputFaults, speed_of
 from iveg.ros2 import cdr
@@ -26,7 +26,7 @@ AHEAD = ros.Twist(ros.Vector3(0.5, 0.1, 0.2), ros.Vector3(0.3, 0.4, -0.2))
 
 def topics(**drive: bool) -> tuple[DriveTopics, InputFaults]:
     input_faults = InputFaults()
-    found = DriveTopics(DriveConfig(**drive), "/cmd_vel_nav", "base_link", input_faults)
+    found = DriveTopics(RobotConfig(drive=DriveConfig(**drive)), input_faults)
     return found, input_faults
 
 
