@@ -291,6 +291,10 @@ class InputFaults:
             del self._noted[min(self._noted, key=lambda one: self._noted[one].last)]
         self._noted[key] = _Noted(since, now, for_s)
 
+    def clear(self) -> None:
+        """Forget all of them."""
+        self._noted.clear()
+
     def faults(self, now: float) -> tuple[RobotFault, ...]:
         """Present faults, in the order of their start."""
         if not self._noted:
