@@ -81,7 +81,8 @@ class Network(Protocol):
 
 def message_of(*, stamped: bool) -> type[Message]:
     """Message type of a topic of twists."""
-    return ros.TwistStamped if stamped else ros.Twist
+    kind: type[Message] = ros.TwistStamped if stamped else ros.Twist
+    return kind
 
 
 class DriveTopics:
@@ -171,6 +172,7 @@ REACH_M = 8.0
 _SPACING_M = 0.1
 _HEIGHT_M = 0.5
 _RAYS = 1440
+_FLOAT32 = 7
 
 
 def cloud(
@@ -187,11 +189,12 @@ def cloud(
         ros.Header(stamp, frame),
         1,
         len(points),
-        tuple(ros.PointField(name, 4 * n) for n, name in enumerate("xyz")),
+        tuple(ros.PointField(name, 4 * n, _FLOAT32, 1) for n, name in enumerate("xyz")),
         False,
         12,
         12 * len(points),
         points.view(np.uint8).reshape(-1),
+        True,
     )
 
 

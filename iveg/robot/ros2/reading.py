@@ -116,7 +116,7 @@ def _ranges(scan: ros.LaserScan) -> NDArray[np.float32]:
     Only +inf says that nothing came back.  NaN is no measurement and -inf is too near
     for one: neither shows that the way is free.
     """
-    ranges = scan.ranges.copy()
+    ranges: NDArray[np.float32] = scan.ranges.copy()
     odd = ranges.view(np.uint32) > _FARTHEST_BITS
     ranges[odd] = np.where(ranges[odd] > 0.0, _NOTHING, _UNKNOWN)
     return ranges

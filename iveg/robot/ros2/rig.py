@@ -130,7 +130,7 @@ class Ros2Robot:
             for form in TOPICS[topic].forms:
                 # Codecs are made before the robot drives, not when a detector joins.
                 for one in definitions(form):
-                    cdr.store_of(one)
+                    one.STORE.get_msgdef(one.ROS)
             if len(TOPICS[topic].forms) == 1:
                 self._listen(topic, TOPICS[topic].message)
         self._wishes = network.reader(

@@ -12,7 +12,7 @@ from iveg.domain.errors import UnreadableError
 from iveg.ros2 import cdr
 from iveg.ros2 import detector_messages as d
 from iveg.ros2 import messages as ros
-from iveg.ros2.cdr import read_user_data, store_of, type_hash, user_data
+from iveg.ros2.cdr import read_user_data, type_hash, user_data
 from iveg.ros2.messages import Message
 from tests.unit.ros2.spelled import HALF, MAP, ONE, POSE, STAMP, TWO, ZERO, payload
 
@@ -387,7 +387,7 @@ def test_a_type_has_the_hash_that_ros_2_announces(
 def test_every_message_has_the_fields_of_its_definition_in_order(
     message: type[Message],
 ) -> None:
-    _, defined = store_of(message).fielddefs[message.ROS]
+    _, defined = message.STORE.fielddefs[message.ROS]
 
     assert [one.name for one in fields(message)] == [name for name, _ in defined]
 

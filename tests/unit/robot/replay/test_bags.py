@@ -4,6 +4,7 @@ import math
 import re
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
@@ -112,7 +113,7 @@ def test_odometry_without_its_transform_is_skipped_and_told(
 # --- detectors ----------------------------------------------------------------------
 
 
-def box_3d() -> Message:
+def box_3d() -> Any:
     return yolact(OPTICAL, *PERSON)
 
 

@@ -13,7 +13,6 @@ from iveg.robot.ros2.config import RobotConfig
 from iveg.ros2 import cdr
 from iveg.ros2 import detector_messages as d
 from iveg.ros2 import messages as ros
-from iveg.ros2.detector_messages import TEXTS
 from iveg.ros2.messages import Message
 from tests.unit.robot.ros2 import said
 from tests.unit.robot.ros2.said import MONO, Bench, tf
@@ -57,19 +56,19 @@ def sure(name: str = "farmer") -> tuple[ros.ObjectHypothesisWithPose, ...]:
 # --- with depth ---------------------------------------------------------------------
 
 
-def vision_3d(header: ros.Header, centre: ros.Point, size: ros.Vector3) -> Message:
+def vision_3d(header: ros.Header, centre: ros.Point, size: ros.Vector3) -> Any:
     box = ros.BoundingBox3D(ros.Pose(centre), size)
     return ros.Detection3DArray(header, (ros.Detection3D(UNSEEN, sure(), box),))
 
 
-def yolact(header: ros.Header, centre: ros.Point, size: ros.Vector3) -> Message:
+def yolact(header: ros.Header, centre: ros.Point, size: ros.Vector3) -> Any:
     x, y, z = centre.x, centre.y, centre.z
     u, v, w = size.x / 2, size.y / 2, size.z / 2
     box = d.BoundingBox3d("farmer", 0.9, x - u, y - v, x + u, y + v, z - w, z + w)
     return d.BoundingBoxes3d(header, (box,))
 
 
-def yolo_3d(header: ros.Header, centre: ros.Point, size: ros.Vector3) -> Message:
+def yolo_3d(header: ros.Header, centre: ros.Point, size: ros.Vector3) -> Any:
     box = d.BoundingBox3D(ros.Pose(centre), size, header.frame_id)
     one = d.Detection(0, "farmer", 0.9, "4", bbox3d=box)
     return d.DetectionArray(ros.Header(header.stamp, "elsewhere"), (one,))
@@ -138,7 +137,7 @@ def test_a_detection_of_yolo_without_depth_is_no_place_at_the_origin() -> None:
 # --- in a picture -------------------------------------------------------------------
 
 
-def vision_2d(centre: ros.Point2D, size: ros.Point2D) -> Message:
+def vision_2d(centre: ros.Point2D, size: ros.Point2D) -> Any:
     box = ros.BoundingBox2D(ros.PicturePose(centre), size.x, size.y)
     return ros.Detection2DArray(OPTICAL, (ros.Detection2D(UNSEEN, sure(), box),))
 
@@ -158,11 +157,11 @@ def yolox_box(centre: ros.Point2D, size: ros.Point2D) -> d.BoundingBox:
     )
 
 
-def yolox(centre: ros.Point2D, size: ros.Point2D) -> Message:
+def yolox(centre: ros.Point2D, size: ros.Point2D) -> Any:
     return d.BoundingBoxes(OPTICAL, UNSEEN, (yolox_box(centre, size),))
 
 
-def yolo_2d(centre: ros.Point2D, size: ros.Point2D) -> Message:
+def yolo_2d(centre: ros.Point2D, size: ros.Point2D) -> Any:
     place = d.Pose2D(d.Point2D(centre.x, centre.y))
     box = d.BoundingBox2D(place, d.Vector2(size.x, size.y))
     return d.DetectionArray(OPTICAL, (d.Detection(0, "farmer", 0.9, bbox=box),))
@@ -213,14 +212,14 @@ def test_boxes_of_yolox_since_2022_are_read_as_those_before(
 
 def test_boxes_of_a_fork_with_other_fields_are_a_fault_by_topic_and_type() -> None:
     @dataclass(frozen=True)
-    class Forked(d.BoundingBox):
+    class Forked(d.BoundingBox):  # type: ignore[misc]
         depth: float = 3.0
 
     parts = {f.name: getattr(yolox_box(MIDDLE, TALL), f.name) for f in BOX_FIELDS}
     seen = d.BoundingBoxes(OPTICAL, UNSEEN, (Forked(**parts),) * 2)
     one = bench()
     store = get_typestore(Stores.ROS2_JAZZY)
-    for name, text in TEXTS[0].items():
+    for name, text in ros.OLDER_TEXTS.items():
         whole = text + "float64 depth\n" * name.endswith("/BoundingBox")
         store.register(get_types_from_msg(whole, name))
     wire = bytes(store.serialize_cdr(seen, seen.ROS))
@@ -303,7 +302,7 @@ def test_a_score_that_is_none_is_lost(score: float) -> None:
 
 
 def test_a_body_with_its_outline_and_joints_is_read_for_its_box_alone() -> None:
-    made = cdr.store_of(d.DetectionArray).types
+    made = ros.STORE.types
     outline = made["yolo_msgs/msg/Mask"](1, 2, [d.Point2D(3.0, 4.0)])
     joint = made["yolo_msgs/msg/KeyPoint2D"](1, d.Point2D(), 0.5)
     joints = made["yolo_msgs/msg/KeyPoint2DArray"]([joint])
