@@ -41,7 +41,7 @@ from iveg.robot.holds import read_holds, write_holds
 from iveg.robot.judgement import Limits, OnLinkLoss
 from iveg.robot.orders import Drive, Effect, Persist, Report, SendAnswer
 from iveg.robot.safety import SafetyMachine, State
-from iveg.robot.uplink import Form, SafetyLane, Uplink
+from iveg.robot.uplink import Form, Origins, SafetyLane, Uplink
 
 # --- pacing -----------------------------------------------------------------------
 #
@@ -171,15 +171,18 @@ class RobotNode:
         if stored is None:
             _log.warning("%s: unreadable hold file, held: %s", robot_id, hold_file)
         boot = secrets.token_hex(4)
+        origins = Origins(
+            boot,
+            1 + secrets.randbelow(2**31),
+            echoes=None if self._is_replay else self._echoes,
+            replay=settings.replay,
+        )
         self._uplink = Uplink(
             robot_id,
             settings.apikey,
-            boot,
+            origins,
             self._link.enqueue,
             form=settings.uplink,
-            first_report=1 + secrets.randbelow(2**31),
-            echoes=None if self._is_replay else self._echoes,
-            replay=settings.replay,
         )
         self._machine = SafetyMachine(
             robot_id,

@@ -32,7 +32,7 @@ from iveg.ngsi import codec, names
 from iveg.robot.gate import Cap
 from iveg.robot.holds import HoldSet
 from iveg.robot.orders import Report
-from iveg.robot.uplink import LEVELS, LaneMessage, SafetyLane, Uplink
+from iveg.robot.uplink import LEVELS, LaneMessage, Origins, SafetyLane, Uplink
 from tests.builders import START, detection, detection_frame, odometry, scan
 from tests.unit.robot.rig import AHEAD, REST, Rig, stop
 
@@ -197,11 +197,13 @@ class Wire:
         self.uplink = Uplink(
             "AGI",
             "iveg",
-            "boot-a",
+            Origins(
+                "boot-a",
+                700,
+                echoes=None if heard is None else lambda: tuple(heard),
+            ),
             lambda topic, payload: self.sent.append((topic, payload)),
             form="single" if form == "single" else "per-topic",
-            first_report=700,
-            echoes=None if heard is None else lambda: tuple(heard),
         )
 
     def read(self) -> list[object]:
@@ -450,7 +452,9 @@ UNREAD = ("farmer", None)
 
 def sent(observation: Unplaced | DetectionFrame) -> tuple[str, bytes]:
     wire: list[tuple[str, bytes]] = []
-    uplink = Uplink("AGI", "iveg", "b", lambda topic, raw: wire.append((topic, raw)))
+    uplink = Uplink(
+        "AGI", "iveg", Origins("b"), lambda topic, raw: wire.append((topic, raw))
+    )
     uplink.send(observation, START)
     return wire[0]
 
@@ -496,7 +500,9 @@ def test_whoever_was_seen_without_a_place_is_unreadable_to_iveg() -> None:
 
 def test_the_single_payload_does_not_call_them_an_empty_look() -> None:
     wire: list[bytes] = []
-    uplink = Uplink("AGI", "iveg", "b", lambda _, raw: wire.append(raw), form="single")
+    uplink = Uplink(
+        "AGI", "iveg", Origins("b"), lambda _, raw: wire.append(raw), form="single"
+    )
 
     uplink.send(DetectionFrame("", Origin(), (), UNREAD), START)
     uplink.send(odometry(), START)
