@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from iveg.domain.errors import UnreadableError
 from iveg.robot.grounding import (
     DEFAULT,
     DepthPicture,
@@ -69,12 +68,6 @@ def test_the_printed_kernel_shrinks_to_its_least_as_the_factor_grows(
     factor: float, area: float
 ) -> None:
     assert kernel_area(factor, 9.0, 49.0) == area
-
-
-@pytest.mark.parametrize("factor", [-0.1, 100.1, math.nan])
-def test_an_erosion_factor_outside_the_percentages_is_refused(factor: float) -> None:
-    with pytest.raises(UnreadableError, match="bad_erosion_factor"):
-        kernel_area(factor, 9.0, 49.0)
 
 
 @pytest.mark.parametrize(("area", "edge"), [(0.0, 1), (8.9, 2), (9.0, 3), (24.5, 4)])
@@ -182,12 +175,6 @@ def test_a_target_without_a_place_says_why() -> None:
     assert refusal(segment(nothing), picture()) == "empty"
     assert refusal(segment(left=60), picture()) == "empty"
     assert refusal(segment(), picture(0.0)) == "no_depth"
-
-
-@pytest.mark.parametrize("probability", [math.nan, -0.1, 1.1])
-def test_a_probability_that_is_none_is_refused(probability: float) -> None:
-    with pytest.raises(UnreadableError, match="bad_probability"):
-        refusal(segment(probability=probability), picture())
 
 
 # --- a recorded picture ---------------------------------------------------------------

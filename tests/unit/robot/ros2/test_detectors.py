@@ -111,21 +111,6 @@ def test_a_box_with_depth_lies_where_the_person_is(
     assert one.box.zmax == pytest.approx(1.8, abs=0.01)
 
 
-@pytest.mark.parametrize("made", [vision_3d, yolact, yolo_3d])
-def test_a_frame_that_nobody_knows_places_nothing_and_is_named(made: Made) -> None:
-    one = bench()
-    header = ros.Header(said.stamp(), "left_eye")
-
-    found = told(
-        one,
-        "detections_3d",
-        made(header, ros.Point(1.0), ros.Vector3(1, 1, 1)),
-    )
-
-    assert (found.detections, found.unread) == ((), ("farmer",))
-    assert one.faults() == {"no_transform": "map → left_eye"}
-
-
 def test_a_detection_of_yolo_without_depth_is_no_place_at_the_origin() -> None:
     seen = d.DetectionArray(OPTICAL, (d.Detection(0, "farmer", 0.9),))
 
@@ -241,16 +226,6 @@ def test_the_picture_that_yolox_looked_at_is_the_one_that_counts() -> None:
     assert math.dist(found.box.centre[:2], TRUTH) <= CLOSE_M
 
 
-def test_boxes_in_a_picture_of_another_size_are_lost_and_named() -> None:
-    box = replace(yolox_box(MIDDLE, TALL), img_width=1280, img_height=720)
-    one = bench().hear("depth", depth()).hear("camera_info", info())
-
-    found = told(one, "detections_2d", d.BoundingBoxes(OPTICAL, UNSEEN, (box,)))
-
-    assert (found.detections, found.unread) == ((), ("farmer",))
-    assert one.faults() == {"bad_picture": "/depth"}
-
-
 @pytest.mark.parametrize(
     ("topic", "message"),
     [
@@ -288,28 +263,3 @@ def test_a_class_that_is_a_number_gets_its_name(topic: str, message: Any) -> Non
     (found,) = told(one, topic, message).detections
 
     assert found.class_id == "farmer"
-
-
-@pytest.mark.parametrize("score", [math.nan, -0.1, 1.5])
-def test_a_score_that_is_none_is_lost(score: float) -> None:
-    box = d.BoundingBox3d("farmer", score, -0.3, -0.9, 0.3, 0.9, 2.8, 3.2)
-    one = bench()
-
-    found = told(one, "detections_3d", d.BoundingBoxes3d(OPTICAL, (box,)))
-
-    assert (found.detections, len(found.unread)) == ((), 1)
-    assert one.faults() == {"bad_probability": "/detections_3d"}
-
-
-def test_a_body_with_its_outline_and_joints_is_read_for_its_box_alone() -> None:
-    made = ros.STORE.types
-    outline = made["yolo_msgs/msg/Mask"](1, 2, [d.Point2D(3.0, 4.0)])
-    joint = made["yolo_msgs/msg/KeyPoint2D"](1, d.Point2D(), 0.5)
-    joints = made["yolo_msgs/msg/KeyPoint2DArray"]([joint])
-    box = d.BoundingBox2D(size=d.Vector2(1.0, 2.0))
-    bodies = (d.Detection(2, bbox=box, mask=outline, keypoints=joints),) * 2
-
-    found = cdr.read(d.DetectionArray, cdr.write(d.DetectionArray(OPTICAL, bodies)))
-
-    assert [(one.class_id, one.bbox) for one in found.detections] == [(2, box)] * 2
-    assert found.detections[1].mask.data == [d.Point2D(3.0, 4.0)]

@@ -88,17 +88,6 @@ def placed(network: FakeNetwork) -> None:
     network.publish("/agi/odom", ros.Odometry(odom, "base_link"))
 
 
-async def test_while_it_is_held_the_base_is_told_zero_again_and_again(
-    site: Site,
-) -> None:
-    for _ in range(10):
-        site.network.publish("/agi/cmd_vel_nav", ros.Twist(ros.Vector3(0.5)))
-
-    await until(lambda: len(site.driven) >= 20)
-
-    assert set(site.driven) == {ros.Twist()}
-
-
 async def test_a_goal_goes_out_as_nav2_takes_it_and_is_given_up_by_staying(
     site: Site,
 ) -> None:
@@ -137,15 +126,6 @@ async def test_a_second_publisher_of_the_drives_topic_makes_it_stand(
 
     await until(lambda: "second_publisher" in site.faults())
     await until(lambda: site.robot.node.speed_factor == 0.0)
-
-
-async def test_our_own_writer_is_no_second_publisher(site: Site) -> None:
-    site.network.others.append(endpoint("/agi/cmd_vel", ros.Twist, own=True))
-    site.network.others.append(endpoint("/agii/cmd_vel", ros.Twist))
-
-    await until(lambda: len(site.driven) >= 20)
-
-    assert "second_publisher" not in site.faults()
 
 
 async def test_who_is_near_goes_out_for_the_costmap_and_for_rviz(site: Site) -> None:
