@@ -238,7 +238,7 @@ MUTANTS = (
     Mutant(
         "clear: whom a feedback does not name has no limit",
         "feedback.speed_limits.get(self._me, UNSUPERVISED)",
-        "feedback.speed_limits.get(self._me, SpeedLimit())",
+        "feedback.speed_limits.get(self._me, SpeedLimit(1.0))",
         ("unit/robot/test_feedback.py",),
     ),
     Mutant(

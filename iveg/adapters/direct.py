@@ -87,9 +87,7 @@ class DirectReader:
         self, apikey: str, robot_id: str, kinds: Iterable[Kind]
     ) -> Iterator[tuple[str, _Source]]:
         """Topics of one robot."""
-        measure = partial(
-            codec.read_measure, is_past=self._is_past, instead=codec.UNREAD
-        )
+        measure = partial(codec.read_measure, is_past=self._is_past)
         for kind in kinds:
             if kind.suffix is None:
                 continue

@@ -18,7 +18,7 @@ other way counts as direct.
 Whether what a robot says can be true: by physics, and by what it said before.
 
 Each finding is a code, a contradiction of ``Doubts`` of a robot's state; what
-cannot be true of any robot is refused before it comes here (``ngsi.payloads``).  Only
+cannot be true of any robot is refused before it comes here (``observations``).  Only
 news is compared, and the longer of the robot's time and ours counts, so that lateness
 and reordering are no contradictions.  docs/safety.md, "Doubt", has the table.
 

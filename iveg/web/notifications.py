@@ -15,7 +15,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from iveg.domain.errors import UnreadableError
 from iveg.domain.observations import EntityReading, Instant, Observation, Received
 from iveg.domain.transports import FIWARE
-from iveg.ngsi.codec import UNREAD, read_notification
+from iveg.ngsi.codec import read_notification
 from iveg.vital.ingest import Ingest
 from iveg.vital.ports import Clock
 from iveg.web.problems import Problem, problem_of
@@ -120,7 +120,7 @@ class NotificationEndpoint:
         at = self._clock()
         try:
             subscription_id, reading = read_notification(
-                body, self._ingest.is_past, UNREAD, self._equipment
+                body, self._ingest.is_past, self._equipment
             )
         except UnreadableError as error:
             return problem_of(error)

@@ -152,7 +152,7 @@ def test_a_message_on_mqtt_is_taken_clean_or_counted_once(sign: str) -> None:
         heard.append,
         lambda _source, reason, _detail: counted.append(reason),
     )
-    measure = orjson.loads(codec.write_navigation(Navigation("AGI", origin(), "row 4")))
+    measure = orjson.loads(codec.write_measure(Navigation("AGI", origin(), "row 4")))
 
     for body in _with(measure, SIGNS[sign]):
         before = len(heard) + len(counted)

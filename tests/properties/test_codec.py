@@ -26,8 +26,8 @@ from iveg.domain.observations import (
     Origin,
     SafetyReport,
 )
+from iveg.domain.wire import MAX_TEXT, clean_text
 from iveg.ngsi import codec, names
-from iveg.ngsi.payloads import MAX_TEXT, clean_text
 
 alphabet = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_.: áéñ"
 texts = st.text(alphabet, min_size=1, max_size=40)
@@ -66,7 +66,7 @@ def test_what_proves_an_age_survives_the_wire(
     )
     one = Odometry("AGI", said, Pose2D(0.0, 0.0, 0.0), Twist2D(0.0, 0.0))
 
-    (read,) = codec.read_measure("AGI_odom", codec.write_odometry(one)).observations
+    (read,) = codec.read_measure("AGI_odom", codec.write_measure(one)).observations
 
     assert isinstance(read, Odometry)
     assert read.origin == said
@@ -119,7 +119,7 @@ alerts = st.builds(
 
 @given(st.builds(Odometry, st.just("AGI"), origins, poses, twists))
 def test_odometry_comes_back_as_it_went(value: Odometry) -> None:
-    reading = codec.read_measure("AGI_odom", codec.write_odometry(value))
+    reading = codec.read_measure("AGI_odom", codec.write_measure(value))
 
     assert reading == codec.ReadResult((value,))
 
@@ -134,7 +134,7 @@ def test_odometry_comes_back_as_it_went(value: Odometry) -> None:
     )
 )
 def test_detections_come_back_as_they_went(value: DetectionFrame) -> None:
-    written = codec.write_detections(value)
+    written = codec.write_measure(value)
 
     assert codec.read_measure("AGI_yolox_bounding_boxes", written) == codec.ReadResult(
         (value,)
@@ -160,7 +160,7 @@ def test_detections_come_back_as_they_went(value: DetectionFrame) -> None:
 )
 def test_safety_reports_come_back_as_they_went(value: SafetyReport) -> None:
     assert codec.read_measure(
-        "AGI_safety", codec.write_safety(value)
+        "AGI_safety", codec.write_measure(value)
     ) == codec.ReadResult((value,))
 
 
@@ -176,7 +176,7 @@ def test_safety_reports_come_back_as_they_went(value: SafetyReport) -> None:
 )
 def test_navigation_comes_back_as_it_went(value: Navigation) -> None:
     assert codec.read_measure(
-        "AGI_nav", codec.write_navigation(value)
+        "AGI_nav", codec.write_measure(value)
     ) == codec.ReadResult((value,))
 
 
@@ -212,7 +212,7 @@ def test_scans_come_back_as_they_went(
         "AGI", origin, -1.5, 0.01, 0.1, 30.0, mount, np.array(ranges, np.float32)
     )
 
-    reading = codec.read_measure("AGI_lidar2D", codec.write_scan(value))
+    reading = codec.read_measure("AGI_lidar2D", codec.write_measure(value))
 
     (back,) = reading.observations
     assert isinstance(back, LaserScan)

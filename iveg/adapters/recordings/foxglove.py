@@ -27,7 +27,7 @@ from iveg.domain.observations import (
     UnreadScan,
     kind_of,
 )
-from iveg.ngsi.codec import UNREAD, read_notification
+from iveg.ngsi.codec import read_notification
 
 # --- schemas ----------------------------------------------------------------------
 
@@ -234,7 +234,7 @@ class Drawing:
 
     def _read(self, came: Incoming) -> None:
         if came.sort is Sort.NOTIFICATION:
-            _, reading = read_notification(came.payload, lambda *_: False, UNREAD)
+            _, reading = read_notification(came.payload, _nothing_is_past)
             for one in reading.observations:
                 with contextlib.suppress(UnreadableError):
                     self._draw(one)
@@ -262,6 +262,10 @@ class Drawing:
     def _is_due(self, stream: _Stream) -> bool:
         is_drawn = stream[1] in DRAWN_APART_S
         return is_drawn and self._at.mono >= self._due.get(stream, float("-inf"))
+
+
+def _nothing_is_past(*_: object) -> bool:
+    return False
 
 
 def _read(observation: Observation) -> Observation:

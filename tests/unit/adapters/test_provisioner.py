@@ -177,7 +177,7 @@ async def test_what_a_gap_has_lost_is_read_once_and_never_looks_live(
 ) -> None:
     async with Site(fiware).running() as site:
         await until(lambda: site.provisioner.subscription_ids)
-        measure = codec.write_odometry(odometry())
+        measure = codec.write_measure(odometry())
         await site.link.publish("/iveg/AGI_odom/attrs", measure)
         read: list[Received] = []
         async with asyncio.timeout(30):

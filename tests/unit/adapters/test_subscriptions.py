@@ -131,9 +131,9 @@ async def test_doubles_and_leftovers_of_ours_go_and_others_stay() -> None:
     assert frozenset(store.kept) == ensured.ids | {theirs}
 
 
-POSE = codec.write_odometry(odometry())
+POSE = codec.write_measure(odometry())
 BOTH = orjson.dumps(
-    orjson.loads(POSE) | orjson.loads(codec.write_safety(safety_report()))
+    orjson.loads(POSE) | orjson.loads(codec.write_measure(safety_report()))
 )
 SINGLE = orjson.dumps({"pose": {"x": 1, "y": 2, "yaw": 0}, "timestamp": "t"})
 
@@ -142,15 +142,15 @@ SINGLE = orjson.dumps({"pose": {"x": 1, "y": 2, "yaw": 0}, "timestamp": "t"})
     ("topic", "payload", "told"),
     [
         ("/iveg/AGI_odom/attrs", POSE, ["odometry"]),
-        ("/iveg/AGI_lidar2D/attrs", codec.write_scan(scan()), ["lidar"]),
+        ("/iveg/AGI_lidar2D/attrs", codec.write_measure(scan()), ["lidar"]),
         (
             "/iveg/AGI_yolox_bounding_boxes/attrs",
-            codec.write_detections(detection_frame()),
+            codec.write_measure(detection_frame()),
             ["detections"],
         ),
         (
             "/iveg/AGI_safety/attrs",
-            codec.write_safety(safety_report()),
+            codec.write_measure(safety_report()),
             ["safety"],
         ),
         ("/iveg/AGI/attrs", SINGLE, ["single uplink"]),

@@ -212,7 +212,7 @@ def test_feedback_is_written_as_the_contract_says() -> None:
         Pose2D(1.0, 2.0, 0.1),
         Twist2D(0.5, 0.0),
         "t",
-        {"AGI": SpeedLimit(), "AGII": SpeedLimit(0.5, "person", None, 1.43, "d-1")},
+        {"AGI": SpeedLimit(1.0), "AGII": SpeedLimit(0.5, "person", None, 1.43, "d-1")},
         {"AGII": 8731},
     )
 
@@ -346,7 +346,7 @@ def test_a_backlog_that_cannot_be_read_costs_no_speed_limit(
 
 
 def test_every_measure_carries_its_stamp_at_the_top_level_too() -> None:
-    written = orjson.loads(codec.write_odometry(odometry(origin=origin())))
+    written = orjson.loads(codec.write_measure(odometry(origin=origin())))
 
     assert written["TimeInstant"] == codec.format_stamp(at(0).wall)
 
@@ -355,10 +355,10 @@ def test_every_measure_carries_its_stamp_at_the_top_level_too() -> None:
 def test_what_a_laser_sees_is_told_in_the_report_and_read_the_same(moved: bool) -> None:
     seen = ReportedObstacle(3.25, -1.5, 0.45, moved)
     said = replace(safety_report(), obstacle=seen)
-    (read,) = codec.read_measure("AGI_safety", codec.write_safety(said)).observations
+    (read,) = codec.read_measure("AGI_safety", codec.write_measure(said)).observations
 
     assert read == said
-    assert b"obstacle" not in codec.write_safety(safety_report())
+    assert b"obstacle" not in codec.write_measure(safety_report())
 
 
 @pytest.mark.parametrize(
@@ -373,7 +373,7 @@ def test_what_a_laser_sees_is_told_in_the_report_and_read_the_same(moved: bool) 
     ],
 )
 def test_an_obstacle_that_cannot_be_read_costs_no_report(obstacle: object) -> None:
-    said = orjson.loads(codec.write_safety(safety_report()))
+    said = orjson.loads(codec.write_measure(safety_report()))
     said["safety_state"]["obstacle"] = obstacle
     reading = codec.read_measure("AGI_safety", orjson.dumps(said))
 
@@ -434,8 +434,8 @@ def test_a_scan_in_no_frame_of_its_robot_is_refused_by_name(frame: str) -> None:
     body = b'{"lidar_points": [1.0], "lidar_header": {"angle_min": 0, '
     body += b'"angle_increment": 0.1, "range_max": 9, "frame_id": "%b"}}'
 
-    for instead in ({}, codec.UNREAD):
-        read = codec.read_measure("AGI_lidar2D", body % frame.encode(), instead=instead)
+    for is_past in (None, lambda *_: False):
+        read = codec.read_measure("AGI_lidar2D", body % frame.encode(), is_past=is_past)
 
         assert read.observations == ()
         assert [one.reason for one in read.problems] == ["unknown_frame"]

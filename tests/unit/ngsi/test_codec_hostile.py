@@ -5,6 +5,7 @@ import time
 import orjson
 import pytest
 
+from iveg.domain import wire
 from iveg.domain.errors import UnreadableError
 from iveg.domain.observations import (
     DetectionFrame,
@@ -14,7 +15,7 @@ from iveg.domain.observations import (
     RefusedFrame,
     SafetyReport,
 )
-from iveg.ngsi import codec, payloads
+from iveg.ngsi import codec
 from tests.builders import notification, pose_value
 
 BOX = {
@@ -154,7 +155,7 @@ def test_f26_five_megabytes_of_points_are_refused() -> None:
 
 
 def test_more_boxes_than_anybody_sees_are_refused() -> None:
-    payload = orjson.dumps({"bounding_boxes": [BOX] * (payloads.MAX_BOXES + 1)})
+    payload = orjson.dumps({"bounding_boxes": [BOX] * (wire.MAX_BOXES + 1)})
 
     reading = codec.read_measure("AGI_yolox_bounding_boxes", payload)
 

@@ -509,7 +509,7 @@ def test_faults_come_back_as_they_were_reported() -> None:
     faults = (RobotFault("no_transform", "map → odom", 2.1), RobotFault("flood", "/tf"))
     report = SafetyReport("AGI", Origin("b", 1), 0.0, "stale", faults=faults)
 
-    (read,) = codec.read_measure("AGI_safety", codec.write_safety(report)).observations
+    (read,) = codec.read_measure("AGI_safety", codec.write_measure(report)).observations
 
     assert isinstance(read, SafetyReport)
     assert read.faults == faults
