@@ -261,7 +261,7 @@ MUTANTS = (
     ),
     Mutant(
         "clear: a frame that cannot be read is as if it never came",
-        "return refused_frame(source, read) if name in _FRAMES else read",
+        "return _refused_frame(source, read) if name in _FRAMES else read",
         "return read",
         ("unit/ngsi",),
     ),

@@ -8,6 +8,7 @@ and neither people nor poses must vanish for that.
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Protocol
 
 from iveg.domain.kinds import KINDS, Kind, Scope
 from iveg.domain.observations import (
@@ -48,13 +49,27 @@ class _Source:
     sparse: bool = True
 
 
+class Intake(Protocol):
+    """Takes what is read: the pipeline's, or one that draws for viewers."""
+
+    def is_past(
+        self, robot_id: str, kind: type[Observation], boot: str, seq: int
+    ) -> bool:
+        """Whether the identity of a message shows that it is no news."""
+
+    def enqueue(self, received: Received) -> None:
+        """Take an observation."""
+
+    def reject(self, source: str, reason: str, detail: str = "") -> None:
+        """Count what cannot be used."""
+
+
 class DirectReader:
     """Turns messages of robots into observations of the ``direct`` transport.
 
     Args:
-        enqueue: Where observations go; ``reject`` where the unreadable is counted.
+        intake: Where observations go and the unreadable is counted.
         scope: What is read; ``safety`` leaves poses, scans and intent to FIWARE.
-        is_past: Tells by its identity what FIWARE has already brought.
         recorded: Told of each message that is read: topic, payload, and when.
     """
 
@@ -63,17 +78,11 @@ class DirectReader:
         apikey: str,
         robots: Iterable[str],
         clock: Callable[[], Instant],
-        enqueue: Callable[[Received], None],
-        reject: Callable[[str, str, str], None],
+        intake: Intake,
         scope: Scope = "all",
-        is_past: codec.IsPast | None = None,
-        recorded: Recorded = lambda *_: None,
+        recorded: Recorded | None = None,
     ) -> None:
-        self._clock = clock
-        self._enqueue = enqueue
-        self._reject = reject
-        self._is_past = is_past
-        self._recorded = recorded
+        self._clock, self._intake, self._recorded = clock, intake, recorded
         kinds = _read_in(scope)
         self._kinds = tuple(kind.of for kind in kinds)
         self._due: dict[tuple[str, type[Observation]], float] = {}
@@ -87,7 +96,7 @@ class DirectReader:
         self, apikey: str, robot_id: str, kinds: Iterable[Kind]
     ) -> Iterator[tuple[str, _Source]]:
         """Topics of one robot."""
-        measure = partial(codec.read_measure, is_past=self._is_past)
+        measure = partial(codec.read_measure, is_past=self._intake.is_past)
         for kind in kinds:
             if kind.suffix is None:
                 continue
@@ -119,7 +128,7 @@ class DirectReader:
         """Count a message that the broker had retained: nobody knows how old it is."""
         source = self._sources.get(topic)
         if source is not None:
-            self._reject(source.robot_id, "retained", topic)
+            self._intake.reject(source.robot_id, "retained", topic)
 
     def read(self, topic: str, payload: bytes) -> None:
         """Take one message."""
@@ -129,13 +138,14 @@ class DirectReader:
         at = self._clock()
         if self._is_early(source, at.mono):
             return
-        self._recorded(topic, payload, at)
+        if self._recorded is not None:
+            self._recorded(topic, payload, at)
         reading = source.read(payload)
         for problem in reading.problems:
-            self._reject(problem.source, problem.reason, problem.detail)
+            self._intake.reject(problem.source, problem.reason, problem.detail)
         for observation in reading.observations:
             if issubclass(kind_of(observation), self._kinds):
-                self._enqueue(
+                self._intake.enqueue(
                     Received(observation, at, DIRECT.id, sparse=source.sparse)
                 )
 

@@ -23,6 +23,7 @@ from iveg.domain.observations import (
     RefusedFrame,
     kind_of,
 )
+from iveg.domain.world import World
 from iveg.vital.waiting import wait_set
 
 _log = logging.getLogger(__name__)
@@ -40,29 +41,18 @@ class Ingest:
     """Holds what has arrived until the rule loop takes it.
 
     Args:
-        known: Whether a robot id belongs to the fleet.
-        rejected: Called once for each new kind of rejection, with source and reason.
-        is_past: Whether a message is too old to be read.
+        world: The fleet; knows who is heard, and what a stream is past.
         passed: Called with each copy of a message of the fleet, before it is queued.
-        is_refused_robot: Whether a setting says that a robot is not heard.
-        misplaced: Name of the frame that odometry is in, if that is not its robot's.
+        rejected: Called once for each new kind of rejection, with source and reason.
     """
 
     def __init__(
         self,
-        known: Callable[[str], bool],
-        rejected: Callable[[str, str], None] = lambda _source, _reason: None,
-        is_past: Callable[[str, type[Observation], str, int], bool] = lambda *_: False,
-        passed: Callable[[Received], None] = lambda _: None,
-        is_refused_robot: Callable[[str], bool] = lambda _: False,
-        misplaced: Callable[[Observation], str | None] = lambda _: None,
+        world: World,
+        passed: Callable[[Received], None],
+        rejected: Callable[[str, str], None],
     ) -> None:
-        self._is_refused_robot = is_refused_robot
-        self._misplaced = misplaced
-        self._known = known
-        self._passed = passed
-        self._is_past = is_past
-        self._rejected = rejected
+        self._world, self._passed, self._rejected = world, passed, rejected
         self._queue: deque[tuple[Received, _Stream]] = deque()
         self._refused: dict[str, Received] = {}
         """By robot, that one of its detection frames was dropped."""
@@ -80,13 +70,13 @@ class Ingest:
     def enqueue(self, received: Received) -> None:
         """Queue one observation; never blocks."""
         robot_id = received.observation.robot_id
-        if robot_id and not self._known(robot_id):
+        if robot_id and robot_id not in self._world.robots:
             self.reject(robot_id, "unknown_robot", str(UnknownRobotError(robot_id)))
             return
-        if self._is_refused_robot(robot_id):
+        if self._world.is_refused(robot_id):
             self.reject(robot_id, "refused_robot", "is not heard, by a setting")
             return
-        if (frame := self._misplaced(received.observation)) is not None:
+        if (frame := self._world.misplaced(received.observation)) is not None:
             self.reject(robot_id, "unknown_frame", f"odometry: {frame}")
             return
         name = kind_of(received.observation).__name__
@@ -145,7 +135,7 @@ class Ingest:
     ) -> bool:
         """Whether a message cannot be news: it is here, or a later one was taken."""
         waits = (robot_id, kind, boot, seq) in self._identities
-        return waits or self._is_past(robot_id, kind, boot, seq)
+        return waits or self._world.is_past(robot_id, kind, boot, seq)
 
     def reject(self, source: str, reason: str, detail: str = "") -> None:
         """Count something that cannot be used; say so once for each source."""
@@ -160,7 +150,7 @@ class Ingest:
     def _may_log(self, source: str) -> bool:
         """Whether there is room: whoever uses up the own leaves that of others."""
         robot_id = source.partition("_")[0]
-        owner = robot_id if self._known(robot_id) else None
+        owner = robot_id if robot_id in self._world.robots else None
         self._logged[owner] += 1
         return self._logged[owner] <= _MOST_LOGGED
 

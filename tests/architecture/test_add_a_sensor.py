@@ -127,7 +127,7 @@ GUARDS = ("tests/architecture/test_sensors.py", "tests/unit/test_page_types.py")
 WRITERS = "iveg.models.typescript", "tests.architecture.sensor_pages"
 WHOLE = """
 from dataclasses import replace
-from iveg.adapters.subscriptions import WANTED_OF_ALL
+from iveg.adapters.reconciler import WANTED_OF_ALL
 from iveg.domain.observations import Instant, Received, SoilMoisture
 from iveg.domain.records import ReadingRecord
 from iveg.domain.world import World

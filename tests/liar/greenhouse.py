@@ -80,9 +80,7 @@ class Field:
             "iveg",
             FLEET,
             desk.clock,
-            desk.ingest.enqueue,
-            desk.ingest.reject,
-            is_past=desk.ingest.is_past,
+            desk.ingest,
         )
         self.stage = Stage(
             self.world,

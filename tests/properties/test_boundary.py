@@ -145,13 +145,8 @@ async def test_no_value_in_a_command_on_live_ends_the_line() -> None:
 def test_a_message_on_mqtt_is_taken_clean_or_counted_once(sign: str) -> None:
     heard: list[Received] = []
     counted: list[str] = []
-    reader = DirectReader(
-        "iveg",
-        ("AGI",),
-        lambda: at(1.0),
-        heard.append,
-        lambda _source, reason, _detail: counted.append(reason),
-    )
+    intake = Ingest(World(("AGI",)), heard.append, print)
+    reader = DirectReader("iveg", ("AGI",), lambda: at(1.0), intake)
     measure = orjson.loads(codec.write_measure(Navigation("AGI", origin(), "row 4")))
 
     for body in _with(measure, SIGNS[sign]):

@@ -219,9 +219,7 @@ class Drawing:
         self._at = Instant(0.0, 0.0)
         self._found: list[Observation] = []
         self._due: dict[_Stream, float] = {}
-        self._reader = DirectReader(
-            apikey, robots, lambda: self._at, self._draw_received, lambda *_: None
-        )
+        self._reader = DirectReader(apikey, robots, lambda: self._at, self)
 
     def messages(self, came: Incoming) -> Iterator[tuple[Channel, bytes]]:
         """Foxglove's messages of an input; none of what cannot be read."""
@@ -234,7 +232,7 @@ class Drawing:
 
     def _read(self, came: Incoming) -> None:
         if came.sort is Sort.NOTIFICATION:
-            _, reading = read_notification(came.payload, _nothing_is_past)
+            _, reading = read_notification(came.payload, self.is_past)
             for one in reading.observations:
                 with contextlib.suppress(UnreadableError):
                     self._draw(one)
@@ -243,8 +241,16 @@ class Drawing:
             if stream is None or self._is_due(stream):
                 self._reader.read(came.name, came.payload)
 
-    def _draw_received(self, received: Received) -> None:
+    def enqueue(self, received: Received) -> None:
+        """Draw what the reader of measures has read."""
         self._draw(received.observation)
+
+    def reject(self, source: str, reason: str, detail: str = "") -> None:
+        """Draw nothing of what cannot be read."""
+
+    def is_past(self, *_: object) -> bool:
+        """Nothing: each message is drawn once."""
+        return False
 
     def _draw(self, observation: Observation) -> None:
         """Have one drawn that is due.  Raises UnreadableError."""
@@ -262,10 +268,6 @@ class Drawing:
     def _is_due(self, stream: _Stream) -> bool:
         is_drawn = stream[1] in DRAWN_APART_S
         return is_drawn and self._at.mono >= self._due.get(stream, float("-inf"))
-
-
-def _nothing_is_past(*_: object) -> bool:
-    return False
 
 
 def _read(observation: Observation) -> Observation:

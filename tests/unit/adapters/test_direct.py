@@ -26,6 +26,8 @@ from tests.fakes.clock import FakeClock
 
 
 class Bench:
+    """A reader, and all that it offers and rejects."""
+
     def __init__(self, scope: Scope = "all") -> None:
         self.offered: list[Received] = []
         self.rejected: list[tuple[str, str, str]] = []
@@ -34,10 +36,18 @@ class Bench:
             "iveg",
             ["AGI"],
             self.clock,
-            self.offered.append,
-            lambda *problem: self.rejected.append(problem),
+            self,
             scope,
         )
+
+    def is_past(self, *_: object) -> bool:
+        return False
+
+    def enqueue(self, received: Received) -> None:
+        self.offered.append(received)
+
+    def reject(self, source: str, reason: str, detail: str = "") -> None:
+        self.rejected.append((source, reason, detail))
 
 
 def test_looks_reports_and_answers_come_in_on_the_direct_transport() -> None:

@@ -4,9 +4,9 @@ from collections.abc import AsyncIterator
 import pytest
 
 from iveg.adapters import fiware_http
-from iveg.adapters.fleet_provisioning import provision
 from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.orion import OrionClient
+from iveg.adapters.reconciler import provision
 from iveg.domain.errors import HopError
 from iveg.lab.embedded.server import Running
 from tests.faulty_fiware import faulty_fiware

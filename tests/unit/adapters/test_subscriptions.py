@@ -6,13 +6,13 @@ import aiomqtt
 import orjson
 import pytest
 
-from iveg.adapters.fleet_provisioning import provision
 from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.orion import OrionClient
-from iveg.adapters.subscriptions import (
+from iveg.adapters.reconciler import (
     PREFIX,
     TOKEN_HEADER,
     ensure_subscriptions,
+    provision,
     wanted_for,
 )
 from iveg.lab.embedded.server import embedded_fiware
@@ -25,7 +25,7 @@ TOKEN = "ab" * 16
 WANTED = wanted_for()
 
 
-class FakeStore:
+class FakeStore(OrionClient):
     """Subscriptions as Orion would keep them, in a list."""
 
     def __init__(self) -> None:
