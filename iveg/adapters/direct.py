@@ -37,7 +37,6 @@ class _Source:
     Attributes:
         read: Reads a payload.
         kind: Kind of all its messages; None: they are of several.
-        apart_s: Least time between two of a robot that are read (s).
         sparse: Its topic has two safety reports a second; see ``Received``.
     """
 
@@ -45,7 +44,6 @@ class _Source:
     qos: int
     read: Callable[[bytes], codec.ReadResult]
     kind: type[Observation] | None = None
-    apart_s: float = 0.0
     sparse: bool = True
 
 
@@ -56,6 +54,9 @@ class Intake(Protocol):
         self, robot_id: str, kind: type[Observation], boot: str, seq: int
     ) -> bool:
         """Whether the identity of a message shows that it is no news."""
+
+    def is_early(self, robot_id: str, kind: type[Observation], now: float) -> bool:
+        """Whether a message comes too soon after one of its kind to be read."""
 
     def enqueue(self, received: Received) -> None:
         """Take an observation."""
@@ -85,7 +86,6 @@ class DirectReader:
         self._clock, self._intake, self._recorded = clock, intake, recorded
         kinds = _read_in(scope)
         self._kinds = tuple(kind.of for kind in kinds)
-        self._due: dict[tuple[str, type[Observation]], float] = {}
         self._sources = {
             topic: source
             for robot_id in robots
@@ -102,7 +102,7 @@ class DirectReader:
                 continue
             name = robot_id + kind.suffix
             read = partial(measure, name)
-            source = _Source(robot_id, kind.qos, read, kind.of, kind.apart_s)
+            source = _Source(robot_id, kind.qos, read, kind.of)
             yield names.measure_topic(apikey, name), source
             if kind.speaks_alone:
                 alone = names.direct_topic(robot_id, kind.suffix)
@@ -113,9 +113,12 @@ class DirectReader:
             answer = partial(codec.read_answer, robot_id)
             yield names.answer_topic(apikey, robot_id), _Source(robot_id, 1, answer)
 
-    def subscriptions(self) -> dict[str, int]:
-        """Topics and their QoS."""
-        return {topic: source.qos for topic, source in self._sources.items()}
+    def subscriptions(self) -> dict[str, dict[str, int]]:
+        """Topics of each robot, and their QoS."""
+        found: dict[str, dict[str, int]] = {}
+        for topic, source in self._sources.items():
+            found.setdefault(source.robot_id, {})[topic] = source.qos
+        return found
 
     def stream(self, topic: str) -> tuple[str, type[Observation]] | None:
         """The robot and the one kind of what comes on a topic, if it is one."""
@@ -136,7 +139,8 @@ class DirectReader:
         if source is None:
             return
         at = self._clock()
-        if self._is_early(source, at.mono):
+        kind = source.kind
+        if kind is not None and self._intake.is_early(source.robot_id, kind, at.mono):
             return
         if self._recorded is not None:
             self._recorded(topic, payload, at)
@@ -148,13 +152,3 @@ class DirectReader:
                 self._intake.enqueue(
                     Received(observation, at, DIRECT.id, sparse=source.sparse)
                 )
-
-    def _is_early(self, source: _Source, now: float) -> bool:
-        """Whether nobody would look at it: one of its kind has just been read."""
-        if source.kind is None or source.apart_s == 0.0:
-            return False
-        stream = source.robot_id, source.kind
-        if now < self._due.get(stream, 0.0):
-            return True
-        self._due[stream] = now + source.apart_s
-        return False

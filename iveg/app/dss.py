@@ -169,11 +169,12 @@ class Dss:
             self.pipeline.supervision.guard(RECORDINGS, self.stores.inputs.measure),
         )
         self.outside.link.attach(
-            reader.subscriptions(),
+            {},
             reader.read,
             self._broker_back,
             self._broker_lost,
             reader.refuse_stored,
+            [*reader.subscriptions().values()],
         )
 
     def _provisioner(self) -> Provisioner:

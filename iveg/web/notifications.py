@@ -6,9 +6,9 @@ its own limit and secret.  Refusals look like those of the rest of the applicati
 
 from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Final, Protocol
 
-from starlette.requests import ClientDisconnect, Request
 from starlette.responses import Response
 from starlette.routing import Route
 from starlette.types import ASGIApp, Receive, Scope, Send
@@ -24,6 +24,7 @@ from iveg.web.security.headers import MAX_BODY, NOTIFICATIONS_PATH, TOO_LONG
 from iveg.web.security.roles import Action
 from iveg.web.security.secrets import NotifySecret
 
+_TAKEN = Response(status_code=204)
 _FORGED = Problem(401, "The notification secret is wrong.")
 
 
@@ -94,13 +95,12 @@ class NotificationEndpoint:
         headers = dict(reversed(scope["headers"]))
         problem = self._refusal(scope, headers)
         if problem is None and not self._is_foreign(headers):
-            try:
-                body = await _body(Request(scope, receive))
-            except ClientDisconnect:
+            body = await _body(receive)
+            if body is None:
                 return
             is_too_long = len(body) > MAX_BODY
             problem = Problem(413, TOO_LONG) if is_too_long else self.receive(body)
-        answer = Response(status_code=204) if problem is None else problem.response()
+        answer = _TAKEN if problem is None else problem.response()
         await answer(scope, receive, send)
 
     def _refusal(self, scope: Scope, headers: Mapping[bytes, bytes]) -> Problem | None:
@@ -132,7 +132,9 @@ class NotificationEndpoint:
         at, followers = self._clock(), self._followers
         try:
             subscription_id, reading = read_notification(
-                body, self._ingest.is_past, followers.equipment
+                body,
+                partial(self._ingest.is_past, now=at.mono),
+                followers.equipment,
             )
         except UnreadableError as error:
             return problem_of(error)
@@ -151,7 +153,7 @@ class NotificationEndpoint:
 
 
 class NotificationsFirst:
-    """Middleware: hands notifications to their endpoint, and all else on.
+    """The outermost layer: hands notifications to their endpoint, and all else on.
 
     Another method than POST goes on too, to be refused like everywhere.
     """
@@ -177,11 +179,14 @@ def _tenant_of(headers: Mapping[bytes, bytes]) -> tuple[str, str]:
     return service, headers.get(b"fiware-servicepath", b"").decode("latin-1")
 
 
-async def _body(request: Request) -> bytes:
-    """The whole body; of one that is too long no more than shows it."""
+async def _body(receive: Receive) -> bytes | None:
+    """The whole body; of one that is too long no more than shows it; None: cut off."""
     body = b""
-    async for part in request.stream():
-        body += part
-        if len(body) > MAX_BODY:
+    while len(body) <= MAX_BODY:
+        message = await receive()
+        if message["type"] == "http.disconnect":
+            return None
+        body += message["body"]
+        if not message["more_body"]:
             break
     return body

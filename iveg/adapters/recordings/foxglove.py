@@ -248,6 +248,10 @@ class Drawing:
     def reject(self, source: str, reason: str, detail: str = "") -> None:
         """Draw nothing of what cannot be read."""
 
+    def is_early(self, *_: object) -> bool:
+        """None: what is not due was left before it was read."""
+        return False
+
     def is_past(self, *_: object) -> bool:
         """Nothing: each message is drawn once."""
         return False

@@ -9,15 +9,19 @@ from iveg.domain.observations import (
     CommandAnswer,
     DetectionFrame,
     LaserScan,
+    Observation,
     Odometry,
     Received,
     SafetyReport,
     kind_of,
 )
+from iveg.domain.world import World
 from iveg.ngsi import codec
+from iveg.vital.ingest import Ingest
 from tests.builders import (
     detection,
     detection_frame,
+    ignore,
     odometry,
     safety_report,
     scan,
@@ -32,6 +36,7 @@ class Bench:
         self.offered: list[Received] = []
         self.rejected: list[tuple[str, str, str]] = []
         self.clock = FakeClock()
+        self.ingest = Ingest(World(("AGI",)), ignore, ignore)
         self.reader = DirectReader(
             "iveg",
             ["AGI"],
@@ -42,6 +47,9 @@ class Bench:
 
     def is_past(self, *_: object) -> bool:
         return False
+
+    def is_early(self, robot_id: str, kind: type[Observation], now: float) -> bool:
+        return self.ingest.is_early(robot_id, kind, now)
 
     def enqueue(self, received: Received) -> None:
         self.offered.append(received)

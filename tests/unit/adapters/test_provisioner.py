@@ -21,7 +21,7 @@ from iveg.lab.embedded.server import Running, embedded_fiware
 from iveg.ngsi import codec, names
 from iveg.vital.health_monitor import HealthMonitor
 from iveg.vital.ingest import Ingest
-from tests.builders import odometry
+from tests.builders import ignore, odometry
 from tests.http_servers import Request, Response, http_server
 from tests.ports import free_ports
 
@@ -67,7 +67,7 @@ class Place:
     ) -> None:
         self.heard: list[tuple[str, bytes]] = []
         self.health_monitor = HealthMonitor(clock.now())
-        self.ingest = Ingest(World(("AGI",)), bool, print)
+        self.ingest = Ingest(World(("AGI",)), ignore, ignore)
         self.orion = orion or OrionClient(
             orion_url or fiware.orion_url, *SERVICE, access
         )
