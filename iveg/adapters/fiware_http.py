@@ -14,7 +14,7 @@ import asyncio
 import logging
 import socket
 import ssl
-from collections.abc import Awaitable, Callable, Mapping, Sequence
+from collections.abc import AsyncGenerator, Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from http import HTTPStatus
@@ -87,8 +87,8 @@ class HeldToken:
     ends_at: float
 
 
-class FiwareToken:
-    """Gets the token and keeps it new.
+class FiwareToken(httpx.Auth):
+    """Gets the token, keeps it new, and sends requests with it.
 
     Args:
         grant: How it is asked for.
@@ -106,7 +106,36 @@ class FiwareToken:
         self._pause_s, self._again_at = FIRST_PAUSE_S, float("-inf")
         self._refused_at = float("-inf")
 
-    async def current(self) -> str:
+    async def async_auth_flow(
+        self, request: httpx.Request
+    ) -> AsyncGenerator[httpx.Request, httpx.Response]:
+        """Send a request with a token; once more after a 401. Raises HopError.
+
+        What a proxy refused has not reached the neighbour: sent again, it comes once.
+        """
+        # A little less than the whole, so that it is known what was waited for.
+        patience_s = _TOKEN_PART * request.extensions["timeout"]["read"]
+        token = await self._in_time(patience_s)
+        response = yield self._carrying(request, token)
+        # Wilma says 401 also to whom it knows and gives no role: asking on for another
+        # token would help nobody.
+        if response.status_code == HTTPStatus.UNAUTHORIZED and self._drops(token):
+            yield self._carrying(request, await self._in_time(patience_s))
+
+    async def _in_time(self, patience_s: float) -> str:
+        try:
+            # Not `wait_for`, which in Python 3.11 may swallow a cancellation.
+            async with asyncio.timeout(patience_s):
+                return await self._current()
+        except TimeoutError as error:
+            raise HopError(HOP, "no answer yet") from error
+
+    def _carrying(self, request: httpx.Request, token: str) -> httpx.Request:
+        is_bearer = self._grant.header == "Authorization"
+        request.headers[self._grant.header] = f"Bearer {token}" if is_bearer else token
+        return request
+
+    async def _current(self) -> str:
         """A token that is not over. Raises HopError: there is none."""
         held, now = self._held, self._mono()
         if held is None or now >= held.ends_at:
@@ -116,24 +145,14 @@ class FiwareToken:
             self._ask()
         return held.text
 
-    async def after(self, refused: str) -> str | None:
-        """Another token than the one that a proxy has refused. Raises HopError.
-
-        None where the refused one is itself such another: Wilma says 401 also to whom
-        it knows and gives no role, and asking on would help nobody.
-        """
+    def _drops(self, refused: str) -> bool:
+        """Whether there may be another token than a refused one."""
         if self._held is not None and self._held.text == refused:
             now = self._mono()
             if now - self._refused_at < _REFUSED_S:
-                return None
+                return False
             self._held, self._refused_at = None, now
-        return await self.current()
-
-    def header(self, token: str) -> Mapping[str, str]:
-        """The header that carries a token."""
-        if self._grant.header == "Authorization":
-            return {"Authorization": f"Bearer {token}"}
-        return {self._grant.header: token}
+        return True
 
     async def close(self) -> None:
         """Close the connection to the endpoint."""
@@ -244,7 +263,6 @@ class FiwareHttp:
         service: ``Fiware-Service``.
         path: ``Fiware-ServicePath``.
         access: Where a proxy before it asks for a token; None: none does.
-        bearer: Token that is sent along; empty for none.
 
     Attributes:
         HOP: Names the neighbour in errors.
@@ -260,10 +278,14 @@ class FiwareHttp:
         access: FiwareToken | None = None,
     ) -> None:
         self._access = access
-        headers = {"Fiware-Service": service, "Fiware-ServicePath": path}
         self._client = httpx.AsyncClient(
+            auth=access,
             base_url=url,
-            headers=headers,
+            headers={
+                "Accept": "application/json",
+                "Fiware-Service": service,
+                "Fiware-ServicePath": path,
+            },
             timeout=TIMEOUT_S,
             transport=httpx.AsyncHTTPTransport(
                 verify=_trusted(),
@@ -310,20 +332,17 @@ class FiwareHttp:
             NoAnswerError: no answer in time.
             HopError: no connection, no token for a proxy, or another status.
         """
-
-        async def send(token: Mapping[str, str]) -> httpx.Response:
-            return await self._client.request(
-                method,
-                path,
-                params=dict(query or {}),
-                json=body,
-                headers={"Accept": "application/json", **token},
-                timeout=timeout_s,
-            )
-
         try:
             async with asyncio.timeout(timeout_s):
-                response = await self._admitted(send, timeout_s)
+                response = await self._client.request(
+                    method,
+                    path,
+                    params=dict(query or {}),
+                    json=body,
+                    timeout=timeout_s,
+                )
+        except HopError as error:
+            raise HopError(self.HOP, f"{NO_TOKEN}: {error.detail}") from error
         except (TimeoutError, httpx.TimeoutException) as error:
             raise NoAnswerError(
                 self.HOP, f"no answer to {method} {path} in {timeout_s:g} s"
@@ -335,35 +354,6 @@ class FiwareHttp:
         if response.is_success or response.status_code in also:
             return response
         raise HopError(self.HOP, _complaint(method, path, response))
-
-    async def _admitted(
-        self,
-        send: Callable[[Mapping[str, str]], Awaitable[httpx.Response]],
-        timeout_s: float,
-    ) -> httpx.Response:
-        """The answer with a token where one is asked for; once more after a 401.
-
-        What a proxy refused has not reached the neighbour: sent again, it comes once.
-        """
-        if self._access is None:
-            return await send({})
-        token = await self._token(self._access.current(), timeout_s)
-        response = await send(self._access.header(token))
-        if response.status_code != HTTPStatus.UNAUTHORIZED:
-            return response
-        other = await self._token(self._access.after(token), timeout_s)
-        return response if other is None else await send(self._access.header(other))
-
-    async def _token(self, asked: Awaitable[_T], timeout_s: float) -> _T:
-        # A little less than the whole, so that it is known what was waited for.
-        try:
-            # Not `wait_for`, which in Python 3.11 may swallow a cancellation.
-            async with asyncio.timeout(_TOKEN_PART * timeout_s):
-                return await asked
-        except TimeoutError as error:
-            raise HopError(self.HOP, f"{NO_TOKEN}: no answer yet") from error
-        except HopError as error:
-            raise HopError(self.HOP, f"{NO_TOKEN}: {error.detail}") from error
 
     def read_object(self, response: httpx.Response) -> Document:
         """The object that is an answer. Raises HopError: it is anything else."""

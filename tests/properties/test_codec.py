@@ -24,6 +24,7 @@ from iveg.domain.observations import (
     Navigation,
     Odometry,
     Origin,
+    ReportedObstacle,
     SafetyReport,
 )
 from iveg.domain.wire import MAX_TEXT, clean_text
@@ -103,6 +104,8 @@ speed_limits = st.builds(
     maybe,
     thousandths(0, 99),
     maybe,
+    st.none() | thousandths(0, 9),
+    st.booleans(),
 )
 alerts = st.builds(
     FeedbackAlert,
@@ -114,6 +117,20 @@ alerts = st.builds(
     st.none() | st.tuples(metres, metres, metres),
     st.none() | thousandths(1, 6),
     maybe,
+    st.none() | st.tuples(thousandths(-3, 3), thousandths(-3, 3)),
+)
+
+
+def hundredths(low: float, high: float) -> st.SearchStrategy[float]:
+    return st.integers(int(low * 100), int(high * 100)).map(lambda n: n / 100)
+
+
+obstacles = st.none() | st.builds(
+    ReportedObstacle,
+    hundredths(-99, 99),
+    hundredths(-99, 99),
+    hundredths(0, 9),
+    st.booleans(),
 )
 
 
@@ -156,6 +173,8 @@ def test_detections_come_back_as_they_went(value: DetectionFrame) -> None:
         thousandths(-3, 3),
         thousandths(-3, 3),
         st.none() | thousandths(0, 100),
+        peer_scans=st.booleans(),
+        obstacle=obstacles,
     )
 )
 def test_safety_reports_come_back_as_they_went(value: SafetyReport) -> None:
@@ -255,6 +274,7 @@ def test_the_heartbeat_comes_back_as_it_went(origin: Origin) -> None:
         maybe,
         st.dictionaries(texts, speed_limits, max_size=4),
         st.dictionaries(texts, st.integers(0, 2**53), max_size=4),
+        foresight=st.booleans(),
     )
 )
 def test_feedback_comes_back_as_it_went(value: Feedback) -> None:

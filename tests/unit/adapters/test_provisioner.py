@@ -139,24 +139,13 @@ async def test_a_subscription_is_ours_as_soon_as_orion_uses_it(
     orion = HastyOrion(fiware.orion_url)
     site = Place(fiware, orion=orion)
     orion.notify = site.provisioner.is_ours
+    assert site.provisioner.is_ours("of an earlier run, until the first are known")
     async with site.running():
         ids = await first_ids(site)
 
     assert orion.taken == [True] * len(wanted_for())
     assert site.provisioner.is_ours(next(iter(ids)))
     assert not site.provisioner.is_ours("somebody else's")
-
-
-async def test_until_the_first_are_known_those_of_an_earlier_run_are_ours(
-    fiware: Running,
-) -> None:
-    site = Place(fiware)
-    before = site.provisioner.is_ours("of an earlier run")
-    async with site.running():
-        await first_ids(site)
-
-    assert before
-    assert not site.provisioner.is_ours("of an earlier run")
 
 
 async def test_the_secret_of_an_earlier_start_is_known_and_no_other(
@@ -221,9 +210,7 @@ async def test_an_agent_that_falls_behind_is_asked_nothing_more(
     "body",
     [
         [{"id": 5, "description": "iVeg: odometry", "notification": 7}],
-        [{"description": "iVeg: odometry", "notification": {}}],
         {"subscriptions": []},
-        [7],
         "text",
     ],
 )

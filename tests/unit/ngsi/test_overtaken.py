@@ -22,7 +22,7 @@ from iveg.domain.observations import (
 from iveg.domain.transports import FIWARE
 from iveg.domain.world import World
 from iveg.ngsi import codec
-from tests.builders import START, detection_frame, notification, odometry, scan
+from tests.builders import START, detection_frame, odometry, scan
 
 BEFORE = Origin("boot-a", 7, "2026-11-20T10:00:00.000Z", 1_795_168_800.0)
 
@@ -51,12 +51,6 @@ def test_telemetry_that_is_past_is_known_by_its_identity_alone(
     device, payload = written(sent)
     reading = codec.read_measure(device, payload, all_past)
     assert reading.observations == (Overtaken("AGI", BEFORE, type(sent)),)
-
-
-def test_a_notification_asks_too() -> None:
-    attributes = orjson.loads(codec.write_measure(odometry(origin=BEFORE)))
-    _, reading = codec.read_notification(notification(attributes), all_past)
-    assert [type(one) for one in reading.observations] == [Overtaken]
 
 
 @pytest.mark.parametrize(

@@ -79,14 +79,6 @@ def test_what_is_wrong_is_refused(changes: dict[str, Any], reason: str) -> None:
     assert refused.value.reason == reason
 
 
-def test_a_report_asks_only_where_the_robot_wants_scans() -> None:
-    asks = replace(safety_report(), peer_scans=True)
-    (read,) = codec.read_measure("AGI_safety", codec.write_measure(asks)).observations
-
-    assert read == asks
-    assert b"peer_scans" not in codec.write_measure(safety_report())
-
-
 def test_a_wish_that_cannot_be_read_costs_no_report() -> None:
     said = orjson.loads(codec.write_measure(safety_report()))
     said["safety_state"]["peer_scans"] = {"every": 1}
