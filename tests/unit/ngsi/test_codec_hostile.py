@@ -5,7 +5,6 @@ import time
 import orjson
 import pytest
 
-from iveg.domain import wire
 from iveg.domain.errors import UnreadableError
 from iveg.domain.observations import (
     DetectionFrame,
@@ -128,14 +127,6 @@ def test_f26_five_megabytes_of_points_are_refused() -> None:
 
     assert reading.observations == ()
     assert reading.problems[0].reason == "bad_lidar_points"
-
-
-def test_more_boxes_than_anybody_sees_are_refused() -> None:
-    payload = orjson.dumps({"bounding_boxes": [BOX] * (wire.MAX_BOXES + 1)})
-
-    reading = codec.read_measure("AGI_yolox_bounding_boxes", payload)
-
-    assert reading.problems[0].reason == "bad_bounding_boxes"
 
 
 # --- text (F29, F32) --------------------------------------------------------------
