@@ -64,7 +64,9 @@ async def provision(
         HopError: a neighbour does not answer or does not take something.
     """
     mended = await _ensure_group(agent, apikey, cbroker_url)
-    known = {str(one.get("device_id")): one for one in await agent.read_devices()}
+    known = {
+        str(device.get("device_id")): device for device in await agent.read_devices()
+    }
     for device in _devices_of_others(tiles, apikey):
         mended += await _ensure_device(agent, known, device)
     for robot_id in robots:
@@ -83,11 +85,13 @@ async def _ensure_group(
     wanted = write_group(apikey, cbroker_url)
     if await agent.create_group(wanted):
         return [f"Made the group of API key {apikey}."]
-    groups = [one for one in await agent.read_groups() if one.get("apikey") == apikey]
+    groups = [
+        group for group in await agent.read_groups() if group.get("apikey") == apikey
+    ]
     # The agent never shows the address of its broker, so it is always sent again.
     sent = ("entity_type", "cbroker", "autoprovision")
     await agent.change_group(apikey, {name: wanted[name] for name in sent})
-    if any(one.get("entity_type") == names.ROBOT_TYPE for one in groups):
+    if any(group.get("entity_type") == names.ROBOT_TYPE for group in groups):
         return []
     return [f"Corrected the entity type of the group of API key {apikey}."]
 
@@ -152,10 +156,17 @@ def _shape(device: Document) -> tuple[object, ...]:
     return (
         *map(device.get, ("apikey", "entity_name", "entity_type", "transport")),
         sorted(
-            (one.get("object_id") or one["name"], one["name"], one.get("type"))
-            for one in device.get("attributes", [])
+            (
+                attribute.get("object_id") or attribute["name"],
+                attribute["name"],
+                attribute.get("type"),
+            )
+            for attribute in device.get("attributes", [])
         ),
-        sorted((one["name"], one.get("type")) for one in device.get("commands", [])),
+        sorted(
+            (command["name"], command.get("type"))
+            for command in device.get("commands", [])
+        ),
     )
 
 
@@ -182,12 +193,12 @@ async def _registered(orion: OrionClient, robot_id: str) -> list[str]:
     """Ids of the registrations of a robot's command, oldest first."""
     robot = {"id": robot_id, "type": names.ROBOT_TYPE}
     found = []
-    for one in await orion.read_registrations():
-        provided = one.get("dataProvided", {})
+    for registration in await orion.read_registrations():
+        provided = registration.get("dataProvided", {})
         if names.COMMAND in provided.get("attrs", []) and any(
             robot.items() <= entity.items() for entity in provided.get("entities", [])
         ):
-            found.append(str(one["id"]))
+            found.append(str(registration["id"]))
     return found
 
 
@@ -198,7 +209,7 @@ def _conflicts(devices: Iterable[Document], robots: Sequence[str]) -> list[str]:
         for robot in robots
         for device in names.ROBOT_DEVICES
     }
-    fed = [(one.get("entity_name"), one["device_id"]) for one in devices]
+    fed = [(device.get("entity_name"), device["device_id"]) for device in devices]
     return [
         f"Device {device_id} also feeds {robot_id}; commands may go to it and "
         "be lost. Give it another entity or remove it."
@@ -211,9 +222,9 @@ def _devices_of_others(tiles: Sequence[Tile], apikey: str) -> Iterator[Document]
     """The climate's device, and one for each that tiles name, with what they show."""
     climate = names.CLIMATE_DEVICE, names.CLIMATE_ID, names.CLIMATE_TYPE
     yield write_device(*climate, [(name, "Number") for name in CLIMATE], apikey)
-    for name in dict.fromkeys(one.device for one in tiles if one.device):
-        mine = [one for one in tiles if one.device == name]
-        attributes = [(one.attribute, "Number") for one in mine]
+    for name in dict.fromkeys(tile.device for tile in tiles if tile.device):
+        mine = [tile for tile in tiles if tile.device == name]
+        attributes = [(tile.attribute, "Number") for tile in mine]
         entity, kind = mine[0].entity_id, mine[0].entity_type
         yield write_device(name, entity, kind, attributes, apikey)
 
@@ -233,8 +244,12 @@ async def _remove_strays(
     """
     ids = [robot + device.suffix for robot in robots for device in names.ROBOT_DEVICES]
     ids += [names.CLIMATE_DEVICE, names.HEARTBEAT_ID]
-    fed = {str(one.get("entity_name")) for one in devices}
-    strays = [one for one in (f"{names.ROBOT_TYPE}:{i}" for i in ids) if one not in fed]
+    fed = {str(device.get("entity_name")) for device in devices}
+    strays = [
+        entity
+        for entity in (f"{names.ROBOT_TYPE}:{i}" for i in ids)
+        if entity not in fed
+    ]
     removed = []
     for start in range(0, len(strays), _AT_ONCE):
         for entity_id, kind in await orion.find_entities(strays[start:][:_AT_ONCE]):
@@ -336,25 +351,35 @@ async def ensure_subscriptions(
         HopError: Orion does not answer or does not take one.
     """
     kept = await orion.read_subscriptions()
-    ours = [one for one in kept if str(one.get("description", "")).startswith(PREFIX)]
+    ours = [
+        subscription
+        for subscription in kept
+        if str(subscription.get("description", "")).startswith(PREFIX)
+    ]
     failing, secrets = describe_failures(ours), frozenset(map(_secret_of, ours))
-    documents = [write_subscription(one, notify_url, token) for one in wanted]
-    spare = {str(one["id"]): one for one in ours}
+    documents = [write_subscription(want, notify_url, token) for want in wanted]
+    spare = {str(subscription["id"]): subscription for subscription in ours}
     ids, mended = [], []
     for document in documents:
-        there = [one for one in ours if one["description"] == document["description"]]
+        there = [
+            subscription
+            for subscription in ours
+            if subscription["description"] == document["description"]
+        ]
         subscription_id, done = await _ensure(orion, document, there)
         spare.pop(subscription_id, None)
         ids.append(subscription_id)
         mended += done
-    for subscription_id, one in spare.items():
+    for subscription_id, subscription in spare.items():
         await orion.delete_subscription(subscription_id)
-        if not _is_limited(one):
-            mended.append(f"Removed {one['description']!r}: one too many.")
+        if not _is_limited(subscription):
+            mended.append(f"Removed {subscription['description']!r}: one too many.")
     return Reconciled(
         tuple(mended),
         ids=frozenset(ids),
-        former_ids=frozenset(str(one["id"]) for one in ours).difference(ids),
+        former_ids=frozenset(
+            str(subscription["id"]) for subscription in ours
+        ).difference(ids),
         former_secrets=secrets - {token, ""},
         failing=failing,
     )
@@ -362,11 +387,13 @@ async def ensure_subscriptions(
 
 def describe_failures(subscriptions: Sequence[Document]) -> str:
     """Orion's account of failing deliveries, in one sentence; empty for none."""
-    deliveries = [one.get("notification", {}) for one in subscriptions]
+    deliveries = [
+        subscription.get("notification", {}) for subscription in subscriptions
+    ]
     reasons = {
-        str(one.get("lastFailureReason", "no reason given"))
-        for one in deliveries
-        if one.get("failsCounter", 0) > 0
+        str(delivery.get("lastFailureReason", "no reason given"))
+        for delivery in deliveries
+        if delivery.get("failsCounter", 0) > 0
     }
     return f"Orion cannot deliver: {', '.join(sorted(reasons))}." if reasons else ""
 
@@ -377,7 +404,7 @@ async def _ensure(
     """Id of the one that is kept, corrected or made, and what was done."""
     name = wanted["description"].removeprefix(PREFIX)
     # Not every Orion takes a limit away by a change: another is made instead.
-    usable = [one for one in there if not _is_limited(one)]
+    usable = [subscription for subscription in there if not _is_limited(subscription)]
     if not usable:
         return await orion.create_subscription(wanted), [f"Subscribed to {name}."]
     subscription_id = str(usable[0]["id"])

@@ -54,7 +54,7 @@ class Ingest:
         rejected: Callable[[str, str], None],
     ) -> None:
         self._world, self._passed, self._rejected = world, passed, rejected
-        self._queue: deque[tuple[Received, _Stream]] = deque()
+        self._queue: deque[Received] = deque()
         self._refused: dict[str, Received] = {}
         """By robot, that one of its detection frames was dropped."""
         self._identities: set[_Identity] = set()
@@ -98,7 +98,7 @@ class Ingest:
         stream = _stream(received)
         if len(self._queue) >= MAX_QUEUED and not self._make_room(received, stream):
             return
-        self._queue.append((received, stream))
+        self._queue.append(received)
         if not received.asked:
             self._identities.add(_identity(received.observation))
         self._waiting[stream] += 1
@@ -185,8 +185,8 @@ class Ingest:
     def drain(self) -> Iterable[Received]:
         """Everything that waits, oldest first."""
         while self._queue:
-            received, stream = self._queue.popleft()
-            self._forget(received, stream)
+            received = self._queue.popleft()
+            self._forget(received)
             yield received
         refused, self._refused = self._refused, {}
         yield from refused.values()
@@ -203,15 +203,15 @@ class Ingest:
         """
         victim = self._victim_for(stream)
         if victim is None:
-            self._note_dropped(received, stream)
+            self._note_dropped(received)
             return False
         index = next(
-            number for number, (_, one) in enumerate(self._queue) if one == victim
+            index for index, one in enumerate(self._queue) if _stream(one) == victim
         )
-        dropped, _ = self._queue[index]
+        dropped = self._queue[index]
         del self._queue[index]
-        self._forget(dropped, victim)
-        self._note_dropped(dropped, victim)
+        self._forget(dropped)
+        self._note_dropped(dropped)
         return True
 
     def _victim_for(self, stream: "_Stream") -> "_Stream | None":
@@ -225,15 +225,16 @@ class Ingest:
             return telemetry
         return stream if count(stream) else largest
 
-    def _note_dropped(self, received: Received, stream: "_Stream") -> None:
-        robot_id, kind = stream
+    def _note_dropped(self, received: Received) -> None:
+        robot_id, kind = _stream(received)
         self.counters[f"dropped.{kind.__name__}"] += 1
         if kind is DetectionFrame:
             self._refused[robot_id] = replace(
                 received, observation=RefusedFrame(robot_id)
             )
 
-    def _forget(self, received: Received, stream: "_Stream") -> None:
+    def _forget(self, received: Received) -> None:
+        stream = _stream(received)
         self._identities.discard(_identity(received.observation))
         self._waiting[stream] -= 1
         if not self._waiting[stream]:

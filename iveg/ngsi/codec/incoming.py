@@ -480,7 +480,7 @@ def read_notification(
         notification = _Notification.model_validate(load_json(body))
     except ValidationError as error:
         raise UnreadableError("not_a_notification", first_complaint(error)) from error
-    entities = [read_entity(one, is_past, equipment) for one in notification.data]
+    entities = [read_entity(entity, is_past, equipment) for entity in notification.data]
     read = entities[0] if len(entities) == 1 else merge(entities)
     return notification.subscriptionId, read
 
