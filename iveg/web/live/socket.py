@@ -17,9 +17,9 @@ from iveg.domain.errors import UnknownRobotError, UnreadableError
 from iveg.domain.latency import LatencyWatch
 from iveg.domain.observations import Instant
 from iveg.domain.stop import Press
+from iveg.domain.wire import legible
 from iveg.models.snapshot import Snapshot
 from iveg.ngsi.codec import load_json
-from iveg.ngsi.payloads import legible
 from iveg.vital import topics
 from iveg.vital.ports import Clock
 from iveg.vital.publish import Hub, Subscriber
