@@ -105,7 +105,7 @@ class LeastMargins:
             (person.person_id, (look.x, look.y, look.age_s(now)))
             for person in people
             for look in person.sightings
-            if look.age_s(now) <= LIMITS.ring_lasts_s
+            if look.age_s(now) <= LIMITS.zone_lasts_s
         ]
         self._persons = [person_id for person_id, _ in seen]
         placed = np.array(facts, float).reshape(-1, 6)

@@ -21,7 +21,7 @@ from iveg.domain.latency import Data, LatencyWatch
 from iveg.domain.observations import Instant
 from iveg.vital import topics
 from iveg.vital.publish import Subscriber
-from iveg.web.live.telemetry import Part, TelemetryEncoder, write_frame
+from iveg.web.live.telemetry import LIST_S, Part, TelemetryEncoder, write_frame
 from iveg.web.presses import read_number
 
 SUBPROTOCOL: Final = "iveg.2"
@@ -197,11 +197,9 @@ class Painting:
 
 PICTURE_S: Final = 1 / 15
 """Between two scans, or detection frames, of one robot."""
-READ_OUT_S: Final = 0.1
-"""Between two states of one robot, or lists of people."""
-PEOPLE_A_BEAT: Final = 50
-"""A longer list is sent so much less often: each person takes 0.1 ms to write."""
-STATES_AFTER_S: Final = READ_OUT_S / 2
+STATE_S: Final = 0.2
+"""Between two states of one robot, whose digits are read."""
+STATES_AFTER_S: Final = LIST_S / 2
 """States of robots come this long after lists of people: each takes long to write."""
 
 _INF: Final = float("inf")
@@ -325,8 +323,7 @@ class TelemetryFeed:
 
     def _next_list(self, sent_at: float) -> float:
         """When a list of people may be sent again (monotonic, s)."""
-        beats = max(1, math.ceil(self._encoder.listed / PEOPLE_A_BEAT))
-        return _next_beat(sent_at + (beats - 1) * READ_OUT_S)
+        return _next_beat(sent_at + self._encoder.lists_apart_s - LIST_S, LIST_S)
 
     def _due_at(self) -> float:
         """Earliest time of a waiting part; parts without room wait for credit."""
@@ -420,15 +417,15 @@ def _next_picture(sent_at: float) -> float:
     return sent_at + PICTURE_S
 
 
-def _next_beat(sent_at: float) -> float:
+def _next_beat(sent_at: float, apart_s: float) -> float:
     """When a read-out may be sent again (monotonic, s).
 
     Read-outs of a kind go together, at the same moments to all browsers: what takes
     all robots and people is worked out once for all of them.
     """
-    return (math.floor(sent_at / READ_OUT_S + 1e-6) + 1) * READ_OUT_S
+    return (math.floor(sent_at / apart_s + 1e-6) + 1) * apart_s
 
 
 def _next_state(sent_at: float) -> float:
     """When the state of a robot may be sent again (monotonic, s)."""
-    return _next_beat(sent_at - STATES_AFTER_S) + STATES_AFTER_S
+    return _next_beat(sent_at - STATES_AFTER_S, STATE_S) + STATES_AFTER_S
