@@ -159,7 +159,7 @@ def _with(
     slowed_s = defaultdict(float, done.slowed_s)
     for limit in filter(_slows, limits.values()):
         slowed_s[limit.reason] += passed_s
-    met = Counter(one.entry.zone.reason for one in changes if one.began)
+    met = Counter[str](one.entry.zone.reason for one in changes if one.began)
     return Doings(slowed_s, Counter(done.encounters) + met)
 
 
