@@ -1,1 +1,1 @@
-"""Parts that may fail alone, unnoticed by vital ones: history, map, messages, goals."""
+"""Parts that may fail, and nothing vital notices: history, map, messages, goals."""

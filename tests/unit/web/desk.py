@@ -21,8 +21,8 @@ from iveg.web.api import health
 from iveg.web.bounded_http import bounded_http
 from iveg.web.build import Face, build_app, live_routers
 from iveg.web.live import encoder
-from iveg.web.live.bounded import BoundedSocket
 from iveg.web.live.pictures import Past
+from iveg.web.live.socket import BoundedSocket
 from iveg.web.pages.contexts import Site
 from iveg.web.pages.drawing import Pages
 from iveg.web.security.authentication import Authenticator

@@ -22,7 +22,6 @@ SPEEDS = {"AGI": 1.0, "AGII": 0.6}
 """Of robots that nothing slows (m/s)."""
 Told = list[tuple[float, str, str, str | None]]
 """Moment (s), robot, what of it changed, cause."""
-Fact = tuple[str, str, str | None]
 
 
 def people_at(now: float) -> dict[str, list[tuple[float, float]]]:
@@ -75,11 +74,10 @@ def played() -> Told:
     return told
 
 
-def by_fact(told: Told) -> dict[Fact, list[float]]:
+def by_fact(told: Told) -> dict[tuple[str, str, str | None], list[float]]:
     """The moments of each change of each robot for each cause."""
-    moments: dict[Fact, list[float]] = {}
-    for at_s, *fact in told:
-        robot_id, change, cause = fact
+    moments: dict[tuple[str, str, str | None], list[float]] = {}
+    for at_s, robot_id, change, cause in told:
         moments.setdefault((robot_id, change, cause), []).append(at_s)
     return moments
 
