@@ -49,6 +49,7 @@ class FiwareSite:
         notify_token: Secret that each notification carries.
         boot: Of this start, in its probes.
         tiles: Of other equipment.
+        scanned: Robots whose scans iVeg reads from the broker.
     """
 
     robots: Sequence[str]
@@ -58,6 +59,7 @@ class FiwareSite:
     notify_token: str
     boot: str
     tiles: Sequence[Tile] = ()
+    scanned: Sequence[str] = ()
 
 
 class Provisioner:
@@ -271,7 +273,10 @@ class Provisioner:
         self._is_subscribing = True
         try:
             done = await ensure_subscriptions(
-                self._orion, site.notify_url, site.notify_token, wanted_for(site.tiles)
+                self._orion,
+                site.notify_url,
+                site.notify_token,
+                wanted_for(site.tiles, site.scanned),
             )
         finally:
             self._is_subscribing = False

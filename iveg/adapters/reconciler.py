@@ -6,7 +6,7 @@ the robot clear; the traps are in docs/fiware.md, "Provisioning".
 """
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from iveg.adapters.fiware_http import Document
@@ -14,7 +14,8 @@ from iveg.adapters.iot_agent import IotAgentClient, write_device, write_group
 from iveg.adapters.orion import OrionClient
 from iveg.domain.equipment import Tile
 from iveg.domain.errors import HopError
-from iveg.domain.kinds import MEASURED
+from iveg.domain.kinds import KIND_OF, MEASURED
+from iveg.domain.observations import LaserScan
 from iveg.ngsi import names
 
 
@@ -265,6 +266,7 @@ async def _remove_strays(
 PREFIX = "iVeg: "
 """Begins the description of our subscriptions, by which they are found again."""
 TOKEN_HEADER = "X-Iveg-Notify-Token"  # noqa: S105 - a header's name
+_SCANS = KIND_OF[LaserScan].name
 CLIMATE = ("temperature", "relativeHumidity", "co2")
 _TIMEOUT_MS = 2000
 
@@ -278,12 +280,14 @@ class WantedSubscription:
         entity: What it is about, as NGSI-v2 says it.
         attributes: What is sent.
         condition: What makes Orion send; the attributes where it is empty.
+        throttling_s: Least time between two of its notifications; 0: each comes.
     """
 
     name: str
     entity: tuple[tuple[str, str], ...]
     attributes: tuple[str, ...]
     condition: tuple[str, ...] = ()
+    throttling_s: int = 0
 
 
 ALL_ROBOTS = (("idPattern", ".*"), ("type", names.ROBOT_TYPE))
@@ -313,8 +317,14 @@ WANTED_OF_ALL = (
 )
 
 
-def wanted_for(tiles: Iterable[Tile] = ()) -> tuple[WantedSubscription, ...]:
+def wanted_for(
+    tiles: Iterable[Tile] = (), scanned: Sequence[str] = ()
+) -> tuple[WantedSubscription, ...]:
     """All subscriptions for robots and for other equipment.
+
+    Orion sends one scan a second of robots in ``scanned``, whose scans iVeg reads from
+    the broker: no rule rests on a scan, and copies of all cost a third of a processor
+    with ten robots.  It throttles a subscription as a whole, so each has its own.
 
     Each attribute of equipment has its own: in a common one Orion would send what is
     silent along.  Its notifications then prove that this very attribute was measured.
@@ -327,7 +337,20 @@ def wanted_for(tiles: Iterable[Tile] = ()) -> tuple[WantedSubscription, ...]:
         )
         for tile in tiles
     )
-    return (*WANTED_OF_ALL, *of_tiles)
+    if not scanned:
+        return (*WANTED_OF_ALL, *of_tiles)
+    scans = next(want for want in WANTED_OF_ALL if want.name == _SCANS)
+    of_scans = (
+        replace(
+            scans,
+            name=f"{_SCANS} {robot_id}",
+            entity=(("id", robot_id), ("type", names.ROBOT_TYPE)),
+            throttling_s=1,
+        )
+        for robot_id in scanned
+    )
+    others = (want for want in WANTED_OF_ALL if want is not scans)
+    return (*others, *of_scans, *of_tiles)
 
 
 async def ensure_subscriptions(
@@ -338,8 +361,8 @@ async def ensure_subscriptions(
 ) -> Reconciled:
     """Create, repair and remove subscriptions at Orion until they are as wanted.
 
-    No throttling (it drops the last value), and no limit of failures (Orion would fall
-    silent for good).
+    No throttling but of scans (it drops the last value), and no limit of failures
+    (Orion would fall silent for good).
 
     Args:
         orion: Where subscriptions are kept.
@@ -372,7 +395,7 @@ async def ensure_subscriptions(
         mended += done
     for subscription_id, subscription in spare.items():
         await orion.delete_subscription(subscription_id)
-        if not _is_limited(subscription):
+        if not any(_limits(subscription)):
             mended.append(f"Removed {subscription['description']!r}: one too many.")
     return Reconciled(
         tuple(mended),
@@ -404,7 +427,11 @@ async def _ensure(
     """Id of the one that is kept, corrected or made, and what was done."""
     name = wanted["description"].removeprefix(PREFIX)
     # Not every Orion takes a limit away by a change: another is made instead.
-    usable = [subscription for subscription in there if not _is_limited(subscription)]
+    usable = [
+        subscription
+        for subscription in there
+        if _limits(subscription) == _limits(wanted)
+    ]
     if not usable:
         return await orion.create_subscription(wanted), [f"Subscribed to {name}."]
     subscription_id = str(usable[0]["id"])
@@ -414,8 +441,8 @@ async def _ensure(
     return subscription_id, [f"Corrected the subscription to {name}."]
 
 
-def _is_limited(subscription: Document) -> bool:
-    return bool(subscription.get("throttling") or subscription.get("expires"))
+def _limits(subscription: Document) -> tuple[object, object]:
+    return subscription.get("throttling") or 0, subscription.get("expires") or None
 
 
 def _wiring(subscription: Document) -> tuple[object, ...]:
@@ -450,7 +477,8 @@ def write_subscription(
     want: WantedSubscription, notify_url: str, token: str
 ) -> Document:
     """The document that Orion is sent."""
-    return {
+    limits = {"throttling": want.throttling_s} if want.throttling_s else {}
+    return limits | {
         "description": PREFIX + want.name,
         "subject": {
             "entities": [dict(want.entity)],

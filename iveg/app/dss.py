@@ -193,6 +193,7 @@ class Dss:
                 notify_token=self.notify_secret.current,
                 boot=self._boot,
                 tiles=parts.equipment.equipment.tiles,
+                scanned=self.fleet.ids if settings.direct_read == "all" else (),
             ),
         )
 
