@@ -1,18 +1,8 @@
-"""iVeg's own files: JSON lines that are on the disk whole, or not at all.
+"""iVeg's own files, which are on the disk whole or not at all; locks, room, priority.
 
-Each file begins with a line that names its content and version; a file without that
-line is of version 0.  A file of a newer iVeg is refused.
-
-Room on the disk of a directory.
-
-How processes beside the server keep out of its way.
-
-One program for each robot of a machine: a lock that ends with its process.
-
-One value for each robot, in a small file of JSON lines that is replaced as a whole.
-
-A file that cannot be read is put aside, and nothing of it counts: each detector is
-waited for then.
+A file of JSON lines begins with a line that names its content and version; a file
+without that line is of version 0.  One of a newer iVeg is refused, and one that cannot
+be read is put aside.
 """
 
 import asyncio
