@@ -93,7 +93,7 @@ MUTANTS = (
     ),
     Mutant(
         "STOP: the second copy of a refused release is judged anew",
-        "verdict = self._verdicts.on(order.attempt)",
+        "verdict = self._verdicts.get(order.attempt)",
         "verdict = None",
         ("unit/robot/test_safety.py",),
     ),

@@ -168,6 +168,23 @@ def test_a_robot_whose_pose_moves_while_its_wheels_rest_is_not_released() -> Non
     assert rig.release().result == "RELEASED"
 
 
+@pytest.mark.parametrize(
+    ("ids", "challenge", "why"),
+    [
+        (["01A"], None, "holds_missing"),
+        (["01A", "boot-b1"], "old", "challenge"),
+    ],
+)
+def test_a_release_that_does_not_fit_lifts_no_hold(
+    ids: list[str], challenge: str | None, why: str
+) -> None:
+    rig = Rig().run(0.5)
+    rig.stop("01A")
+    answer = rig.command(release(ids, challenge or rig.machine.challenge))
+    assert (answer.result, answer.why) == ("REFUSED", why)
+    assert len(rig.holds) == 2
+
+
 def test_the_answer_to_an_order_names_its_attempt() -> None:
     rig = Rig().run(0.5)
     lifted = rig.command(release(["boot-b1"], rig.machine.challenge, "01TRY"))
@@ -175,6 +192,18 @@ def test_the_answer_to_an_order_names_its_attempt() -> None:
     assert (lifted.result, lifted.attempt) == ("RELEASED", "01TRY")
     assert (resumed.result, resumed.attempt) == ("RESUMED", "01GO")
     assert rig.stop("01STOP").attempt is None
+
+
+def test_a_refused_attempt_stays_refused_when_all_would_be_right() -> None:
+    rig = Rig(speed=Twist2D(0.0, 0.05), obeys=False).run(0.5)
+    order = release(["boot-b1"], rig.machine.challenge, "01TRY")
+    first = rig.command(order)
+    rig.speed = REST
+    rig.run(1.0)
+    again = rig.command(order)
+    assert (first.why, again.why) == ("not_standing", "not_standing")
+    assert again.attempt == "01TRY"
+    assert rig.holds
 
 
 def test_an_attempt_that_is_forgotten_cannot_act_either() -> None:

@@ -278,24 +278,6 @@ def test_a_recording_proves_nothing() -> None:
     assert not said.origin.acknowledgements
 
 
-@pytest.mark.parametrize("form", ["per-topic", "single"])
-def test_a_scan_travels_with_every_digit_of_its_float32_even_through_orion(
-    form: str,
-) -> None:
-    measured = np.random.default_rng(1).uniform(0.1, 30.0, 720).astype(np.float32)
-    wire = Wire(form)
-    wire.uplink.send(scan(ranges=measured.tolist(), origin=BLANK), AT)
-    wire.uplink.send(odometry(origin=BLANK), AT)
-    (payload,) = [one for _, one in wire.sent if b"lidar_header" in one]
-    told = orjson.loads(payload)
-    ranges = told.get("lidar_points") or told["laser_scan"]
-    by_orion = [round(one, 9) for one in ranges]
-    assert np.array_equal(np.array(ranges, np.float32), measured)
-    assert np.array_equal(np.array(by_orion, np.float32), measured)
-    # In no more digits than that takes.
-    assert [float(str(np.float32(one))) for one in ranges] == ranges
-
-
 # --- an agent that is behind --------------------------------------------------------
 
 
