@@ -35,7 +35,7 @@ def disk_space(directory: Path) -> DiskSpace:
 
 
 LESS_URGENT = 10
-"""Of a process whose work may be late."""
+"""Niceness of a process whose work may be late."""
 _FIRST_TO_GO = "1000"
 
 
@@ -89,7 +89,7 @@ def write_lines(path: Path, form: Form, values: Iterable[object]) -> os.stat_res
 
 
 async def save_lines(path: Path, form: Form, values: Iterable[object]) -> None:
-    """The same in a thread; returns when it is on disk.
+    """Replace a file in a thread; returns when it is on disk.
 
     Raises:
         HopError: the disk did not take it; the old file stands.
@@ -101,7 +101,7 @@ async def save_lines(path: Path, form: Form, values: Iterable[object]) -> None:
 
 
 def write_bytes(path: Path, content: bytes) -> os.stat_result:
-    """The same of any content: written beside, synced, then moved.
+    """Replace a file by any content: written beside, synced, then moved.
 
     Raises:
         OSError: the disk did not take it; the old file stands.
@@ -313,7 +313,7 @@ def _lock(handle: int, what: str) -> None:
 
 
 class FileByRobot(Generic[_T]):
-    """Implements ``pipeline.ports.ChoiceStore``.
+    """One value for each robot, in a file that is replaced as a whole.
 
     Args:
         path: The file.
