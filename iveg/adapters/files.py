@@ -1,18 +1,8 @@
-"""iVeg's own files: JSON lines that are on the disk whole, or not at all.
+"""iVeg's own files, which are on the disk whole or not at all; locks, room, priority.
 
-Each file begins with a line that names its content and version; a file without that
-line is of version 0.  A file of a newer iVeg is refused.
-
-Room on the disk of a directory.
-
-How processes beside the server keep out of its way.
-
-One program for each robot of a machine: a lock that ends with its process.
-
-One value for each robot, in a small file of JSON lines that is replaced as a whole.
-
-A file that cannot be read is put aside, and nothing of it counts: each detector is
-waited for then.
+A file of JSON lines begins with a line that names its content and version; a file
+without that line is of version 0.  One of a newer iVeg is refused, and one that cannot
+be read is put aside.
 """
 
 import asyncio
@@ -45,7 +35,7 @@ def disk_space(directory: Path) -> DiskSpace:
 
 
 LESS_URGENT = 10
-"""Of a process whose work may be late."""
+"""Niceness of a process whose work may be late."""
 _FIRST_TO_GO = "1000"
 
 
@@ -99,7 +89,7 @@ def write_lines(path: Path, form: Form, values: Iterable[object]) -> os.stat_res
 
 
 async def save_lines(path: Path, form: Form, values: Iterable[object]) -> None:
-    """The same in a thread; returns when it is on disk.
+    """Replace a file in a thread; returns when it is on disk.
 
     Raises:
         HopError: the disk did not take it; the old file stands.
@@ -111,7 +101,7 @@ async def save_lines(path: Path, form: Form, values: Iterable[object]) -> None:
 
 
 def write_bytes(path: Path, content: bytes) -> os.stat_result:
-    """The same of any content: written beside, synced, then moved.
+    """Replace a file by any content: written beside, synced, then moved.
 
     Raises:
         OSError: the disk did not take it; the old file stands.
@@ -323,7 +313,7 @@ def _lock(handle: int, what: str) -> None:
 
 
 class FileByRobot(Generic[_T]):
-    """Implements ``pipeline.ports.ChoiceStore``.
+    """One value for each robot, in a file that is replaced as a whole.
 
     Args:
         path: The file.

@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
     AfterValidator,
@@ -26,7 +26,6 @@ from iveg.domain.fleet import (
     Frame,
     Kind,
     RobotDescription,
-    RobotProfile,
     is_robot_id,
     split_word,
 )
@@ -153,47 +152,39 @@ class _Robot(Table):
     laser: _Laser = _Laser()
 
     def value(self) -> RobotDescription:
-        profile, body, drive, camera = CAUTIOUS, self.body, self.drive, self.camera
+        body, drive, camera, laser = self.body, self.drive, self.camera, self.laser
+        known: dict[str, Any] = {"laser": Pose2D(laser.x_m, laser.y_m, laser.yaw_rad)}
         if body is not None:
-            profile = replace(profile, length=body.length_m, width=body.width_m)
+            known |= {"length": body.length_m, "width": body.width_m}
         if drive is not None:
-            profile = _driven(profile, drive)
+            least = min(CAUTIOUS.assumed_braking, drive.braking_m_s2)
+            known |= {
+                "drive": drive.type,
+                "max_speed": drive.max_speed_m_s,
+                "max_turn": drive.max_turn_rad_s,
+                "turning_radius": drive.turning_radius_m,
+                "acceleration": drive.acceleration_m_s2,
+                "braking": drive.braking_m_s2,
+                "assumed_braking": drive.assumed_braking_m_s2 or least,
+            }
         if camera is not None:
-            profile = replace(
-                profile,
-                camera=Pose2D(camera.x_m, camera.y_m, camera.yaw_rad),
-                camera_height=camera.height_m,
-                camera_fov=math.radians(camera.fov_deg),
-                camera_range=camera.range_m,
-                unlabelled_frame=camera.unlabelled_frame,
-                camera_frame=camera.frame,
-            )
-        laser = self.laser
-        profile = replace(profile, laser=Pose2D(laser.x_m, laser.y_m, laser.yaw_rad))
-        is_described = body is not None and drive is not None
+            known |= {
+                "camera": Pose2D(camera.x_m, camera.y_m, camera.yaw_rad),
+                "camera_height": camera.height_m,
+                "camera_fov": math.radians(camera.fov_deg),
+                "camera_range": camera.range_m,
+                "unlabelled_frame": camera.unlabelled_frame,
+                "camera_frame": camera.frame,
+            }
         return RobotDescription(
             self.id,
             self.kind,
-            profile,
-            is_described,
+            replace(CAUTIOUS, **known),
+            body is not None and drive is not None,
             self.detector,
             self.pose_frame,
             self.classes,
         )
-
-
-def _driven(profile: RobotProfile, drive: _Drive) -> RobotProfile:
-    assumed = drive.assumed_braking_m_s2
-    return replace(
-        profile,
-        drive=drive.type,
-        max_speed=drive.max_speed_m_s,
-        max_turn=drive.max_turn_rad_s,
-        turning_radius=drive.turning_radius_m,
-        acceleration=drive.acceleration_m_s2,
-        braking=drive.braking_m_s2,
-        assumed_braking=assumed or min(CAUTIOUS.assumed_braking, drive.braking_m_s2),
-    )
 
 
 class _FileTable(Table):

@@ -63,7 +63,7 @@ def read_table(text: str, file: str, shape: type[T]) -> T:
 
 
 def complaint(file: str, path: KeyPath, reason: str) -> DataFileError:
-    """What is wrong with one key of a file."""
+    """The error that one key of a file is wrong."""
     key = "".join(f"[{one}]" if isinstance(one, int) else f".{one}" for one in path)
     said = reason.removeprefix("Value error, ")
     return DataFileError(file, key.lstrip("."), f"{said}.")

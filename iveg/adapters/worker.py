@@ -51,7 +51,7 @@ class Worker:
     async def run(
         self, work: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs
     ) -> _T:
-        """What ``work`` returns in the other process.
+        """Run ``work`` in the other process, and return its result.
 
         Raises:
             HopError: it raised one, the process died or took too long, or too many

@@ -24,7 +24,7 @@ from iveg.domain.errors import HopError, SettingsError, UnreadableError
 from iveg.domain.fleet import UNDESCRIBED_SPEED, RobotDescription, RobotProfile
 from iveg.domain.witness import Plan
 from iveg.ngsi import names
-from iveg.robot.ros2.checking import CheckRow, Traffic, forms_published, judge, lines
+from iveg.robot.ros2.checking import CheckRow, forms_published, judge, lines
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.inputs import SensorInputs
 from iveg.robot.ros2.outputs import Network
@@ -75,7 +75,7 @@ async def check(
         rows = judge(
             config,
             dds.endpoints(),
-            {key: Traffic(n / _CHECK_S, frames[key]) for key, n in counts.items()},
+            {key: (n / _CHECK_S, frames[key]) for key, n in counts.items()},
             inputs.input_faults.faults(clock.mono()),
             robot_id=robot_id,
             has_detector=fleet.of_robot(robot_id).has_detector,

@@ -151,14 +151,12 @@ def alerts_of(feedback: Feedback) -> dict[AlertKey, FeedbackAlert]:
         if alert.class_ is None:
             continue
         number = 0
-        while (key := (*_whose(alert), number)) in found:
+        while (
+            key := (alert.decision_id, alert.observer, alert.class_, number)
+        ) in found:
             number += 1
         found[key] = alert
     return found
-
-
-def _whose(alert: FeedbackAlert) -> tuple[str, str | None, str | None]:
-    return alert.decision_id, alert.observer, alert.class_
 
 
 def limited_free(speed_limit: SpeedLimit, alert: FeedbackAlert) -> bool:

@@ -211,12 +211,8 @@ second over a radio that takes half a second each way, and no standstill is meas
 from those."""
 
 
-@dataclass(frozen=True, slots=True)
-class LaneMessage:
-    """Bytes for one topic, at QoS 1."""
-
-    topic: str
-    payload: bytes
+LaneMessage = tuple[str, bytes]
+"""Topic and payload of a message at QoS 1."""
 
 
 class SafetyLane:
@@ -254,7 +250,7 @@ class SafetyLane:
 
     def report(self, message: LaneMessage) -> None:
         """Send when possible; a newer report of the same topic replaces it."""
-        self._reports[message.topic] = message
+        self._reports[message[0]] = message
         self._send_wake.set()
 
     async def keep_forever(self) -> None:
@@ -302,7 +298,7 @@ class SafetyLane:
 
     async def _send(self, message: LaneMessage) -> None:
         try:
-            await self._publish(message.topic, message.payload)
+            await self._publish(*message)
         except HopError:
             pass  # lost without a broker; the next report has the state
         finally:
@@ -427,23 +423,22 @@ class Uplink:
         """
         origin = self._origins.next(_SAFETY, at)
         payload = codec.write_measure(replace(report, origin=origin))
-        messages = [LaneMessage(names.direct_topic(self._id, _SAFETY), payload)]
+        messages = [(names.direct_topic(self._id, _SAFETY), payload)]
         if is_measure:
-            messages.append(LaneMessage(self._topic(_SAFETY), payload))
+            messages.append((self._topic(_SAFETY), payload))
         return origin.seq or 0, messages
 
     def answer(self, answer: CommandAnswer, at: Instant) -> LaneMessage:
         """The message of an answer on ``cmdexe``."""
         origin = self._origins.next(_ANSWERS, at)
         topic = names.answer_topic(self._apikey, self._id)
-        return LaneMessage(topic, codec.write_answer(replace(answer, origin=origin)))
+        return topic, codec.write_answer(replace(answer, origin=origin))
 
     def goal_answer(self, answer: GoalAnswer, at: Instant) -> LaneMessage:
         """The message of a word on a goal on ``cmdexe``."""
         origin = self._origins.next(_GOALS, at)
         topic = names.answer_topic(self._apikey, self._id)
-        payload = codec.write_answer(replace(answer, origin=origin))
-        return LaneMessage(topic, payload)
+        return topic, codec.write_answer(replace(answer, origin=origin))
 
     def _send_single(
         self, single: SinglePayload, observation: Observation, at: Instant

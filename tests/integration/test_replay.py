@@ -2,9 +2,7 @@
 
 import asyncio
 import logging
-import math
 import re
-from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
@@ -24,7 +22,6 @@ from iveg.robot.replay.replay import ReplaySettings, run_replay
 from iveg.ros2 import detector_messages as d
 from iveg.ros2 import messages as ros
 from tests import data, processes
-from tests.data.bags import Said, bag_directory, db3_bag, drive, mcap_bag
 from tests.data.message_bags import Said as MessageSaid
 from tests.data.message_bags import message_bag
 from tests.integration.emulator_cloud import Cloud, running, until
@@ -134,35 +131,6 @@ async def test_what_cannot_be_played_is_refused_with_one_sentence(
         )
 
 
-@pytest.mark.parametrize(
-    ("write", "name"),
-    [
-        (db3_bag, "run"),
-        (mcap_bag, "run"),
-        (bag_directory, "run"),
-    ],
-)
-async def test_a_bag_of_ros_is_played_like_any_recording(
-    address: BrokerAddress,
-    cloud: Cloud,
-    tmp_path: Path,
-    caplog: pytest.LogCaptureFixture,
-    write: Callable[[Path, Sequence[Said]], Path],
-    name: str,
-) -> None:
-    bag = write(tmp_path / name, drive(2.0))
-
-    with caplog.at_level(logging.WARNING):
-        await asyncio.wait_for(replay(address, tmp_path, bag, speed=4.0), 30.0)
-
-    scan = cloud.of("AGI", LaserScan)[-1]
-    assert farthest(cloud) == pytest.approx(1.9, abs=0.05)
-    # What is no number is no return and no free way either.
-    assert scan.ranges.tolist() == [1.0, float("inf"), 0.0, 2.5]
-    assert cloud.problems == []
-    assert caplog.records == []
-
-
 def detected(stamp: float) -> d.BoundingBoxes3d:
     """A person 3 m before the robot, in its own frame, as YOLACT tells it."""
     header = ros.Header(ros.Time.of(stamp), "base_link")
@@ -180,19 +148,6 @@ def yolact_bag(path: Path) -> Path:
         said.append(("/odom", ros.Odometry(header, "base_link", place), at))
         said.append(("/yolact_coordinate", detected(at), at))
     return message_bag(path, said)
-
-
-async def test_a_detector_in_a_bag_sees_its_person_on_the_map(
-    address: BrokerAddress, cloud: Cloud, tmp_path: Path
-) -> None:
-    bag = yolact_bag(tmp_path / "run")
-
-    await asyncio.wait_for(replay(address, tmp_path, bag, speed=4.0), 30.0)
-
-    frame = next(one for one in cloud.of("AGI", DetectionFrame) if one.detections)
-    (seen,) = frame.detections
-    assert math.dist(seen.box.centre[:2], (5.0, 1.0)) <= 0.1
-    assert cloud.problems == []
 
 
 def test_the_command_tells_of_each_topic_what_becomes_of_it(place: Site) -> None:

@@ -249,10 +249,10 @@ class StagedRobot:
                 case Report(report):
                     seq, (_, message) = self._uplink.report(report, self._dated(now))
                     self._machine.reported(seq, now.mono)
-                    self._say(message.topic, message.payload)
+                    self._say(*message)
                 case SendAnswer(answer):
                     message = self._uplink.answer(answer, self._dated(now))
-                    self._say(message.topic, message.payload)
+                    self._say(*message)
 
     def _say(self, topic: str, payload: bytes) -> None:
         if not self._faults.mute:

@@ -248,7 +248,7 @@ class BagPass:
     def __init__(self, uses: Mapping[str, Use], tree: "BagTree", mount: Pose2D) -> None:
         self._mount, self._tree = mount, tree
         self._lost = InputFaults()
-        """Of the newest message alone."""
+        """Faults of the newest message alone."""
         self._places = Places(tree.frames, _MAX_AGE_S, self._lost)
         for links in tree.links:
             self._places.add(links, static=True)

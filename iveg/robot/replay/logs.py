@@ -35,6 +35,7 @@ from iveg.domain.wire import (
 )
 from iveg.ngsi import codec
 from iveg.ngsi.codec import load_json
+from iveg.ngsi.codec.fields import first_complaint
 from iveg.ngsi.codec.incoming import ranges_of
 
 # --- logs -------------------------------------------------------------------------
@@ -108,9 +109,7 @@ class LogReader:
         except UnreadableError as error:
             why = str(error)
         except ValidationError as error:
-            complaint = error.errors(include_input=False, include_url=False)[0]
-            place = ".".join(str(part) for part in complaint["loc"][1:])
-            why = f"{place}: {complaint['msg']}" if place else complaint["msg"]
+            why = first_complaint(error)
         if number not in self._reported:
             self._reported.add(number)
             _log.warning("%s, line %d skipped: %s", self._file, number, why)

@@ -56,6 +56,8 @@ class Playback:
         ended: Whether the last entry was played; never with ``loop``.
         has_detector: Whether a detection was read: then none means an empty frame; of
             whole frames, empty ones too, whether one is at most a second old.
+        scan: The newest scan; the same object until the next.
+        detections: Of the newest frame; none when it is too old.
         unread: Class of each box of the newest frame that has no place.
     """
 
@@ -72,11 +74,11 @@ class Playback:
         self._source = self._open()
         self._ahead: deque[RecordingEntry] = deque()
         self._poses_ahead: deque[tuple[float, Odometry]] = deque()
-        self._picture: tuple[Detection, ...] = ()
+        self.detections: tuple[Detection, ...] = ()
         self.unread: tuple[str | None, ...] = ()
         self.has_detector = self.has_detector and not self._is_frame
         self._seen_at = 0.0
-        self._scan: LaserScan | None = None
+        self.scan: LaserScan | None = None
         self._read_ahead()
         self._at = self._ahead[0].at if self._ahead else 0.0
         while not self._poses_ahead and self._ahead:
@@ -92,7 +94,7 @@ class Playback:
             self._read_ahead()
         age = self._at - self._seen_at
         if age >= (_SILENT_S if self._is_frame else _SEEN_FOR_S):
-            self._picture, self.unread = (), ()
+            self.detections, self.unread = (), ()
             self.has_detector = self.has_detector and not self._is_frame
         if not self._ahead and self._loop:
             self._start_over()
@@ -112,19 +114,19 @@ class Playback:
             case Odometry():
                 self._last = self._poses_ahead.popleft()
             case LaserScan() as scan:
-                self._scan = scan
+                self.scan = scan
             case Detection() as detection:
                 self.has_detector = True
                 self._see(detection, entry.at)
             case DetectionFrame(detections=seen, unread=unread):
                 self.has_detector = self._is_frame = True
-                self._picture, self.unread, self._seen_at = seen, unread, entry.at
+                self.detections, self.unread, self._seen_at = seen, unread, entry.at
 
     def _see(self, detection: Detection, at: float) -> None:
         """The newest frame replaces the one before: a walking person counts once."""
-        if not self._picture or abs(at - self._seen_at) > _ONE_PICTURE_S:
-            self._picture, self._seen_at = (), at
-        self._picture = (*self._picture, detection)
+        if not self.detections or abs(at - self._seen_at) > _ONE_PICTURE_S:
+            self.detections, self._seen_at = (), at
+        self.detections = (*self.detections, detection)
 
     # --- sensor values at this moment ---------------------------------------------
 
@@ -143,16 +145,6 @@ class Playback:
             + part * (following.twist.angular_z - last.twist.angular_z),
         )
         return last.pose.interpolate(following.pose, part), twist
-
-    @property
-    def scan(self) -> LaserScan | None:
-        """The newest scan; the same object until the next."""
-        return self._scan
-
-    @property
-    def detections(self) -> tuple[Detection, ...]:
-        """Detections of the newest frame; none when it is too old."""
-        return self._picture
 
 
 # --- recordings -------------------------------------------------------------------
@@ -173,7 +165,7 @@ def open_recording(
     bag: BagOptions = AS_RECORDED,
     *,
     pose: Pose2D | None = None,
-    tell: Callable[[str], None] = lambda _: None,
+    tell: Callable[[str], None] | None = None,
 ) -> Recording:
     """Open a recording by its file name.
 
@@ -189,7 +181,10 @@ def open_recording(
         DataFileError: unknown format, unreadable file, or neither odometry nor a fixed
             pose.
     """
-    recording = _opened(path, mount, bag, tell, fixed=pose is not None)
+    recording, table = _opened(path, mount, bag, fixed=pose is not None)
+    if tell is not None:
+        for line in table:
+            tell(line)
     if any(isinstance(one.observation, Odometry) for one in recording()):
         return recording
     if pose is None:
@@ -204,14 +199,14 @@ def _opened(
     path: Path,
     mount: Pose2D,
     bag: BagOptions,
-    tell: Callable[[str], None],
     *,
     fixed: bool,
-) -> Recording:
+) -> tuple[Recording, list[str]]:
+    """The recording, and the table of a bag's topics."""
     stem, _, robot_id = str(path).partition(".mcap#")
     own = Path(f"{stem}.mcap") if robot_id else path
     if own.suffix == ".mcap" and is_own(own):
-        return OwnRecording(own, robot_id or None).entries
+        return OwnRecording(own, robot_id or None).entries, []
     if robot_id and own.is_file():
         reason = (
             "is no recording of iVeg's that can be read, so # names no robot in it."
@@ -219,11 +214,9 @@ def _opened(
         raise DataFileError(str(own), "", reason)
     if path.is_dir() or path.suffix in _BAGS:
         opened = Bag(path, bag, mount, needs_odometry=not fixed)
-        for line in (f"{path}:", *opened.plan.table()):
-            tell(line)
-        return opened.entries
+        return opened.entries, [f"{path}:", *opened.plan.table()]
     if path.suffix in _LOGS:
-        return LogReader(path).entries
+        return LogReader(path).entries, []
     known = ", ".join((*_LOGS[:1], ".jsonl.gz", *_BAGS))
     reason = f"is none of {known}, and no directory of a bag."
     raise DataFileError(str(path), "", reason)
@@ -277,7 +270,7 @@ async def run_replay(
     bag: BagOptions = AS_RECORDED,
     fleet: FleetDescription | None = None,
     poses: Mapping[str, Pose2D] | None = None,
-    tell: Callable[[str], None] = lambda _: None,
+    tell: Callable[[str], None] | None = None,
 ) -> None:
     """Play recordings; returns when all have ended, never with ``loop``.
 

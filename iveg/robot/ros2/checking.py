@@ -136,12 +136,8 @@ class CheckRow:
     verdict: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Traffic:
-    """Messages of one topic: their rate (Hz), and the frame of the newest."""
-
-    rate_hz: float = 0.0
-    frame: str = ""
+Traffic = tuple[float, str]
+"""Rate of a topic's messages (Hz), and the frame of the newest."""
 
 
 def judge(
@@ -185,16 +181,18 @@ def judge(
     for topic, name in (sensed_topics(names) | drive).items():
         met = [one for one in others if one.topic == name]
         ends = [one for one in met if one.writes != (topic == "cmd_vel_out")]
-        found = traffic.get(topic, Traffic())
-        said = _badness(topic, config, ends, found.rate_hz, topic in needed)
+        rate_hz, frame = traffic.get(topic, (0.0, ""))
+        said = _badness(topic, config, ends, rate_hz, topic in needed)
         if topic == "cmd_vel_in" and len(met) > len(ends):
             said = "somebody listens beside the gate: a base would go round it"
-        rows.append(_row(name, ends, found, said, *verdicts.pop(name, ())))
+        rows.append(_row(name, ends, rate_hz, frame, said, *verdicts.pop(name, ())))
     rows += [CheckRow(one, verdict=", ".join(said)) for one, said in verdicts.items()]
     return *rows, *_unnamed(names, others)
 
 
-def _row(name: str, ends: Sequence[Endpoint], found: Traffic, *said: str) -> CheckRow:
+def _row(
+    name: str, ends: Sequence[Endpoint], rate_hz: float, frame: str, *said: str
+) -> CheckRow:
     kinds = " and ".join(sorted({one.type for one in ends}))
     qos = " and ".join(
         sorted(
@@ -206,7 +204,7 @@ def _row(name: str, ends: Sequence[Endpoint], found: Traffic, *said: str) -> Che
         )
     )
     verdict = ", ".join(dict.fromkeys(filter(None, said)))
-    return CheckRow(name, kinds, len(ends), found.rate_hz, qos, found.frame, verdict)
+    return CheckRow(name, kinds, len(ends), rate_hz, qos, frame, verdict)
 
 
 def _badness(
@@ -241,9 +239,7 @@ def _unnamed(names: Mapping[str, str], others: Sequence[Endpoint]) -> list[Check
     if any(names[key] in found for key in _DETECTORS):
         return []
     return [
-        _row(
-            topic, [one], Traffic(), f"a detector's: topics.{' or topics.'.join(keys)}"
-        )
+        _row(topic, [one], 0.0, "", f"a detector's: topics.{' or topics.'.join(keys)}")
         for topic, one in sorted(found.items())
         if (keys := [key for key in _DETECTORS if TOPICS[key].form(one.type)])
     ]

@@ -23,6 +23,7 @@ from iveg.domain.observations import (
     RobotFault,
 )
 from iveg.domain.wire import FORBIDDEN, MAX_BEAMS, MAX_PATH, clean_text
+from iveg.robot.grounding import corners_of, hull_of
 from iveg.robot.ros2.transforms import RigidTransform, rigid_of
 from iveg.ros2 import messages as ros
 
@@ -150,14 +151,9 @@ def read_detection(
     sides = size.x, size.y, size.z
     if box is None or not all(0.0 <= side < math.inf for side in sides):
         raise UnreadableError("not_a_number", "a box")
-    placed = place.compose(box)
-    # Half extent of a rotated box: sum of its projected half sides, for each axis.
-    (x, y, z), (along, across, up) = placed.move, sides
-    (a, b, c), (d, e, f), (g, h, i) = placed.rows
-    dx = 0.5 * (abs(a) * along + abs(b) * across + abs(c) * up)
-    dy = 0.5 * (abs(d) * along + abs(e) * across + abs(f) * up)
-    dz = 0.5 * (abs(g) * along + abs(h) * across + abs(i) * up)
-    hull = within_world(Box3D(x - dx, x + dx, y - dy, y + dy, z - dz, z + dz))
+    x, y, z = (side / 2 for side in sides)
+    corners = corners_of(Box3D(-x, x, -y, y, -z, z))
+    hull = within_world(hull_of(place.compose(box).of(corners)))
     det_id = clean(detection.id) or None
     return Detection(class_id, probability, hull, "map", det_id)
 

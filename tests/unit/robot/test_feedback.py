@@ -338,6 +338,25 @@ def test_no_stray_message_makes_a_robot_drop_what_iveg_says_next(stray: Origin) 
     assert bench.factor(1.5) == 0.5
 
 
+def test_an_author_is_as_old_as_our_report_that_it_has_seen() -> None:
+    bench = AuthorsBench()
+    bench.tell(0.0)
+    bench.tell(1.5, seen_at=0.4)
+    assert bench.factor(1.5) == 0.5
+    bench.tell(1.6, seen_at=0.7)
+    assert bench.factor(1.6) == 1.0
+
+
+def test_whoever_is_told_by_an_author_that_fell_silent_stays_for_ten_seconds() -> None:
+    bench = AuthorsBench()
+    bench.tell(0.0, person(1.0), origin=Origin("other", 1))
+    bench.go_on(0.2, 9.8)
+    found = {cap.reason for cap in bench.authors.caps(AT_THE_ROW, False, 9.8)}
+    assert "person" in found
+    bench.go_on(10.0, 10.4)
+    assert bench.factor(10.4) == 1.0
+
+
 def test_a_copy_is_no_news() -> None:
     bench = AuthorsBench()
     bench.go_on(0.0, 1.0)

@@ -168,6 +168,23 @@ def test_a_robot_whose_pose_moves_while_its_wheels_rest_is_not_released() -> Non
     assert rig.release().result == "RELEASED"
 
 
+@pytest.mark.parametrize(
+    ("ids", "challenge", "why"),
+    [
+        (["01A"], None, "holds_missing"),
+        (["01A", "boot-b1"], "old", "challenge"),
+    ],
+)
+def test_a_release_that_does_not_fit_lifts_no_hold(
+    ids: list[str], challenge: str | None, why: str
+) -> None:
+    rig = Rig().run(0.5)
+    rig.stop("01A")
+    answer = rig.command(release(ids, challenge or rig.machine.challenge))
+    assert (answer.result, answer.why) == ("REFUSED", why)
+    assert len(rig.holds) == 2
+
+
 def test_the_answer_to_an_order_names_its_attempt() -> None:
     rig = Rig().run(0.5)
     lifted = rig.command(release(["boot-b1"], rig.machine.challenge, "01TRY"))

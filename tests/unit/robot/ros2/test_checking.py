@@ -8,7 +8,6 @@ from iveg.domain.observations import RobotFault
 from iveg.robot.ros2.checking import (
     CheckRow,
     Lookout,
-    Traffic,
     forms_published,
     judge,
     lines,
@@ -135,7 +134,7 @@ def judged(
     return judge(
         config or RobotConfig(),
         [*endpoints, *more],
-        {key: Traffic(rate, "odom") for key, rate in (RATES | rates).items()},
+        {key: (rate, "odom") for key, rate in (RATES | rates).items()},
         faults,
         robot_id="AGI",
         has_detector=has_detector,
