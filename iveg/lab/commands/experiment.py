@@ -9,6 +9,7 @@ import os
 import secrets
 import sys
 from collections.abc import Mapping
+from contextlib import AsyncExitStack
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -177,7 +178,7 @@ class Lab:
         if step.is_timed:
             self._say(step, "real time")
             before = os.getloadavg()[0]
-            real = await self._timed(step, parts)
+            real = await self._real(step, parts)
         load = before, os.getloadavg()[0]
         timed = None if real is None else timed_of(real)
         outcome = outcome_of(step, counted_of(virtual), timed, load)
@@ -187,18 +188,8 @@ class Lab:
         self._outcomes.append(outcome)
 
     def _say(self, step: PlannedRun, half: str) -> None:
-        of = len([*self.plan.steps()])
-        place = f"{len(self._outcomes) + 1} of {of}"
-        print(f"{place}  {step.name}: {half}", flush=True)
-
-    async def _timed(self, step: PlannedRun, parts: Parts) -> TimedRecording:
-        """The half in real time, whose emulator ends with it."""
-        started = len(parts.running)
-        try:
-            return await self._real(step, parts)
-        finally:
-            if len(parts.running) > started:
-                await parts.stop_newest()
+        number, count = len(self._outcomes) + 1, len([*self.plan.steps()])
+        print(f"{number} of {count}  {step.name}: {half}", flush=True)
 
     @property
     def _rule(self) -> DetectionRule:
@@ -208,8 +199,9 @@ class Lab:
     async def _real(self, step: PlannedRun, parts: Parts) -> TimedRecording:
         """The same run by all programs, any of which may end early."""
         words = ["--scenario", step.family, "--seed", str(step.seed)]
-        async with recorder(self.settings) as recorded:
+        async with recorder(self.settings) as recorded, AsyncExitStack() as stack:
             await parts.start("emulator", *words, "--profile", step.profile)
+            stack.push_async_callback(parts.stop_newest)
             began_live = await parts.outlast(self._until_live())
             settled = await parts.outlast(recorded.settle())
             began = clock.wall()
@@ -217,10 +209,10 @@ class Lab:
             ended = clock.wall()
             await parts.outlast(asyncio.sleep(LAST_COPIES_S))
             times = recorded.times(began, ended)
-        completed = began_live and await self._are_live()
-        # Stopped robots are not released here, so STOP comes last.
-        is_last = step == [*self.plan.steps()][-1]
-        stops = await self._stop() if is_last else ()
+            completed = began_live and await self._are_live()
+            # Stopped robots are not released here, so STOP comes last.
+            is_last = step == [*self.plan.steps()][-1]
+            stops = await self._stop() if is_last else ()
         return TimedRecording(began, ended, times, settled, completed, stops)
 
     async def _until_live(self) -> bool:

@@ -27,11 +27,6 @@ _LEAST_SLOPE = 1e-9
 """Stands for zero in a direction, so that no division is by zero."""
 
 
-def into(frame: Pose2D, x: float, y: float) -> tuple[float, float]:
-    """A point of ``map`` in a frame with this pose; inverse of its ``transform``."""
-    return frame.inverse(x, y)
-
-
 @dataclass(frozen=True, slots=True)
 class Disc:
     """A person seen from above (m)."""
@@ -65,7 +60,7 @@ class Body:
     def span(self, rays: Floats, sensor: Pose2D) -> Span:
         """Rays of a sensor through the body; directions of shape (2, n)."""
         c, s = math.cos(self.pose.yaw), math.sin(self.pose.yaw)
-        x, y = into(self.pose, sensor.x, sensor.y)
+        x, y = self.pose.inverse(sensor.x, sensor.y)
         half = self.length / 2, self.width / 2
         turned = np.array(((c, s), (-s, c))) @ rays
         box = np.array((-half[0], -half[1], *half))
@@ -77,7 +72,7 @@ class Body:
         Returns:
             Distance (m, 0 inside) and the unit vector from the body to the point.
         """
-        ahead, left = into(self.pose, x, y)
+        ahead, left = self.pose.inverse(x, y)
         out_x = ahead - min(max(ahead, -self.length / 2), self.length / 2)
         out_y = left - min(max(left, -self.width / 2), self.width / 2)
         gap = math.hypot(out_x, out_y)
