@@ -25,7 +25,7 @@ from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import DataFileError, HopError, SettingsError
 from iveg.domain.parameters import by_keys
 from iveg.lab.commands.demo import on_free_ports
-from iveg.lab.commands.processes import Parts
+from iveg.lab.commands.processes import Parts, running_parts
 from iveg.lab.experiment.desired_states import give_back, read_free_robots
 from iveg.lab.experiment.messages import LAST_COPIES_S, recorder
 from iveg.lab.experiment.outcome import (
@@ -144,7 +144,7 @@ class Lab:
             if not self.embedded:
                 await refuse_live_robots(self.settings)
                 self._retained = await read_free_robots(self.settings, ROBOTS)
-            async with Parts(surroundings) as parts:
+            async with running_parts(surroundings) as parts:
                 if self.embedded:
                     await parts.start("fiware")
                 # As in a demo no link is printed: no person signs in here.
@@ -171,7 +171,7 @@ class Lab:
 
     async def _step(self, step: PlannedRun, parts: Parts) -> None:
         self._say(step, "virtual clock")
-        rehearsal = VirtualRun(step, self._rule)
+        rehearsal = VirtualRun(step, DetectionRule.of(self.settings.rule))
         before = os.getloadavg()[0]
         virtual = await parts.outlast(rehearsal.play(step.counted_s))
         real = None
@@ -190,11 +190,6 @@ class Lab:
     def _say(self, step: PlannedRun, half: str) -> None:
         number, count = len(self._outcomes) + 1, len([*self.plan.steps()])
         print(f"{number} of {count}  {step.name}: {half}", flush=True)
-
-    @property
-    def _rule(self) -> DetectionRule:
-        """The rule of the iVeg that is started."""
-        return DetectionRule.of(self.settings.rule)
 
     async def _real(self, step: PlannedRun, parts: Parts) -> TimedRecording:
         """The same run by all programs, any of which may end early."""
@@ -240,10 +235,6 @@ class Lab:
             if standing >= len(ROBOTS) or clock.mono() > deadline:
                 return robots
 
-    @property
-    def _url(self) -> str:
-        return f"http://{self.settings.host}:{self.settings.port}"
-
     async def _ask(self, path: str, method: str = "GET") -> Any:
         """One response of the API.
 
@@ -253,7 +244,8 @@ class Lab:
         bearer = {"Authorization": f"Bearer {self.settings.api_token}"}
         try:
             async with httpx.AsyncClient(headers=bearer, trust_env=False) as client:
-                url = f"{self._url}/api/v1/{path}"
+                place = f"{self.settings.host}:{self.settings.port}"
+                url = f"http://{place}/api/v1/{path}"
                 answer = await client.request(method, url, timeout=10.0)
                 return answer.raise_for_status().json()
         except httpx.HTTPError as error:

@@ -74,23 +74,6 @@ async def test_a_retained_level_waits_for_whoever_comes_and_can_be_cleared(
     assert (await heard(robot)).payload == b"end"
 
 
-@pytest.mark.parametrize(
-    ("published", "subscribed", "heard_with"), [(0, 1, 0), (1, 0, 0), (1, 1, 1)]
-)
-async def test_a_retained_level_comes_with_the_lesser_quality(
-    robot: aiomqtt.Client,
-    other: aiomqtt.Client,
-    published: int,
-    subscribed: int,
-    heard_with: int,
-) -> None:
-    await other.publish("level", b"x", qos=published, retain=True)
-    await other.publish("after", b"y", qos=1)
-    await robot.subscribe("level", qos=subscribed)
-    message = await heard(robot)
-    assert (message.payload, message.qos) == (b"x", heard_with)
-
-
 async def test_a_neighbour_hears_and_publishes_without_a_connection(
     broker: MqttBroker, robot: aiomqtt.Client
 ) -> None:

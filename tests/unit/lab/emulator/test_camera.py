@@ -15,9 +15,8 @@ from iveg.lab.emulator.camera import (
     EmulatedDetector,
     Target,
     person_target,
-    robot_target,
 )
-from iveg.lab.emulator.greenhouse import Body, Disc, Scenery
+from iveg.lab.emulator.greenhouse import Disc, Scenery
 from iveg.lab.experiment.scoring import wilson
 from tests.builders import AGI
 
@@ -62,15 +61,6 @@ def test_crop_hides_a_person() -> None:
     garden = Scenery.of(Greenhouse("garden", BOUNDS, rows=(row,)))
 
     assert looks(person(4.0, 0.0), scenery=garden) == [()]
-
-
-def test_a_robot_is_named_as_the_papers_detector_names_it() -> None:
-    body = Body("AGII", Pose2D(5.0, 0.0, math.pi / 2), 1.4, 0.8)
-
-    ((found,),) = looks(robot_target(body))
-
-    assert found.class_id == "AGII"
-    assert found.box.ymax - found.box.ymin == pytest.approx(1.4)
 
 
 @dataclass(frozen=True, slots=True)

@@ -85,7 +85,6 @@ def nearest_person(world: SimulatedWorld, robot_id: str) -> float:
 
 
 @pytest.mark.slow
-@pytest.mark.slow
 @pytest.mark.parametrize("scenario", sorted(SCENARIOS))
 def test_robots_drive_without_touching_anything_or_anybody(scenario: str) -> None:
     greenhouse = load_greenhouse(scenario_named(scenario).greenhouse)
@@ -100,7 +99,6 @@ def test_robots_drive_without_touching_anything_or_anybody(scenario: str) -> Non
             assert min(gaps) > PERSON_RADIUS_M
 
 
-@pytest.mark.slow
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("robots", "greenhouse"),
