@@ -1,4 +1,4 @@
-"""What the rule costs: ``python -m benchmarks.rule_cost [--robots 5 10 20]``.
+"""Cost of the rule: ``python -m benchmarks.rule_cost [--robots 5 10 20]``.
 
 CPU seconds per 1,000 messages of the rule loop alone, everything read already: each
 robot sends odometry, a scan and four boxes at 30 Hz, feedback is written as for MQTT.
@@ -59,7 +59,7 @@ SCAN = np.minimum(1.0 / np.maximum(np.abs(np.sin(_BEAMS)), 0.01), 30.0).astype("
 def story(
     robots: tuple[str, ...], *, storm: bool, seconds: float = SECONDS
 ) -> Iterator[Received]:
-    """What arrives, in order: robots two lanes apart, sends spread over the period."""
+    """Messages in order of arrival: robots two lanes apart, spread over the period."""
     draw = random.Random(3)  # noqa: S311 - the same each time
     for tick in range(round(seconds * RATE_HZ)):
         for place in range(3 * len(robots)):

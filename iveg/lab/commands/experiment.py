@@ -192,7 +192,7 @@ class Lab:
         print(f"{number} of {count}  {step.name}: {half}", flush=True)
 
     async def _real(self, step: PlannedRun, parts: Parts) -> TimedRecording:
-        """The same run by all programs, any of which may end early."""
+        """Play a run by all programs, any of which may end early."""
         words = ["--scenario", step.family, "--seed", str(step.seed)]
         async with recorder(self.settings) as recorded, AsyncExitStack() as stack:
             await parts.start("emulator", *words, "--profile", step.profile)

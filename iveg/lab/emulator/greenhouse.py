@@ -22,7 +22,7 @@ Floats = NDArray[np.float64]
 Span = tuple[Floats, Floats]
 """Where rays enter and leave (m); a ray that leaves before it enters misses."""
 _LEANS_M, _TUFT_M = 0.2, 0.15
-"""How far a plant leans out at most, and the radius of its tuft (m)."""
+"""Farthest that a plant leans out, and the radius of its tuft (m)."""
 _LEAST_SLOPE = 1e-9
 """Stands for zero in a direction, so that no division is by zero."""
 

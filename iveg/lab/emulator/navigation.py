@@ -360,7 +360,7 @@ class Follower:
 
 
 _STAYS_S = 3.0
-"""How long a robot that has returned stands before it goes on (s)."""
+"""Time that a robot stands after its return, before it goes on (s)."""
 
 
 class Navigator:

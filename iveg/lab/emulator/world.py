@@ -61,7 +61,7 @@ class EmulatedSensors:
     _sent_at: dict[str, float] = field(default_factory=dict)
 
     def due(self, now: float) -> Iterator[Observation]:
-        """What is to be sent ``now`` (s of the run)."""
+        """Readings to be sent ``now`` (s of the run)."""
         for kind in SENSED:
             every_s = kind.sensor.every_s if kind.sensor else 0.0
             if now - self._sent_at.get(kind.name, -every_s) >= every_s:
@@ -245,7 +245,7 @@ class SimulatedWorld:
 
 @dataclass(frozen=True, slots=True)
 class Driving:
-    """How a robot may drive.
+    """Permission of a robot to drive.
 
     Attributes:
         wanted: Speed that its navigation asks for (m/s); 0 while it is held.

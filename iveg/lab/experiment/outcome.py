@@ -214,12 +214,12 @@ def scored(classes: Sequence[str], runs: Sequence[Outcome]) -> dict[str, object]
         for name in classes
         if name in one["classes"]
     ]
-    of = score(tallies)
+    total = score(tallies)
     sure = [one for each in tallies for one in each.found]
-    precision = thinned(of.tp, of.tp + of.fp, of.claims)
-    recall = thinned(of.tp, of.tp + of.fn, of.looks)
+    precision = thinned(total.tp, total.tp + total.fp, total.claims)
+    recall = thinned(total.tp, total.tp + total.fn, total.looks)
     return {
-        **asdict(of),
+        **asdict(total),
         "confidence": fmean(sure) if sure else None,
         "precision": None if precision is None else asdict(precision),
         "recall": None if recall is None else asdict(recall),

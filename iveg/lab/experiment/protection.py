@@ -40,7 +40,7 @@ AWAY_M = (2.3, 4.0)
 """Slowed with nobody so near is needless: at the zone, and far away (m)."""
 MOVES_M_S = 0.05
 SLOW_SHARE = 0.55
-"""Of the speed that a robot wants: half, and what noise adds."""
+"""Share of the speed that a robot wants: half, and what noise adds."""
 AHEAD_S = 1.5
 """So long before its entry an encounter should be told (s)."""
 ROUNDING_S = 1e-6
@@ -199,9 +199,9 @@ def _quantile(values: list[float], percent: int) -> float | None:
 
 
 _STILL_S: Final = 0.25
-"""How long a picture, or a gap between two, counts (s)."""
+"""Time for which a picture, or a gap between two, counts (s)."""
 _SAME_M: Final = 1.0
-"""Who is farther from where iVeg has somebody is somebody else (m)."""
+"""Farthest that iVeg may have somebody from where they are (m)."""
 
 
 def moments_of(
@@ -247,7 +247,7 @@ def _people(row: Row, in_view: set[str], places: Sequence[Row]) -> Iterator[Near
 
 
 def person_at(people: Iterable[Row], x: float, y: float) -> str | None:
-    """Who really is at a place (m), by the truth's keys; None: nobody."""
+    """Person who really is at a place (m), by the truth's keys; None: nobody."""
     away = {one["key"]: dist((one["x"], one["y"]), (x, y)) for one in people}
     nearest = min(away, key=lambda key: away[key], default=None)
     return nearest if nearest is not None and away[nearest] <= _SAME_M else None

@@ -29,19 +29,20 @@ class Interval:
     high: float
 
 
-def wilson(hits: float, of: float) -> Interval | None:
+def wilson(hits: float, count: float) -> Interval | None:
     """The Wilson score interval (Wilson 1927); None without data."""
-    if of <= 0:
+    if count <= 0:
         return None
-    share, z2 = hits / of, _Z * _Z
-    middle = (share + z2 / (2 * of)) / (1 + z2 / of)
-    half = _Z / (1 + z2 / of) * sqrt(share * (1 - share) / of + z2 / (4 * of * of))
+    share, z2 = hits / count, _Z * _Z
+    middle = (share + z2 / (2 * count)) / (1 + z2 / count)
+    spread = sqrt(share * (1 - share) / count + z2 / (4 * count * count))
+    half = _Z / (1 + z2 / count) * spread
     return Interval(share, max(0.0, middle - half), min(1.0, middle + half))
 
 
-def thinned(hits: int, of: int, worth: int) -> Interval | None:
-    """The same where ``of`` counts are worth only ``worth`` independent ones."""
-    return wilson(hits * worth / of, worth) if of and worth else None
+def thinned(hits: int, count: int, worth: int) -> Interval | None:
+    """The interval where ``count`` trials are worth only ``worth`` independent ones."""
+    return wilson(hits * worth / count, worth) if count and worth else None
 
 
 OVERLAP: Final = 0.5

@@ -217,7 +217,7 @@ class StagedRobot:
 
     @property
     def driving(self) -> Driving:
-        """How it may drive now."""
+        """Speed that it may drive now."""
         factor = self._machine.cap.factor if self._machine.may_drive else 0.0
         return Driving(self._wanted, factor)
 
