@@ -1,1 +1,1 @@
-"""What iVeg costs and how fast it is, measured: ``python -m benchmarks``."""
+"""Measurements of iVeg's cost and speed: ``python -m benchmarks``."""

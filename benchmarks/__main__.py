@@ -6,17 +6,13 @@
 import runpy
 
 BENCHMARKS = (
-    "decision_cost",
-    "feedback_delay",
     "latency_cost",
     "lidar_cost",
-    "emulator_cost",
     "fiware_transport",
     "notify_cost",
-    "paint",
+    "rule_cost",
     "ros2_cost",
     "sign_in_flood",
-    "tracking",
     "glass",
 )
 

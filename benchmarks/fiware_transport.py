@@ -1,4 +1,4 @@
-"""How fast the embedded FIWARE carries measures: MQTT publish → notification received.
+"""Speed of the embedded FIWARE: MQTT publish → notification received.
 
 ``python -m benchmarks.fiware_transport [--robots 2 20 …] [--seconds 6]``: each robot
 sends odometry, a 720-beam scan and two boxes at 30 Hz.  The embedded FIWARE, the robots

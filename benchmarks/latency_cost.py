@@ -1,4 +1,4 @@
-"""What timing every message costs, at twenty robots of ninety messages a second.
+"""Cost of timing every message, at twenty robots of ninety messages a second.
 
 Run ``python -m benchmarks.latency_cost``.  Each message passes both taps and the loop
 (three calls); each second ticks twenty times.  Time is that of the processor, so that

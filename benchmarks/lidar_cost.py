@@ -1,4 +1,4 @@
-"""What the emulated laser costs: ``python -m benchmarks.lidar_cost``.
+"""Cost of the emulated laser: ``python -m benchmarks.lidar_cost``.
 
 One robot's sweep of 720 beams among the other robots and four people, and the same
 with the bytes of its message, as share of one core at 30 Hz.

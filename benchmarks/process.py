@@ -1,4 +1,4 @@
-"""What a process costs, read from ``/proc``, and numbers laid out as a table."""
+"""Cost of a process, read from ``/proc``, and numbers laid out as a table."""
 
 import os
 import select
@@ -12,7 +12,7 @@ _PAGE_MIB = os.sysconf("SC_PAGE_SIZE") / 2**20
 
 @dataclass(frozen=True, slots=True)
 class Usage:
-    """Of one process: processor time since its start (s) and resident memory (MiB)."""
+    """Processor time of a process since its start (s), and resident memory (MiB)."""
 
     cpu_s: float
     rss_mib: float

@@ -9,6 +9,8 @@ stands, by detector profile; the same seed gives the same numbers on any machine
 """
 
 import argparse
+from collections.abc import Iterator
+from typing import Any
 
 from benchmarks.process import print_table
 from iveg.adapters.fleet_files import load_fleet
@@ -20,8 +22,12 @@ from iveg.lab.emulator.camera import DETECTORS
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.scenarios import scenario_named
 from iveg.lab.emulator.world import SimulatedWorld, true_picture
-from iveg.lab.experiment import tables
-from iveg.lab.experiment.protection import Protection, moments_of, protection_of, whole
+from iveg.lab.experiment.protection import (
+    Protection,
+    moments_of,
+    protection_of,
+    total_of,
+)
 from iveg.lab.experiment.stage import STEP_S, Row, Stage, foretold_row
 
 ROBOTS = ("AGI", "AGII")
@@ -96,15 +102,18 @@ def main() -> None:
     for profile in asked.profiles.split(","):
         lasers = not asked.no_laser, not asked.no_own_laser
         runs = (run(profile, n, asked.seconds, rule, *lasers) for n in seeds)
-        chosen = {"where": "demo", "profile": profile, "rule": "as asked"}
-        rows.append({**chosen, **whole(runs).row()})
-    result = {"protection": rows}
-    for head, cells in (
-        (tables.PROTECTION, tables.protection(result)),
-        (tables.ENTRIES, tables.entries(result)),
-    ):
-        told = [[str(one) for one in row] for row in cells]
-        print_table(f"Protection, seeds {asked.seeds}", [*head], told)
+        rows += [[profile, *cell] for cell in cells_of(total_of(runs).row())]
+    head = ("detector", "number", "value")
+    print_table(f"Protection, seeds {asked.seeds}", head, rows)
+
+
+def cells_of(numbers: Any, place: str = "") -> Iterator[tuple[str, str]]:
+    """Each number with its name, those of groups behind the group's."""
+    for name, value in numbers.items():
+        if isinstance(value, dict):
+            yield from cells_of(value, f"{place}{name} ")
+        else:
+            yield f"{place}{name}", str(value)
 
 
 if __name__ == "__main__":

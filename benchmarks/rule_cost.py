@@ -1,4 +1,4 @@
-"""What the rule costs: ``python -m benchmarks.rule_cost [--robots 5 10 20]``.
+"""Cost of the rule: ``python -m benchmarks.rule_cost [--robots 5 10 20]``.
 
 CPU seconds per 1,000 messages of the rule loop alone, everything read already: each
 robot sends odometry, a scan and four boxes at 30 Hz, feedback is written as for MQTT.
@@ -12,6 +12,7 @@ decide alike, to the last digit, have the same.
 
 import argparse
 import hashlib
+import itertools
 import math
 import random
 import time
@@ -19,8 +20,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from benchmarks.decision_cost import TICK_S, WALL, Sink, Telling, assessor_of
 from benchmarks.process import print_table
+from iveg.adapters.fleet_files import load_fleet
+from iveg.adapters.greenhouses import load_greenhouse
+from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import Feedback
 from iveg.domain.geometry import Box3D, Pose2D, Twist2D
 from iveg.domain.observations import (
@@ -33,10 +36,20 @@ from iveg.domain.observations import (
     Origin,
     Received,
 )
+from iveg.domain.peer_scan import PeerScan
 from iveg.domain.records import Record
+from iveg.domain.tracking.people import People
 from iveg.domain.transports import FIWARE
+from iveg.domain.world import World
+from iveg.ngsi import codec
+from iveg.vital.evaluate import Evaluator
+from iveg.vital.event_log import EventLog
+from iveg.vital.publish import Hub
+from iveg.vital.supervision import Supervision
 
 RATE_HZ = 30
+TICK_S = 0.05
+WALL = 1_800_000_000.0
 SECONDS = 8.0
 _BEAMS = np.linspace(-math.pi, math.pi, 720)
 SCAN = np.minimum(1.0 / np.maximum(np.abs(np.sin(_BEAMS)), 0.01), 30.0).astype("f4")
@@ -46,7 +59,7 @@ SCAN = np.minimum(1.0 / np.maximum(np.abs(np.sin(_BEAMS)), 0.01), 30.0).astype("
 def story(
     robots: tuple[str, ...], *, storm: bool, seconds: float = SECONDS
 ) -> Iterator[Received]:
-    """What arrives, in order: robots two lanes apart, sends spread over the period."""
+    """Messages in order of arrival: robots two lanes apart, spread over the period."""
     draw = random.Random(3)  # noqa: S311 - the same each time
     for tick in range(round(seconds * RATE_HZ)):
         for place in range(3 * len(robots)):
@@ -86,29 +99,57 @@ def _told(
     return DetectionFrame(robot_id, origin, found)
 
 
-class Kept(Telling, Sink):
-    """Keeps all that is decided, to be compared when the time is taken."""
+class Kept:
+    """Stands where MQTT and the history stand, and keeps all that is decided."""
 
     def __init__(self) -> None:
-        super().__init__()
         self.all: list[Feedback | Record] = []
+        self._writer = codec.FeedbackWriter()
 
     def publish_feedback(self, feedback: Feedback) -> None:
         """Write one feedback, and keep it."""
-        super().publish_feedback(feedback)
+        self._writer.write(feedback)
         self.all.append(feedback)
+
+    def publish_peer_scan(self, scan: PeerScan) -> None:
+        """Write one scan for peers."""
+        codec.write_peer_scan(scan)
 
     def enqueue(self, record: Record) -> None:
         """Keep one row."""
         self.all.append(record)
 
+    async def flushed(self) -> None:
+        """Return; nothing is stored here."""
+
+    async def ignore(self, *_: object) -> None:
+        """Ignore; no robot takes orders here."""
+
+    stop = release = resume = goal = set_desired_state = ignore
+
     @property
     def digest(self) -> str:
-        """Of everything, in its order."""
+        """Digest of everything, in its order."""
         whole = hashlib.sha256()
-        for one in self.all:
-            whole.update(repr(one).encode())
+        for decided in self.all:
+            whole.update(repr(decided).encode())
         return whole.hexdigest()[:8]
+
+
+def evaluator_of(robots: tuple[str, ...], kept: Kept) -> Evaluator:
+    """The rule with everything round it but the network and the disk."""
+    numbers = itertools.count()
+    start, greenhouse = Instant(0.0, WALL), load_greenhouse("agroconnect")
+    return Evaluator(
+        World(load_fleet(words=robots)),
+        greenhouse,
+        People(greenhouse),
+        DetectionRule(),
+        kept,
+        EventLog(Hub(), kept, start, Supervision(lambda: start)),
+        lambda: f"{next(numbers):026d}",
+        "bench",
+    )
 
 
 def cost(
@@ -117,7 +158,7 @@ def cost(
     """CPU seconds per 1,000 messages, and the digest of what was decided."""
     robots = tuple(f"R{number:02d}" for number in range(count))
     kept = Kept()
-    evaluator = assessor_of(robots, kept, kept)
+    evaluator = evaluator_of(robots, kept)
     everything = list(story(robots, storm=storm, seconds=seconds))
     ticked = 0.0
     began = time.process_time()

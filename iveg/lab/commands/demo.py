@@ -19,7 +19,7 @@ from iveg.adapters.free_ports import bind_once
 from iveg.cli.arguments import CommandCall
 from iveg.cli.running import LOOPBACK, print_sign_in_link, run_until_stopped
 from iveg.domain.errors import SettingsError
-from iveg.lab.commands.processes import Parts
+from iveg.lab.commands.processes import running_parts
 from iveg.ros2.names import namespace_of
 from iveg.settings import Settings
 
@@ -123,7 +123,7 @@ def _moved(
 async def _supervise(
     parts: Sequence[Sequence[str]], settings: Settings, environment: Mapping[str, str]
 ) -> None:
-    async with Parts(environment) as running:
+    async with running_parts(environment) as running:
         for words in parts:
             await running.start(*words)
         print_sign_in_link(settings, settings.sign_in_token)

@@ -9,6 +9,7 @@ import os
 import secrets
 import sys
 from collections.abc import Mapping
+from contextlib import AsyncExitStack
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -24,7 +25,7 @@ from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import DataFileError, HopError, SettingsError
 from iveg.domain.parameters import by_keys
 from iveg.lab.commands.demo import on_free_ports
-from iveg.lab.commands.processes import Parts
+from iveg.lab.commands.processes import Parts, running_parts
 from iveg.lab.experiment.desired_states import give_back, read_free_robots
 from iveg.lab.experiment.messages import LAST_COPIES_S, recorder
 from iveg.lab.experiment.outcome import (
@@ -143,7 +144,7 @@ class Lab:
             if not self.embedded:
                 await refuse_live_robots(self.settings)
                 self._retained = await read_free_robots(self.settings, ROBOTS)
-            async with Parts(surroundings) as parts:
+            async with running_parts(surroundings) as parts:
                 if self.embedded:
                     await parts.start("fiware")
                 # As in a demo no link is printed: no person signs in here.
@@ -170,14 +171,14 @@ class Lab:
 
     async def _step(self, step: PlannedRun, parts: Parts) -> None:
         self._say(step, "virtual clock")
-        rehearsal = VirtualRun(step, self._rule)
+        rehearsal = VirtualRun(step, DetectionRule.of(self.settings.rule))
         before = os.getloadavg()[0]
         virtual = await parts.outlast(rehearsal.play(step.counted_s))
         real = None
         if step.is_timed:
             self._say(step, "real time")
             before = os.getloadavg()[0]
-            real = await self._timed(step, parts)
+            real = await self._real(step, parts)
         load = before, os.getloadavg()[0]
         timed = None if real is None else timed_of(real)
         outcome = outcome_of(step, counted_of(virtual), timed, load)
@@ -187,29 +188,15 @@ class Lab:
         self._outcomes.append(outcome)
 
     def _say(self, step: PlannedRun, half: str) -> None:
-        of = len([*self.plan.steps()])
-        place = f"{len(self._outcomes) + 1} of {of}"
-        print(f"{place}  {step.name}: {half}", flush=True)
-
-    async def _timed(self, step: PlannedRun, parts: Parts) -> TimedRecording:
-        """The half in real time, whose emulator ends with it."""
-        started = len(parts.running)
-        try:
-            return await self._real(step, parts)
-        finally:
-            if len(parts.running) > started:
-                await parts.stop_newest()
-
-    @property
-    def _rule(self) -> DetectionRule:
-        """The rule of the iVeg that is started."""
-        return DetectionRule.of(self.settings.rule)
+        number, count = len(self._outcomes) + 1, len([*self.plan.steps()])
+        print(f"{number} of {count}  {step.name}: {half}", flush=True)
 
     async def _real(self, step: PlannedRun, parts: Parts) -> TimedRecording:
-        """The same run by all programs, any of which may end early."""
+        """Play a run by all programs, any of which may end early."""
         words = ["--scenario", step.family, "--seed", str(step.seed)]
-        async with recorder(self.settings) as recorded:
+        async with recorder(self.settings) as recorded, AsyncExitStack() as stack:
             await parts.start("emulator", *words, "--profile", step.profile)
+            stack.push_async_callback(parts.stop_newest)
             began_live = await parts.outlast(self._until_live())
             settled = await parts.outlast(recorded.settle())
             began = clock.wall()
@@ -217,10 +204,10 @@ class Lab:
             ended = clock.wall()
             await parts.outlast(asyncio.sleep(LAST_COPIES_S))
             times = recorded.times(began, ended)
-        completed = began_live and await self._are_live()
-        # Stopped robots are not released here, so STOP comes last.
-        is_last = step == [*self.plan.steps()][-1]
-        stops = await self._stop() if is_last else ()
+            completed = began_live and await self._are_live()
+            # Stopped robots are not released here, so STOP comes last.
+            is_last = step == [*self.plan.steps()][-1]
+            stops = await self._stop() if is_last else ()
         return TimedRecording(began, ended, times, settled, completed, stops)
 
     async def _until_live(self) -> bool:
@@ -248,10 +235,6 @@ class Lab:
             if standing >= len(ROBOTS) or clock.mono() > deadline:
                 return robots
 
-    @property
-    def _url(self) -> str:
-        return f"http://{self.settings.host}:{self.settings.port}"
-
     async def _ask(self, path: str, method: str = "GET") -> Any:
         """One response of the API.
 
@@ -261,7 +244,8 @@ class Lab:
         bearer = {"Authorization": f"Bearer {self.settings.api_token}"}
         try:
             async with httpx.AsyncClient(headers=bearer, trust_env=False) as client:
-                url = f"{self._url}/api/v1/{path}"
+                place = f"{self.settings.host}:{self.settings.port}"
+                url = f"http://{place}/api/v1/{path}"
                 answer = await client.request(method, url, timeout=10.0)
                 return answer.raise_for_status().json()
         except httpx.HTTPError as error:

@@ -5,8 +5,8 @@ import contextlib
 import logging
 import signal
 import sys
-from collections.abc import Coroutine, Mapping
-from types import TracebackType
+from collections.abc import AsyncIterator, Coroutine, Mapping
+from contextlib import asynccontextmanager
 from typing import TypeVar
 
 from iveg.domain.errors import HopError
@@ -17,11 +17,22 @@ _GRACE_S = 5.0
 T = TypeVar("T")
 
 
+@asynccontextmanager
+async def running_parts(environment: Mapping[str, str]) -> AsyncIterator["Parts"]:
+    """Parts that end with the block, the newest first."""
+    parts = Parts(environment)
+    try:
+        yield parts
+    finally:
+        while parts.running:
+            await parts.stop_newest()
+
+
 class Parts:
-    """Running parts; use it with ``async with``, which ends them, the newest first.
+    """Running parts.
 
     Args:
-        environment: Of all parts.
+        environment: Environment of all parts.
 
     Attributes:
         running: The parts' commands and processes, in the order of their start.
@@ -30,18 +41,6 @@ class Parts:
     def __init__(self, environment: Mapping[str, str]) -> None:
         self.running: list[tuple[str, asyncio.subprocess.Process]] = []
         self._environment = dict(environment)
-
-    async def __aenter__(self) -> "Parts":
-        return self
-
-    async def __aexit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        while self.running:
-            await self.stop_newest()
 
     async def start(self, name: str, *words: str) -> None:
         """Start a part and wait until it reports that it is ready.

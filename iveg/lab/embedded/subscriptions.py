@@ -203,7 +203,7 @@ class Subscription:
 
 _log = logging.getLogger(__name__)
 MOST_WAITING = 300
-"""Of one lane: ten seconds of one kind of a robot's measures at 30 Hz."""
+"""Capacity of one lane: ten seconds of one kind of a robot's measures at 30 Hz."""
 IDLE_S = 2.0
 """A connection that was idle for longer is not used again: Node.js closes after 5 s."""
 

@@ -25,7 +25,7 @@ from iveg.domain.geometry import (
     wrap_angle,
 )
 from iveg.domain.observations import Detection
-from iveg.lab.emulator.greenhouse import Body, Disc, Scenery, into
+from iveg.lab.emulator.greenhouse import Body, Disc, Scenery
 
 PERSON = "farmer"
 
@@ -187,7 +187,7 @@ class EmulatedDetector:
         self._profile = profile
         self._model = model
         self._rng = rng
-        self._encounters: dict[str, _Encounter] = {}
+        self._encounters: dict[str, _Encounter | None] = {}
 
     def detect(
         self, now: float, pose: Pose2D, targets: Sequence[Target], scenery: Scenery
@@ -213,7 +213,9 @@ class EmulatedDetector:
             if seen > 0.0 and not encounter.missed:
                 drawn.append(self._box(pose, target, encounter, seen))
             if encounter.ghost is not None:
-                drawn.append(self._ghost_box(pose, encounter.ghost))
+                ghost = encounter.ghost
+                sure = self._probability(ghost.confidence)
+                drawn.append(upright_box(pose, ghost.class_id, ghost.x, ghost.y, sure))
         return tuple(drawn)
 
     # --- what is in view ----------------------------------------------------------
@@ -239,28 +241,20 @@ class EmulatedDetector:
     ) -> _Encounter | None:
         """The running encounter; a new one when it is over and the target in view."""
         running = self._encounters.get(target.key)
-        if running is not None and now < running.until:
-            return running
-        self._encounters.pop(target.key, None)
-        if not visible:
-            return None
-        fresh = self._draw(now, camera, target)
-        self._encounters[target.key] = fresh
-        return fresh
+        if running is None or now >= running.until:
+            running = self._draw(now, camera, target) if visible else None
+            self._encounters[target.key] = running
+        return running
 
     def _draw(self, now: float, camera: Pose2D, target: Target) -> _Encounter:
-        counts, rng, model = (
-            self._model.counts_of(target.class_id),
-            self._rng,
-            self._model,
-        )
+        rng, model = self._rng, self._model
+        counts = model.counts_of(target.class_id)
         until = now + rng.uniform(_SHORTEST_S, _LONGEST_S)
         missed = rng.random() < counts.miss_rate
         confidence = rng.normal(model.confidence, model.spread)
         x, y = rng.normal(0.0, model.position, 2)
-        ghost = None
-        if rng.random() < counts.ghost_rate:
-            ghost = self._draw_ghost(camera, target.class_id)
+        has_ghost = rng.random() < counts.ghost_rate
+        ghost = self._draw_ghost(camera, target.class_id) if has_ghost else None
         return _Encounter(until, missed, confidence, (float(x), float(y)), ghost)
 
     def _draw_ghost(self, camera: Pose2D, class_id: str) -> _Ghost:
@@ -280,16 +274,12 @@ class EmulatedDetector:
     ) -> Detection:
         jitter = self._rng.normal(0.0, self._model.jitter, 2)
         moved = target.body.corners() + encounter.offset + jitter
-        corners = [into(pose, float(x), float(y)) for x, y in moved]
+        corners = [pose.inverse(float(x), float(y)) for x, y in moved]
         xs, ys = [x for x, _ in corners], [y for _, y in corners]
         box = Box3D(min(xs), max(xs), min(ys), max(ys), 0.0, target.height)
         certainty = encounter.confidence - _HIDDEN_LOSS * (1.0 - seen)
         probability = self._probability(certainty)
         return Detection(target.class_id, probability, box, "base_link")
-
-    def _ghost_box(self, pose: Pose2D, ghost: _Ghost) -> Detection:
-        probability = self._probability(ghost.confidence)
-        return upright_box(pose, ghost.class_id, ghost.x, ghost.y, probability)
 
     def _probability(self, confidence: float) -> float:
         flickering = confidence + self._rng.normal(0.0, self._model.flicker)
@@ -300,5 +290,5 @@ def upright_box(
     pose: Pose2D, class_id: str, x: float, y: float, probability: float
 ) -> Detection:
     """A box of a person's size at a position in ``map``, given in ``base_link``."""
-    box = box_of_a_person(*into(pose, x, y))
+    box = box_of_a_person(*pose.inverse(x, y))
     return Detection(class_id, probability, box, "base_link")

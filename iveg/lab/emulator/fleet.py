@@ -167,7 +167,6 @@ class EmulatedRobot:
         self._run_began = 0.0
         self._navigation_sent: tuple[str, float] = ("", -_NAVIGATION_EVERY_S)
         self._sensors = EmulatedSensors()
-        self._faults = FaultOrder(robot=self.robot_id)
         self._requested = REST
 
     def _new_node(self) -> RobotNode:
@@ -176,9 +175,7 @@ class EmulatedRobot:
             replace(
                 self._settings.node,
                 read_clock=self._read_clock,
-                open_link=partial(
-                    EmulatedLink, is_mute=lambda: bool(self._faults.mute)
-                ),
+                open_link=partial(EmulatedLink, is_mute=self._is_mute),
             ),
             profile=self._rig.profile,
             drive=self._obey_gate,
@@ -215,7 +212,7 @@ class EmulatedRobot:
         self._rig.move(min(dt * SLOTS, LONGEST_STEP_S))
         if self._node_task is None:
             return
-        if not self._faults.freeze_odometry:
+        if not self._rig.faults.freeze_odometry:
             node.sense(self._rig.odometry())
         navigation = self._rig.navigation()
         task, published_at = self._navigation_sent
@@ -236,20 +233,22 @@ class EmulatedRobot:
 
     def _obey_gate(self, command: Twist2D) -> None:
         """Apply the gate's command; with the fault ``deaf`` only a halt."""
-        ignores = self._faults.deaf and command != REST
+        ignores = self._rig.faults.deaf and command != REST
         self._rig.drive(self._requested if ignores else command)
 
     def _read_clock(self) -> Instant:
         """The robot's own clocks; the wall clock may be wrong."""
         now = clock.now()
-        return Instant(now.mono, now.wall + (self._faults.clock_offset_s or 0.0))
+        return Instant(now.mono, now.wall + (self._rig.faults.clock_offset_s or 0.0))
+
+    def _is_mute(self) -> bool:
+        return bool(self._rig.faults.mute)
 
     # --- faults -------------------------------------------------------------------
 
     def obey(self, order: FaultOrder) -> None:
         """Execute a fault order in the order of its fields."""
         node = self._node
-        self._faults = self._faults.changed_by(order)
         self._rig.obey(order)
         if order.local_hold is not None:
             node.add_local_hold(order.local_hold)
@@ -319,10 +318,7 @@ async def run_emulator(
     detector = DETECTORS[layout.detector or profile]
     world = SimulatedWorld(greenhouse, layout, detector, seed)
     incidents = (*(Incident(0.0, order) for order in faults), *layout.incidents)
-    bases = None
-    if network is not None:
-        bases = partial(_base, world, network, settings.rate_hz)
-    fleet = SimulatedFleet(world, settings, bases)
+    fleet = SimulatedFleet(world, settings, network)
     if fault_port is None:
         await fleet.run(incidents)
         return
@@ -331,36 +327,32 @@ async def run_emulator(
         await fleet.run(incidents)
 
 
-def _base(
-    world: SimulatedWorld, network: Network, rate_hz: float, rig: RobotHardware
-) -> Ros2Base:
-    config = RobotConfig(namespace=f"/{namespace_of(rig.robot_id)}")
-    return Ros2Base(rig, world, network, config, rate_hz)
-
-
 class SimulatedFleet:
     """Robots and people of a run, advanced in real time.
 
     Args:
-        bases: Makes ROS 2 robots without iVeg's software.
+        network: DDS of ROS 2 robots without iVeg's software; None: robots have it.
     """
 
     def __init__(
         self,
         world: SimulatedWorld,
         settings: FleetSettings,
-        bases: Callable[[RobotHardware], Ros2Base] | None = None,
+        network: Network | None = None,
     ) -> None:
         self._world = world
         self._settings = settings
         self._started = clock.now()
         settings.node.directory.mkdir(parents=True, exist_ok=True)
-        self._robots: Mapping[str, EmulatedRobot | Ros2Base] = {
-            robot_id: EmulatedRobot(rig, world, settings)
-            if bases is None
-            else bases(rig)
-            for robot_id, rig in world.rigs.items()
-        }
+        self._robots: dict[str, EmulatedRobot | Ros2Base] = {}
+        for robot_id, rig in world.rigs.items():
+            if network is None:
+                self._robots[robot_id] = EmulatedRobot(rig, world, settings)
+            else:
+                config = RobotConfig(namespace=f"/{namespace_of(robot_id)}")
+                self._robots[robot_id] = Ros2Base(
+                    rig, world, network, config, settings.rate_hz
+                )
 
     async def run(self, incidents: Sequence[Incident] = ()) -> None:
         """Run until cancelled."""
@@ -415,13 +407,11 @@ class SimulatedFleet:
         """
         if isinstance(order, FaultOrder):
             robot = self._robots.get(order.robot)
-            if robot is None:
-                return f"there is no robot {order.robot}"
-            if not robot.started.is_set():
-                return f"{order.robot} has not started yet"
+            if robot is None or not robot.started.is_set():
+                return f"there is no robot {order.robot}, or it has not started yet"
             robot.obey(order)
-            return None
-        if order.person >= len(self._world.people):
+        elif order.person >= len(self._world.people):
             return f"there are {len(self._world.people)} people, counted from 0"
-        self._world.people[order.person].place(order.x, order.y, hold=order.hold)
+        else:
+            self._world.people[order.person].place(order.x, order.y, hold=order.hold)
         return None

@@ -22,14 +22,9 @@ Floats = NDArray[np.float64]
 Span = tuple[Floats, Floats]
 """Where rays enter and leave (m); a ray that leaves before it enters misses."""
 _LEANS_M, _TUFT_M = 0.2, 0.15
-"""How far a plant leans out at most, and the radius of its tuft (m)."""
+"""Farthest that a plant leans out, and the radius of its tuft (m)."""
 _LEAST_SLOPE = 1e-9
 """Stands for zero in a direction, so that no division is by zero."""
-
-
-def into(frame: Pose2D, x: float, y: float) -> tuple[float, float]:
-    """A point of ``map`` in a frame with this pose; inverse of its ``transform``."""
-    return frame.inverse(x, y)
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +60,7 @@ class Body:
     def span(self, rays: Floats, sensor: Pose2D) -> Span:
         """Rays of a sensor through the body; directions of shape (2, n)."""
         c, s = math.cos(self.pose.yaw), math.sin(self.pose.yaw)
-        x, y = into(self.pose, sensor.x, sensor.y)
+        x, y = self.pose.inverse(sensor.x, sensor.y)
         half = self.length / 2, self.width / 2
         turned = np.array(((c, s), (-s, c))) @ rays
         box = np.array((-half[0], -half[1], *half))
@@ -77,7 +72,7 @@ class Body:
         Returns:
             Distance (m, 0 inside) and the unit vector from the body to the point.
         """
-        ahead, left = into(self.pose, x, y)
+        ahead, left = self.pose.inverse(x, y)
         out_x = ahead - min(max(ahead, -self.length / 2), self.length / 2)
         out_y = left - min(max(left, -self.width / 2), self.width / 2)
         gap = math.hypot(out_x, out_y)

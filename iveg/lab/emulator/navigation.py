@@ -9,11 +9,10 @@ route, and drives an open one forwards and backwards.  Left out: slip, load, slo
 
 import heapq
 import math
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import REST, Pose2D, Twist2D, wrap_angle
@@ -151,11 +150,10 @@ def way_between(
 
 
 class _Grid:
-    """Where the middle of a robot may be."""
+    """Cells where the middle of a robot may be, with the place of each."""
 
     def __init__(self, scenery: Scenery, keep_off_m: float) -> None:
         bounds = scenery.bounds
-        self._origin = bounds.xmin, bounds.ymin
         xs = np.arange(bounds.xmin, bounds.xmax, _CELL_M) + _CELL_M / 2
         ys = np.arange(bounds.ymin, bounds.ymax, _CELL_M) + _CELL_M / 2
         x, y = np.meshgrid(xs, ys, indexing="ij")
@@ -168,87 +166,63 @@ class _Grid:
             away = np.minimum(away, np.hypot(dx, dy))
         for px, py, radius in scenery.posts:
             away = np.minimum(away, np.hypot(x - px, y - py) - radius)
-        self._free: NDArray[np.bool_] = away > keep_off_m
+        self._places: dict[_Cell, _Place] = {
+            (int(i), int(j)): (float(x[i, j]), float(y[i, j]))
+            for i, j in np.argwhere(away > keep_off_m)
+        }
 
     def way(self, start: _Place, goal: _Place) -> list[_Place] | None:
         """Corners from one place to another; None where nothing leads there."""
-        first, last = self._free_cell(start), self._free_cell(goal)
+        first, last = self._cell_near(start), self._cell_near(goal)
         if first is None or last is None:
             return None
         cells = self._search(first, last)
         if cells is None:
             return None
-        middle = [self._middle(one) for one in self._straight(cells)]
-        corners = [start, *middle[1:-1], goal]
+        corners = [start, *(self._places[cell] for cell in self._straight(cells)), goal]
         return [a for a, b in zip(corners, [*corners[1:], None], strict=True) if a != b]
 
-    def _free_cell(self, place: _Place) -> _Cell | None:
+    def _cell_near(self, place: _Place) -> _Cell | None:
         """The free cell nearest to a place, within 0.75 m."""
-        cells = np.argwhere(self._free)
-        if not len(cells):
-            return None
-        centres = cells * _CELL_M + _CELL_M / 2 + np.array(self._origin)
-        away = np.hypot(centres[:, 0] - place[0], centres[:, 1] - place[1])
-        nearest = int(away.argmin())
-        if away[nearest] > _SNAP_M:
-            return None
-        return int(cells[nearest][0]), int(cells[nearest][1])
-
-    def _middle(self, cell: _Cell) -> _Place:
-        x, y = self._origin
-        return x + (cell[0] + 0.5) * _CELL_M, y + (cell[1] + 0.5) * _CELL_M
+        away = {cell: math.dist(self._places[cell], place) for cell in self._places}
+        nearest = min(away, key=lambda cell: away[cell], default=None)
+        return nearest if nearest and away[nearest] <= _SNAP_M else None
 
     def _search(self, first: _Cell, last: _Cell) -> list[_Cell] | None:
+        """The shortest way (A*); None where there is none."""
         cost, came_from = {first: 0.0}, {first: first}
         queue = [(math.dist(first, last), first)]
-        done: set[_Cell] = set()
         while queue:
             cell = heapq.heappop(queue)[1]
             if cell == last:
-                return list(_back(came_from, last))[::-1]
-            if cell in done:
-                continue
-            done.add(cell)
+                way = [cell]
+                while way[-1] != first:
+                    way.append(came_from[way[-1]])
+                return way[::-1]
             for i, j in _STEPS:
                 near = cell[0] + i, cell[1] + j
                 far = cost[cell] + math.hypot(i, j)
-                if self._is_free(near) and far < cost.get(near, math.inf):
+                if near in self._places and far < cost.get(near, math.inf):
                     cost[near], came_from[near] = far, cell
                     heapq.heappush(queue, (far + math.dist(near, last), near))
         return None
 
-    def _is_free(self, cell: _Cell) -> bool:
-        inside = (
-            0 <= cell[0] < self._free.shape[0] and 0 <= cell[1] < (self._free.shape[1])
-        )
-        return inside and bool(self._free[cell])
-
     def _straight(self, cells: list[_Cell]) -> list[_Cell]:
-        """The cells where the way has to turn."""
-        kept, at = [cells[0]], 0
+        """The cells between first and last where the way has to turn."""
+        kept, at = [], 0
         while at < len(cells) - 1:
-            seen = (
-                n for n in range(len(cells) - 1, at, -1) if self._sees(cells, at, n)
-            )
-            at = next(seen, at + 1)
+            farther = range(len(cells) - 1, at, -1)
+            at = next((n for n in farther if self._sees(cells[at], cells[n])), at + 1)
             kept.append(cells[at])
-        return kept
+        return kept[:-1]
 
-    def _sees(self, cells: list[_Cell], one: int, other: int) -> bool:
-        (ax, ay), (bx, by) = cells[one], cells[other]
+    def _sees(self, one: _Cell, other: _Cell) -> bool:
+        (ax, ay), (bx, by) = one, other
         steps = 2 * max(abs(bx - ax), abs(by - ay), 1)
         along = np.linspace(0.0, 1.0, steps + 1)
-        x = np.rint(ax + (bx - ax) * along).astype(int)
-        y = np.rint(ay + (by - ay) * along).astype(int)
-        return bool(self._free[x, y].all())
-
-
-def _back(came_from: dict[_Cell, _Cell], cell: _Cell) -> Iterator[_Cell]:
-    while True:
-        yield cell
-        if came_from[cell] == cell:
-            return
-        cell = came_from[cell]
+        x = np.rint(ax + (bx - ax) * along).astype(int).tolist()
+        y = np.rint(ay + (by - ay) * along).astype(int).tolist()
+        return all(cell in self._places for cell in zip(x, y, strict=True))
 
 
 _LOOK_AHEAD_M = 0.7
@@ -321,10 +295,10 @@ class Follower:
         passed = int(away.argmin())
         index = self._index
         for _ in range(passed):
-            index = index + self._direction
-            if index % len(self._route.points) in self._stations:
+            index = (index + self._direction) % len(self._route.points)
+            if index in self._stations:
                 break
-        self._index = index % len(self._route.points)
+        self._index = index
 
     def _halts(self, now: float) -> bool:
         if self._leaves_at is None:
@@ -381,13 +355,12 @@ class Follower:
         curvature = 2.0 * math.sin(aside) / max(pose.distance_to(x, y), 0.3)
         if self._profile.turning_radius > 0.0:
             curvature = clip(curvature, 1.0 / self._profile.turning_radius)
-        if abs(curvature) * speed > self._profile.max_turn:
-            speed = self._profile.max_turn / abs(curvature)
+        speed = min(speed, self._profile.max_turn / max(abs(curvature), 1e-9))
         return Twist2D(-speed if backwards else speed, speed * curvature)
 
 
 _STAYS_S = 3.0
-"""How long a robot that has returned stands before it goes on (s)."""
+"""Time that a robot stands after its return, before it goes on (s)."""
 
 
 class Navigator:
@@ -401,13 +374,13 @@ class Navigator:
     def __init__(self, profile: RobotProfile, script: RobotScript) -> None:
         self._profile, self._script = profile, script
         self._goal: Goal | None = None
-        self._there_at: float | None = None
+        self._there_since = math.inf
         self._follower: Follower | None = self._own_work(script.start)
 
     def _own_work(self, pose: Pose2D) -> Follower:
         script = self._script
-        stations = script.stations
-        return Follower(self._profile, script.route(), pose, script.cruise, stations)
+        route, stations = script.route(), script.stations
+        return Follower(self._profile, route, pose, script.cruise, stations)
 
     def pursue(self, goal: Goal | None, pose: Pose2D, scenery: Scenery) -> bool:
         """Drive to a goal; None: give it up and stand.
@@ -425,7 +398,7 @@ class Navigator:
             follower = self._way_to(goal, pose, scenery)
             if follower is None:
                 return False
-        self._goal, self._follower, self._there_at = goal, follower, None
+        self._goal, self._follower, self._there_since = goal, follower, math.inf
         return True
 
     def _way_to(self, goal: Goal, pose: Pose2D, scenery: Scenery) -> Follower | None:
@@ -452,8 +425,8 @@ class Navigator:
             return REST
         twist = self._follower.requested_twist(pose, now, discs)
         if self._goal is not None and self._follower.at_station:
-            self._there_at = now if self._there_at is None else self._there_at
-            is_over = now - self._there_at >= _STAYS_S
+            self._there_since = min(self._there_since, now)
+            is_over = now - self._there_since >= _STAYS_S
             if self._goal.kind == "return" and is_over:
                 self._goal, self._follower = None, self._own_work(pose)
         return twist
@@ -463,16 +436,11 @@ class Navigator:
         goal, follower = self._goal, self._follower
         if follower is None:
             return Navigation(robot_id, Origin(), "waiting")
-        path = follower.path()
-        task = "waiting" if follower.at_station else self._script.task
-        intent = Navigation(robot_id, Origin(), task, path[-1], path)
-        if goal is None:
-            return intent
-        return replace(
-            intent,
-            task="waiting" if follower.at_station else "goal",
-            goal=(goal.x, goal.y),
-        )
+        path, task = follower.path(), "goal" if goal else self._script.task
+        place = (goal.x, goal.y) if goal else path[-1]
+        if follower.at_station:
+            task = "waiting"
+        return Navigation(robot_id, Origin(), task, place, path)
 
 
 def _end_on(route: Route, goal: Goal) -> tuple[float, float]:

@@ -66,8 +66,9 @@ class FaultOrder(_Order):
     stuck: bool | None = None
 
     def changed_by(self, order: "FaultOrder") -> "FaultOrder":
-        """The faults in force after another order."""
-        return self.model_copy(update=order.model_dump(exclude_none=True))
+        """The faults in force after another order; fields that it names count."""
+        named = {name: getattr(order, name) for name in order.model_fields_set}
+        return self.model_copy(update=named)
 
 
 class PersonOrder(_Order):

@@ -3,18 +3,20 @@
 import asyncio
 import logging
 import math
+from collections.abc import Callable
+from functools import partial
+from typing import TypeVar
 
 from iveg.adapters import clock
 from iveg.domain.errors import UnreadableError
 from iveg.domain.geometry import REST, Pose2D, Twist2D
 from iveg.domain.goals import Goal
 from iveg.domain.observations import Detection
-from iveg.lab.emulator.greenhouse import into
 from iveg.lab.emulator.orders import FaultOrder
 from iveg.lab.emulator.world import EmulatedSensors, RobotHardware, SimulatedWorld
 from iveg.robot.node import LONGEST_STEP_S, SLOTS, every, in_slots
 from iveg.robot.ros2.config import RobotConfig
-from iveg.robot.ros2.outputs import Network, Writer
+from iveg.robot.ros2.outputs import Network, Reader, Writer
 from iveg.robot.ros2.reading import read_twist, write_twist
 from iveg.robot.ros2.topics import ROS_SENSORS
 from iveg.ros2 import cdr
@@ -26,6 +28,7 @@ TIMEOUT_S = 0.5
 
 
 _GIVES_UP_S, _RESTS_S = 1.0, 0.8
+T = TypeVar("T")
 
 
 class SimulatedNavigation:
@@ -105,7 +108,6 @@ class Ros2Base:
         self._base, self._navigation = DriveWatchdog(), SimulatedNavigation()
         self._odom_in_map = rig.vehicle.pose
         self._run_began = 0.0
-        self._is_odometry_frozen = False
         names = config.full_topics
 
         def writer(topic: str, message: type[Message]) -> Writer:
@@ -147,8 +149,6 @@ class Ros2Base:
 
     def obey(self, order: FaultOrder) -> None:
         """Execute the sensor faults of an order; the others concern its software."""
-        if order.freeze_odometry is not None:
-            self._is_odometry_frozen = order.freeze_odometry
         self._rig.obey(order)
 
     # --- the slots ----------------------------------------------------------------
@@ -163,31 +163,29 @@ class Ros2Base:
         asked = self._navigation.requested_twist(requested, command, now.mono)
         self._wishes.write(cdr.write(write_twist(asked)))
         self._rig.move(min(dt * SLOTS, LONGEST_STEP_S))
-        if not self._is_odometry_frozen:
+        if not self._rig.faults.freeze_odometry:
             self._tell_place(ros.Time.of(now.wall))
 
     def _read_commands(self, now: float) -> None:
-        waited = self._commands.take()
-        if not waited:
-            return
-        try:
-            twist = read_twist(cdr.read(ros.Twist, waited[-1]))
-        except UnreadableError as error:
-            _log.warning("%s: unusable command: %s", self.robot_id, error)
-            return
-        self._base.replace_command(twist, now)
+        twist = self._newest(self._commands, _read_twist)
+        if twist is not None:
+            self._base.replace_command(twist, now)
 
     def _read_goal(self) -> None:
         """Take the newest goal; one without a way is left, as Nav2 aborts it."""
-        waited = self._goals.take()
-        if not waited:
-            return
+        goal = self._newest(self._goals, partial(cdr.read, ros.PoseStamped))
+        if goal is not None:
+            place = goal.pose.position
+            self._rig.pursue(Goal("", "here", place.x, place.y), self._world)
+
+    def _newest(self, reader: Reader, read: Callable[[bytes], T]) -> T | None:
+        """The newest message of a topic; None for none, or one that is unusable."""
+        waited = reader.take()
         try:
-            place = cdr.read(ros.PoseStamped, waited[-1]).pose.position
+            return read(waited[-1]) if waited else None
         except UnreadableError as error:
-            _log.warning("%s: unusable goal: %s", self.robot_id, error)
-            return
-        self._rig.pursue(Goal("", "here", place.x, place.y), self._world)
+            _log.warning("%s: unusable message: %s", self.robot_id, error)
+            return None
 
     def _tell_place(self, stamp: ros.Time) -> None:
         measured = self._rig.odometry()
@@ -246,9 +244,13 @@ class Ros2Base:
         return ros.TFMessage((_link(stamp, self._frames.base_link, _LASER, laser),))
 
 
+def _read_twist(raw: bytes) -> Twist2D:
+    return read_twist(cdr.read(ros.Twist, raw))
+
+
 def _relative(outer: Pose2D, pose: Pose2D) -> Pose2D:
     """A pose of ``map`` in a frame whose pose in ``map`` is ``outer``."""
-    return Pose2D(*into(outer, pose.x, pose.y), pose.yaw - outer.yaw)
+    return Pose2D(*outer.inverse(pose.x, pose.y), pose.yaw - outer.yaw)
 
 
 def _turned(yaw: float) -> ros.Quaternion:

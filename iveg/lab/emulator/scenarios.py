@@ -104,7 +104,7 @@ class SimulatedPerson:
     def _slide(
         self, move_x: float, move_y: float, out_x: float, out_y: float
     ) -> tuple[float, float]:
-        """The same step sideways along the robot; head-on, to the robot's left."""
+        """Turn a step sideways along the robot; head-on, to the robot's left."""
         along = move_y * out_x - move_x * out_y
         way = math.hypot(move_x, move_y)
         turn = math.copysign(way, along) if abs(along) > 0.05 * way else way
@@ -214,7 +214,7 @@ def _bend(before: Floats, corner: Floats, after: Floats, radius: float) -> Float
 
 
 def _even(points: Floats, closed: bool) -> Floats:
-    """The same line with evenly spaced points."""
+    """Space the points of a line evenly."""
     line = np.concatenate((points, points[:1])) if closed else points
     steps = np.hypot(*np.diff(line, axis=0).T)
     along = np.concatenate(((0.0,), np.cumsum(steps)))

@@ -61,7 +61,7 @@ class EmulatedSensors:
     _sent_at: dict[str, float] = field(default_factory=dict)
 
     def due(self, now: float) -> Iterator[Observation]:
-        """What is to be sent ``now`` (s of the run)."""
+        """Readings to be sent ``now`` (s of the run)."""
         for kind in SENSED:
             every_s = kind.sensor.every_s if kind.sensor else 0.0
             if now - self._sent_at.get(kind.name, -every_s) >= every_s:
@@ -78,10 +78,7 @@ class RobotHardware:
 
     Attributes:
         command: Last command of the drive.
-        false_person: Fault: a position in ``map`` where the camera detects a person.
-        thing: Fault: one where it takes a thing for a person when it is in view.
-        hides_people: Fault: the camera detects no person.
-        is_stuck: Fault: navigation has given up.
+        faults: Faults in force; those of camera and navigation show here.
     """
 
     def __init__(
@@ -95,10 +92,7 @@ class RobotHardware:
         self.robot_id = robot_id
         self.profile = profile
         self.command = REST
-        self.false_person: tuple[float, float] | None = None
-        self.thing: tuple[float, float] | None = None
-        self.hides_people = False
-        self.is_stuck = False
+        self.faults = FaultOrder(robot=robot_id)
         self._rng = rng
         self._odometer = Odometer(rng)
         self._detector = EmulatedDetector(profile, detector, rng)
@@ -117,21 +111,12 @@ class RobotHardware:
         self._believed = self._odometer.measure(truth, twist, dt)
 
     def obey(self, order: FaultOrder) -> None:
-        """Set the faults of camera and navigation of an order."""
-        if order.stuck is not None:
-            self.is_stuck = order.stuck
-        if order.hide_people is not None:
-            self.hides_people = order.hide_people
-        if "false_person" in order.model_fields_set:
-            place = order.false_person
-            self.false_person = None if place is None else (place.x, place.y)
-        if "thing" in order.model_fields_set:
-            place = order.thing
-            self.thing = None if place is None else (place.x, place.y)
+        """Take the faults of an order."""
+        self.faults = self.faults.changed_by(order)
 
     def requested_twist(self, now: float, around: "SimulatedWorld") -> Twist2D:
         """Twist that navigation requests; ``now`` in seconds into the run."""
-        if self.is_stuck:
+        if self.faults.stuck:
             return REST
         discs = around.discs()
         for body in around.bodies_but(self.robot_id):
@@ -150,10 +135,13 @@ class RobotHardware:
 
     def scan(self, around: "SimulatedWorld") -> LaserScan:
         """One turn of the laser."""
-        sensor = self.vehicle.pose.compose(self.profile.laser)
-        others = around.bodies_but(self.robot_id)
         ranges = sweep(
-            sensor, _LASER, around.scenery, around.discs(), others, self._rng
+            self.vehicle.pose.compose(self.profile.laser),
+            _LASER,
+            around.scenery,
+            around.discs(),
+            around.bodies_but(self.robot_id),
+            self._rng,
         )
         return LaserScan(
             self.robot_id,
@@ -168,19 +156,17 @@ class RobotHardware:
 
     def detect(self, now: float, around: "SimulatedWorld") -> DetectionFrame:
         """One frame of camera and detector; empty when nothing is seen."""
-        pose = self.vehicle.pose
+        pose, faults = self.vehicle.pose, self.faults
         targets = around.targets_for(self.robot_id)
-        if self.hides_people:
+        if faults.hide_people:
             targets = [target for target in targets if target.class_id != PERSON]
-        if self.thing is not None:
-            targets = [*targets, thing_target(*self.thing)]
+        if faults.thing is not None:
+            targets.append(thing_target(faults.thing.x, faults.thing.y))
         found = self._detector.detect(now, pose, targets, around.scenery)
-        if self.false_person is not None:
-            x, y = self.false_person
-            ghost = upright_box(pose, PERSON, x, y, _FALSE_PERSON_CONFIDENCE)
-            found = (*found, ghost)
-        name = self._detector.name
-        return DetectionFrame(self.robot_id, Origin(), found, (), name)
+        if ghost := faults.false_person:
+            sure = _FALSE_PERSON_CONFIDENCE
+            found = (*found, upright_box(pose, PERSON, ghost.x, ghost.y, sure))
+        return DetectionFrame(self.robot_id, Origin(), found, (), self._detector.name)
 
     def part_seen(self, target: Target, around: "SimulatedWorld") -> float:
         """Visible share of a target from its camera, whatever the detector reports."""
@@ -259,7 +245,7 @@ class SimulatedWorld:
 
 @dataclass(frozen=True, slots=True)
 class Driving:
-    """How a robot may drive.
+    """Permission of a robot to drive.
 
     Attributes:
         wanted: Speed that its navigation asks for (m/s); 0 while it is held.
@@ -331,9 +317,9 @@ def true_picture(
     }
 
 
-def _place(of: Pose2D | Disc) -> dict[str, float]:
-    return {"x": round(of.x, 3), "y": round(of.y, 3)}
+def _place(point: Pose2D | Disc) -> dict[str, float]:
+    return {"x": round(point.x, 3), "y": round(point.y, 3)}
 
 
-def _pose(of: Pose2D) -> dict[str, float]:
-    return {**_place(of), "yaw": round(of.yaw, 4)}
+def _pose(pose: Pose2D) -> dict[str, float]:
+    return {**_place(pose), "yaw": round(pose.yaw, 4)}

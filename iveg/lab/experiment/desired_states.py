@@ -25,7 +25,7 @@ _RETAINED_WITHIN_S = 1.0
 async def read_free_robots(
     settings: Settings, robots: Collection[str]
 ) -> Mapping[str, bytes]:
-    """What is retained of these robots, of which no STOP of the site may hold one.
+    """Read what is retained of these robots; no STOP of the site may hold one.
 
     Returns:
         Desired state by robot, for those that have one.
@@ -72,7 +72,7 @@ async def give_back(
 async def _desired(
     client: aiomqtt.Client, robots: Collection[str]
 ) -> Mapping[str, bytes]:
-    """What is retained, by robot."""
+    """Retained desired states, by robot."""
     topics = {names.DESIRED_TOPIC.format(robot_id=one): one for one in robots}
     found: dict[str, bytes] = {}
     for topic in topics:

@@ -107,9 +107,9 @@ def hops_of(times: Iterable[MessageTimes]) -> dict[Data, dict[Segment, list[floa
 
 
 DESCRIPTION: Final = "iVeg experiment, times of messages"
-"""Of its subscriptions; iVeg's own begin otherwise, so that it leaves these alone."""
+"""Description of its subscriptions; iVeg leaves alone those that begin otherwise."""
 LAST_COPIES_S: Final = 2.0
-"""How long Orion's copies of the last messages are waited for (s)."""
+"""Wait for Orion's copies of the last messages (s)."""
 _SUBSCRIBED_WITHIN_S = 5.0
 _SETTLED_S, _SETTLES_WITHIN_S, _LOOK_EVERY_S = 0.5, 60.0, 0.5
 

@@ -27,7 +27,12 @@ from iveg.domain.latency import DATA, Place
 from iveg.domain.records import Json
 from iveg.lab.experiment.messages import HOPS, counts_of, hops_of
 from iveg.lab.experiment.plan import ExperimentPlan, PlannedRun, write_json
-from iveg.lab.experiment.protection import Protection, moments_of, protection_of, whole
+from iveg.lab.experiment.protection import (
+    Protection,
+    moments_of,
+    protection_of,
+    total_of,
+)
 from iveg.lab.experiment.scoring import score, tally, thinned
 from iveg.lab.experiment.stage import (
     TimedRecording,
@@ -153,7 +158,12 @@ def result_of(
         "plan": asdict(plan),
         "ended_early": why,
         "version": __version__,
-        "machine": machine(),
+        "machine": {
+            "system": platform.platform(),
+            "processor": platform.processor() or platform.machine(),
+            "cores": os.cpu_count(),
+            "python": platform.python_version(),
+        },
         "configuration": dict(chosen),
         "planned": sum(step.is_timed for step in plan.steps()),
         "completed": {"counted": _completed(counted), "timed": _completed(timed)},
@@ -165,16 +175,6 @@ def result_of(
         "stops": [stop for one in timed for stop in one["stops"]],
         "latency": [*_rows(timed)],
         "runs": list(outcomes),
-    }
-
-
-def machine() -> dict[str, object]:
-    """The machine that it ran on."""
-    return {
-        "system": platform.platform(),
-        "processor": platform.processor() or platform.machine(),
-        "cores": os.cpu_count(),
-        "python": platform.python_version(),
     }
 
 
@@ -191,7 +191,7 @@ def _protected(plan: ExperimentPlan, outcomes: Sequence[Outcome]) -> Json | None
     """All virtual runs with the experiment's own detector and the rule as it stands."""
     own = {"profile": plan.profile, "rule": "iveg"}
     runs = [one["counted"] for one in outcomes if own.items() <= one.items()]
-    return whole(one["protection"] for one in runs).row() if runs else None
+    return total_of(one["protection"] for one in runs).row() if runs else None
 
 
 def _protection(outcomes: Sequence[Outcome]) -> Iterator[dict[str, object]]:
@@ -202,7 +202,7 @@ def _protection(outcomes: Sequence[Outcome]) -> Iterator[dict[str, object]]:
         chosen = where, one["profile"], one["rule"]
         groups.setdefault(chosen, []).append(one["counted"]["protection"])
     for (where, profile, rule), runs in groups.items():
-        numbers = whole(runs).row()
+        numbers = total_of(runs).row()
         yield {"where": where, "profile": profile, "rule": rule, **numbers}
 
 
@@ -214,12 +214,12 @@ def scored(classes: Sequence[str], runs: Sequence[Outcome]) -> dict[str, object]
         for name in classes
         if name in one["classes"]
     ]
-    of = score(tallies)
+    total = score(tallies)
     sure = [one for each in tallies for one in each.found]
-    precision = thinned(of.tp, of.tp + of.fp, of.claims)
-    recall = thinned(of.tp, of.tp + of.fn, of.looks)
+    precision = thinned(total.tp, total.tp + total.fp, total.claims)
+    recall = thinned(total.tp, total.tp + total.fn, total.looks)
     return {
-        **asdict(of),
+        **asdict(total),
         "confidence": fmean(sure) if sure else None,
         "precision": None if precision is None else asdict(precision),
         "recall": None if recall is None else asdict(recall),

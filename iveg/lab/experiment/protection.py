@@ -6,7 +6,7 @@ or told does not count, except for when it told of an encounter.
 
 *Near* is within two metres of a robot that moves; an *encounter* is one robot near one
 person in view of some camera, without a pause of a second; its *delay* is the time
-from there until the robot is limited to half speed.  An *entry* is a ring that a robot
+from there until the robot is limited to half speed.  An *entry* is a zone that a robot
 reaches, or is reached by, around somebody who has been in view for two seconds, who has
 stepped into view since, which leaves nobody the time to slow before, or who is in no
 camera's view.
@@ -15,13 +15,14 @@ A person is in view where the newest picture of some robot has them, if it is no
 than a quarter of a second: robots take theirs at different times.
 """
 
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
-from math import dist
-from operator import itemgetter
+from math import dist, inf
+from operator import attrgetter, itemgetter
 from statistics import quantiles
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 from iveg.domain.feedback import HALF_SPEED
 from iveg.domain.records import Json
@@ -34,12 +35,12 @@ Known = Literal["in_view", "stepped_out", "unseen"]
 """In view for two seconds, for less, not at all."""
 KNOWN: Final[tuple[Known, ...]] = ("in_view", "stepped_out", "unseen")
 NEAR_M = 2.0
-"""The ring of the rule (m)."""
+"""The zone of the rule (m)."""
 AWAY_M = (2.3, 4.0)
-"""Slowed with nobody so near is needless: at the ring, and far away (m)."""
+"""Slowed with nobody so near is needless: at the zone, and far away (m)."""
 MOVES_M_S = 0.05
 SLOW_SHARE = 0.55
-"""Of the speed that a robot wants: half, and what noise adds."""
+"""Share of the speed that a robot wants: half, and what noise adds."""
 AHEAD_S = 1.5
 """So long before its entry an encounter should be told (s)."""
 ROUNDING_S = 1e-6
@@ -80,6 +81,11 @@ class NearMoment:
     factor: float
     people: tuple[NearPerson, ...]
 
+    @property
+    def is_slowed(self) -> bool:
+        """Whether it is limited to half speed or less."""
+        return self.factor <= HALF_SPEED
+
 
 @dataclass(frozen=True, slots=True)
 class Entry:
@@ -101,8 +107,12 @@ class Entry:
         return (self.foretold_s or 0.0) >= AHEAD_S - ROUNDING_S
 
 
-def _nothing() -> dict[str, float]:
-    return dict.fromkeys(SIGHTS, 0.0)
+def _metres(distance: float) -> str:
+    return f"{distance:g}"
+
+
+def _seconds() -> defaultdict[Any, float]:
+    return defaultdict(float)
 
 
 @dataclass(slots=True)
@@ -120,11 +130,9 @@ class Protection:
 
     driven_s: float = 0.0
     driven_m: float = 0.0
-    near_s: dict[str, float] = field(default_factory=_nothing)
-    slowed_s: dict[str, float] = field(default_factory=_nothing)
-    needless_s: dict[str, float] = field(
-        default_factory=lambda: {f"{away_m:g}": 0.0 for away_m in AWAY_M}
-    )
+    near_s: defaultdict[Sight, float] = field(default_factory=_seconds)
+    slowed_s: defaultdict[Sight, float] = field(default_factory=_seconds)
+    needless_s: defaultdict[str, float] = field(default_factory=_seconds)
     delays_s: list[float | None] = field(default_factory=list)
     entries: list[Entry] = field(default_factory=list)
 
@@ -143,8 +151,8 @@ class Protection:
             "delay_p50_s": _quantile(delays, 50),
             "delay_p95_s": _quantile(delays, 95),
             "needless": {
-                away_m: share(spent_s, self.driven_s)
-                for away_m, spent_s in self.needless_s.items()
+                away_m: share(self.needless_s[away_m], self.driven_s)
+                for away_m in map(_metres, AWAY_M)
             },
             "driven_m": round(self.driven_m, 1),
             "entries": {
@@ -164,27 +172,24 @@ def _entered(entries: list[Entry]) -> Json:
     }
 
 
-def whole(runs: Iterable[Protection]) -> Protection:
+def total_of(runs: Iterable[Protection]) -> Protection:
     """The sum of several runs."""
     total = Protection()
-    for one in runs:
-        total.driven_s += one.driven_s
-        total.driven_m += one.driven_m
-        for sums, more in (
-            (total.near_s, one.near_s),
-            (total.slowed_s, one.slowed_s),
-            (total.needless_s, one.needless_s),
-        ):
-            for key, spent_s in more.items():
+    for run in runs:
+        total.driven_s += run.driven_s
+        total.driven_m += run.driven_m
+        for name in ("near_s", "slowed_s", "needless_s"):
+            sums = getattr(total, name)
+            for key, spent_s in getattr(run, name).items():
                 sums[key] += spent_s
-        total.delays_s += one.delays_s
-        total.entries += one.entries
+        total.delays_s += run.delays_s
+        total.entries += run.entries
     return total
 
 
-def share(part: float, of: float) -> float | None:
+def share(part: float, whole: float) -> float | None:
     """A share to four digits; None of nothing."""
-    return None if of == 0.0 else round(part / of, 4)
+    return None if whole == 0.0 else round(part / whole, 4)
 
 
 def _quantile(values: list[float], percent: int) -> float | None:
@@ -194,9 +199,9 @@ def _quantile(values: list[float], percent: int) -> float | None:
 
 
 _STILL_S: Final = 0.25
-"""How long a picture, or a gap between two, counts (s)."""
+"""Time for which a picture, or a gap between two, counts (s)."""
 _SAME_M: Final = 1.0
-"""Who is farther from where iVeg has somebody is somebody else (m)."""
+"""Farthest that iVeg may have somebody from where they are (m)."""
 
 
 def moments_of(
@@ -242,7 +247,7 @@ def _people(row: Row, in_view: set[str], places: Sequence[Row]) -> Iterator[Near
 
 
 def person_at(people: Iterable[Row], x: float, y: float) -> str | None:
-    """Who really is at a place (m), by the truth's keys; None: nobody."""
+    """Person who really is at a place (m), by the truth's keys; None: nobody."""
     away = {one["key"]: dist((one["x"], one["y"]), (x, y)) for one in people}
     nearest = min(away, key=lambda key: away[key], default=None)
     return nearest if nearest is not None and away[nearest] <= _SAME_M else None
@@ -258,32 +263,40 @@ _GLIMPSE_S = 0.5
 
 def protection_of(moments: Iterable[NearMoment]) -> Protection:
     """The sums of one run, whose moments come in the order of time."""
-    score = _Score()
+    sums, pairs = Protection(), defaultdict[tuple[str, str], _Pair](_Pair)
     for moment in moments:
-        score.add(moment)
-    delays = [one.delay_s for one in score.encounters if one.counts]
-    score.sums.delays_s = [None if s is None else round(s, 3) for s in delays]
-    return score.sums
+        if moment.speed >= MOVES_M_S:
+            _add_driving(sums, moment)
+        for person in moment.people:
+            pair = pairs[moment.robot_id, person.name]
+            _note_entry(sums, pair, moment, person)
+            if moment.speed >= MOVES_M_S and person.distance_m <= NEAR_M:
+                _add_near(sums, pair, moment, person)
+    met = [encounter for pair in pairs.values() for encounter in pair.encounters]
+    for encounter in sorted(met, key=attrgetter("began")):
+        if encounter.delay_s is not None:
+            sums.delays_s.append(round(encounter.delay_s, 3))
+        elif encounter.last - encounter.began >= _GLIMPSE_S - ROUNDING_S:
+            sums.delays_s.append(None)
+    return sums
+
+
+def _add_driving(sums: Protection, moment: NearMoment) -> None:
+    sums.driven_s += moment.lasts_s
+    sums.driven_m += moment.speed * moment.lasts_s
+    nearest = min((person.distance_m for person in moment.people), default=inf)
+    for away_m in AWAY_M:
+        if moment.is_slowed and nearest > away_m:
+            sums.needless_s[_metres(away_m)] += moment.lasts_s
 
 
 @dataclass(slots=True)
 class _Encounter:
-    """One robot near one person in view, all in s."""
+    """One robot near one person in view (s); ``delay_s`` None: never limited."""
 
     began: float
     last: float
-    slowed_at: float | None = None
-
-    @property
-    def delay_s(self) -> float | None:
-        """From its begin until the robot was limited (s); None: never."""
-        return None if self.slowed_at is None else self.slowed_at - self.began
-
-    @property
-    def counts(self) -> bool:
-        """Whether it was more than a glimpse, or slowed the robot."""
-        lasted = self.last - self.began >= _GLIMPSE_S - ROUNDING_S
-        return lasted or self.slowed_at is not None
+    delay_s: float | None = None
 
 
 @dataclass(slots=True)
@@ -294,88 +307,53 @@ class _Pair:
         seen_since: Since when in view without a break (s); None: not in view.
         told_since: Since when iVeg tells of them, without a break of a second (s);
             ``told_at`` when it did last.
-        outside: Whether the ring lay between them.
+        is_outside: Whether the zone's edge lay between them.
     """
 
     seen_since: float | None = None
-    told_since: float | None = None
-    told_at: float = float("-inf")
-    outside: bool = False
-    encounter: _Encounter | None = None
-
-
-@dataclass(slots=True)
-class _Score:
-    """Counts moment by moment."""
-
-    sums: Protection = field(default_factory=Protection)
+    told_since: float = -inf
+    told_at: float = -inf
+    is_outside: bool = False
     encounters: list[_Encounter] = field(default_factory=list)
-    _pairs: dict[tuple[str, str], _Pair] = field(default_factory=dict)
-
-    def add(self, moment: NearMoment) -> None:
-        """Count one moment of one robot."""
-        for person in moment.people:
-            self.note_entry(moment, person)
-        if moment.speed < MOVES_M_S:
-            return
-        slowed = moment.factor <= HALF_SPEED
-        self.sums.driven_s += moment.lasts_s
-        self.sums.driven_m += moment.speed * moment.lasts_s
-        nearest = min((one.distance_m for one in moment.people), default=float("inf"))
-        for away_m in AWAY_M:
-            if slowed and nearest > away_m:
-                self.sums.needless_s[f"{away_m:g}"] += moment.lasts_s
-        for person in moment.people:
-            if person.distance_m <= NEAR_M:
-                self._add_near(moment, person, slowed=slowed)
-
-    def note_entry(self, moment: NearMoment, person: NearPerson) -> None:
-        """Count an entry, if this is one."""
-        pair = self._pairs.setdefault((moment.robot_id, person.name), _Pair())
-        if person.sight != "in_view":
-            pair.seen_since = None
-        elif pair.seen_since is None:
-            pair.seen_since = moment.at
-        outside = person.distance_m > NEAR_M
-        if pair.outside and not outside and moment.wanted > MOVES_M_S:
-            share_ = round(moment.speed / moment.wanted, 4)
-            known = _known(pair, moment.at)
-            self.sums.entries.append(Entry(share_, _told_s(pair, moment.at), known))
-        pair.outside = outside
-        if person.foretold:
-            if moment.at - pair.told_at > _PAUSE_S:
-                pair.told_since = moment.at
-            pair.told_at = moment.at
-
-    def _add_near(
-        self, moment: NearMoment, person: NearPerson, *, slowed: bool
-    ) -> None:
-        self.sums.near_s[person.sight] += moment.lasts_s
-        self.sums.slowed_s[person.sight] += moment.lasts_s * slowed
-        if person.sight != "in_view":
-            return
-        encounter = self._encounter(moment.robot_id, person.name, moment.at)
-        if slowed and encounter.slowed_at is None:
-            encounter.slowed_at = moment.at
-
-    def _encounter(self, robot_id: str, person: str, at: float) -> _Encounter:
-        pair = self._pairs[robot_id, person]
-        if pair.encounter is None or at - pair.encounter.last > _PAUSE_S:
-            pair.encounter = _Encounter(at, at)
-            self.encounters.append(pair.encounter)
-        pair.encounter.last = at
-        return pair.encounter
 
 
-def _known(pair: _Pair, at: float) -> Known:
-    if pair.seen_since is None:
-        return "unseen"
-    is_long = at - pair.seen_since >= _IN_VIEW_S - ROUNDING_S
-    return "in_view" if is_long else "stepped_out"
+def _add_near(
+    sums: Protection, pair: _Pair, moment: NearMoment, person: NearPerson
+) -> None:
+    """Count a person near a moving robot, and their encounter if in view."""
+    sums.near_s[person.sight] += moment.lasts_s
+    sums.slowed_s[person.sight] += moment.lasts_s * moment.is_slowed
+    if person.sight != "in_view":
+        return
+    if not pair.encounters or moment.at - pair.encounters[-1].last > _PAUSE_S:
+        pair.encounters.append(_Encounter(moment.at, moment.at))
+    encounter = pair.encounters[-1]
+    encounter.last = moment.at
+    if moment.is_slowed and encounter.delay_s is None:
+        encounter.delay_s = moment.at - encounter.began
 
 
-def _told_s(pair: _Pair, at: float) -> float | None:
-    """For how long iVeg has told of an encounter that is about to begin (s)."""
-    if pair.told_since is None or at - pair.told_at > _PAUSE_S:
-        return None
-    return round(at - pair.told_since, 3)
+def _note_entry(
+    sums: Protection, pair: _Pair, moment: NearMoment, person: NearPerson
+) -> None:
+    """Count a zone entry, if this is one."""
+    at = moment.at
+    if person.sight != "in_view":
+        pair.seen_since = None
+    elif pair.seen_since is None:
+        pair.seen_since = at
+    is_outside = person.distance_m > NEAR_M
+    if pair.is_outside and not is_outside and moment.wanted > MOVES_M_S:
+        known: Known = "unseen"
+        if pair.seen_since is not None:
+            is_long = at - pair.seen_since >= _IN_VIEW_S - ROUNDING_S
+            known = "in_view" if is_long else "stepped_out"
+        is_told = at - pair.told_at <= _PAUSE_S
+        foretold_s = round(at - pair.told_since, 3) if is_told else None
+        speed_share = round(moment.speed / moment.wanted, 4)
+        sums.entries.append(Entry(speed_share, foretold_s, known))
+    pair.is_outside = is_outside
+    if person.foretold:
+        if at - pair.told_at > _PAUSE_S:
+            pair.told_since = at
+        pair.told_at = at

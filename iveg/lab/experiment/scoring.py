@@ -29,19 +29,20 @@ class Interval:
     high: float
 
 
-def wilson(hits: float, of: float) -> Interval | None:
+def wilson(hits: float, count: float) -> Interval | None:
     """The Wilson score interval (Wilson 1927); None without data."""
-    if of <= 0:
+    if count <= 0:
         return None
-    share, z2 = hits / of, _Z * _Z
-    middle = (share + z2 / (2 * of)) / (1 + z2 / of)
-    half = _Z / (1 + z2 / of) * sqrt(share * (1 - share) / of + z2 / (4 * of * of))
+    share, z2 = hits / count, _Z * _Z
+    middle = (share + z2 / (2 * count)) / (1 + z2 / count)
+    spread = sqrt(share * (1 - share) / count + z2 / (4 * count * count))
+    half = _Z / (1 + z2 / count) * spread
     return Interval(share, max(0.0, middle - half), min(1.0, middle + half))
 
 
-def thinned(hits: int, of: int, worth: int) -> Interval | None:
-    """The same where ``of`` counts are worth only ``worth`` independent ones."""
-    return wilson(hits * worth / of, worth) if of and worth else None
+def thinned(hits: int, count: int, worth: int) -> Interval | None:
+    """The interval where ``count`` trials are worth only ``worth`` independent ones."""
+    return wilson(hits * worth / count, worth) if count and worth else None
 
 
 OVERLAP: Final = 0.5
@@ -100,7 +101,7 @@ class Score:
     claims: int = 0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Tally:
     """Counts of one class, from which scores of many runs can be added.
 
@@ -111,52 +112,35 @@ class Tally:
         looks, claims: As in ``Score``.
     """
 
-    found: tuple[float, ...] = ()
+    found: list[float] = field(default_factory=list)
     missed: int = 0
-    ghosts: tuple[float, ...] = ()
+    ghosts: list[float] = field(default_factory=list)
     looks: int = 0
     claims: int = 0
 
 
-@dataclass(slots=True)
-class _Count:
-    """A growing tally; looks are (robot, target or None, two-second interval)."""
-
-    found: list[float] = field(default_factory=list)
-    missed: int = 0
-    ghosts: list[float] = field(default_factory=list)
-    looks: set[tuple[str, str, int]] = field(default_factory=set)
-    claims: set[tuple[str, str, int]] = field(default_factory=set)
-
-    def tally(self) -> Tally:
-        return Tally(
-            tuple(self.found),
-            self.missed,
-            tuple(self.ghosts),
-            len(self.looks),
-            len(self.claims),
-        )
-
-
 def tally(pairs: Iterable[Pair]) -> dict[str, Tally]:
     """Count each class."""
-    counts: dict[str, _Count] = defaultdict(_Count)
+    counts: dict[str, Tally] = defaultdict(Tally)
+    looks: dict[str, set[object]] = defaultdict(set)
+    claims: dict[str, set[object]] = defaultdict(set)
     for real, reported in pairs:
-        robot_id, look = real.robot_id, int(real.at // _LOOK_S)
+        look = real.robot_id, int(real.at // _LOOK_S)
         matched, wrong = match(real.seen, reported.seen)
         for target in real.seen:
-            one, place = counts[target.class_id], (robot_id, target.key, look)
-            one.looks.add(place)
+            name = target.class_id
+            looks[name].add((target.key, look))
             if target.key in matched:
-                one.found.append(round(matched[target.key].confidence, 4))
-                one.claims.add(place)
+                counts[name].found.append(round(matched[target.key].confidence, 4))
+                claims[name].add((target.key, look))
             else:
-                one.missed += 1
+                counts[name].missed += 1
         for ghost in wrong:
-            one = counts[ghost.class_id]
-            one.ghosts.append(round(ghost.confidence, 4))
-            one.claims.add((robot_id, "", look))
-    return {name: counts[name].tally() for name in sorted(counts)}
+            counts[ghost.class_id].ghosts.append(round(ghost.confidence, 4))
+            claims[ghost.class_id].add(("", look))
+    for name, count in counts.items():
+        count.looks, count.claims = len(looks[name]), len(claims[name])
+    return dict(sorted(counts.items()))
 
 
 def match(
@@ -180,30 +164,32 @@ def match(
 
 
 def overlap(real: SeenObject, reported: SeenObject) -> float:
-    """Intersection over union of two squares of the target's size at these centres."""
+    """Intersection over union of two squares of the target's size at these centres.
+
+    They are compared in the robot's frame, where both are known in it.
+    """
     size = SIZE_M.get(real.class_id, _ROBOT_SIZE_M)
-    dx, dy = _between(real, reported)
-    shared = max(0.0, size - abs(dx)) * max(0.0, size - abs(dy))
+    a, b = (real.x, real.y), (reported.x, reported.y)
+    if real.local is not None and reported.local is not None:
+        a, b = real.local, reported.local
+    shared = max(0.0, size - abs(a[0] - b[0])) * max(0.0, size - abs(a[1] - b[1]))
     return shared / (2 * size * size - shared)
-
-
-def _between(real: SeenObject, reported: SeenObject) -> tuple[float, float]:
-    """From a target to a detection (m): in the robot's frame, where both are known."""
-    if real.local is None or reported.local is None:
-        return reported.x - real.x, reported.y - real.y
-    return reported.local[0] - real.local[0], reported.local[1] - real.local[1]
 
 
 def score(tallies: Iterable[Tally]) -> Score:
     """One class over all runs."""
-    all_of = list(tallies)
-    found = [one for each in all_of for one in each.found]
-    ghosts = [one for each in all_of for one in each.ghosts]
-    missed = sum(each.missed for each in all_of)
-    ap = average_precision(found, ghosts, len(found) + missed)
-    looks = sum(each.looks for each in all_of)
-    claims = sum(each.claims for each in all_of)
-    return Score(len(found), len(ghosts), missed, ap, looks, claims)
+    runs = list(tallies)
+    found = [confidence for run in runs for confidence in run.found]
+    ghosts = [confidence for run in runs for confidence in run.ghosts]
+    missed = sum(run.missed for run in runs)
+    return Score(
+        len(found),
+        len(ghosts),
+        missed,
+        average_precision(found, ghosts, len(found) + missed),
+        sum(run.looks for run in runs),
+        sum(run.claims for run in runs),
+    )
 
 
 def average_precision(

@@ -16,7 +16,6 @@ from iveg.domain.observations import FeedbackRef, Instant
 from iveg.domain.records import Json
 from iveg.domain.witness import Outline, Plan
 from iveg.lab.emulator.camera import DETECTORS
-from iveg.lab.emulator.greenhouse import into
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.orders import FaultOrder
 from iveg.lab.emulator.scenarios import Incident, scenario_named
@@ -80,43 +79,25 @@ class TimedRecording:
 def picture_of_truth(row: Row) -> Picture:
     """One true picture, in ``map`` and in the robot's frame."""
     pose = Pose2D(**row["pose"])
-    seen = tuple(
-        SeenObject(
-            one["key"],
-            one["class"],
-            one["x"],
-            one["y"],
-            local=into(pose, one["x"], one["y"]),
-        )
-        for one in row["visible"]
-    )
-    return Picture(row["robot"], row["at"], seen)
+    seen = []
+    for target in row["visible"]:
+        place = target["x"], target["y"]
+        local = pose.inverse(*place)
+        seen.append(SeenObject(target["key"], target["class"], *place, local=local))
+    return Picture(row["robot"], row["at"], tuple(seen))
 
 
 def picture_of(frame: Row, at: float) -> Picture:
     """One detection frame as iVeg told it, taken at this time (s)."""
-    return Picture(frame["robot_id"], at, _seen_in(frame["items"]))
-
-
-def _seen_in(items: Sequence[Row]) -> tuple[SeenObject, ...]:
-    return tuple(
-        SeenObject(
-            str(place),
-            one["class_id"],
-            one["position"]["x"],
-            one["position"]["y"],
-            one["probability"],
-            _centre(one["box"]),
-        )
-        for place, one in enumerate(items)
-    )
-
-
-def _centre(box: Row | None) -> tuple[float, float] | None:
-    """Centre of a box in the robot's frame; None where it was told in another."""
-    if box is None or box["frame_id"] != "base_link":
-        return None
-    return (box["xmin"] + box["xmax"]) / 2, (box["ymin"] + box["ymax"]) / 2
+    seen = []
+    for number, item in enumerate(frame["items"]):
+        box, centre = item["box"], None
+        if box is not None and box["frame_id"] == "base_link":
+            centre = (box["xmin"] + box["xmax"]) / 2, (box["ymin"] + box["ymax"]) / 2
+        place = item["position"]["x"], item["position"]["y"]
+        sure = item["probability"]
+        seen.append(SeenObject(str(number), item["class_id"], *place, sure, centre))
+    return Picture(frame["robot_id"], at, tuple(seen))
 
 
 STEP_S: Final = 0.05
@@ -153,7 +134,6 @@ class StagedRobot:
         is_witness: bool = True,
     ) -> None:
         texts = count(1)
-        self._faults = FaultOrder(robot=rig.robot_id)
         self._rig = rig
         self._hear = hear
         self._looked = looked
@@ -186,7 +166,7 @@ class StagedRobot:
         requested = self._rig.requested_twist(into_run, world) if free else REST
         self._wanted = abs(requested.linear_x)
         self._perform(self._machine.request_twist(requested, now.mono), now)
-        if self._faults.deaf and free:
+        if self._rig.faults.deaf and free:
             self._rig.drive(requested)
         self._rig.move(STEP_S)
         moved = self._rig.odometry()
@@ -208,7 +188,7 @@ class StagedRobot:
 
     def _dated(self, now: Instant) -> Instant:
         """Readings of its own clocks."""
-        return Instant(now.mono, now.wall + (self._faults.clock_offset_s or 0.0))
+        return Instant(now.mono, now.wall + (self._rig.faults.clock_offset_s or 0.0))
 
     def obey(self, order: FaultOrder) -> None:
         """Take faults of camera and navigation, ``mute``, ``deaf``, ``clock_offset_s``.
@@ -216,7 +196,6 @@ class StagedRobot:
         A mute robot's messages do not arrive; a deaf one ignores iVeg's speed limits,
         but not holds.
         """
-        self._faults = self._faults.changed_by(order)
         self._rig.obey(order)
 
     def listen(self, topic: str, payload: bytes, now: Instant) -> None:
@@ -237,7 +216,7 @@ class StagedRobot:
 
     @property
     def driving(self) -> Driving:
-        """How it may drive now."""
+        """Speed that it may drive now."""
         factor = self._machine.cap.factor if self._machine.may_drive else 0.0
         return Driving(self._wanted, factor)
 
@@ -255,7 +234,7 @@ class StagedRobot:
                     self._say(*message)
 
     def _say(self, topic: str, payload: bytes) -> None:
-        if not self._faults.mute:
+        if not self._rig.faults.mute:
             self._hear(topic, payload)
 
 

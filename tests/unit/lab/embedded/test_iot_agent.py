@@ -62,16 +62,6 @@ async def test_poison_is_survived_in_silence(
     assert not [one for one in caplog.records if one.levelno >= logging.WARNING]
 
 
-async def test_what_is_discarded_changes_nothing(
-    up: Running, orion: OrionClient
-) -> None:
-    for payload in (b"x", b'{"a":"<"}', b"[1]"):
-        up.agent.hear("/iveg/AGI/attrs", payload)
-    up.agent.hear("/AGI/mqtt_feedback", b"none of its business")
-    assert await orion.read_robots() == []
-    assert not await orion.has_attribute("AGI", "a")
-
-
 @pytest.mark.parametrize(
     ("part", "status"),
     [
@@ -116,13 +106,3 @@ async def test_a_device_is_of_the_tenant_of_the_request_whatever_it_says(
         await agent.create_device(device)
         (made,) = await agent.read_devices()
     assert (made["service"], made["service_path"]) == TENANT
-
-
-async def test_a_group_that_is_changed_wrongly_stays_as_it_was(up: Running) -> None:
-    group = {"apikey": "iveg", "resource": "/iot/json", "entity_type": "Robot"}
-    async with IotAgentClient(up.iota_url, *TENANT) as agent:
-        await agent.create_group(group)
-        with pytest.raises(HopError, match="400"):
-            await agent.change_group("iveg", {"entity_type": ["Robot"]})
-        (kept,) = await agent.read_groups()
-    assert kept["entity_type"] == "Robot"

@@ -47,16 +47,6 @@ async def test_a_filter_that_fits_hears(
     assert (await heard(robot)).payload == b"x"
 
 
-async def test_a_subscription_made_later_counts_at_once(
-    robot: aiomqtt.Client, other: aiomqtt.Client
-) -> None:
-    await robot.subscribe("a", qos=1)
-    await other.publish("b", b"before", qos=1)
-    await robot.subscribe("b", qos=1)
-    await other.publish("b", b"after", qos=1)
-    assert (await heard(robot)).payload == b"after"
-
-
 async def test_what_is_unsubscribed_is_not_heard_any_more(
     robot: aiomqtt.Client, other: aiomqtt.Client
 ) -> None:
@@ -84,23 +74,6 @@ async def test_a_retained_level_waits_for_whoever_comes_and_can_be_cleared(
     assert (await heard(robot)).payload == b"end"
 
 
-@pytest.mark.parametrize(
-    ("published", "subscribed", "heard_with"), [(0, 1, 0), (1, 0, 0), (1, 1, 1)]
-)
-async def test_a_retained_level_comes_with_the_lesser_quality(
-    robot: aiomqtt.Client,
-    other: aiomqtt.Client,
-    published: int,
-    subscribed: int,
-    heard_with: int,
-) -> None:
-    await other.publish("level", b"x", qos=published, retain=True)
-    await other.publish("after", b"y", qos=1)
-    await robot.subscribe("level", qos=subscribed)
-    message = await heard(robot)
-    assert (message.payload, message.qos) == (b"x", heard_with)
-
-
 async def test_a_neighbour_hears_and_publishes_without_a_connection(
     broker: MqttBroker, robot: aiomqtt.Client
 ) -> None:
@@ -126,16 +99,6 @@ async def test_a_neighbour_that_fails_hurts_no_client(
     assert (await heard(robot)).payload == b"x"
     (told,) = [one for one in caplog.records if one.levelno >= logging.WARNING]
     assert told.getMessage() == "a message on a could not be taken"
-
-
-async def test_messages_of_one_client_keep_their_order(
-    robot: aiomqtt.Client, other: aiomqtt.Client
-) -> None:
-    await robot.subscribe("n", qos=0)
-    sent = [b"%d" % number for number in range(300)]
-    for payload in sent:
-        await other.publish("n", payload, qos=0)
-    assert [(await heard(robot)).payload for _ in sent] == sent
 
 
 CONNACK = b"\x20\x02\x00\x00"
@@ -187,16 +150,6 @@ async def answered(reader: asyncio.StreamReader, count: int) -> bytes:
             return b""
 
 
-@pytest.mark.parametrize("size", [0, 1, 100, 200, 20_000, 2_100_000])
-async def test_a_message_of_any_size_arrives_as_it_went(
-    broker: MqttBroker, size: int
-) -> None:
-    heard = Heard(broker)
-    async with line(broker) as (_, writer):
-        writer.write(publish_packet("a/b", b"x" * size))
-        assert await heard.wait_for(1) == [("a/b", b"x" * size)]
-
-
 @pytest.mark.parametrize("step", [1, 2, 3, 7])
 async def test_packets_that_come_in_pieces_or_together_are_the_same(
     broker: MqttBroker, step: int
@@ -210,18 +163,6 @@ async def test_packets_that_come_in_pieces_or_together_are_the_same(
             await writer.drain()
         assert await heard.wait_for(len(sent)) == sent
         assert await answered(reader, 6) == 3 * PINGRESP
-
-
-async def test_a_packet_that_takes_longer_than_the_keep_alive_is_not_torn(
-    broker: MqttBroker,
-) -> None:
-    heard = Heard(broker)
-    packet = publish_packet("slow", b"payload")
-    async with line(broker, keep_alive_s=1) as (_, writer):
-        writer.write(packet[:5])
-        await asyncio.sleep(1.2)
-        writer.write(packet[5:] + publish_packet("next", b""))
-        assert await heard.wait_for(2) == [("slow", b"payload"), ("next", b"")]
 
 
 async def test_who_has_not_said_connect_publishes_nothing(broker: MqttBroker) -> None:
@@ -326,14 +267,6 @@ async def test_the_newest_client_of_an_identifier_stays(broker: MqttBroker) -> N
         assert await answered(second, 2) == PINGRESP
 
 
-async def test_another_version_of_mqtt_is_refused_in_words(broker: MqttBroker) -> None:
-    reader, writer = await asyncio.open_connection("127.0.0.1", broker.port)
-    writer.write(b"\x10\x0d\x00\x04MQTT\x05\x02\x00\x00\x00\x00\x00")
-    assert await answered(reader, 4) == b"\x20\x02\x00\x01"
-    writer.close()
-    await writer.wait_closed()
-
-
 async def test_a_measure_that_is_to_be_confirmed_is_heard_and_confirmed(
     broker: MqttBroker,
 ) -> None:
@@ -342,17 +275,3 @@ async def test_a_measure_that_is_to_be_confirmed_is_heard_and_confirmed(
         writer.write(b"\x32\x08\x00\x01a\x01\x02xyz")
         assert await answered(reader, 4) == b"\x40\x02\x01\x02"
         assert heard.messages == [("a", b"xyz")]
-
-
-async def test_what_follows_connect_at_once_counts_after_the_welcome(
-    broker: MqttBroker,
-) -> None:
-    heard = Heard(broker)
-    reader, writer = await asyncio.open_connection("127.0.0.1", broker.port)
-    hello = b"\x10\x0e\x00\x04MQTT\x04\x02\x00\x00\x00\x02me"
-    writer.write(hello + b"\x32\x06\x00\x01a\x00\x01x" + PINGREQ)
-    welcome = CONNACK + b"\x40\x02\x00\x01" + PINGRESP
-    assert await answered(reader, len(welcome)) == welcome
-    assert heard.messages == [("a", b"x")]
-    writer.close()
-    await writer.wait_closed()

@@ -31,12 +31,6 @@ async def test_an_address_that_others_can_reach_is_refused(
             pass
 
 
-@pytest.mark.parametrize("host", ["localhost", "127.0.0.2"])
-async def test_every_name_of_loopback_will_do(host: str) -> None:
-    async with embedded_fiware((host, 0), (host, 0), (host, 0)) as up:
-        assert up.orion_port > 0
-
-
 @pytest.mark.parametrize("taken", [0, 1, 2])
 async def test_a_taken_port_is_an_os_error_and_leaves_nothing(
     taken: int, caplog: pytest.LogCaptureFixture
@@ -101,20 +95,6 @@ async def test_closing_under_clients_leaves_no_task_and_no_warning(
     assert not [one for one in caplog.records if one.levelno >= logging.WARNING]
 
 
-async def test_a_client_that_vanishes_hurts_nobody() -> None:
-    async with embedded_fiware() as up:
-        _, writer = await asyncio.open_connection("127.0.0.1", up.mqtt_port)
-        writer.write(b"\x10\x10\x00\x04MQTT\x04\x02\x00\x00\x00\x04gone")
-        await writer.drain()
-        writer.transport.abort()
-        async with aiomqtt.Client("127.0.0.1", up.mqtt_port) as mqtt:
-            await mqtt.subscribe("x", qos=1)
-            await mqtt.publish("x", b"still here", qos=1)
-            async with asyncio.timeout(30):
-                message = await anext(aiter(mqtt.messages))
-    assert message.payload == b"still here"
-
-
 async def ended(reader: asyncio.StreamReader) -> bytes:
     """What a connection says until the server closes it."""
     async with asyncio.timeout(10):
@@ -136,19 +116,6 @@ async def test_an_endless_head_is_refused(head: bytes) -> None:
         said = await ended(reader)
         writer.close()
     assert said.startswith(b"HTTP/1.1 4") or not said
-
-
-@pytest.mark.parametrize(
-    "packet",
-    [b"\x10\xff\xff\x7f\x00\x04MQTT", b"\x30\xff\xff\xff\x7f\x00\x01x"],
-    ids=["connect", "publish"],
-)
-async def test_a_client_that_announces_megabytes_first_is_ended(packet: bytes) -> None:
-    async with embedded_fiware() as up:
-        reader, writer = await asyncio.open_connection("127.0.0.1", up.mqtt_port)
-        writer.write(packet)
-        assert await ended(reader) == b""
-        writer.close()
 
 
 async def test_an_admitted_client_that_announces_megabytes_is_ended() -> None:

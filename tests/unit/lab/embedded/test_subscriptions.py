@@ -13,14 +13,12 @@ from iveg.lab.embedded.entities import Attribute, Entity
 from iveg.lab.embedded.subscriptions import (
     CLOSED,
     MOST_WAITING,
-    REFUSED,
     TIMED_OUT,
     Lane,
     Outbox,
     Subscription,
 )
 from tests.patience import PATIENCE_S
-from tests.ports import free_ports
 
 OK = b"HTTP/1.1 204 No Content\r\n\r\n"
 Talk = Callable[[asyncio.StreamReader, asyncio.StreamWriter, int], Awaitable[None]]
@@ -161,16 +159,6 @@ async def test_a_failure_is_told_and_the_next_one_goes_on(
     assert first == reason
     # A busy machine may take longer than 50 ms for one more.
     assert timeout_ms == 50 or others == [""] * 2
-
-
-async def test_a_receiver_that_is_away_is_refused_at_once() -> None:
-    (port,) = free_ports(1)
-    to = Subscribed(port)
-    lane = Lane(to)
-    lane.send(b"0")
-    lane.send(b"1")
-    assert await to.failures(2) == [REFUSED] * 2
-    lane.close()
 
 
 async def test_a_connection_that_was_idle_for_long_is_not_used_again(

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.greenhouse import Greenhouse, PlacedObstacle, StructuralPost
 from iveg.lab.emulator.greenhouse import Body, Disc, LaserModel, Scenery, sweep
-from tests.touching import touches
 
 GREENHOUSE = Greenhouse(
     "shed",
@@ -26,20 +25,6 @@ SCENERY = Scenery.of(GREENHOUSE)
 
 def robot(x: float, y: float, yaw: float = 0.0, robot_id: str = "AGI") -> Body:
     return Body(robot_id, Pose2D(x, y, yaw), length=1.0, width=0.6)
-
-
-@pytest.mark.parametrize(
-    "body",
-    [
-        robot(3.6, 4.0),
-        robot(8.5, 2.2),
-        robot(7.0, 7.3),
-        robot(0.4, 5.0),
-        robot(3.45, 4.0, math.radians(45)),
-    ],
-)
-def test_a_robot_in_crop_crates_post_or_wall_touches(body: Body) -> None:
-    assert touches(SCENERY, body)
 
 
 def test_crop_and_crates_hide_what_is_behind_them() -> None:
@@ -77,19 +62,6 @@ def test_the_walls_of_a_room_stand_where_they_stand() -> None:
     assert ranges[towards(-math.pi)] == pytest.approx(12.0)
     assert ranges[towards(-math.pi / 2)] == pytest.approx(6.0)
     assert ranges[towards(math.pi / 4)] == pytest.approx(4.0 * math.sqrt(2), abs=6e-4)
-
-
-def test_a_row_of_crop_is_nearer_than_the_wall_behind_it() -> None:
-    row = Rectangle(4.0, -2.0, 5.0, 2.0)
-    greenhouse = Greenhouse("room", ROOM.bounds, rows=(row,))
-
-    ranges = swept(Pose2D(0.0, 0.0, 0.0), greenhouse)
-
-    assert ranges[towards(0.0)] == pytest.approx(4.0)
-    assert ranges[towards(math.radians(26.0))] == pytest.approx(
-        4.0 / math.cos(math.radians(26.0)), abs=6e-4
-    )
-    assert ranges[towards(math.radians(40.0))] > 5.0
 
 
 @given(

@@ -29,9 +29,6 @@ from tests.fakes.ros2_network import FakeNetwork
 AHEAD = Twist2D(0.5, 0.1)
 
 
-# --- the base -----------------------------------------------------------------------
-
-
 def test_a_base_does_what_it_was_told_last_for_half_a_second() -> None:
     base = DriveWatchdog()
     before = base.command(0.0)
@@ -39,12 +36,6 @@ def test_a_base_does_what_it_was_told_last_for_half_a_second() -> None:
 
     assert (before, base.command(10.0 + TIMEOUT_S)) == (REST, AHEAD)
     assert base.command(10.0 + TIMEOUT_S + 0.001) == REST
-
-
-# --- navigation ---------------------------------------------------------------------
-
-
-# --- topics -------------------------------------------------------------------------
 
 
 class Emulated:

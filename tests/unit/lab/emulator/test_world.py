@@ -7,7 +7,7 @@ import pytest
 
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.domain.errors import DataFileError
-from iveg.domain.geometry import PERSON_RADIUS_M, Twist2D
+from iveg.domain.geometry import PERSON_RADIUS_M
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.kinds import SENSED
 from iveg.lab.emulator.camera import DETECTORS, PERSON, Counts, DetectorModel
@@ -85,7 +85,6 @@ def nearest_person(world: SimulatedWorld, robot_id: str) -> float:
 
 
 @pytest.mark.slow
-@pytest.mark.slow
 @pytest.mark.parametrize("scenario", sorted(SCENARIOS))
 def test_robots_drive_without_touching_anything_or_anybody(scenario: str) -> None:
     greenhouse = load_greenhouse(scenario_named(scenario).greenhouse)
@@ -100,7 +99,6 @@ def test_robots_drive_without_touching_anything_or_anybody(scenario: str) -> Non
             assert min(gaps) > PERSON_RADIUS_M
 
 
-@pytest.mark.slow
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("robots", "greenhouse"),
@@ -146,16 +144,6 @@ def test_the_same_seed_gives_the_same_run() -> None:
     for robot_id in FLEET:
         assert one.rigs[robot_id].odometry() == other.rigs[robot_id].odometry()
     assert one.discs() == other.discs()
-
-
-def test_a_robot_that_is_not_commanded_stands() -> None:
-    world = world_of("demo")
-    rig = world.rigs["AGI"]
-
-    rig.drive(Twist2D(0.0, 0.0))
-    rig.move(0.5)
-
-    assert rig.odometry().twist == Twist2D(0.0, 0.0)
 
 
 def test_a_greenhouse_without_room_for_the_fleet_is_refused() -> None:

@@ -46,14 +46,6 @@ def test_a_person_in_the_ring_of_a_robot_at_half_speed_is_protected() -> None:
     assert score.row()["never_slowed"] == 0
 
 
-def test_a_robot_at_full_speed_protects_nobody() -> None:
-    score = score_of(moment(0), moment(1), moment(2))
-
-    assert score.row()["slowed"]["in_view"] == 0.0
-    assert score.delays_s == [None]
-    assert score.row()["never_slowed"] == 1
-
-
 def test_the_delay_is_from_the_ring_and_the_view_to_the_limit() -> None:
     score = score_of(
         moment(0, 3.0),
@@ -64,7 +56,7 @@ def test_the_delay_is_from_the_ring_and_the_view_to_the_limit() -> None:
     )
 
     assert score.delays_s == [1.0]
-    assert score.near_s == {"in_view": 1.5, "behind_plants": 0.0, "unseen": 0.5}
+    assert score.near_s == {"in_view": 1.5, "unseen": 0.5}
 
 
 @pytest.mark.parametrize("sight", ["behind_plants", "unseen"])
