@@ -28,20 +28,18 @@ import orjson
 from iveg.adapters import clock
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
-from iveg.comfort.mapping import Mapper
-from iveg.domain.detection_rule import DetectionRule
+from iveg.comfort.maps import SCAN_TICK_S, Mapper, ScanReader
 from iveg.domain.feedback import Feedback
 from iveg.domain.observations import Instant, Received
 from iveg.domain.peer_scan import PeerScan
 from iveg.domain.records import Record
-from iveg.domain.tracking.people import People
-from iveg.domain.world import World
 from iveg.ngsi import codec
+from iveg.pipeline import Choices, build
 from iveg.vital.evaluate import Evaluator
-from iveg.vital.event_log import EventLog
-from iveg.vital.publish import Hub
+from iveg.vital.ports import Ports
 from iveg.vital.record import RecordSink
-from iveg.vital.supervision import Supervision
+from tests.fakes.journal import FakeJournal
+from tests.fakes.kept import FakeChoices
 
 BEAMS = 720
 ODOMETRY_HZ, SCAN_HZ, LOOK_HZ, SAFETY_HZ = 20, 10, 10, 2
@@ -111,18 +109,25 @@ def assessor_of(
     robots: tuple[str, ...], fleet: Telling, sink: RecordSink | None = None
 ) -> Evaluator:
     """The rule with everything round it but the network and the disk."""
-    numbers = itertools.count()
-    start, greenhouse = Instant(0.0, WALL), load_greenhouse("agroconnect")
-    return Evaluator(
-        World(load_fleet(words=robots)),
-        greenhouse,
-        People(greenhouse),
-        DetectionRule(),
+    numbers, start = itertools.count(), Instant(0.0, WALL)
+    ports = Ports(
         fleet,
-        EventLog(Hub(), sink or Sink(), start, Supervision(lambda: start)),
+        {},
+        FakeJournal(),
+        sink or Sink(),
+        lambda: start,
         lambda: f"{next(numbers):026d}",
-        "bench",
+        lambda: "ok",
     )
+    greenhouse, choices = load_greenhouse("agroconnect"), Choices(FakeChoices().kept)
+    return build(load_fleet(words=robots), greenhouse, ports, choices).evaluator
+
+
+async def draw(mapper: Mapper) -> None:
+    """Draw scans as iVeg does, until cancelled."""
+    while True:
+        mapper.tick(clock.now())
+        await asyncio.sleep(SCAN_TICK_S)
 
 
 def record(robots: tuple[str, ...], seconds: float) -> list[Recorded]:
@@ -239,8 +244,9 @@ async def latency(robots: int, seconds: float) -> list[float]:
     names = tuple(f"R{number}" for number in range(robots))
     fleet = Telling()
     evaluator = assessor_of(names, fleet)
-    mapper = Mapper(evaluator.world, evaluator.greenhouse.bounds)
-    drawing = asyncio.create_task(mapper.run(clock.now))
+    reader = ScanReader(lambda *_: None)
+    mapper = Mapper(evaluator.world, evaluator.greenhouse.bounds, reader)
+    drawing = asyncio.create_task(draw(mapper))
     recorded, took = record(names, seconds), []
     start = time.perf_counter()
     ticked = float("-inf")

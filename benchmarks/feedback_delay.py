@@ -21,20 +21,21 @@ from dataclasses import dataclass
 import numpy as np
 import orjson
 
-from benchmarks.decision_cost import Sink, Telling
+from benchmarks.decision_cost import Sink, Telling, draw
 from benchmarks.process import machine, percentile, print_table
 from iveg.adapters import clock
 from iveg.adapters.clock import new_id
 from iveg.adapters.direct import DirectReader
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
-from iveg.comfort.mapping import Mapper
 from iveg.domain.feedback import Feedback
 from iveg.domain.observations import Received
 from iveg.domain.transports import DIRECT, FIWARE
 from iveg.ngsi import codec, names
-from iveg.pipeline import Choices, Pipeline, Ports, build
+from iveg.pipeline import Choices, Pipeline, build
+from iveg.vital.ports import Ports
 from tests.fakes.journal import FakeJournal
+from tests.fakes.kept import FakeChoices
 
 RATE_HZ = 30
 PLACE_S, SHOWN_AFTER_S = 2.0, 1.3
@@ -148,12 +149,12 @@ async def delays(robots: int, seconds: float, *, direct: bool) -> list[float]:
         Sink(),
         clock.now,
         new_id,
+        lambda: "ok",
     )
-    parts = build(fleet, greenhouse, ports, Choices())
-    mapper = Mapper(parts.world, greenhouse.bounds)
+    parts = build(fleet, greenhouse, ports, Choices(FakeChoices().kept))
     living = [
         asyncio.create_task(parts.loop.run()),
-        asyncio.create_task(mapper.run(clock.now)),
+        asyncio.create_task(draw(parts.mapper)),
     ]
     came = await (_directly if direct else _through_orion)(parts, told)
     await asyncio.sleep(1.0)
@@ -185,7 +186,7 @@ def _notify(parts: Pipeline, body: bytes) -> None:
 
 async def _directly(parts: Pipeline, told: list[Message]) -> dict[Spot, float]:
     """The same, by both ways."""
-    robots = list(parts.world.robots)
+    robots = list(parts.core.world.robots)
     reader = DirectReader(
         "bench",
         robots,

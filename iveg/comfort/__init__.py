@@ -1,1 +1,1 @@
-"""Parts that people like to have: each may fail by itself, and nothing vital notices."""
+"""Parts that people like to have: each may fail, and nothing vital notices."""

@@ -19,10 +19,8 @@ from iveg.domain.records import (
     LogRecord,
 )
 from iveg.vital.command import Commander
+from iveg.vital.core import Core
 from iveg.vital.evaluate import Evaluator
-from iveg.vital.event_log import EventLog
-from iveg.vital.health_monitor import HealthMonitor
-from iveg.vital.ports import Clock
 
 LINES = 200
 """Lines of the log that come back."""
@@ -50,12 +48,10 @@ class History(Protocol):
 
 async def remember(
     history: History,
+    core: Core,
     commander: Commander,
     goals: GoalDispatcher,
     evaluator: Evaluator,
-    event_log: EventLog,
-    health_monitor: HealthMonitor,
-    read_clock: Clock,
 ) -> None:
     """Ask until the history answers; returns when all of it is taken up."""
     while True:
@@ -68,11 +64,11 @@ async def remember(
         except HopError:
             await asyncio.sleep(_AGAIN_S)
             continue
-        now = read_clock()
+        now = core.ports.clock()
         commander.close_earlier(left_open, now)
         goals.close_earlier(left_open, now)
         evaluator.close_earlier(decisions, alerted, now)
         evaluator.alerts.remember(read_alert(one, now) for one in unseen)
-        event_log.recall(lines)
-        health_monitor.earlier_read = True
+        core.event_log.recall(lines)
+        core.health_monitor.earlier_read = True
         return

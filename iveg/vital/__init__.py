@@ -1,1 +1,1 @@
-"""What a speed limit or a STOP needs: observations enter, feedback, orders and alerts leave."""
+"""Speed limits and STOP: observations enter; feedback, orders and alerts leave."""

@@ -1,27 +1,21 @@
 """Alerts: raised, cleared, acknowledged, logged."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable
 
 from iveg.domain.alerts import AlertBook, BookedAlert
 from iveg.domain.events import Condition, LogEvent, Slot
 from iveg.domain.observations import Instant
 from iveg.vital import topics
-from iveg.vital.event_log import EventLog
-from iveg.vital.log_messages import alert_line
-from iveg.vital.ports import Ids
+from iveg.vital.core import Core
+from iveg.vital.evidence import alert_line
 
 
 class Alerting:
-    """Raises, clears and acknowledges alerts, and records each step.
+    """Raises, clears and acknowledges alerts, and records each step."""
 
-    Attributes:
-        on_raised: Given every alert that is raised; must neither wait nor fail.
-    """
-
-    def __init__(self, event_log: EventLog, new_id: Ids) -> None:
-        self.on_raised: Callable[[Sequence[BookedAlert]], None] = lambda _: None
-        self._event_log = event_log
-        self._new_id = new_id
+    def __init__(self, core: Core) -> None:
+        self._event_log, self._new_id = core.event_log, core.ports.new_id
+        self._tell = core.supervision.tell
         self._book = AlertBook()
 
     @property
@@ -49,7 +43,7 @@ class Alerting:
                 self._event_log.changed(topics.ROBOT.of(alert.condition.robot_id))
         raised = [one for one in changed if one.cleared is None]
         if raised:
-            self.on_raised(raised)
+            self._tell("raised", raised)
 
     def acknowledge(
         self, alert_id: str, by: str, note: str, now: Instant

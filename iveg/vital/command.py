@@ -6,8 +6,8 @@ stands between the two and informs people, disk and browsers of each step.
 
 import asyncio
 import logging
-from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections import Counter, OrderedDict
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Literal
 
 from iveg.domain.errors import UnknownRobotError
@@ -35,16 +35,16 @@ from iveg.domain.stop import (
     StopMachine,
 )
 from iveg.domain.stop import machine as stop_conditions
-from iveg.domain.transports import Transport
 from iveg.vital import topics
-from iveg.vital.event_log import EventLog
-from iveg.vital.ports import Clock, CommandPort, FleetPort, Ids, StopJournal
-from iveg.vital.presses import Presses
-from iveg.vital.sending import IsCut, OrderSender
+from iveg.vital.core import Core
+from iveg.vital.sending import OrderSender
 
 _log = logging.getLogger(__name__)
 _KEPT = 200
 _PLAIN = Press()
+REMEMBERED_S = 60.0
+"""Time that a press is known by its id (s)."""
+_MOST_PRESSES = 4096
 
 _JOURNALLED: Mapping[str, Literal["stopped", "run"]] = {
     "ready": "run",
@@ -56,50 +56,61 @@ _JOURNALLED: Mapping[str, Literal["stopped", "run"]] = {
 """Changes of what is wanted that no person's call has written down already."""
 
 
+class Presses:
+    """The command of each press, for a while: one press is one STOP.
+
+    A page sends a press over HTTP and over its WebSocket and repeats it until it is
+    taken.  One that comes back later counts as a new press, because a STOP too many is
+    better than one too few.
+    """
+
+    def __init__(self) -> None:
+        self._known: OrderedDict[tuple[str, str, str], tuple[float, str]] = (
+            OrderedDict()
+        )
+
+    def find(self, by: str, press: Press, robot_id: str, at: Instant) -> str | None:
+        """The command that this press has begun; None for a new press."""
+        if press.press_id is None:
+            return None
+        since, command_id = self._known.get(
+            (by, press.press_id, robot_id), (float("-inf"), "")
+        )
+        return command_id if at.mono - since <= REMEMBERED_S else None
+
+    def note(
+        self, by: str, press: Press, robot_id: str, command_id: str, at: Instant
+    ) -> None:
+        """Remember the command of this press."""
+        if press.press_id is None:
+            return
+        self._known[by, press.press_id, robot_id] = at.mono, command_id
+        while len(self._known) > _MOST_PRESSES:
+            self._known.popitem(last=False)
+
+
 class Commander:
     """Keeps one STOP machine for each robot and carries out its effects.
 
-    Args:
-        robots: The fleet.
-        ports: The transports that carry orders, each with its way out.
-        fleet: Keeps the desired state of each robot.
-        journal: Outlives a crash.
-        event_log: Tells people and the history.
-        new_id: Makes ULIDs.
-        clock: Reads both clocks.
-        agent_lag_s: How far the IoT Agent is behind (s); None where nobody knows.
-        is_cut: Whether what lies behind a transport is known to pass nothing on.
+    Attributes:
+        machines: By robot.
+        commands: The newest commands, by id, as they stand.
     """
 
-    def __init__(
-        self,
-        robots: Iterable[str],
-        ports: Mapping[Transport, CommandPort],
-        fleet: FleetPort,
-        journal: StopJournal,
-        event_log: EventLog,
-        new_id: Ids,
-        clock: Clock,
-        *,
-        agent_lag_s: Callable[[Instant], float | None],
-        is_cut: IsCut,
-    ) -> None:
+    def __init__(self, core: Core) -> None:
         self.machines: Mapping[str, StopMachine] = {
-            robot_id: StopMachine(robot_id, ports) for robot_id in robots
+            robot_id: StopMachine(robot_id, core.ports.transports)
+            for robot_id in core.world.robots
         }
         self.commands: dict[str, FollowedCommand] = {}
         self.counters: Counter[str] = Counter()
         self._mistakes: dict[str, OffTable] = {}
         """Robots whose machine once had no step: shown until iVeg starts again."""
         self._presses = Presses()
-        by_id = {transport.id: port for transport, port in ports.items()}
-        self._sender = OrderSender(
-            by_id, fleet, journal, event_log, clock, self._came_back, is_cut
-        )
-        self._agent_lag_s = agent_lag_s
-        self._journal = journal
-        self._event_log = event_log
-        self._new_id = new_id
+        self._sender = OrderSender(core, self._came_back)
+        self._agent_lag_s = core.health_monitor.probe.lag
+        self._journal, self._event_log = core.ports.journal, core.event_log
+        self._new_id = core.ports.new_id
 
     def machine(self, robot_id: str) -> StopMachine:
         """One robot's machine.

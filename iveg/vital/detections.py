@@ -4,27 +4,23 @@ A sighting is logged at its start, so that a person who stands before a camera f
 hour does not fill the log.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.detector import flaw_of
 from iveg.domain.events import LogEvent, Slot
-from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import DetectionFrame, Instant, Received, SafetyReport
 from iveg.domain.robot_state import RobotState
 from iveg.domain.stream_order import OrderVerdict
 from iveg.domain.tracking.blind import BlindCameras
-from iveg.domain.tracking.people import People, Placed
+from iveg.domain.tracking.people import Placed
 from iveg.domain.tracking.person import TrackedPerson
 from iveg.domain.tracking.sight import Look, OwnSight
 from iveg.domain.words import HeardWords, meaning_of, name_numbers, plain
-from iveg.domain.world import World
 from iveg.vital import topics
-from iveg.vital.event_log import EventLog
-from iveg.vital.kept_detections import KeptDetections
-from iveg.vital.newest_detections import NewestDetections
-from iveg.vital.ports import Ids
+from iveg.vital.core import Core
+from iveg.vital.kept_detections import KeptDetections, NewestDetections
 
 _LOGGED_S = 2.0
 _MAX_SUBJECTS = 1000
@@ -43,33 +39,21 @@ class DetectionTracking:
     Attributes:
         placed: What each robot's newest look found, faint ones included.
         other: When the newest confident object of another class came, by robot.
-        taken: Comfort, called with each frame that is judged, its source moment, and
-            when it came.
-        witnessed: The same with each report of an obstacle.
         kept: Chooses the detections that become rows.
         newest: Each detection of the last moments.
     """
 
-    def __init__(
-        self,
-        world: World,
-        people: People,
-        greenhouse: Greenhouse,
-        event_log: EventLog,
-        new_id: Ids,
-    ) -> None:
+    def __init__(self, core: Core) -> None:
         self.placed: dict[str, list[Placed]] = {}
         self.other: dict[str, Instant] = {}
-        self.taken: Callable[[DetectionFrame, Instant, Instant], None] = lambda *_: None
-        self.witnessed: Callable[[SafetyReport, Instant], None] = lambda *_: None
-        self.kept = KeptDetections(event_log)
+        self.kept = KeptDetections(core.event_log)
         self.newest = NewestDetections()
-        self._world = world
-        self._people = people
-        self._greenhouse = greenhouse
-        self._own_sight, self._blind = OwnSight(greenhouse), BlindCameras(greenhouse)
-        self._event_log = event_log
-        self._new_id = new_id
+        self._world, self._people = core.world, core.people
+        self._greenhouse = core.greenhouse
+        self._own_sight = OwnSight(core.greenhouse)
+        self._blind = BlindCameras(core.greenhouse)
+        self._event_log, self._new_id = core.event_log, core.ports.new_id
+        self._tell = core.supervision.tell
         self._logged_at: dict[tuple[str, str], float] = {}
         self._unknown_frames: dict[str, set[str]] = {}
 
@@ -126,7 +110,7 @@ class DetectionTracking:
         elif verdict == "new":
             detector.note_whole(robot.detections_at)
         self._compare(robot, frame, placed, received.at)
-        self.taken(frame, seen_at, received.at)
+        self._tell("frame_taken", frame, seen_at, received.at)
         if verdict == "new":
             self.placed[robot_id] = placed
             self._event_log.changed(topics.DETECTIONS.of(robot_id))
@@ -223,7 +207,7 @@ class DetectionTracking:
         if report.obstacle is None or self._world.robot(report.robot_id).is_replay:
             return False
         one = self._people.witness(report, at, self._new_id())
-        self.witnessed(report, at)
+        self._tell("obstacle_reported", report, at)
         if one is not None:
             self._event_log.changed(topics.PEOPLE.name)
             if one.first_seen == at:

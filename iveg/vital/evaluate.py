@@ -6,14 +6,13 @@ heartbeat to the fleet is sent from here and nowhere else, so that a loop that h
 falls silent and slows the robots.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 
 from iveg.domain import alerts
 from iveg.domain.decisions import Decisions, SlowdownDecision
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.events import Condition, LogEvent, Slot
 from iveg.domain.feedback import UNSUPERVISED, SpeedLimit
-from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.kinds import kind
 from iveg.domain.limits import LIMITS
 from iveg.domain.low_values import LowValues
@@ -33,15 +32,12 @@ from iveg.domain.rule.foresight import Encounter
 from iveg.domain.rule.judge import SpeedLimits
 from iveg.domain.rule.zones import LimitChange, ZoneEntry
 from iveg.domain.tracking.people import People
-from iveg.domain.world import World
 from iveg.vital import topics
 from iveg.vital.alerting import Alerting
+from iveg.vital.core import Core
 from iveg.vital.detections import DetectionTracking
-from iveg.vital.event_log import EventLog
-from iveg.vital.evidence import places_of, record_of
+from iveg.vital.evidence import evidence_of, places_of, record_of, speed_line
 from iveg.vital.feedback import FeedbackPublisher
-from iveg.vital.log_messages import evidence_of, speed_line
-from iveg.vital.ports import FleetPort, Ids
 from iveg.vital.staleness import Staleness
 
 HEARTBEAT_S, _EARLY_S = 0.1, 0.02
@@ -58,56 +54,27 @@ _TOPIC_OF = {
 class Evaluator:
     """Keeps the world and decides for the fleet.
 
-    Args:
-        boot: Random, new at each start: identity of our feedback.
-
     Attributes:
         rule: The version in force; a new one counts from the next judgement on.
-        aged: Comfort, called with each tick.
-        judged: The same with each judgement: the rule, limits, changes, and when.
     """
 
-    def __init__(
-        self,
-        world: World,
-        greenhouse: Greenhouse,
-        people: People,
-        rule: DetectionRule,
-        fleet: FleetPort,
-        event_log: EventLog,
-        new_id: Ids,
-        boot: str,
-        backlog: Callable[[Instant], float | None] = lambda _: None,
-    ) -> None:
-        self.world = world
-        self.greenhouse = greenhouse
+    def __init__(self, core: Core, rule: DetectionRule) -> None:
+        self.world, self.people = core.world, core.people
+        self.greenhouse = core.greenhouse
         self.rule = rule
-        self.aged: Callable[[Instant], None] = lambda _: None
-        self.judged: Callable[
-            [DetectionRule, Mapping[str, SpeedLimit], Sequence[LimitChange], Instant],
-            None,
-        ] = lambda *_: None
-        self.people = people
         self.decisions = Decisions()
-        self.alerts = Alerting(event_log, new_id)
+        self.alerts = Alerting(core)
         self.speed_limits: dict[str, SpeedLimit] = dict.fromkeys(
-            world.robots, UNSUPERVISED
+            self.world.robots, UNSUPERVISED
         )
         self.protected_unseen = 0
         """How often a robot slowed for a person or peer out of its own sight."""
-        self._speed_limits = SpeedLimits(greenhouse)
-        self.tracking = DetectionTracking(world, people, greenhouse, event_log, new_id)
-        self._staleness = Staleness(world, people, greenhouse, event_log)
-        self._feedback_publisher = FeedbackPublisher(
-            world,
-            self.people,
-            self.tracking.other,
-            fleet,
-            boot,
-            backlog,
-        )
-        self._event_log = event_log
-        self._new_id = new_id
+        self._speed_limits = SpeedLimits(core.greenhouse)
+        self.tracking = DetectionTracking(core)
+        self._staleness = Staleness(core)
+        self._feedback_publisher = FeedbackPublisher(core, self.tracking.other)
+        self._event_log, self._new_id = core.event_log, core.ports.new_id
+        self._tell = core.supervision.tell
         self._applied: dict[str, float] = {}
         self._low = LowValues()
         self._obedience = Obedience()
@@ -269,7 +236,7 @@ class Evaluator:
         # A slow-down never waits; other news waits until robots can use more.
         if slower or (self._untold and self._feedback_publisher.may_publish(now)):
             self.publish(now)
-        self.judged(self.rule, speed_limits, changes, now)
+        self._tell("judged", self.rule, speed_limits, changes, now)
 
     def _crossed(self, change: LimitChange, now: Instant) -> None:
         entry = change.entry
@@ -299,7 +266,7 @@ class Evaluator:
         self._staleness.tick(now)
         self._log_returned_detectors(now)
         self.tracking.forget(now)
-        self.aged(now)
+        self._tell("aged", now)
 
     def tick(self, now: Instant, more: Iterable[Condition] = ()) -> None:
         """Judge a world that has aged: limits, heartbeat, decisions, alerts."""

@@ -1,24 +1,30 @@
-"""Which detections the history keeps: two a second of each subject, and all evidence.
+"""Detections that are kept: in the history few of them, in memory each for a while.
 
-A detector tells thirty pictures a second, of which a person who stands before a camera
-would fill the disk.  Of each robot and subject (a person, a peer, or all boxes of one
-class that are neither) one row in half a second is kept, as odometry is; and whatever
-these leave out, the detection that a decision rests on (docs/interfaces/http.md,
-"Detections that are kept").
+A detector sends thirty frames a second, by which a person who stands before a camera
+would fill the disk.  The history gets one row in half a second for each robot and
+subject (a person, a peer, or all boxes of one class that are neither), and each
+detection that a decision rests on (docs/interfaces/http.md, "Detections that are
+kept").
 """
 
-from collections.abc import Sequence
+from collections import deque
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
+from typing import NamedTuple
 
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import DetectionFrame, Instant, Received
+from iveg.domain.records import DetectionRecord
 from iveg.domain.tracking.people import Placed
 from iveg.domain.tracking.person import Sighting
-from iveg.vital.event_log import EventLog
+from iveg.vital.event_log import EventLog, detection_of
 from iveg.vital.record import ODOMETRY_PERIOD_S
 
 KEPT_EVERY_S = ODOMETRY_PERIOD_S
 _MAX_SUBJECTS = 1000
+MOST_DETECTIONS = 5000
+"""Two robots that see three objects, at 30 frames a second, fill it in 30 s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,3 +118,32 @@ def _is_of(look: _Look, sighting: Sighting) -> bool:
     )
     is_same = one.detection.probability == sighting.confidence
     return is_same and is_there and look.frame.robot_id == sighting.observer
+
+
+class JudgedDetection(NamedTuple):
+    """A detection, the frame that it came in and how that came; its row is made later.
+
+    Making every row at once would cost the rule loop what nobody may ask for.
+    """
+
+    one: Placed
+    frame: DetectionFrame
+    received: Received
+
+
+class NewestDetections:
+    """The last detections of the whole fleet; the oldest gives way."""
+
+    def __init__(self) -> None:
+        self._newest: deque[JudgedDetection] = deque(maxlen=MOST_DETECTIONS)
+
+    def note(self, one: Placed, frame: DetectionFrame, received: Received) -> None:
+        """Remember one detection."""
+        self._newest.append(JudgedDetection(one, frame, received))
+
+    def rows(
+        self, admits: Callable[[JudgedDetection], bool], most: int
+    ) -> tuple[DetectionRecord, ...]:
+        """At most so many of those that are admitted, newest first."""
+        admitted = filter(admits, reversed(self._newest))
+        return tuple(detection_of(*one) for one in islice(admitted, most))

@@ -6,7 +6,7 @@ way, and a failure of one transport holds up no other.
 
 import asyncio
 import logging
-from collections.abc import Callable, Coroutine, Mapping
+from collections.abc import Callable, Coroutine
 from functools import partial
 
 from iveg.domain.errors import HopError
@@ -18,52 +18,34 @@ from iveg.domain.stop import (
     SetDesiredState,
     StopMachine,
 )
-from iveg.domain.transports import TransportId
-from iveg.vital.event_log import EventLog
-from iveg.vital.ports import Clock, CommandPort, FleetPort, StopJournal
+from iveg.domain.transports import FIWARE, TransportId
+from iveg.vital.core import Core
 
 _log = logging.getLogger(__name__)
 CameBack = Callable[[StopMachine, list[Effect], Instant], None]
 _Send = Callable[[], Coroutine[None, None, None]]
-IsCut = Callable[[TransportId, Instant], bool]
 
 
 class OrderSender:
     """Sends STOPs, releases, resumes and desired states, each in its own task.
 
     Args:
-        ports: The way out of each transport.
-        fleet: Keeps the desired state of each robot.
-        journal: Knows what a release names before it goes.
-        event_log: Holds the audit row of a release before it goes.
-        clock: Reads both clocks.
+        core: Of its ports the transports, the fleet and the journal.
         came_back: Told how each send went.
-        is_cut: Whether what lies behind a transport is known to pass nothing on.
     """
 
-    def __init__(
-        self,
-        ports: Mapping[TransportId, CommandPort],
-        fleet: FleetPort,
-        journal: StopJournal,
-        event_log: EventLog,
-        clock: Clock,
-        came_back: CameBack,
-        is_cut: IsCut,
-    ) -> None:
-        self._ports = ports
-        self._fleet = fleet
-        self._journal = journal
-        self._event_log = event_log
-        self._clock = clock
+    def __init__(self, core: Core, came_back: CameBack) -> None:
+        self._transports = {way.id: port for way, port in core.ports.transports.items()}
+        self._fleet, self._journal = core.ports.fleet, core.ports.journal
+        self._event_log, self._clock = core.event_log, core.ports.clock
+        self._health_monitor = core.health_monitor
         self._came_back = came_back
-        self._is_cut = is_cut
         self._desired_states: dict[str, SetDesiredState] = {}
         self._tasks: set[asyncio.Task[None]] = set()
 
     def send_stop(self, machine: StopMachine, effect: SendStop) -> None:
         """Begin to send a STOP on one transport; the result comes back later."""
-        port, order = self._ports[effect.transport], effect.command_id
+        port, order = self._transports[effect.transport], effect.command_id
         send = partial(port.stop, effect.robot_id, effect.hold_id, order[-6:])
         self._start_attempt(machine, "stop", effect.transport, order, send)
 
@@ -115,7 +97,7 @@ class OrderSender:
         for transport, way in command.transports.items():
             if way == "off":
                 continue
-            port = self._ports[transport]
+            port = self._transports[transport]
             if command.kind == "resume":
                 send = partial(port.resume, machine.robot_id, challenge, order)
             else:
@@ -167,7 +149,8 @@ class OrderSender:
             _log.info("order by transport %s: %s", transport, error)
         finally:
             at = self._clock()
-            doubtful = self._is_cut(transport, at)
+            # What lies behind Orion may be known to pass nothing on.
+            doubtful = transport == FIWARE.id and self._health_monitor.is_cut(at)
             effects = machine.sent(
                 transport, command_id, at, ok=ok, doubtful=doubtful, left=left
             )

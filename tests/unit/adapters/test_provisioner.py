@@ -65,7 +65,7 @@ class Site:
         access: FiwareToken | None = None,
     ) -> None:
         self.heard: list[tuple[str, bytes]] = []
-        self.health_monitor = HealthMonitor(clock.now())
+        self.health_monitor = HealthMonitor(clock.now(), lambda: "ok")
         self.ingest = Ingest({"AGI"}.__contains__)
         self.orion = orion or OrionClient(
             orion_url or fiware.orion_url, *SERVICE, access

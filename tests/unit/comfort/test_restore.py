@@ -47,12 +47,10 @@ class LeftBehind:
 async def take_up(desk: Desk, left: LeftBehind) -> None:
     await remember(
         cast("History", left),
+        desk.parts.core,
         desk.commander,
         desk.parts.goals,
         desk.evaluator,
-        desk.event_log,
-        desk.health_monitor,
-        desk.clock,
     )
 
 

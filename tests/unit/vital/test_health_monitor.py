@@ -32,7 +32,7 @@ def healthy(now: float) -> HealthMonitor:
 
 
 def test_nobody_is_accused_in_the_first_seconds() -> None:
-    found = states(HealthMonitor(START), 5.9)
+    found = states(HealthMonitor(START, lambda: "unknown"), 5.9)
 
     assert found == {
         "mqtt": "unknown",
@@ -199,7 +199,7 @@ def test_an_agent_that_keeps_up_and_answers_no_question_is_down() -> None:
 
 
 def test_a_probe_of_an_earlier_life_proves_nothing() -> None:
-    monitor = HealthMonitor(START)
+    monitor = HealthMonitor(START, lambda: "unknown")
     monitor.sent(Origin("new", 1), START)
     monitor.stored(Origin("old", 1))
     monitor.received(Origin("old", 1), START)

@@ -4,7 +4,7 @@ from iveg.domain.geometry import Rectangle
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import SafetyReport
 from iveg.domain.rule.clear import ClearCondition
-from iveg.vital.log_messages import speed_line
+from iveg.vital.evidence import speed_line
 from tests.builders import detection, safety_report
 from tests.unit.vital.desk import Desk
 

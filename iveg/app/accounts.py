@@ -1,4 +1,4 @@
-"""The door of the server: who may come in, known from memory and kept in a file."""
+"""Accounts of people and tokens of programs: known from memory, kept in a file."""
 
 import asyncio
 import logging
@@ -39,7 +39,7 @@ _SHOWN_S = 60.0
 _log = logging.getLogger(__name__)
 
 
-class Door:
+class Accounts:
     """People with accounts and programs with tokens.
 
     Args:
