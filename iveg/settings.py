@@ -382,24 +382,47 @@ class Settings:
     def _check_together(self) -> None:
         """Raise SettingsError where two settings contradict each other."""
         kept, forever = self.retention, math.inf
-        if self.feedback_stand_s <= self.feedback_slow_s:
-            name, value = "IVEG_FEEDBACK_STAND_S", f"{self.feedback_stand_s:g}"
-            raise SettingsError(name, value, "more than IVEG_FEEDBACK_SLOW_S")
-        if (kept.positions or forever) > (kept.decisions or forever):
-            name, value = "IVEG_KEEP_POSITIONS_DAYS", str(kept.positions)
-            raise SettingsError(name, value, "no longer than IVEG_KEEP_DECISIONS_DAYS")
-        if (kept.audit or forever) < (kept.decisions or forever):
-            name, value = "IVEG_KEEP_AUDIT_DAYS", str(kept.audit)
-            raise SettingsError(name, value, "no shorter than IVEG_KEEP_DECISIONS_DAYS")
-
-        if self.fiware_token_url and not self.fiware_client_id:
-            name = "IVEG_FIWARE_CLIENT_ID"
-            raise SettingsError(name, "", "set where IVEG_FIWARE_TOKEN_URL is")
-        if self.sso_issuer and not self.sso_client_id:
-            name = "IVEG_SSO_CLIENT_ID"
-            raise SettingsError(name, "", "set where IVEG_SSO_ISSUER is")
-        if self.sso_issuer and not self.sso_roles:
-            raise SettingsError("IVEG_SSO_ROLES", "", "set where IVEG_SSO_ISSUER is")
+        decisions = kept.decisions or forever
+        for is_so, variable, value, allowed in (
+            (
+                self.feedback_stand_s > self.feedback_slow_s,
+                "IVEG_FEEDBACK_STAND_S",
+                f"{self.feedback_stand_s:g}",
+                "more than IVEG_FEEDBACK_SLOW_S",
+            ),
+            (
+                (kept.positions or forever) <= decisions,
+                "IVEG_KEEP_POSITIONS_DAYS",
+                str(kept.positions),
+                "no longer than IVEG_KEEP_DECISIONS_DAYS",
+            ),
+            (
+                (kept.audit or forever) >= decisions,
+                "IVEG_KEEP_AUDIT_DAYS",
+                str(kept.audit),
+                "no shorter than IVEG_KEEP_DECISIONS_DAYS",
+            ),
+            (
+                self.fiware_client_id or not self.fiware_token_url,
+                "IVEG_FIWARE_CLIENT_ID",
+                "",
+                "set where IVEG_FIWARE_TOKEN_URL is",
+            ),
+            (
+                self.sso_client_id or not self.sso_issuer,
+                "IVEG_SSO_CLIENT_ID",
+                "",
+                "set where IVEG_SSO_ISSUER is",
+            ),
+            (
+                self.sso_roles or not self.sso_issuer,
+                "IVEG_SSO_ROLES",
+                "",
+                "set where IVEG_SSO_ISSUER is",
+            ),
+        ):
+            if not is_so:
+                raise SettingsError(variable, value, allowed)
 
     @property
     def sso_role_map(self) -> dict[str, PersonRole]:

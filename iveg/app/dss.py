@@ -24,6 +24,7 @@ from iveg.adapters.direct import DirectReader
 from iveg.adapters.equipment_files import load_equipment
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
+from iveg.adapters.history.queries import Queries
 from iveg.adapters.loop_watch import LoopWatch
 from iveg.adapters.messages import AppriseSender, load_messages
 from iveg.adapters.provisioner import Provisioner
@@ -40,15 +41,15 @@ from iveg.comfort.equipment import TICK_S as EQUIPMENT_TICK_S
 from iveg.comfort.maps import COVERAGE_TICK_S, SCAN_TICK_S
 from iveg.comfort.messenger import PART as MESSAGES
 from iveg.comfort.messenger import Messenger
-from iveg.comfort.restore import remember
 from iveg.comfort.retention import PART as RETENTION
 from iveg.comfort.retention import HistoryUpkeep
 from iveg.comfort.trials import PART as TRIAL
-from iveg.domain.errors import SettingsError, VitalPartError
+from iveg.domain.alerts import MOST_KEPT, read_alert
+from iveg.domain.errors import HopError, SettingsError, VitalPartError
 from iveg.domain.fleet import FleetDescription
 from iveg.domain.observations import Instant
 from iveg.domain.transports import DIRECT, FIWARE
-from iveg.pipeline import Choices, build
+from iveg.pipeline import Choices, Pipeline, build
 from iveg.settings import Settings
 from iveg.vital.audit import AuditTrail
 from iveg.vital.ports import Ports
@@ -65,6 +66,9 @@ from iveg.web.views import Views
 
 _log = logging.getLogger(__name__)
 Work = Callable[[], Awaitable[object]]
+EARLIER_LINES = 200
+"""Lines of the log that come back after a restart."""
+_ASK_AGAIN_S = 5.0
 LAST_WORD_S = 0.5
 """Time that the last word may take; robots slow by themselves half a second later."""
 
@@ -356,15 +360,8 @@ class Dss:
 
     async def _remember(self) -> None:
         """Take up what earlier runs left in the history, as soon as it answers."""
-        parts = self.pipeline
         await self.stores.recorder.caught_up()
-        await remember(
-            self.stores.queries,
-            self.core,
-            parts.commander,
-            parts.goals,
-            parts.evaluator,
-        )
+        await remember(self.stores.queries, self.pipeline)
 
     def _ended(self, task: asyncio.Task[None]) -> None:
         """A vital part has ended: say so and leave; the robots slow down."""
@@ -448,3 +445,30 @@ async def _say(last_word: Work) -> None:
     except Exception:
         # The part that would say it may be the one that has failed.
         _log.exception("the last feedback failed; robots slow by themselves")
+
+
+async def remember(history: Queries, parts: Pipeline) -> None:
+    """Take up open rows of earlier runs, while STOP already works.
+
+    A P1 that nobody acknowledged stays active, the log continues, and rows that a crash
+    left open are closed.  Nothing waits for this: until the history answers the page
+    says that earlier alerts are unknown.  Returns when all of it is taken up.
+    """
+    while True:
+        try:
+            left_open = await history.open_commands()
+            decisions = await history.open_decisions()
+            alerted = await history.open_alerts()
+            unseen = await history.unseen_alerts(MOST_KEPT)
+            lines = await history.newest_lines(EARLIER_LINES)
+        except HopError:
+            await asyncio.sleep(_ASK_AGAIN_S)
+            continue
+        now = parts.core.ports.clock()
+        parts.commander.close_earlier(left_open, now)
+        parts.goals.close_earlier(left_open, now)
+        parts.evaluator.close_earlier(decisions, alerted, now)
+        parts.evaluator.alerts.remember(read_alert(one, now) for one in unseen)
+        parts.core.event_log.recall(lines)
+        parts.core.health_monitor.earlier_read = True
+        return

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from iveg.domain import alerts
 from iveg.domain.decisions import Decisions, SlowdownDecision
 from iveg.domain.detection_rule import DetectionRule
-from iveg.domain.events import Condition, LogEvent, Slot
+from iveg.domain.events import Condition, LogEvent
 from iveg.domain.feedback import UNSUPERVISED, SpeedLimit
 from iveg.domain.kinds import kind
 from iveg.domain.limits import LIMITS
@@ -42,8 +42,6 @@ from iveg.vital.staleness import Staleness
 
 HEARTBEAT_S, _EARLY_S = 0.1, 0.02
 """Between two heartbeats; so early one goes rather than a whole tick late."""
-
-
 _TOPIC_OF = {
     "robot": topics.ROBOT,
     "scan": topics.SCAN,
@@ -56,6 +54,7 @@ class Evaluator:
 
     Attributes:
         rule: The version in force; a new one counts from the next judgement on.
+        is_urgent: Whether something new of people or obstacles awaits its judgement.
     """
 
     def __init__(self, core: Core, rule: DetectionRule) -> None:
@@ -80,7 +79,7 @@ class Evaluator:
         self._obedience = Obedience()
         self._moved: dict[str, Odometry] = {}
         self._unjudged: Instant | None = None
-        self._is_urgent = False
+        self.is_urgent = False
         self._started: Instant | None = None
         self._untold = False
 
@@ -157,15 +156,10 @@ class Evaluator:
         """Whether something was taken that :meth:`settle` has not judged yet."""
         return self._unjudged is not None
 
-    @property
-    def is_urgent(self) -> bool:
-        """Whether something new of people or obstacles is among it."""
-        return self._is_urgent
-
     def _await_judgement(self, at: Instant, *, is_urgent: bool) -> None:
         if self._unjudged is None or at.mono >= self._unjudged.mono:
             self._unjudged = at
-        self._is_urgent |= is_urgent
+        self.is_urgent |= is_urgent
 
     def settle(self) -> None:
         """Judge the fleet once for everything that was taken since the last time."""
@@ -173,7 +167,7 @@ class Evaluator:
             self._settle(self._unjudged)
 
     def _settle(self, now: Instant) -> None:
-        self._unjudged, self._is_urgent = None, False
+        self._unjudged, self.is_urgent = None, False
         self._judge(now)
         for robot_id, odometry in self._moved.items():
             robot, speed_limit = self.world.robot(robot_id), self.speed_limits[robot_id]
@@ -213,14 +207,11 @@ class Evaluator:
         for change in changes:
             self._crossed(change, now)
         before, self.speed_limits = self.speed_limits, speed_limits
-        # Mostly all are the very same, and this is asked at each judgement.
-        perhaps = () if speed_limits is before else speed_limits.items()
         changed = [
             robot_id
-            for robot_id, speed_limit in perhaps
-            if speed_limit is not (was := before[robot_id])
-            and (speed_limit.speed_factor, speed_limit.reason, speed_limit.cause)
-            != (was.speed_factor, was.reason, was.cause)
+            for robot_id, speed_limit in speed_limits.items()
+            if speed_limit is not before[robot_id]
+            and _told_of(speed_limit) != _told_of(before[robot_id])
         ]
         for robot_id in changed:
             self._event_log.changed(topics.ROBOT.of(robot_id))
@@ -280,9 +271,10 @@ class Evaluator:
     def _log_returned_detectors(self, now: Instant) -> None:
         returned = self.world.returned_detectors
         for robot_id in returned:
-            slots: dict[str, Slot] = {"robot": robot_id}
-            event = LogEvent("system", "log.detector_booted", slots, robot_id)
-            self._event_log.log(event, now)
+            slots = {"robot": robot_id}
+            self._event_log.log(
+                LogEvent("system", "log.detector_booted", slots, robot_id), now
+            )
         returned.clear()
 
     def _conditions(self, now: Instant) -> Iterable[Condition]:
@@ -354,3 +346,8 @@ class Evaluator:
             after.decision_id,
         )
         self._log_speed(report, at)
+
+
+def _told_of(limit: SpeedLimit) -> tuple[float, str, str | None]:
+    """The part of a limit that people and robots are told when it changes."""
+    return limit.speed_factor, limit.reason, limit.cause

@@ -21,7 +21,7 @@ from iveg.models.base import Body, Listing, write_json
 from iveg.models.people import DetectionRow, Thing
 from iveg.models.robot import Detector
 from iveg.ngsi.payloads import legible
-from iveg.vital.kept_detections import NewestDetections
+from iveg.vital.detections import NewestDetections
 from iveg.vital.operators import Detectors, ThingMarks
 from iveg.vital.ports import Clock
 from iveg.web.api import exports

@@ -60,17 +60,6 @@ def test_scans_of_all_robots_make_one_costmap() -> None:
     assert knows(field.shared(), 16.0)
 
 
-def test_a_robot_believes_its_own_scans_alone() -> None:
-    field = Field()
-    field.sweep_from("AGI", 5.0)
-    field.sweep_from("AGII", 15.0)
-    field.tick()
-    field.tick()
-
-    assert knows(field.of("AGI"), 6.0)
-    assert not knows(field.of("AGI"), 16.0)
-
-
 def test_a_robot_believes_what_it_was_told_of_others_and_is_none_to_itself() -> None:
     field = Field()
     field.sweep_from("AGI", 5.0)

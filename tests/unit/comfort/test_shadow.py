@@ -9,7 +9,7 @@ from iveg.adapters.rules import TRIALS_FORM, FileTrials
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import HopError, OutdatedError, TrialRefusedError
 from iveg.domain.parameters import ByClass
-from iveg.domain.rule.trial import MOST_KEPT, Trial
+from iveg.domain.rule.trial import Trial
 from iveg.domain.words import WordAnswer
 from iveg.lab.emulator.orders import FaultOrder
 from iveg.pipeline import Pipeline
@@ -129,20 +129,6 @@ def test_who_is_sure_enough_for_the_rule_in_force_alone_frees() -> None:
     assert later == pytest.approx(0.3, abs=0.01)
 
 
-def test_another_rule_in_force_begins_the_comparison_anew() -> None:
-    desk = Desk()
-    begin(desk.parts, LAX, desk)
-    for number in range(40):
-        watch(desk, 1.5, *([0.85] if number >= 25 else []))
-    assert trial_of(desk).differences
-    desk.evaluator.rule = replace(RULE, version=2, threshold=ByClass(0.95))
-    watch(desk, 1.5)
-
-    told = trial_of(desk).so_far
-    assert told is not None
-    assert (told.against, told.compared_s, told.would_not) == (2, 0.0, 0)
-
-
 def test_a_trial_that_cannot_judge_ends_and_is_named() -> None:
     desk = Desk()
     begin(desk.parts, replace(RULE, radius_m="wide"), desk)  # type: ignore[arg-type]
@@ -151,20 +137,6 @@ def test_a_trial_that_cannot_judge_ends_and_is_named() -> None:
     assert desk.parts.trials.current is None
     assert desk.parts.core.supervision.counters["comfort_failed.shadow-rule"] == 1
     assert desk.evaluator.speed_limits["AGI"].speed_factor == 0.5
-
-
-def test_the_list_is_bounded_and_the_count_is_not() -> None:
-    desk = Desk()
-    begin(desk.parts, LAX, desk)
-    for number in range(40):
-        watch(desk, 1.5, *([0.85] if number >= 25 else []))
-    trial = trial_of(desk)
-    many = trial.differences * (MOST_KEPT + 5)
-    again = replace(trial, differences=many)
-    desk.parts.trials.start(again, desk.clock())
-
-    assert len(trial_of(desk).differences) == MOST_KEPT
-    assert trial_of(desk).so_far == trial.so_far
 
 
 async def test_it_goes_on_after_a_restart_with_what_it_had(tmp_path: Path) -> None:

@@ -63,18 +63,6 @@ async def test_a_robot_that_names_no_frame_is_a_notice_as_long_as_it_names_none(
     assert ALERT not in conditions_of(desk)
 
 
-async def test_a_robot_whose_frame_the_fleet_names_is_no_notice() -> None:
-    desk = parked()
-    robot = desk.world.robot("AGI")
-    profile = replace(robot.profile, unlabelled_frame="camera_link")
-    robot.description = replace(robot.description, profile=profile)
-
-    desk.look("AGI", unlabelled(4.0))
-    await desk.wait(0.1)
-
-    assert ALERT not in conditions_of(desk)
-
-
 async def test_the_papers_box_is_one_person_at_two_places_on_the_page() -> None:
     desk = parked()
     views = Views(desk.parts)

@@ -7,7 +7,6 @@ what was put in is known to the microsecond.
 import heapq
 from dataclasses import dataclass, field
 from itertools import count
-from statistics import mean, quantiles
 
 import numpy as np
 import pytest
@@ -122,20 +121,6 @@ async def test_a_delay_is_found_in_the_hop_that_has_it_and_in_no_other(
         "robot_orion": close(late_s + agent_s),
     }
     assert air.took("AGII", "uplink").mean == close(0.0)
-
-
-async def test_jitter_of_300_ms_is_found_as_the_radio_had_it() -> None:
-    air = Air(Radio(jitter_s=0.300))
-
-    await play(air, 20.0)
-
-    found = air.took("AGI", "uplink")
-    put_in = air.put_in[: found.count]
-    assert found.mean == close(mean(put_in))
-    assert found.quantile(0.95) == close(quantiles(put_in, n=20)[18])
-    assert found.least == close(min(put_in))
-    assert air.took("AGI", "fiware").mean == close(CALM_AGENT_S)
-    assert air.took("AGII", "uplink").most < 0.010
 
 
 async def test_a_delay_that_begins_later_is_not_taken_for_a_clock_that_was_set() -> (
