@@ -8,7 +8,6 @@ robots drive.
 import asyncio
 import secrets
 from collections.abc import Awaitable, Callable, Mapping
-from contextlib import AsyncExitStack
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -63,13 +62,6 @@ class Finding:
     said: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Remark:
-    """A remark about a hop that works."""
-
-    words: str
-
-
 Findings = dict[Hop, Finding]
 _Step = Callable[[], Awaitable[object]]
 
@@ -107,8 +99,7 @@ async def examine(
         patience_s: Time limit of each hop (s).
     """
     database = history_url(settings.database_url, data)
-    async with AsyncExitStack() as stack:
-        path = await stack.enter_async_context(_Path(settings))
+    async with _Path(settings) as path:
         steps: tuple[tuple[Hop, _Step], ...] = (
             (Hop.MQTT, path.publish_probe),
             (Hop.ORION, path.orion.version),
@@ -126,8 +117,8 @@ async def examine(
 async def _try(step: _Step, patience_s: float) -> Finding:
     try:
         async with asyncio.timeout(patience_s):
-            said = await step()
-            return Finding(True, said.words if isinstance(said, Remark) else "")
+            found = await step()
+            return found if isinstance(found, Finding) else Finding(True)
     except TimeoutError:
         return Finding(False, f"nothing came in {patience_s:g} s")
     except HopError as error:
@@ -163,7 +154,7 @@ class _Path:
         await publish_and_hear(broker_of(self._settings), topic, payload)
         return stamp
 
-    async def send_measure(self) -> Remark | None:
+    async def send_measure(self) -> Finding:
         """Repair the devices, then send a probe and wait until Orion has it."""
         settings = self._settings
         robots = load_fleet(settings.fleet, settings.robots).ids
@@ -181,7 +172,7 @@ class _Path:
         while not await self._has_probe(stamp):  # noqa: ASYNC110
             await asyncio.sleep(_LOOK_EVERY_S)
         took_s = clock.mono() - began
-        return Remark(lag_in_words(took_s)) if took_s > SLOW_S else None
+        return Finding(True, lag_in_words(took_s) if took_s > SLOW_S else "")
 
     async def _has_probe(self, stamp: str) -> bool:
         """Whether Orion has this probe, or a later one of a running iVeg."""

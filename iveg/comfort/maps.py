@@ -75,6 +75,40 @@ class ScanReader:
         return None
 
 
+class _Turns:
+    """Turns of robots by their scans: the one that has waited longest is next.
+
+    Args:
+        apart_s: Between two scans of one robot (s), at least.
+    """
+
+    def __init__(self, apart_s: float) -> None:
+        self._apart_s = apart_s
+        self._taken: dict[str, tuple[float, LaserScan | UnreadScan]] = {}
+
+    def next(self, robots: Iterable[RobotState], now: Instant) -> RobotState | None:
+        """Take the turn of a robot with a new scan; None: none is due."""
+        due = [robot for robot in robots if self._is_due(robot, now)]
+        robot = min(due, key=self._at, default=None)
+        if robot is not None and robot.scan is not None:
+            self._taken[robot.robot_id] = now.mono, robot.scan
+        return robot
+
+    def newest_at(self, robot_id: str | None) -> float | None:
+        """The newest turn of a robot, or of any (monotonic, s); None: never."""
+        names = self._taken if robot_id is None else {robot_id} & self._taken.keys()
+        return max((self._taken[name][0] for name in names), default=None)
+
+    def _is_due(self, robot: RobotState, now: Instant) -> bool:
+        if robot.scan is None or robot.scan_pose is None:
+            return False
+        _, last = self._taken.get(robot.robot_id, (0.0, None))
+        return robot.scan is not last and now.mono - self._at(robot) >= self._apart_s
+
+    def _at(self, robot: RobotState) -> float:
+        return self._taken.get(robot.robot_id, (float("-inf"), None))[0]
+
+
 class Mapper:
     """One grid that the fleet shares, and one for each robot.
 
@@ -90,14 +124,13 @@ class Mapper:
         self._grid = None if self._is_open else Grid.over(bounds)
         # By robot; the fleet shares that of None.
         self._drawn: dict[str | None, Occupancy] = {}
-        self._read: dict[str, LaserScan | UnreadScan] = {}
-        self._read_at: dict[str, float] = {}
+        self._turns = _Turns(_PERIOD_S)
 
     def tick(self, now: Instant) -> None:
         """Take in the scan that has waited longest, if one is due."""
-        due = [robot for robot in self._world.live_robots() if self._is_due(robot, now)]
-        if due:
-            self._draw(min(due, key=self._last_drawn), now)
+        robot = self._turns.next(self._world.live_robots(), now)
+        if robot is not None:
+            self._draw(robot, now)
 
     def shared(self, zones: Iterable[Zone], now: Instant) -> InflatedGrid | None:
         """The fleet's costmap; None before the first scan."""
@@ -105,10 +138,8 @@ class Mapper:
 
     def age_s(self, robot_id: str | None, now: Instant) -> float | None:
         """Since the newest scan of one robot, or of any, was drawn (s); None: never."""
-        times = self._read_at
-        found = times.values() if robot_id is None else [times.get(robot_id)]
-        drawn = [at for at in found if at is not None]
-        return now.mono - max(drawn) if drawn else None
+        at = self._turns.newest_at(robot_id)
+        return None if at is None else now.mono - at
 
     def of(
         self, robot_id: str, zones: Iterable[Zone], now: Instant
@@ -117,25 +148,10 @@ class Mapper:
         others = [zone for zone in zones if zone.cause != robot_id]
         return _costs(self._drawn.get(robot_id), others, now)
 
-    def _is_due(self, robot: RobotState, now: Instant) -> bool:
-        scan = robot.scan
-        if scan is None or robot.scan_pose is None:
-            return False
-        fresh = scan is not self._read.get(robot.robot_id)
-        return fresh and now.mono - self._last_drawn(robot) >= _PERIOD_S
-
-    def _last_drawn(self, robot: RobotState) -> float:
-        return self._read_at.get(robot.robot_id, float("-inf"))
-
     def _draw(self, robot: RobotState, now: Instant) -> None:
-        pose = robot.scan_pose
         self._place()
-        if robot.scan is None or pose is None or self._grid is None:
-            return
-        self._read[robot.robot_id] = robot.scan
-        self._read_at[robot.robot_id] = now.mono
-        scan = self._scans.newest(robot)
-        if scan is None:
+        scan, pose = self._scans.newest(robot), robot.scan_pose
+        if scan is None or pose is None or self._grid is None:
             return
         try:
             sweep = sweep_of(scan, pose, self._grid)
@@ -194,45 +210,29 @@ class PeerScans:
     ) -> None:
         self._world, self._scans, self._publish = world, scans, publish
         self._boot, self._seq = boot, 0
-        self._handled: dict[str, tuple[float, LaserScan | UnreadScan]] = {}
+        self._turns = _Turns(APART_S)
 
     def tick(self, now: Instant) -> None:
         """Hand on the scan of the robot that has waited longest, if one is due."""
-        asking = {
-            robot.robot_id for robot in self._world.live_robots() if _asks(robot, now)
-        }
-        if not asking:
-            return
-        due = [
-            robot
-            for robot in self._world.live_robots()
-            if asking - {robot.robot_id} and self._is_due(robot, now)
-        ]
-        if due:
-            self._tell(min(due, key=self._handled_at), now)
+        robots = [*self._world.live_robots()]
+        asking = {robot.robot_id for robot in robots if _asks(robot, now)}
+        robot = self._turns.next(
+            (
+                one
+                for one in robots
+                if asking - {one.robot_id} and _age_s(one, now) <= OLDEST_S / 2
+            ),
+            now,
+        )
+        if robot is not None:
+            self._publish_scan(robot, now)
 
-    def _is_due(self, robot: RobotState, now: Instant) -> bool:
-        received = robot.scan_received
-        if robot.scan is None or robot.scan_pose is None or received is None:
-            return False
-        if now.mono - received.mono > OLDEST_S / 2:
-            return False
-        _, last = self._handled.get(robot.robot_id, (0.0, None))
-        return robot.scan is not last and now.mono - self._handled_at(robot) >= APART_S
-
-    def _handled_at(self, robot: RobotState) -> float:
-        return self._handled.get(robot.robot_id, (float("-inf"), None))[0]
-
-    def _tell(self, robot: RobotState, now: Instant) -> None:
-        waiting, pose, received = robot.scan, robot.scan_pose, robot.scan_received
-        if waiting is None or pose is None or received is None:
-            return
-        self._handled[robot.robot_id] = now.mono, waiting
-        scan = self._scans.newest(robot)
-        if scan is None or not scan.ranges.size:
+    def _publish_scan(self, robot: RobotState, now: Instant) -> None:
+        scan, pose = self._scans.newest(robot), robot.scan_pose
+        if scan is None or pose is None or not scan.ranges.size:
             return
         try:
-            peer_scan = peer_scan_of(scan, pose, max(0.0, now.mono - received.mono))
+            peer_scan = peer_scan_of(scan, pose, max(0.0, _age_s(robot, now)))
         except Exception as error:
             # One robot's scan ends neither this part nor what others are told.
             self._scans.undrawable(robot.robot_id, error)
@@ -240,6 +240,12 @@ class PeerScans:
         self._seq += 1
         origin = Origin(self._boot, self._seq, format_stamp(now.wall))
         self._publish(replace(peer_scan, origin=origin))
+
+
+def _age_s(robot: RobotState, now: Instant) -> float:
+    """Since a robot's newest scan came (s); infinite before the first."""
+    received = robot.scan_received
+    return float("inf") if received is None else now.mono - received.mono
 
 
 def _asks(robot: RobotState, now: Instant) -> bool:

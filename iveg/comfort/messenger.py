@@ -42,7 +42,7 @@ class Pace:
 
 
 class _Line:
-    """What waits for one address."""
+    """Queue of one address."""
 
     def __init__(self, address: Address) -> None:
         self.address = address

@@ -1,6 +1,6 @@
-"""What is known of each robot, gathered for its situation (``domain/situation``)."""
+"""Facts about each robot, gathered for its situation (``domain/situation``)."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from iveg.domain.events import Condition
 from iveg.domain.feedback import SpeedLimit
@@ -34,11 +34,11 @@ class Situations:
         self._evaluator = evaluator
 
     def of(self, robot: RobotState, machine: StopMachine, now: Instant) -> Situation:
-        """How it stands with one robot."""
+        """Situation of one robot."""
         limit = self._evaluator.speed_limits[robot.robot_id]
         report, alerts = fresh_report(robot, now), self._alerts(robot.robot_id)
-        once = machine.once
-        out = robot.detector.out_of_service
+        around = _Surroundings(self._evaluator, robot, now)
+        once, out = machine.once, robot.detector.out_of_service
         facts = RobotFacts(
             robot_id=robot.robot_id,
             link=robot.link(now),
@@ -50,9 +50,9 @@ class Situations:
             unmet=self._evaluator.unmet(robot.robot_id),
             doubts=robot.doubts.active(now),
             alerts=alerts,
-            alert_about=self._whom(robot, alerts[0], now) if alerts else None,
-            near=None if report is None else self._reported(robot, report, limit, now),
-            told_near=self._limited(robot, limit, now),
+            alert_about=around.of_alert(alerts[0]) if alerts else None,
+            near=None if report is None else around.of_report(report, limit),
+            told_near=around.of_limit(limit),
             stop=machine.state,
             is_resuming=once is not None and once.kind == "resume",
             out_of_service_by=None if out is None else out.by,
@@ -62,79 +62,66 @@ class Situations:
         return situation_of(facts)
 
     def _alerts(self, robot_id: str) -> list[Condition]:
-        """What holds for a robot or the fleet now and is a situation."""
+        """Conditions of a robot or the fleet that are a situation."""
         return told_of(
             one.condition
             for one in self._evaluator.alerts.waiting
             if one.cleared is None and one.condition.robot_id in (robot_id, None)
         )
 
-    def _whom(self, robot: RobotState, alert: Condition, now: Instant) -> Near | None:
-        """Whom an alert is about; its own distance is of this moment."""
+
+@dataclass(frozen=True, slots=True)
+class _Surroundings:
+    """People and robots around one robot at one moment."""
+
+    evaluator: Evaluator
+    robot: RobotState
+    now: Instant
+
+    def of_alert(self, alert: Condition) -> Near | None:
+        """Person or robot of an alert, at the distance that the alert says."""
         about, distance_m = alert.slots.get("person"), alert.slots.get("distance")
         if not isinstance(about, str):
             return None
-        found = self._near(robot, about, now)
+        found = self._named(about)
         if found is not None and isinstance(distance_m, float):
             found = replace(found, distance_m=distance_m)
-        return self._nearest(robot, found, now)
+        return self._nearest(found)
 
-    def _reported(
-        self,
-        robot: RobotState,
-        report: SafetyReport,
-        limit: SpeedLimit,
-        now: Instant,
-    ) -> Near | None:
-        """Whom a robot says that it is slow for.
+    def of_report(self, report: SafetyReport, limit: SpeedLimit) -> Near | None:
+        """Person or robot that a robot reports as its reason.
 
         It judges alerts by its own pose, too, and may be ahead of our speed limit; it
         then names the alert.
         """
         if report.reason not in HAZARDS:
             return None
-        return self._nearest(robot, self._cause(robot, report, limit, now), now)
+        return self._nearest(self._cause(report, limit))
 
-    def _cause(
-        self,
-        robot: RobotState,
-        report: SafetyReport,
-        limit: SpeedLimit,
-        now: Instant,
-    ) -> Near:
+    def of_limit(self, limit: SpeedLimit) -> Near | None:
+        """Person or robot of our speed limit."""
+        return self._nearest(self._limited(limit)) if limit.reason in HAZARDS else None
+
+    def _cause(self, report: SafetyReport, limit: SpeedLimit) -> Near:
         if report.reason == limit.reason and report.cause in (None, limit.cause):
-            return self._told(robot, limit, now)
-        known = self._evaluator.people.known.values()
+            return self._limited(limit)
         named = {report.decision_id, report.cause} - {None}
-        found = next(
-            (one for one in known if {one.decision_id, one.person_id} & named), None
-        )
-        if found is not None:
-            return self._to_person(robot, found, now)
-        seen = self._near(robot, report.cause, now)
-        return seen or Near(report.reason, distance_m=_to_obstacle(robot, report))
+        for one in self.evaluator.people.known.values():
+            if {one.decision_id, one.person_id} & named:
+                return self._person(one)
+        seen = self._named(report.cause)
+        return seen or Near(report.reason, distance_m=_to_obstacle(self.robot, report))
 
-    def _limited(
-        self, robot: RobotState, limit: SpeedLimit, now: Instant
-    ) -> Near | None:
-        """Whom our speed limit is for."""
-        if limit.reason not in HAZARDS:
-            return None
-        return self._nearest(robot, self._told(robot, limit, now), now)
-
-    def _told(self, robot: RobotState, limit: SpeedLimit, now: Instant) -> Near:
-        found = self._near(robot, limit.cause, now)
+    def _limited(self, limit: SpeedLimit) -> Near:
         return replace(
-            found or Near(limit.reason),
+            self._named(limit.cause) or Near(limit.reason),
             kind=limit.reason,
             about=limit.cause,
             distance_m=limit.distance_m,
             foretold_s=limit.foretold_s,
         )
 
-    def _nearest(
-        self, robot: RobotState, near: Near | None, now: Instant
-    ) -> Near | None:
+    def _nearest(self, near: Near | None) -> Near | None:
         """The person to name: the nearest who is seen now, else who slows the robot.
 
         The place of somebody who is out of sight is no distance to anybody, so whoever
@@ -142,51 +129,44 @@ class Situations:
         """
         if near is None or near.kind != "person":
             return near
+        people = self.evaluator.people
         seen = (
-            self._to_person(robot, one, now)
-            for one in self._evaluator.people.known.values()
+            self._person(one)
+            for one in people.known.values()
             if one.class_ == "person"
-            and one.age_s(now) <= LIMITS.seen_s
-            and self._evaluator.people.things.explain(one, now) is None
+            and one.age_s(self.now) <= LIMITS.seen_s
+            and people.things.explain(one, self.now) is None
         )
         placed = [one for one in seen if one.distance_m is not None]
         found = min(placed, key=_distance, default=near)
-        radius_m = self._evaluator.rule.radius_m.of("person")
+        radius_m = self.evaluator.rule.radius_m.of("person")
         reach_m = max(_distance(near), radius_m + _AT_A_ZONE_M)
         if found.about == near.about or _distance(found) > reach_m:
             return near
         return found
 
-    def _near(self, robot: RobotState, about: str | None, now: Instant) -> Near | None:
+    def _named(self, about: str | None) -> Near | None:
         """A person or robot by its id; None where nothing of it is known."""
-        peer = self._evaluator.world.robots.get(about or "")
+        peer = self.evaluator.world.robots.get(about or "")
         if peer is None:
-            return self._person(robot, about, now)
-        if peer.odometry is None or robot.odometry is None:
+            known = self.evaluator.people.known.get(about or "")
+            return None if known is None else self._person(known)
+        if peer.odometry is None or self.robot.odometry is None:
             return Near("robot", about)
         place = peer.odometry.pose
-        return Near("robot", about, robot.odometry.pose.distance_to(place.x, place.y))
+        distance_m = self.robot.odometry.pose.distance_to(place.x, place.y)
+        return Near("robot", about, distance_m)
 
-    def _person(
-        self, robot: RobotState, person_id: str | None, now: Instant
-    ) -> Near | None:
-        known = self._evaluator.people.known.get(person_id or "")
-        return None if known is None else self._to_person(robot, known, now)
-
-    def _to_person(
-        self, robot: RobotState, person: TrackedPerson, now: Instant
-    ) -> Near:
+    def _person(self, person: TrackedPerson) -> Near:
         """A person, or a robot that is not of the fleet."""
         x, y = person.newest.x, person.newest.y
-        lane = self._evaluator.greenhouse.lane_at(x, y)
-        odometry = robot.odometry
-        distance_m = None if odometry is None else odometry.pose.distance_to(x, y)
+        odometry = self.robot.odometry
         return Near(
             person.class_,
             person.person_id,
-            distance_m,
-            lane,
-            unseen_s=person.age_s(now),
+            None if odometry is None else odometry.pose.distance_to(x, y),
+            self.evaluator.greenhouse.lane_at(x, y),
+            unseen_s=person.age_s(self.now),
         )
 
 

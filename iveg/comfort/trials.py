@@ -41,7 +41,7 @@ class ShadowRun:
         self._ids = count()
 
     def looked(self, frame: DetectionFrame, seen_at: Instant, at: Instant) -> None:
-        """A picture of some robot, and when it came."""
+        """Take a detection frame, and when it came."""
         known, robot = self._people, self._world.robot(frame.robot_id)
         answered = self._world.word_answers.persons(frame.detector or frame.robot_id)
         rule = self._rule.also_naming(answered)
@@ -49,11 +49,11 @@ class ShadowRun:
         self._own_sight.take(Look.of_frame(robot, frame, placed, at), known)
 
     def witnessed(self, report: SafetyReport, at: Instant) -> None:
-        """What some robot's laser sees walk."""
+        """Take an obstacle of a robot's laser."""
         self._people.witness(report, at, self._new_id())
 
     def aged(self, now: Instant) -> None:
-        """A tick: people age."""
+        """Let people age."""
         self._people.forget(now)
 
     def judged(
@@ -79,7 +79,7 @@ class ShadowRun:
     def _live(
         self, limits: Limits, changes: Iterable[LimitChange]
     ) -> tuple[Limits, Sequence[LimitChange]]:
-        """What concerns robots of today."""
+        """Limits and changes of live robots."""
         live = {robot.robot_id for robot in self._world.live_robots()}
         of_live = {name: one for name, one in limits.items() if name in live}
         return of_live, [one for one in changes if one.entry.robot_id in live]

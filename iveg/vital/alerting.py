@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 
 from iveg.domain.alerts import AlertBook, BookedAlert
-from iveg.domain.events import Condition, LogEvent, Slot
+from iveg.domain.events import Condition
 from iveg.domain.observations import Instant
 from iveg.vital import topics
 from iveg.vital.core import Core
@@ -37,7 +37,8 @@ class Alerting:
         changed = self._book.sync(wrong, now, self._new_id())
         for alert in changed:
             self._event_log.alert(alert)
-            self._event_log.log(alert_line(alert), now)
+            step = "raised" if alert.cleared is None else "cleared"
+            self._event_log.log(alert_line(step, alert), now)
             if alert.condition.robot_id is not None:
                 # A P1 is part of its situation.
                 self._event_log.changed(topics.ROBOT.of(alert.condition.robot_id))
@@ -52,13 +53,7 @@ class Alerting:
         alert = self._book.acknowledge(alert_id, by, note, now)
         if alert is not None:
             self._event_log.alert(alert)
-            slots: dict[str, Slot] = {
-                **alert.condition.slots,
-                "alert": alert.condition.key,
-                "by": by,
-                "priority": alert.priority,
-            }
-            self._event_log.log(LogEvent("alert", "log.alert.acknowledged", slots), now)
+            self._event_log.log(alert_line("acknowledged", alert, by=by), now)
         return alert
 
     def acknowledge_together(

@@ -1,4 +1,4 @@
-"""The rule at work: observations change the world, the world changes speed limits.
+"""Observations change the world, and the world changes speed limits.
 
 ``apply`` takes one observation and ``settle`` judges the fleet, once for all that was
 taken; ``tick`` does what time alone brings: silence, expiry, overdue links.  The
@@ -67,7 +67,7 @@ class Evaluator:
             self.world.robots, UNSUPERVISED
         )
         self.protected_unseen = 0
-        """How often a robot slowed for a person or peer out of its own sight."""
+        """Number of slow-downs for a person or peer out of the robot's own sight."""
         self._speed_limits = SpeedLimits(core.greenhouse)
         self.tracking = DetectionTracking(core)
         self._staleness = Staleness(core)
@@ -84,7 +84,7 @@ class Evaluator:
         self._untold = False
 
     def beginning(self) -> tuple[People, SpeedLimits]:
-        """Who is known and what slows robots now, for another rule to begin with."""
+        """Known people and present limits, for another rule to begin with."""
         return self.people.copy(), self._speed_limits.copy()
 
     @property
@@ -93,13 +93,13 @@ class Evaluator:
         return self._speed_limits.entries
 
     def encounters(self, robot_id: str, now: Instant) -> Sequence[Encounter]:
-        """Rings that a robot will reach, the soonest first; forecasts grow old, too."""
+        """Zones that a robot will reach, the soonest first; old forecasts left out."""
         ahead = self._speed_limits.encounters_told(robot_id).values()
         young = (one for one in ahead if now.mono - one.at <= LIMITS.silence_s)
         return sorted(young, key=lambda one: one.in_s)
 
     def unmet(self, robot_id: str) -> Sequence[ClearCondition]:
-        """What the claim "clear" lacks for a robot now, the reason first."""
+        """Clear conditions that a robot lacks now, the reason first."""
         return self._speed_limits.unmet.get(robot_id, ())
 
     def decision_record(self, decision_id: str) -> DecisionRecord | None:

@@ -56,7 +56,7 @@ _P = ParamSpec("_P")
 def _guarded(
     write: Callable[Concatenate["EventLog", _P], None],
 ) -> Callable[Concatenate["EventLog", _P], None]:
-    """The same, whose failure is the history's and not that of what is recorded."""
+    """Guard a write: its failure is the history's, not that of what is recorded."""
 
     @wraps(write)
     def guarded(log: "EventLog", /, *args: _P.args, **kwargs: _P.kwargs) -> None:

@@ -216,7 +216,7 @@ def _seen_by(
     observer: str,
     confidence: float | None = None,
 ) -> SlowdownCauses | None:
-    """How far a cause at x, y (m) is from a robot, and whether it may see it."""
+    """Distance of a cause at x, y (m) from a robot, and whether it may see it."""
     if robot.odometry is None:
         return None
     pose = robot.odometry.pose
@@ -283,19 +283,14 @@ def speed_line(
     )
 
 
-def alert_line(alert: BookedAlert) -> LogEvent:
-    """An alert was raised or cleared."""
-    condition = alert.condition
-    key = "log.alert.raised" if alert.cleared is None else "log.alert.cleared"
-    slots: dict[str, Slot] = {
-        **condition.slots,
-        "alert": condition.key,
-        "priority": alert.priority,
-    }
-    return LogEvent("alert", key, slots, condition.robot_id)
+def alert_line(step: str, alert: BookedAlert, **also: Slot) -> LogEvent:
+    """An alert was raised, cleared or acknowledged."""
+    condition, key = alert.condition, alert.condition.key
+    slots = {**condition.slots, "alert": key, "priority": alert.priority, **also}
+    return LogEvent("alert", f"log.alert.{step}", slots, condition.robot_id)
 
 
 def thing_line(key: str, thing: Thing, by: str) -> LogEvent:
     """A line of the log: a mark was made, taken back, or is over."""
-    slots: dict[str, Slot] = {"by": by, "x": round(thing.x, 2), "y": round(thing.y, 2)}
-    return LogEvent("system", key, slots)
+    place = {"x": round(thing.x, 2), "y": round(thing.y, 2)}
+    return LogEvent("system", key, {"by": by, **place})

@@ -30,7 +30,7 @@ TICK_S = 0.05
 POSES_S = 0.02
 """After poses alone the fleet is judged at most so often (s)."""
 URGENT_S = 0.01
-"""The same after a detection frame or a robot's obstacle (s)."""
+"""After a detection frame or a robot's obstacle it is judged so soon (s)."""
 _EARLY_S = 0.001
 _ANSWERS = (CommandAnswer, GoalAnswer)
 _HEALTH_PERIOD_S = 1.0

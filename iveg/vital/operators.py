@@ -117,8 +117,8 @@ class Rules:
 
 def _lines(before: DetectionRule, rule: DetectionRule) -> Iterator[LogEvent]:
     """The change, then each value of a class that is another now."""
-    slots: dict[str, Slot] = {"by": rule.author, "version": rule.version}
-    yield LogEvent("system", "log.rule_changed", slots)
+    facts: dict[str, Slot] = {"by": rule.author, "version": rule.version}
+    yield LogEvent("system", "log.rule_changed", facts)
     for class_ in CLASSES:
         earlier = for_class(before, class_)
         for row in PARAMETERS:
@@ -126,13 +126,12 @@ def _lines(before: DetectionRule, rule: DetectionRule) -> Iterator[LogEvent]:
             one_for_all = row.class_key is None and class_ != CLASSES[0]
             if value == earlier[row.name] or one_for_all:
                 continue
-            changed: dict[str, Slot] = {
+            about = {
                 "parameter": row.word,
                 "class": "every" if row.class_key is None else class_,
-                "from": float(earlier[row.name]),
-                "to": float(value),
             }
-            yield LogEvent("system", f"log.rule.{row.unit}", changed)
+            values = {"from": float(earlier[row.name]), "to": float(value)}
+            yield LogEvent("system", f"log.rule.{row.unit}", {**about, **values})
 
 
 class Detectors:

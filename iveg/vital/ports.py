@@ -1,4 +1,4 @@
-"""What the pipeline needs of the outside: a few verbs each."""
+"""Ports of the pipeline to the outside, a few verbs each."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass

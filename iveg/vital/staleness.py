@@ -66,7 +66,7 @@ class Staleness:
         if key is None or before is None:
             return
         newest = person.newest
-        slots: dict[str, Slot] = {
+        slots = {
             "person": person.person_id,
             "observer": newest.observer,
             "class": person.class_,

@@ -96,7 +96,7 @@ class Supervision:
         """Parts that wait for their restart."""
         self._minute = 0
         self._longest_s = 0.0, 0.0
-        """Of this minute, and of the one before."""
+        """Longest turn of this minute, and of the one before (s)."""
         self._long_turns: dict[str, tuple[float, float]] = {}
         """Part → when its newest long turn ended (monotonic, s), and its CPU (s)."""
         self._found: dict[str, tuple[Condition, ...]] = {}
@@ -146,7 +146,7 @@ class Supervision:
             pause_s = min(LONGEST_PAUSE_S, 2.0 * pause_s)
 
     def report(self, part: str, wrong: Iterable[Condition]) -> None:
-        """What a part has found wrong, in the place of what it found before."""
+        """Take the conditions of a part in the place of its earlier ones."""
         self._found[part] = tuple(wrong)
 
     def note_turn(self, part: str, cpu_s: float) -> None:

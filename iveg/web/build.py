@@ -96,7 +96,7 @@ class WebParts:
 
 
 def live_routers(web: WebParts) -> Iterator[Callable[[], APIRouter]]:
-    """What makes the routes of now: all but history and pages."""
+    """Makers of the routes of the present: all but history and pages."""
     parts, views, clock = web.pipeline, web.views, web.clock
     watch, evaluator = parts.latency, parts.evaluator
     yield partial(

@@ -112,16 +112,6 @@ async def test_without_the_direct_transport_only_orion_is_asked() -> None:
     assert len(desk.broker.asked) == 1
 
 
-async def test_stop_all_stops_every_robot_at_once() -> None:
-    desk = Desk()
-
-    commands = await desk.commander.stop(desk.commander.machines, "ana", desk.clock())
-    await settle()
-
-    assert [name for name, _ in desk.fleet.stops] == ["AGI", "AGII"]
-    assert len({command.command_id for command in commands}) == 2
-
-
 async def test_i3_204_from_orion_and_a_puback_are_no_evidence() -> None:
     desk = Desk()
 
