@@ -7,19 +7,6 @@ from tests.builders import detection
 from tests.unit.vital.desk import Desk, conditions_of
 
 ALERT = "alert.frame_not_named"
-LISTING_1 = {
-    "class_id": "farmer",
-    "probability": 0.945,
-    "position": {
-        "xmin": 0.4506,
-        "xmax": 0.7936,
-        "ymin": -0.3154,
-        "ymax": 0.1137,
-        "zmin": -0.2596,
-        "zmax": 0.1051,
-    },
-}
-"""The box of the paper, which names no frame."""
 
 
 def unlabelled(x: float, class_id: str = "farmer") -> Detection:
