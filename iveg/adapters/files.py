@@ -323,7 +323,7 @@ def _lock(handle: int, what: str) -> None:
 
 
 class FileByRobot(Generic[_T]):
-    """Implements ``pipeline.ports.ChoiceStore``.
+    """A value for each robot, in a small file that is replaced as a whole.
 
     Args:
         path: The file.

@@ -39,7 +39,7 @@ _MOST_WAITING = 10_000
 
 
 class FileJournal:
-    """The journal in one file; implements ``pipeline.ports.StopJournal``.
+    """The journal in one file; implements ``vital.ports.StopJournal``.
 
     Args:
         path: The file.
