@@ -19,7 +19,7 @@ from iveg.domain.events import LogEvent
 from iveg.domain.fleet import FleetDescription
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.latency import LatencyWatch
-from iveg.domain.tracking.calibration import Calibrations
+from iveg.domain.tracking.looks import Calibrations
 from iveg.domain.tracking.people import People
 from iveg.domain.world import World
 from iveg.vital.command import Commander

@@ -178,6 +178,7 @@ class Dss:
             self.settings.direct_read,
             ingest.is_past,
             partial(self.supervision.tell, "measured"),
+            ingest.is_early,
         )
 
         def came_back() -> None:
@@ -188,11 +189,12 @@ class Dss:
             monitor.mqtt_connected = False
 
         self.outside.link.attach(
-            reader.subscriptions(),
+            {},
             reader.read,
             came_back,
             was_lost,
             reader.refuse_stored,
+            [*reader.subscriptions().values()],
         )
 
     def _provisioner(self) -> Provisioner:

@@ -2,7 +2,6 @@
 
 import asyncio
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -20,13 +19,9 @@ from iveg.cli.running import (
     tune_garbage_collection,
 )
 from iveg.domain.errors import HopError, SettingsError, UnreadableError
-from iveg.domain.feedback import Feedback
 from iveg.domain.fleet import UNDESCRIBED_SPEED, RobotDescription, RobotProfile
-from iveg.domain.geometry import Twist2D
-from iveg.domain.witness import Outline, Plan
+from iveg.domain.witness import Plan
 from iveg.ngsi import names
-from iveg.robot.goals import Navigate
-from iveg.robot.node import RobotNode
 from iveg.robot.ros2.checking import CheckRow, Traffic, forms_published, judge, lines
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.inputs import SensorInputs
@@ -154,35 +149,16 @@ async def _ride(
     if options.greenhouse is not None:
         # What the laser need not report.
         plan = Plan.of(load_greenhouse(options.greenhouse))
-    safety = node_settings(settings, call.data / "robots", plan)
     described = load_fleet(settings.fleet, settings.robots).of_robot(options.id)
-    body = _profile(described, config)
-
-    def make_node(
-        drive: Callable[[Twist2D], None],
-        on_feedback: Callable[[str, Feedback], None],
-        navigate: Navigate,
-    ) -> RobotNode:
-        return RobotNode(
-            options.id,
-            safety,
-            profile=body,
-            drive=drive,
-            on_feedback=on_feedback,
-            navigate=navigate,
-        )
-
     with Dds(network, gate=options.id) as dds:
         await refuse_second_gate(dds, config.full_topics["cmd_vel_out"])
         robot = Ros2Robot(
             options.id,
             config,
             dds,
-            make_node,
-            classes=classes,
-            sim_time=options.sim_time,
-            outline=Outline(body.length, body.width),
-            area=None if plan is None else plan.bounds,
+            SensorInputs(config, classes, sim_time=options.sim_time),
+            node_settings(settings, call.data / "robots", plan),
+            _profile(described, config),
         )
         if options.attended:
             robot.node.release_locally()

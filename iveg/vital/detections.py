@@ -21,10 +21,9 @@ from iveg.domain.observations import DetectionFrame, Instant, Received, SafetyRe
 from iveg.domain.records import DetectionRecord
 from iveg.domain.robot_state import RobotState
 from iveg.domain.stream_order import OrderVerdict
-from iveg.domain.tracking.blind import BlindCameras
 from iveg.domain.tracking.people import Placed
 from iveg.domain.tracking.person import Sighting, TrackedPerson
-from iveg.domain.tracking.sight import Look, OwnSight
+from iveg.domain.tracking.sight import BlindCameras, Look, OwnSight
 from iveg.domain.words import HeardWords, meaning_of, name_numbers, plain
 from iveg.vital import topics
 from iveg.vital.core import Core
@@ -108,7 +107,7 @@ class KeptDetections:
             self._kept_at = {
                 key: at
                 for key, at in self._kept_at.items()
-                if now.mono - at < LIMITS.ring_lasts_s
+                if now.mono - at < LIMITS.zone_lasts_s
             }
             self._looks = {
                 key: looks for key, looks in self._looks.items() if key in self._kept_at
@@ -218,7 +217,7 @@ class DetectionTracking:
         detector, has_pose = robot.detector, robot.odometry is not None
         seen_at = robot.sighted_at or received.at
         late = verdict == "late" and not received.asked
-        protects = late and received.at.mono - seen_at.mono <= LIMITS.ring_lasts_s
+        protects = late and received.at.mono - seen_at.mono <= LIMITS.zone_lasts_s
         if verdict != "new" and not protects:
             return
         if not detector.admits_frame(received.at):
@@ -367,7 +366,7 @@ class DetectionTracking:
             self._logged_at = {
                 key: at
                 for key, at in self._logged_at.items()
-                if now.mono - at < LIMITS.ring_lasts_s
+                if now.mono - at < LIMITS.zone_lasts_s
             }
 
 

@@ -94,7 +94,7 @@ class Evaluator:
 
     def encounters(self, robot_id: str, now: Instant) -> Sequence[Encounter]:
         """Zones that a robot will reach, the soonest first; old forecasts left out."""
-        ahead = self._speed_limits.encounters_told(robot_id).values()
+        ahead = self._speed_limits.encounters.get(robot_id, {}).values()
         young = (one for one in ahead if now.mono - one.at <= LIMITS.silence_s)
         return sorted(young, key=lambda one: one.in_s)
 

@@ -157,5 +157,4 @@ def build_app(
     app.add_middleware(SignInGate, clock=clock)
     # Last is outermost: a refusal carries the headers, too.
     app.add_middleware(headers.SecurityHeaders)
-    app.add_middleware(notifications.NotificationsFirst, endpoint=web.orion)
     return app

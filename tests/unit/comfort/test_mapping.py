@@ -82,15 +82,6 @@ def test_whom_a_recording_saw_is_not_laid_over_today() -> None:
     assert not knows(field.shared(recorded), 15.0, 15.0)
 
 
-def test_one_tick_takes_one_scan_however_many_wait() -> None:
-    field = Field()
-    field.sweep_from("AGI", 5.0)
-    field.sweep_from("AGII", 15.0)
-    field.tick()
-
-    assert knows(field.shared(), 6.0) != knows(field.shared(), 16.0)
-
-
 def test_f60_a_scan_that_cannot_be_drawn_is_refused_and_the_others_are_drawn() -> None:
     field, refused = Field(), list[tuple[str, str]]()
     scans = ScanReader(lambda robot, why, _: refused.append((robot, why)))
