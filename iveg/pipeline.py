@@ -164,11 +164,5 @@ def _ingest(core: Core) -> Ingest:
         slots = {"source": source, "reason": reason}
         event_log.log(LogEvent("system", "log.rejected", slots), clock())
 
-    return Ingest(
-        world.robots.__contains__,
-        log_rejected,
-        world.is_past,
-        partial(core.supervision.tell, "arrived"),
-        world.is_refused,
-        world.misplaced,
-    )
+    tell_arrival = partial(core.supervision.tell, "arrived")
+    return Ingest(world, tell_arrival, log_rejected)

@@ -27,7 +27,7 @@ from iveg.adapters.greenhouses import load_greenhouse
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.loop_watch import LoopWatch
 from iveg.adapters.messages import AppriseSender, load_messages
-from iveg.adapters.provisioner import Provisioner
+from iveg.adapters.provisioner import FiwareSite, Provisioner
 from iveg.adapters.recordings.pictures import PictureFiles
 from iveg.adapters.recordings.recorder import PART as RECORDINGS
 from iveg.adapters.recordings.recorder import RecordedSink
@@ -58,7 +58,7 @@ from iveg.web.api import health
 from iveg.web.build import WebParts
 from iveg.web.live.encoder import Encoder
 from iveg.web.live.pictures import Past, PictureRecorder
-from iveg.web.notifications import NotificationEndpoint
+from iveg.web.notifications import Followers, NotificationEndpoint
 from iveg.web.pages import sentences
 from iveg.web.pages.contexts import Site
 from iveg.web.security.secrets import NotifySecret
@@ -173,12 +173,9 @@ class Dss:
             self.settings.apikey,
             self.fleet.ids,
             clock.now,
-            ingest.enqueue,
-            ingest.reject,
+            ingest,
             self.settings.direct_read,
-            ingest.is_past,
             partial(self.supervision.tell, "measured"),
-            ingest.is_early,
         )
 
         def came_back() -> None:
@@ -205,14 +202,15 @@ class Dss:
             outside.link,
             self.core.health_monitor,
             self.pipeline.ingest,
-            robots=self.fleet.ids,
-            apikey=settings.apikey,
-            context_broker_url=settings.iota_cb_url or settings.orion_url,
-            notify_url=settings.notify_address,
-            notify_token=self.notify_secret.current,
-            boot=self.core.boot,
-            read_clock=clock.now,
-            tiles=self.pipeline.equipment.equipment.tiles,
+            FiwareSite(
+                self.fleet.ids,
+                settings.apikey,
+                context_broker_url=settings.iota_cb_url or settings.orion_url,
+                notify_url=settings.notify_address,
+                notify_token=self.notify_secret.current,
+                boot=self.core.boot,
+                tiles=self.pipeline.equipment.equipment.tiles,
+            ),
         )
 
     def _web(self, *, demo: bool) -> WebParts:
@@ -224,13 +222,14 @@ class Dss:
             parts.ingest,
             self.notify_secret,
             clock.now,
-            self.provisioner.is_ours,
+            self.provisioner,
             (settings.fiware_service, settings.fiware_servicepath),
-            self._notified,
-            parts.equipment.equipment.entities,
-            partial(self.supervision.tell, "entity_read"),
-            partial(self.supervision.tell, "notified"),
-            self.provisioner.is_former,
+            Followers(
+                self._notified,
+                parts.equipment.equipment.entities,
+                partial(self.supervision.tell, "entity_read"),
+                partial(self.supervision.tell, "notified"),
+            ),
         )
         site = Site(
             self.core.greenhouse.name,

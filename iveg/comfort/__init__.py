@@ -1,1 +1,1 @@
-"""Parts that people like to have: each may fail, and nothing vital notices."""
+"""Parts that may fail, and nothing vital notices: history, map, messages, goals."""

@@ -1,1 +1,1 @@
-"""Speed limits and STOP: observations enter; feedback, orders and alerts leave."""
+"""Parts of a limit or a STOP: observations in; feedback, orders and alerts out."""
