@@ -65,7 +65,7 @@ def forecasts(
 ) -> Iterator[Forecast]:
     """Where iVeg has everybody go whom it sees."""
     evaluator = iveg.parts.evaluator
-    for robot in iveg.parts.world.robots.values():
+    for robot in iveg.parts.core.world.robots.values():
         odometry = robot.odometry
         if odometry and abs(odometry.twist.linear_x) >= MOVES_M_S:
             x, y = path_of(robot, now)
@@ -90,7 +90,7 @@ def meetings(
     iveg: VirtualPipeline, step: int, places: Places, now: Instant
 ) -> Iterator[Meeting]:
     """The encounters with people that were foretold just now."""
-    for robot_id in iveg.parts.world.robots:
+    for robot_id in iveg.parts.core.world.robots:
         for one in iveg.parts.evaluator.encounters(robot_id, now):
             name = person_at(places, one.zone.x, one.zone.y)
             apart = 0.0 if name is None else math.dist(places[name], places[robot_id])

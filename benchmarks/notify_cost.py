@@ -17,8 +17,7 @@ import numpy as np
 import orjson
 
 from benchmarks.process import print_table
-from iveg.app.dss import Dss
-from iveg.app.opening import open_dss
+from iveg.app.dss import Dss, open_dss
 from iveg.asgi import create_app
 from iveg.ngsi.codec import read_notification
 from iveg.settings import Settings
@@ -134,7 +133,7 @@ async def whole_way(dss: Dss, line: Line, bodies: list[bytes]) -> float:
         await line.post(one)
     spent = (time.process_time() - began) / len(bodies) * 1000
     for received in dss.pipeline.ingest.drain():
-        dss.pipeline.world.apply(received)
+        dss.core.world.apply(received)
     return spent
 
 

@@ -1,4 +1,4 @@
-"""The web face of the DSS: the routes of now, of the past, and the pages."""
+"""The web side of the server: routes of the present, of the past, and the pages."""
 
 import asyncio
 from collections.abc import Iterator
@@ -20,15 +20,15 @@ _STATIC = Path(__file__).with_name("static")
 
 
 def create_app(dss: Dss) -> FastAPI:
-    """The web face of a DSS; its lifespan runs the rest."""
+    """The web side of a DSS; its lifespan runs the rest."""
     # Whoever has the link needs no admin.
     pages = drawing.Pages(
-        dss.face.site, lambda: dss.face.site.link or dss.door.people.is_led()
+        dss.web.site, lambda: dss.web.site.link or dss.accounts.people.is_led()
     )
     app = build_app(
-        dss.face,
+        dss.web,
         pages,
-        [*(make() for make in live_routers(dss.face)), *_past_routers(dss, pages)],
+        [*(make() for make in live_routers(dss.web)), *_past_routers(dss, pages)],
         title="iVeg",
         version=__version__,
         description="Supervise mixed robot fleets in greenhouses.",
@@ -54,8 +54,8 @@ def create_app(dss: Dss) -> FastAPI:
 
 def _past_routers(dss: Dss, pages: drawing.Pages) -> Iterator[APIRouter]:
     """History, and what a browser needs besides."""
-    queries, face = dss.stores.queries, dss.face
-    views, evaluator, clock = face.views, dss.pipeline.evaluator, face.clock
+    queries, web = dss.stores.queries, dss.web
+    views, evaluator, clock = web.views, dss.pipeline.evaluator, web.clock
     yield day.stop_records_router(queries, clock, views.find_command)
     url, greenhouse, worker = queries.url, evaluator.greenhouse, dss.worker
     yield day.router(
@@ -74,22 +74,20 @@ def _past_routers(dss: Dss, pages: drawing.Pages) -> Iterator[APIRouter]:
             queries,
             dss.stores.inputs,
             dss.packer,
-            lambda: dss.services.rules.versions,
+            lambda: dss.pipeline.rules.versions,
             dss.settings.without_secrets(),
-            dss.pipeline.event_log.log,
+            dss.core.event_log.log,
             clock,
             __version__,
         )
     )
-    yield alerts.notes_router(
-        queries, dss.fleet.members, dss.pipeline.event_log.log, clock
-    )
+    yield alerts.notes_router(queries, dss.fleet.members, dss.core.event_log.log, clock)
     if dss.sign_in_token:
         yield account.sign_in_code_router(dss.sign_in_token)
-    yield account.router(dss.door.people)
+    yield account.router(dss.accounts.people)
     yield account.sessions_router()
-    yield account.users_router(dss.door.people, clock)
-    yield account.tokens_router(dss.door.people, dss.door.programs, clock)
+    yield account.users_router(dss.accounts.people, clock)
+    yield account.tokens_router(dss.accounts.people, dss.accounts.programs, clock)
     if dss.sign_on is not None:
         yield signing.router(pages, dss.sign_on)
     yield routes.service_worker_router()

@@ -1,4 +1,4 @@
-"""What the values of settings may be: a rule, and behind it the same in words."""
+"""Types of settings: a check of the value, and behind it the check in words."""
 
 from ipaddress import ip_address
 from typing import Annotated, Any, Literal, get_args

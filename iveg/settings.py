@@ -17,7 +17,7 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 from iveg.domain.accounts import DEFAULT_NAME, PersonRole
 from iveg.domain.errors import SettingsError
 from iveg.domain.limits import LIMITS
-from iveg.domain.parameters import PARAMETERS, ByClass, Parameter, Parameters
+from iveg.domain.parameters import PARAMETERS, ByClass, Parameters
 from iveg.domain.recordings import RecordingLimits
 from iveg.domain.retention import Retention
 from iveg.setting_types import (
@@ -382,24 +382,47 @@ class Settings:
     def _check_together(self) -> None:
         """Raise SettingsError where two settings contradict each other."""
         kept, forever = self.retention, math.inf
-        if self.feedback_stand_s <= self.feedback_slow_s:
-            name, value = "IVEG_FEEDBACK_STAND_S", f"{self.feedback_stand_s:g}"
-            raise SettingsError(name, value, "more than IVEG_FEEDBACK_SLOW_S")
-        if (kept.positions or forever) > (kept.decisions or forever):
-            name, value = "IVEG_KEEP_POSITIONS_DAYS", str(kept.positions)
-            raise SettingsError(name, value, "no longer than IVEG_KEEP_DECISIONS_DAYS")
-        if (kept.audit or forever) < (kept.decisions or forever):
-            name, value = "IVEG_KEEP_AUDIT_DAYS", str(kept.audit)
-            raise SettingsError(name, value, "no shorter than IVEG_KEEP_DECISIONS_DAYS")
-
-        if self.fiware_token_url and not self.fiware_client_id:
-            name = "IVEG_FIWARE_CLIENT_ID"
-            raise SettingsError(name, "", "set where IVEG_FIWARE_TOKEN_URL is")
-        if self.sso_issuer and not self.sso_client_id:
-            name = "IVEG_SSO_CLIENT_ID"
-            raise SettingsError(name, "", "set where IVEG_SSO_ISSUER is")
-        if self.sso_issuer and not self.sso_roles:
-            raise SettingsError("IVEG_SSO_ROLES", "", "set where IVEG_SSO_ISSUER is")
+        decisions = kept.decisions or forever
+        for is_so, variable, value, allowed in (
+            (
+                self.feedback_stand_s > self.feedback_slow_s,
+                "IVEG_FEEDBACK_STAND_S",
+                f"{self.feedback_stand_s:g}",
+                "more than IVEG_FEEDBACK_SLOW_S",
+            ),
+            (
+                (kept.positions or forever) <= decisions,
+                "IVEG_KEEP_POSITIONS_DAYS",
+                str(kept.positions),
+                "no longer than IVEG_KEEP_DECISIONS_DAYS",
+            ),
+            (
+                (kept.audit or forever) >= decisions,
+                "IVEG_KEEP_AUDIT_DAYS",
+                str(kept.audit),
+                "no shorter than IVEG_KEEP_DECISIONS_DAYS",
+            ),
+            (
+                self.fiware_client_id or not self.fiware_token_url,
+                "IVEG_FIWARE_CLIENT_ID",
+                "",
+                "set where IVEG_FIWARE_TOKEN_URL is",
+            ),
+            (
+                self.sso_client_id or not self.sso_issuer,
+                "IVEG_SSO_CLIENT_ID",
+                "",
+                "set where IVEG_SSO_ISSUER is",
+            ),
+            (
+                self.sso_roles or not self.sso_issuer,
+                "IVEG_SSO_ROLES",
+                "",
+                "set where IVEG_SSO_ISSUER is",
+            ),
+        ):
+            if not is_so:
+                raise SettingsError(variable, value, allowed)
 
     @property
     def sso_role_map(self) -> dict[str, PersonRole]:
@@ -407,12 +430,12 @@ class Settings:
         return dict(row for one in self.sso_roles if (row := split_role(one)))
 
     def limits_of_recordings(self, most_gb: int) -> RecordingLimits:
-        """How many recordings of a sort are kept."""
+        """Limits of one sort of recordings."""
         return RecordingLimits(self.keep_recordings_days, most_gb * 10**9)
 
     @property
     def retention(self) -> Retention:
-        """How long the history keeps what."""
+        """Time that the history keeps rows of each kind."""
         return Retention(
             self.keep_positions_days,
             self.keep_telemetry_days,
@@ -423,8 +446,7 @@ class Settings:
     @property
     def notify_address(self) -> str:
         """URL to which Orion posts notifications."""
-        own = f"http://{self.host}:{self.port}/ngsi/notifications"
-        return self.notify_url or own
+        return self.notify_url or f"http://{self.host}:{self.port}/ngsi/notifications"
 
     def without_secrets(self) -> dict[str, str]:
         """All of them by variable; of secrets and logins nothing."""
@@ -465,15 +487,12 @@ def _rows() -> Iterator[_Row]:
     hints = get_type_hints(Settings, include_extras=True)
     for one in fields(Settings):
         if one.name == "rule":
-            yield from map(_of_rule, PARAMETERS)
+            for row in PARAMETERS:
+                type_, default = rule_value(row), row.default
+                yield _Row(row.variable, row.name, type_, default, row.says, True)
         else:
             variable, help_ = one.metadata["variable"], one.metadata["help"]
             yield _Row(variable, one.name, hints[one.name], one.default, help_)
-
-
-def _of_rule(row: Parameter) -> _Row:
-    hint = rule_value(row)
-    return _Row(row.variable, row.name, hint, row.default, row.says, is_of_rule=True)
 
 
 def _read(row: _Row, text: str) -> Any:
@@ -503,15 +522,15 @@ def _write(value: object) -> str:
     if isinstance(value, tuple):
         return ",".join(value)
     if isinstance(value, ByClass):
-        others = (f"{class_}={one}" for class_, one in value.by_class.items())
-        return ",".join((str(value.every), *others))
+        by_class = (f"{class_}={one}" for class_, one in value.by_class.items())
+        return ",".join((str(value.every), *by_class))
     return str(value)
 
 
 def default_data_directory(environment: Mapping[str, str], home: Path) -> Path:
     """The user's data directory for iVeg (XDG base directory specification)."""
-    base = environment.get("XDG_DATA_HOME", "")
-    return (Path(base) if base else home / ".local" / "share") / "iveg"
+    base = environment.get("XDG_DATA_HOME") or home / ".local" / "share"
+    return Path(base) / "iveg"
 
 
 def describe() -> str:

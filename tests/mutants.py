@@ -317,13 +317,13 @@ MUTANTS = (
         "vital: a drawing shares the fate of STOP",
         'return {"mqtt": link.run, "rule-loop": loop.run}',
         'return {"mqtt": link.run, "rule-loop": loop.run, '
-        '"costmap": lambda: self.services.mapper.run(clock.now)}',
+        '"costmap": partial(_tick, self.pipeline.mapper.tick, 0.05)}',
         ("unit/app",),
     ),
     Mutant(
         "vital: a failure of comfort is its caller's",
-        "                self.failed(part, error)\n\n        return guarded",
-        "                raise\n\n        return guarded",
+        "            self.failed(part, error)\n\n    def failed",
+        "            raise\n\n    def failed",
         ("unit/vital/test_supervision.py",),
     ),
     Mutant(

@@ -15,7 +15,7 @@ from iveg.lab.emulator.world import SimulatedWorld
 from iveg.lab.experiment import stage as staging
 from iveg.lab.experiment.stage import STEP_S
 from iveg.pipeline import Pipeline
-from iveg.vital.things import ThingMarks
+from iveg.vital.operators import ThingMarks
 from iveg.web.views import Views
 from tests.unit.vital.desk import Desk, settle
 
@@ -104,8 +104,7 @@ class Stage:
 
     def mark(self, person_id: str) -> None:
         """An operator says that somebody is no person, for the rest of the day."""
-        people, event_log = self.desk.evaluator.people, self.desk.parts.event_log
-        marks = ThingMarks(people, event_log)
+        marks = ThingMarks(self.parts.core)
         marks.mark(person_id, "ana", self.now.wall + 3600.0, self.now)
 
     # --- what iVeg says ---------------------------------------------------------------

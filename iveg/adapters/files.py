@@ -313,7 +313,7 @@ def _lock(handle: int, what: str) -> None:
 
 
 class FileByRobot(Generic[_T]):
-    """One value for each robot, in a file that is replaced as a whole.
+    """A value for each robot, in a small file that is replaced as a whole.
 
     Args:
         path: The file.

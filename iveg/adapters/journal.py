@@ -61,7 +61,7 @@ _Line = _Wish | Waiting
 
 
 class FileJournal:
-    """The journal in one file; implements ``pipeline.ports.StopJournal``.
+    """The journal in one file; implements ``vital.ports.StopJournal``.
 
     Args:
         path: The file.

@@ -47,7 +47,7 @@ _FIRST = DetectionRule()
 
 
 class FileRules:
-    """The rule's versions in one file; implements ``pipeline.ports.RuleStore``."""
+    """The versions of the rule in one file."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -209,7 +209,7 @@ TRIALS_FORM = Form("trial")
 
 
 class FileTrials:
-    """The trial; implements ``pipeline.ports.ChoiceStore``."""
+    """The trial in one file."""
 
     def __init__(self, path: Path) -> None:
         self._path = path

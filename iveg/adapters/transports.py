@@ -71,7 +71,7 @@ class MqttTransport:
 
 
 class OrionTransport:
-    """Through Orion; implements ``pipeline.ports.CommandPort``."""
+    """Through Orion; implements ``vital.ports.CommandPort``."""
 
     def __init__(self, orion: OrionClient) -> None:
         self._orion = orion

@@ -1,12 +1,18 @@
-"""The DSS with all its parts, wired; and its life."""
+"""The one composition of iVeg's server: settings → parts, and their life.
+
+Vital parts share one fate, comfort has none.  A vital part that ends takes the process
+with it, after a last word to the fleet: a server that is half alive would look as if it
+watched (docs/architecture.md, "Vital and comfort").
+"""
 
 import asyncio
 import logging
 import secrets
 from collections import Counter
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from contextlib import asynccontextmanager
 from functools import partial
+from pathlib import Path
 
 from fastapi import FastAPI
 
@@ -16,7 +22,9 @@ from iveg.adapters.calibration_files import load_calibrations
 from iveg.adapters.clock import new_id
 from iveg.adapters.direct import DirectReader
 from iveg.adapters.equipment_files import load_equipment
+from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
+from iveg.adapters.history.queries import Queries
 from iveg.adapters.loop_watch import LoopWatch
 from iveg.adapters.messages import AppriseSender, load_messages
 from iveg.adapters.provisioner import FiwareSite, Provisioner
@@ -25,24 +33,29 @@ from iveg.adapters.recordings.recorder import PART as RECORDINGS
 from iveg.adapters.recordings.recorder import RecordedSink
 from iveg.adapters.transports import MqttTransport, OrionTransport
 from iveg.adapters.worker import PACK_LIMIT_S, Worker
-from iveg.app.counts import count_all, read_queues
-from iveg.app.door import PART as ACCOUNTS
-from iveg.app.door import Door
-from iveg.app.life import Work, live
-from iveg.app.outside import Outside
+from iveg.app.accounts import PART as ACCOUNTS
+from iveg.app.accounts import Accounts
+from iveg.app.outside import Outside, open_outside
 from iveg.comfort.equipment import PART as EQUIPMENT
+from iveg.comfort.equipment import TICK_S as EQUIPMENT_TICK_S
+from iveg.comfort.maps import COVERAGE_TICK_S, SCAN_TICK_S
+from iveg.comfort.messenger import PART as MESSAGES
 from iveg.comfort.messenger import Messenger
-from iveg.comfort.restore import remember
 from iveg.comfort.retention import PART as RETENTION
 from iveg.comfort.retention import HistoryUpkeep
-from iveg.domain.errors import VitalPartError
+from iveg.comfort.trials import PART as TRIAL
+from iveg.domain.alerts import MOST_KEPT, read_alert
+from iveg.domain.errors import HopError, SettingsError, VitalPartError
 from iveg.domain.fleet import FleetDescription
 from iveg.domain.observations import Instant
 from iveg.domain.transports import DIRECT, FIWARE
-from iveg.pipeline import Choices, Ports, build, build_services
+from iveg.pipeline import Choices, Pipeline, build
 from iveg.settings import Settings
 from iveg.vital.audit import AuditTrail
-from iveg.web.build import Face
+from iveg.vital.ports import Ports
+from iveg.vital.supervision import Supervision
+from iveg.web.api import health
+from iveg.web.build import WebParts
 from iveg.web.live.encoder import Encoder
 from iveg.web.live.pictures import Past, PictureRecorder
 from iveg.web.notifications import Followers, NotificationEndpoint
@@ -52,6 +65,12 @@ from iveg.web.security.secrets import NotifySecret
 from iveg.web.views import Views
 
 _log = logging.getLogger(__name__)
+Work = Callable[[], Awaitable[object]]
+EARLIER_LINES = 200
+"""Lines of the log that come back after a restart."""
+_ASK_AGAIN_S = 5.0
+LAST_WORD_S = 0.5
+"""Time that the last word may take; robots slow by themselves half a second later."""
 
 
 class Dss:
@@ -64,11 +83,9 @@ class Dss:
         demo: Whether the robots are emulated; shown on the page.
 
     Attributes:
-        on_failure: Called when a vital part has ended.
-        failure: The error that ended it; None while all is well.
-        counted: Counters of parts beside the pipeline.
-        pipeline: From observations to feedback; ``services`` beside it.
-        face: The parts that the web shows.
+        failure: The error that ended a vital part; None while all is well.
+        pipeline: From observations to feedback, and comfort beside it.
+        web: The parts that the web shows.
     """
 
     def __init__(
@@ -81,68 +98,60 @@ class Dss:
     ) -> None:
         self.settings, self.fleet, self.outside = settings, fleet, outside
         self.stores = outside.stores
-        self.on_failure: Callable[[], None] = lambda: None
         self.failure: VitalPartError | None = None
         # An empty token lets nobody in.
         by_link = settings.sign_in == "link" or demo
         link = settings.sign_in_token or secrets.token_hex(32)
         self.sign_in_token = link if by_link else ""
-        notify_token = settings.notify_token or secrets.token_hex(32)
-        previous = settings.notify_token_previous
-        self.notify_secret = NotifySecret(notify_token, previous)
-        self._boot, self._demo = secrets.token_hex(8), demo
-        kept = self.stores.kept_choices(settings)
-        era = f"-{self._boot[:8]}"
-        tiles = load_equipment(settings.equipment, fleet.ids)
-        rows = load_calibrations(settings.calibration)
-        refused = settings.refused_robots
-        choices = Choices(kept.rules[-1], self._boot, era, tiles, rows, refused)
-        greenhouse = load_greenhouse(settings.greenhouse)
-        self.pipeline = build(fleet, greenhouse, self._ports(), choices)
-        self.stores.inputs.rule = lambda: self.pipeline.evaluator.rule
-        self.services = build_services(self.pipeline, kept, clock.now)
-        self.messenger = self._messenger()
+        self.notify_secret = NotifySecret(
+            settings.notify_token or secrets.token_hex(32),
+            settings.notify_token_previous,
+        )
+        boot = secrets.token_hex(8)
+        self.pipeline = build(
+            fleet,
+            load_greenhouse(settings.greenhouse),
+            self._ports(),
+            Choices(
+                self.stores.kept_choices(settings),
+                boot,
+                f"-{boot[:8]}",
+                load_equipment(settings.equipment, fleet.ids),
+                load_calibrations(settings.calibration),
+                settings.refused_robots,
+            ),
+        )
+        self.core = core = self.pipeline.core
+        inputs, self.supervision = self.stores.inputs, core.supervision
+        inputs.rule = lambda: self.pipeline.evaluator.rule
+        self.supervision.listen(
+            RECORDINGS, measured=inputs.measure, notified=inputs.notification
+        )
+        plan = load_messages(settings.messages)
+        write, alerts = sentences.writer(plan.language), self.pipeline.evaluator.alerts
+        self.messenger = Messenger(plan, AppriseSender().send, write, alerts, core)
         self.trail = AuditTrail(self.stores.recorder, new_id)
-        self.door = Door(
+        self.accounts = Accounts(
             self.stores.access,
             self.stores.queries.url,
             self.trail,
-            self.pipeline.supervision,
+            self.supervision,
             clock.now,
         )
         self.upkeep = HistoryUpkeep(
             self.stores.retained(),
             settings.retention,
-            self.pipeline.event_log,
-            self.pipeline.supervision,
+            core.event_log,
+            self.supervision,
             self.trail,
         )
-        self.counted: list[Counter[str]] = [
-            log_filter.counted,
-            self.messenger.counters,
-            self.upkeep.counters,
-            self.stores.inputs.counters,
-        ]
-        failed = partial(self.pipeline.supervision.failed, "worker")
+        failed = partial(self.supervision.failed, "worker")
         self.worker, self.packer = Worker(failed), Worker(failed, PACK_LIMIT_S)
         self._attach_reader()
         self.provisioner = self._provisioner()
-        self.face = self._face()
+        self.web = self._web(demo=demo)
 
     # --- wiring -------------------------------------------------------------------
-
-    def _messenger(self) -> Messenger:
-        plan, parts = load_messages(self.settings.messages), self.pipeline
-        alerts = parts.evaluator.alerts
-        messenger = Messenger(
-            plan,
-            AppriseSender(),
-            sentences.writer(plan.language),
-            lambda: alerts.waiting,
-            clock.now,
-        )
-        alerts.on_raised = parts.supervision.guard("messages", messenger.enqueue_raised)
-        return messenger
 
     def _ports(self) -> Ports:
         mqtt = MqttTransport(self.outside.link, self.settings.apikey)
@@ -159,47 +168,55 @@ class Dss:
 
     def _attach_reader(self) -> None:
         """Have robots' own messages read from the broker."""
-        ingest = self.pipeline.ingest
+        ingest, monitor = self.pipeline.ingest, self.core.health_monitor
         reader = DirectReader(
             self.settings.apikey,
             self.fleet.ids,
             clock.now,
             ingest,
             self.settings.direct_read,
-            self.pipeline.supervision.guard(RECORDINGS, self.stores.inputs.measure),
+            partial(self.supervision.tell, "measured"),
         )
+
+        def came_back() -> None:
+            monitor.mqtt_connected = True
+            self.pipeline.commander.broker_back()
+
+        def was_lost() -> None:
+            monitor.mqtt_connected = False
+
         self.outside.link.attach(
             {},
             reader.read,
-            self._broker_back,
-            self._broker_lost,
+            came_back,
+            was_lost,
             reader.refuse_stored,
             [*reader.subscriptions().values()],
         )
 
     def _provisioner(self) -> Provisioner:
-        settings, parts, outside = self.settings, self.pipeline, self.outside
+        settings, outside = self.settings, self.outside
         return Provisioner(
             outside.orion,
             outside.agent,
             outside.link,
-            parts.health_monitor,
-            parts.ingest,
+            self.core.health_monitor,
+            self.pipeline.ingest,
             FiwareSite(
                 self.fleet.ids,
                 settings.apikey,
                 context_broker_url=settings.iota_cb_url or settings.orion_url,
                 notify_url=settings.notify_address,
                 notify_token=self.notify_secret.current,
-                boot=self._boot,
-                tiles=parts.equipment.equipment.tiles,
+                boot=self.core.boot,
+                tiles=self.pipeline.equipment.equipment.tiles,
                 scanned=self.fleet.ids if settings.direct_read == "all" else (),
             ),
         )
 
-    def _face(self) -> Face:
-        parts, settings, recorder = self.pipeline, self.settings, self.stores.recorder
-        authenticator, self.sign_on = self.door.ways_in(
+    def _web(self, *, demo: bool) -> WebParts:
+        parts, settings = self.pipeline, self.settings
+        authenticator, self.sign_on = self.accounts.ways_in(
             settings, self.sign_in_token, self.outside.provider
         )
         orion = NotificationEndpoint(
@@ -211,37 +228,76 @@ class Dss:
             Followers(
                 self._notified,
                 parts.equipment.equipment.entities,
-                parts.supervision.guard(EQUIPMENT, parts.equipment.receive),
-                parts.supervision.guard(RECORDINGS, self.stores.inputs.notification),
+                partial(self.supervision.tell, "entity_read"),
+                partial(self.supervision.tell, "notified"),
             ),
         )
         site = Site(
-            parts.evaluator.greenhouse.name,
+            self.core.greenhouse.name,
             self.fleet.ids,
             __version__,
-            self._demo,
+            demo,
             link=bool(self.sign_in_token),
             sso=None if self.outside.provider is None else settings.sso_label,
         )
-        views = Views(parts, partial(count_all, parts, recorder, self.counted))
-        return Face(
+        views = Views(parts, self.counters)
+        return WebParts(
             pipeline=parts,
-            services=self.services,
             views=views,
             authenticator=authenticator,
             orion=orion,
             site=site,
-            boot=self._boot,
-            queues=partial(read_queues, parts, recorder, self.outside.link),
+            queues=self.queues,
             clock=clock.now,
-            new_id=new_id,
             worker=self.worker,
             recordings=self.stores.inputs,
             trail=self.trail,
             past=Past(PictureFiles(self.stores.inputs.pictures)),
             encoder=Encoder(views, parts.hub, clock.now),
-            accounts=lambda: self.door.state,
+            accounts=lambda: self.accounts.state,
         )
+
+    def _notified(self, at: Instant) -> None:
+        self.core.health_monitor.notified_at = at.mono
+
+    # --- counts -------------------------------------------------------------------
+
+    def counters(self) -> Counter[str]:
+        """All counters: of the pipeline, the history and the parts beside."""
+        total = self.pipeline.counters()
+        for counted in (
+            self.stores.recorder.counters,
+            log_filter.counted,
+            self.messenger.counters,
+            self.upkeep.counters,
+            self.stores.inputs.counters,
+        ):
+            total.update(counted)
+        return total
+
+    def queues(self) -> health.Queues:
+        """Depth of each queue, messages dropped from it, and repeated attempts."""
+        ingest, kept = self.pipeline.ingest, self.stores.recorder.counters
+        link = self.outside.link
+        dropped = {
+            "ingest": sum(
+                n for name, n in ingest.counters.items() if name.startswith("dropped.")
+            ),
+            "history": kept["history_dropped"],
+            "mqtt_out": link.replaced,
+        }
+        machines = self.pipeline.commander.machines.values()
+        stops = [machine.stop for machine in machines if machine.stop is not None]
+        retries = {
+            "broker_connect": max(0, link.connects - 1),
+            "stop_send": sum(max(0, one.tries - 1) for one in stops),
+        }
+        depths = {
+            "ingest": ingest.waiting,
+            "history": kept["history_waiting"],
+            "mqtt_out": link.offered,
+        }
+        return health.Queues(depths, dropped, retries)
 
     # --- life ---------------------------------------------------------------------
 
@@ -260,13 +316,12 @@ class Dss:
             parts = self.pipeline.commander, self.pipeline.goals, self.outside
             for part in parts:
                 await part.close()
-            for one in (self.worker, self.packer, self.door):
+            for one in (self.worker, self.packer, self.accounts):
                 one.close()
 
     async def _live(self) -> None:
-        parts = self.pipeline
-        parts.commander.restore(self.stores.journal.read(), clock.now())
-        await live(self.vital(), self.comfort(), parts.supervision, self._last_word)
+        self.pipeline.commander.restore(self.stores.journal.read(), clock.now())
+        await live(self.vital(), self.comfort(), self.supervision, self._last_word)
 
     def vital(self) -> dict[str, Work]:
         """Parts without which there is no STOP or no speed limit, by name."""
@@ -275,29 +330,29 @@ class Dss:
 
     def comfort(self) -> dict[str, Work]:
         """All other parts, by name; each may fail by itself."""
-        beside = self.services
+        parts = self.pipeline
         return {
-            "costmap": lambda: beside.mapper.run(clock.now),
-            "peer-scans": lambda: self.pipeline.peer_scans.run(clock.now),
-            "coverage": lambda: beside.coverage.run(clock.now),
+            "costmap": partial(_tick, parts.mapper.tick, SCAN_TICK_S),
+            "peer-scans": partial(_tick, parts.peer_scans.tick, SCAN_TICK_S),
+            "coverage": partial(_tick, parts.coverage.tick, COVERAGE_TICK_S),
             "provisioner": self.provisioner.run,
             "history": self.stores.recorder.run,
-            EQUIPMENT: lambda: self.pipeline.equipment.run(clock.now),
-            RETENTION: lambda: self.upkeep.run(clock.now),
-            **self.stores.comfort(),
+            EQUIPMENT: partial(_tick, parts.equipment.tick, EQUIPMENT_TICK_S),
+            RETENTION: partial(self.upkeep.run, clock.now),
+            RECORDINGS: self.stores.inputs.run,
             "pictures": self._take_pictures,
-            "shadow-rule": beside.trials.run,
-            "messages": self.messenger.run,
-            ACCOUNTS: self.door.run,
+            TRIAL: parts.trials.run,
+            MESSAGES: self.messenger.run,
+            ACCOUNTS: self.accounts.run,
             "earlier": self._remember,
-            "loop-watch": LoopWatch(self.pipeline.supervision.note_turn).run,
+            "loop-watch": LoopWatch(self.supervision.note_turn).run,
         }
 
     async def _take_pictures(self) -> None:
         """Write down what pages are sent, where anything is recorded."""
-        face, hub, write = self.face, self.pipeline.hub, self.stores.inputs.picture
+        web, hub, write = self.web, self.pipeline.hub, self.stores.inputs.picture
         if self.settings.recordings:
-            taken = PictureRecorder(face.encoder, face.views, hub, clock.now, write)
+            taken = PictureRecorder(web.encoder, web.views, hub, clock.now, write)
             await taken.run()
 
     async def _last_word(self) -> None:
@@ -307,17 +362,8 @@ class Dss:
 
     async def _remember(self) -> None:
         """Take up what earlier runs left in the history, as soon as it answers."""
-        parts, queries = self.pipeline, self.stores.queries
         await self.stores.recorder.caught_up()
-        await remember(
-            queries,
-            parts.commander,
-            parts.goals,
-            parts.evaluator,
-            parts.event_log,
-            parts.health_monitor,
-            clock.now,
-        )
+        await remember(self.stores.queries, self.pipeline)
 
     def _ended(self, task: asyncio.Task[None]) -> None:
         """A vital part has ended: say so and leave; the robots slow down."""
@@ -326,16 +372,105 @@ class Dss:
         self.failure = VitalPartError("dss")
         if isinstance(error, VitalPartError):
             self.failure = error
-        self.on_failure()
 
-    # --- what comes in ------------------------------------------------------------
 
-    def _broker_back(self) -> None:
-        self.pipeline.health_monitor.mqtt_connected = True
-        self.pipeline.commander.broker_back()
+def open_dss(
+    settings: Settings,
+    data_directory: Path,
+    *,
+    demo: bool = False,
+    make: type[Dss] = Dss,
+) -> Dss:
+    """A server as the settings say.
 
-    def _broker_lost(self) -> None:
-        self.pipeline.health_monitor.mqtt_connected = False
+    Args:
+        settings: An operator's choices.
+        data_directory: Where the database (unless set) and the journals are.
+        demo: Whether the robots are emulated.
+        make: The class.
+    """
+    fleet = load_fleet(settings.fleet, settings.robots)
+    if unknown := sorted({*settings.refused_robots} - {*fleet.ids}):
+        raise SettingsError("IVEG_REFUSED_ROBOTS", unknown[0], "robots of the fleet")
+    outside = open_outside(settings, data_directory, fleet)
+    return make(settings, fleet, outside, demo=demo)
 
-    def _notified(self, at: Instant) -> None:
-        self.pipeline.health_monitor.notified_at = at.mono
+
+async def live(
+    vital: Mapping[str, Work],
+    comfort: Mapping[str, Work],
+    supervision: Supervision,
+    last_word: Work,
+) -> None:
+    """Run all parts until cancelled.
+
+    Args:
+        vital: By name; none may end.
+        comfort: By name; each is started again when it fails.
+        supervision: Names what of comfort is down.
+        last_word: Said to the fleet when a vital part has ended.
+
+    Raises:
+        VitalPartError: one has.
+    """
+    tasks = [asyncio.create_task(_run(work), name=name) for name, work in vital.items()]
+    beside = [
+        asyncio.create_task(supervision.keep_running(name, work), name=name)
+        for name, work in comfort.items()
+    ]
+    try:
+        ended, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        await _say(last_word)
+        task = ended.pop()
+        raise VitalPartError(task.get_name()) from task.exception()
+    finally:
+        for task in (*tasks, *beside):
+            task.cancel()
+        await asyncio.gather(*tasks, *beside, return_exceptions=True)
+
+
+async def _run(work: Work) -> None:
+    await work()
+
+
+async def _tick(tick: Callable[[Instant], None], period_s: float) -> None:
+    """Let time pass for a part of comfort, until cancelled."""
+    while True:
+        tick(clock.now())
+        await asyncio.sleep(period_s)
+
+
+async def _say(last_word: Work) -> None:
+    try:
+        async with asyncio.timeout(LAST_WORD_S):
+            await last_word()
+    except Exception:
+        # The part that would say it may be the one that has failed.
+        _log.exception("the last feedback failed; robots slow by themselves")
+
+
+async def remember(history: Queries, parts: Pipeline) -> None:
+    """Take up open rows of earlier runs, while STOP already works.
+
+    A P1 that nobody acknowledged stays active, the log continues, and rows that a crash
+    left open are closed.  Nothing waits for this: until the history answers the page
+    says that earlier alerts are unknown.  Returns when all of it is taken up.
+    """
+    while True:
+        try:
+            left_open = await history.open_commands()
+            decisions = await history.open_decisions()
+            alerted = await history.open_alerts()
+            unseen = await history.unseen_alerts(MOST_KEPT)
+            lines = await history.newest_lines(EARLIER_LINES)
+        except HopError:
+            await asyncio.sleep(_ASK_AGAIN_S)
+            continue
+        now = parts.core.ports.clock()
+        parts.commander.close_earlier(left_open, now)
+        parts.goals.close_earlier(left_open, now)
+        parts.evaluator.close_earlier(decisions, alerted, now)
+        parts.evaluator.alerts.remember(read_alert(one, now) for one in unseen)
+        parts.core.event_log.recall(lines)
+        parts.core.health_monitor.earlier_read = True
+        return

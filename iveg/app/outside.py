@@ -1,7 +1,6 @@
 """Ports of the server to the world outside its process: network and disk."""
 
 import logging
-from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,29 +8,28 @@ from pydantic import TypeAdapter
 
 from iveg.adapters import clock
 from iveg.adapters.access_file import AccessFile
+from iveg.adapters.extras import require_extra
 from iveg.adapters.files import FileByRobot
 from iveg.adapters.history.engine import history_url, sqlite_file
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.recorder import Recorder, spilled_file
 from iveg.adapters.history.upkeep import RecordedHistory
-from iveg.adapters.identity_provider import IdentityProvider
+from iveg.adapters.identity_provider import Client, IdentityProvider, Keyrock
 from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.journal import FileJournal
 from iveg.adapters.mqtt import BrokerAddress, MqttLink, TlsFiles
 from iveg.adapters.orion import OrionClient
-from iveg.adapters.recordings.recorder import PART as RECORDINGS
 from iveg.adapters.recordings.recorder import InputRecorder
 from iveg.adapters.recordings.writer import WriterSetup
 from iveg.adapters.rules import FileRules, FileTrials
 from iveg.app.fiware import open_fiware
-from iveg.app.sign_on import open_provider
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.detector import OutOfService
 from iveg.domain.fleet import FleetDescription
 from iveg.domain.words import WordAnswer
-from iveg.pipeline import KeptChoices
 from iveg.settings import Settings
 from iveg.vital.health_monitor import HopState
+from iveg.vital.operators import Kept, KeptChoices
 
 ACCOUNTS = "accounts.jsonl"
 _log = logging.getLogger(__name__)
@@ -71,22 +69,15 @@ class Stores:
             drop_recording=self.inputs.drop_oldest,
         )
 
-    def comfort(self) -> dict[str, Callable[[], Awaitable[None]]]:
-        """Parts that take in what comes, by name."""
-        return {RECORDINGS: self.inputs.run}
-
     def kept_choices(self, settings: Settings) -> KeptChoices:
         """Choices of earlier runs; the settings have the rule where there is none."""
         first = DetectionRule.of(settings.rule)
         return KeptChoices(
-            self.rules,
-            self.detectors,
-            self.words,
-            self.trials,
             self.rules.load(first, clock.now()),
-            self.detectors.load(),
-            self.words.load(),
-            self.trials.load(),
+            self.rules.append,
+            Kept(self.detectors.load(), self.detectors.save),
+            Kept(self.words.load(), self.words.save),
+            Kept(self.trials.load(), self.trials.save),
         )
 
     async def close(self) -> None:
@@ -179,3 +170,26 @@ def open_stores(
             is_on=settings.recordings,
         ),
     )
+
+
+def open_provider(settings: Settings) -> IdentityProvider | None:
+    """The identity provider that the settings name; None: none.
+
+    Raises:
+        MissingExtraError: its library is not installed.
+    """
+    if not settings.sso_issuer:
+        return None
+    client = Client(
+        settings.sso_issuer,
+        settings.sso_client_id,
+        settings.sso_client_secret,
+        settings.sso_scopes,
+    )
+    if settings.sso_provider == "keyrock":
+        return Keyrock(client)
+    require_extra("sso", "IVEG_SSO_ISSUER")
+    # Only here: without the extra the module cannot be imported.
+    from iveg.adapters.oidc import OpenIdProvider
+
+    return OpenIdProvider(client, clock.now)

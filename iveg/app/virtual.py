@@ -17,7 +17,9 @@ from iveg.domain.peer_scan import PeerScan
 from iveg.domain.records import DecisionRecord, Record
 from iveg.domain.transports import DIRECT
 from iveg.ngsi import codec
-from iveg.pipeline import Choices, Ports, build
+from iveg.pipeline import Choices, build
+from iveg.vital.operators import Kept, KeptChoices
+from iveg.vital.ports import Ports
 
 START = Instant(0.0, 1_700_000_000.0)
 
@@ -28,7 +30,7 @@ class VirtualPipeline:
     Args:
         fleet, greenhouse, rule: As iVeg is started with.
 
-    Implements ``pipeline.ports.FleetPort``, ``StopJournal`` and ``RecordSink``.
+    Implements ``vital.ports.FleetPort``, ``StopJournal`` and ``RecordSink``.
 
     Attributes:
         now: Its time.
@@ -54,8 +56,16 @@ class VirtualPipeline:
             self,
             lambda: self.now,
             lambda: f"{next(ids):026d}",
+            lambda: "ok",
         )
-        self.parts = build(fleet, greenhouse, ports, Choices(rule))
+        kept = KeptChoices(
+            [rule],
+            self.keep,
+            Kept({}, self.keep),
+            Kept({}, self.keep),
+            Kept(None, self.keep),
+        )
+        self.parts = build(fleet, greenhouse, ports, Choices(kept))
 
     def move(self, seconds: float) -> Instant:
         """Set the clock to ``seconds`` after the start."""
@@ -80,6 +90,9 @@ class VirtualPipeline:
         """Keep a decision; ignore other records."""
         if isinstance(record, DecisionRecord):
             self.decisions[record.decision_id] = record
+
+    async def keep(self, _: object) -> None:
+        """Ignore; no operator chooses anything here."""
 
     async def flushed(self) -> None:
         """Return; nothing is stored here."""

@@ -46,7 +46,7 @@ class CommandWord:
     name: str
     help: str
     module: str
-    add_arguments: AddArguments = lambda _: None
+    add_arguments: AddArguments | None = None
 
 
 def parser(commands: Iterable[CommandWord]) -> argparse.ArgumentParser:
@@ -59,10 +59,11 @@ def parser(commands: Iterable[CommandWord]) -> argparse.ArgumentParser:
         "-v", "--verbose", action="store_true", help="log what goes well, too"
     )
     words = parser.add_subparsers(dest="command", required=True)
-    for one in commands:
-        word = words.add_parser(one.name, help=one.help)
-        one.add_arguments(word)
-        word.set_defaults(module=one.module)
+    for command in commands:
+        word = words.add_parser(command.name, help=command.help)
+        if command.add_arguments is not None:
+            command.add_arguments(word)
+        word.set_defaults(module=command.module)
     return parser
 
 

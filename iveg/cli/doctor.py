@@ -8,8 +8,8 @@ robots drive.
 import asyncio
 import secrets
 from collections.abc import Awaitable, Callable, Mapping
-from contextlib import AsyncExitStack
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from iveg.adapters import clock
@@ -62,6 +62,7 @@ class Finding:
 
 
 Findings = dict[Hop, Finding]
+_Step = Callable[[], Awaitable[object]]
 
 
 def run(call: CommandCall) -> int:
@@ -97,15 +98,14 @@ async def examine(
         patience_s: Time limit of each hop (s).
     """
     database = history_url(settings.database_url, data)
-    async with AsyncExitStack() as stack:
-        path = await stack.enter_async_context(_Path(settings))
-        steps: tuple[tuple[Hop, Callable[[], Awaitable[str]]], ...] = (
-            (Hop.MQTT, path.ask_broker),
-            (Hop.ORION, path.ask_orion),
+    async with _Path(settings) as path:
+        steps: tuple[tuple[Hop, _Step], ...] = (
+            (Hop.MQTT, path.publish_probe),
+            (Hop.ORION, path.orion.version),
             (Hop.AGENT, path.send_measure),
-            (Hop.PAGE, path.ask_page),
+            (Hop.PAGE, partial(path.page.ask, "GET", "/healthz")),
             (Hop.NOTIFICATIONS, path.look_at_subscriptions),
-            (Hop.DATABASE, lambda: asyncio.to_thread(_check_database, database)),
+            (Hop.DATABASE, partial(asyncio.to_thread, check_database, database)),
         )
         for hop, step in steps:
             needs = (findings.get(need) for need in _NEEDS.get(hop, ()))
@@ -113,10 +113,11 @@ async def examine(
                 findings[hop] = await _try(step, patience_s)
 
 
-async def _try(step: Callable[[], Awaitable[str]], patience_s: float) -> Finding:
+async def _try(step: _Step, patience_s: float) -> Finding:
     try:
         async with asyncio.timeout(patience_s):
-            return Finding(True, await step())
+            found = await step()
+            return found if isinstance(found, Finding) else Finding(True)
     except TimeoutError:
         return Finding(False, f"nothing came in {patience_s:g} s")
     except HopError as error:
@@ -125,43 +126,26 @@ async def _try(step: Callable[[], Awaitable[str]], patience_s: float) -> Finding
         return Finding(False, str(error))
 
 
-def _check_database(database_url: str) -> str:
-    check_database(database_url)
-    return ""
-
-
 class _Page(FiwareHttp):
     HOP = Hop.PAGE
 
 
 class _Path:
-    """Uses of the hops of the data path; each returns a remark or raises HopError."""
+    """Uses of the hops of the data path; each raises HopError where it fails."""
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
-        self._orion, self._agent = open_fiware(settings)
-        self._page = _Page(page_address(settings), "", "")
+        self.orion, self._agent = open_fiware(settings)
+        self.page = _Page(page_address(settings), "", "")
 
     async def __aenter__(self) -> "_Path":
         return self
 
     async def __aexit__(self, *_: object) -> None:
-        for client in (self._orion, self._agent, self._page):
+        for client in (self.orion, self._agent, self.page):
             await client.close()
 
-    async def ask_orion(self) -> str:
-        await self._orion.version()
-        return ""
-
-    async def ask_page(self) -> str:
-        await self._page.ask("GET", "/healthz")
-        return ""
-
-    async def ask_broker(self) -> str:
-        await self._publish_probe()
-        return ""
-
-    async def _publish_probe(self) -> str:
+    async def publish_probe(self) -> str:
         """Publish a probe and hear it from the broker; returns its stamp."""
         stamp = codec.format_stamp(clock.wall())
         payload = codec.write_heartbeat(Origin(secrets.token_hex(4), 1, stamp))
@@ -169,43 +153,42 @@ class _Path:
         await publish_and_hear(broker_of(self._settings), topic, payload)
         return stamp
 
-    async def send_measure(self) -> str:
+    async def send_measure(self) -> Finding:
         """Repair the devices, then send a probe and wait until Orion has it."""
         settings = self._settings
         robots = load_fleet(settings.fleet, settings.robots).ids
         await self._agent.version()
         await provision(
             self._agent,
-            self._orion,
+            self.orion,
             robots=robots,
             apikey=settings.apikey,
             cbroker_url=settings.iota_cb_url or settings.orion_url,
             tiles=load_equipment(settings.equipment, robots),
         )
-        began, stamp = clock.mono(), await self._publish_probe()
+        began, stamp = clock.mono(), await self.publish_probe()
         # Orion is polled: notifications are tested by another hop.
         while not await self._has_probe(stamp):  # noqa: ASYNC110
             await asyncio.sleep(_LOOK_EVERY_S)
         took_s = clock.mono() - began
-        return lag_in_words(took_s) if took_s > SLOW_S else ""
+        return Finding(True, lag_in_words(took_s) if took_s > SLOW_S else "")
 
     async def _has_probe(self, stamp: str) -> bool:
         """Whether Orion has this probe, or a later one of a running iVeg."""
-        read = codec.read_entity(await self._orion.read_probe() or {})
+        read = codec.read_entity(await self.orion.read_probe() or {})
         return any(
             isinstance(one, HeartbeatProbe) and (one.origin.stamp or "") >= stamp
             for one in read.observations
         )
 
-    async def look_at_subscriptions(self) -> str:
+    async def look_at_subscriptions(self) -> None:
         """Read at Orion whether iVeg's subscriptions are there and deliver."""
         ours = [
             one
-            for one in await self._orion.read_subscriptions()
+            for one in await self.orion.read_subscriptions()
             if str(one.get("description", "")).startswith(PREFIX)
         ]
         if failing := describe_failures(ours):
             raise HopError(Hop.NOTIFICATIONS, failing)
         if not ours:
             raise HopError(Hop.NOTIFICATIONS, "Orion has no subscription of iVeg")
-        return ""

@@ -5,9 +5,10 @@ import asyncio
 import contextlib
 import os
 import sys
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import Callable, Coroutine
 from datetime import UTC, datetime
-from typing import Any
+from functools import partial
+from typing import Any, BinaryIO
 
 from iveg.adapters.database_check import check_database
 from iveg.adapters.history.engine import history_url
@@ -15,13 +16,11 @@ from iveg.adapters.history.lists import MOST_ROWS, Filter
 from iveg.adapters.history.queries import Queries
 from iveg.cli.arguments import CommandCall
 from iveg.domain.errors import HopError, SettingsError
-from iveg.domain.records import Record
 from iveg.domain.stamps import parse_stamp
 from iveg.web.api import exports
 from iveg.web.api.history import HistoryList, lists_of
 from iveg.web.api.history_filters import NO_DAY, is_kept
 
-_Pages = AsyncIterator[Sequence[Record]]
 _MOMENT = "a moment as ISO-8601, in UTC unless it says otherwise"
 
 
@@ -64,9 +63,9 @@ def _is_of_history(moment: float) -> bool:
 
 def _write(options: argparse.Namespace, queries: Queries, asked: Filter) -> None:
     (one,) = (one for one in lists_of(queries) if one.path == options.list)
+    work = partial(_export, queries, one, asked, options.format)
     if options.out is None:
-        asyncio.run(_export(queries, one, asked, options.format, _to_output))
-        _flush_output()
+        _print(work)
         return
     if options.out.exists() and not options.out.is_file():
         # Whatever writes to it would find a file in its place.
@@ -74,7 +73,7 @@ def _write(options: argparse.Namespace, queries: Queries, asked: Filter) -> None
     part = options.out.with_name(options.out.name + ".part")
     try:
         with part.open("wb") as file:
-            asyncio.run(_export(queries, one, asked, options.format, file.write))
+            asyncio.run(work(file))
         part.replace(options.out)
     except OSError as error:
         raise HopError("disk", error.strerror or str(error)) from error
@@ -83,46 +82,24 @@ def _write(options: argparse.Namespace, queries: Queries, asked: Filter) -> None
             part.unlink(missing_ok=True)
 
 
-def _to_output(piece: bytes) -> None:
+def _print(work: Callable[[BinaryIO], Coroutine[Any, Any, None]]) -> None:
     try:
-        sys.stdout.buffer.write(piece)
-    except OSError as error:
-        raise _output_gone(error) from error
-
-
-def _flush_output() -> None:
-    try:
+        asyncio.run(work(sys.stdout.buffer))
         sys.stdout.buffer.flush()
     except OSError as error:
-        raise _output_gone(error) from error
-
-
-def _output_gone(error: OSError) -> HopError:
-    # What is left in the buffer would fail once more when the program ends.
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    return HopError("output", error.strerror or str(error))
+        # What is left in the buffer would fail once more when the program ends.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        raise HopError("output", error.strerror or str(error)) from error
 
 
 async def _export(
-    queries: Queries,
-    one: HistoryList[Any],
-    asked: Filter,
-    form: str,
-    write: Callable[[bytes], object],
+    queries: Queries, one: HistoryList[Any], asked: Filter, form: str, file: BinaryIO
 ) -> None:
     first = await queries.page(one.of, asked)
-    pages = queries.pages(one.of, first, asked)
-    writer = _csv if form == "csv" else _ndjson
-    async for piece in writer(one, pages):
-        write(piece)
-
-
-async def _csv(one: HistoryList[Any], pages: _Pages) -> AsyncIterator[bytes]:
-    yield exports.csv_head(one.of.kind)
-    async for records in pages:
-        yield exports.csv_rows(one.of.kind, records)
-
-
-async def _ndjson(one: HistoryList[Any], pages: _Pages) -> AsyncIterator[bytes]:
-    async for records in pages:
-        yield exports.ndjson_rows(one.model, await one.rows(records))
+    if form == "csv":
+        file.write(exports.csv_head(one.of.kind))
+    async for records in queries.pages(one.of, first, asked):
+        if form == "csv":
+            file.write(exports.csv_rows(one.of.kind, records))
+        else:
+            file.write(exports.ndjson_rows(one.model, await one.rows(records)))

@@ -1,10 +1,8 @@
 """``iveg robot`` connects a ROS 2 robot; ``iveg robot check`` reports what it lacks."""
 
-import argparse
 import asyncio
 from collections import Counter
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from iveg.adapters import clock
@@ -50,12 +48,12 @@ async def check(
     """Listen without publishing, and print what is wrong; 1 where anything is."""
     from iveg.adapters.dds import Dds
 
-    counts: Counter[str] = Counter()
-    frames: dict[str, str] = {}
+    counts, frames = Counter[str](), dict[str, str]()
     fleet = load_fleet(settings.fleet, settings.robots)
+    address = broker_of(settings)
     with Dds(network) as dds:
         readers: dict[tuple[str, type[Message], bool], DdsReader] = {}
-        link = MqttLink(broker_of(settings), f"check of {robot_id}")
+        link = MqttLink(address, f"check of {robot_id}")
         task = asyncio.create_task(link.run(), name="broker")
         began = clock.mono()
         while clock.mono() - began < _CHECK_S:
@@ -82,7 +80,6 @@ async def check(
             unheard=dds.unheard(),
         )
     if not broker:
-        address = broker_of(settings)
         at = f"{address.host}:{address.port}"
         rows += (CheckRow("MQTT broker", verdict=f"none at {at} (IVEG_MQTT_URL)"),)
     if robot_id not in fleet.ids:
@@ -135,42 +132,39 @@ def run(call: CommandCall) -> int:
     from iveg.adapters.files import lease
 
     with lease(call.data / "robots" / f"{options.id}.lease", options.id):
-        work = _ride(options, settings, call.data, config, classes, network)
+        work = _ride(call, config, classes, network)
         return run_until_stopped(work, until_eof=options.until_eof)
 
 
 async def _ride(
-    options: argparse.Namespace,
-    settings: Settings,
-    data: Path,
+    call: CommandCall,
     config: RobotConfig,
     classes: tuple[str, ...],
     network: DdsNetwork,
 ) -> None:
     from iveg.adapters.dds import Dds
 
+    options, settings = call.options, call.settings
+    plan = None
+    if options.greenhouse is not None:
+        # What the laser need not report.
+        plan = Plan.of(load_greenhouse(options.greenhouse))
+    described = load_fleet(settings.fleet, settings.robots).of_robot(options.id)
     with Dds(network, gate=options.id) as dds:
         await refuse_second_gate(dds, config.full_topics["cmd_vel_out"])
-        safety = node_settings(settings, data / "robots", _plan(options.greenhouse))
-        fleet = load_fleet(settings.fleet, settings.robots)
         robot = Ros2Robot(
             options.id,
             config,
             dds,
             SensorInputs(config, classes, sim_time=options.sim_time),
-            safety,
-            _profile(fleet.of_robot(options.id), config),
+            node_settings(settings, call.data / "robots", plan),
+            _profile(described, config),
         )
         if options.attended:
             robot.node.release_locally()
         tune_garbage_collection()
         report_ready()
         await robot.run()
-
-
-def _plan(greenhouse: str | None) -> Plan | None:
-    """What the laser need not report."""
-    return None if greenhouse is None else Plan.of(load_greenhouse(greenhouse))
 
 
 def _profile(robot: RobotDescription, config: RobotConfig) -> RobotProfile:

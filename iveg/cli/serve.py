@@ -12,8 +12,7 @@ import uvicorn
 from starlette.types import ASGIApp
 
 from iveg.adapters.history.engine import history_url, upgrade
-from iveg.app.dss import Dss
-from iveg.app.opening import open_dss
+from iveg.app.dss import Dss, open_dss
 from iveg.asgi import create_app
 from iveg.cli.arguments import CommandCall
 from iveg.cli.running import (
@@ -36,11 +35,19 @@ _WS_MAX_BYTES = 65536
 
 
 class _Server(uvicorn.Server):
-    """A server that leaves signals to ``run_until_stopped``, as all parts do."""
+    """A server that ends with a vital part.
 
-    def __init__(self, config: uvicorn.Config, on_start: Callable[[], None]) -> None:
+    It leaves signals to ``run_until_stopped``, as all parts do.
+    """
+
+    def __init__(
+        self, config: uvicorn.Config, dss: Dss, on_start: Callable[[], None]
+    ) -> None:
         super().__init__(config)
-        self._on_start = on_start
+        self._dss, self._on_start = dss, on_start
+
+    async def on_tick(self, counter: int) -> bool:
+        return self._dss.failure is not None or await super().on_tick(counter)
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         await super().startup(sockets)
@@ -73,15 +80,15 @@ async def serve(
     raise_descriptor_limit()
     dss = open_dss(settings, data, demo=demo, make=make)
     with contextlib.suppress(HopError):
-        await dss.door.copy_earlier()
-    app = NotificationsFirst(create_app(dss), dss.face.orion)
+        await dss.accounts.copy_earlier()
+    app = NotificationsFirst(create_app(dss), dss.web.orion)
     config = _config(settings, app)
     server = _Server(
         config,
+        dss,
         on_start=report_ready if demo else lambda: _print_way_in(settings, dss),
     )
     tune_garbage_collection()
-    dss.on_failure = lambda: setattr(server, "should_exit", True)
     serving = asyncio.create_task(server.serve(), name="http")
     try:
         await asyncio.shield(serving)
@@ -98,7 +105,7 @@ def _print_way_in(settings: Settings, dss: Dss) -> None:
         print_sign_in_link(settings, dss.sign_in_token)
         return
     try:
-        invitation = dss.door.first_invitation()
+        invitation = dss.accounts.first_invitation()
     except HopError as error:
         _log.warning("nobody can be made admin: %s", error)
         return

@@ -77,14 +77,15 @@ def _act(options: argparse.Namespace, settings: Settings, book: AccessBook) -> s
         case "add":
             invited = (options.name, options.role, _end(options, now))
             return _invited(settings, admission.add(*invited)[0])
-    found = _find(book, options.name)
-    match options.action:
         case "reset":
+            found = _find(book, options.name)
             return _invited(settings, admission.reset(found)[0])
         case "role":
-            changed = admission.give_role(found, options.role)
+            changed = admission.give_role(_find(book, options.name), options.role)
             return f"{changed.name} is {changed.role}, and signs in anew."
-    return f"{admission.disable(found).name} is out within a second."
+    return (
+        f"{admission.disable(_find(book, options.name)).name} is out within a second."
+    )
 
 
 def _end(options: argparse.Namespace, now: float) -> float | None:

@@ -4,16 +4,12 @@ What Orion notifies of an equipment's entity comes straight here and never waits
 robots' observations.
 """
 
-import asyncio
-
 from iveg.domain.equipment import Equipment, State, Tile
 from iveg.domain.observations import EntityReading, Instant
 from iveg.domain.records import MeasurementRecord
 from iveg.vital import topics
-from iveg.vital.event_log import READING_PERIOD_S, EventLog
-from iveg.vital.ports import Clock
-from iveg.vital.record import RecordSink
-from iveg.vital.supervision import Supervision
+from iveg.vital.core import Core
+from iveg.vital.event_log import READING_PERIOD_S
 
 PART = "equipment"
 TICK_S = 1.0
@@ -26,17 +22,10 @@ class EquipmentMonitor:
         equipment: All tiles with what is known of them.
     """
 
-    def __init__(
-        self,
-        equipment: Equipment,
-        sink: RecordSink,
-        event_log: EventLog,
-        supervision: Supervision,
-    ) -> None:
+    def __init__(self, core: Core, equipment: Equipment) -> None:
         self.equipment = equipment
-        self._sink = sink
-        self._event_log = event_log
-        self._supervision = supervision
+        self._sink, self._event_log = core.ports.sink, core.event_log
+        self._supervision = core.supervision
         self._kept_at: dict[str, float] = {}
         self._states: tuple[State, ...] = ()
 
@@ -45,12 +34,6 @@ class EquipmentMonitor:
         for tile in self.equipment.read(reading.entity_id, reading.attributes, at):
             self._keep(tile, at)
         self._event_log.changed(topics.EQUIPMENT.name)
-
-    async def run(self, clock: Clock) -> None:
-        """Until cancelled."""
-        while self.equipment.tiles:
-            self.tick(clock())
-            await asyncio.sleep(TICK_S)
 
     def tick(self, now: Instant) -> None:
         """Let time pass: what is silent or beyond a limit becomes an alert."""

@@ -23,15 +23,13 @@ from iveg.domain.goals import (
     place_of,
     refusal,
 )
-from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import GoalAnswer, Instant
 from iveg.domain.records import CommandRecord
 from iveg.domain.stop import StopMachine
-from iveg.domain.transports import Transport, TransportId
-from iveg.domain.world import World
+from iveg.domain.transports import TransportId
 from iveg.vital import topics
-from iveg.vital.event_log import EventLog
-from iveg.vital.ports import Clock, GoalPort, Ids
+from iveg.vital.core import Core
+from iveg.vital.ports import CommandPort
 
 _log = logging.getLogger(__name__)
 _EVENTS: Mapping[str, GoalEvent] = {
@@ -46,31 +44,19 @@ class GoalDispatcher:
     """Keeps the newest goal of each robot.
 
     Args:
-        world: Where each robot is, and whether it may be told anything.
-        greenhouse: Where a goal may be.
+        core: Whose robots.
         machines: STOP of each robot; read alone.
-        ports: The transports that carry orders.
-        event_log: Tells people and the history.
-        new_id: Makes ULIDs.
-        clock: Tells when an order left.
     """
 
-    def __init__(
-        self,
-        world: World,
-        greenhouse: Greenhouse,
-        machines: Mapping[str, StopMachine],
-        ports: Mapping[Transport, GoalPort],
-        event_log: EventLog,
-        new_id: Ids,
-        clock: Clock,
-    ) -> None:
-        self._world, self._greenhouse = world, greenhouse
-        self._machines = machines
-        self._ports = {w.id: port for w, port in ports.items() if w.carries("resume")}
-        self._event_log = event_log
-        self._new_id = new_id
-        self._clock = clock
+    def __init__(self, core: Core, machines: Mapping[str, StopMachine]) -> None:
+        self._world, self._greenhouse = core.world, core.greenhouse
+        self._machines, self._event_log = machines, core.event_log
+        self._ports = {
+            way.id: port
+            for way, port in core.ports.transports.items()
+            if way.carries("resume")
+        }
+        self._new_id, self._clock = core.ports.new_id, core.ports.clock
         self._goals: dict[str, FollowedGoal] = {}
         self._given: set[str] = set()
         """Ids of all goals of this run: what the history has of them is our own."""
@@ -216,7 +202,7 @@ class GoalDispatcher:
     async def _attempt(
         self,
         transport: TransportId,
-        port: GoalPort,
+        port: CommandPort,
         robot_id: str,
         order: GoalOrder | CancelOrder,
     ) -> None:

@@ -8,28 +8,41 @@ What was not taken waits on: the message says since when.
 import asyncio
 import logging
 from collections import Counter, deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Awaitable, Callable, Iterable, Sequence
+from dataclasses import dataclass
 from typing import Final
 
 from iveg.domain.alerts import BookedAlert
 from iveg.domain.events import Address, AlertItem, MessagePlan, MessageText
-from iveg.vital.ports import Clock, MessageSender
+from iveg.vital.alerting import Alerting
+from iveg.vital.core import Core
 
 _log = logging.getLogger(__name__)
+PART: Final = "messages"
 
 Write = Callable[[Sequence[AlertItem], bool], MessageText]
+SendMessage = Callable[[Address, MessageText], Awaitable[str | None]]
 
 MOST_WAITING: Final = 100
 """Alerts that wait for one address; the oldest gives way and is counted."""
-REST_S: Final = 30.0
-"""Between two messages to one address: a flood of alerts is two messages a minute."""
-LIMIT_S: Final = 60.0
-"""A message that takes longer is told as failed, while its end is awaited."""
 _LOOK_S: Final = 5.0
 
 
+@dataclass(frozen=True, slots=True)
+class Pace:
+    """Time between messages to one address, and for one message.
+
+    Attributes:
+        rest_s: Between two of them: a flood of alerts is two messages a minute.
+        limit_s: A message that takes longer counts as failed; its end is awaited.
+    """
+
+    rest_s: float = 30.0
+    limit_s: float = 60.0
+
+
 class _Line:
-    """What waits for one address."""
+    """Queue of one address."""
 
     def __init__(self, address: Address) -> None:
         self.address = address
@@ -41,7 +54,9 @@ class Messenger:
     """Sends alerts to the addresses of a plan.
 
     Args:
-        waiting: Active alerts, and each P1 that nobody has acknowledged.
+        send: Brings a message to an address; returns why it was not taken, or None.
+        write: Makes the message of some alerts; the flag says that they escalate.
+        alerts: Raised, and still waiting.
 
     Attributes:
         counters: Messages that were taken and not, alerts that were dropped.
@@ -50,22 +65,21 @@ class Messenger:
     def __init__(
         self,
         plan: MessagePlan,
-        sender: MessageSender,
+        send: SendMessage,
         write: Write,
-        waiting: Callable[[], Sequence[BookedAlert]],
-        clock: Clock,
-        rest_s: float = REST_S,
-        limit_s: float = LIMIT_S,
+        alerts: Alerting,
+        core: Core,
+        pace: Pace = Pace(),
     ) -> None:
         self.counters: Counter[str] = Counter()
         self._lines = [_Line(one) for one in plan.addresses]
         self._escalate_after_s = plan.escalate_after_s
-        self._sender, self._write = sender, write
-        self._waiting, self._clock = waiting, clock
-        self._rest_s, self._limit_s = rest_s, limit_s
+        self._send_message, self._write = send, write
+        self._alerts, self._clock, self._pace = alerts, core.ports.clock, pace
         self._since: dict[str, float] = {}
         self._escalated: set[str] = set()
         self._logged: set[tuple[str, str]] = set()
+        core.supervision.listen(PART, raised=self.enqueue_raised)
 
     def enqueue_raised(self, raised: Iterable[BookedAlert]) -> None:
         """Queue alerts that were raised for every address that wants them."""
@@ -75,7 +89,7 @@ class Messenger:
     def escalate(self) -> None:
         """Queue for the second list whatever nobody has acknowledged for too long."""
         now = self._clock().mono
-        unseen = {one.alert_id: one for one in self._waiting() if one.unseen}
+        unseen = {one.alert_id: one for one in self._alerts.waiting if one.unseen}
         self._since = {name: self._since.get(name, now) for name in unseen}
         self._escalated &= unseen.keys()
         for name, since in self._since.items():
@@ -110,11 +124,11 @@ class Messenger:
             if not await self._is_taken(line.address, items):
                 line.items.extendleft(reversed(items))
                 line.filled.set()
-            await asyncio.sleep(self._rest_s)
+            await asyncio.sleep(self._pace.rest_s)
 
     async def _is_taken(self, to: Address, items: Sequence[AlertItem]) -> bool:
         sending = asyncio.ensure_future(self._send(to, items))
-        done, _ = await asyncio.wait([sending], timeout=self._limit_s)
+        done, _ = await asyncio.wait([sending], timeout=self._pace.limit_s)
         if not done:
             self._failed(to, "no answer")
         failed = await sending
@@ -127,7 +141,7 @@ class Messenger:
 
     async def _send(self, to: Address, items: Sequence[AlertItem]) -> str | None:
         try:
-            return await self._sender.send(to, self._write(items, to.escalates))
+            return await self._send_message(to, self._write(items, to.escalates))
         except Exception as error:
             # Of the error nothing more: it may name the address.
             return type(error).__name__

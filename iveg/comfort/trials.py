@@ -1,48 +1,145 @@
-"""Trials of a rule: an operator begins, ends and promotes them."""
+"""Trials of a rule: a candidate runs beside the version in force and acts on nothing.
+
+It takes the same frames, reports and ticks at the same moments, and has people, zones
+and entries of its own.  No feedback, decision or alert knows of it
+(``tests/properties/test_shadow``).
+"""
 
 import asyncio
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from functools import partial
+from itertools import count
 from typing import Final
 
-from iveg.comfort.shadow import ShadowRule
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import TrialRefusedError
-from iveg.domain.observations import Instant
-from iveg.domain.rule.trial import Trial
+from iveg.domain.observations import DetectionFrame, Instant, SafetyReport
+from iveg.domain.rule.trial import Account, Limits, Trial
+from iveg.domain.rule.zones import LimitChange
+from iveg.domain.tracking.sight import Look, OwnSight
+from iveg.vital.core import Core
 from iveg.vital.evaluate import Evaluator
-from iveg.vital.ports import ChoiceStore, Clock
-from iveg.vital.rules import Rules
+from iveg.vital.operators import Kept, Rules
 
+PART: Final = "shadow-rule"
 SAVED_EVERY_S: Final = 30.0
+_SETTLES_S: Final = 2.0
+"""Until then it may still miss what those in force remember of earlier scans."""
+
+
+class ShadowRun:
+    """One trial, with people and entries of its own over the world, which it reads."""
+
+    def __init__(self, trial: Trial, evaluator: Evaluator, now: Instant) -> None:
+        self.account = Account(trial)
+        self._world, self._own_sight = evaluator.world, OwnSight(evaluator.greenhouse)
+        self._trial, self._rule = trial, trial.rule
+        # It begins with what those in force know by now.
+        self._people, self._limits = evaluator.beginning()
+        self._counts_from = now.mono + _SETTLES_S
+        self._ids = count()
+
+    def looked(self, frame: DetectionFrame, seen_at: Instant, at: Instant) -> None:
+        """Take a detection frame, and when it came."""
+        known, robot = self._people, self._world.robot(frame.robot_id)
+        answered = self._world.word_answers.persons(frame.detector or frame.robot_id)
+        rule = self._rule.also_naming(answered)
+        placed = known.sight(frame, self._world, rule, seen_at, self._new_id())
+        self._own_sight.take(Look.of_frame(robot, frame, placed, at), known)
+
+    def witnessed(self, report: SafetyReport, at: Instant) -> None:
+        """Take an obstacle of a robot's laser."""
+        self._people.witness(report, at, self._new_id())
+
+    def aged(self, now: Instant) -> None:
+        """Let people age."""
+        self._people.forget(now)
+
+    def judged(
+        self,
+        rule: DetectionRule,
+        limits: Limits,
+        changes: Iterable[LimitChange],
+        now: Instant,
+    ) -> None:
+        """Judge by the candidate, and compare with what the rule in force gave."""
+        would, crossed = self._limits.evaluate(
+            self._world, self._people, self._rule, now, self._new_id()
+        )
+        if now.mono < self._counts_from:
+            return
+        if not self.account.is_of(rule):
+            anew = replace(self._trial, since=now.wall, so_far=None, differences=())
+            self.account = Account(anew)
+        self.account.judged(
+            rule, self._live(limits, changes), self._live(would, crossed), now
+        )
+
+    def _live(
+        self, limits: Limits, changes: Iterable[LimitChange]
+    ) -> tuple[Limits, Sequence[LimitChange]]:
+        """Limits and changes of live robots."""
+        live = {robot.robot_id for robot in self._world.live_robots()}
+        of_live = {name: one for name, one in limits.items() if name in live}
+        return of_live, [one for one in changes if one.entry.robot_id in live]
+
+    def _new_id(self) -> str:
+        return f"shadow-{next(self._ids)}"
 
 
 class Trials:
     """Begins, ends and promotes trials by an operator's word.
 
     Args:
-        store: Keeps the trial for the next start of iVeg.
-        kept: What the last run left.
+        core: Its supervision tells a trial what happens, at the same moments as those
+            in force.
+        kept: What the last run left, and where the trial is kept for the next one.
     """
 
     def __init__(
         self,
-        shadow: ShadowRule,
+        core: Core,
         evaluator: Evaluator,
         rules: Rules,
-        store: ChoiceStore[Trial | None],
-        kept: Trial | None,
-        clock: Clock,
+        kept: Kept[Trial | None],
     ) -> None:
-        self._shadow, self._evaluator, self._rules = shadow, evaluator, rules
-        self._store, self._clock = store, clock
+        self._evaluator, self._rules, self._save = evaluator, rules, kept.save
         self._one_by_one = asyncio.Lock()
-        if kept is not None:
-            shadow.begin(kept, evaluator, clock())
+        self._running: ShadowRun | None = None
+        core.supervision.listen(
+            PART,
+            frame_taken=partial(self._follow, ShadowRun.looked),
+            obstacle_reported=partial(self._follow, ShadowRun.witnessed),
+            aged=partial(self._follow, ShadowRun.aged),
+            judged=partial(self._follow, ShadowRun.judged),
+        )
+        if kept.value is not None:
+            self.start(kept.value, core.ports.clock())
 
     @property
     def current(self) -> Trial | None:
         """The trial as it stands; None: nothing is tried."""
-        return self._shadow.trial()
+        return None if self._running is None else self._running.account.trial()
+
+    def start(self, trial: Trial, now: Instant) -> None:
+        """Run a trial from now on."""
+        self._running = ShadowRun(trial, self._evaluator, now)
+
+    def stop(self) -> None:
+        """Forget the trial."""
+        self._running = None
+
+    def _follow(self, take: Callable[..., None], *facts: object) -> None:
+        """Have the trial take what those in force did; what fails ends it."""
+        if self._running is None:
+            return
+        try:
+            take(self._running, *facts)
+        except Exception:
+            # What it says from here on would be wrong.
+            self.stop()
+            raise
 
     async def begin(self, wanted: DetectionRule, by: str, at: Instant) -> Trial:
         """Try a candidate.
@@ -57,8 +154,8 @@ class Trials:
             if is_same(wanted, self._rules.current):
                 raise TrialRefusedError("same")
             trial = Trial(replace(wanted, author=by, since=None), by, at.wall)
-            await self._store.save(trial)
-            self._shadow.begin(trial, self._evaluator, at)
+            await self._save(trial)
+            self.start(trial, at)
             return trial
 
     async def end(self) -> Trial:
@@ -69,9 +166,9 @@ class Trials:
             HopError: it could not be written down; the trial goes on.
         """
         async with self._one_by_one:
-            trial = self._running()
-            await self._store.save(None)
-            self._shadow.end()
+            trial = self._tried()
+            await self._save(None)
+            self.stop()
             return trial
 
     async def promote(self, by: str, at: Instant, seen: int) -> DetectionRule:
@@ -83,14 +180,14 @@ class Trials:
             HopError: it could not be written down; the old version stays in force.
         """
         async with self._one_by_one:
-            trial = self._running()
+            trial = self._tried()
             wanted = replace(trial.rule, comparison=trial.so_far)
             rule = await self._rules.change(wanted, by, at, seen)
-            self._shadow.end()
-            await self._store.save(None)
+            self.stop()
+            await self._save(None)
             return rule
 
-    def _running(self) -> Trial:
+    def _tried(self) -> Trial:
         trial = self.current
         if trial is None:
             raise TrialRefusedError("none")
@@ -106,7 +203,7 @@ class Trials:
         """Write down what came of the trial so far.  Raises HopError."""
         async with self._one_by_one:
             if (trial := self.current) is not None:
-                await self._store.save(trial)
+                await self._save(trial)
 
 
 def is_same(one: DetectionRule, other: DetectionRule) -> bool:

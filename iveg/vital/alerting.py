@@ -1,27 +1,21 @@
 """Alerts: raised, cleared, acknowledged, logged."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable
 
 from iveg.domain.alerts import AlertBook, BookedAlert
-from iveg.domain.events import Condition, LogEvent, Slot
+from iveg.domain.events import Condition
 from iveg.domain.observations import Instant
 from iveg.vital import topics
-from iveg.vital.event_log import EventLog
-from iveg.vital.log_messages import alert_line
-from iveg.vital.ports import Ids
+from iveg.vital.core import Core
+from iveg.vital.evidence import alert_line
 
 
 class Alerting:
-    """Raises, clears and acknowledges alerts, and records each step.
+    """Raises, clears and acknowledges alerts, and records each step."""
 
-    Attributes:
-        on_raised: Given every alert that is raised; must neither wait nor fail.
-    """
-
-    def __init__(self, event_log: EventLog, new_id: Ids) -> None:
-        self.on_raised: Callable[[Sequence[BookedAlert]], None] = lambda _: None
-        self._event_log = event_log
-        self._new_id = new_id
+    def __init__(self, core: Core) -> None:
+        self._event_log, self._new_id = core.event_log, core.ports.new_id
+        self._tell = core.supervision.tell
         self._book = AlertBook()
 
     @property
@@ -43,13 +37,14 @@ class Alerting:
         changed = self._book.sync(wrong, now, self._new_id())
         for alert in changed:
             self._event_log.alert(alert)
-            self._event_log.log(alert_line(alert), now)
+            step = "raised" if alert.cleared is None else "cleared"
+            self._event_log.log(alert_line(step, alert), now)
             if alert.condition.robot_id is not None:
                 # A P1 is part of its situation.
                 self._event_log.changed(topics.ROBOT.of(alert.condition.robot_id))
         raised = [one for one in changed if one.cleared is None]
         if raised:
-            self.on_raised(raised)
+            self._tell("raised", raised)
 
     def acknowledge(
         self, alert_id: str, by: str, note: str, now: Instant
@@ -58,13 +53,7 @@ class Alerting:
         alert = self._book.acknowledge(alert_id, by, note, now)
         if alert is not None:
             self._event_log.alert(alert)
-            slots: dict[str, Slot] = {
-                **alert.condition.slots,
-                "alert": alert.condition.key,
-                "by": by,
-                "priority": alert.priority,
-            }
-            self._event_log.log(LogEvent("alert", "log.alert.acknowledged", slots), now)
+            self._event_log.log(alert_line("acknowledged", alert, by=by), now)
         return alert
 
     def acknowledge_together(

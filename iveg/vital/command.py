@@ -1,16 +1,18 @@
 """STOP, release and resume: from a person's press to the robot's own answer.
 
-The machines of ``domain/stop`` decide; ``sending`` carries their orders; this module
-stands between the two and informs people, disk and browsers of each step.
+The machines of ``domain/stop`` decide, ``OrderSender`` carries their orders on all
+transports at once, and ``Commander`` stands between the two and informs people, disk
+and browsers of each step.
 """
 
 import asyncio
 import logging
-from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections import Counter, OrderedDict
+from collections.abc import Callable, Coroutine, Iterable, Mapping, Sequence
+from functools import partial
 from typing import Literal
 
-from iveg.domain.errors import UnknownRobotError
+from iveg.domain.errors import HopError, UnknownRobotError
 from iveg.domain.events import Condition, LogEvent, Slot
 from iveg.domain.motion import UNMOVED, Motion
 from iveg.domain.observations import (
@@ -35,16 +37,18 @@ from iveg.domain.stop import (
     StopMachine,
 )
 from iveg.domain.stop import machine as stop_conditions
-from iveg.domain.transports import Transport
+from iveg.domain.transports import FIWARE, TransportId
 from iveg.vital import topics
-from iveg.vital.event_log import EventLog
-from iveg.vital.ports import Clock, CommandPort, FleetPort, Ids, StopJournal
-from iveg.vital.presses import Presses
-from iveg.vital.sending import IsCut, OrderSender
+from iveg.vital.core import Core
 
 _log = logging.getLogger(__name__)
+CameBack = Callable[[StopMachine, list[Effect], Instant], None]
+_Send = Callable[[], Coroutine[None, None, None]]
 _KEPT = 200
 _PLAIN = Press()
+REMEMBERED_S = 60.0
+"""Time that a press is known by its id (s)."""
+_MOST_PRESSES = 4096
 
 _JOURNALLED: Mapping[str, Literal["stopped", "run"]] = {
     "ready": "run",
@@ -56,50 +60,195 @@ _JOURNALLED: Mapping[str, Literal["stopped", "run"]] = {
 """Changes of what is wanted that no person's call has written down already."""
 
 
+class Presses:
+    """The command of each press, for a while: one press is one STOP.
+
+    A page sends a press over HTTP and over its WebSocket and repeats it until it is
+    taken.  One that comes back later counts as a new press, because a STOP too many is
+    better than one too few.
+    """
+
+    def __init__(self) -> None:
+        self._known: OrderedDict[tuple[str, str, str], tuple[float, str]] = (
+            OrderedDict()
+        )
+
+    def find(self, by: str, press: Press, robot_id: str, at: Instant) -> str | None:
+        """The command that this press has begun; None for a new press."""
+        if press.press_id is None:
+            return None
+        since, command_id = self._known.get(
+            (by, press.press_id, robot_id), (float("-inf"), "")
+        )
+        return command_id if at.mono - since <= REMEMBERED_S else None
+
+    def note(
+        self, by: str, press: Press, robot_id: str, command_id: str, at: Instant
+    ) -> None:
+        """Remember the command of this press."""
+        if press.press_id is None:
+            return
+        self._known[by, press.press_id, robot_id] = at.mono, command_id
+        while len(self._known) > _MOST_PRESSES:
+            self._known.popitem(last=False)
+
+
+class OrderSender:
+    """Sends STOPs, releases, resumes and desired states, each in its own task.
+
+    Nothing is awaited before a STOP's first byte is on its way, and a failure of one
+    transport holds up no other.
+
+    Args:
+        core: Of its ports the transports, the fleet and the journal.
+        came_back: Told how each send went.
+    """
+
+    def __init__(self, core: Core, came_back: CameBack) -> None:
+        self._transports = {way.id: port for way, port in core.ports.transports.items()}
+        self._fleet, self._journal = core.ports.fleet, core.ports.journal
+        self._event_log, self._clock = core.event_log, core.ports.clock
+        self._health_monitor = core.health_monitor
+        self._came_back = came_back
+        self._desired_states: dict[str, SetDesiredState] = {}
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    def send_stop(self, machine: StopMachine, effect: SendStop) -> None:
+        """Begin to send a STOP on one transport; the result comes back later."""
+        port, order = self._transports[effect.transport], effect.command_id
+        send = partial(port.stop, effect.robot_id, effect.hold_id, order[-6:])
+        work = self._attempt(machine, effect.transport, order, send)
+        self.start(work, f"stop-{effect.transport}-{machine.robot_id}")
+
+    def send_once(self, machine: StopMachine, effect: SendOnce) -> None:
+        """Begin to send a release or resume; the results come back later."""
+        name = f"{effect.attempt.command.kind}-{machine.robot_id}"
+        self.start(self._send_once(machine, effect), name)
+
+    def set_desired_state(self, effect: SetDesiredState) -> None:
+        """Begin to publish a robot's desired state."""
+        self._desired_states[effect.robot_id] = effect
+        self.start(self._set_desired_state(effect), f"desired-{effect.robot_id}")
+
+    def publish_desired_states(self) -> None:
+        """Publish every desired state again: the broker is connected."""
+        for wanted in self._desired_states.values():
+            self.set_desired_state(wanted)
+
+    def start(self, work: Coroutine[None, None, None], name: str) -> None:
+        """Run this as a task; a failure is logged."""
+        task = asyncio.get_running_loop().create_task(work, name=name)
+        self._tasks.add(task)
+        task.add_done_callback(self._finished)
+
+    def _finished(self, task: asyncio.Task[None]) -> None:
+        self._tasks.discard(task)
+        if not task.cancelled() and task.exception() is not None:
+            _log.error("%s failed", task.get_name(), exc_info=task.exception())
+
+    async def close(self) -> None:
+        """Cancel the sends that are under way."""
+        tasks = list(self._tasks)
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    # --- the transports -----------------------------------------------------------
+
+    async def _send_once(self, machine: StopMachine, effect: SendOnce) -> None:
+        """Send once, after the audit row is on disk."""
+        await asyncio.gather(
+            self._event_log.flushed(), self._note_named(machine, effect)
+        )
+        command, attempt = effect.attempt.command, effect.attempt
+        if machine.once is None or machine.once.command_id != command.command_id:
+            # The disk took so long that a STOP has come, or taken its place.
+            return
+        challenge, order = attempt.challenge, command.command_id
+        for transport, way in command.transports.items():
+            if way == "off":
+                continue
+            port = self._transports[transport]
+            if command.kind == "resume":
+                send = partial(port.resume, machine.robot_id, challenge, order)
+            else:
+                names = machine.robot_id, attempt.ids
+                send = partial(port.release, *names, challenge, order)
+            work = self._attempt(machine, transport, order, send)
+            self.start(work, f"{command.kind}-{transport}-{machine.robot_id}")
+
+    async def _note_named(self, machine: StopMachine, effect: SendOnce) -> None:
+        """Write down which STOPs a release names: none is asserted as new again."""
+        if machine.hold_id is None or not effect.ours:
+            return
+        by = "iveg" if machine.stop is None else machine.stop.requesters[0]
+        await self._journal.log_release(
+            machine.robot_id,
+            machine.hold_id,
+            effect.ours,
+            effect.attempt.challenge,
+            by,
+            self._clock(),
+        )
+
+    async def _attempt(
+        self,
+        machine: StopMachine,
+        transport: TransportId,
+        command_id: str,
+        send: _Send,
+    ) -> None:
+        """Send, and report the result to the machine, whatever went wrong.
+
+        A transport whose failure was not reported would count as busy for ever.
+        """
+        ok, left = False, self._clock()
+        try:
+            await send()
+            ok = True
+        except HopError as error:
+            _log.info("order by transport %s: %s", transport, error)
+        finally:
+            at = self._clock()
+            # What lies behind Orion may be known to pass nothing on.
+            doubtful = transport == FIWARE.id and self._health_monitor.is_cut(at)
+            effects = machine.sent(
+                transport, command_id, at, ok=ok, doubtful=doubtful, left=left
+            )
+            self._came_back(machine, effects, at)
+
+    async def _set_desired_state(self, wanted: SetDesiredState) -> None:
+        try:
+            await self._fleet.set_desired_state(
+                wanted.robot_id, wanted.desired, wanted.ids
+            )
+        except HopError as error:
+            # Published again when the broker is back (``publish_desired_states``).
+            _log.info("desired state of %s not set: %s", wanted.robot_id, error)
+
+
 class Commander:
     """Keeps one STOP machine for each robot and carries out its effects.
 
-    Args:
-        robots: The fleet.
-        ports: The transports that carry orders, each with its way out.
-        fleet: Keeps the desired state of each robot.
-        journal: Outlives a crash.
-        event_log: Tells people and the history.
-        new_id: Makes ULIDs.
-        clock: Reads both clocks.
-        agent_lag_s: How far the IoT Agent is behind (s); None where nobody knows.
-        is_cut: Whether what lies behind a transport is known to pass nothing on.
+    Attributes:
+        machines: By robot.
+        commands: The newest commands, by id, as they stand.
     """
 
-    def __init__(
-        self,
-        robots: Iterable[str],
-        ports: Mapping[Transport, CommandPort],
-        fleet: FleetPort,
-        journal: StopJournal,
-        event_log: EventLog,
-        new_id: Ids,
-        clock: Clock,
-        *,
-        agent_lag_s: Callable[[Instant], float | None],
-        is_cut: IsCut,
-    ) -> None:
+    def __init__(self, core: Core) -> None:
         self.machines: Mapping[str, StopMachine] = {
-            robot_id: StopMachine(robot_id, ports) for robot_id in robots
+            robot_id: StopMachine(robot_id, core.ports.transports)
+            for robot_id in core.world.robots
         }
         self.commands: dict[str, FollowedCommand] = {}
         self.counters: Counter[str] = Counter()
         self._mistakes: dict[str, OffTable] = {}
         """Robots whose machine once had no step: shown until iVeg starts again."""
         self._presses = Presses()
-        by_id = {transport.id: port for transport, port in ports.items()}
-        self._sender = OrderSender(
-            by_id, fleet, journal, event_log, clock, self._came_back, is_cut
-        )
-        self._agent_lag_s = agent_lag_s
-        self._journal = journal
-        self._event_log = event_log
-        self._new_id = new_id
+        self._sender = OrderSender(core, self._came_back)
+        self._agent_lag_s = core.health_monitor.probe.lag
+        self._journal, self._event_log = core.ports.journal, core.event_log
+        self._new_id = core.ports.new_id
 
     def machine(self, robot_id: str) -> StopMachine:
         """One robot's machine.

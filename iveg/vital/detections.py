@@ -1,32 +1,40 @@
-"""Detection frames become persons on the map and lines of the log.
+"""Detection frames become persons on the map, lines of the log and rows.
 
-A sighting is logged at its start, so that a person who stands before a camera for an
-hour does not fill the log.
+A detector sends thirty frames a second, by which a person who stands before a camera
+would fill log and disk.  A sighting is logged at its start; the history gets one row in
+half a second for each robot and subject (a person, a peer, or all boxes of one class
+that are neither), and each detection that a decision rests on
+(docs/interfaces/http.md, "Detections that are kept").  Memory has each for a while.
 """
 
-from collections.abc import Callable, Iterator
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import islice
+from typing import NamedTuple
 
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.detector import flaw_of
 from iveg.domain.events import LogEvent, Slot
-from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import DetectionFrame, Instant, Received, SafetyReport
+from iveg.domain.records import DetectionRecord
 from iveg.domain.robot_state import RobotState
 from iveg.domain.stream_order import OrderVerdict
-from iveg.domain.tracking.people import People, Placed
-from iveg.domain.tracking.person import TrackedPerson
+from iveg.domain.tracking.people import Placed
+from iveg.domain.tracking.person import Sighting, TrackedPerson
 from iveg.domain.tracking.sight import BlindCameras, Look, OwnSight
 from iveg.domain.words import HeardWords, meaning_of, name_numbers, plain
-from iveg.domain.world import World
 from iveg.vital import topics
-from iveg.vital.event_log import EventLog
-from iveg.vital.kept_detections import KeptDetections
-from iveg.vital.newest_detections import NewestDetections
-from iveg.vital.ports import Ids
+from iveg.vital.core import Core
+from iveg.vital.event_log import EventLog, detection_of
+from iveg.vital.record import ODOMETRY_PERIOD_S
 
 _LOGGED_S = 2.0
 _MAX_SUBJECTS = 1000
+KEPT_EVERY_S = ODOMETRY_PERIOD_S
+MOST_DETECTIONS = 5000
+"""Two robots that see three objects, at 30 frames a second, fill it in 30 s."""
 _MAX_FRAMES = 20
 """Names of unknown frames that are logged, of each robot."""
 _KEYS = {
@@ -36,39 +44,149 @@ _KEYS = {
 }
 
 
+@dataclass(frozen=True, slots=True)
+class _Look:
+    """One detection with what its row needs; ``is_kept``: it has its row."""
+
+    one: Placed
+    frame: DetectionFrame
+    received: Received
+    is_kept: bool
+
+
+class KeptDetections:
+    """Chooses the detections that become rows.
+
+    A look is remembered while it is the newest of a chain of sightings, because a robot
+    may enter the zone of a person seconds after they were seen.
+    """
+
+    def __init__(self, event_log: EventLog) -> None:
+        self._event_log = event_log
+        self._kept_at: dict[tuple[str, str], float] = {}
+        self._looks: dict[tuple[str, str], Sequence[_Look]] = {}
+
+    def look(
+        self, one: Placed, subject: str, frame: DetectionFrame, received: Received
+    ) -> None:
+        """Keep a detection if one of its subject is due, and remember it."""
+        key, now = (frame.robot_id, subject), received.at.mono
+        # Frames come at 10 or 30 Hz: half a frame early must not wait a whole one.
+        is_due = now - self._kept_at.get(key, -1e9) >= 0.95 * KEPT_EVERY_S
+        if not is_due and one.person is None:
+            return
+        look = _Look(one, frame, received, is_kept=is_due)
+        if is_due:
+            self._kept_at[key] = now
+            self._record(look)
+        if one.person is not None:
+            alive = one.person.sightings
+            before = self._looks.get(key, ())
+            self._looks[key] = [
+                *(old for old in before if _is_among(old, alive)),
+                look,
+            ]
+
+    def keep_evidence(self, person_id: str, sighting: Sighting) -> None:
+        """Keep the detection that a decision rests on, unless it has its row."""
+        key = sighting.observer, person_id
+        looks = self._looks.get(key, ())
+        # The newest first: twins of two transports are told apart by nothing.
+        for look in reversed(looks):
+            if _is_of(look, sighting):
+                if not look.is_kept:
+                    self._record(look)
+                self._looks[key] = [
+                    replace(one, is_kept=True) if one is look else one for one in looks
+                ]
+                return
+
+    def forget(self, now: Instant) -> None:
+        """Forget subjects who are gone."""
+        if len(self._kept_at) > _MAX_SUBJECTS:
+            self._kept_at = {
+                key: at
+                for key, at in self._kept_at.items()
+                if now.mono - at < LIMITS.zone_lasts_s
+            }
+            self._looks = {
+                key: looks for key, looks in self._looks.items() if key in self._kept_at
+            }
+
+    def _record(self, look: _Look) -> None:
+        self._event_log.detection(look.one, look.frame, look.received)
+
+
+def _is_among(look: _Look, sightings: Sequence[Sighting]) -> bool:
+    return any(_is_of(look, one) for one in sightings)
+
+
+def _is_of(look: _Look, sighting: Sighting) -> bool:
+    """Whether a sighting is of this detection; of one without a place its confidence.
+
+    A doubtful position is its observer's own (``Sighting``).
+    """
+    one = look.one
+    x, y, z = one.position
+    is_there = bool(sighting.reach_m) or (sighting.x, sighting.y, sighting.z) == (
+        x,
+        y,
+        z,
+    )
+    is_same = one.detection.probability == sighting.confidence
+    return is_same and is_there and look.frame.robot_id == sighting.observer
+
+
+class JudgedDetection(NamedTuple):
+    """A detection, the frame that it came in and how that came; its row is made later.
+
+    Making every row at once would cost the rule loop what nobody may ask for.
+    """
+
+    one: Placed
+    frame: DetectionFrame
+    received: Received
+
+
+class NewestDetections:
+    """The last detections of the whole fleet; the oldest gives way."""
+
+    def __init__(self) -> None:
+        self._newest: deque[JudgedDetection] = deque(maxlen=MOST_DETECTIONS)
+
+    def note(self, one: Placed, frame: DetectionFrame, received: Received) -> None:
+        """Remember one detection."""
+        self._newest.append(JudgedDetection(one, frame, received))
+
+    def rows(
+        self, admits: Callable[[JudgedDetection], bool], most: int
+    ) -> tuple[DetectionRecord, ...]:
+        """At most so many of those that are admitted, newest first."""
+        admitted = filter(admits, reversed(self._newest))
+        return tuple(detection_of(*one) for one in islice(admitted, most))
+
+
 class DetectionTracking:
     """Takes the detection frames of the fleet.
 
     Attributes:
         placed: What each robot's newest look found, faint ones included.
         other: When the newest confident object of another class came, by robot.
-        taken: Comfort, called with each frame that is judged, its source moment, and
-            when it came.
-        witnessed: The same with each report of an obstacle.
         kept: Chooses the detections that become rows.
         newest: Each detection of the last moments.
     """
 
-    def __init__(
-        self,
-        world: World,
-        people: People,
-        greenhouse: Greenhouse,
-        event_log: EventLog,
-        new_id: Ids,
-    ) -> None:
+    def __init__(self, core: Core) -> None:
         self.placed: dict[str, list[Placed]] = {}
         self.other: dict[str, Instant] = {}
-        self.taken: Callable[[DetectionFrame, Instant, Instant], None] = lambda *_: None
-        self.witnessed: Callable[[SafetyReport, Instant], None] = lambda *_: None
-        self.kept = KeptDetections(event_log)
+        self.kept = KeptDetections(core.event_log)
         self.newest = NewestDetections()
-        self._world = world
-        self._people = people
-        self._greenhouse = greenhouse
-        self._own_sight, self._blind = OwnSight(greenhouse), BlindCameras(greenhouse)
-        self._event_log = event_log
-        self._new_id = new_id
+        self._world, self._people = core.world, core.people
+        self._greenhouse = core.greenhouse
+        self._own_sight = OwnSight(core.greenhouse)
+        self._blind = BlindCameras(core.greenhouse)
+        self._event_log, self._new_id = core.event_log, core.ports.new_id
+        self._tell = core.supervision.tell
         self._logged_at: dict[tuple[str, str], float] = {}
         self._unknown_frames: dict[str, set[str]] = {}
 
@@ -125,7 +243,7 @@ class DetectionTracking:
         elif verdict == "new":
             detector.note_whole(robot.detections_at)
         self._compare(robot, frame, placed, received.at)
-        self.taken(frame, seen_at, received.at)
+        self._tell("frame_taken", frame, seen_at, received.at)
         if verdict == "new":
             self.placed[robot_id] = placed
             self._event_log.changed(topics.DETECTIONS.of(robot_id))
@@ -198,9 +316,10 @@ class DetectionTracking:
         if frame_id in named or len(named) >= _MAX_FRAMES:
             return
         named.add(frame_id)
-        slots: dict[str, Slot] = {"robot": robot_id, "frame": frame_id}
-        line = LogEvent("detection", "log.unknown_frame", slots, robot_id)
-        self._event_log.log(line, at)
+        slots = {"robot": robot_id, "frame": frame_id}
+        self._event_log.log(
+            LogEvent("detection", "log.unknown_frame", slots, robot_id), at
+        )
 
     def _describe(self, one: Placed, frame: DetectionFrame, received: Received) -> None:
         at, robot_id = received.at, frame.robot_id
@@ -222,7 +341,7 @@ class DetectionTracking:
         if report.obstacle is None or self._world.robot(report.robot_id).is_replay:
             return False
         one = self._people.witness(report, at, self._new_id())
-        self.witnessed(report, at)
+        self._tell("obstacle_reported", report, at)
         if one is not None:
             self._event_log.changed(topics.PEOPLE.name)
             if one.first_seen == at:
@@ -234,12 +353,11 @@ class DetectionTracking:
         newest = person.newest
         if person.sightings or person.stage(now) == "seen":
             return
-        slots: dict[str, Slot] = {
-            "person": person.person_id,
-            "lane": self._greenhouse.lane_at(newest.x, newest.y) or "",
-        }
-        line = LogEvent("detection", "log.person_cleared", slots, None, person.class_)
-        self._event_log.log(line, now)
+        lane = self._greenhouse.lane_at(newest.x, newest.y) or ""
+        slots = {"person": person.person_id, "lane": lane}
+        self._event_log.log(
+            LogEvent("detection", "log.person_cleared", slots, None, person.class_), now
+        )
 
     def forget(self, now: Instant) -> None:
         """Forget log lines and rows about persons who are gone."""
@@ -253,12 +371,8 @@ class DetectionTracking:
 
 
 def _walker_line(one: TrackedPerson, robot_id: str) -> LogEvent:
-    slots: dict[str, Slot] = {
-        "robot": robot_id,
-        "person": one.person_id,
-        "x": round(one.newest.x, 2),
-        "y": round(one.newest.y, 2),
-    }
+    place = {"x": round(one.newest.x, 2), "y": round(one.newest.y, 2)}
+    slots: dict[str, Slot] = {"robot": robot_id, "person": one.person_id, **place}
     return LogEvent("detection", "log.walker", slots, robot_id, one.class_)
 
 

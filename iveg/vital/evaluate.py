@@ -1,4 +1,4 @@
-"""The rule at work: observations change the world, the world changes speed limits.
+"""Observations change the world, and the world changes speed limits.
 
 ``apply`` takes one observation and ``settle`` judges the fleet, once for all that was
 taken; ``tick`` does what time alone brings: silence, expiry, overdue links.  The
@@ -6,14 +6,13 @@ heartbeat to the fleet is sent from here and nowhere else, so that a loop that h
 falls silent and slows the robots.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 
 from iveg.domain import alerts
 from iveg.domain.decisions import Decisions, SlowdownDecision
 from iveg.domain.detection_rule import DetectionRule
-from iveg.domain.events import Condition, LogEvent, Slot
+from iveg.domain.events import Condition, LogEvent
 from iveg.domain.feedback import UNSUPERVISED, SpeedLimit
-from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.kinds import kind
 from iveg.domain.limits import LIMITS
 from iveg.domain.low_values import LowValues
@@ -33,21 +32,16 @@ from iveg.domain.rule.foresight import Encounter
 from iveg.domain.rule.judge import SpeedLimits
 from iveg.domain.rule.zones import LimitChange, ZoneEntry
 from iveg.domain.tracking.people import People
-from iveg.domain.world import World
 from iveg.vital import topics
 from iveg.vital.alerting import Alerting
+from iveg.vital.core import Core
 from iveg.vital.detections import DetectionTracking
-from iveg.vital.event_log import EventLog
-from iveg.vital.evidence import places_of, record_of
+from iveg.vital.evidence import evidence_of, places_of, record_of, speed_line
 from iveg.vital.feedback import FeedbackPublisher
-from iveg.vital.log_messages import evidence_of, speed_line
-from iveg.vital.ports import FleetPort, Ids
 from iveg.vital.staleness import Staleness
 
 HEARTBEAT_S, _EARLY_S = 0.1, 0.02
 """Between two heartbeats; so early one goes rather than a whole tick late."""
-
-
 _TOPIC_OF = {
     "robot": topics.ROBOT,
     "scan": topics.SCAN,
@@ -58,67 +52,39 @@ _TOPIC_OF = {
 class Evaluator:
     """Keeps the world and decides for the fleet.
 
-    Args:
-        boot: Random, new at each start: identity of our feedback.
-
     Attributes:
         rule: The version in force; a new one counts from the next judgement on.
-        aged: Comfort, called with each tick.
-        judged: The same with each judgement: the rule, limits, changes, and when.
+        is_urgent: Whether something new of people or obstacles awaits its judgement.
     """
 
-    def __init__(
-        self,
-        world: World,
-        greenhouse: Greenhouse,
-        people: People,
-        rule: DetectionRule,
-        fleet: FleetPort,
-        event_log: EventLog,
-        new_id: Ids,
-        boot: str,
-        backlog: Callable[[Instant], float | None] = lambda _: None,
-    ) -> None:
-        self.world = world
-        self.greenhouse = greenhouse
+    def __init__(self, core: Core, rule: DetectionRule) -> None:
+        self.world, self.people = core.world, core.people
+        self.greenhouse = core.greenhouse
         self.rule = rule
-        self.aged: Callable[[Instant], None] = lambda _: None
-        self.judged: Callable[
-            [DetectionRule, Mapping[str, SpeedLimit], Sequence[LimitChange], Instant],
-            None,
-        ] = lambda *_: None
-        self.people = people
         self.decisions = Decisions()
-        self.alerts = Alerting(event_log, new_id)
+        self.alerts = Alerting(core)
         self.speed_limits: dict[str, SpeedLimit] = dict.fromkeys(
-            world.robots, UNSUPERVISED
+            self.world.robots, UNSUPERVISED
         )
         self.protected_unseen = 0
-        """How often a robot slowed for a person or peer out of its own sight."""
-        self._speed_limits = SpeedLimits(greenhouse)
-        self.tracking = DetectionTracking(world, people, greenhouse, event_log, new_id)
-        self._staleness = Staleness(world, people, greenhouse, event_log)
-        self._feedback_publisher = FeedbackPublisher(
-            world,
-            self.people,
-            self.tracking.other,
-            fleet,
-            boot,
-            backlog,
-        )
-        self._event_log = event_log
-        self._new_id = new_id
+        """Number of slow-downs for a person or peer out of the robot's own sight."""
+        self._speed_limits = SpeedLimits(core.greenhouse)
+        self.tracking = DetectionTracking(core)
+        self._staleness = Staleness(core)
+        self._feedback_publisher = FeedbackPublisher(core, self.tracking.other)
+        self._event_log, self._new_id = core.event_log, core.ports.new_id
+        self._tell = core.supervision.tell
         self._applied: dict[str, float] = {}
         self._low = LowValues()
         self._obedience = Obedience()
         self._moved: dict[str, Odometry] = {}
         self._unjudged: Instant | None = None
-        self._is_urgent = False
+        self.is_urgent = False
         self._started: Instant | None = None
         self._untold = False
 
     def beginning(self) -> tuple[People, SpeedLimits]:
-        """Who is known and what slows robots now, for another rule to begin with."""
+        """Known people and present limits, for another rule to begin with."""
         return self.people.copy(), self._speed_limits.copy()
 
     @property
@@ -127,13 +93,13 @@ class Evaluator:
         return self._speed_limits.entries
 
     def encounters(self, robot_id: str, now: Instant) -> Sequence[Encounter]:
-        """Zones that a robot will reach, the soonest first; forecasts grow old, too."""
+        """Zones that a robot will reach, the soonest first; old forecasts left out."""
         ahead = self._speed_limits.encounters.get(robot_id, {}).values()
         young = (one for one in ahead if now.mono - one.at <= LIMITS.silence_s)
         return sorted(young, key=lambda one: one.in_s)
 
     def unmet(self, robot_id: str) -> Sequence[ClearCondition]:
-        """What the claim "clear" lacks for a robot now, the reason first."""
+        """Clear conditions that a robot lacks now, the reason first."""
         return self._speed_limits.unmet.get(robot_id, ())
 
     def decision_record(self, decision_id: str) -> DecisionRecord | None:
@@ -190,15 +156,10 @@ class Evaluator:
         """Whether something was taken that :meth:`settle` has not judged yet."""
         return self._unjudged is not None
 
-    @property
-    def is_urgent(self) -> bool:
-        """Whether something new of people or obstacles is among it."""
-        return self._is_urgent
-
     def _await_judgement(self, at: Instant, *, is_urgent: bool) -> None:
         if self._unjudged is None or at.mono >= self._unjudged.mono:
             self._unjudged = at
-        self._is_urgent |= is_urgent
+        self.is_urgent |= is_urgent
 
     def settle(self) -> None:
         """Judge the fleet once for everything that was taken since the last time."""
@@ -206,7 +167,7 @@ class Evaluator:
             self._settle(self._unjudged)
 
     def _settle(self, now: Instant) -> None:
-        self._unjudged, self._is_urgent = None, False
+        self._unjudged, self.is_urgent = None, False
         self._judge(now)
         for robot_id, odometry in self._moved.items():
             robot, speed_limit = self.world.robot(robot_id), self.speed_limits[robot_id]
@@ -246,14 +207,11 @@ class Evaluator:
         for change in changes:
             self._crossed(change, now)
         before, self.speed_limits = self.speed_limits, speed_limits
-        # Mostly all are the very same, and this is asked at each judgement.
-        perhaps = () if speed_limits is before else speed_limits.items()
         changed = [
             robot_id
-            for robot_id, speed_limit in perhaps
-            if speed_limit is not (was := before[robot_id])
-            and (speed_limit.speed_factor, speed_limit.reason, speed_limit.cause)
-            != (was.speed_factor, was.reason, was.cause)
+            for robot_id, speed_limit in speed_limits.items()
+            if speed_limit is not before[robot_id]
+            and _told_of(speed_limit) != _told_of(before[robot_id])
         ]
         for robot_id in changed:
             self._event_log.changed(topics.ROBOT.of(robot_id))
@@ -269,7 +227,7 @@ class Evaluator:
         # A slow-down never waits; other news waits until robots can use more.
         if slower or (self._untold and self._feedback_publisher.may_publish(now)):
             self.publish(now)
-        self.judged(self.rule, speed_limits, changes, now)
+        self._tell("judged", self.rule, speed_limits, changes, now)
 
     def _crossed(self, change: LimitChange, now: Instant) -> None:
         entry = change.entry
@@ -299,7 +257,7 @@ class Evaluator:
         self._staleness.tick(now)
         self._log_returned_detectors(now)
         self.tracking.forget(now)
-        self.aged(now)
+        self._tell("aged", now)
 
     def tick(self, now: Instant, more: Iterable[Condition] = ()) -> None:
         """Judge a world that has aged: limits, heartbeat, decisions, alerts."""
@@ -313,9 +271,10 @@ class Evaluator:
     def _log_returned_detectors(self, now: Instant) -> None:
         returned = self.world.returned_detectors
         for robot_id in returned:
-            slots: dict[str, Slot] = {"robot": robot_id}
-            event = LogEvent("system", "log.detector_booted", slots, robot_id)
-            self._event_log.log(event, now)
+            slots = {"robot": robot_id}
+            self._event_log.log(
+                LogEvent("system", "log.detector_booted", slots, robot_id), now
+            )
         returned.clear()
 
     def _conditions(self, now: Instant) -> Iterable[Condition]:
@@ -387,3 +346,8 @@ class Evaluator:
             after.decision_id,
         )
         self._log_speed(report, at)
+
+
+def _told_of(limit: SpeedLimit) -> tuple[float, str, str | None]:
+    """The part of a limit that people and robots are told when it changes."""
+    return limit.speed_factor, limit.reason, limit.cause

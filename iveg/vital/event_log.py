@@ -5,9 +5,9 @@ API and the database agree.
 """
 
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields, replace
-from functools import wraps
+from functools import partial, wraps
 from typing import Concatenate, ParamSpec
 
 from iveg.domain.alerts import BookedAlert, cleared_behind, write_alert
@@ -42,7 +42,6 @@ from iveg.domain.stop import Changed, Closed, FollowedCommand
 from iveg.domain.tracking.people import Placed
 from iveg.vital import topics
 from iveg.vital.evidence import left_behind, record_of
-from iveg.vital.publish import Hub
 from iveg.vital.record import OdometryThinner, RecordSink
 from iveg.vital.supervision import Supervision
 
@@ -57,14 +56,11 @@ _P = ParamSpec("_P")
 def _guarded(
     write: Callable[Concatenate["EventLog", _P], None],
 ) -> Callable[Concatenate["EventLog", _P], None]:
-    """The same, whose failure is the history's and not that of what is recorded."""
+    """Guard a write: its failure is the history's, not that of what is recorded."""
 
     @wraps(write)
     def guarded(log: "EventLog", /, *args: _P.args, **kwargs: _P.kwargs) -> None:
-        try:
-            write(log, *args, **kwargs)
-        except Exception as error:
-            log.failed("history", error)
+        log.supervision.guard("history", partial(write, log, *args, **kwargs))
 
     return guarded
 
@@ -73,19 +69,15 @@ class EventLog:
     """Writes log lines and history records, and tells browsers what changed.
 
     Attributes:
-        changed: Marks a topic as changed for every browser (``Hub.changed``).
-        failed: Told of a part of comfort and its failure.
         lines: The newest log lines, oldest first.
-        margin_of: The newest margin of a robot (m), which its pose is kept with.
+        margins: The newest margin of each robot (m), which its pose is kept with.
     """
 
     def __init__(
-        self, hub: Hub, sink: RecordSink, start: Instant, supervision: Supervision
+        self, sink: RecordSink, start: Instant, supervision: Supervision
     ) -> None:
-        self.changed = supervision.guard("live", hub.changed)
-        self.failed = supervision.failed
-        self.margin_of: Callable[[str, Instant], float | None] = lambda *_: None
-        self._hub = hub
+        self.supervision = supervision
+        self.margins: Mapping[str, float | None] = {}
         self._sink = sink
         self._thinner = OdometryThinner()
         # The last reading of each robot and kind; the air is of no robot.
@@ -93,6 +85,10 @@ class EventLog:
         # Starting at the clock keeps ids growing over restarts without asking anyone.
         self._next_id = int(start.wall * 1000)
         self.lines: deque[LogRecord] = deque(maxlen=_KEPT_LINES)
+
+    def changed(self, topic: str) -> None:
+        """Mark a topic as changed for every browser."""
+        self.supervision.tell("changed", topic)
 
     @_guarded
     def log(self, event: LogEvent, at: Instant) -> None:
@@ -110,7 +106,7 @@ class EventLog:
         )
         self.lines.append(record)
         self._sink.enqueue(record)
-        self._hub.append(topics.LOG.name, record)
+        self.supervision.tell("appended", topics.LOG.name, record)
 
     @_guarded
     def write(self, event: Callable[[], LogEvent], at: Instant) -> None:
@@ -127,7 +123,7 @@ class EventLog:
         before = before[-(_KEPT_LINES - len(self.lines)) :]
         if before and len(self.lines) < _KEPT_LINES:
             self.lines.extendleft(reversed(before))
-            self._hub.append(topics.EARLIER_LOG.name, before)
+            self.supervision.tell("appended", topics.EARLIER_LOG.name, before)
 
     @_guarded
     def decisions(self, changed: Iterable[SlowdownDecision]) -> None:
@@ -173,7 +169,7 @@ class EventLog:
                 if robot.safety is None
                 else robot.safety.speed_factor,
                 link=link,
-                margin_m=self.margin_of(robot.robot_id, at),
+                margin_m=self.margins.get(robot.robot_id),
             )
         )
         if record is not None:
@@ -204,7 +200,9 @@ class EventLog:
         )
         if changed is not None:
             self._audit(command, changed.state, changed.why or changed.key, at)
-        self._hub.append(topics.COMMAND.of(command.command_id), command)
+        self.supervision.tell(
+            "appended", topics.COMMAND.of(command.command_id), command
+        )
 
     @_guarded
     def goal(self, goal: FollowedGoal, step: str | None, at: Instant) -> None:
@@ -256,7 +254,7 @@ class EventLog:
         try:
             await self._sink.flushed()
         except Exception as error:
-            self.failed("history", error)
+            self.supervision.failed("history", error)
 
     @_guarded
     def rule(self, event: LogEvent, at: Instant) -> None:

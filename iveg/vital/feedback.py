@@ -1,6 +1,6 @@
 """Feedback to the fleet (Algorithm 2, line 13): one message for each observer."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import Feedback, FeedbackAlert, SpeedLimit
@@ -9,9 +9,7 @@ from iveg.domain.observations import Instant, Origin
 from iveg.domain.parameters import sent_to_robots
 from iveg.domain.robot_state import RobotState
 from iveg.domain.stamps import format_stamp
-from iveg.domain.tracking.people import People
-from iveg.domain.world import World
-from iveg.vital.ports import FleetPort
+from iveg.vital.core import Core
 
 USED_HZ, BURST = 20.0, 8.0
 """Greatest mean rate of feedback that slows nobody, and size of a burst (1/s, 1)."""
@@ -26,27 +24,15 @@ class FeedbackPublisher:
     one message (docs/interfaces/mqtt.md).
 
     Args:
+        core: Whose fleet is told.
         other: When each robot's newest confident object of another class came.
-        boot: Random, new at each start: identity of our feedback.
-        backlog: How far Orion is behind (s); None where nobody knows.
     """
 
-    def __init__(
-        self,
-        world: World,
-        people: People,
-        other: Mapping[str, Instant],
-        fleet: FleetPort,
-        boot: str,
-        backlog: Callable[[Instant], float | None] = lambda _: None,
-    ) -> None:
+    def __init__(self, core: Core, other: Mapping[str, Instant]) -> None:
         self.published_at = float("-inf")
-        self._world = world
-        self._people = people
-        self._other = other
-        self._fleet = fleet
-        self._boot = boot
-        self._backlog = backlog
+        self._world, self._people = core.world, core.people
+        self._other, self._boot = other, core.boot
+        self._fleet, self._probe = core.ports.fleet, core.health_monitor.probe
         self._seq = 0
         self._left = BURST
 
@@ -105,7 +91,7 @@ class FeedbackPublisher:
             None if odometry is None else odometry.origin.stamp,
             speed_limits,
             seen,
-            self._backlog(now),
+            self._probe.lag(now),
             rule.foresight,
             sent_to_robots(rule),
         )

@@ -96,9 +96,7 @@ class HealthMonitor:
         earlier_read: Whether what earlier runs left in the history is taken up.
     """
 
-    def __init__(
-        self, start: Instant, database: Callable[[], HopState] = lambda: "unknown"
-    ) -> None:
+    def __init__(self, start: Instant, database: Callable[[], HopState]) -> None:
         self._start = start
         self._database = database
         self.mqtt_connected = False

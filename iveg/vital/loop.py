@@ -4,7 +4,7 @@ If this loop hangs, feedback stops and every robot slows down by itself (fault F
 """
 
 import asyncio
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable
 from itertools import chain
 
 from iveg.domain.events import LogEvent
@@ -18,63 +18,33 @@ from iveg.domain.observations import (
     Received,
     kind_of,
 )
-from iveg.domain.transports import TransportId
 from iveg.vital import topics
 from iveg.vital.command import Commander
+from iveg.vital.core import Core
 from iveg.vital.evaluate import Evaluator
-from iveg.vital.event_log import EventLog
-from iveg.vital.health_monitor import HealthMonitor, HopHealth, HopState
+from iveg.vital.health_monitor import HopHealth, HopState
 from iveg.vital.ingest import Ingest
-from iveg.vital.ports import Clock
-from iveg.vital.supervision import Supervision
 
 TICK_S = 0.05
 """Time passes, and the fleet is judged, at least so often (s)."""
 POSES_S = 0.02
 """After poses alone the fleet is judged at most so often (s)."""
 URGENT_S = 0.01
-"""The same after a detection frame or a robot's obstacle (s)."""
+"""After a detection frame or a robot's obstacle it is judged so soon (s)."""
 _EARLY_S = 0.001
 _ANSWERS = (CommandAnswer, GoalAnswer)
 _HEALTH_PERIOD_S = 1.0
 
 
 class RuleLoop:
-    """Runs ingest, assess and command in one order, in one task.
-
-    Args:
-        supervision: Names what of comfort is down.
-        decided: Comfort that measures: called with what a judgement was made of.
-        ticks: Comfort that lets time pass, called with each tick; all of it guarded.
-        goals: Comfort, likewise: called with each new word on a goal; with each tick.
-    """
+    """Runs ingest, assess and command in one order, in one task."""
 
     def __init__(
-        self,
-        ingest: Ingest,
-        evaluator: Evaluator,
-        commander: Commander,
-        health_monitor: HealthMonitor,
-        event_log: EventLog,
-        clock: Clock,
-        supervision: Supervision,
-        decided: Callable[[Iterable[Received], Instant], None],
-        ticks: Sequence[Callable[[Instant], None]],
-        goals: tuple[
-            Callable[[GoalAnswer, Instant, TransportId], None],
-            Callable[[Instant], None],
-        ],
+        self, core: Core, ingest: Ingest, evaluator: Evaluator, commander: Commander
     ) -> None:
-        self._ingest = ingest
-        self._evaluator = evaluator
-        self._commander = commander
-        self._health_monitor = health_monitor
-        self._event_log = event_log
-        self._clock = clock
-        self._supervision = supervision
-        self._decided = decided
-        self._goal_heard, tick_goals = goals
-        self._ticks = (tick_goals, *ticks)
+        self._ingest, self._evaluator, self._commander = ingest, evaluator, commander
+        self._health_monitor, self._event_log = core.health_monitor, core.event_log
+        self._clock, self._supervision = core.ports.clock, core.supervision
         self._ticked = self._judged = float("-inf")
         self._health_at = float("-inf")
         self._taken: list[Received] = []
@@ -122,12 +92,11 @@ class RuleLoop:
         else:
             self._evaluator.settle()
         if self._taken:
-            self._decided(self._taken, self._clock())
+            self._supervision.tell("decided", self._taken, self._clock())
             self._taken.clear()
         if ticks:
             self._watch_chain(now)
-            for tick in self._ticks:
-                tick(now)
+            self._supervision.tell("ticked", now)
 
     def _hear(self, received: Received) -> None:
         fresh = self._apply(received)
@@ -153,7 +122,8 @@ class RuleLoop:
         """Hand an observation to whoever follows an order."""
         observation = received.observation
         if isinstance(observation, GoalAnswer):
-            self._goal_heard(observation, received.at, received.transport)
+            facts = observation, received.at, received.transport
+            self._supervision.tell("goal_answered", *facts)
         else:
             world = self._evaluator.world
             robot = world.robots.get(observation.robot_id)

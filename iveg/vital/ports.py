@@ -1,33 +1,27 @@
-"""Ports of the pipeline: what it needs of the outside, a few verbs each."""
+"""Ports of the pipeline to the outside, a few verbs each."""
 
-from collections.abc import Iterable, Sequence
-from typing import Literal, Protocol, TypeVar
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal, Protocol
 
-from iveg.domain.detection_rule import DetectionRule
-from iveg.domain.events import Address, MessageText
 from iveg.domain.feedback import Feedback
 from iveg.domain.goals import CancelOrder, GoalOrder
 from iveg.domain.observations import Instant
 from iveg.domain.peer_scan import PeerScan
+from iveg.domain.transports import Transport
+from iveg.vital.health_monitor import HopState
+from iveg.vital.record import RecordSink
 
-_Kept = TypeVar("_Kept", contravariant=True)
-
-
-class GoalPort(Protocol):
-    """A transport's port for goals, each sent once; 2xx or PUBACK is no evidence."""
-
-    async def goal(self, robot_id: str, order: GoalOrder | CancelOrder) -> None:
-        """Send a goal, or its cancellation.
-
-        Raises:
-            HopError: it was not taken.
-        """
+Clock = Callable[[], Instant]
+"""Reads both clocks of this machine."""
+Ids = Callable[[], str]
+"""Source of new ids: random, sortable, never reused (ULID)."""
 
 
-class CommandPort(GoalPort, Protocol):
+class CommandPort(Protocol):
     """A transport's port for orders; an answer of 2xx or a PUBACK is no evidence.
 
-    A release or resume is sent once: never retained, never sent again.
+    A release, resume or goal is sent once: never retained, never sent again.
     """
 
     async def stop(self, robot_id: str, hold_id: str, by: str) -> None:
@@ -48,6 +42,13 @@ class CommandPort(GoalPort, Protocol):
 
     async def resume(self, robot_id: str, challenge: str, attempt: str) -> None:
         """Send a resume, once.
+
+        Raises:
+            HopError: it was not taken.
+        """
+
+    async def goal(self, robot_id: str, order: GoalOrder | CancelOrder) -> None:
+        """Send a goal, or its cancellation.
 
         Raises:
             HopError: it was not taken.
@@ -101,36 +102,24 @@ class StopJournal(Protocol):
         """
 
 
-class RuleStore(Protocol):
-    """Every version of the rule that ever was in force."""
+@dataclass(frozen=True, slots=True)
+class Ports:
+    """Ports of the pipeline to the outside.
 
-    async def append(self, rule: DetectionRule) -> None:
-        """Write a new version down; returns when it is on disk. Raises HopError."""
+    Attributes:
+        fleet: Feedback and desired states of all robots.
+        transports: Ways of an order to a robot.
+        journal: Desired state of each robot, on disk.
+        sink: The history.
+        clock: Reads both clocks.
+        new_id: Makes ids.
+        history_state: State of the history.
+    """
 
-
-class ChoiceStore(Protocol[_Kept]):
-    """Storage of what people chose, such as the trial of a rule."""
-
-    async def save(self, kept: _Kept, /) -> None:
-        """Put it in the place of what was before; returns on disk. Raises HopError."""
-
-
-class MessageSender(Protocol):
-    """Way to people who are not before a page."""
-
-    async def send(self, to: Address, text: MessageText) -> str | None:
-        """Why an address did not take a message; None where it did."""
-
-
-class Ids(Protocol):
-    """Source of new ids: random, sortable, never reused (ULID)."""
-
-    def __call__(self) -> str:
-        """A new id."""
-
-
-class Clock(Protocol):
-    """Reads both clocks of this machine."""
-
-    def __call__(self) -> Instant:
-        """This moment."""
+    fleet: FleetPort
+    transports: Mapping[Transport, CommandPort]
+    journal: StopJournal
+    sink: RecordSink
+    clock: Clock
+    new_id: Ids
+    history_state: Callable[[], HopState]

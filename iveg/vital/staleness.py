@@ -1,15 +1,12 @@
 """Staleness: links that fall silent, people who are remembered and expire."""
 
 from iveg.domain.events import LogEvent, Slot
-from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import Instant
 from iveg.domain.robot_state import Link, RobotState
-from iveg.domain.tracking.people import People
 from iveg.domain.tracking.person import TrackedPerson
-from iveg.domain.world import World
 from iveg.vital import topics
-from iveg.vital.event_log import EventLog
-from iveg.vital.things import thing_line
+from iveg.vital.core import Core
+from iveg.vital.evidence import thing_line
 
 _STAGE_KEYS = {
     "seen": "log.person_seen",
@@ -21,17 +18,9 @@ _STAGE_KEYS = {
 class Staleness:
     """Ages the world and logs each step of it."""
 
-    def __init__(
-        self,
-        world: World,
-        people: People,
-        greenhouse: Greenhouse,
-        event_log: EventLog,
-    ) -> None:
-        self._world = world
-        self._people = people
-        self._greenhouse = greenhouse
-        self._event_log = event_log
+    def __init__(self, core: Core) -> None:
+        self._world, self._people = core.world, core.people
+        self._greenhouse, self._event_log = core.greenhouse, core.event_log
         self._links: dict[str, Link] = {}
         self._stages: dict[str, str] = {}
 
@@ -77,7 +66,7 @@ class Staleness:
         if key is None or before is None:
             return
         newest = person.newest
-        slots: dict[str, Slot] = {
+        slots = {
             "person": person.person_id,
             "observer": newest.observer,
             "class": person.class_,

@@ -1,9 +1,9 @@
 """Keeps comfort away from what is vital: a part that fails is named and comes back.
 
 Vital is what a STOP or a speed limit needs; everything else is comfort
-(docs/architecture.md, "Vital and comfort").  Vital code is given comfort as calls that
-are guarded here and never imports it, so that no drawing, statistic or row of the
-history can end a STOP::
+(docs/architecture.md, "Vital and comfort").  Vital code never imports comfort: it tells
+an event, and whoever listens is guarded here, so that no drawing, statistic or row of
+the history can end a STOP::
 
     runs ── fails ──> down, P3 ── after a pause that doubles ──> runs
 """
@@ -11,23 +11,64 @@ history can end a STOP::
 import asyncio
 import logging
 from collections import Counter
-from collections.abc import Awaitable, Callable, Iterable
-from functools import wraps
+from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from itertools import chain
-from typing import ParamSpec
+from typing import TypedDict, Unpack, cast
 
-from iveg.domain.alerts import SHOWN_S
+from iveg.domain.alerts import SHOWN_S, BookedAlert
+from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.events import Condition, Slot
-from iveg.domain.observations import Instant
-from iveg.vital.ports import Clock
+from iveg.domain.feedback import SpeedLimit
+from iveg.domain.observations import (
+    DetectionFrame,
+    EntityReading,
+    GoalAnswer,
+    Instant,
+    Observation,
+    Received,
+    SafetyReport,
+)
+from iveg.domain.rule.zones import LimitChange
+from iveg.domain.transports import TransportId
 
 _log = logging.getLogger(__name__)
-_P = ParamSpec("_P")
 
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 1.0, 60.0
 """Between the first failure of a part and its restart, and at most."""
 LONGEST_TURN_S = 0.25
 """CPU that one turn of the loop may take; more delays STOP and feedback."""
+
+
+class Listeners(TypedDict, total=False):
+    """Events, and the facts that a listener is given."""
+
+    measured: Callable[[str, bytes, Instant], object]
+    """A robot's own message was read: topic, payload, and when."""
+    notified: Callable[[bytes, Instant, Sequence[Observation]], object]
+    """A notification was read, and what was observed in it."""
+    entity_read: Callable[[EntityReading, Instant], object]
+    """Orion said something of other equipment."""
+    arrived: Callable[[Received], object]
+    """A copy of a message of the fleet came, by either transport."""
+    frame_taken: Callable[[DetectionFrame, Instant, Instant], object]
+    """A detection frame is judged: its source's moment, and when it came."""
+    obstacle_reported: Callable[[SafetyReport, Instant], object]
+    """A robot of today reported what its laser sees."""
+    goal_answered: Callable[[GoalAnswer, Instant, TransportId], object]
+    aged: Callable[[Instant], object]
+    """Time has passed for the world, which is not judged yet."""
+    judged: Callable[
+        [DetectionRule, Mapping[str, SpeedLimit], Sequence[LimitChange], Instant],
+        object,
+    ]
+    decided: Callable[[Iterable[Received], Instant], object]
+    """A judgement is over, and this is what it was made of."""
+    ticked: Callable[[Instant], object]
+    raised: Callable[[Sequence[BookedAlert]], object]
+    changed: Callable[[str], object]
+    """A live topic has changed."""
+    appended: Callable[[str, object], object]
+    """A live topic has a new item, which every browser is sent."""
 
 
 class Supervision:
@@ -41,31 +82,41 @@ class Supervision:
         counters: Failures and long turns since the start, by part.
     """
 
-    def __init__(self, clock: Clock, first_pause_s: float = FIRST_PAUSE_S) -> None:
+    def __init__(
+        self, clock: Callable[[], Instant], first_pause_s: float = FIRST_PAUSE_S
+    ) -> None:
         self.counters: Counter[str] = Counter()
         self._clock = clock
+        self._listeners: dict[str, list[tuple[str, Callable[..., object]]]] = {
+            event: [] for event in Listeners.__annotations__
+        }
         self._first_pause_s = first_pause_s
         self._failed_at: dict[str, float] = {}
         self._stopped: set[str] = set()
         """Parts that wait for their restart."""
         self._minute = 0
         self._longest_s = 0.0, 0.0
-        """Of this minute, and of the one before."""
+        """Longest turn of this minute, and of the one before (s)."""
         self._long_turns: dict[str, tuple[float, float]] = {}
         """Part → when its newest long turn ended (monotonic, s), and its CPU (s)."""
         self._found: dict[str, tuple[Condition, ...]] = {}
 
-    def guard(self, part: str, call: Callable[_P, object]) -> Callable[_P, None]:
-        """The same call, whose failure is the part's and not its caller's."""
+    def listen(self, part: str, **calls: Unpack[Listeners]) -> None:
+        """Have a part of comfort told of these events, after all who listen already."""
+        for event, call in cast("Mapping[str, Callable[..., object]]", calls).items():
+            self._listeners[event].append((part, call))
 
-        @wraps(call)
-        def guarded(*args: _P.args, **kwargs: _P.kwargs) -> None:
-            try:
-                call(*args, **kwargs)
-            except Exception as error:
-                self.failed(part, error)
+    def tell(self, event: str, *facts: object) -> None:
+        """Tell an event; a listener that fails fails alone."""
+        for part, call in self._listeners[event]:
+            self.guard(part, call, *facts)
 
-        return guarded
+    def guard(self, part: str, call: Callable[..., object], *facts: object) -> None:
+        """Call a part of comfort, whose failure is not its caller's."""
+        try:
+            call(*facts)
+        except Exception as error:
+            self.failed(part, error)
 
     def failed(self, part: str, error: BaseException) -> None:
         """Count a failure of a part; logged once, until the part is well again."""
@@ -95,7 +146,7 @@ class Supervision:
             pause_s = min(LONGEST_PAUSE_S, 2.0 * pause_s)
 
     def report(self, part: str, wrong: Iterable[Condition]) -> None:
-        """What a part has found wrong, in the place of what it found before."""
+        """Take the conditions of a part in the place of its earlier ones."""
         self._found[part] = tuple(wrong)
 
     def note_turn(self, part: str, cpu_s: float) -> None:

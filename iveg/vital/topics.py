@@ -1,18 +1,16 @@
 """The live topics: name, model and source of each.
 
-This table is the only place that spells a topic.  The pipeline names changed topics by
+This table is the only place that spells a topic.  Vital parts name changed topics by
 it (``ROBOT.of("AGI")``), ``/live`` reads and paces by it, and the snapshot is the table
 read once.  Events are each sent; of states the newest is.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 from iveg.domain.observations import Instant
-from iveg.domain.records import LogRecord
-from iveg.domain.stop import FollowedCommand as StopCommand
 from iveg.models.alert import Alert, LogEntry
 from iveg.models.base import GreenhouseMap, Scan
 from iveg.models.command import Command
@@ -26,47 +24,8 @@ Pace = Literal["at once", "frame", "read-out", "picture"]
 """At once, past all telemetry; in each frame; as digits are read; as pictures are."""
 
 
-class StateReader(Protocol):
-    """Source of the newest value of every topic (``web.views``)."""
-
-    def robots(self, now: Instant) -> list[Robot]:
-        """The fleet."""
-
-    def people(self, now: Instant) -> list[Person]:
-        """Every known person."""
-
-    def frames(self, now: Instant) -> dict[str, DetectionFrame]:
-        """The newest detection frames of all robots that have one."""
-
-    def command(self, command: StopCommand, now: Instant) -> Command:
-        """A command at one of its steps."""
-
-    def open_commands(self, now: Instant) -> list[Command]:
-        """Commands that go on."""
-
-    def alerts(self) -> list[Alert]:
-        """All alerts that people should see now."""
-
-    def log(self, lines: Iterable[LogRecord]) -> list[LogEntry]:
-        """Lines of the log."""
-
-    def newest_log(self) -> list[LogEntry]:
-        """The lines that a page begins with, oldest first."""
-
-    def rule(self) -> Rule:
-        """The version in force."""
-
-    def map(self) -> GreenhouseMap:
-        """The greenhouse."""
-
-    def health(self, now: Instant) -> Health:
-        """The data path, hop by hop."""
-
-    def climate(self, now: Instant) -> Climate | None:
-        """The newest reading of the air."""
-
-    def equipment(self, now: Instant) -> list[Tile]:
-        """Every tile of other equipment."""
+StateReader = Any
+"""Source of the newest value of every topic (``web.views.Views``)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,4 +1,4 @@
-"""Composition of the web face from its parts, for iVeg and for its tests."""
+"""Routes of the present and what stands before them, made of the composed parts."""
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
@@ -11,10 +11,10 @@ from iveg.domain.observations import Instant
 from iveg.domain.stamps import format_stamp
 from iveg.domain.stop import Press
 from iveg.models.snapshot import Server, Snapshot, User
-from iveg.pipeline import Pipeline, Services
+from iveg.pipeline import Pipeline
 from iveg.vital import topics
 from iveg.vital.audit import AuditTrail
-from iveg.vital.ports import Clock, Ids
+from iveg.vital.ports import Clock
 from iveg.web import notifications, problems
 from iveg.web.api import (
     alerts,
@@ -43,12 +43,11 @@ from iveg.web.views import Views
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Face:
+class WebParts:
     """The parts that answer requests for the present state.
 
     Attributes:
         orion: Takes Orion's notifications.
-        boot: Random, new at each start.
         queues: How full the queues are.
         worker: Where long work is done.
         encoder: Encodes for pages.
@@ -59,26 +58,23 @@ class Face:
     """
 
     pipeline: Pipeline
-    services: Services
     views: Views
     authenticator: Authenticator
     orion: notifications.NotificationEndpoint
     site: Site
-    boot: str
     queues: Callable[[], health.Queues]
     clock: Clock
-    new_id: Ids
     worker: Apart
     recordings: past.Recordings
     trail: AuditTrail
     past: Past
     encoder: Encoder
-    accounts: Callable[[], str] = lambda: "ok"
+    accounts: Callable[[], str]
 
     def snapshot(self, principal: Principal, now: Instant) -> Snapshot:
         """Everything that is known, for a browser that has just come."""
         server = Server(
-            boot=self.boot,
+            boot=self.pipeline.core.boot,
             version=self.site.version,
             demo=self.site.demo,
             wall=now.wall,
@@ -99,36 +95,36 @@ class Face:
         self.trail.note(who, "stop", robot_id or "", details, at=self.clock())
 
 
-def live_routers(face: Face) -> Iterator[Callable[[], APIRouter]]:
-    """What makes the routes of now: all but history and pages."""
-    parts, beside, views, clock = face.pipeline, face.services, face.views, face.clock
+def live_routers(web: WebParts) -> Iterator[Callable[[], APIRouter]]:
+    """Makers of the routes of the present: all but history and pages."""
+    parts, views, clock = web.pipeline, web.views, web.clock
     watch, evaluator = parts.latency, parts.evaluator
     yield partial(
-        socket.router, parts.hub, face.encoder, face.snapshot, clock, face.stop, watch
+        socket.router, parts.hub, web.encoder, web.snapshot, clock, web.stop, watch
     )
     yield partial(robots.router, views, clock)
     yield partial(robots.equipment_router, views, clock)
-    yield partial(robots.costmap_router, beside.mapper, evaluator, clock)
-    yield partial(robots.coverage_router, beside.coverage, clock)
+    yield partial(robots.costmap_router, parts.mapper, evaluator, clock)
+    yield partial(robots.coverage_router, parts.coverage, clock)
     yield partial(commands.router, parts.commander, clock)
     yield partial(goals.router, parts.goals, clock)
     yield partial(alerts.router, evaluator, clock)
-    yield partial(rule.router, beside.rules, clock)
-    yield partial(rule.trial_router, beside.trials, beside.rules, clock)
-    yield partial(detections.router, evaluator.tracking.newest, face.worker)
-    yield partial(detections.detectors_router, beside.detectors, clock)
-    yield partial(detections.words_router, beside.detectors, clock)
-    yield partial(detections.things_router, beside.things, clock)
-    yield partial(latency.router, watch, clock, face.worker)
-    yield partial(past.recordings_router, face.recordings)
-    yield partial(past.router, face.past, clock)
-    yield partial(health.router, clock, views.health, face.accounts)
-    turns = parts.supervision.longest_turn_s
-    yield partial(health.metrics_router, clock, views.health, watch, face.queues, turns)
+    yield partial(rule.router, parts.rules, clock)
+    yield partial(rule.trial_router, parts.trials, parts.rules, clock)
+    yield partial(detections.router, evaluator.tracking.newest, web.worker)
+    yield partial(detections.detectors_router, parts.detectors, clock)
+    yield partial(detections.words_router, parts.detectors, clock)
+    yield partial(detections.things_router, parts.things, clock)
+    yield partial(latency.router, watch, clock, web.worker)
+    yield partial(past.recordings_router, web.recordings)
+    yield partial(past.router, web.past, clock)
+    yield partial(health.router, clock, views.health, web.accounts)
+    turns = parts.core.supervision.longest_turn_s
+    yield partial(health.metrics_router, clock, views.health, watch, web.queues, turns)
 
 
 def build_app(
-    face: Face,
+    web: WebParts,
     pages: Pages,
     routers: Iterable[APIRouter],
     **facts: Any,
@@ -136,27 +132,27 @@ def build_app(
     """The application with these routes, and what stands before them.
 
     Args:
-        face: Its parts.
+        web: Its parts.
         pages: Draws problems for people.
         routers: Its routes.
         facts: Further arguments of FastAPI.
     """
     app = DocumentedApp(docs_url=None, redoc_url=None, openapi_url=None, **facts)
-    app.state.authenticator, app.state.orion = face.authenticator, face.orion
-    app.router.routes.append(face.orion.route())
+    app.state.authenticator, app.state.orion = web.authenticator, web.orion
+    app.router.routes.append(web.orion.route())
     for router in routers:
         # As they are: what is included is made anew at the first request.
         app.router.routes.extend(router.routes)
     problems.install(app, pages.problem)
-    identify, clock = face.authenticator.identify, face.clock
+    identify, clock = web.authenticator.identify, web.clock
     app.add_middleware(headers.ReadableBodies)
     app.add_middleware(
-        audited.AuditRequests, identify=identify, trail=face.trail, clock=clock
+        audited.AuditRequests, identify=identify, trail=web.trail, clock=clock
     )
     app.add_middleware(headers.BodyLimit)
     app.add_middleware(rate_limits.SocketLimits, identify=identify, clock=clock)
     app.add_middleware(
-        SignInLink, authenticator=face.authenticator, refusal=pages.refused_link
+        SignInLink, authenticator=web.authenticator, refusal=pages.refused_link
     )
     app.add_middleware(SignInGate, clock=clock)
     # Last is outermost: a refusal carries the headers, too.

@@ -63,10 +63,10 @@ class Views:
         self._goals = parts.goals
         self._situations = Situations(parts.evaluator)
         self.scans = parts.scans
-        self._world, self._people = parts.world, parts.evaluator.people
+        self._world, self._people = parts.core.world, parts.core.people
         self._greenhouse = parts.evaluator.greenhouse
-        self._event_log = parts.event_log
-        self._health_monitor = parts.health_monitor
+        self._event_log = parts.core.event_log
+        self._health_monitor = parts.core.health_monitor
         self._equipment = parts.equipment.equipment
         self._counters = counters or parts.counters
         self._alerts: dict[str, tuple[BookedAlert, Alert]] = {}

@@ -9,7 +9,7 @@ from fastapi import FastAPI
 from fastapi.routing import iter_route_contexts
 
 from iveg.adapters import admission
-from iveg.app.opening import open_dss
+from iveg.app.dss import open_dss
 from iveg.asgi import create_app
 from iveg.domain.tracking import person
 from iveg.settings import Settings

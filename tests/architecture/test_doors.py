@@ -12,7 +12,7 @@ from fastapi import FastAPI
 from fastapi.routing import iter_route_contexts
 from starlette.requests import Request
 
-from iveg.app.opening import open_dss
+from iveg.app.dss import open_dss
 from iveg.asgi import create_app
 from iveg.settings import Settings
 from iveg.web.security.audited import AUDITED, READING

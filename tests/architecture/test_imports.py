@@ -10,6 +10,7 @@ from tests.processes import ROOT
 
 MODULES = sorted((ROOT / "iveg").rglob("*.py"))
 FORBIDDEN = ("TODO", "FIXME", "XXX", "NotImplementedError", "time.sleep(")
+MOST_PARAMETERS = 6
 DOCUMENTED = {"_asdict", "_replace", "_current_frames"}
 """Public in spite of their names: of named tuples, and of ``sys``."""
 EVERYTHING = sorted(
@@ -77,6 +78,25 @@ def test_one_door_of_the_product_names_the_laboratory() -> None:
     }
 
     assert doors == {"iveg/app/laboratory.py"}
+
+
+def test_a_constructor_has_six_parameters_at_most_and_no_default_does_nothing() -> None:
+    long, idle = [], []
+    for path in MODULES:
+        if path.relative_to(ROOT / "iveg").parts[0] not in ("app", "vital", "comfort"):
+            continue
+        for node in ast.walk(_tree(path)):
+            if not isinstance(node, ast.FunctionDef) or node.name != "__init__":
+                continue
+            given = node.args
+            if len(given.args) + len(given.kwonlyargs) > 1 + MOST_PARAMETERS:
+                long.append(f"{path.name}:{node.lineno}")
+            defaults = (*given.defaults, *given.kw_defaults)
+            if any(isinstance(one, ast.Lambda) for one in defaults):
+                idle.append(f"{path.name}:{node.lineno}")
+
+    assert long == []
+    assert idle == []
 
 
 def test_nothing_is_left_half_done() -> None:

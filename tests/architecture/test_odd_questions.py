@@ -10,7 +10,7 @@ import pytest
 from fastapi import FastAPI
 
 from iveg.adapters.history.engine import history_url, upgrade
-from iveg.app.opening import open_dss
+from iveg.app.dss import open_dss
 from iveg.asgi import create_app
 from iveg.settings import Settings
 

@@ -41,7 +41,7 @@ from iveg.domain.observations import Origin
 from iveg.domain.parameters import ByClass, for_class, sent_to_robots
 from iveg.models.rule import Rule
 from iveg.ngsi import codec
-from iveg.vital.rules import _lines
+from iveg.vital.operators import _lines
 from iveg.settings import Settings, describe
 from iveg.web.api.rule import RuleChange
 from iveg.web.pages.contexts import Appearance, Page, PageFrame, Site

@@ -5,7 +5,7 @@ from tests.builders import at
 
 
 class FakeClock:
-    """Implements ``pipeline.ports.Clock``; ``now`` counts seconds from the start."""
+    """Implements ``vital.ports.Clock``; ``now`` counts seconds from the start."""
 
     def __init__(self) -> None:
         self.now = 0.0

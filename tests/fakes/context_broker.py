@@ -8,7 +8,7 @@ from iveg.domain.goals import CancelOrder, GoalOrder
 
 
 class FakeContextBroker:
-    """Implements ``pipeline.ports.ContextBroker``.
+    """Implements ``vital.ports.CommandPort``.
 
     Attributes:
         asked: (what, robot, hold ids) in the order it was asked.

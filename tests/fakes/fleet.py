@@ -11,7 +11,7 @@ from iveg.domain.peer_scan import PeerScan
 
 
 class FakeFleet:
-    """Implements ``pipeline.ports.FleetPort``.
+    """Implements ``vital.ports.FleetPort``.
 
     Attributes:
         told: Feedback in the order it was offered; ``scans`` for peers likewise.

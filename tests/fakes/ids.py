@@ -2,7 +2,7 @@
 
 
 class FakeIds:
-    """Implements ``pipeline.ports.Ids``."""
+    """Implements ``vital.ports.Ids``."""
 
     def __init__(self) -> None:
         self.given: list[str] = []

@@ -8,7 +8,7 @@ from iveg.domain.observations import Instant
 
 
 class FakeJournal:
-    """Implements ``pipeline.ports.StopJournal``.
+    """Implements ``vital.ports.StopJournal``.
 
     Attributes:
         lines: (robot, desired, hold, by) that have reached the disk.

@@ -5,8 +5,7 @@ import os
 import sys
 from pathlib import Path
 
-from iveg.app.dss import Dss
-from iveg.app.life import Work
+from iveg.app.dss import Dss, Work
 from iveg.cli.running import run_until_stopped
 from iveg.cli.serve import serve
 from iveg.domain.errors import IvegError

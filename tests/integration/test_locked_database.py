@@ -10,8 +10,7 @@ import httpx
 import pytest
 
 from iveg.adapters import clock
-from iveg.app.dss import Dss
-from iveg.app.opening import open_dss
+from iveg.app.dss import Dss, open_dss
 from iveg.asgi import create_app
 from iveg.domain.observations import Received
 from iveg.settings import Settings
@@ -84,7 +83,7 @@ async def test_f20_with_a_locked_database_iveg_starts_stops_signs_in_and_judges(
                 read = await browser.get("/api/v1/robots")
                 pressed = await press(browser)
                 dss.pipeline.ingest.enqueue(Received(odometry("AGI", 3.0), clock.now()))
-                robot = dss.pipeline.world.robot("AGI")
+                robot = dss.core.world.robot("AGI")
                 await so(lambda: robot.odometry is not None)
                 judged = dss.pipeline.evaluator.speed_limits["AGI"]
 

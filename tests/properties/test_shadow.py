@@ -55,8 +55,8 @@ def _told(desk: Desk) -> list[bytes]:
 
 
 def _happen(desk: Desk, candidate: DetectionRule, happens: str) -> None:
-    shadow, now = desk.parts.shadow, desk.clock()
+    trials, now = desk.parts.trials, desk.clock()
     if happens == "begin":
-        shadow.begin(Trial(candidate, "ana", now.wall), desk.evaluator, now)
+        trials.start(Trial(candidate, "ana", now.wall), now)
     elif happens == "end":
-        shadow.end()
+        trials.stop()

@@ -9,7 +9,7 @@ import pytest
 
 from iveg.adapters.extras import EXTRAS
 from iveg.adapters.history.engine import writing_engine
-from iveg.app.sign_on import open_provider
+from iveg.app.outside import open_provider
 from iveg.cli import UNUSABLE, main
 from iveg.domain.errors import MissingExtraError
 from iveg.settings import Settings

@@ -354,7 +354,7 @@ class VirtualRun:
             self._report()
             if number % _REST_EVERY == 0:
                 await asyncio.sleep(0)
-        result, robots = self._result, self._iveg.parts.world.robots
+        result, robots = self._result, self._iveg.parts.core.world.robots
         result.decisions = [asdict(one) for one in self._iveg.decisions.values()]
         result.completed = bool(result.reported) and all(
             robots[one].link(self._iveg.now) == "LIVE" for one in ROBOTS

@@ -21,10 +21,9 @@ from iveg.domain.words import WordAnswer
 from iveg.models.base import Body, Listing, write_json
 from iveg.models.people import DetectionRow, Thing
 from iveg.models.robot import Detector
-from iveg.vital.detectors import Detectors
-from iveg.vital.newest_detections import NewestDetections
+from iveg.vital.detections import NewestDetections
+from iveg.vital.operators import Detectors, ThingMarks
 from iveg.vital.ports import Clock
-from iveg.vital.things import ThingMarks
 from iveg.web.api import exports
 from iveg.web.api.answers import FEW_ROWS, Apart, Json
 from iveg.web.api.exports import MEDIA_TYPES, Form

@@ -24,7 +24,7 @@ from iveg.adapters.history import lists
 from iveg.adapters.history.lists import Cursor, Filter, ListOf
 from iveg.domain.errors import UnreadableError
 from iveg.domain.records import Record
-from iveg.vital.newest_detections import JudgedDetection
+from iveg.vital.detections import JudgedDetection
 from iveg.web.api.exports import Form
 
 R = TypeVar("R", bound=Record)

@@ -20,8 +20,7 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 from numpy.typing import NDArray
 from PIL import Image
 
-from iveg.comfort.coverage import CoverageMonitor
-from iveg.comfort.mapping import Mapper
+from iveg.comfort.maps import CoverageMonitor, Mapper
 from iveg.domain.costmap import UNKNOWN, InflatedGrid
 from iveg.domain.coverage import RECENT_S
 from iveg.domain.observations import Instant

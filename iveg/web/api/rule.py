@@ -14,8 +14,8 @@ from iveg.models.base import Body, Listing
 from iveg.models.rule import Rule as RuleModel
 from iveg.models.rule import Trial as TrialModel
 from iveg.models.rule import parameter_fields
+from iveg.vital.operators import Rules
 from iveg.vital.ports import Clock
-from iveg.vital.rules import Rules
 from iveg.web.api.answers import Json
 from iveg.web.refusals import refusals
 from iveg.web.security.requirements import Operator, require

@@ -66,7 +66,7 @@ class Place:
         access: FiwareToken | None = None,
     ) -> None:
         self.heard: list[tuple[str, bytes]] = []
-        self.health_monitor = HealthMonitor(clock.now())
+        self.health_monitor = HealthMonitor(clock.now(), lambda: "ok")
         self.ingest = Ingest(World(("AGI",)), ignore, ignore)
         self.orion = orion or OrionClient(
             orion_url or fiware.orion_url, *SERVICE, access

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from iveg.app.dss import Dss
-from iveg.app.opening import open_dss
+from iveg.app.dss import Dss, open_dss
 from iveg.settings import Settings
 
 

@@ -8,8 +8,7 @@ WITHOUT = "import sys; sys.modules['iveg.lab'] = None; "
 SERVER = """
 import pathlib
 from fastapi.routing import iter_route_contexts
-from iveg.app.dss import Dss
-from iveg.app.opening import open_dss
+from iveg.app.dss import Dss, open_dss
 from iveg.asgi import create_app
 from iveg.settings import Settings
 dss = open_dss(Settings(), pathlib.Path(sys.argv[1]))

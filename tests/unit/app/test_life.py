@@ -4,7 +4,7 @@ import asyncio
 
 import pytest
 
-from iveg.app.life import live
+from iveg.app.dss import live
 from iveg.domain.errors import VitalPartError
 from iveg.vital.supervision import Supervision
 from tests.fakes.clock import FakeClock

@@ -2,12 +2,11 @@
 
 import argparse
 import asyncio
-import sys
 from pathlib import Path
 
 import pytest
 
-from iveg.cli import COMMANDS, main, robot
+from iveg.cli import COMMANDS, robot
 from iveg.cli.arguments import CommandCall, parser
 from iveg.cli.nodes import load_config
 from iveg.cli.robot import refuse_second_gate
@@ -28,12 +27,6 @@ def test_an_id_that_iveg_cannot_know_is_refused(robot_id: str, tmp_path: Path) -
 
     with pytest.raises(SettingsError, match="--id"):
         robot.run(CommandCall(asked, Settings(), {}, tmp_path))
-
-
-def test_importing_iveg_needs_no_dds(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "cyclonedds", None)
-
-    assert main(["settings"]) == 0
 
 
 @pytest.mark.parametrize("domain", ["233", "-1"])

@@ -125,15 +125,6 @@ async def test_goals_of_an_earlier_run_are_closed_and_ours_are_not() -> None:
     assert rows[ours.command_id].state == "SENT"
 
 
-async def test_an_unanswered_goal_is_not_confirmed_and_never_sent_again() -> None:
-    desk = await sent()
-    await desk.wait(10.2)
-
-    assert newest(desk).state == "UNCONFIRMED"
-    await desk.wait(30.0)
-    assert len(desk.fleet.goals) == 1
-
-
 @pytest.mark.parametrize("answer", [None, "ACCEPTED"])
 async def test_a_stop_deletes_the_goal_at_once(answer: str | None) -> None:
     desk = await sent()
@@ -143,27 +134,6 @@ async def test_a_stop_deletes_the_goal_at_once(answer: str | None) -> None:
 
     assert newest(desk).state == "DELETED"
     assert "log.goal.held" in desk.sentences()
-
-
-async def test_the_robots_own_hold_deletes_the_goal_too() -> None:
-    desk = await sent()
-    free(desk, Hold("hw-1", "hw", "local"))
-    await desk.wait(0.1)
-
-    assert newest(desk).state == "DELETED"
-
-
-async def test_a_release_and_a_resume_bring_no_goal_back() -> None:
-    desk = await sent()
-    say(desk, "ACCEPTED")
-    free(desk, Hold("hw-1", "hw", "local"))
-    await desk.wait(0.1)
-    free(desk)
-    say(desk, "ACCEPTED")
-    await desk.wait(5.0)
-
-    assert newest(desk).state == "DELETED"
-    assert len(desk.fleet.goals) == 1
 
 
 async def test_a_stop_before_the_goal_left_keeps_it_back() -> None:
@@ -197,18 +167,3 @@ async def test_a_cancellation_names_the_goal_and_waits_for_the_robot() -> None:
     assert desk.fleet.goals[-1] == ("AGI", CancelOrder(goal_id))
     say(desk, "DROPPED", "cancelled")
     assert newest(desk).state == "CANCELLED"
-
-
-async def test_words_of_another_goal_change_nothing() -> None:
-    desk = await sent()
-    desk.hear(GoalAnswer("AGI", counted(desk), "01OTHER", "REACHED"))
-
-    assert newest(desk).state == "SENT"
-
-
-async def test_an_answer_that_orion_kept_changes_nothing() -> None:
-    desk = await sent()
-    answer = GoalAnswer("AGI", counted(desk), newest(desk).goal.goal_id, "REACHED")
-    desk.hear(answer, asked=True)
-
-    assert newest(desk).state == "SENT"

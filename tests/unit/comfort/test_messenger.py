@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import pytest
 
-from iveg.comfort.messenger import MOST_WAITING, Messenger
+from iveg.comfort.messenger import MOST_WAITING, Messenger, Pace
 from iveg.domain.events import Address, AlertItem, Condition, MessagePlan, MessageText
 from tests.unit.vital.desk import Desk
 
@@ -55,14 +55,12 @@ class Outpost:
         self.alerts = self.desk.evaluator.alerts
         self.messenger = Messenger(
             MessagePlan(addresses, escalate_after_s=300.0),
-            self.way,
+            self.way.send,
             write,
-            lambda: self.alerts.waiting,
-            self.desk.clock,
-            rest_s,
-            limit_s,
+            self.alerts,
+            self.desk.parts.core,
+            Pace(rest_s, limit_s),
         )
-        self.alerts.on_raised = self.messenger.enqueue_raised
 
     def wrong(self, *conditions: Condition) -> None:
         self.alerts.sync(conditions, self.desk.clock())

@@ -3,8 +3,7 @@
 import math
 from dataclasses import replace
 
-from iveg.comfort.peer_scans import PeerScans
-from iveg.comfort.scans import ScanReader
+from iveg.comfort.maps import PeerScans, ScanReader
 from iveg.domain.geometry import Pose2D
 from iveg.domain.peer_scan import PeerScan
 from tests.builders import at, safety_report, scan

@@ -65,7 +65,7 @@ class Upkeep:
             self.history,
             Retention(),
             self.desk.event_log,
-            self.desk.parts.supervision,
+            self.desk.parts.core.supervision,
             AuditTrail(self.desk.sink, self.desk.ids),
             self._rest,
         )

@@ -9,7 +9,7 @@ from iveg.adapters.rules import TRIALS_FORM, FileTrials
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import HopError, OutdatedError, TrialRefusedError
 from iveg.domain.parameters import ByClass
-from iveg.domain.rule.trial import MOST_KEPT, Trial
+from iveg.domain.rule.trial import Trial
 from iveg.domain.words import WordAnswer
 from iveg.lab.emulator.orders import FaultOrder
 from iveg.pipeline import Pipeline
@@ -27,11 +27,11 @@ STRICT, LAX = (
 
 def begin(parts: Pipeline, rule: DetectionRule, desk: Desk) -> None:
     trial = Trial(rule, "ana", desk.clock().wall)
-    parts.shadow.begin(trial, parts.evaluator, desk.clock())
+    parts.trials.start(trial, desk.clock())
 
 
 def trial_of(desk: Desk) -> Trial:
-    trial = desk.parts.shadow.trial()
+    trial = desk.parts.trials.current
     assert trial is not None
     return trial
 
@@ -129,42 +129,14 @@ def test_who_is_sure_enough_for_the_rule_in_force_alone_frees() -> None:
     assert later == pytest.approx(0.3, abs=0.01)
 
 
-def test_another_rule_in_force_begins_the_comparison_anew() -> None:
-    desk = Desk()
-    begin(desk.parts, LAX, desk)
-    for number in range(40):
-        watch(desk, 1.5, *([0.85] if number >= 25 else []))
-    assert trial_of(desk).differences
-    desk.evaluator.rule = replace(RULE, version=2, threshold=ByClass(0.95))
-    watch(desk, 1.5)
-
-    told = trial_of(desk).so_far
-    assert told is not None
-    assert (told.against, told.compared_s, told.would_not) == (2, 0.0, 0)
-
-
 def test_a_trial_that_cannot_judge_ends_and_is_named() -> None:
     desk = Desk()
     begin(desk.parts, replace(RULE, radius_m="wide"), desk)  # type: ignore[arg-type]
     watch(desk, 1.5, 0.9)
 
-    assert desk.parts.shadow.trial() is None
-    assert desk.parts.supervision.counters["comfort_failed.shadow-rule"] == 1
+    assert desk.parts.trials.current is None
+    assert desk.parts.core.supervision.counters["comfort_failed.shadow-rule"] == 1
     assert desk.evaluator.speed_limits["AGI"].speed_factor == 0.5
-
-
-def test_the_list_is_bounded_and_the_count_is_not() -> None:
-    desk = Desk()
-    begin(desk.parts, LAX, desk)
-    for number in range(40):
-        watch(desk, 1.5, *([0.85] if number >= 25 else []))
-    trial = trial_of(desk)
-    many = trial.differences * (MOST_KEPT + 5)
-    again = replace(trial, differences=many)
-    desk.parts.shadow.begin(again, desk.evaluator, desk.clock())
-
-    assert len(trial_of(desk).differences) == MOST_KEPT
-    assert trial_of(desk).so_far == trial.so_far
 
 
 async def test_it_goes_on_after_a_restart_with_what_it_had(tmp_path: Path) -> None:
@@ -182,7 +154,7 @@ async def test_it_goes_on_after_a_restart_with_what_it_had(tmp_path: Path) -> No
     assert kept == before
     assert kept is not None
     desk = Desk()
-    desk.parts.shadow.begin(kept, desk.evaluator, desk.clock())
+    desk.parts.trials.start(kept, desk.clock())
     again = trial_of(desk)
     assert again.so_far == before.so_far
     assert all(one.ended is not None for one in again.differences)
@@ -203,7 +175,7 @@ def test_a_file_that_cannot_be_read_tries_nothing(
 
 async def test_an_operator_begins_ends_and_promotes() -> None:
     desk = WebDesk()
-    trials, at = desk.services.trials, desk.clock()
+    trials, at = desk.parts.trials, desk.clock()
     with pytest.raises(TrialRefusedError, match="none"):
         await trials.end()
     with pytest.raises(TrialRefusedError, match="same"):
@@ -211,7 +183,7 @@ async def test_an_operator_begins_ends_and_promotes() -> None:
     desk.trial_store.full = True
     with pytest.raises(HopError):
         await trials.begin(LAX, "ana", at)
-    assert desk.parts.shadow.trial() is None
+    assert desk.parts.trials.current is None
     desk.trial_store.full = False
     await trials.begin(LAX, "ana", at)
     with pytest.raises(TrialRefusedError, match="running"):
@@ -233,4 +205,4 @@ async def test_an_operator_begins_ends_and_promotes() -> None:
     assert rule.comparison.would_not > 0
     assert desk.rule_store.written == [rule]
     assert desk.trial_store.written is None
-    assert desk.parts.shadow.trial() is None
+    assert desk.parts.trials.current is None

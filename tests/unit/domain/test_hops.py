@@ -9,7 +9,7 @@ from tests.builders import at
 
 
 def test_the_running_monitor_judges_hops_in_the_order_of_the_table() -> None:
-    judged = [hop.name for hop in HealthMonitor(at(0.0)).hops(at(1.0))]
+    judged = [hop.name for hop in HealthMonitor(at(0.0), lambda: "ok").hops(at(1.0))]
 
     assert judged == [hop for hop in Hop if hop is not Hop.PAGE]
 

@@ -18,14 +18,15 @@ from iveg.domain.observations import (
 )
 from iveg.domain.stop import FollowedCommand
 from iveg.domain.transports import DIRECT, FIWARE, Transport, TransportId
-from iveg.pipeline import Choices, Ports, build
-from iveg.vital.ports import CommandPort
+from iveg.pipeline import Choices, build
+from iveg.vital.ports import CommandPort, Ports
 from tests.builders import detection_frame, fleet_of, odometry, origin, safety_report
 from tests.fakes.clock import FakeClock
 from tests.fakes.context_broker import FakeContextBroker
 from tests.fakes.fleet import FakeFleet
 from tests.fakes.ids import FakeIds
 from tests.fakes.journal import FakeJournal
+from tests.fakes.kept import FakeChoices
 from tests.fakes.recorder import FakeRecorder
 
 OneRecord = TypeVar("OneRecord")
@@ -51,6 +52,7 @@ class Desk:
         self.journal = FakeJournal()
         self.ids = FakeIds()
         self.sink = FakeRecorder()
+        self.choices = FakeChoices()
         self.description = fleet_of(*robots)
         self.parts = parts = build(
             self.description,
@@ -66,17 +68,18 @@ class Desk:
                 self.sink,
                 self.clock,
                 self.ids,
+                lambda: "ok",
             ),
-            Choices(tiles=tiles, refused=refused),
+            Choices(self.choices.kept, tiles=tiles, refused=refused),
         )
         self.hub, self.event_log, self.health_monitor = (
             parts.hub,
-            parts.event_log,
-            parts.health_monitor,
+            parts.core.event_log,
+            parts.core.health_monitor,
         )
         self.latency, self.ingest, self.loop = parts.latency, parts.ingest, parts.loop
         self.evaluator, self.commander = parts.evaluator, parts.commander
-        self.world = parts.world
+        self.world = parts.core.world
         self.seq = 0
 
     # --- what arrives -------------------------------------------------------------

@@ -192,19 +192,6 @@ async def test_robots_whose_age_is_estimated_are_named_in_one_notice() -> None:
     assert condition.slots == {"robots": "AGI, AGII"}
 
 
-async def test_neither_a_robot_that_echoes_nor_a_recording_is_named() -> None:
-    desk = Desk(("AGI", "AGII:recording"))
-    robot = Robot(desk)
-    robot.speed = 0.0
-    for _ in range(60):
-        robot.live()
-        desk.look("AGI")
-        desk.drive("AGII", 50.0)
-        await desk.wait(0.1)
-
-    assert conditions_of(desk) == []
-
-
 async def test_a_robot_that_stands_and_whose_odometry_is_late_did_not_move() -> None:
     robot = await standing()
     robot.frozen = True

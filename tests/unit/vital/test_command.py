@@ -4,7 +4,6 @@ import asyncio
 
 import pytest
 
-from iveg.domain.errors import UnknownRobotError
 from iveg.domain.observations import Hold
 from iveg.domain.records import CommandEventRecord, CommandRecord
 from iveg.domain.stop import STEPS, DesiredRecord, FollowedCommand, StopMachine
@@ -54,15 +53,6 @@ async def test_the_journal_has_it_before_the_press_is_accepted() -> None:
     assert desk.journal.lines == [("AGI", "stopped", command.command_id, "ana")]
 
 
-async def test_both_transports_carry_the_same_id() -> None:
-    desk = Desk()
-
-    command = await press(desk)
-
-    assert desk.fleet.stops == [("AGI", command.command_id)]
-    assert desk.broker.asked == [("stop", "AGI", (command.command_id,))]
-
-
 async def test_a_transport_that_hangs_does_not_hold_up_the_other() -> None:
     desk = Desk()
     desk.broker.opened.clear()
@@ -73,17 +63,6 @@ async def test_a_transport_that_hangs_does_not_hold_up_the_other() -> None:
     assert len(desk.fleet.stops) == 4
     assert desk.now(command).transports == {"direct": "ok", "fiware": "pending"}
     desk.broker.opened.set()
-    await desk.commander.close()
-
-
-async def test_a_broker_that_hangs_does_not_hold_up_orion() -> None:
-    desk = Desk()
-    desk.fleet.opened.clear()
-
-    command = await press(desk)
-
-    assert desk.broker.asked
-    assert desk.now(command).state == "SENT"
     await desk.commander.close()
 
 
@@ -131,25 +110,6 @@ async def test_without_the_direct_transport_only_orion_is_asked() -> None:
 
     assert desk.fleet.stops == []
     assert len(desk.broker.asked) == 1
-
-
-async def test_stop_all_stops_every_robot_at_once() -> None:
-    desk = Desk()
-
-    commands = await desk.commander.stop(desk.commander.machines, "ana", desk.clock())
-    await settle()
-
-    assert [name for name, _ in desk.fleet.stops] == ["AGI", "AGII"]
-    assert len({command.command_id for command in commands}) == 2
-
-
-async def test_stopping_a_robot_outside_the_fleet_stops_nothing() -> None:
-    desk = Desk()
-
-    with pytest.raises(UnknownRobotError):
-        await desk.commander.stop(["AGI", "AGX"], "ana", desk.clock())
-
-    assert desk.fleet.stops == []
 
 
 async def test_i3_204_from_orion_and_a_puback_are_no_evidence() -> None:
@@ -221,42 +181,6 @@ async def test_a_held_robot_that_moves_is_a_grave_alert_until_it_stands_again() 
         if one.condition.key == "alert.stop_moved"
     )
     assert alert.cleared is not None
-
-
-async def test_a_robot_that_was_merely_stopped_is_not_said_to_have_moved() -> None:
-    desk = Desk()
-    await press(desk)
-
-    await desk.wait(6.0)
-
-    assert "alert.stop_moved" not in conditions_of(desk)
-
-
-async def test_every_browser_gets_each_try_of_a_stop_that_nobody_answers() -> None:
-    desk = Desk()
-    command = await press(desk)
-    await desk.wait(2.0)
-    before = desk.hub.versions["robots/AGI"], command.tries
-
-    await desk.wait(3.0)
-
-    told = desk.hub.versions["robots/AGI"] - before[0]
-    assert desk.now(command).tries - before[1] >= 6
-    assert told >= desk.now(command).tries - before[1]
-
-
-async def test_a_silent_robots_tries_are_told_at_most_a_few_times_a_second() -> None:
-    desk = Desk()
-    await press(desk)
-    await desk.wait(2.0)
-    looker = desk.hub.join()
-    told = 0
-    for _ in range(100):
-        looker.telemetry.clear()
-        await desk.wait(0.05)
-        told += "robots/AGI" in looker.telemetry
-
-    assert 10 <= told <= 5 * 4
 
 
 async def test_i6_a_release_goes_once_on_each_transport_and_names_its_attempt() -> None:
@@ -444,15 +368,6 @@ async def test_a_restart_among_three_holds_that_were_named_waits_for_the_robot()
     assert desk.fleet.stops[-1][1] not in three
 
 
-async def test_a_restart_forgets_robots_that_left_the_fleet() -> None:
-    desk = Desk()
-
-    desk.commander.restore({"AGX": DesiredRecord("ana")}, desk.clock())
-    await settle()
-
-    assert desk.fleet.stops == []
-
-
 async def test_what_a_crash_left_open_is_closed_and_says_what_became_of_it() -> None:
     desk = Desk()
     desk.commander.restore({"AGI": DesiredRecord("ana")}, desk.clock())
@@ -478,18 +393,6 @@ async def test_what_a_crash_left_open_is_closed_and_says_what_became_of_it() -> 
         ("01LIFT", "EXPIRED", "server restarted; followed no more"),
     ]
     assert [one.reason for one in rows] == ["restarted"] * 3
-
-
-async def test_a_row_of_a_hold_that_was_adopted_goes_on_in_this_run() -> None:
-    desk = Desk()
-    desk.report("AGI", Hold("01BEFORE", "iveg", "remote"))
-    before = len(desk.sink.records)
-
-    left = [command_record(command_id="01BEFORE", state="STANDING")]
-    desk.commander.close_earlier(left, desk.clock())
-    await settle()
-
-    assert desk.sink.records[before:] == []
 
 
 async def test_a_release_goes_out_when_its_audit_row_is_on_the_disk() -> None:
@@ -575,16 +478,6 @@ async def test_f38_fifty_presses_are_fifty_rows_and_one_episode() -> None:
         *(f"joined by operator-{number}" for number in range(1, 50)),
     ]
     assert len({row.command_id for row in rows}) == 1
-
-
-async def test_old_commands_make_room() -> None:
-    desk = Desk()
-    for _ in range(250):
-        desk.commander.restore({"AGII": DesiredRecord("ana")}, desk.clock())
-        desk.report("AGII", released=(desk.commander.machine("AGII").hold_id or "",))
-
-    assert len(desk.commander.commands) <= 200
-    await desk.commander.close()
 
 
 async def test_a_step_that_the_table_lacks_is_told_and_counted_and_ends_nothing(

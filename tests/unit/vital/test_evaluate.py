@@ -9,7 +9,7 @@ from iveg.domain.detector import CLASS_NAMES
 from iveg.domain.geometry import Rectangle
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.margins import LeastMargins
-from iveg.domain.observations import Hold, Origin
+from iveg.domain.observations import Origin
 from iveg.domain.records import (
     AlertRecord,
     DecisionRecord,
@@ -17,7 +17,7 @@ from iveg.domain.records import (
     OdometryRecord,
 )
 from iveg.models.decision import Decision
-from tests.builders import detection, detection_frame, safety_report
+from tests.builders import detection, detection_frame
 from tests.fakes.records import alert_record
 from tests.unit.vital.desk import Desk, conditions_of
 
@@ -103,15 +103,6 @@ def test_feedback_says_which_report_of_each_robot_was_seen() -> None:
     assert desk.fleet.told[-1].seen["AGI"] == seen
 
 
-def test_every_message_to_the_fleet_has_a_number_of_its_own() -> None:
-    desk = watched(Desk())
-    meet(desk)
-
-    numbers = [one.origin.seq for one in desk.fleet.told]
-    assert len(set(numbers)) == len(numbers)
-    assert {one.origin.boot for one in desk.fleet.told} == {"iveg-boot"}
-
-
 def test_every_robot_is_told_how_far_orion_is_behind() -> None:
     desk = watched(Desk())
     desk.health_monitor.sent(Origin("iveg-boot", 1), desk.clock())
@@ -191,15 +182,6 @@ def test_a_robot_that_slows_for_somebody_it_cannot_see_is_counted() -> None:
     assert desk.evaluator.protected_unseen == 1
 
 
-async def test_13_10_a_slow_down_that_the_rule_asked_for_is_no_alert() -> None:
-    desk = watched(Desk())
-    meet(desk)
-    await desk.wait(0.1)
-
-    assert conditions_of(desk) == []
-    assert "log.alert.raised" not in desk.sentences()
-
-
 async def test_a_robot_that_does_not_slow_down_raises_a_grave_alert() -> None:
     desk = watched(Desk())
     for number in range(22):
@@ -211,30 +193,6 @@ async def test_a_robot_that_does_not_slow_down_raises_a_grave_alert() -> None:
 
     assert "alert.person_not_slowing" in conditions_of(desk)
     assert "log.alert.raised" in desk.sentences()
-
-
-async def test_a_moving_robot_that_is_lost_raises_and_its_return_clears() -> None:
-    desk = watched(Desk())
-    await desk.wait(3.2)
-    assert "alert.moving_robot_lost" in conditions_of(desk)
-
-    watched(desk)
-    await desk.wait(0.1)
-
-    assert all(one.cleared for one in desk.evaluator.alerts.waiting)
-    assert desk.sentences().count("log.alert.cleared") == 2
-
-
-async def test_acknowledging_is_written_down_and_told() -> None:
-    desk = watched(Desk())
-    await desk.wait(3.2)
-    (first, *_) = desk.evaluator.alerts.waiting
-
-    desk.evaluator.alerts.acknowledge(first.alert_id, "ana", "seen", desk.clock())
-
-    newest = desk.records(AlertRecord)[-1]
-    assert (newest.acknowledged_by, newest.note) == ("ana", "seen")
-    assert desk.sentences()[-1] == "log.alert.acknowledged"
 
 
 def stored_verdicts(desk: Desk) -> set[str]:
@@ -264,31 +222,6 @@ async def drive_on(desk: Desk, seconds: float) -> None:
         desk.drive("AGI", 0.08 * number, linear=0.8)
         meet(desk)
         await desk.wait(0.1)
-
-
-async def test_a_robot_that_nobody_can_hear_is_not_judged_until_it_is_heard_again() -> (
-    None
-):
-    desk = watched(Desk())
-    meet(desk)
-    await desk.wait(5.0)
-    told = ["alert.person_not_slowing" in conditions_of(desk)]
-    for _ in range(3):
-        await drive_on(desk, 1.0)
-        told.append("alert.person_not_slowing" in conditions_of(desk))
-
-    assert told == [False, False, True, True]
-
-
-async def test_a_decision_that_waits_is_not_stored_again_and_again() -> None:
-    desk = watched(Desk())
-    meet(desk)
-    for _ in range(10):
-        desk.drive("AGI", 0.0)
-        meet(desk)
-        await desk.wait(0.45)
-
-    assert len(desk.records(DecisionRecord)) <= 4
 
 
 def test_a_decision_that_is_open_when_iveg_goes_away_says_so() -> None:
@@ -512,25 +445,3 @@ def test_f46_somebody_whose_observer_died_still_slows_who_comes_near() -> None:
     desk.look("AGI")
 
     assert desk.evaluator.speed_limits["AGI"].reason == "person"
-
-
-def test_a_held_robot_says_so_in_the_log_once() -> None:
-    desk = watched(Desk())
-    for _ in range(3):
-        desk.report("AGI", Hold("hw-1", "hw", "local"), factor=0.0, reason="hold")
-
-    assert desk.sentences().count("log.speed_down.hold") == 1
-
-
-def test_what_orion_kept_of_an_earlier_run_slows_nobody_in_the_log() -> None:
-    desk = Desk()
-    kept = safety_report(
-        "AGI", speed_factor=0.5, reason="stale", origin=desk.next_origin()
-    )
-    desk.hear(kept, asked=True)
-    before = desk.sentences()
-
-    desk.report("AGI", factor=0.5, reason="stale")
-
-    assert not any(key.startswith("log.speed") for key in before)
-    assert desk.sentences()[-1].startswith("log.speed_down")

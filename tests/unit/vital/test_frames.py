@@ -2,28 +2,11 @@
 
 from dataclasses import replace
 
-import orjson
-
 from iveg.domain.observations import Detection
-from iveg.ngsi import codec
-from iveg.web.views import Views
 from tests.builders import detection
 from tests.unit.vital.desk import Desk, conditions_of
 
 ALERT = "alert.frame_not_named"
-LISTING_1 = {
-    "class_id": "farmer",
-    "probability": 0.945,
-    "position": {
-        "xmin": 0.4506,
-        "xmax": 0.7936,
-        "ymin": -0.3154,
-        "ymax": 0.1137,
-        "zmin": -0.2596,
-        "zmax": 0.1051,
-    },
-}
-"""The box of the paper, which names no frame."""
 
 
 def unlabelled(x: float, class_id: str = "farmer") -> Detection:
@@ -61,36 +44,6 @@ async def test_a_robot_that_names_no_frame_is_a_notice_as_long_as_it_names_none(
     desk.look("AGI", detection(x=4.0))
     await desk.wait(0.1)
     assert ALERT not in conditions_of(desk)
-
-
-async def test_a_robot_whose_frame_the_fleet_names_is_no_notice() -> None:
-    desk = parked()
-    robot = desk.world.robot("AGI")
-    profile = replace(robot.profile, unlabelled_frame="camera_link")
-    robot.description = replace(robot.description, profile=profile)
-
-    desk.look("AGI", unlabelled(4.0))
-    await desk.wait(0.1)
-
-    assert ALERT not in conditions_of(desk)
-
-
-async def test_the_papers_box_is_one_person_at_two_places_on_the_page() -> None:
-    desk = parked()
-    views = Views(desk.parts)
-    measure = orjson.dumps({"bounding_boxes": [LISTING_1]})
-    (frame,) = codec.read_measure("AGI_yolox_bounding_boxes", measure).observations
-
-    desk.hear(frame)
-
-    (known,) = views.people(desk.clock())
-    shown = views.frame("AGI", desk.clock())
-    assert shown is not None
-    assert [one.person_id for one in shown.items] == [known.person_id] * 2
-    assert [round(one.position.x, 2) for one in shown.items] == [0.62, 1.02]
-    assert {one.box.frame_id for one in shown.items if one.box} == {"base_link"}
-    told = desk.fleet.told[-1].alerts
-    assert {round(one.position[0], 2) for one in told if one.position} == {0.62, 1.02}
 
 
 def test_a_person_in_an_unknown_frame_slows_who_is_near_for_a_second() -> None:

@@ -16,10 +16,8 @@ from iveg.domain.observations import (
     Observation,
     Received,
 )
-from iveg.domain.records import ReadingRecord
 from iveg.domain.world import World
 from iveg.models.robot import Device
-from iveg.ngsi import codec
 from tests.builders import (
     at,
     detection_frame,
@@ -79,21 +77,6 @@ def test_a_copy_is_news_only_where_its_row_orders_by_arrival(row: Kind) -> None:
     assert verdict == ("duplicate" if row.ordered == "counted" else "new")
 
 
-def test_a_battery_is_read_as_it_was_written() -> None:
-    said = Battery("AGI", origin(3), 0.42, charging=True, voltage=25.1)
-
-    reading = codec.read_measure("AGI_battery", codec.write_measure(said))
-
-    assert reading.observations == (said,)
-
-
-@pytest.mark.parametrize("level", [-0.1, 1.1, 42, "0.4"])
-def test_a_level_that_is_no_share_is_refused(level: object) -> None:
-    reading = codec.read_attributes("AGI", {"battery": {"percentage": level}})
-
-    assert [one.reason for one in reading.problems] == ["bad_battery"]
-
-
 async def test_a_battery_at_a_fifth_is_a_p3_until_it_is_at_a_quarter() -> None:
     desk = Desk()
     told = []
@@ -103,43 +86,6 @@ async def test_a_battery_at_a_fifth_is_a_p3_until_it_is_at_a_quarter() -> None:
         told.append(LOW in conditions_of(desk))
 
     assert told == [False, False, True, True, True, False, False]
-
-
-async def test_one_that_charges_or_does_not_know_raises_nothing() -> None:
-    desk = Desk()
-    battery(desk, 0.1, charging=True)
-    await desk.wait(0.1)
-    charging = [*conditions_of(desk)]
-    battery(desk, None)
-    await desk.wait(0.1)
-
-    assert LOW not in charging
-    assert LOW not in conditions_of(desk)
-
-
-def test_an_older_battery_changes_nothing() -> None:
-    desk = Desk()
-    late = desk.next_origin()
-    battery(desk, 0.5)
-    desk.hear(Battery("AGI", late, 0.1))
-
-    kept = desk.world.robot("AGI").sensed[Battery].observation
-
-    assert isinstance(kept, Battery)
-    assert kept.percentage == 0.5
-
-
-async def test_a_battery_is_kept_once_a_minute() -> None:
-    desk = Desk()
-    for _ in range(25):
-        battery(desk, 0.5)
-        desk.clock.now += 5.0
-
-    kept = desk.records(ReadingRecord)
-
-    assert [one.at - kept[0].at for one in kept] == [0.0, 55.0, 110.0]
-    assert kept[0].kind == "battery"
-    assert kept[0].value == {"percentage": 0.5, "charging": False, "voltage": 25.1}
 
 
 @dataclass(frozen=True, slots=True)

@@ -43,25 +43,6 @@ async def test_a_live_robot_that_the_fleet_calls_a_recording_is_told_at_once() -
     assert "D1" in [one.robot_id for one in desk.world.live_robots()]
 
 
-async def test_a_replay_that_marks_its_messages_raises_nothing() -> None:
-    desk = Desk(("AGI", "D1:recording"))
-    marked = replace(desk.next_origin(), replay="D1")
-
-    desk.hear(safety_report("D1", origin=marked))
-    desk.hear(odometry("D1", 3.0, origin=marked))
-    await desk.wait(0.1)
-
-    assert alerts(desk) == []
-
-
-async def test_robots_that_nobody_described_are_named_in_one_alert() -> None:
-    desk = Desk(("AGI", "B1", "B2", "D1:recording"))
-
-    await desk.wait(0.1)
-
-    assert alerts(desk) == [("P3", "alert.robots_not_described", "B1, B2")]
-
-
 async def test_a_rule_that_was_recovered_is_told_until_somebody_makes_another() -> None:
     desk = Desk(("AGI",))
     desk.evaluator.rule = replace(desk.evaluator.rule, author=RECOVERED)

@@ -2,9 +2,8 @@
 
 from iveg.domain.geometry import Rectangle
 from iveg.domain.greenhouse import Greenhouse
-from iveg.domain.observations import SafetyReport
 from iveg.domain.rule.clear import ClearCondition
-from iveg.vital.log_messages import speed_line
+from iveg.vital.evidence import speed_line
 from tests.builders import detection, safety_report
 from tests.unit.vital.desk import Desk
 
@@ -18,13 +17,6 @@ def told(desk: Desk) -> tuple[str, dict[str, object]]:
     lines = [one for one in desk.event_log.lines if one.kind == "speed"]
     line = [one for one in lines if one.robot_id == "AGI"][-1]
     return line.key, dict(line.slots)
-
-
-def means_agii(desk: Desk) -> SafetyReport:
-    """AGI slows for its peer."""
-    return safety_report(
-        "AGI", speed_factor=0.5, reason="robot", cause="AGII", origin=desk.next_origin()
-    )
 
 
 def slows_for(desk: Desk, x: float, by: str = "AGII") -> None:
@@ -82,26 +74,6 @@ def test_13_9_a_slow_down_far_from_anybody_says_how_the_ring_had_grown() -> None
     assert slots["distance"] == 5.0
     assert slots["radius"] == 5.49
     assert slots["unseen"] == 2.5
-
-
-def test_a_robot_that_means_a_peer_is_told_with_its_distance() -> None:
-    desk = Desk()
-    desk.drive("AGI", 0.0)
-    desk.drive("AGII", 2.5)
-
-    desk.hear(means_agii(desk))
-
-    key, slots = told(desk)
-    assert key == "log.speed_down.robot"
-    assert (slots["person"], slots["distance"]) == ("AGII", 2.5)
-
-
-def test_full_speed_again_has_one_sentence_whatever_it_was_for() -> None:
-    desk = Desk()
-    desk.report("AGI", factor=0.5, reason="stale")
-    desk.report("AGI", factor=1.0, reason="clear")
-
-    assert told(desk)[0] == "log.speed_up"
 
 
 def test_a_slow_down_for_a_camera_that_is_not_read_names_it() -> None:

@@ -17,7 +17,6 @@ from iveg.domain.observations import (
 from iveg.domain.transports import DIRECT, FIWARE
 from iveg.vital.evaluate import HEARTBEAT_S
 from iveg.vital.loop import TICK_S
-from iveg.vital.publish import MAX_PENDING
 from tests.builders import detection, detection_frame, odometry, origin
 from tests.unit.vital.desk import Desk, settle
 
@@ -153,36 +152,6 @@ async def test_a_hop_that_breaks_and_mends_is_told_once_each_time() -> None:
 
     hops = [line.key for line in desk.event_log.lines if line.key.startswith("log.hop")]
     assert hops == ["log.hop.down", "log.hop.back"]
-
-
-async def test_health_is_told_every_second() -> None:
-    desk = Desk()
-    before = desk.hub.versions["health"]
-
-    await desk.wait(5.0)
-
-    assert desk.hub.versions["health"] - before >= 5
-
-
-def test_a_browser_gets_the_newest_of_each_topic_and_every_event() -> None:
-    hub = Desk().hub
-    browser = hub.join()
-    for number in range(3):
-        hub.changed("robots/AGI")
-        hub.append("log", number)
-
-    assert browser.drain_events() == [("log", 0), ("log", 1), ("log", 2)]
-    assert browser.drain_telemetry() == ["robots/AGI"]
-
-
-async def test_a_browser_that_lets_events_pile_up_is_marked_and_keeps_no_more() -> None:
-    hub = Desk().hub
-    browser = hub.join()
-    for number in range(MAX_PENDING + 1):
-        hub.append("log", number)
-
-    assert browser.overflowed
-    assert len(browser.pending) == MAX_PENDING
 
 
 def test_log_numbers_grow_also_over_a_restart() -> None:

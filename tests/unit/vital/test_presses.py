@@ -4,7 +4,7 @@ import pytest
 
 from iveg.domain.records import CommandRecord
 from iveg.domain.stop import FollowedCommand, Press
-from iveg.vital.presses import REMEMBERED_S
+from iveg.vital.command import REMEMBERED_S
 from tests.builders import START
 from tests.unit.vital.desk import Desk, settle
 

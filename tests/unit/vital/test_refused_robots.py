@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from iveg.app.opening import open_dss
+from iveg.app.dss import open_dss
 from iveg.domain.errors import SettingsError
 from iveg.domain.observations import Received
 from iveg.domain.transports import DIRECT, FIWARE

@@ -32,10 +32,10 @@ def test_f61_a_guarded_call_that_fails_is_counted_and_named_until_it_is_well(
 ) -> None:
     clock = FakeClock()
     supervision = Supervision(clock)
-    draw = supervision.guard("costmap", breaks)
+    supervision.listen("costmap", aged=breaks)
 
     for _ in range(3):
-        draw(1)
+        supervision.tell("aged", clock())
     clock.now = 5.0
     while_failing = said(supervision, clock)
     clock.now = 11.0

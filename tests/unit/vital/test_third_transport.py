@@ -1,11 +1,8 @@
 """A third way to the robots is one entry of the table: nothing else is told of it."""
 
-from iveg.domain.observations import CommandAnswer
-from iveg.domain.records import CommandRecord
 from iveg.domain.transports import Transport, TransportId
 from iveg.models.command import Command as CommandModel
 from tests.fakes.fleet import FakeFleet
-from tests.fakes.records import NOON
 from tests.unit.vital.desk import Desk, settle
 
 DDS = Transport(TransportId("dds"), confirms=True)
@@ -31,28 +28,6 @@ async def test_a_stop_goes_over_the_third_transport_again_and_again() -> None:
 
     assert dds.stops == [("AGI", hold_id)] * 4
     assert len(desk.fleet.stops) == 4
-    await desk.commander.close()
-
-
-async def test_times_and_the_row_of_the_history_are_keyed_by_the_third_transport() -> (
-    None
-):
-    desk = Desk(also={DDS: FakeFleet()})
-    command_id = await stopped(desk)
-    desk.clock.now = 0.5
-    desk.hear(
-        CommandAnswer("AGI", desk.next_origin(), command_id, "LATCHED"),
-        TransportId("dds"),
-    )
-
-    row = desk.records(CommandRecord)[-1]
-    times = told(desk, command_id).times
-
-    assert set(row.sent_at) == {"direct", "fiware", "dds"}
-    assert row.answer_at == {"dds": NOON + 0.5}
-    assert set(times.sent) == {"direct", "fiware", "dds"}
-    assert times.answer == {"dds": "2023-11-14T22:13:20.500Z"}
-    assert CommandModel.of_record(row).times == times
     await desk.commander.close()
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from iveg.domain.words import WordAnswer
-from tests.builders import detection, detection_frame
+from tests.builders import detection
 from tests.unit.vital.desk import Desk, conditions_of
 from tests.unit.vital.test_frames import factors, parked
 
@@ -122,28 +122,3 @@ def test_a_robot_that_invents_words_is_asked_of_sixteen_at_most() -> None:
         desk.look("AGI", detection("thing" + "x" * turn, 4.0))
 
     assert len(desk.world.robot("AGI").detector.words["AGI"].unknown) == 16
-
-
-async def test_of_two_robots_with_the_same_detector_a_word_is_asked_once() -> None:
-    desk = parked()
-    for robot_id in ("AGI", "AGII"):
-        frame = detection_frame(
-            robot_id, detection("tractor", 4.0), origin=desk.next_origin()
-        )
-        desk.hear(replace(frame, detector="yolox"))
-    await desk.wait(0.1)
-
-    assert words_asked(desk) == [("yolox", "tractor")]
-
-
-def test_detectors_of_one_robot_are_asked_apart_and_four_are_remembered() -> None:
-    desk = parked()
-    for number in range(9):
-        frame = detection_frame(
-            "AGI", detection("tractor", 4.0), origin=desk.next_origin()
-        )
-        desk.hear(replace(frame, detector=f"net-{number}"))
-
-    words = desk.world.robot("AGI").detector.words
-    assert list(words) == ["net-5", "net-6", "net-7", "net-8"]
-    assert all(one.is_strange for one in words.values())

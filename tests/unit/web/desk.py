@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 from collections import Counter
 from collections.abc import AsyncIterator, Sequence
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import httpx
@@ -14,12 +14,11 @@ from iveg.adapters.recordings.pictures import PictureFiles
 from iveg.domain.equipment import Tile
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import Instant
-from iveg.pipeline import KeptChoices, build_services
 from iveg.vital.audit import AuditTrail
 from iveg.web import notifications
 from iveg.web.api import health
 from iveg.web.bounded_http import bounded_http
-from iveg.web.build import Face, build_app, live_routers
+from iveg.web.build import WebParts, build_app, live_routers
 from iveg.web.live import encoder
 from iveg.web.live.pictures import Past
 from iveg.web.live.socket import BoundedSocket
@@ -29,9 +28,7 @@ from iveg.web.security.authentication import Authenticator
 from iveg.web.security.roles import Role
 from iveg.web.security.secrets import NotifySecret
 from iveg.web.views import Views
-from tests.fakes.detector_store import FakeDetectorStore, FakeWordStore
 from tests.fakes.recordings import FakeRecordings
-from tests.fakes.rule_store import FakeRuleStore, FakeTrialStore
 from tests.fakes.worker import FakeWorker
 from tests.unit.vital.desk import FIELD, Desk
 from tests.unit.web.when_asked import RoutesWhenAsked
@@ -65,9 +62,10 @@ class WebDesk(Desk):
             clock=self.clock,
             trail=self.trail,
         )
-        kept = self._kept_choices()
-        self.services = build_services(self.parts, kept, self.clock)
-        self.rules = self.services.rules
+        self.rules = self.parts.rules
+        self.rule_store, self.trial_store = self.choices.rules, self.choices.trial
+        self.detector_store = self.choices.out_of_service
+        self.word_store = self.choices.words
         self.counters = Counter({"some": 1})
         self.views = Views(self.parts, lambda: self.counters)
         self.encoder = encoder.Encoder(self.views, self.hub, self.clock)
@@ -80,41 +78,31 @@ class WebDesk(Desk):
             notifications.Followers(
                 self.heard.append,
                 self.parts.equipment.equipment.entities,
-                self.parts.supervision.guard("equipment", self.parts.equipment.receive),
+                partial(self.parts.core.supervision.tell, "entity_read"),
                 lambda *_: None,
             ),
         )
         self.recordings = FakeRecordings()
-        self.face = Face(
+        self.face = WebParts(
             pipeline=self.parts,
-            services=self.services,
             views=self.views,
             authenticator=self.authenticator,
             orion=self.notifications,
             site=Site("field", robots, "1", demo=True),
-            boot="iveg-boot",
             queues=lambda: self.queues,
             clock=self.clock,
-            new_id=self.ids,
             worker=FakeWorker(),
             recordings=self.recordings,
             trail=self.trail,
             past=Past(PictureFiles(pictures)),
             encoder=self.encoder,
+            accounts=lambda: "ok",
         )
         self.http = bounded_http()
         self.pages = _pages(self.face.site)
         self.app = build_app(self.face, self.pages, routers=())
         makers = list(live_routers(self.face))
         self.app.add_middleware(RoutesWhenAsked, face=self.app, makers=makers)
-
-    def _kept_choices(self) -> KeptChoices:
-        self.rule_store = FakeRuleStore()
-        self.detector_store, self.trial_store = FakeDetectorStore(), FakeTrialStore()
-        self.word_store = FakeWordStore()
-        return KeptChoices(
-            self.rule_store, self.detector_store, self.word_store, self.trial_store
-        )
 
     # --- the subscriptions of iVeg --------------------------------------------------
 

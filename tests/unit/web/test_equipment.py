@@ -54,7 +54,9 @@ def alerts(desk: WebDesk) -> set[str]:
     """What is wrong with equipment now, as people in England read it."""
     desk.parts.equipment.tick(desk.clock())
     desk.loop.step([], desk.clock())
-    desk.evaluator.tick(desk.clock(), desk.parts.supervision.conditions(desk.clock()))
+    desk.evaluator.tick(
+        desk.clock(), desk.parts.core.supervision.conditions(desk.clock())
+    )
     say = Sentences(read_translations("en")).say
     return {
         say(one.condition.key, one.condition.slots)

@@ -19,9 +19,8 @@ from iveg.app.outside import Outside, open_outside
 from iveg.asgi import create_app
 from iveg.domain.records import Record
 from iveg.domain.transports import DIRECT, FIWARE, Transport
-from iveg.pipeline import Ports
 from iveg.settings import Settings
-from iveg.vital.ports import CommandPort
+from iveg.vital.ports import CommandPort, Ports
 from iveg.web.security.roles import MAY
 from iveg.web.security.sessions import IDLE_S
 from tests.databases import lay_history
@@ -98,7 +97,7 @@ def whole_server(folder: Path) -> Iterator[WholeServer]:
     parts["stores"] = replace(real.stores, recorder=recorder)
     dss = _Dss(chosen, fleet, Outside(**parts))
     dss.worker = dss.packer = FakeWorker()  # type: ignore[assignment]
-    dss.face = replace(dss.face, worker=FakeWorker())
+    dss.web = replace(dss.web, worker=FakeWorker())
     app = create_app(dss)
     transport = httpx.ASGITransport(app, raise_app_exceptions=False)
     client = httpx.AsyncClient(transport=transport, base_url="http://iveg.test")

@@ -13,7 +13,7 @@ def swept() -> WebDesk:
     desk = WebDesk()
     desk.drive("AGI", 0.05)
     desk.hear(scan("AGI", [2.0] * 4, origin=desk.next_origin()))
-    desk.services.mapper.tick(desk.clock())
+    desk.parts.mapper.tick(desk.clock())
     return desk
 
 

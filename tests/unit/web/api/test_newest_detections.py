@@ -4,8 +4,8 @@ import httpx
 import pytest
 
 from iveg.domain.records import DetectionRecord
-from iveg.vital import newest_detections
-from iveg.vital.newest_detections import JudgedDetection
+from iveg.vital import detections
+from iveg.vital.detections import JudgedDetection
 from tests.builders import detection
 from tests.unit.web.desk import WebDesk
 
@@ -74,10 +74,10 @@ def test_a_crowd_makes_the_oldest_give_way(desk: WebDesk) -> None:
 
     newest = desk.evaluator.tracking.newest
     newest.rows(hold, 1)
-    for _ in range(newest_detections.MOST_DETECTIONS):
+    for _ in range(detections.MOST_DETECTIONS):
         newest.note(*held[0])
-    rows = newest.rows(lambda _: True, 10 * newest_detections.MOST_DETECTIONS)
+    rows = newest.rows(lambda _: True, 10 * detections.MOST_DETECTIONS)
 
     assert len(held) == 20
-    assert len(rows) == newest_detections.MOST_DETECTIONS
+    assert len(rows) == detections.MOST_DETECTIONS
     assert {one.at for one in rows} == {held[0].received.at.wall}

@@ -4,7 +4,7 @@ import httpx
 
 from iveg.domain.records import LogRecord
 from iveg.domain.words import WordAnswer
-from iveg.vital.detectors import Detectors
+from iveg.vital.operators import Detectors
 from tests.builders import detection
 from tests.unit.web.desk import WebDesk
 
@@ -58,8 +58,7 @@ async def test_an_answer_is_on_the_record_and_kept_for_the_next_start() -> None:
     kept = WordAnswer("AGI", "tractor", True, "ana", desk.clock().wall)
     assert desk.word_store.written == {"AGI/tractor": kept}
     anew = WebDesk()
-    stores = anew.detector_store, anew.word_store
-    Detectors(anew.world, *stores, anew.event_log, {}, desk.word_store.written)
+    Detectors(anew.parts.core, desk.choices.kept)
     assert anew.world.word_answers.is_person("AGI", "tractor") is True
 
 

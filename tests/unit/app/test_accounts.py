@@ -1,4 +1,4 @@
-"""The door: who was known before stays known, and its file is looked after."""
+"""Accounts that were known before stay known, and their file is looked after."""
 
 import asyncio
 from collections.abc import Callable, Iterator
@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from iveg.adapters.access_file import AccessFile
-from iveg.app.door import Door
+from iveg.app.accounts import Accounts
 from iveg.domain.accounts import AccessChange, Account, ApiToken
 from iveg.domain.audit import CONSOLE
 from iveg.domain.errors import HopError
@@ -25,7 +25,7 @@ MES = ApiToken("T1", "MES", "stop", "ab" * 32, 1.0)
 
 
 class House:
-    """A place where doors are opened, one after the other."""
+    """A data directory in which accounts are opened, one after the other."""
 
     def __init__(self, folder: Path, url: str) -> None:
         self.folder, self.url = folder, url
@@ -33,21 +33,21 @@ class House:
         self.clock = FakeClock()
         self.sink = FakeRecorder()
         self.supervision = Supervision(self.clock)
-        self._doors: list[Door] = []
+        self._opened: list[Accounts] = []
 
-    def door(self) -> Door:
+    def open(self) -> Accounts:
         self.close()
         ids = iter(f"id-{number}" for number in range(100))
         trail = AuditTrail(self.sink, lambda: next(ids))
-        door = Door(
+        accounts = Accounts(
             AccessFile(self.path), self.url, trail, self.supervision, self.clock
         )
-        self._doors.append(door)
-        return door
+        self._opened.append(accounts)
+        return accounts
 
     def close(self) -> None:
-        while self._doors:
-            self._doors.pop().close()
+        while self._opened:
+            self._opened.pop().close()
 
     def acts(self) -> list[tuple[str, str, str]]:
         rows = [one for one in self.sink.records if isinstance(one, AuditRecord)]
@@ -75,7 +75,7 @@ async def until(holds: Callable[[], bool]) -> None:
 async def test_who_was_in_the_tables_is_copied_once(house: House) -> None:
     put_into_tables(house.url, ANA, MES)
 
-    first = house.door()
+    first = house.open()
     with pytest.raises(HopError):
         first.first_invitation()
     await first.copy_earlier()
@@ -83,7 +83,7 @@ async def test_who_was_in_the_tables_is_copied_once(house: House) -> None:
     first.book.apply(revoked)
     # With a file no database is asked any more: an older one brings nobody back.
     house.url, url = "sqlite:////nowhere/history.db", house.url
-    again = house.door()
+    again = house.open()
     await again.copy_earlier()
 
     assert (again.book.accounts, again.book.tokens) == ({"P1": ANA}, {})
@@ -91,57 +91,57 @@ async def test_who_was_in_the_tables_is_copied_once(house: House) -> None:
     house.close()
     house.path.unlink()
     house.url = url
-    third = house.door()
+    third = house.open()
     await third.copy_earlier()
     assert third.book.accounts == {}
     assert third._file.damaged == 1
 
 
 async def test_the_first_admin_is_invited_anew_until_there_is_one(house: House) -> None:
-    door = house.door()
-    await door.copy_earlier()
-    first, second = door.first_invitation(), door.first_invitation()
+    accounts = house.open()
+    await accounts.copy_earlier()
+    first, second = accounts.first_invitation(), accounts.first_invitation()
     assert first is not None
     assert second is not None
 
-    late = await door.people.accept(first, "berenjena-77")
-    begun = await door.people.accept(second, "berenjena-77")
+    late = await accounts.people.accept(first, "berenjena-77")
+    begun = await accounts.people.accept(second, "berenjena-77")
 
     assert late is None
     assert begun is not None
     assert begun.role == "admin"
-    assert door.first_invitation() is None
+    assert accounts.first_invitation() is None
 
 
 async def test_the_first_link_is_over_after_half_an_hour(house: House) -> None:
-    door = house.door()
-    await door.copy_earlier()
-    first = door.first_invitation()
+    accounts = house.open()
+    await accounts.copy_earlier()
+    first = accounts.first_invitation()
     assert first is not None
     house.clock.now += 1801.0
 
-    assert await door.people.accept(first, "berenjena-77") is None
+    assert await accounts.people.accept(first, "berenjena-77") is None
 
 
 async def test_a_change_of_the_console_counts_at_once_and_has_its_row(
     house: House,
 ) -> None:
-    door = house.door()
-    door.book.put(ANA)
+    accounts = house.open()
+    accounts.book.put(ANA)
     console = AccessFile(house.path)
-    running = asyncio.create_task(door.run())
+    running = asyncio.create_task(accounts.run())
     await until(house.path.exists)
 
     off = replace(ANA, disabled=True)
     console.leave(AccessChange(CONSOLE, "account_disabled", off))
     console.leave(AccessChange(CONSOLE, "account_added", replace(ANA, account_id="P2")))
-    await until(lambda: door.book.accounts["P1"].disabled and not console.left())
+    await until(lambda: accounts.book.accounts["P1"].disabled and not console.left())
     running.cancel()
     with suppress(asyncio.CancelledError):
         await running
 
     # A second one of that name was left out.
-    assert door.book.accounts == {"P1": off}
+    assert accounts.book.accounts == {"P1": off}
     assert house.acts() == [("account_disabled", "Ana", "console")]
     assert AccessFile(house.path).read()[0].accounts == (off,)
     console.close()
@@ -150,16 +150,16 @@ async def test_a_change_of_the_console_counts_at_once_and_has_its_row(
 async def test_a_damaged_file_is_told_until_somebody_takes_it_away(
     house: House,
 ) -> None:
-    door = house.door()
-    door.book.put(ANA)
-    running = asyncio.create_task(door.run())
-    await until(lambda: door._file.copied and house.path.exists())
+    accounts = house.open()
+    accounts.book.put(ANA)
+    running = asyncio.create_task(accounts.run())
+    await until(lambda: accounts._file.copied and house.path.exists())
     # No writing of it is on its way any more.
-    await door._file.look()
+    await accounts._file.look()
 
     house.path.write_bytes(b"junk")
     await until(lambda: house.keys() == ["alert.accounts_damaged"])
-    told = door.state
+    told = accounts.state
     house.clock.now += 3600.0
     (aside,) = house.folder.glob("*.damaged-*")
     aside.unlink()
@@ -168,6 +168,6 @@ async def test_a_damaged_file_is_told_until_somebody_takes_it_away(
     with suppress(asyncio.CancelledError):
         await running
 
-    assert (told, door.state) == ("damaged", "ok")
+    assert (told, accounts.state) == ("damaged", "ok")
     assert house.acts() == [("accounts_damaged", "", "iVeg")]
     assert AccessFile(house.path).read()[0].accounts == (ANA,)

@@ -1,4 +1,4 @@
-"""The door of the server: who may come in, known from memory and kept in a file."""
+"""Accounts of people and tokens of programs: known from memory, kept in a file."""
 
 import asyncio
 import logging
@@ -21,7 +21,7 @@ from iveg.domain.accounts import (
 )
 from iveg.domain.audit import CONSOLE, ITSELF
 from iveg.domain.errors import HopError, NameTakenError
-from iveg.domain.events import Condition, Slot
+from iveg.domain.events import Condition
 from iveg.settings import Settings
 from iveg.vital.audit import AuditTrail
 from iveg.vital.ports import Clock
@@ -34,12 +34,12 @@ PART: Final = "accounts"
 SET_UP_S: Final = 1800.0
 """Validity of the first invitation of a new server (s)."""
 FIRST_ADMIN: Final = "admin"
-_LOOK_S, _ASK_S = 0.4, 5.0
+_LOOK_S, _COPY_AGAIN_S = 0.4, 5.0
 _SHOWN_S = 60.0
 _log = logging.getLogger(__name__)
 
 
-class Door:
+class Accounts:
     """People with accounts and programs with tokens.
 
     Args:
@@ -62,7 +62,7 @@ class Door:
         self._trail, self._supervision, self._clock = trail, supervision, clock
         self._waiting: list[Path] = []
         """Files to delete once the file of accounts has what they say."""
-        self._told, self._damaged_at = 0, -_SHOWN_S
+        self._damages, self._damaged_at = 0, -_SHOWN_S
         self.book = AccessBook(file.load())
         if not file.exists:
             before = file.beside("sessions.jsonl")
@@ -90,7 +90,7 @@ class Door:
         sign_in_token: str,
         provider: IdentityProvider | None,
     ) -> tuple[Authenticator, SingleSignOn | None]:
-        """What lets them in, and the identity provider beside it.
+        """Authentication of people and programs, and sign-on at the identity provider.
 
         Args:
             settings: An operator's choices.
@@ -134,9 +134,9 @@ class Door:
         if has_admin(self.people.known.values(), now):
             return None
         admission = Admission(self.book, CONSOLE, now)
-        for one in self.people.known.values():
-            if name_key(one.name) == FIRST_ADMIN:
-                return admission.reset(one, SET_UP_S)[0]
+        for account in self.people.known.values():
+            if name_key(account.name) == FIRST_ADMIN:
+                return admission.reset(account, SET_UP_S)[0]
         return admission.add(FIRST_ADMIN, "admin", waits_s=SET_UP_S)[0]
 
     # --- beside the requests ------------------------------------------------------
@@ -144,14 +144,14 @@ class Door:
     async def run(self) -> None:
         """Look after the file until cancelled."""
         self.book.keep()
-        asked_at = -_ASK_S
+        copied_at = -_COPY_AGAIN_S
         while True:
             await self._file.look()
             self._report()
             await self._take_changes()
             now = self._clock().mono
-            if not self._file.copied and now - asked_at >= _ASK_S:
-                asked_at = now
+            if not self._file.copied and now - copied_at >= _COPY_AGAIN_S:
+                copied_at = now
                 with suppress(HopError):
                     await self.copy_earlier()
             await asyncio.sleep(_LOOK_S)
@@ -183,20 +183,20 @@ class Door:
             self._waiting.clear()
 
     def _note(self, change: AccessChange) -> None:
-        name, told = change.row.name, change.details
-        self._trail.note(change.by, change.action, name, told, at=self._clock())
+        name, details, at = change.row.name, change.details, self._clock()
+        self._trail.note(change.by, change.action, name, details, at=at)
 
     def _report(self) -> None:
         """Tell people what is wrong with the file; each damage has its row."""
         now = self._clock()
-        if self._file.damaged > self._told:
-            self._told, self._damaged_at = self._file.damaged, now.mono
+        if self._file.damaged > self._damages:
+            self._damages, self._damaged_at = self._file.damaged, now.mono
             details = {"aside": self._file.aside[-1:]}
             self._trail.note(ITSELF, "accounts_damaged", details=details, at=now)
         wrong: list[Condition] = []
         if self._is_damaged():
-            slots: dict[str, Slot] = {"file": (self._file.aside or ["–"])[-1]}
-            wrong.append(Condition("P1", "alert.accounts_damaged", PART, None, slots))
+            file = {"file": (self._file.aside or ["–"])[-1]}
+            wrong.append(Condition("P1", "alert.accounts_damaged", PART, None, file))
         if self._file.failing:
             wrong.append(Condition("P2", "alert.accounts_unwritten", PART))
         self._supervision.report(PART, wrong)

@@ -1,10 +1,11 @@
-"""Issue 13.6: a restart forgets neither a P1 that nobody saw nor the log."""
+"""A restart forgets neither a P1 that nobody saw nor the log."""
 
 import asyncio
 from dataclasses import replace
 from typing import cast
 
-from iveg.comfort.restore import History, remember
+from iveg.adapters.history.queries import Queries
+from iveg.app.dss import remember
 from iveg.domain.alerts import read_alert
 from iveg.domain.errors import HopError
 from iveg.domain.records import AlertRecord, LogRecord
@@ -45,15 +46,7 @@ class LeftBehind:
 
 
 async def take_up(desk: Desk, left: LeftBehind) -> None:
-    await remember(
-        cast("History", left),
-        desk.commander,
-        desk.parts.goals,
-        desk.evaluator,
-        desk.event_log,
-        desk.health_monitor,
-        desk.clock,
-    )
+    await remember(cast("Queries", left), desk.parts)
 
 
 def unseen(alert_id: str, cleared_at: float | None = None) -> AlertRecord:
