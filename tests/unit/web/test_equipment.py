@@ -5,8 +5,7 @@ from typing import Any
 import orjson
 
 from iveg.domain.equipment import Tile
-from iveg.domain.records import MeasurementRecord
-from iveg.web.pages.sentences import Sentences, read_translations
+from iveg.web.pages.sentences import read_sentences
 from tests.unit.web.desk import WebDesk
 
 CONDUCTIVITY = Tile(
@@ -55,7 +54,7 @@ def alerts(desk: WebDesk) -> set[str]:
     desk.parts.equipment.tick(desk.clock())
     desk.loop.step([], desk.clock())
     desk.evaluator.tick(desk.clock(), desk.parts.supervision.conditions(desk.clock()))
-    say = Sentences(read_translations("en")).say
+    say = read_sentences("en").say
     return {
         say(one.condition.key, one.condition.slots)
         for one in desk.evaluator.alerts.waiting
@@ -100,14 +99,3 @@ async def test_a_limit_and_a_text_are_alerts_of_their_own_tiles() -> None:
         "Conductivity is above 3.5 mS/cm",
         "Flow: the value is not a number",
     }
-
-
-async def test_one_number_a_minute_is_kept() -> None:
-    desk = WebDesk(tiles=[CONDUCTIVITY, FLOW])
-    for second in range(0, 121, 10):
-        desk.clock.now = float(second)
-        await notify(desk, conductivity=2.0 + second, flow="open")
-
-    kept = desk.records(MeasurementRecord)
-    assert [one.value for one in kept] == [2.0, 62.0, 122.0]
-    assert {(one.entity_id, one.unit) for one in kept} == {("fertigation-1", "mS/cm")}
