@@ -29,7 +29,7 @@ _LOOK_S: Final = 5.0
 
 
 class _Line:
-    """What waits for one address."""
+    """Alerts that wait for one address."""
 
     def __init__(self, address: Address) -> None:
         self.address = address
@@ -45,6 +45,8 @@ class Messenger:
 
     Attributes:
         counters: Messages that were taken and not, alerts that were dropped.
+        rest_s: Between two messages to one address (s).
+        limit_s: A message that takes longer is told as failed (s).
     """
 
     def __init__(
@@ -54,15 +56,13 @@ class Messenger:
         write: Write,
         waiting: Callable[[], Sequence[BookedAlert]],
         clock: Clock,
-        rest_s: float = REST_S,
-        limit_s: float = LIMIT_S,
     ) -> None:
         self.counters: Counter[str] = Counter()
         self._lines = [_Line(one) for one in plan.addresses]
         self._escalate_after_s = plan.escalate_after_s
         self._sender, self._write = sender, write
         self._waiting, self._clock = waiting, clock
-        self._rest_s, self._limit_s = rest_s, limit_s
+        self.rest_s, self.limit_s = REST_S, LIMIT_S
         self._since: dict[str, float] = {}
         self._escalated: set[str] = set()
         self._logged: set[tuple[str, str]] = set()
@@ -110,11 +110,11 @@ class Messenger:
             if not await self._is_taken(line.address, items):
                 line.items.extendleft(reversed(items))
                 line.filled.set()
-            await asyncio.sleep(self._rest_s)
+            await asyncio.sleep(self.rest_s)
 
     async def _is_taken(self, to: Address, items: Sequence[AlertItem]) -> bool:
         sending = asyncio.ensure_future(self._send(to, items))
-        done, _ = await asyncio.wait([sending], timeout=self._limit_s)
+        done, _ = await asyncio.wait([sending], timeout=self.limit_s)
         if not done:
             self._failed(to, "no answer")
         failed = await sending

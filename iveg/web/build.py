@@ -7,6 +7,7 @@ from typing import Any
 
 from fastapi import APIRouter, FastAPI
 
+from iveg.adapters.recordings.recorder import InputRecorder
 from iveg.domain.observations import Instant
 from iveg.domain.stamps import format_stamp
 from iveg.domain.stop import Press
@@ -33,12 +34,11 @@ from iveg.web.live.encoder import Encoder
 from iveg.web.live.pictures import Past
 from iveg.web.pages.contexts import Site
 from iveg.web.pages.drawing import Pages
-from iveg.web.refusals import DocumentedApp
 from iveg.web.security import audited, headers, rate_limits
-from iveg.web.security.authentication import Authenticator
-from iveg.web.security.rate_limits import SignInGate
+from iveg.web.security.attempts import SignInGate
+from iveg.web.security.authentication import Authenticator, SignInLink
+from iveg.web.security.requirements import DocumentedApp
 from iveg.web.security.roles import Principal
-from iveg.web.security.signin import SignInLink
 from iveg.web.views import Views
 
 
@@ -69,7 +69,7 @@ class Face:
     clock: Clock
     new_id: Ids
     worker: Apart
-    recordings: past.Recordings
+    recordings: InputRecorder
     trail: AuditTrail
     past: Past
     encoder: Encoder
@@ -107,24 +107,18 @@ def live_routers(face: Face) -> Iterator[Callable[[], APIRouter]]:
         socket.router, parts.hub, face.encoder, face.snapshot, clock, face.stop, watch
     )
     yield partial(robots.router, views, clock)
-    yield partial(robots.equipment_router, views, clock)
-    yield partial(robots.costmap_router, beside.mapper, evaluator, clock)
-    yield partial(robots.coverage_router, beside.coverage, clock)
+    cells = beside.mapper, evaluator, beside.coverage, clock
+    yield partial(robots.cells_router, *cells)
     yield partial(commands.router, parts.commander, clock)
     yield partial(goals.router, parts.goals, clock)
     yield partial(alerts.router, evaluator, clock)
-    yield partial(rule.router, beside.rules, clock)
-    yield partial(rule.trial_router, beside.trials, beside.rules, clock)
+    yield partial(rule.router, beside.rules, beside.trials, clock)
     yield partial(detections.router, evaluator.tracking.newest, face.worker)
-    yield partial(detections.detectors_router, beside.detectors, clock)
-    yield partial(detections.words_router, beside.detectors, clock)
-    yield partial(detections.things_router, beside.things, clock)
+    yield partial(detections.words_router, beside.detectors, beside.things, clock)
     yield partial(latency.router, watch, clock, face.worker)
-    yield partial(past.recordings_router, face.recordings)
-    yield partial(past.router, face.past, clock)
-    yield partial(health.router, clock, views.health, face.accounts)
-    turns = parts.supervision.longest_turn_s
-    yield partial(health.metrics_router, clock, views.health, watch, face.queues, turns)
+    yield partial(past.router, face.recordings, face.past, clock)
+    asked = face.accounts, watch, face.queues, parts.supervision.longest_turn_s
+    yield partial(health.router, clock, views.health, *asked)
 
 
 def build_app(

@@ -1,18 +1,13 @@
-"""Errors become HTTP here: the only file that knows both.
+"""Errors become HTTP here, the only file that knows both (RFC 9457).
 
-The answer is ``application/problem+json`` (RFC 9457), or a page where a person's
-browser asked for one.  Answers echo no input and reveal nothing internal.
-
-Errors of HTTP's boundary alone.
-
-Under the tree of ``domain/errors``::
+The answer is ``application/problem+json``, or a page where a person's browser asked for
+one.  It echoes no input and reveals nothing internal.  HTTP adds to the tree of
+``domain/errors``::
 
     IvegError
     ├── NotSignedInError    401
     ├── ForeignOriginError  403
     └── NotJsonError        415
-
-One RFC 9457 problem, and the page that shows it to a person.
 """
 
 from collections.abc import Callable, Mapping

@@ -1,6 +1,4 @@
-"""Health of the data path: for people, supervisors and Prometheus.
-
-Metrics for Prometheus: counters, hops, latency, queues, safety figures.
+"""Health of the data path: for supervisors, and as metrics for Prometheus.
 
 ``deploy/grafana`` draws them, and a test compares its names with these.
 """
@@ -40,48 +38,6 @@ class Queues:
     depths: Mapping[str, int]
     dropped: Mapping[str, int]
     retries: Mapping[str, int]
-
-
-def metrics_router(
-    clock: Clock,
-    health: Callable[[Instant], Health],
-    watch: LatencyWatch,
-    queues: Callable[[], Queues],
-    longest_turn_s: Callable[[Instant], float],
-) -> APIRouter:
-    """The endpoint that Prometheus asks."""
-    routes = APIRouter(tags=["health"])
-
-    @routes.get(
-        "/metrics",
-        dependencies=[Depends(require("read"))],
-        response_class=PlainTextResponse,
-    )
-    async def metrics() -> Response:
-        """Counters, hops, latency and safety in Prometheus' text format."""
-        now = clock()
-        families = [
-            *_families(health(now), watch, queues()),
-            _family(
-                "gauge",
-                "loop_longest_turn_seconds",
-                "CPU time of the longest turn of the loop in the last two minutes.",
-                {"": round(longest_turn_s(now), 4)},
-            ),
-        ]
-        latency: _Latency = [
-            ((one.robot_id, one.data, hop), part.count, part.total, part.parts("1min"))
-            for one in watch.streams
-            for hop, part in one.segments.items()
-            if part.count
-        ]
-        # Twenty robots have 300 sketches to sum up: beside the loop, not in it.
-        text = await asyncio.to_thread(
-            lambda: generate_latest(_Told([*families, _summary(latency)]))
-        )
-        return Response(text, media_type=CONTENT_TYPE_PLAIN_0_0_4)
-
-    return routes
 
 
 class _Told(Collector):
@@ -220,6 +176,9 @@ def router(
     clock: Clock,
     health: Callable[[Instant], Health],
     accounts: Callable[[], str],
+    watch: LatencyWatch,
+    queues: Callable[[], Queues],
+    longest_turn_s: Callable[[Instant], float],
 ) -> APIRouter:
     """The endpoints that machines ask."""
     routes = APIRouter(tags=["health"])
@@ -239,5 +198,34 @@ def router(
         kept = accounts()
         is_ok = health(clock()).ok and kept == "ok"
         return Json({"ok": is_ok, "accounts": kept}, 200 if is_ok else 503)
+
+    @routes.get(
+        "/metrics",
+        dependencies=[Depends(require("read"))],
+        response_class=PlainTextResponse,
+    )
+    async def metrics() -> Response:
+        """Counters, hops, latency and safety in Prometheus' text format."""
+        now = clock()
+        families = [
+            *_families(health(now), watch, queues()),
+            _family(
+                "gauge",
+                "loop_longest_turn_seconds",
+                "CPU time of the longest turn of the loop in the last two minutes.",
+                {"": round(longest_turn_s(now), 4)},
+            ),
+        ]
+        latency: _Latency = [
+            ((one.robot_id, one.data, hop), part.count, part.total, part.parts("1min"))
+            for one in watch.streams
+            for hop, part in one.segments.items()
+            if part.count
+        ]
+        # Twenty robots have 300 sketches to sum up: beside the loop, not in it.
+        text = await asyncio.to_thread(
+            lambda: generate_latest(_Told([*families, _summary(latency)]))
+        )
+        return Response(text, media_type=CONTENT_TYPE_PLAIN_0_0_4)
 
     return routes

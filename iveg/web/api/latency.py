@@ -1,6 +1,6 @@
 """The paper's latency table, live, beside its own numbers (docs/interfaces/http.md).
 
-The latency table: read in the loop from streams of measures, written elsewhere.
+It is read in the loop from streams of measures, and written in the worker.
 """
 
 import asyncio
@@ -34,8 +34,7 @@ from iveg.web.api.answers import Apart
 from iveg.web.api.exports import MEDIA_TYPES, cell, csv_lines, form_of
 from iveg.web.pages import charts
 from iveg.web.pages.charts import cdf_figure
-from iveg.web.refusals import refusals
-from iveg.web.security.requirements import require
+from iveg.web.security.requirements import refusals, require
 
 
 class Asked(BaseModel):

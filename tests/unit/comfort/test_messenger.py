@@ -59,9 +59,8 @@ class Outpost:
             write,
             lambda: self.alerts.waiting,
             self.desk.clock,
-            rest_s,
-            limit_s,
         )
+        self.messenger.rest_s, self.messenger.limit_s = rest_s, limit_s
         self.alerts.on_raised = self.messenger.enqueue_raised
 
     def wrong(self, *conditions: Condition) -> None:

@@ -25,10 +25,12 @@ from iveg.web.live.bounded import BoundedSocket
 from iveg.web.live.pictures import Past
 from iveg.web.pages.contexts import Site
 from iveg.web.pages.drawing import Pages
-from iveg.web.security.authentication import Authenticator
+from iveg.web.security.authentication import Authenticator, Credentials
+from iveg.web.security.people import People
 from iveg.web.security.roles import Role
 from iveg.web.security.secrets import NotifySecret
 from iveg.web.views import Views
+from tests.fakes.accounts import FakeBook, FakePasswords
 from tests.fakes.detector_store import FakeDetectorStore, FakeWordStore
 from tests.fakes.recordings import FakeRecordings
 from tests.fakes.rule_store import FakeRuleStore, FakeTrialStore
@@ -38,10 +40,13 @@ from tests.unit.web.when_asked import RoutesWhenAsked
 
 HOST = "iveg.test"
 API_TOKEN = "a-token-for-programs"
-SECRET = "ab" * 32
+SECRET, LINK = "ab" * 32, "cd" * 32
 TENANT = {"Fiware-Service": "agroconnect", "Fiware-ServicePath": "/greenhouse"}
 
-_pages = cache(Pages)
+
+@cache
+def _pages(site: Site) -> Pages:
+    return Pages(site, lambda: True)
 
 
 class WebDesk(Desk):
@@ -59,11 +64,10 @@ class WebDesk(Desk):
         self.former_secrets: set[str] = set()
         self.queues = health.Queues({"ingest": 3}, {"history": 2}, {"stop_send": 1})
         self.trail = AuditTrail(self.sink, self.ids)
+        self.book, self.passwords = FakeBook(), FakePasswords()
+        self.people = People(self.book, self.passwords, self.clock)
         self.authenticator = Authenticator(
-            sign_in_token="cd" * 32,
-            api_token=API_TOKEN,
-            clock=self.clock,
-            trail=self.trail,
+            Credentials(LINK, API_TOKEN), self.people, self.trail
         )
         kept = self._kept_choices()
         self.services = build_services(self.parts, kept, self.clock)
