@@ -46,6 +46,7 @@ from iveg.web.cookies import keep_language
 from iveg.web.problems import Problem
 from iveg.web.security.people import People
 from iveg.web.security.requirements import (
+    ADMINS,
     Admin,
     Reader,
     authenticator_of,
@@ -258,7 +259,7 @@ def users_router(people: People) -> APIRouter:
     routes = APIRouter(
         prefix="/api/v1/users",
         tags=["users"],
-        dependencies=[Depends(require("admin"))],
+        dependencies=ADMINS,
         responses=refusals(409),
     )
 
@@ -336,7 +337,7 @@ def tokens_router(people: People) -> APIRouter:
     @routes.get(
         "",
         response_model=Listing[ProgramToken],
-        dependencies=[Depends(require("admin"))],
+        dependencies=ADMINS,
     )
     async def tokens() -> Response:
         """Every program, by name."""

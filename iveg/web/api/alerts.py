@@ -7,7 +7,7 @@ into the incident packs of its moment.
 from collections.abc import Callable, Collection
 from typing import Annotated, Self
 
-from fastapi import APIRouter, Depends, HTTPException, Query, Response
+from fastapi import APIRouter, HTTPException, Query, Response
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from iveg.adapters.history import lists
@@ -23,7 +23,7 @@ from iveg.vital.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.api.history_filters import Moment, Span, seconds
 from iveg.web.pages.sentences import local_stamp
-from iveg.web.security.requirements import Operator, refusals, require
+from iveg.web.security.requirements import READERS, Operator, refusals
 
 MOST_TOGETHER = 200
 """More alerts at once nobody has read."""
@@ -129,7 +129,7 @@ def notes_router(
     @routes.get(
         "/notes",
         response_model=Listing[Note],
-        dependencies=[Depends(require("read"))],
+        dependencies=READERS,
     )
     async def notes(asked: Annotated[Span, Query()]) -> Response:
         """Notes by when they were written, newest first."""

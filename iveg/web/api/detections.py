@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from datetime import timedelta
 from typing import Annotated, Self
 
-from fastapi import APIRouter, Depends, Query, Request, Response
+from fastapi import APIRouter, Query, Request, Response
 from pydantic import AfterValidator, Field, model_validator
 
 from iveg.adapters.history.lists import USUAL_ROWS
@@ -26,7 +26,7 @@ from iveg.web.api.answers import FEW_ROWS, Apart, Json
 from iveg.web.api.exports import MEDIA_TYPES, Form
 from iveg.web.api.history_filters import NewestFilters, admitting
 from iveg.web.pages.sentences import in_madrid, start_of
-from iveg.web.security.requirements import Operator, refusals, require
+from iveg.web.security.requirements import READERS, Operator, refusals
 
 
 def router(newest: NewestDetections, worker: Apart) -> APIRouter:
@@ -34,7 +34,7 @@ def router(newest: NewestDetections, worker: Apart) -> APIRouter:
     routes = APIRouter(
         prefix="/api/v1",
         tags=["live"],
-        dependencies=[Depends(require("read"))],
+        dependencies=READERS,
         responses=refusals(503),
     )
 
@@ -152,10 +152,8 @@ def words_router(detectors: Detectors, marks: ThingMarks, clock: Clock) -> APIRo
         await detectors.answer(said, now)
         return Response(status_code=204)
 
-    reader = [Depends(require("read"))]
-
     @routes.get(
-        "/things", response_model=Listing[Thing], dependencies=reader, tags=["people"]
+        "/things", response_model=Listing[Thing], dependencies=READERS, tags=["people"]
     )
     async def things() -> Response:
         """Every place that an operator marked."""

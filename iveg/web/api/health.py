@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from fastapi import APIRouter, Depends, Response
+from fastapi import APIRouter, Response
 from fastapi.responses import PlainTextResponse
 from prometheus_client import CONTENT_TYPE_PLAIN_0_0_4, generate_latest
 from prometheus_client.metrics_core import Metric
@@ -19,7 +19,7 @@ from iveg.domain.observations import Instant
 from iveg.models.health import Health
 from iveg.vital.ports import Clock
 from iveg.web.api.answers import Json
-from iveg.web.security.requirements import require
+from iveg.web.security.requirements import READERS, STRANGERS
 
 _SHARES = (0.5, 0.95, 0.99)
 _Latency = list[tuple[tuple[str, str, str], int, float, list[Sketch]]]
@@ -69,13 +69,7 @@ def _family(
 
 def _families(health: Health, watch: LatencyWatch, queues: Queues) -> list[Metric]:
     latency, asked = health.safety.alert_latency, health.safety.not_echoed
-    shares = dict(
-        zip(
-            ("0.5", "0.95", "0.99"),
-            (latency.p50_ms, latency.p95_ms, latency.p99_ms),
-            strict=True,
-        )
-    )
+    shares = {"0.5": latency.p50_ms, "0.95": latency.p95_ms, "0.99": latency.p99_ms}
     return [
         _family(
             "counter",
@@ -185,14 +179,14 @@ def router(
 
     @routes.get(
         "/healthz",
-        dependencies=[Depends(require("open"))],
+        dependencies=STRANGERS,
         response_class=PlainTextResponse,
     )
     async def alive() -> Response:
         """The process answers; says nothing else to strangers."""
         return PlainTextResponse("ok\n")
 
-    @routes.get("/readyz", dependencies=[Depends(require("read"))], responses=_READY)
+    @routes.get("/readyz", dependencies=READERS, responses=_READY)
     async def ready() -> Response:
         """200 when every hop and the file of accounts are well, else 503."""
         kept = accounts()
@@ -201,7 +195,7 @@ def router(
 
     @routes.get(
         "/metrics",
-        dependencies=[Depends(require("read"))],
+        dependencies=READERS,
         response_class=PlainTextResponse,
     )
     async def metrics() -> Response:

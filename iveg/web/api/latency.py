@@ -9,7 +9,7 @@ from dataclasses import asdict
 from typing import Annotated, Any, Literal
 
 import orjson
-from fastapi import APIRouter, Depends, Query, Request, Response
+from fastapi import APIRouter, Query, Request, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from iveg.domain.latency import (
@@ -34,7 +34,7 @@ from iveg.web.api.answers import Apart
 from iveg.web.api.exports import MEDIA_TYPES, cell, csv_lines, form_of
 from iveg.web.pages import charts
 from iveg.web.pages.charts import cdf_figure
-from iveg.web.security.requirements import refusals, require
+from iveg.web.security.requirements import READERS, refusals
 
 
 class Asked(BaseModel):
@@ -132,7 +132,7 @@ def router(watch: LatencyWatch, clock: Clock, worker: Apart) -> APIRouter:
     routes = APIRouter(
         prefix="/api/v1",
         tags=["latency"],
-        dependencies=[Depends(require("read"))],
+        dependencies=READERS,
         responses=refusals(503),
     )
 

@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, HTTPException, Query, Response
+from fastapi import APIRouter, HTTPException, Query, Response
 from fastapi.responses import FileResponse
 
 from iveg.adapters.recordings.recorder import InputRecorder
@@ -13,7 +13,7 @@ from iveg.vital.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.api.history_filters import Moment
 from iveg.web.live.pictures import Past
-from iveg.web.security.requirements import refusals, require
+from iveg.web.security.requirements import READERS, refusals
 
 MEDIA_TYPE = "application/vnd.mcap"
 
@@ -23,7 +23,7 @@ def router(recordings: InputRecorder, past: Past, clock: Clock) -> APIRouter:
     routes = APIRouter(
         prefix="/api/v1",
         tags=["history"],
-        dependencies=[Depends(require("read"))],
+        dependencies=READERS,
         responses=refusals(503),
     )
 

@@ -11,7 +11,7 @@ from typing import Annotated
 
 import numpy as np
 import orjson
-from fastapi import APIRouter, Depends, Query, Request, Response
+from fastapi import APIRouter, Query, Request, Response
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -39,7 +39,7 @@ from iveg.models.robot import Device, Robot
 from iveg.vital.evaluate import Evaluator
 from iveg.vital.ports import Clock
 from iveg.web.api.answers import Json
-from iveg.web.security.requirements import refusals, require
+from iveg.web.security.requirements import READERS, refusals
 from iveg.web.views import Views
 
 _PNG = "image/png"
@@ -51,9 +51,7 @@ _NOTHING = CostmapModel(
 
 def router(views: Views, clock: Clock) -> APIRouter:
     """Routes of the present state."""
-    routes = APIRouter(
-        prefix="/api/v1", tags=["live"], dependencies=[Depends(require("read"))]
-    )
+    routes = APIRouter(prefix="/api/v1", tags=["live"], dependencies=READERS)
 
     @routes.get("/robots", response_model=Listing[Robot])
     async def robots() -> Response:
@@ -107,9 +105,7 @@ def cells_router(
     mapper: Mapper, evaluator: Evaluator, monitor: CoverageMonitor, clock: Clock
 ) -> APIRouter:
     """Routes of cells of the map: what is taken, and what a camera saw."""
-    routes = APIRouter(
-        prefix="/api/v1", tags=["live"], dependencies=[Depends(require("read"))]
-    )
+    routes = APIRouter(prefix="/api/v1", tags=["live"], dependencies=READERS)
 
     @routes.get(
         "/costmap",

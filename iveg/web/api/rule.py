@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING, Annotated, Any
 
-from fastapi import APIRouter, Depends, Response
+from fastapi import APIRouter, Response
 from pydantic import Field, create_model, field_validator
 
 from iveg.comfort.trials import Trials
@@ -17,7 +17,7 @@ from iveg.ngsi.payloads import clean_text
 from iveg.vital.ports import Clock
 from iveg.vital.rules import Rules
 from iveg.web.api.answers import Json
-from iveg.web.security.requirements import Operator, refusals, require
+from iveg.web.security.requirements import READERS, Operator, refusals
 
 _MOST_ALIASES = 200
 
@@ -89,15 +89,14 @@ def router(rules: Rules, trials: Trials, clock: Clock) -> APIRouter:
     Every version keeps its author and time; a trial acts on nothing.
     """
     routes = APIRouter(prefix="/api/v1", tags=["rule"])
-    reader = [Depends(require("read"))]
 
-    @routes.get("/rule", response_model=RuleModel, dependencies=reader)
+    @routes.get("/rule", response_model=RuleModel, dependencies=READERS)
     async def rule() -> Response:
         """The version in force."""
         return Json(RuleModel.of(rules.current))
 
     @routes.get(
-        "/rule/versions", response_model=Listing[RuleModel], dependencies=reader
+        "/rule/versions", response_model=Listing[RuleModel], dependencies=READERS
     )
     async def versions() -> Response:
         """Every version with its author and time, newest first."""
@@ -120,7 +119,7 @@ def router(rules: Rules, trials: Trials, clock: Clock) -> APIRouter:
         "/rule/trial",
         response_model=Listing[TrialModel],
         responses=refused,
-        dependencies=reader,
+        dependencies=READERS,
     )
     async def current() -> Response:
         """The trial, if one runs: it acts on nothing."""

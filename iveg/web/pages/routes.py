@@ -25,7 +25,13 @@ from iveg.web.pages.contexts import (
     RecordPage,
 )
 from iveg.web.pages.drawing import Pages
-from iveg.web.security.requirements import Reader, authenticator_of, require
+from iveg.web.security.requirements import (
+    READERS,
+    STRANGERS,
+    Reader,
+    authenticator_of,
+    require,
+)
 from iveg.web.security.roles import Action, Principal
 from iveg.web.security.single_sign_on import CALLBACK, SingleSignOn
 
@@ -59,7 +65,7 @@ def service_worker_router() -> APIRouter:
     """One file at the root, where its scope is every page; nothing secret is in it."""
     routes = APIRouter(include_in_schema=False)
 
-    @routes.get("/sw.js", dependencies=[Depends(require("open"))])
+    @routes.get("/sw.js", dependencies=STRANGERS)
     async def worker() -> FileResponse:
         """Never from a cache: a change must reach every device."""
         file = str(files("iveg") / "static" / "sw.js")
@@ -126,7 +132,7 @@ def _add_scripted(
 def _add_moved(routes: APIRouter, old: str, new: str) -> None:
     """Lead the address of a page that is gone to the page that took its place."""
 
-    @routes.get(old, dependencies=[Depends(require("read"))], response_model=None)
+    @routes.get(old, dependencies=READERS, response_model=None)
     async def moved() -> Response:
         return RedirectResponse(new, 308)
 
@@ -158,13 +164,12 @@ class _ByInvitation(Body):
 
 def _add_signing(routes: APIRouter, pages: Pages, sign_on: SingleSignOn | None) -> None:
     """Add the routes of sign-in, sign-out and of a screen on a wall."""
-    is_open = [Depends(require("open"))]
 
-    @routes.get("/signin", response_model=None, dependencies=is_open)
+    @routes.get("/signin", response_model=None, dependencies=STRANGERS)
     async def signin(request: Request) -> Response:
         return pages.sign_in(request)
 
-    @routes.post("/signin", response_model=None, dependencies=is_open)
+    @routes.post("/signin", response_model=None, dependencies=STRANGERS)
     async def sign_in(
         request: Request, body: _ByLink | _ByPassword | _ByInvitation
     ) -> Response:
@@ -203,13 +208,12 @@ def _add_signing(routes: APIRouter, pages: Pages, sign_on: SingleSignOn | None) 
 
 def _add_single_sign_on(routes: APIRouter, pages: Pages, sign_on: SingleSignOn) -> None:
     """Add the way to the identity provider and back, as a person's browser goes it."""
-    is_open = [Depends(require("open"))]
 
     def refused(request: Request, error: SignOnError) -> Response:
         status = _STATUS.get(error.failure, 403)
         return pages.sign_in(request, status, failure=error.failure)
 
-    @routes.get("/signin/sso", response_model=None, dependencies=is_open)
+    @routes.get("/signin/sso", response_model=None, dependencies=STRANGERS)
     async def begin(
         request: Request, to: Annotated[str, Query(max_length=512)] = "/"
     ) -> Response:
@@ -218,7 +222,7 @@ def _add_single_sign_on(routes: APIRouter, pages: Pages, sign_on: SingleSignOn) 
         except SignOnError as error:
             return refused(request, error)
 
-    @routes.get(CALLBACK, response_model=None, dependencies=is_open)
+    @routes.get(CALLBACK, response_model=None, dependencies=STRANGERS)
     async def finish(request: Request) -> Response:
         try:
             token, to = await sign_on.finish(request)

@@ -15,7 +15,7 @@ from iveg.domain.accounts import (
     digest_of,
     name_key,
 )
-from iveg.domain.audit import Actor, NamedActor
+from iveg.domain.audit import Actor
 from iveg.vital.ports import Clock
 from iveg.web.security.roles import Principal, Role
 
@@ -74,15 +74,6 @@ class People:
         now = self.find(found.account_id)
         is_same = now is not None and now.password == found.password
         return now if now and is_same and now.is_open(self.clock().wall) else None
-
-    def vouched(self, user: Account) -> Account:
-        """The account of somebody whom the provider vouches for; made where needed.
-
-        Raises:
-            SignOnError: they are shut out here.
-        """
-        by = NamedActor(user.account_id, user.name, user.role, "sso")
-        return self.admission(by).vouched(user)
 
     async def accept(self, invitation: str, password: str) -> Account | None:
         """Begin an account by its invitation; None where that is none any more.

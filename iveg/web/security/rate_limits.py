@@ -78,10 +78,8 @@ class SocketLimits:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one connection."""
-        if scope["type"] != "websocket":
-            await self._app(scope, receive, send)
-            return
-        who = self._identify(HTTPConnection(scope))
+        is_socket = scope["type"] == "websocket"
+        who = self._identify(HTTPConnection(scope)) if is_socket else None
         if who is None:
             await self._app(scope, receive, send)
             return
@@ -89,11 +87,9 @@ class SocketLimits:
         owner = who.session or who.name
         sockets = self._sockets.setdefault(owner, [])
         # Programs only listen: their silence says nothing.
-        is_free = (
-            len(sockets) < PROGRAM_SOCKETS
-            if who.session is None
-            else _make_room(sockets, now)
-        )
+        is_free = len(sockets) < PROGRAM_SOCKETS
+        if who.session is not None:
+            is_free = _make_room(sockets, now)
         if not is_free:
             await _refuse(scope, receive, send)
             return

@@ -6,6 +6,7 @@ OpenAPI document tells the refusals that follow from role, parameters and body (
 """
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from http import HTTPStatus
 from typing import Annotated, Any, Final
 
@@ -26,14 +27,14 @@ def authenticator_of(connection: HTTPConnection) -> Authenticator:
     return authenticator
 
 
+@dataclass(frozen=True, slots=True)
 class Requirement:
     """A FastAPI dependency that lets a role in; made by ``require``.
 
     It serves HTTP and WebSocket routes alike.
     """
 
-    def __init__(self, action: Action) -> None:
-        self.action = action
+    action: Action
 
     async def __call__(self, connection: HTTPConnection) -> Principal:
         """The authorised principal, or the error that refuses the request."""
@@ -45,17 +46,15 @@ class Requirement:
         return authenticator.authorise(Request(connection.scope), self.action)
 
 
-_REQUIREMENTS: Final[Mapping[Action, Requirement]] = {
-    action: Requirement(action)
-    for action in ("open", "read", "stop", "release", "admin")
-}
-
-
 def require(action: Action) -> Requirement:
     """Requirement of a route: ``Depends(require("stop"))``; ``open`` asks nothing."""
-    return _REQUIREMENTS[action]
+    return Requirement(action)
 
 
+STRANGERS: Final = [Depends(require("open"))]
+READERS: Final = [Depends(require("read"))]
+ADMINS: Final = [Depends(require("admin"))]
+"""Dependencies of routes that do not ask who it is."""
 Reader = Annotated[Principal, Depends(require("read"))]
 Presser = Annotated[Principal, Depends(require("stop"))]
 Operator = Annotated[Principal, Depends(require("release"))]

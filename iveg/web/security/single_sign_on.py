@@ -191,7 +191,8 @@ class SingleSignOn:
         """Begin the session of somebody who was vouched for."""
         if proven.role is None:
             raise SignOnError("no_role", "none of the claim's values gives one")
-        account = self._authenticator.people.vouched(
+        by = NamedActor(proven.person, proven.name, proven.role, "sso")
+        account = self._authenticator.people.admission(by).vouched(
             Account(proven.person, proven.name, proven.role, provider=self._issuer)
         )
         sessions = self._authenticator.sessions

@@ -88,14 +88,3 @@ async def test_a_tile_that_loses_its_signal_says_so_and_raises_an_alert() -> Non
 
     await notify(desk, flow=17.0)
     assert alerts(desk) == set()
-
-
-async def test_a_limit_and_a_text_are_alerts_of_their_own_tiles() -> None:
-    desk = WebDesk(tiles=[CONDUCTIVITY, FLOW])
-
-    assert await notify(desk, conductivity=3.6, flow="open") == 204
-
-    assert alerts(desk) == {
-        "Conductivity is above 3.5 mS/cm",
-        "Flow: the value is not a number",
-    }

