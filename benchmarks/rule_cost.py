@@ -23,7 +23,6 @@ import numpy as np
 from benchmarks.process import print_table
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
-from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import Feedback
 from iveg.domain.geometry import Box3D, Pose2D, Twist2D
 from iveg.domain.observations import (
@@ -38,14 +37,13 @@ from iveg.domain.observations import (
 )
 from iveg.domain.peer_scan import PeerScan
 from iveg.domain.records import Record
-from iveg.domain.tracking.people import People
 from iveg.domain.transports import FIWARE
-from iveg.domain.world import World
 from iveg.ngsi import codec
+from iveg.pipeline import Choices, build
 from iveg.vital.evaluate import Evaluator
-from iveg.vital.event_log import EventLog
-from iveg.vital.publish import Hub
-from iveg.vital.supervision import Supervision
+from iveg.vital.ports import Ports
+from tests.fakes.journal import FakeJournal
+from tests.fakes.kept import FakeChoices
 
 RATE_HZ = 30
 TICK_S = 0.05
@@ -125,7 +123,7 @@ class Kept:
     async def ignore(self, *_: object) -> None:
         """Ignore; no robot takes orders here."""
 
-    stop = release = resume = goal = set_desired_state = ignore
+    set_desired_state = ignore
 
     @property
     def digest(self) -> str:
@@ -138,18 +136,19 @@ class Kept:
 
 def evaluator_of(robots: tuple[str, ...], kept: Kept) -> Evaluator:
     """The rule with everything round it but the network and the disk."""
-    numbers = itertools.count()
-    start, greenhouse = Instant(0.0, WALL), load_greenhouse("agroconnect")
-    return Evaluator(
-        World(load_fleet(words=robots)),
-        greenhouse,
-        People(greenhouse),
-        DetectionRule(),
+    numbers, start = itertools.count(), Instant(0.0, WALL)
+    ports = Ports(
         kept,
-        EventLog(Hub(), kept, start, Supervision(lambda: start)),
+        {},
+        FakeJournal(),
+        kept,
+        lambda: start,
         lambda: f"{next(numbers):026d}",
-        "bench",
+        lambda: "ok",
     )
+    choices = Choices(FakeChoices().kept, "bench")
+    fleet = load_fleet(words=robots)
+    return build(fleet, load_greenhouse("agroconnect"), ports, choices).evaluator
 
 
 def cost(

@@ -12,7 +12,7 @@ from iveg.app.dss import Dss
 from iveg.web.api import account, alerts, day, history, incidents
 from iveg.web.api.answers import Json
 from iveg.web.build import build_app, live_routers
-from iveg.web.pages import drawing, routes, signing
+from iveg.web.pages import drawing, routes
 from iveg.web.security.requirements import require
 from iveg.web.static_files import KeptFiles
 
@@ -86,8 +86,6 @@ def _past_routers(dss: Dss, pages: drawing.Pages) -> Iterator[APIRouter]:
         yield account.sign_in_code_router(dss.sign_in_token)
     yield account.router(dss.accounts.people)
     yield account.sessions_router()
-    yield account.users_router(dss.accounts.people, clock)
-    yield account.tokens_router(dss.accounts.people, dss.accounts.programs, clock)
-    if dss.sign_on is not None:
-        yield signing.router(pages, dss.sign_on)
+    yield account.users_router(dss.accounts.people)
+    yield account.tokens_router(dss.accounts.people)
     yield routes.service_worker_router()

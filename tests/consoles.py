@@ -12,5 +12,5 @@ from iveg.domain.audit import CONSOLE
 def console(folder: Path) -> Admission:
     """Leaves what it changes for the server whose files are in this folder."""
     book = AccessBook()
-    book.note = AccessFile(folder / "accounts.jsonl").leave
+    book.on_change.append(AccessFile(folder / "accounts.jsonl").leave)
     return Admission(book, CONSOLE, clock.wall())

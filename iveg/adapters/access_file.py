@@ -13,7 +13,6 @@ import contextlib
 import logging
 import os
 import zlib
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime
 from pathlib import Path
@@ -122,7 +121,7 @@ class AccessFile:
 
     async def look(self) -> None:
         """Write the file anew where it is not as it was written, or was not."""
-        await asyncio.get_running_loop().run_in_executor(self._writer, self._look)
+        await asyncio.wrap_future(self._writer.submit(self._look))
 
     def close(self) -> None:
         """Return when the newest is on disk."""
@@ -209,29 +208,22 @@ class AccessFile:
 
     def left(self) -> list[tuple[Path, AccessChange]]:
         """Changes of the console that wait, the oldest first."""
-        return [*self._left()]
-
-    def _left(self) -> Iterator[tuple[Path, AccessChange]]:
+        found = []
         for path in sorted(self._path.parent.glob(f"{self._path.name}.left-*")):
             if path.suffix.endswith((".new", ".unreadable")):
                 continue
             try:
                 _, told = _checked(path.read_bytes())
-                kept = orjson.dumps(told["row"])
-                row = _READ[told["kind"]].validate_json(kept, strict=True)
-                yield (
-                    path,
-                    AccessChange(
-                        CONSOLE, told["action"], row, told["details"], told["gone"]
-                    ),
-                )
-            except (OSError, ValueError, KeyError) as error:
+                kept = orjson.dumps(told.pop("row"))
+                row = _READ[told.pop("kind")].validate_json(kept, strict=True)
+                found.append((path, AccessChange(CONSOLE, row=row, **told)))
+            except (OSError, ValueError, KeyError, TypeError) as error:
                 put_aside(path, type(error).__name__)
+        return found
 
     async def taken(self, changes: list[Path]) -> bool:
         """Delete changes that count, once the file has them; whether it has."""
-        loop = asyncio.get_running_loop()
-        return await loop.run_in_executor(self._writer, self._take, changes)
+        return await asyncio.wrap_future(self._writer.submit(self._take, changes))
 
     def _take(self, changes: list[Path]) -> bool:
         if self.failing:
@@ -261,12 +253,13 @@ def earlier_sessions(path: Path) -> tuple[Session, ...]:
     return tuple(found)
 
 
-def _lines(access: Access, copied: bool) -> Iterator[Json]:
-    yield from (_with_checksum("account", one) for one in access.accounts)
-    yield from (_with_checksum("token", one) for one in access.tokens)
-    yield from (_with_checksum("session", one) for one in access.sessions)
-    count = len(access.accounts) + len(access.tokens) + len(access.sessions)
-    yield _with_checksum("end", (count, copied))
+def _lines(access: Access, copied: bool) -> list[Json]:
+    rows: list[tuple[str, object]] = [
+        *(("account", one) for one in access.accounts),
+        *(("token", one) for one in access.tokens),
+        *(("session", one) for one in access.sessions),
+    ]
+    return [_with_checksum(*one) for one in (*rows, ("end", (len(rows), copied)))]
 
 
 def _with_checksum(kind: str, row: object) -> Json:

@@ -21,7 +21,6 @@ from iveg.domain.accounts import (
     digest_of,
     is_name,
     is_reserved,
-    name_key,
 )
 from iveg.domain.audit import Actor
 from iveg.domain.errors import (
@@ -29,14 +28,12 @@ from iveg.domain.errors import (
     NotANameError,
     ProvidedAccountError,
     SignOnError,
-    UnknownNameError,
 )
-from iveg.domain.records import Json
 from iveg.domain.retention import DAY_S
 
 MOST_ACCOUNTS: Final = 1000
 INVITED_S: Final = 3 * DAY_S
-"""How long an invitation waits (s)."""
+"""Life of an invitation (s)."""
 
 
 class Admission:
@@ -71,8 +68,7 @@ class Admission:
         _refuse_name(name)
         account = Account(new_id(), name, role, ends_at=ends_at)
         invitation, invited = self._invited(account, waits_s)
-        self._add(invited)
-        return invitation, invited
+        return invitation, self._add(invited)
 
     def reset(
         self, account: Account, waits_s: float = INVITED_S
@@ -106,7 +102,8 @@ class Admission:
     def give_password(self, account: Account, password: str) -> Account:
         """Put a hash in the place of another; sessions that began before are over."""
         changed = replace(account, password=password, since=self._now)
-        return self._change(changed, "password_changed", {})
+        self._book.apply(AccessChange(self._by, "password_changed", changed))
+        return changed
 
     def vouched(self, user: Account) -> Account:
         """Let somebody in whom a provider vouches for, under the name that they had.
@@ -121,7 +118,7 @@ class Admission:
         """
         account = self._book.accounts.get(user.account_id)
         if account is None:
-            return self._vouched_first(user)
+            return self._add_vouched(user)
         if not account.is_open(self._now):
             raise SignOnError("disabled", account.account_id)
         if account.role == user.role:
@@ -129,7 +126,7 @@ class Admission:
         changed = replace(account, role=user.role, since=self._now)
         return self._change(changed, "account_role")
 
-    def _vouched_first(self, user: Account) -> Account:
+    def _add_vouched(self, user: Account) -> Account:
         if len(self._book.accounts) >= MOST_ACCOUNTS:
             raise SignOnError("busy", f"{MOST_ACCOUNTS} accounts are there already")
         marked = replace(user, name=another_name(user.name, user.account_id))
@@ -139,13 +136,10 @@ class Admission:
             return self._add(marked)
 
     def _add(self, account: Account) -> Account:
-        details = {"role": account.role, "ends_at": account.ends_at}
-        return self._change(account, "account_added", details)
+        return self._change(account, "account_added", ends_at=account.ends_at)
 
-    def _change(
-        self, account: Account, action: str, details: Json | None = None
-    ) -> Account:
-        told = {"role": account.role} if details is None else details
+    def _change(self, account: Account, action: str, **details: object) -> Account:
+        told = {"role": account.role, **details}
         self._book.apply(AccessChange(self._by, action, account, told))
         return account
 
@@ -174,18 +168,10 @@ class Admission:
         self._book.apply(AccessChange(self._by, "token_added", made, details))
         return token, made
 
-    def revoke(self, name: str) -> None:
-        """Delete a token.
-
-        Raises:
-            UnknownNameError: no program is called so.
-        """
-        for one in self._book.tokens.values():
-            if name_key(one.name) == name_key(name):
-                change = AccessChange(self._by, "token_revoked", one, gone=True)
-                self._book.apply(change)
-                return
-        raise UnknownNameError("token", name)
+    def revoke(self, token: ApiToken) -> None:
+        """Delete a token."""
+        change = AccessChange(self._by, "token_revoked", token, gone=True)
+        self._book.apply(change)
 
 
 def _refuse_name(name: str) -> None:

@@ -1,6 +1,4 @@
-"""Passwords by Argon2id (RFC 9106), off the loop and no faster than one thread.
-
-One thread beside the event loop for work that strangers may ask for.
+"""Passwords by Argon2id (RFC 9106), in one thread beside the loop.
 
 One thread is the bound: a flood of sign-ins takes half a core at most, never the loop
 on which a STOP runs.
@@ -39,7 +37,7 @@ class BoundedThread:
     async def run(
         self, work: Callable[_P, _T], *args: _P.args, **named: _P.kwargs
     ) -> _T:
-        """What a call returns.
+        """Result of a call.
 
         Raises:
             BusyError: too many wait.

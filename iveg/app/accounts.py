@@ -26,8 +26,8 @@ from iveg.settings import Settings
 from iveg.vital.audit import AuditTrail
 from iveg.vital.ports import Clock
 from iveg.vital.supervision import Supervision
-from iveg.web.security.authentication import Authenticator
-from iveg.web.security.people import People, Programs
+from iveg.web.security.authentication import Authenticator, Credentials
+from iveg.web.security.people import People
 from iveg.web.security.single_sign_on import SingleSignOn
 
 PART: Final = "accounts"
@@ -68,10 +68,9 @@ class Accounts:
             before = file.beside("sessions.jsonl")
             self.book.add(Access(sessions=earlier_sessions(before)))
             self._waiting.append(before)
-        self.book.note = self._note
-        self.book.keep = lambda: file.save(self.book.picture())
+        self.book.on_change.append(self._note)
+        self.book.on_keep.append(lambda: file.save(self.book.picture()))
         self.people = People(self.book, Passwords(), clock)
-        self.programs = Programs(self.book, clock)
 
     @property
     def state(self) -> str:
@@ -97,30 +96,17 @@ class Accounts:
             sign_in_token: Of the link; empty: there is none.
             provider: Vouches for people; None: nobody does.
         """
-        authenticator = Authenticator(
-            sign_in_token=sign_in_token,
-            api_token=settings.api_token,
-            clock=self._clock,
-            book=self.book,
-            link_name=settings.sign_in_name,
-            trail=self._trail,
-            people=self.people,
-            programs=self.programs,
+        credentials = Credentials(
+            sign_in_token, settings.api_token, settings.sign_in_name
         )
+        authenticator = Authenticator(credentials, self.people, self._trail)
         if provider is None:
             return authenticator, None
         reading = ClaimReading(
             settings.sso_role_claim, settings.sso_name_claim, settings.sso_role_map
         )
-        return authenticator, SingleSignOn(
-            provider,
-            reading,
-            self.people,
-            authenticator,
-            self._clock,
-            self._trail,
-            settings.sso_hours * 3600.0,
-        )
+        lasts_s = settings.sso_hours * 3600.0
+        return authenticator, SingleSignOn(provider, reading, authenticator, lasts_s)
 
     def first_invitation(self) -> str | None:
         """An invitation for the first admin; None where somebody is admin already.

@@ -4,6 +4,7 @@ import argparse
 from collections.abc import Iterable
 from contextlib import suppress
 from functools import partial
+from typing import TypeVar
 
 from iveg.adapters import clock
 from iveg.adapters.access_file import AccessFile
@@ -21,6 +22,8 @@ from iveg.domain.retention import DAY_S
 from iveg.domain.stamps import format_stamp
 from iveg.settings import Settings
 
+_Row = TypeVar("_Row", Account, ApiToken)
+
 
 def run(call: CommandCall) -> int:
     """One action on accounts; returns the exit code.
@@ -32,7 +35,7 @@ def run(call: CommandCall) -> int:
     url = history_url(settings.database_url, call.data)
     file = AccessFile(files_of(url, call.data) / ACCOUNTS)
     book = _known(file, url)
-    book.note = partial(_leave, file)
+    book.on_change.append(partial(_leave, file))
     try:
         print(_act(options, settings, book))
     finally:
@@ -69,7 +72,7 @@ def _act(options: argparse.Namespace, settings: Settings, book: AccessBook) -> s
             made = (options.name, options.scope, _end(options, now))
             return admission.give_token(*made)[0]
         case "revoke":
-            admission.revoke(options.name)
+            admission.revoke(_find(book.tokens.values(), "token", options.name))
             return f"{options.name} is out within a second."
         case "list":
             people, programs = book.accounts.values(), book.tokens.values()
@@ -77,15 +80,14 @@ def _act(options: argparse.Namespace, settings: Settings, book: AccessBook) -> s
         case "add":
             invited = (options.name, options.role, _end(options, now))
             return _invited(settings, admission.add(*invited)[0])
+    found = _find(book.accounts.values(), "account", options.name)
+    match options.action:
         case "reset":
-            found = _find(book, options.name)
             return _invited(settings, admission.reset(found)[0])
         case "role":
-            changed = admission.give_role(_find(book, options.name), options.role)
+            changed = admission.give_role(found, options.role)
             return f"{changed.name} is {changed.role}, and signs in anew."
-    return (
-        f"{admission.disable(_find(book, options.name)).name} is out within a second."
-    )
+    return f"{admission.disable(found).name} is out within a second."
 
 
 def _end(options: argparse.Namespace, now: float) -> float | None:
@@ -98,12 +100,12 @@ def invitation_link(settings: Settings, invitation: str) -> str:
     return f"{page_address(settings)}/signin#invitation={invitation}"
 
 
-def _find(book: AccessBook, name: str) -> Account:
+def _find(known: Iterable[_Row], kind: str, name: str) -> _Row:
     key = name_key(name)
-    for one in book.accounts.values():
+    for one in known:
         if name_key(one.name) == key:
             return one
-    raise UnknownNameError("account", name)
+    raise UnknownNameError(kind, name)
 
 
 def _invited(settings: Settings, invitation: str) -> str:

@@ -42,7 +42,7 @@ class Pace:
 
 
 class _Line:
-    """Queue of one address."""
+    """Alerts that wait for one address."""
 
     def __init__(self, address: Address) -> None:
         self.address = address
@@ -60,6 +60,8 @@ class Messenger:
 
     Attributes:
         counters: Messages that were taken and not, alerts that were dropped.
+        rest_s: Between two messages to one address (s).
+        limit_s: A message that takes longer is told as failed (s).
     """
 
     def __init__(

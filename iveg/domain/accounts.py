@@ -1,24 +1,16 @@
-"""People who sign in: how they may be called, and how they came in.
+"""Access: accounts, tokens of programs, sessions, and claims of providers.
 
 A name travels with each STOP through Orion, which refuses some characters with the
-whole update they stand in; such a name would stop nothing by that transport.
-
-Access of people and programs, held in memory: the truth while iVeg runs.
-
-Each question is answered from here, so neither a disk nor a database that is away,
-slow or damaged changes who may stop.  Whoever keeps it is told of every change.
-
-What an identity provider's claims mean here: a person, a name, a role.
-
-A claim's path fits the shapes of the providers (docs/deployment.md, "Single sign-on"):
-``realm_access.roles`` (Keycloak), ``roles`` or ``groups`` (Entra), ``roles[].name``
-(Keyrock).  Lists on the way are gone through, with or without ``[]``.
+whole update they stand in; such a name would stop nothing by that transport.  All of
+it is held in memory while iVeg runs: neither a disk nor a database that is away, slow
+or damaged changes who may stop.
 """
 
 import hashlib
 import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import islice
 from typing import Final, Literal
 
 from iveg.domain.audit import Actor
@@ -34,7 +26,7 @@ Language = Literal["es", "en"]
 AccountState = Literal["active", "invited", "lapsed", "over", "disabled"]
 """``lapsed``: the invitation was not taken in time; ``over``: ended by itself."""
 TokenScope = Literal["read", "stop", "operate"]
-"""What a program may: read; also stop; also release, resume and all else of people."""
+"""Rights of a program: read; also stop; also release, resume and all else of people."""
 
 LINK_PERSON: Final = "link"
 """Id of whoever holds the link of the environment."""
@@ -63,12 +55,12 @@ def is_reserved(name: str) -> bool:
 
 
 def name_key(name: str) -> str:
-    """What two names may not share: case and width do not tell people apart."""
+    """Key that two names may not share: case and width do not tell people apart."""
     return unicodedata.normalize("NFKC", name).casefold().strip()
 
 
 def digest_of(secret: str) -> str:
-    """What is kept of an invitation or a token: SHA-256 (hex)."""
+    """SHA-256 (hex) of an invitation or a token, which is all that is kept of it."""
     return hashlib.sha256(secret.encode()).hexdigest()
 
 
@@ -104,7 +96,7 @@ class Account:
         return not self.disabled and (self.ends_at is None or now < self.ends_at)
 
     def state(self, now: float) -> AccountState:
-        """What became of the account at this moment (Unix s)."""
+        """State of the account at this moment (Unix s)."""
         if self.disabled:
             return "disabled"
         if not self.is_open(now):
@@ -201,21 +193,17 @@ class AccessChange:
 class AccessBook:
     """Accounts by id, tokens by digest (hex), sessions by digest.
 
-    Args:
-        most: How many sessions there may be; the one that was idle longest ends.
-
     Attributes:
-        note: Told of each change of rights, once it counts.
-        keep: Called when something is to be remembered; returns at once.
+        on_change: Told of each change of rights, once it counts.
+        on_keep: Called when something is to be remembered; they return at once.
     """
 
-    def __init__(self, kept: Access = NOBODY, most: int = MOST_SESSIONS) -> None:
+    def __init__(self, kept: Access = NOBODY) -> None:
         self.accounts = {one.account_id: one for one in kept.accounts}
         self.tokens = {one.digest: one for one in kept.tokens}
         self.sessions = {bytes.fromhex(one.digest): one for one in kept.sessions}
-        self.note: Callable[[AccessChange], None] = lambda _: None
-        self.keep: Callable[[], None] = lambda: None
-        self._most = most
+        self.on_change: list[Callable[[AccessChange], None]] = []
+        self.on_keep: list[Callable[[], None]] = []
 
     def picture(self) -> Access:
         """All of it at this moment."""
@@ -225,14 +213,17 @@ class AccessBook:
             tuple(self.sessions.values()),
         )
 
+    def keep(self) -> None:
+        """Have what is known now remembered."""
+        for keep in self.on_keep:
+            keep()
+
     def add(self, earlier: Access) -> None:
         """Take in what is not known yet."""
-        for account in earlier.accounts:
-            self.accounts.setdefault(account.account_id, account)
-        for token in earlier.tokens:
-            self.tokens.setdefault(token.digest, token)
-        for session in earlier.sessions:
-            self.sessions.setdefault(bytes.fromhex(session.digest), session)
+        before = AccessBook(earlier)
+        self.accounts = before.accounts | self.accounts
+        self.tokens = before.tokens | self.tokens
+        self.sessions = before.sessions | self.sessions
         self.keep()
 
     def apply(self, change: AccessChange) -> None:
@@ -242,39 +233,35 @@ class AccessBook:
             NameTakenError: somebody or some program else is called so.
         """
         row = change.row
-        if isinstance(row, ApiToken):
+        if isinstance(row, Account):
+            _refuse_taken(row.name, row.account_id, self.accounts.values())
+            self._set(row)
+        else:
             _refuse_taken(row.name, row.token_id, self.tokens.values())
             self.tokens.pop(row.digest, None)
             if not change.gone:
                 self.tokens[row.digest] = row
-        else:
-            _refuse_taken(row.name, row.account_id, self.accounts.values())
-            self.accounts[row.account_id] = row
-            self._end_sessions_of(row)
-        self.note(change)
+        for note in self.on_change:
+            note(change)
         self.keep()
 
     def put(self, account: Account) -> None:
         """Keep a new state of an account, which is no change of rights."""
-        self.accounts[account.account_id] = account
-        self._end_sessions_of(account)
+        self._set(account)
         self.keep()
 
-    def _end_sessions_of(self, account: Account) -> None:
-        """Forget sessions that a change has ended, so that no file holds them."""
-        over = [
-            digest
-            for digest, one in self.sessions.items()
-            if one.person == account.account_id
-            and (account.disabled or one.began < account.since)
-        ]
-        for digest in over:
-            del self.sessions[digest]
+    def _set(self, account: Account) -> None:
+        """Keep an account, and forget the sessions that its new state has ended."""
+        self.accounts[account.account_id] = account
+        for digest, one in [*self.sessions.items()]:
+            is_over = account.disabled or one.began < account.since
+            if one.person == account.account_id and is_over:
+                del self.sessions[digest]
 
     def open(self, session: Session) -> None:
-        """Let a session begin."""
+        """Let a session begin; of too many the one that was idle longest ends."""
         known = self.sessions
-        if len(known) >= self._most:
+        if len(known) >= MOST_SESSIONS:
             del known[min(known, key=lambda one: known[one].seen)]
         self.sessions[bytes.fromhex(session.digest)] = session
         self.keep()
@@ -323,6 +310,10 @@ class ProvenIdentity:
 class ClaimReading:
     """Where name and role stand in a provider's claims.
 
+    A path fits the shapes of the providers (docs/deployment.md, "Single sign-on"):
+    ``realm_access.roles`` (Keycloak), ``roles`` or ``groups`` (Entra),
+    ``roles[].name`` (Keyrock).
+
     Attributes:
         roles: Value of a claim → the role that it gives.
     """
@@ -337,15 +328,14 @@ class ClaimReading:
         Args:
             issuer: Whose claims they are.
             subject: Id of the person there.
-            claims: What is told; of it nothing but strings and numbers counts.
+            claims: What is told; of it nothing but strings counts.
         """
         person = person_id(issuer, subject)
         claimed = next(values_at(claims, self.name_claim), "")
-        return ProvenIdentity(
-            person,
-            name_of(claimed, person),
-            highest_role(values_at(claims, self.role_claim), self.roles),
-        )
+        values = values_at(claims, self.role_claim)
+        given = {self.roles[value] for value in values if value in self.roles}
+        role = max(given, key=_RANKS.index, default=None)
+        return ProvenIdentity(person, name_of(claimed, person), role)
 
 
 def person_id(issuer: str, subject: str) -> str:
@@ -367,14 +357,6 @@ def another_name(name: str, person: str) -> str:
     return f"{name[: MOST_NAME - len(mark)].rstrip()}{mark}"
 
 
-def highest_role(
-    values: Iterable[str], roles: Mapping[str, PersonRole]
-) -> PersonRole | None:
-    """The highest role among those that some values give; None: none."""
-    given = {roles[value] for value in values if value in roles}
-    return max(given, key=_RANKS.index, default=None)
-
-
 def values_at(claims: Json, path: str) -> Iterator[str]:
     """Strings at a path, such as ``realm_access.roles`` or ``roles[].name``.
 
@@ -384,8 +366,7 @@ def values_at(claims: Json, path: str) -> Iterator[str]:
         found = _walk(claims[path], ())
     else:
         found = _walk(claims, tuple(path.replace("[]", "").split(".")))
-    for _, value in zip(range(_MOST_VALUES), found, strict=False):
-        yield value
+    yield from islice(found, _MOST_VALUES)
 
 
 def _walk(value: object, path: tuple[str, ...]) -> Iterator[str]:

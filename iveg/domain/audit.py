@@ -38,7 +38,7 @@ class NamedActor:
 
 
 ITSELF: Final = NamedActor("iveg", "iVeg", "system", "none")
-"""What iVeg does unasked, such as retention."""
+"""Actor of acts that nobody asked for, such as retention."""
 STRANGER: Final = NamedActor("", "", "stranger", "none")
 """Whoever tries to sign in."""
 CONSOLE: Final = NamedActor("console", "console", "system", "shell")
@@ -48,7 +48,7 @@ CONSOLE: Final = NamedActor("console", "console", "system", "shell")
 def act_of(
     actor: Actor, action: str, subject: str, details: Json, *, audit_id: str, at: float
 ) -> AuditRecord:
-    """What somebody did at a moment (Unix s)."""
+    """Record of an act at a moment (Unix s)."""
     return AuditRecord(
         audit_id=audit_id,
         at=at,

@@ -7,6 +7,7 @@ from typing import Any
 
 from fastapi import APIRouter, FastAPI
 
+from iveg.adapters.recordings.recorder import InputRecorder
 from iveg.domain.observations import Instant
 from iveg.domain.stamps import format_stamp
 from iveg.domain.stop import Press
@@ -33,12 +34,11 @@ from iveg.web.live.encoder import Encoder
 from iveg.web.live.pictures import Past
 from iveg.web.pages.contexts import Site
 from iveg.web.pages.drawing import Pages
-from iveg.web.refusals import DocumentedApp
 from iveg.web.security import audited, headers, rate_limits
-from iveg.web.security.authentication import Authenticator
-from iveg.web.security.rate_limits import SignInGate
+from iveg.web.security.attempts import SignInGate
+from iveg.web.security.authentication import Authenticator, SignInLink
+from iveg.web.security.requirements import DocumentedApp
 from iveg.web.security.roles import Principal
-from iveg.web.security.signin import SignInLink
 from iveg.web.views import Views
 
 
@@ -65,7 +65,7 @@ class WebParts:
     queues: Callable[[], health.Queues]
     clock: Clock
     worker: Apart
-    recordings: past.Recordings
+    recordings: InputRecorder
     trail: AuditTrail
     past: Past
     encoder: Encoder
@@ -103,24 +103,19 @@ def live_routers(web: WebParts) -> Iterator[Callable[[], APIRouter]]:
         socket.router, parts.hub, web.encoder, web.snapshot, clock, web.stop, watch
     )
     yield partial(robots.router, views, clock)
-    yield partial(robots.equipment_router, views, clock)
-    yield partial(robots.costmap_router, parts.mapper, evaluator, clock)
-    yield partial(robots.coverage_router, parts.coverage, clock)
+    cells = parts.mapper, evaluator, parts.coverage, clock
+    yield partial(robots.cells_router, *cells)
     yield partial(commands.router, parts.commander, clock)
     yield partial(goals.router, parts.goals, clock)
     yield partial(alerts.router, evaluator, clock)
-    yield partial(rule.router, parts.rules, clock)
-    yield partial(rule.trial_router, parts.trials, parts.rules, clock)
+    yield partial(rule.router, parts.rules, parts.trials, clock)
     yield partial(detections.router, evaluator.tracking.newest, web.worker)
-    yield partial(detections.detectors_router, parts.detectors, clock)
-    yield partial(detections.words_router, parts.detectors, clock)
-    yield partial(detections.things_router, parts.things, clock)
+    yield partial(detections.words_router, parts.detectors, parts.things, clock)
     yield partial(latency.router, watch, clock, web.worker)
-    yield partial(past.recordings_router, web.recordings)
-    yield partial(past.router, web.past, clock)
-    yield partial(health.router, clock, views.health, web.accounts)
+    yield partial(past.router, web.recordings, web.past, clock)
     turns = parts.core.supervision.longest_turn_s
-    yield partial(health.metrics_router, clock, views.health, watch, web.queues, turns)
+    asked = web.accounts, watch, web.queues, turns
+    yield partial(health.router, clock, views.health, *asked)
 
 
 def build_app(

@@ -1,18 +1,13 @@
-"""Errors become HTTP here: the only file that knows both.
+"""Errors become HTTP here, the only file that knows both (RFC 9457).
 
-The answer is ``application/problem+json`` (RFC 9457), or a page where a person's
-browser asked for one.  Answers echo no input and reveal nothing internal.
-
-Errors of HTTP's boundary alone.
-
-Under the tree of ``domain/errors``::
+The answer is ``application/problem+json``, or a page where a person's browser asked for
+one.  It echoes no input and reveals nothing internal.  HTTP adds to the tree of
+``domain/errors``::
 
     IvegError
     ├── NotSignedInError    401
     ├── ForeignOriginError  403
     └── NotJsonError        415
-
-One RFC 9457 problem, and the page that shows it to a person.
 """
 
 from collections.abc import Callable, Mapping
@@ -135,40 +130,33 @@ def problem_of(error: Exception) -> Problem:
             return Problem(
                 error.status_code, str(error.detail), headers=error.headers or {}
             )
-        case CommandRefusedError() | MarkRefusedError() | TrialRefusedError():
-            return Problem(409, str(error), _REFUSED[type(error)], {"why": error.why})
         case UnreadableError():
             return Problem(400, str(error), "unreadable", {"reason": error.reason})
         case NotRecordedError():
             ends = {"before": stamp(error.before), "after": stamp(error.after)}
             return Problem(404, str(error), "not-recorded", ends)
         case HopError():
-            return _broken_hop(error)
+            # Addresses and drivers' words stay inside.
+            detail = f"{error.hop} did not answer."
+            return Problem(503, detail, "hop", {"hop": error.hop})
     for kind, status, code in _PLAIN:
         if isinstance(error, kind):
-            headers = _HEADERS.get(kind, {})
-            return Problem(status, str(error), code, headers=headers)
+            extra = {"why": error.why} if isinstance(error, _REFUSALS) else {}
+            return Problem(status, str(error), code, extra, _HEADERS.get(kind, {}))
     # The server logs the traceback: Starlette raises it again after this answer.
     return Problem(500, "Something failed inside iVeg; its log says what.")
 
 
-def _broken_hop(error: HopError) -> Problem:
-    extra = {"hop": error.hop}
-    # Addresses and drivers' words stay inside.
-    return Problem(503, f"{error.hop} did not answer.", "hop", extra)
-
-
-_REFUSED: Mapping[type[IvegError], str] = {
-    CommandRefusedError: "command-refused",
-    MarkRefusedError: "mark-refused",
-    TrialRefusedError: "trial-refused",
-}
+_REFUSALS = CommandRefusedError, MarkRefusedError, TrialRefusedError
 _PLAIN: tuple[tuple[type[IvegError], int, str], ...] = (
     (NotSignedInError, 401, "not-signed-in"),
     (BusyError, 429, "busy"),
     (UnknownRobotError, 404, "unknown-robot"),
     (UnknownNameError, 404, "unknown-name"),
     (NotAllowedError, 403, "not-allowed"),
+    (CommandRefusedError, 409, "command-refused"),
+    (MarkRefusedError, 409, "mark-refused"),
+    (TrialRefusedError, 409, "trial-refused"),
     (NameTakenError, 409, "name-taken"),
     (OutdatedError, 409, "outdated"),
     (ProvidedAccountError, 409, "provided-account"),
@@ -192,17 +180,15 @@ def _invalid(error: RequestValidationError) -> Problem:
     errors = [
         {
             "where": ".".join(str(part) for part in complaint["loc"])[:200],
-            "what": _what(str(complaint["type"]), str(complaint["msg"])),
+            # A validator of our own writes its sentence itself and may quote the value.
+            "what": "not allowed"
+            if complaint["type"] == "value_error"
+            else str(complaint["msg"])[:200],
         }
         for complaint in complaints[:_MOST_COMPLAINTS]
     ]
     detail = f"{len(complaints)} value(s) cannot be used."
     return Problem(422, detail, "invalid", {"errors": errors})
-
-
-def _what(kind: str, message: str) -> str:
-    # A validator of our own writes its sentence itself and may quote the value.
-    return "not allowed" if kind == "value_error" else message[:200]
 
 
 def _wants_a_page(request: Request) -> bool:

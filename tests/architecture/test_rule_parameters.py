@@ -46,7 +46,7 @@ from iveg.settings import Settings, describe
 from iveg.web.api.rule import RuleChange
 from iveg.web.pages.contexts import Appearance, Page, PageFrame, Site
 from iveg.web.pages.drawing import environment_of
-from iveg.web.pages.sentences import read_translations
+from iveg.web.pages.sentences import read_sentences
 from iveg.web.security.audited import AUDITED
 
 settings = Settings.from_environment({"IVEG_PAUSE_S": "2,person=3"})
@@ -55,7 +55,7 @@ change = RuleChange(class_pauses_s={"person": 4.0})
 line = json.dumps(rule_fields(rule))
 site = Site("none", ("AGI",), "1", demo=False)
 page = Page(PageFrame(site, Appearance("en"), "settings", "ana", "operator"))
-drawn = environment_of(read_translations("en")).get_template("settings.html")
+drawn = environment_of(read_sentences("en")).get_template("settings.html")
 html = drawn.render(page=page)
 told = Feedback("AGI", Origin("b", 1), rule=sent_to_robots(rule))
 print(json.dumps({

@@ -12,8 +12,8 @@ class FakeBook(AccessBook):
         programs = tuple(one for one in known if isinstance(one, ApiToken))
         super().__init__(Access(people, programs))
         self.changes: list[tuple[str, str, str]] = []
-        self.note = lambda one: self.changes.append(
-            (one.action, one.row.name, one.by.name)
+        self.on_change.append(
+            lambda one: self.changes.append((one.action, one.row.name, one.by.name))
         )
 
 

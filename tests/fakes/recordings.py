@@ -12,8 +12,8 @@ from iveg.domain.recordings import RecordingFile
 from iveg.domain.retention import DiskSpace
 
 
-class FakeRecordings:
-    """Implements ``web.api.recordings.Recordings``."""
+class FakeRecordings(InputRecorder):
+    """Files of a folder, without a process."""
 
     def __init__(self) -> None:
         self.directory = RecordingDirectory(Path("nowhere"))

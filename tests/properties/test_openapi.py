@@ -26,7 +26,7 @@ from schemathesis.specs.openapi.checks import (
     status_code_conformance,
 )
 
-from iveg.web.refusals import declared_actions
+from iveg.web.security.requirements import declared_actions
 from iveg.web.security.roles import MAY
 from tests.unit.web.whole import STRANGER, WholeServer, whole_server
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from iveg.web.pages.sentences import Translations, read_translations
+from iveg.web.pages.sentences import Sentences, read_sentences
 
 ROOT = Path(__file__).parents[2]
 STATIC = ROOT / "iveg/static"
@@ -17,7 +17,7 @@ _IN_TEMPLATES = re.compile(r"""(?:say|t)\("([a-z][\w.]*\.\w+)"\s*[),]""")
 _IN_LABELS = re.compile(r"""label\("[\w-]+", "([\w.]+)"\s*[),]""")
 _IN_PYTHON = re.compile(r"""f?"((?:log|alert|health)\.[a-z_.]+)(?<!\.)["{]""")
 
-ES, EN = read_translations("es"), read_translations("en")
+ES, EN = read_sentences("es"), read_sentences("en")
 _BLOCKS = "|".join(sorted({key.partition(".")[0] for key in ES.sentences}))
 _IN_SCRIPTS = re.compile(
     rf"""(?<!named\()["`]((?:{_BLOCKS})\.(?!js`)[\w.]*)(["`]|\$)"""
@@ -148,7 +148,7 @@ def test_stop_says_what_the_product_says(key: str, es: str, en: str | None) -> N
 
 @pytest.mark.parametrize("texts", [ES, EN], ids=["es", "en"])
 def test_line_buttons_and_banners_have_one_sentence_for_the_red_button(
-    texts: Translations,
+    texts: Sentences,
 ) -> None:
     todo = texts.sentences["situation.do.red_button"]
     button = todo.removeprefix("use la ").removeprefix("use the ")[:8]
@@ -175,10 +175,10 @@ def test_no_control_is_called_an_emergency_stop() -> None:
 def test_numbers_are_written_as_the_reader_writes_them() -> None:
     translations = {"n": "{value:1} m, {share:percent}"}
     assert (
-        Translations("es", translations).say("n", value=1.43, share=0.94)
+        Sentences("es", translations).say("n", {"value": 1.43, "share": 0.94})
         == "1,4 m, 94\u00a0%"
     )
     assert (
-        Translations("en", translations).say("n", value=1.43, share=0.94)
+        Sentences("en", translations).say("n", {"value": 1.43, "share": 0.94})
         == "1.4 m, 94%"
     )

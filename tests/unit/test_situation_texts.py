@@ -16,7 +16,7 @@ from playwright.sync_api import Browser, Page
 
 from iveg.domain.limits import LIMITS
 from iveg.domain.situation import ALERTED
-from iveg.web.pages.sentences import read_translations
+from iveg.web.pages.sentences import read_sentences
 from tests import staged
 from tests.staged import STAGED
 from tests.unit.test_js_modules import browser, files
@@ -155,7 +155,7 @@ OF_SPEED = {
 
 @pytest.mark.parametrize("language", ["es", "en"])
 def test_alerts_and_the_log_have_the_words_of_the_situation(language: str) -> None:
-    said = read_translations(language).sentences
+    said = read_sentences(language).sentences
     for key, (_, state, _) in ALERTED.items():
         if not said.get(key, "").startswith("{robot}"):
             continue

@@ -4,14 +4,14 @@ import re
 
 import pytest
 
-from iveg.web.pages.sentences import read_translations
+from iveg.web.pages.sentences import read_sentences
 
 INSIDE = ("error",)
 """Pages for programmers, and codes of HTTP."""
 
 
 def sentences(language: str) -> dict[str, str]:
-    found = read_translations(language).sentences
+    found = read_sentences(language).sentences
     return {key: text for key, text in found.items() if key.split(".")[0] not in INSIDE}
 
 

@@ -1,29 +1,17 @@
-"""One's own account over HTTP: what is known of it, and a new password.
+"""Access over HTTP: one's own account, sessions, accounts of others, programs.
 
-Sessions over HTTP: everybody's for admins, one's own for each person.
-
-Neither a token nor its digest leaves: a session is named by an id of its own.
-
-The sign-in link for another device: as text and as a QR code, for operators alone.
-
-It is a password: whoever has it comes in as operator until the next start.  The page
-asks for it only when somebody presses, and no cache keeps it.
-
-Accounts of people over HTTP, for admins: invite, change a role, reset, shut out.
-
-An invitation is a password until it is taken: it leaves by the one answer that made it.
-
-Tokens of programs over HTTP, for admins: give, look after and revoke.
-
-A token leaves by the one answer that made it.
+A sign-in link, an invitation and a token are passwords: each leaves by the one answer
+that somebody asked it by, and no cache keeps it.  A session is named by an id of its
+own: neither its token nor its digest leaves.
 """
 
 from ipaddress import ip_address
 from typing import Annotated, Final
 
 import segno
-from fastapi import APIRouter, Depends, HTTPException, Request, Response
+from fastapi import APIRouter, Depends, Request, Response
 from pydantic import AfterValidator, Field
+from starlette.exceptions import HTTPException
 
 from iveg.adapters.admission import MOST_ACCOUNTS
 from iveg.adapters.passwords import LEAST, MOST
@@ -53,17 +41,23 @@ from iveg.models.access import (
     UserAccount,
 )
 from iveg.models.base import Body, Listing, stamp
-from iveg.vital.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.cookies import keep_language
 from iveg.web.problems import Problem
-from iveg.web.refusals import refusals
-from iveg.web.security.people import People, Programs
-from iveg.web.security.requirements import Admin, Reader, authenticator_of, require
+from iveg.web.security.people import People
+from iveg.web.security.requirements import (
+    ADMINS,
+    Admin,
+    Reader,
+    authenticator_of,
+    refusals,
+    require,
+)
 from iveg.web.security.roles import Action, Principal, Role
-from iveg.web.security.sessions import Sessions
 
-_BY_LINK: Final = "link"
+MOST_TOKENS: Final = 200
+_SCALE = 6
+"""Pixels of a module of a QR code: read from an arm's length."""
 
 
 def sessions_router() -> APIRouter:
@@ -88,10 +82,16 @@ def _add(routes: APIRouter, path: str, action: Action, *, everybodys: bool) -> N
     """List and end the sessions that somebody may see."""
     visitor = Annotated[Principal, Depends(require(action))]
 
+    def seen_by(request: Request, who: Principal) -> list[tuple[Session, Role]]:
+        standing = authenticator_of(request).sessions.standing()
+        # The one of a program is nobody's, and has no session.
+        own = None if who.session is None else who.person
+        return [one for one in standing if everybodys or one[0].person == own]
+
     @routes.get(path, response_model=Listing[OpenSession])
     async def listed(request: Request, who: visitor) -> Response:
         """Those that are not over; the newest sign of life first."""
-        seen = _seen(request, who, everybodys=everybodys)
+        seen = seen_by(request, who)
         seen.sort(key=lambda one: one[0].seen, reverse=True)
         return Json(Listing(items=[_open_session(*one, who) for one in seen]))
 
@@ -99,9 +99,9 @@ def _add(routes: APIRouter, path: str, action: Action, *, everybodys: bool) -> N
     async def end(request: Request, session_id: str, who: visitor) -> Response:
         """End one at once, STOP included."""
         refuse_walls(who)
-        for session, role in _seen(request, who, everybodys=everybodys):
+        for session, role in seen_by(request, who):
             if session.session_id == session_id:
-                _sessions(request).end([session])
+                authenticator_of(request).sessions.end([session])
                 return Json(_open_session(session, role, who))
         raise UnknownNameError("session", session_id)
 
@@ -109,23 +109,9 @@ def _add(routes: APIRouter, path: str, action: Action, *, everybodys: bool) -> N
     async def end_others(request: Request, who: visitor) -> Response:
         """End all but the one that asks, STOP included."""
         refuse_walls(who)
-        seen = _seen(request, who, everybodys=everybodys)
-        others = [one for one, _ in seen if not _is_own(one, who)]
-        _sessions(request).end(others)
+        others = [one for one, _ in seen_by(request, who) if not _is_own(one, who)]
+        authenticator_of(request).sessions.end(others)
         return Json(SessionsEnded(ended=len(others)))
-
-
-def _sessions(request: Request) -> Sessions:
-    return authenticator_of(request).sessions
-
-
-def _seen(
-    request: Request, who: Principal, *, everybodys: bool
-) -> list[tuple[Session, Role]]:
-    standing = _sessions(request).standing()
-    # The one of a program is nobody's, and has no session.
-    own = None if who.session is None else who.person
-    return [one for one in standing if everybodys or one[0].person == own]
 
 
 def _is_own(session: Session, who: Principal) -> bool:
@@ -133,7 +119,7 @@ def _is_own(session: Session, who: Principal) -> bool:
 
 
 def _open_session(session: Session, role: Role, who: Principal) -> OpenSession:
-    kind: SessionKind = "link" if session.method == _BY_LINK else "account"
+    kind: SessionKind = "link" if session.method == "link" else "account"
     return OpenSession(
         session_id=session.session_id,
         name=session.name,
@@ -166,7 +152,7 @@ def router(people: People) -> APIRouter:
 
     @routes.get("", response_model=OwnAccount)
     async def own(who: Reader) -> Response:
-        """Who this is."""
+        """Name, role and end of whoever asks."""
         account = people.find(who.person)
         return Json(
             OwnAccount(
@@ -183,11 +169,11 @@ def router(people: People) -> APIRouter:
     async def change(request: Request, body: PasswordBody, who: Reader) -> Response:
         """Change the password; every session ends but this one, which begins anew."""
         change = authenticator_of(request).change_password
-        done = await change(request, who, body.old, body.new)
-        if not isinstance(done, Problem):
-            return done
-        if done.status != 401:
-            return done.response()
+        try:
+            return await change(request, who, body.old, body.new)
+        except HTTPException as error:
+            if error.status_code != 401:
+                raise
         return Problem(403, "The old password is wrong.", "wrong-password").response()
 
     @routes.put("/language", status_code=204)
@@ -202,10 +188,6 @@ def router(people: People) -> APIRouter:
         return response
 
     return routes
-
-
-_SCALE = 6
-"""Pixels of a module: read from an arm's length."""
 
 
 def sign_in_code_router(token: str) -> APIRouter:
@@ -231,11 +213,11 @@ def code_of(request: Request, proof: str) -> SignInCode:
         scale=_SCALE, border=4, dark="#000", light="#fff"
     )
     return SignInCode(
-        link=link, image=image, local=is_local(request.url.hostname or "")
+        link=link, image=image, local=_is_local(request.url.hostname or "")
     )
 
 
-def is_local(host: str) -> bool:
+def _is_local(host: str) -> bool:
     """Whether an address leads nowhere from another device."""
     try:
         return ip_address(host).is_loopback
@@ -243,28 +225,27 @@ def is_local(host: str) -> bool:
         return host == "localhost" or host.endswith(".localhost")
 
 
-def named(text: str) -> str:
-    """A name that somebody may have. Raises ValueError."""
+def _named(text: str) -> str:
     if not is_name(text) or is_reserved(text):
         raise ValueError("not a name")
     return text
 
 
-def end_of(days: int | None, now: float) -> float | None:
-    """When something ends by itself (Unix s), after so many days; None: never."""
-    return None if days is None else now + days * DAY_S
+class _Newcomer(Body):
+    """Somebody, or a program, that ends by itself after so many `days`."""
+
+    name: Annotated[str, Field(max_length=MOST_NAME), AfterValidator(_named)]
+    days: Annotated[int, Field(ge=1, le=3650)] | None = None
+
+    def ends_at(self, now: float) -> float | None:
+        """When it ends by itself (Unix s); None: never."""
+        return None if self.days is None else now + self.days * DAY_S
 
 
-Days = Annotated[int, Field(ge=1, le=3650)]
-Name = Annotated[str, Field(max_length=MOST_NAME), AfterValidator(named)]
-
-
-class UserBody(Body):
+class UserBody(_Newcomer):
     """Somebody new; `days` until the account ends by itself."""
 
-    name: Name
     role: PersonRole
-    days: Days | None = None
 
 
 class RoleBody(Body):
@@ -273,19 +254,19 @@ class RoleBody(Body):
     role: PersonRole
 
 
-def users_router(people: People, clock: Clock) -> APIRouter:
+def users_router(people: People) -> APIRouter:
     """The routes of accounts; all for admins."""
     routes = APIRouter(
         prefix="/api/v1/users",
         tags=["users"],
-        dependencies=[Depends(require("admin"))],
+        dependencies=ADMINS,
         responses=refusals(409),
     )
 
     @routes.get("", response_model=Listing[UserAccount])
     async def users(who: Admin) -> Response:
         """Every account, by name."""
-        now = clock().wall
+        now = people.clock().wall
         items = [
             UserAccount.of(one, now, own=user_id == who.person)
             for user_id, one in people.known.items()
@@ -296,36 +277,41 @@ def users_router(people: People, clock: Clock) -> APIRouter:
     @routes.post("", response_model=Invitation, status_code=201)
     async def invite(request: Request, body: UserBody, who: Admin) -> Response:
         """Add an account, and show its invitation this once."""
-        now = clock().wall
+        now = people.clock().wall
         if len(people.known) >= MOST_ACCOUNTS:
             raise HTTPException(409, f"There are {MOST_ACCOUNTS} accounts already.")
-        ends_at = end_of(body.days, now)
-        made = people.admission(who).add(body.name, body.role, ends_at)
-        return _invitation(request, made, now, 201)
+        made = people.admission(who).add(body.name, body.role, body.ends_at(now))
+        return invitation(request, made, now, 201)
 
-    _add_changes(routes, people, clock)
-    return routes
+    def invitation(
+        request: Request, made: tuple[str, Account], now: float, status: int
+    ) -> Response:
+        token, account = made
+        code = code_of(request, f"invitation={token}") if token else None
+        shown = Invitation(user=UserAccount.of(account, now), code=code)
+        return Json(shown, status)
 
-
-def _add_changes(routes: APIRouter, people: People, clock: Clock) -> None:
     @routes.put("/{user_id}/role", response_model=UserAccount)
     async def give_role(user_id: str, body: RoleBody, who: Admin) -> Response:
         """Change a role; the person signs in anew."""
-        other = _other(people, user_id, who)
-        changed = people.admission(who).give_role(other, body.role)
-        return Json(UserAccount.of(changed, clock().wall))
+        changed = people.admission(who).give_role(
+            _other(people, user_id, who), body.role
+        )
+        return Json(UserAccount.of(changed, people.clock().wall))
 
     @routes.post("/{user_id}/reset", response_model=Invitation)
     async def reset(request: Request, user_id: str, who: Admin) -> Response:
         """Take a password away, let in who was shut out, and invite again."""
         made = people.admission(who).reset(_other(people, user_id, who))
-        return _invitation(request, made, clock().wall)
+        return invitation(request, made, people.clock().wall, 200)
 
     @routes.post("/{user_id}/disable", response_model=UserAccount)
     async def disable(user_id: str, who: Admin) -> Response:
         """Shut somebody out at once, STOP included."""
         off = people.admission(who).disable(_other(people, user_id, who))
-        return Json(UserAccount.of(off, clock().wall))
+        return Json(UserAccount.of(off, people.clock().wall))
+
+    return routes
 
 
 def _other(people: People, user_id: str, who: Principal) -> Account:
@@ -338,49 +324,35 @@ def _other(people: People, user_id: str, who: Principal) -> Account:
     return found
 
 
-def _invitation(
-    request: Request, made: tuple[str, Account], now: float, status: int = 200
-) -> Response:
-    invitation, account = made
-    code = code_of(request, f"invitation={invitation}") if invitation else None
-    return Json(Invitation(user=UserAccount.of(account, now), code=code), status)
-
-
-MOST_TOKENS: Final = 200
-
-
-class TokenBody(Body):
+class TokenBody(_Newcomer):
     """A program that is to come; `days` until its token ends by itself."""
 
-    name: Name
     scope: TokenScope
-    days: Days | None = None
 
 
-def tokens_router(people: People, programs: Programs, clock: Clock) -> APIRouter:
+def tokens_router(people: People) -> APIRouter:
     """The routes of tokens; all for admins."""
     routes = APIRouter(prefix="/api/v1/tokens", tags=["users"], responses=refusals(409))
 
     @routes.get(
         "",
         response_model=Listing[ProgramToken],
-        dependencies=[Depends(require("admin"))],
+        dependencies=ADMINS,
     )
     async def tokens() -> Response:
         """Every program, by name."""
-        known = sorted(programs.known, key=lambda one: name_key(one.name))
-        now = clock().wall
+        known = sorted(people.book.tokens.values(), key=lambda one: name_key(one.name))
+        now = people.clock().wall
         return Json(Listing(items=[ProgramToken.of(one, now) for one in known]))
 
     @routes.post("", response_model=NewToken, status_code=201)
     async def give(body: TokenBody, who: Admin) -> Response:
         """Let a program in, and show its token this once."""
-        now = clock().wall
-        if len(programs.known) >= MOST_TOKENS:
+        now = people.clock().wall
+        if len(people.book.tokens) >= MOST_TOKENS:
             raise HTTPException(409, f"There are {MOST_TOKENS} tokens already.")
-        ends_at = end_of(body.days, now)
         token, program = people.admission(who).give_token(
-            body.name, body.scope, ends_at
+            body.name, body.scope, body.ends_at(now)
         )
         shown = NewToken(program=ProgramToken.of(program, now), token=token)
         return Json(shown, 201)
@@ -388,10 +360,9 @@ def tokens_router(people: People, programs: Programs, clock: Clock) -> APIRouter
     @routes.delete("/{token_id}", status_code=204)
     async def revoke(token_id: str, who: Admin) -> None:
         """End a token at once, and the sockets of its program."""
-        known = (one for one in programs.known if one.token_id == token_id)
-        found = next(known, None)
-        if found is None:
-            raise UnknownNameError("token", token_id)
-        people.admission(who).revoke(found.name)
+        for one in people.book.tokens.values():
+            if one.token_id == token_id:
+                return people.admission(who).revoke(one)
+        raise UnknownNameError("token", token_id)
 
     return routes

@@ -1,15 +1,13 @@
-"""Acknowledgement of alerts, one or a list: by whom, when, and with which note.
+"""Acknowledgement of alerts, and notes of people, over HTTP.
 
-Notes of people over HTTP: pinned to a time and a place, and on the record.
-
-A note is a line of the log: it is written once, and goes into the incident packs of the
-moment that it is about.
+A note is a line of the log, pinned to a time and a place.  It is written once, and goes
+into the incident packs of its moment.
 """
 
 from collections.abc import Callable, Collection
 from typing import Annotated, Self
 
-from fastapi import APIRouter, Depends, HTTPException, Query, Response
+from fastapi import APIRouter, HTTPException, Query, Response
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from iveg.adapters.history import lists
@@ -25,8 +23,7 @@ from iveg.vital.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.api.history_filters import Moment, Span, seconds
 from iveg.web.pages.sentences import local_stamp
-from iveg.web.refusals import refusals
-from iveg.web.security.requirements import Operator, require
+from iveg.web.security.requirements import READERS, Operator, refusals
 
 MOST_TOGETHER = 200
 """More alerts at once nobody has read."""
@@ -93,7 +90,7 @@ _Id = Annotated[str, Field(pattern=r"^[ -~]{1,64}$")]
 
 
 class NoteRequest(BaseModel):
-    """What is to be noted; without a time it is about now."""
+    """A note to write down; without a time it is about now."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -132,7 +129,7 @@ def notes_router(
     @routes.get(
         "/notes",
         response_model=Listing[Note],
-        dependencies=[Depends(require("read"))],
+        dependencies=READERS,
     )
     async def notes(asked: Annotated[Span, Query()]) -> Response:
         """Notes by when they were written, newest first."""

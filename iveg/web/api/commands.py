@@ -14,8 +14,7 @@ from iveg.vital.command import Commander
 from iveg.vital.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.presses import DESCRIBED, press_of
-from iveg.web.refusals import refusals
-from iveg.web.security.requirements import Operator, Presser
+from iveg.web.security.requirements import Operator, Presser, refusals
 
 HoldId = Annotated[str, Field(min_length=1, max_length=64)]
 

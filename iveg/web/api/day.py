@@ -56,8 +56,7 @@ from iveg.web.pages import charts
 from iveg.web.pages.contexts import DayPage
 from iveg.web.pages.drawing import Pages
 from iveg.web.pages.sentences import in_madrid, start_of
-from iveg.web.refusals import refusals
-from iveg.web.security.requirements import require
+from iveg.web.security.requirements import refusals, require
 
 _DAY_S = 86_400.0
 _FOR_GOOD = "public, max-age=31536000, immutable"

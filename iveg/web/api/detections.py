@@ -1,17 +1,13 @@
-"""Each detection of the last moments (docs/interfaces/http.md, "Each detection").
+"""Detections over HTTP (docs/interfaces/http.md), and what operators say of them.
 
-Detectors in and out of service over HTTP (docs/interfaces/http.md).
-
-Words of detectors over HTTP (docs/interfaces/http.md).
-
-Marks "not a person here" over HTTP (docs/interfaces/http.md).
+They say which detector is in service, what its words stand for, and who is no person.
 """
 
 from collections.abc import Sequence
 from datetime import timedelta
 from typing import Annotated, Self
 
-from fastapi import APIRouter, Depends, Query, Request, Response
+from fastapi import APIRouter, Query, Request, Response
 from pydantic import AfterValidator, Field, model_validator
 
 from iveg.adapters.history.lists import USUAL_ROWS
@@ -29,8 +25,7 @@ from iveg.web.api.answers import FEW_ROWS, Apart, Json
 from iveg.web.api.exports import MEDIA_TYPES, Form
 from iveg.web.api.history_filters import NewestFilters, admitting
 from iveg.web.pages.sentences import in_madrid, start_of
-from iveg.web.refusals import refusals
-from iveg.web.security.requirements import Operator, require
+from iveg.web.security.requirements import READERS, Operator, refusals
 
 
 def router(newest: NewestDetections, worker: Apart) -> APIRouter:
@@ -38,7 +33,7 @@ def router(newest: NewestDetections, worker: Apart) -> APIRouter:
     routes = APIRouter(
         prefix="/api/v1",
         tags=["live"],
-        dependencies=[Depends(require("read"))],
+        dependencies=READERS,
         responses=refusals(503),
     )
 
@@ -89,12 +84,41 @@ class ServiceRequest(Body):
         return self
 
 
-def detectors_router(detectors: Detectors, clock: Clock) -> APIRouter:
-    """The word of an operator on a robot's detector."""
-    routes = APIRouter(prefix="/api/v1", tags=["robots"])
+Name = Annotated[str, Field(min_length=1, max_length=64)]
+
+
+class WordRequest(Body):
+    """Meaning of a detector's word."""
+
+    detector: Name
+    word: Name
+    is_person: bool
+    sure: bool = Field(
+        default=False, description="Asked a second time; needed for ``false``."
+    )
+
+    @model_validator(mode="after")
+    def _asked_twice(self) -> Self:
+        if not (self.is_person or self.sure):
+            raise ValueError("that it is no person has to be sure")
+        return self
+
+
+class MarkRequest(Body):
+    """Which track is no person."""
+
+    person_id: Name
+
+
+def words_router(detectors: Detectors, marks: ThingMarks, clock: Clock) -> APIRouter:
+    """Words of operators on detectors, on what they say, and on whom they see."""
+    routes = APIRouter(prefix="/api/v1")
 
     @routes.put(
-        "/robots/{robot_id}/detector", response_model=Detector, responses=refusals(503)
+        "/robots/{robot_id}/detector",
+        response_model=Detector,
+        responses=refusals(503),
+        tags=["robots"],
     )
     async def service(
         robot_id: str,
@@ -117,34 +141,9 @@ def detectors_router(detectors: Detectors, clock: Clock) -> APIRouter:
         )
         return Json(Detector.of(robot, now))
 
-    return routes
-
-
-Name = Annotated[str, Field(min_length=1, max_length=64)]
-
-
-class WordRequest(Body):
-    """What a detector's word stands for."""
-
-    detector: Name
-    word: Name
-    is_person: bool
-    sure: bool = Field(
-        default=False, description="Asked a second time; needed for ``false``."
+    @routes.put(
+        "/words", status_code=204, responses=refusals(404, 503), tags=["people"]
     )
-
-    @model_validator(mode="after")
-    def _asked_twice(self) -> Self:
-        if not (self.is_person or self.sure):
-            raise ValueError("that it is no person has to be sure")
-        return self
-
-
-def words_router(detectors: Detectors, clock: Clock) -> APIRouter:
-    """The word of an operator on a detector's word."""
-    routes = APIRouter(prefix="/api/v1", tags=["people"])
-
-    @routes.put("/words", status_code=204, responses=refusals(404, 503))
     async def answer(body: WordRequest, who: Operator) -> Response:
         """Say whether a word that was asked for stands for a person."""
         now = clock()
@@ -152,27 +151,19 @@ def words_router(detectors: Detectors, clock: Clock) -> APIRouter:
         await detectors.answer(said, now)
         return Response(status_code=204)
 
-    return routes
-
-
-class MarkRequest(Body):
-    """Which track is no person."""
-
-    person_id: Name
-
-
-def things_router(marks: ThingMarks, clock: Clock) -> APIRouter:
-    """Read by all, made and taken back by operators."""
-    routes = APIRouter(prefix="/api/v1", tags=["people"])
-    reader = [Depends(require("read"))]
-
-    @routes.get("/things", response_model=Listing[Thing], dependencies=reader)
+    @routes.get(
+        "/things", response_model=Listing[Thing], dependencies=READERS, tags=["people"]
+    )
     async def things() -> Response:
         """Every place that an operator marked."""
         return Json(Listing(items=[Thing.of(one) for one in marks.known]))
 
     @routes.post(
-        "/things", status_code=201, response_model=Thing, responses=refusals(404, 409)
+        "/things",
+        status_code=201,
+        response_model=Thing,
+        responses=refusals(404, 409),
+        tags=["people"],
     )
     async def mark(body: MarkRequest, who: Operator) -> Response:
         """Mark where a track is, until the day's end.
@@ -184,7 +175,7 @@ def things_router(marks: ThingMarks, clock: Clock) -> APIRouter:
         thing = marks.mark(body.person_id, who.name, until, now)
         return Json(Thing.of(thing), 201)
 
-    @routes.delete("/things/{thing_id}", response_model=Thing)
+    @routes.delete("/things/{thing_id}", response_model=Thing, tags=["people"])
     async def unmark(thing_id: str, who: Operator) -> Response:
         """Take a mark back: from now on whoever is there is somebody."""
         return Json(Thing.of(marks.unmark(thing_id, who.name, clock())))

@@ -101,7 +101,7 @@ def csv_lines(rows: Iterable[Sequence[str]], reader: Sentences | None = None) ->
     """Rows of cells as CSV (RFC 4180), for programs or for a reader's spreadsheet."""
     text = io.StringIO()
     # Excel takes the separator of lists of its country; Spain's is the semicolon.
-    is_spanish = reader is not None and reader.translations.language == "es"
+    is_spanish = reader is not None and reader.language == "es"
     csv.writer(text, delimiter=";" if is_spanish else ",").writerows(rows)
     return text.getvalue().encode()
 
@@ -115,7 +115,7 @@ def cell(name: str, value: object, reader: Sentences | None = None) -> str:
     if isinstance(value, float) and (name == "at" or name.endswith("_at")):
         return format_stamp(value)
     if isinstance(value, float) and reader is not None:
-        return reader.translations.decimal(str(value))
+        return reader.decimal(str(value))
     if isinstance(value, Mapping | list):
         return write_json(value).decode()
     return _safe(value) if isinstance(value, str) else str(value)

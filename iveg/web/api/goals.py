@@ -10,8 +10,7 @@ from iveg.domain.goals import GoalWish
 from iveg.models.robot import Goal
 from iveg.vital.ports import Clock
 from iveg.web.api.answers import Json
-from iveg.web.refusals import refusals
-from iveg.web.security.requirements import Operator
+from iveg.web.security.requirements import Operator, refusals
 
 _Metres = Annotated[float, Field(ge=-1e6, le=1e6)]
 
@@ -28,7 +27,7 @@ class HereRequest(_Wish):
     y: _Metres
 
     def wish(self) -> GoalWish:
-        """What the person asked for."""
+        """The goal that the person asked for."""
         return GoalWish("here", self.x, self.y)
 
 
@@ -39,7 +38,7 @@ class AisleRequest(_Wish):
     aisle: Annotated[str, Field(min_length=1, max_length=64)]
 
     def wish(self) -> GoalWish:
-        """What the person asked for."""
+        """The goal that the person asked for."""
         return GoalWish("aisle", aisle=self.aisle)
 
 
@@ -49,7 +48,7 @@ class PlainRequest(_Wish):
     kind: Literal["return", "pause"]
 
     def wish(self) -> GoalWish:
-        """What the person asked for."""
+        """The goal that the person asked for."""
         return GoalWish(self.kind)
 
 

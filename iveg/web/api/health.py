@@ -1,6 +1,4 @@
-"""Health of the data path: for people, supervisors and Prometheus.
-
-Metrics for Prometheus: counters, hops, latency, queues, safety figures.
+"""Health of the data path: for supervisors, and as metrics for Prometheus.
 
 ``deploy/grafana`` draws them, and a test compares its names with these.
 """
@@ -10,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from fastapi import APIRouter, Depends, Response
+from fastapi import APIRouter, Response
 from fastapi.responses import PlainTextResponse
 from prometheus_client import CONTENT_TYPE_PLAIN_0_0_4, generate_latest
 from prometheus_client.metrics_core import Metric
@@ -21,7 +19,7 @@ from iveg.domain.observations import Instant
 from iveg.models.health import Health
 from iveg.vital.ports import Clock
 from iveg.web.api.answers import Json
-from iveg.web.security.requirements import require
+from iveg.web.security.requirements import READERS, STRANGERS
 
 _SHARES = (0.5, 0.95, 0.99)
 _Latency = list[tuple[tuple[str, str, str], int, float, list[Sketch]]]
@@ -40,48 +38,6 @@ class Queues:
     depths: Mapping[str, int]
     dropped: Mapping[str, int]
     retries: Mapping[str, int]
-
-
-def metrics_router(
-    clock: Clock,
-    health: Callable[[Instant], Health],
-    watch: LatencyWatch,
-    queues: Callable[[], Queues],
-    longest_turn_s: Callable[[Instant], float],
-) -> APIRouter:
-    """The endpoint that Prometheus asks."""
-    routes = APIRouter(tags=["health"])
-
-    @routes.get(
-        "/metrics",
-        dependencies=[Depends(require("read"))],
-        response_class=PlainTextResponse,
-    )
-    async def metrics() -> Response:
-        """Counters, hops, latency and safety in Prometheus' text format."""
-        now = clock()
-        families = [
-            *_families(health(now), watch, queues()),
-            _family(
-                "gauge",
-                "loop_longest_turn_seconds",
-                "CPU time of the longest turn of the loop in the last two minutes.",
-                {"": round(longest_turn_s(now), 4)},
-            ),
-        ]
-        latency: _Latency = [
-            ((one.robot_id, one.data, hop), part.count, part.total, part.parts("1min"))
-            for one in watch.streams
-            for hop, part in one.segments.items()
-            if part.count
-        ]
-        # Twenty robots have 300 sketches to sum up: beside the loop, not in it.
-        text = await asyncio.to_thread(
-            lambda: generate_latest(_Told([*families, _summary(latency)]))
-        )
-        return Response(text, media_type=CONTENT_TYPE_PLAIN_0_0_4)
-
-    return routes
 
 
 class _Told(Collector):
@@ -113,13 +69,7 @@ def _family(
 
 def _families(health: Health, watch: LatencyWatch, queues: Queues) -> list[Metric]:
     latency, asked = health.safety.alert_latency, health.safety.not_echoed
-    shares = dict(
-        zip(
-            ("0.5", "0.95", "0.99"),
-            (latency.p50_ms, latency.p95_ms, latency.p99_ms),
-            strict=True,
-        )
-    )
+    shares = {"0.5": latency.p50_ms, "0.95": latency.p95_ms, "0.99": latency.p99_ms}
     return [
         _family(
             "counter",
@@ -220,24 +170,56 @@ def router(
     clock: Clock,
     health: Callable[[Instant], Health],
     accounts: Callable[[], str],
+    watch: LatencyWatch,
+    queues: Callable[[], Queues],
+    longest_turn_s: Callable[[Instant], float],
 ) -> APIRouter:
     """The endpoints that machines ask."""
     routes = APIRouter(tags=["health"])
 
     @routes.get(
         "/healthz",
-        dependencies=[Depends(require("open"))],
+        dependencies=STRANGERS,
         response_class=PlainTextResponse,
     )
     async def alive() -> Response:
         """The process answers; says nothing else to strangers."""
         return PlainTextResponse("ok\n")
 
-    @routes.get("/readyz", dependencies=[Depends(require("read"))], responses=_READY)
+    @routes.get("/readyz", dependencies=READERS, responses=_READY)
     async def ready() -> Response:
         """200 when every hop and the file of accounts are well, else 503."""
         kept = accounts()
         is_ok = health(clock()).ok and kept == "ok"
         return Json({"ok": is_ok, "accounts": kept}, 200 if is_ok else 503)
+
+    @routes.get(
+        "/metrics",
+        dependencies=READERS,
+        response_class=PlainTextResponse,
+    )
+    async def metrics() -> Response:
+        """Counters, hops, latency and safety in Prometheus' text format."""
+        now = clock()
+        families = [
+            *_families(health(now), watch, queues()),
+            _family(
+                "gauge",
+                "loop_longest_turn_seconds",
+                "CPU time of the longest turn of the loop in the last two minutes.",
+                {"": round(longest_turn_s(now), 4)},
+            ),
+        ]
+        latency: _Latency = [
+            ((one.robot_id, one.data, hop), part.count, part.total, part.parts("1min"))
+            for one in watch.streams
+            for hop, part in one.segments.items()
+            if part.count
+        ]
+        # Twenty robots have 300 sketches to sum up: beside the loop, not in it.
+        text = await asyncio.to_thread(
+            lambda: generate_latest(_Told([*families, _summary(latency)]))
+        )
+        return Response(text, media_type=CONTENT_TYPE_PLAIN_0_0_4)
 
     return routes

@@ -35,9 +35,8 @@ from iveg.web.api import day, exports
 from iveg.web.api.answers import FEW_ROWS, Apart, Json
 from iveg.web.api.exports import MEDIA_TYPES, Form
 from iveg.web.api.history_filters import Filters, filter_of
-from iveg.web.pages.sentences import Sentences, in_madrid, read_translations
-from iveg.web.refusals import refusals
-from iveg.web.security.requirements import require
+from iveg.web.pages.sentences import Sentences, in_madrid, read_sentences
+from iveg.web.security.requirements import refusals, require
 from iveg.web.security.roles import Action
 
 R = TypeVar("R", bound=Record)
@@ -328,7 +327,7 @@ async def _ndjson(
 
 @cache
 def _reader(language: str | None) -> Sentences | None:
-    return None if language is None else Sentences(read_translations(language))
+    return None if language is None else read_sentences(language)
 
 
 def _day(asked: Filter) -> str:

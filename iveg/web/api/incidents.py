@@ -34,8 +34,7 @@ from iveg.web.api.answers import Apart
 from iveg.web.api.history_filters import Span
 from iveg.web.pages.drawing import appearance_of
 from iveg.web.pages.incident_report import write_report
-from iveg.web.refusals import refusals
-from iveg.web.security.requirements import Operator
+from iveg.web.security.requirements import Operator, refusals
 
 MEDIA_TYPE = "application/zip"
 LONGEST_S, BEFORE_S, AFTER_S = 3600.0, 30.0, 30.0

@@ -1,6 +1,6 @@
 """The paper's latency table, live, beside its own numbers (docs/interfaces/http.md).
 
-The latency table: read in the loop from streams of measures, written elsewhere.
+It is read in the loop from streams of measures, and written in the worker.
 """
 
 import asyncio
@@ -9,7 +9,7 @@ from dataclasses import asdict
 from typing import Annotated, Any, Literal
 
 import orjson
-from fastapi import APIRouter, Depends, Query, Request, Response
+from fastapi import APIRouter, Query, Request, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from iveg.domain.clock_offset import ClockOffset
@@ -34,8 +34,7 @@ from iveg.web.api.answers import Apart
 from iveg.web.api.exports import MEDIA_TYPES, cell, csv_lines, form_of
 from iveg.web.pages import charts
 from iveg.web.pages.charts import cdf_figure
-from iveg.web.refusals import refusals
-from iveg.web.security.requirements import require
+from iveg.web.security.requirements import READERS, refusals
 
 
 class Asked(BaseModel):
@@ -133,7 +132,7 @@ def router(watch: LatencyWatch, clock: Clock, worker: Apart) -> APIRouter:
     routes = APIRouter(
         prefix="/api/v1",
         tags=["latency"],
-        dependencies=[Depends(require("read"))],
+        dependencies=READERS,
         responses=refusals(503),
     )
 

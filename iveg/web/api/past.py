@@ -1,16 +1,11 @@
-"""The world at any recorded moment (docs/interfaces/http.md, "The past").
+"""Recordings over HTTP: the world at any moment, and files of inputs."""
 
-Recordings of what came in over HTTP (docs/interfaces/recordings.md).
-"""
+from typing import Annotated
 
-from collections.abc import Sequence
-from pathlib import Path
-from typing import Annotated, Protocol
-
-from fastapi import APIRouter, Depends, HTTPException, Query, Response
+from fastapi import APIRouter, HTTPException, Query, Response
 from fastapi.responses import FileResponse
 
-from iveg.domain.recordings import RecordingFile
+from iveg.adapters.recordings.recorder import InputRecorder
 from iveg.models.base import Listing
 from iveg.models.health import Recording
 from iveg.models.snapshot import PastWorld
@@ -18,28 +13,17 @@ from iveg.vital.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.api.history_filters import Moment
 from iveg.web.live.pictures import Past
-from iveg.web.refusals import refusals
-from iveg.web.security.requirements import require
+from iveg.web.security.requirements import READERS, refusals
 
 MEDIA_TYPE = "application/vnd.mcap"
 
 
-class Recordings(Protocol):
-    """The recordings on the disk; each question may raise HopError."""
-
-    async def files(self) -> Sequence[RecordingFile]:
-        """All of them, oldest first."""
-
-    async def finished(self, name: str) -> Path | None:
-        """The file of one that is finished."""
-
-
-def recordings_router(recordings: Recordings) -> APIRouter:
-    """Their list, and each as a file."""
+def router(recordings: InputRecorder, past: Past, clock: Clock) -> APIRouter:
+    """Recordings, each as a file; and the world of then."""
     routes = APIRouter(
         prefix="/api/v1",
         tags=["history"],
-        dependencies=[Depends(require("read"))],
+        dependencies=READERS,
         responses=refusals(503),
     )
 
@@ -61,19 +45,7 @@ def recordings_router(recordings: Recordings) -> APIRouter:
             raise HTTPException(404, "There is no such recording that is finished.")
         return FileResponse(path, media_type=MEDIA_TYPE, filename=recording_id)
 
-    return routes
-
-
-def router(past: Past, clock: Clock) -> APIRouter:
-    """The route."""
-    routes = APIRouter(
-        prefix="/api/v1",
-        tags=["history"],
-        dependencies=[Depends(require("read"))],
-        responses=refusals(404, 503),
-    )
-
-    @routes.get("/world", response_model=PastWorld)
+    @routes.get("/world", response_model=PastWorld, responses=refusals(404))
     async def world(
         at: Annotated[Moment, Query(description="Which moment (ISO-8601)")],
     ) -> Response:

@@ -1,13 +1,8 @@
-"""REST twins of live topics: robots, people, map, climate (docs/interfaces/http.md).
+"""REST twins of live topics (docs/interfaces/http.md), costmap and camera coverage.
 
-Tiles of other equipment over HTTP (docs/interfaces/http.md).
-
-The costmap over HTTP: numbers for programs and the page, a picture for people.
-
-The picture is a PNG of shades of grey, white free and black taken, with the grey that
-ROS map files use for unknown; its first line is the north.
-
-Camera coverage over HTTP: the page shades the aisles by it.
+The costmap comes as numbers for programs and the page, and as a picture for people: a
+PNG of shades of grey, white free and black taken, with the grey that ROS map files use
+for unknown; its first line is the north.
 """
 
 import asyncio
@@ -16,7 +11,7 @@ from typing import Annotated
 
 import numpy as np
 import orjson
-from fastapi import APIRouter, Depends, Query, Request, Response
+from fastapi import APIRouter, Query, Request, Response
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -43,16 +38,19 @@ from iveg.models.robot import Device, Robot
 from iveg.vital.evaluate import Evaluator
 from iveg.vital.ports import Clock
 from iveg.web.api.answers import Json
-from iveg.web.refusals import refusals
-from iveg.web.security.requirements import require
+from iveg.web.security.requirements import READERS, refusals
 from iveg.web.views import Views
+
+_PNG = "image/png"
+_UNKNOWN_GREY = 205
+_NOTHING = CostmapModel(
+    resolution=0.1, width=0, height=0, origin=Point(x=0.0, y=0.0), data=[]
+)
 
 
 def router(views: Views, clock: Clock) -> APIRouter:
     """Routes of the present state."""
-    routes = APIRouter(
-        prefix="/api/v1", tags=["live"], dependencies=[Depends(require("read"))]
-    )
+    routes = APIRouter(prefix="/api/v1", tags=["live"], dependencies=READERS)
 
     @routes.get("/robots", response_model=Listing[Robot])
     async def robots() -> Response:
@@ -94,15 +92,6 @@ def router(views: Views, clock: Clock) -> APIRouter:
         """The data path from robot to screen, hop by hop, and the counters."""
         return Json(views.health(clock()))
 
-    return routes
-
-
-def equipment_router(views: Views, clock: Clock) -> APIRouter:
-    """The route of the tiles."""
-    routes = APIRouter(
-        prefix="/api/v1", tags=["live"], dependencies=[Depends(require("read"))]
-    )
-
     @routes.get("/equipment", response_model=Listing[Tile])
     async def equipment() -> Response:
         """Tiles of other equipment, each with its newest number and state."""
@@ -111,18 +100,11 @@ def equipment_router(views: Views, clock: Clock) -> APIRouter:
     return routes
 
 
-_PNG = "image/png"
-_UNKNOWN_GREY = 205
-_NOTHING = CostmapModel(
-    resolution=0.1, width=0, height=0, origin=Point(x=0.0, y=0.0), data=[]
-)
-
-
-def costmap_router(mapper: Mapper, evaluator: Evaluator, clock: Clock) -> APIRouter:
-    """Routes of the costmap."""
-    routes = APIRouter(
-        prefix="/api/v1", tags=["live"], dependencies=[Depends(require("read"))]
-    )
+def cells_router(
+    mapper: Mapper, evaluator: Evaluator, monitor: CoverageMonitor, clock: Clock
+) -> APIRouter:
+    """Routes of cells of the map: what is taken, and what a camera saw."""
+    routes = APIRouter(prefix="/api/v1", tags=["live"], dependencies=READERS)
 
     @routes.get(
         "/costmap",
@@ -150,6 +132,24 @@ def costmap_router(mapper: Mapper, evaluator: Evaluator, clock: Clock) -> APIRou
             return Response(body, 200, headers, _PNG)
         age = mapper.age_s(robot, now)
         return Response(_json(found, age), 200, headers, "application/json")
+
+    @routes.get("/coverage", response_model=Coverage)
+    async def coverage() -> Response:
+        """When a camera last looked at each cell of the aisles; null: never.
+
+        ``share`` of the cells (0-1) was looked at within ``within_s``; null where the
+        greenhouse has no aisles.
+        """
+        now = clock()
+        share = monitor.coverage.share(now)
+        body = Coverage(
+            at=format_stamp(now.wall),
+            cameras=monitor.cameras(now),
+            within_s=RECENT_S,
+            share=None if share is None else round(share, 4),
+            lanes=_lanes(monitor, now),
+        )
+        return Json(body)
 
     return routes
 
@@ -184,33 +184,6 @@ def write_png(shades: NDArray[np.uint8]) -> bytes:
     file = BytesIO()
     Image.fromarray(shades).save(file, "png")
     return file.getvalue()
-
-
-def coverage_router(monitor: CoverageMonitor, clock: Clock) -> APIRouter:
-    """Routes of the camera coverage."""
-    routes = APIRouter(
-        prefix="/api/v1", tags=["live"], dependencies=[Depends(require("read"))]
-    )
-
-    @routes.get("/coverage", response_model=Coverage)
-    async def coverage() -> Response:
-        """When a camera last looked at each cell of the aisles; null: never.
-
-        ``share`` of the cells (0-1) was looked at within ``within_s``; null where the
-        greenhouse has no aisles.
-        """
-        now = clock()
-        share = monitor.coverage.share(now)
-        body = Coverage(
-            at=format_stamp(now.wall),
-            cameras=monitor.cameras(now),
-            within_s=RECENT_S,
-            share=None if share is None else round(share, 4),
-            lanes=_lanes(monitor, now),
-        )
-        return Json(body)
-
-    return routes
 
 
 def _lanes(monitor: CoverageMonitor, now: Instant) -> list[LaneCoverage]:

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING, Annotated, Any
 
-from fastapi import APIRouter, Depends, Response
+from fastapi import APIRouter, Response
 from pydantic import Field, create_model, field_validator
 
 from iveg.comfort.trials import Trials
@@ -17,9 +17,7 @@ from iveg.models.rule import parameter_fields
 from iveg.vital.operators import Rules
 from iveg.vital.ports import Clock
 from iveg.web.api.answers import Json
-from iveg.web.refusals import refusals
-from iveg.web.security.requirements import Operator, require
-from iveg.web.security.roles import Principal
+from iveg.web.security.requirements import READERS, Operator, refusals
 
 _MOST_ALIASES = 200
 
@@ -35,7 +33,7 @@ class _RuleChange(Body):
     """The version that the person saw: 428 without, 409 when it is in force no more."""
     aliases: Annotated[dict[str, Class], Field(max_length=_MOST_ALIASES)] | None = None
     possible_people: bool | None = None
-    """Of one version ago: looks always add up."""
+    """Kept from one version ago: looks always add up."""
 
     @field_validator("aliases")
     @classmethod
@@ -85,18 +83,20 @@ class Promotion(Body):
     version: int
 
 
-def router(rules: Rules, clock: Clock) -> APIRouter:
-    """Read by all, changed by operators; every version keeps its author and time."""
-    routes = APIRouter(prefix="/api/v1", tags=["rule"])
-    reader = [Depends(require("read"))]
+def router(rules: Rules, trials: Trials, clock: Clock) -> APIRouter:
+    """Rule and trial, read by all and changed by operators.
 
-    @routes.get("/rule", response_model=RuleModel, dependencies=reader)
+    Every version keeps its author and time; a trial acts on nothing.
+    """
+    routes = APIRouter(prefix="/api/v1", tags=["rule"])
+
+    @routes.get("/rule", response_model=RuleModel, dependencies=READERS)
     async def rule() -> Response:
         """The version in force."""
         return Json(RuleModel.of(rules.current))
 
     @routes.get(
-        "/rule/versions", response_model=Listing[RuleModel], dependencies=reader
+        "/rule/versions", response_model=Listing[RuleModel], dependencies=READERS
     )
     async def versions() -> Response:
         """Every version with its author and time, newest first."""
@@ -113,37 +113,34 @@ def router(rules: Rules, clock: Clock) -> APIRouter:
             RuleModel.of(await rules.change(wanted, who.name, clock(), body.version))
         )
 
-    return routes
-
-
-def trial_router(trials: Trials, rules: Rules, clock: Clock) -> APIRouter:
-    """The trial of a candidate: seen by all, begun, ended, promoted by operators."""
-    routes = APIRouter(
-        prefix="/api/v1/rule/trial", tags=["rule"], responses=refusals(409, 503)
-    )
-    operator = Depends(require("release"))
+    refused = refusals(409, 503)
 
     @routes.get(
-        "", response_model=Listing[TrialModel], dependencies=[Depends(require("read"))]
+        "/rule/trial",
+        response_model=Listing[TrialModel],
+        responses=refused,
+        dependencies=READERS,
     )
     async def current() -> Response:
         """The trial, if one runs: it acts on nothing."""
         trial = trials.current
         return Json(Listing(items=[TrialModel.of(trial)] if trial else []))
 
-    @routes.post("", response_model=TrialModel, status_code=201)
-    async def begin(body: RuleChange, who: Annotated[Principal, operator]) -> Response:
+    @routes.post(
+        "/rule/trial", response_model=TrialModel, status_code=201, responses=refused
+    )
+    async def begin(body: RuleChange, who: Operator) -> Response:
         """Try the rule in force with other parameters, beside it."""
         wanted = body.applied_to(rules.current)
         return Json(TrialModel.of(await trials.begin(wanted, who.name, clock())), 201)
 
-    @routes.delete("", response_model=TrialModel, dependencies=[operator])
-    async def end() -> Response:
+    @routes.delete("/rule/trial", response_model=TrialModel, responses=refused)
+    async def end(_: Operator) -> Response:
         """End the trial; the answer is how it stood."""
         return Json(TrialModel.of(await trials.end()))
 
-    @routes.post("/promote", response_model=RuleModel)
-    async def promote(body: Promotion, who: Annotated[Principal, operator]) -> Response:
+    @routes.post("/rule/trial/promote", response_model=RuleModel, responses=refused)
+    async def promote(body: Promotion, who: Operator) -> Response:
         """Put the candidate in force, with what came of the trial."""
         return Json(RuleModel.of(await trials.promote(who.name, clock(), body.version)))
 

@@ -4,25 +4,19 @@ The package checks every figure as it is made.  The browser draws it with the ba
 bundle of the same version, which lies beside the page (docs/decisions, "What each
 dependency is for").  ``meta`` names what a trace or an axis shows, and the page puts
 the words in the reader's language.
-
-Distributions of latency as curves.
-
-Traces name what they show in ``meta``; the page gives them words and colours.
-
-Plotly's script for the browser, packed and named by its content.
-
-Figures over time: speed, margin, air and other equipment.
 """
 
 import gzip
 import hashlib
 import importlib.resources
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import Any, Final
+
+import numpy as np
 
 from iveg.adapters.history.series import (
     CONFIDENCE_BINS,
@@ -39,8 +33,68 @@ from iveg.domain.transports import TRANSPORTS
 from iveg.vital.record import ODOMETRY_PERIOD_S
 
 Trace = Mapping[str, object]
+Values = Sequence[float | None]
 
 _BIN = 1.0 / CONFIDENCE_BINS
+_SILENCE_S = 5.0
+_AIR_SILENCE_S = 300.0
+_LEAST_ROOM = {"temperature": 4.0, "humidity": 20.0, "co2": 100.0}
+_STEPS: Final[tuple[Segment, ...]] = ("uplink", "fiware", "iveg", "screen")
+_MOST_POINTS: Final = 200
+_BUNDLE = "plotly-basic.min.js"
+_STYLE_ID = re.compile(rb'getElementById\("([0-9a-f]{64})"\)')
+
+
+# --- figures ----------------------------------------------------------------------
+
+
+def figure_of(
+    traces: Sequence[Trace], axes: tuple[str, str], layout: Mapping[str, object]
+) -> bytes:
+    """A figure as JSON; ``axes`` say what they show.
+
+    Checked by the package: a wrong name or value raises here, not in a browser.
+    """
+    # Half of its users never open a chart, and the package is slow to load.
+    from plotly.graph_objects import Figure
+
+    figure = Figure(data=list(traces), layout=dict(layout))
+    figure.update_layout(template="none", meta={"x": axes[0], "y": axes[1]})
+    if axes[0] == "time":
+        figure.update_xaxes(type="date")
+    return str(figure.to_json()).encode()
+
+
+def _line(name: str, x: Values, y: Values, meta: Trace, **more: object) -> Trace:
+    """A line that breaks where a value is None."""
+    return {
+        "type": "scatter",
+        "mode": "lines",
+        "name": name,
+        "meta": meta,
+        "x": x,
+        "y": y,
+        "connectgaps": False,
+        **more,
+    }
+
+
+def _times(moments: Iterable[float]) -> list[float]:
+    """Moments (Unix s) as the browser counts them (ms)."""
+    return [round(1000.0 * moment, 1) for moment in moments]
+
+
+def _broken(
+    at: Sequence[float], longest: float, values: Values
+) -> tuple[Values, Values]:
+    """Times and values of a line, with a gap where no data came for so long (s)."""
+    gaps = np.flatnonzero(np.diff(at) > longest) + 1
+    times = np.array(_times(at))
+    x = np.insert(times, gaps, times[gaps - 1]).tolist()
+    return x, np.insert(np.array(values, float), gaps, np.nan).tolist()
+
+
+# --- counts and latencies ---------------------------------------------------------
 
 
 def confidence_figure(
@@ -62,14 +116,10 @@ def confidence_figure(
     ]
     layout: dict[str, object] = {"barmode": "stack", "xaxis": {"range": [0, 1]}}
     if threshold is not None:
-        layout["shapes"] = [_mark(threshold, "threshold")]
+        ends = {"x0": threshold, "x1": threshold, "y0": 0, "y1": 1}
+        line = {"type": "line", "name": "threshold", "yref": "paper", **ends}
+        layout["shapes"] = [line]
     return figure_of(traces, ("confidence", "count"), layout)
-
-
-def _mark(value: float, name: str) -> Trace:
-    """A line over the whole height."""
-    height = {"yref": "paper", "y0": 0, "y1": 1}
-    return {"type": "line", "name": name, "x0": value, "x1": value, **height}
 
 
 def stop_figure(latencies: Sequence[CommandLatency]) -> bytes:
@@ -85,7 +135,7 @@ def stop_figure(latencies: Sequence[CommandLatency]) -> bytes:
             "mode": "markers",
             "name": kind,
             "meta": {"kind": kind},
-            "x": [milliseconds(one.requested_at) for one in latencies],
+            "x": _times(one.requested_at for one in latencies),
             "y": took,
             "text": [one.robot_id for one in latencies],
         }
@@ -95,58 +145,23 @@ def stop_figure(latencies: Sequence[CommandLatency]) -> bytes:
     return figure_of(traces, ("time", "took"), {"yaxis": {"rangemode": "tozero"}})
 
 
-def figure_of(
-    traces: Sequence[Trace], axes: tuple[str, str], layout: Mapping[str, object]
-) -> bytes:
-    """A figure as JSON; ``axes`` say what they show.
-
-    Checked by the package: a wrong name or value raises here, not in a browser.
-    """
-    # Half of its users never open a chart, and the package is slow to load.
-    from plotly.graph_objects import Figure
-
-    figure = Figure(data=list(traces), layout=dict(layout))
-    figure.update_layout(template="none", meta={"x": axes[0], "y": axes[1]})
-    if axes[0] == "time":
-        figure.update_xaxes(type="date")
-    return str(figure.to_json()).encode()
-
-
-def milliseconds(moment: float) -> float:
-    """A moment (Unix s) as the browser counts it."""
-    return round(1000.0 * moment, 1)
-
-
-_STEPS: Final[tuple[Segment, ...]] = ("uplink", "fiware", "iveg", "screen")
-_MOST_POINTS: Final = 200
-
-
 def cdf_figure(sketches: Mapping[Cell, Sketch]) -> bytes:
     """Which share of the messages took no longer than so many ms."""
     layout = {"xaxis": {"type": "log"}, "yaxis": {"range": [0, 1]}}
-    return figure_of([*_curves(sketches)], ("ms", "share"), layout)
-
-
-def _curves(sketches: Mapping[Cell, Sketch]) -> Iterator[Mapping[str, object]]:
-    for data, hop in ((data, hop) for data in DATA for hop in _STEPS):
+    curves = []
+    for data, hop in product(DATA, _STEPS):
         edges, shares = sketches[data, hop].distribution()
-        if not edges:
-            continue
-        every = max(1, len(edges) // _MOST_POINTS)
-        kept = [*range(0, len(edges) - 1, every), len(edges) - 1]
-        yield {
-            "type": "scatter",
-            "mode": "lines",
-            "name": f"{data} {hop}",
-            "meta": {"hop": hop, "data": data},
-            "x": [round(max(0.01, 1000.0 * edges[place]), 3) for place in kept],
-            "y": [round(shares[place], 4) for place in kept],
-            "line": {"shape": "hv"},
-        }
+        if edges:
+            every = max(1, len(edges) // _MOST_POINTS)
+            kept = [*range(0, len(edges) - 1, every), len(edges) - 1]
+            x = [round(max(0.01, 1000.0 * edges[place]), 3) for place in kept]
+            y = [round(shares[place], 4) for place in kept]
+            meta = {"hop": hop, "data": data}
+            curves.append(_line(f"{data} {hop}", x, y, meta, line={"shape": "hv"}))
+    return figure_of(curves, ("ms", "share"), layout)
 
 
-_BUNDLE = "plotly-basic.min.js"
-_STYLE_ID = re.compile(rb'getElementById\("([0-9a-f]{64})"\)')
+# --- plotly's script for the browser ----------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,9 +199,7 @@ def library_facts() -> dict[str, Any]:
     return {"library": f"/vendor/{found.name}", "style_ids": list(found.style_ids)}
 
 
-_SILENCE_S = 5.0
-_AIR_SILENCE_S = 300.0
-_LEAST_ROOM = {"temperature": 4.0, "humidity": 20.0, "co2": 100.0}
+# --- over time --------------------------------------------------------------------
 
 
 def speed_figure(series: Sequence[SpeedSeries], fleet: FleetDescription) -> bytes:
@@ -222,45 +235,31 @@ def _strip(n: int, of: int) -> list[float]:
 
 def _slow_downs(series: SpeedSeries, axis: str) -> Iterator[Trace]:
     """A shade for each time with a speed limit below full speed."""
-    since: float | None = None
-    for at, factor in zip(series.at, series.limit, strict=True):
-        if factor < FULL_SPEED and since is None:
-            since = at
-        elif factor >= FULL_SPEED and since is not None:
-            yield _shade(since, at, axis)
-            since = None
-    if since is not None:
-        yield _shade(since, series.at[-1], axis)
-
-
-def _shade(since: float, until: float, axis: str) -> Trace:
-    return {
-        "type": "rect",
-        "name": "slow",
-        "layer": "below",
-        "x0": milliseconds(since),
-        "x1": milliseconds(until),
-        "yref": f"{axis} domain",
-        "y0": 0,
-        "y1": 1,
-    }
+    slow = np.array(series.limit) < FULL_SPEED
+    turns = np.flatnonzero(np.diff(slow, prepend=False, append=False)).tolist()
+    times = _times([*series.at, *series.at[-1:]])
+    for since, until in zip(turns[::2], turns[1::2], strict=True):
+        yield {
+            "type": "rect",
+            "name": "slow",
+            "layer": "below",
+            "x0": times[since],
+            "x1": times[until],
+            "yref": f"{axis} domain",
+            "y0": 0,
+            "y1": 1,
+        }
 
 
 def margin_figure(series: Sequence[SpeedSeries]) -> bytes:
     """Least margin of each robot (m), as JSON; a gap where it was not known."""
-    traces = [
-        {
-            "type": "scatter",
-            "mode": "lines",
-            "name": one.robot_id,
-            "meta": {"kind": "margin", "robot": one.robot_id, "slice_s": one.slice_s},
-            "x": [milliseconds(at) for at, _ in points],
-            "y": [margin for _, margin in points],
-            "connectgaps": False,
-        }
-        for one in series
-        if (points := [*_lasting(one)])
-    ]
+    traces = []
+    for one in series:
+        points = [*_lasting(one)]
+        if points:
+            meta = {"kind": "margin", "robot": one.robot_id, "slice_s": one.slice_s}
+            x, y = _times(at for at, _ in points), [margin for _, margin in points]
+            traces.append(_line(one.robot_id, x, y, meta))
     return figure_of(traces, ("time", "margin"), {})
 
 
@@ -287,39 +286,28 @@ def climate_figures(series: ClimateSeries) -> dict[str, bytes]:
     was heard for five minutes.
     """
     humidity = [None if h is None else 100.0 * h for h in series.relative_humidity]
-    values: dict[str, Sequence[float | None]] = {
-        "temperature": series.temperature,
-        "humidity": humidity,
-        "co2": series.co2,
+    return {
+        "temperature": _climate_figure(series, "temperature", series.temperature),
+        "humidity": _climate_figure(series, "humidity", humidity),
+        "co2": _climate_figure(series, "co2", series.co2),
     }
-    return {kind: _climate_figure(series, kind, y) for kind, y in values.items()}
 
 
 def _speed_traces(series: SpeedSeries, fleet: FleetDescription) -> Iterator[Trace]:
     robot = series.robot_id
     fastest = fleet.of_robot(robot).profile.max_speed
-    at = [milliseconds(moment) for moment in series.at]
-    lines: tuple[tuple[str, Sequence[float | None], Trace], ...] = (
+    lines: tuple[tuple[str, Values, Trace], ...] = (
         ("speed", [round(v, 3) for v in series.linear], {}),
         ("mandated", [fastest * f for f in series.limit], {"shape": "hv"}),
     )
-    gaps = _gaps(series.at, max(_SILENCE_S, 3 * series.slice_s))
+    longest = max(_SILENCE_S, 3 * series.slice_s)
     for kind, values, line in lines:
-        yield {
-            "type": "scatter",
-            "mode": "lines",
-            "name": f"{robot} {kind}",
-            "meta": {"kind": kind, "robot": robot, "slice_s": series.slice_s},
-            "x": _broken(at, gaps, at),
-            "y": _broken(values, gaps, [None] * len(at)),
-            "line": line,
-            "connectgaps": False,
-        }
+        x, y = _broken(series.at, longest, values)
+        meta = {"kind": kind, "robot": robot, "slice_s": series.slice_s}
+        yield _line(f"{robot} {kind}", x, y, meta, line=line)
 
 
-def _climate_figure(
-    series: ClimateSeries, kind: str, values: Sequence[float | None]
-) -> bytes:
+def _climate_figure(series: ClimateSeries, kind: str, values: Values) -> bytes:
     heard = [value for value in values if value is not None]
     traces = [_readings(series, kind, kind, values)] if heard else []
     layout = {"showlegend": False, "yaxis": {"range": _room(heard, _LEAST_ROOM[kind])}}
@@ -333,24 +321,12 @@ def measurement_figure(series: MeasurementSeries) -> bytes:
 
 
 def _readings(
-    series: ClimateSeries | MeasurementSeries,
-    name: str,
-    kind: str,
-    values: Sequence[float | None],
+    series: ClimateSeries | MeasurementSeries, name: str, kind: str, values: Values
 ) -> Trace:
     """A line with its points, broken where nothing was heard for long."""
-    at = [milliseconds(moment) for moment in series.at]
-    gaps = _gaps(series.at, max(_AIR_SILENCE_S, 3 * series.slice_s))
-    return {
-        "type": "scatter",
-        "mode": "lines+markers",
-        "name": name,
-        "meta": {"kind": kind, "slice_s": series.slice_s},
-        "marker": {"size": 4},
-        "x": _broken(at, gaps, at),
-        "y": _broken(values, gaps, [None] * len(at)),
-        "connectgaps": False,
-    }
+    x, y = _broken(series.at, max(_AIR_SILENCE_S, 3 * series.slice_s), values)
+    meta = {"kind": kind, "slice_s": series.slice_s}
+    return _line(name, x, y, meta, mode="lines+markers", marker={"size": 4})
 
 
 def _room(values: Sequence[float], least: float) -> list[float] | None:
@@ -365,20 +341,3 @@ def _room(values: Sequence[float], least: float) -> list[float] | None:
         return None
     middle = (low + high) / 2
     return [middle - least / 2, middle + least / 2]
-
-
-def _gaps(at: Sequence[float], longest: float) -> list[int]:
-    """Places after which no data came for too long."""
-    pairs = enumerate(pairwise(at))
-    return [place for place, (one, other) in pairs if other - one > longest]
-
-
-def _broken(
-    values: Sequence[float | None], gaps: Sequence[int], fill: Sequence[float | None]
-) -> list[float | None]:
-    out: list[float | None] = []
-    start = 0
-    for gap in gaps:
-        out += [*values[start : gap + 1], fill[gap]]
-        start = gap + 1
-    return out + list(values[start:])

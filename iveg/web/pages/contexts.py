@@ -14,7 +14,7 @@ from iveg.models.day import Day
 
 Theme = Literal["auto", "light", "dark", "sunlight"]
 HUES = 10
-"""How many robots have a hue of their own."""
+"""Robots that have a hue of their own."""
 THEMES: dict[str, Theme] = {theme: theme for theme in get_args(Theme)}
 
 

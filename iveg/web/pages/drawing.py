@@ -1,12 +1,10 @@
-"""Draws pages: a context by its template, in the reader's language.
-
-Templates of the pages, in one language each, with the words that they may use.
-"""
+"""Draws pages: a context by its template, in the reader's language."""
 
 import json
-from collections.abc import Callable
-from dataclasses import asdict, replace
+from collections.abc import Callable, Mapping
+from dataclasses import asdict
 from datetime import datetime
+from functools import partial
 from importlib.resources import files
 
 from fastapi import Request, Response
@@ -31,11 +29,9 @@ from iveg.web.pages.contexts import (
 from iveg.web.pages.sentences import (
     LANGUAGES,
     Sentences,
-    Slot,
-    Translations,
     in_madrid,
     preferred_language,
-    read_translations,
+    read_sentences,
 )
 from iveg.web.problems import Problem
 from iveg.web.security.requirements import authenticator_of
@@ -53,15 +49,9 @@ def rule_parameters_text() -> str:
     return json.dumps([{key: getattr(one, key) for key in keys} for one in PARAMETERS])
 
 
-def _clock(stamp: str) -> str:
-    """Time of day in Madrid of an ISO-8601 stamp."""
-    return f"{in_madrid(datetime.fromisoformat(stamp).timestamp()):%H:%M:%S}"
-
-
-def _wall(stamp: str) -> str:
-    """Day and time in Madrid of an ISO-8601 stamp, as a form has them."""
-    at = datetime.fromisoformat(stamp).timestamp()
-    return in_madrid(at).isoformat(" ", "seconds")
+def _local(stamp: str, form: str) -> str:
+    """An ISO-8601 stamp in Madrid."""
+    return f"{in_madrid(datetime.fromisoformat(stamp).timestamp()):{form}}"
 
 
 def _before(stamp: str) -> str:
@@ -70,8 +60,34 @@ def _before(stamp: str) -> str:
     return f"/?t={format_stamp(at - 10.0)}"
 
 
-def environment_of(translations: Translations) -> Environment:
+def environment_of(texts: Sentences) -> Environment:
     """Templates that speak one language."""
+
+    def tell(key: str, **slots: object) -> str:
+        return texts.say(key, slots)
+
+    def slots_of(slots: Mapping[str, object]) -> Markup:
+        if not slots:
+            return Markup()
+        return Markup(' data-slots="{}"').format(json.dumps(slots))
+
+    def say(key: str, **slots: object) -> Markup:
+        return Markup('<span data-i18n="{}"{}>{}</span>').format(
+            key, slots_of(slots), texts.say(key, slots)
+        )
+
+    def label(attribute: str, key: str, **slots: object) -> Markup:
+        return Markup('{}="{}" data-i18n-{}="{}"{}').format(
+            attribute, texts.say(key, slots), attribute, key, slots_of(slots)
+        )
+
+    def greenhouse(name: str) -> str:
+        return texts.sentences.get(f"greenhouse.{name}", name)
+
+    def say_house(name: str) -> Markup:
+        key = f"greenhouse.{name}"
+        return say(key) if key in texts.sentences else escape(name)
+
     environment = Environment(
         loader=FileSystemLoader(str(files("iveg") / "templates")),
         autoescape=True,
@@ -79,38 +95,19 @@ def environment_of(translations: Translations) -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-
-    environment.filters["clock"] = _clock
-    environment.filters["wall"] = _wall
-    environment.filters["before"] = _before
-    environment.filters["lane"] = Sentences(translations).lane
-
-    def say(key: str, **slots: Slot) -> Markup:
-        data = Markup(' data-slots="{}"').format(json.dumps(slots)) if slots else ""
-        return Markup('<span data-i18n="{}"{}>{}</span>').format(
-            key, data, translations.say(key, **slots)
-        )
-
-    def label(attribute: str, key: str, **slots: Slot) -> Markup:
-        data = Markup(' data-slots="{}"').format(json.dumps(slots)) if slots else ""
-        return Markup('{}="{}" data-i18n-{}="{}"{}').format(
-            attribute, translations.say(key, **slots), attribute, key, data
-        )
-
-    def greenhouse(name: str) -> str:
-        return translations.sentences.get(f"greenhouse.{name}", name)
-
-    def say_house(name: str) -> Markup:
-        key = f"greenhouse.{name}"
-        return say(key) if key in translations.sentences else escape(name)
-
+    environment.filters.update(
+        clock=partial(_local, form="%H:%M:%S"),
+        wall=partial(_local, form="%Y-%m-%d %H:%M:%S"),
+        before=_before,
+        lane=texts.lane,
+    )
     environment.globals.update(
         greenhouse=greenhouse,
         say_house=say_house,
-        t=translations.say,
+        t=tell,
         say=say,
         label=label,
-        has=translations.sentences.__contains__,
+        has=texts.sentences.__contains__,
         limits=LIMITS,
         limits_text=limits_text(),
         rule_parameters=PARAMETERS,
@@ -131,28 +128,25 @@ class Pages:
         is_ready: Whether somebody can see to who comes in; each page says where not.
     """
 
-    def __init__(self, site: Site, is_ready: Callable[[], bool] = lambda: True) -> None:
+    def __init__(self, site: Site, is_ready: Callable[[], bool]) -> None:
         self._site = site
         self._is_ready = is_ready
         self._environments = {
-            language: environment_of(read_translations(language))
-            for language in LANGUAGES
+            language: environment_of(read_sentences(language)) for language in LANGUAGES
         }
 
     def frame(
         self, request: Request, route: str, visitor: Principal | None = None
     ) -> PageFrame:
         """The frame around a page for this reader."""
-        frame = PageFrame(
-            self._site, appearance_of(request), route, unready=not self._is_ready()
-        )
-        if visitor is None:
-            return frame
-        return replace(
-            frame,
-            name=visitor.name,
-            role=visitor.role,
-            account=visitor.has_account,
+        return PageFrame(
+            self._site,
+            appearance_of(request),
+            route,
+            visitor.name if visitor else None,
+            visitor.role if visitor else None,
+            account=visitor is not None and visitor.has_account,
+            unready=not self._is_ready(),
         )
 
     def draw(self, page: Page, status: int = 200) -> HTMLResponse:
@@ -194,12 +188,9 @@ class Pages:
         failure: str = "",
     ) -> Response:
         """The sign-in page; ``failure`` is the identity provider's."""
-        address, frame = (
-            str(request.base_url).rstrip("/"),
-            self.frame(request, "signin"),
-        )
-        page = SignInPage(frame, address, wrong, LEAST, failure)
-        return self.draw(page, status)
+        address = str(request.base_url).rstrip("/")
+        frame = self.frame(request, "signin")
+        return self.draw(SignInPage(frame, address, wrong, LEAST, failure), status)
 
 
 def appearance_of(request: Request) -> Appearance:

@@ -20,7 +20,7 @@ from iveg.web.pages.sentences import (
     Sentences,
     in_madrid,
     local_stamp,
-    read_translations,
+    read_sentences,
 )
 
 
@@ -47,7 +47,7 @@ def write_report(
     ``rows`` are decisions, commands, alerts and log; ``said`` is what the pack
     is about, as its manifest has it.
     """
-    sentences = Sentences(read_translations(language))
+    sentences = read_sentences(language)
     lines = sorted(_lines(rows, sentences), key=lambda one: one.at)
     html = _template().render(
         language=language,

@@ -1,52 +1,57 @@
-"""Addresses of the HTML pages: each is one context that ``Pages`` draws.
-
-The service worker at the root, where its scope is every page.
-"""
+"""Addresses of the HTML pages and of sign-in; each page is one context to draw."""
 
 from collections.abc import Callable
 from importlib.resources import files
 from typing import Annotated, Final
 
-from fastapi import APIRouter, Depends, Path, Request, Response
-from fastapi.responses import FileResponse, HTMLResponse, RedirectResponse
+from fastapi import APIRouter, Depends, Path, Query, Request, Response
+from fastapi.responses import (
+    FileResponse,
+    HTMLResponse,
+    JSONResponse,
+    RedirectResponse,
+)
+from pydantic import Field
 
-from iveg.adapters.passwords import LEAST
+from iveg.adapters.passwords import LEAST, MOST
 from iveg.domain.detection_rule import DetectionRule
-from iveg.web.pages.contexts import AboutPage, AccountPage, Page, RecordPage
+from iveg.domain.errors import SignOnError
+from iveg.models.base import Body
+from iveg.web.pages.contexts import (
+    AboutPage,
+    AccountPage,
+    EnteredPage,
+    Page,
+    RecordPage,
+)
 from iveg.web.pages.drawing import Pages
-from iveg.web.pages.signing import add_signing
-from iveg.web.security.requirements import Reader, require
+from iveg.web.security.requirements import (
+    READERS,
+    STRANGERS,
+    Reader,
+    authenticator_of,
+    require,
+)
 from iveg.web.security.roles import Action, Principal
-from iveg.web.security.single_sign_on import SingleSignOn
+from iveg.web.security.single_sign_on import CALLBACK, SingleSignOn
 
-
-def service_worker_router() -> APIRouter:
-    """One file, without anything that strangers may not see."""
-    routes = APIRouter(include_in_schema=False)
-
-    @routes.get("/sw.js", dependencies=[Depends(require("open"))])
-    async def worker() -> FileResponse:
-        """Never from a cache: a change must reach every device."""
-        file = str(files("iveg") / "static" / "sw.js")
-        headers = {"Cache-Control": "no-cache"}
-        return FileResponse(file, headers=headers, media_type="text/javascript")
-
-    return routes
-
-
-_RECORD_ID = Annotated[str, Path(pattern=r"^[ -~]{1,64}$")]
-_SCRIPTED: Final = {
-    "live": "/",
-    "alerts": "/alerts",
-    "climate": "/climate",
-    "commands": "/commands",
-    "decisions": "/decisions",
-    "fleet": "/fleet",
-    "history": "/history",
-    "latency": "/latency",
-    "settings": "/settings",
+_RecordId = Annotated[str, Path(pattern=r"^[ -~]{1,64}$")]
+_SCRIPTED: Final[dict[Action, dict[str, str]]] = {
+    "read": {
+        "live": "/",
+        "alerts": "/alerts",
+        "climate": "/climate",
+        "commands": "/commands",
+        "decisions": "/decisions",
+        "fleet": "/fleet",
+        "history": "/history",
+        "latency": "/latency",
+        "settings": "/settings",
+    },
+    "release": {"audit": "/audit"},
+    "admin": {"users": "/users", "tokens": "/tokens", "sessions": "/sessions"},
 }
-"""Pages that scripts fill, and their addresses."""
+"""Pages that scripts fill, and their addresses, by what they ask for."""
 _MOVED: Final = {
     "/compare": "/day",
     "/docs": "/openapi.json",
@@ -54,6 +59,20 @@ _MOVED: Final = {
     "/what-if": "/settings",
 }
 """Addresses of pages that are gone, and where their readers are sent."""
+
+
+def service_worker_router() -> APIRouter:
+    """One file at the root, where its scope is every page; nothing secret is in it."""
+    routes = APIRouter(include_in_schema=False)
+
+    @routes.get("/sw.js", dependencies=STRANGERS)
+    async def worker() -> FileResponse:
+        """Never from a cache: a change must reach every device."""
+        file = str(files("iveg") / "static" / "sw.js")
+        headers = {"Cache-Control": "no-cache"}
+        return FileResponse(file, headers=headers, media_type="text/javascript")
+
+    return routes
 
 
 def router(
@@ -67,49 +86,39 @@ def router(
     Args:
         pages: What draws them.
         rule: The version in force.
-        sign_on: Signs people out at the identity provider, too; None: there is none.
+        sign_on: Signs people in and out at the identity provider; None: there is none.
     """
     routes = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
-    for route, path in _SCRIPTED.items():
-        add_scripted(routes, pages, route, path)
+    for needs, paths in _SCRIPTED.items():
+        for route, path in paths.items():
+            _add_scripted(routes, pages, route, path, needs)
     for old, new in _MOVED.items():
         _add_moved(routes, old, new)
-    add_scripted(routes, pages, "audit", "/audit", "release")
-    for route in ("users", "tokens", "sessions"):
-        add_scripted(routes, pages, route, f"/{route}", "admin")
 
     @routes.get("/account", response_model=None)
     async def account(request: Request, visitor: Reader) -> Response:
         return pages.draw(AccountPage(pages.frame(request, "account", visitor), LEAST))
 
-    @routes.get("/decisions/{decision_id}", response_model=None)
-    async def decision(
-        request: Request,
-        visitor: Reader,
-        decision_id: _RECORD_ID,
+    @routes.get("/decisions/{record_id}", name="decision", response_model=None)
+    @routes.get("/commands/{record_id}", name="command", response_model=None)
+    async def record(
+        request: Request, visitor: Reader, record_id: _RecordId
     ) -> Response:
-        frame = pages.frame(request, "decision", visitor)
-        return pages.draw(RecordPage(frame, decision_id))
-
-    @routes.get("/commands/{command_id}", response_model=None)
-    async def command(
-        request: Request,
-        visitor: Reader,
-        command_id: _RECORD_ID,
-    ) -> Response:
-        frame = pages.frame(request, "command", visitor)
-        return pages.draw(RecordPage(frame, command_id))
+        frame = pages.frame(request, request.scope["route"].name, visitor)
+        return pages.draw(RecordPage(frame, record_id))
 
     @routes.get("/about", response_model=None)
     async def about(request: Request, visitor: Reader) -> Response:
         return pages.draw(AboutPage(pages.frame(request, "about", visitor), rule()))
 
-    add_signing(routes, pages, sign_on)
+    _add_signing(routes, pages, sign_on)
+    if sign_on is not None:
+        _add_single_sign_on(routes, pages, sign_on)
     return routes
 
 
-def add_scripted(
-    routes: APIRouter, pages: Pages, route: str, path: str, needs: Action = "read"
+def _add_scripted(
+    routes: APIRouter, pages: Pages, route: str, path: str, needs: Action
 ) -> None:
     """Add a page that its script fills; ``route`` names template and script."""
 
@@ -123,6 +132,104 @@ def add_scripted(
 def _add_moved(routes: APIRouter, old: str, new: str) -> None:
     """Lead the address of a page that is gone to the page that took its place."""
 
-    @routes.get(old, dependencies=[Depends(require("read"))], response_model=None)
+    @routes.get(old, dependencies=READERS, response_model=None)
     async def moved() -> Response:
         return RedirectResponse(new, 308)
+
+
+# --- people come in and go --------------------------------------------------------
+
+_STATUS: Final = {"unreachable": 503, "busy": 429, "outdated": 400}
+
+
+class _ByLink(Body):
+    """The token behind the ``#`` of the link."""
+
+    token: str = Field(max_length=256)
+
+
+class _ByPassword(Body):
+    """Name and password of an account."""
+
+    name: str = Field(max_length=256)
+    password: str = Field(max_length=MOST)
+
+
+class _ByInvitation(Body):
+    """An invitation, and the password that is to be."""
+
+    invitation: str = Field(max_length=256)
+    password: str = Field(min_length=LEAST, max_length=MOST)
+
+
+def _add_signing(routes: APIRouter, pages: Pages, sign_on: SingleSignOn | None) -> None:
+    """Add the routes of sign-in, sign-out and of a screen on a wall."""
+
+    @routes.get("/signin", response_model=None, dependencies=STRANGERS)
+    async def signin(request: Request) -> Response:
+        return pages.sign_in(request)
+
+    @routes.post("/signin", response_model=None, dependencies=STRANGERS)
+    async def sign_in(
+        request: Request, body: _ByLink | _ByPassword | _ByInvitation
+    ) -> Response:
+        authenticator = authenticator_of(request)
+        match body:
+            case _ByLink():
+                return authenticator.sign_in(request, body.token)
+            case _ByPassword():
+                return await authenticator.sign_in_by_password(
+                    request, body.name, body.password
+                )
+        return await authenticator.accept(request, body.invitation, body.password)
+
+    # Whose session is past its age can end it, too.
+    @routes.post(
+        "/signout", response_model=None, dependencies=[Depends(require("stop"))]
+    )
+    async def sign_out(request: Request) -> Response:
+        authenticator = authenticator_of(request)
+        who = authenticator.identify(request)
+        # Here before anywhere else.
+        gone = authenticator.sign_out(request)
+        if sign_on is None or who is None:
+            return gone
+        onward = await sign_on.sign_out_address(request, who)
+        if onward is None:
+            return gone
+        cookie = gone.headers["set-cookie"]
+        return JSONResponse({"next": onward}, headers={"Set-Cookie": cookie})
+
+    @routes.post("/wall", status_code=204)
+    async def wall(request: Request, visitor: Reader) -> None:
+        # A screen on a wall is everybody's: it looks and stops, and frees nothing.
+        authenticator_of(request).sessions.lower(visitor)
+
+
+def _add_single_sign_on(routes: APIRouter, pages: Pages, sign_on: SingleSignOn) -> None:
+    """Add the way to the identity provider and back, as a person's browser goes it."""
+
+    def refused(request: Request, error: SignOnError) -> Response:
+        status = _STATUS.get(error.failure, 403)
+        return pages.sign_in(request, status, failure=error.failure)
+
+    @routes.get("/signin/sso", response_model=None, dependencies=STRANGERS)
+    async def begin(
+        request: Request, to: Annotated[str, Query(max_length=512)] = "/"
+    ) -> Response:
+        try:
+            return await sign_on.begin(request, to)
+        except SignOnError as error:
+            return refused(request, error)
+
+    @routes.get(CALLBACK, response_model=None, dependencies=STRANGERS)
+    async def finish(request: Request) -> Response:
+        try:
+            token, to = await sign_on.finish(request)
+        except SignOnError as error:
+            return refused(request, error)
+        page = EnteredPage(pages.frame(request, "entered"), to)
+        response = pages.draw(page)
+        # A redirect would still be the provider's, and leave the Strict cookie behind.
+        response.headers["Refresh"] = f"0; url={to}"
+        return authenticator_of(request).admit(request, token, response)

@@ -1,20 +1,9 @@
-"""Sentences for files and paper, as the page writes them: templates, slots, formats.
-
-The formats are those of ``static/js/core/messages.js``; a missing template shows its
-key, so that a row of an older version is never lost.
-
-The greenhouse's clock: Europe/Madrid on paper and screen, UTC in data.
-
-Central European time with the summer time of Directive 2000/84/EC, so that no table of
-time zones must be installed.
-
-Texts of the page on the server: the same templates that the browser reads.
+"""Texts and clock of the greenhouse on the server, as the page has them.
 
 ``iveg/static/i18n/{es,en}.json`` hold nested blocks; a key such as ``nav.live`` walks
-down them.  Holes are ``{name}``, ``{name:2}`` (decimals), ``{name:percent}`` and
-``{name:who}``; the browser knows further formats, for values that only it ever shows.
-
-Messages to people elsewhere, in words.
+down them.  Holes are ``{name}`` or ``{name:format}``; formats are those of
+``static/js/core/messages.js``.  Paper and screen show Central European time, with the
+summer time of Directive 2000/84/EC, so that no table of time zones must be installed.
 """
 
 import json
@@ -64,61 +53,6 @@ LANGUAGES = ("es", "en")
 
 HOLE: Final = re.compile(r"\{(\w+)(?::(\w+))?\}")
 
-Slot = str | int | float
-
-
-@dataclass(frozen=True, slots=True)
-class Translations:
-    """All sentences of one language, by key."""
-
-    language: str
-    sentences: Mapping[str, str]
-
-    def say(self, key: str, **slots: Slot) -> str:
-        """The sentence with its holes filled.
-
-        Raises:
-            KeyError: no such sentence; a template of ours is wrong.
-        """
-
-        def fill(hole: re.Match[str]) -> str:
-            return self._write(slots[hole[1]], hole[2])
-
-        return HOLE.sub(fill, self.sentences[key])
-
-    def _write(self, value: Slot, form: str | None) -> str:
-        if form == "who":
-            return self.sentences.get(f"who.{value}", str(value))
-        if isinstance(value, str) or form is None:
-            return str(value)
-        if form == "percent":
-            return self.percent(value)
-        return self.decimal(f"{value:.{int(form)}f}")
-
-    def percent(self, share: float) -> str:
-        """A share as browsers write it: Spanish keeps the sign on the number's line."""
-        sign = "\u00a0%" if self.language == "es" else "%"
-        return f"{100 * share:.0f}{sign}"
-
-    def decimal(self, number: str) -> str:
-        """A number with the decimal sign of the language."""
-        return number.replace(".", ",") if self.language == "es" else number
-
-
-def read_translations(language: str) -> Translations:
-    """Read the sentences of one of ``LANGUAGES`` from the package."""
-    file = files("iveg") / "static" / "i18n" / f"{language}.json"
-    blocks = json.loads(file.read_text(encoding="utf-8"))
-    return Translations(language, dict(_flatten(blocks)))
-
-
-def _flatten(blocks: Mapping[str, object], path: str = "") -> Iterator[tuple[str, str]]:
-    for name, value in blocks.items():
-        if isinstance(value, Mapping):
-            yield from _flatten(value, f"{path}{name}.")
-        else:
-            yield f"{path}{name}", str(value)
-
 
 def preferred_language(accept: str) -> str:
     """The first of ``LANGUAGES`` in an ``Accept-Language`` header, else Spanish.
@@ -157,20 +91,35 @@ _LANES: Final = (
 Slots = Mapping[str, object]
 
 
+@dataclass(frozen=True, slots=True)
 class Sentences:
-    """Writes events as sentences in one language."""
+    """All sentences of one language, by key."""
 
-    def __init__(self, translations: Translations) -> None:
-        self.translations = translations
+    language: str
+    sentences: Mapping[str, str]
 
     def say(self, key: str, slots: Slots) -> str:
-        """A sentence with its holes filled."""
-        template = self._find(key)
-        if template is None:
-            return key
-        return HOLE.sub(
-            lambda hole: self._write(slots.get(hole[1]), hole[2], slots), template
-        ).strip()
+        """A sentence with its holes filled.
+
+        A missing one is its key, so that a row of an older version is never lost.
+        """
+        head = key.rpartition(".")[0]
+        for one in (key, f"{head}.default", f"{key}.default"):
+            if one in self.sentences:
+                return HOLE.sub(
+                    lambda hole: self._write(slots.get(hole[1]), hole[2], slots),
+                    self.sentences[one],
+                ).strip()
+        return key
+
+    def percent(self, share: float) -> str:
+        """A share as browsers write it: Spanish keeps the sign on the number's line."""
+        sign = "\u00a0%" if self.language == "es" else "%"
+        return f"{100 * share:.0f}{sign}"
+
+    def decimal(self, number: str) -> str:
+        """A number with the decimal sign of the language."""
+        return number.replace(".", ",") if self.language == "es" else number
 
     def lane(self, label: str) -> str:
         """An aisle in the reader's words; a name that a grower gave stays."""
@@ -179,13 +128,6 @@ class Sentences:
             if found:
                 return self.say(key, {"n": "".join(found.groups())})
         return label
-
-    def _find(self, key: str) -> str | None:
-        sentences, head = self.translations.sentences, key.rpartition(".")[0]
-        for one in (key, f"{head}.default", f"{key}.default"):
-            if one in sentences:
-                return sentences[one]
-        return None
 
     def _write(self, value: object, form: str | None, slots: Slots) -> str:
         if value is None or value == "":
@@ -196,30 +138,30 @@ class Sentences:
             return self._person(str(value))
         if form == "own":
             # What the grower calls it in this language, as the equipment's file says.
-            return str(slots.get(f"tile_{self.translations.language}", value))
+            return str(slots.get(f"tile_{self.language}", value))
         if form == "lane":
             return self.lane(str(value))
         if form in _NAMED:
             key = f"{_NAMED[form]}.{value}"
-            return self.translations.sentences.get(key, str(value))
+            return self.sentences.get(key, str(value))
         if isinstance(value, bool) or not isinstance(value, int | float):
             return str(value)
         return self._measure(float(value), form)
 
     def _measure(self, value: float, form: str | None) -> str:
         if form == "percent":
-            return self.translations.percent(value)
+            return self.percent(value)
         if form == "time":
             return f"{in_madrid(value):%H:%M:%S}"
         decimals = int(form) if form and form.isdigit() else 3
-        text = self.translations.decimal(f"{value:.{decimals}f}")
+        text = self.decimal(f"{value:.{decimals}f}")
         return text if form else _trimmed(text)
 
     def _person(self, track: str) -> str:
         found = _TRACK.fullmatch(track)
         if found:
             return self.say(f"class.track.{found[1]}", {"n": found[2]})
-        return self.translations.sentences.get(f"class.{track}", track)
+        return self.sentences.get(f"class.{track}", track)
 
     def _sentence(self, value: object, slots: Slots) -> str:
         if isinstance(value, Mapping):
@@ -233,9 +175,24 @@ def _trimmed(text: str) -> str:
     return text.rstrip("0").rstrip(".,") if "." in text or "," in text else text
 
 
+def read_sentences(language: str) -> Sentences:
+    """Read the sentences of one of ``LANGUAGES`` from the package."""
+    file = files("iveg") / "static" / "i18n" / f"{language}.json"
+    blocks = json.loads(file.read_text(encoding="utf-8"))
+    return Sentences(language, dict(_flatten(blocks)))
+
+
+def _flatten(blocks: Mapping[str, object], path: str = "") -> Iterator[tuple[str, str]]:
+    for name, value in blocks.items():
+        if isinstance(value, Mapping):
+            yield from _flatten(value, f"{path}{name}.")
+        else:
+            yield f"{path}{name}", str(value)
+
+
 def writer(language: Language) -> Write:
     """Writes messages in words: priority and time, but no place and no person."""
-    said = Sentences(read_translations(language))
+    said = read_sentences(language)
 
     def write(items: Sequence[AlertItem], is_escalated: bool) -> MessageText:
         slots = {

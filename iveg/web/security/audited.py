@@ -1,6 +1,4 @@
-"""Reads requests and their answers for the audit, as ``audited_routes`` says.
-
-Which requests the audit keeps, and what of each (SECURITY.md, "Audit").
+"""Requests that change or export something, and their answers, read for the audit.
 
 Every route that changes something has a row here; a test walks the routes.  Of a body
 only the named keys are kept: the rest may be a password, or long.
@@ -26,111 +24,80 @@ from iveg.web.security.roles import Principal
 
 @dataclass(frozen=True, slots=True)
 class Audited:
-    """What is kept of one route.
+    """Parts of a route that are kept, beside the parameter of its path.
 
     Attributes:
         action: Its word in the audit; empty: the route writes its rows itself.
-        subject: The parameter of the path that names what it was done to.
         asked: Keys of the body that are kept; ``answered`` of the answer.
         by_store: A change and its row are one transaction of the store; here only what
             was refused is written.
     """
 
     action: str
-    subject: str = ""
     asked: tuple[str, ...] = ()
     answered: tuple[str, ...] = ()
     by_store: bool = False
 
 
-_COMMAND: Final = ("command_id",)
-_RULE: Final = (*by_keys(Parameters()), "aliases")
-_API: Final = "/api/v1"
-AUDITED: Final[Mapping[tuple[str, str], Audited]] = {
-    ("POST", f"{_API}/robots/{{robot_id}}/stop"): Audited(
-        "stop", "robot_id", ("press_id", "pressed_at"), _COMMAND
+def _row(
+    route: str,
+    action: str,
+    asked: str = "",
+    answered: str = "",
+    *,
+    by_store: bool = False,
+) -> tuple[tuple[str, str], Audited]:
+    method, path = route.split()
+    names, told = tuple(asked.split()), tuple(answered.split())
+    return (method, path), Audited(action, names, told, by_store)
+
+
+_PRESS: Final = "press_id pressed_at"
+_RULE: Final = " ".join((*by_keys(Parameters()), "aliases"))
+_ROWS: Final = (
+    _row("POST /api/v1/robots/{robot_id}/stop", "stop", _PRESS, "command_id"),
+    _row("POST /api/v1/fleet/stop", "stop", _PRESS, "commands"),
+    _row("POST /api/v1/robots/{robot_id}/release", "release", "holds", "command_id"),
+    _row("POST /api/v1/robots/{robot_id}/resume", "resume", "", "command_id"),
+    _row("POST /api/v1/robots/{robot_id}/goal", "goal", "kind x y aisle", "goal_id"),
+    _row("DELETE /api/v1/robots/{robot_id}/goal", "cancel_goal", "", "goal_id"),
+    _row("PUT /api/v1/robots/{robot_id}/detector", "detector", "in_service reason"),
+    _row("PUT /api/v1/words", "word", "detector word is_person"),
+    _row(
+        "POST /api/v1/alerts/{alert_id}/acknowledge",
+        "acknowledge",
+        "note",
+        "key robot_id",
     ),
-    ("POST", f"{_API}/fleet/stop"): Audited(
-        "stop", asked=("press_id", "pressed_at"), answered=("commands",)
-    ),
-    ("POST", f"{_API}/robots/{{robot_id}}/release"): Audited(
-        "release", "robot_id", ("holds",), _COMMAND
-    ),
-    ("POST", f"{_API}/robots/{{robot_id}}/resume"): Audited(
-        "resume", "robot_id", answered=_COMMAND
-    ),
-    ("POST", f"{_API}/robots/{{robot_id}}/goal"): Audited(
-        "goal", "robot_id", ("kind", "x", "y", "aisle"), ("goal_id",)
-    ),
-    ("DELETE", f"{_API}/robots/{{robot_id}}/goal"): Audited(
-        "cancel_goal", "robot_id", answered=("goal_id",)
-    ),
-    ("PUT", f"{_API}/robots/{{robot_id}}/detector"): Audited(
-        "detector", "robot_id", ("in_service", "reason")
-    ),
-    ("PUT", f"{_API}/words"): Audited("word", asked=("detector", "word", "is_person")),
-    ("POST", f"{_API}/alerts/{{alert_id}}/acknowledge"): Audited(
-        "acknowledge", "alert_id", ("note",), ("key", "robot_id")
-    ),
-    ("POST", f"{_API}/alerts/acknowledge"): Audited(
-        "acknowledge", asked=("alert_ids", "note"), answered=("left",)
-    ),
-    ("PUT", f"{_API}/rule"): Audited(
-        "rule",
-        asked=("version", *_RULE),
-        answered=("version",),
-    ),
-    ("POST", f"{_API}/rule/trial"): Audited("trial", asked=_RULE),
-    ("DELETE", f"{_API}/rule/trial"): Audited("trial_ended"),
-    ("POST", f"{_API}/rule/trial/promote"): Audited(
-        "trial_promoted", asked=("version",), answered=("version",)
-    ),
-    ("POST", f"{_API}/notes"): Audited(
-        "note", asked=("text", "at", "x", "y", "robot_id", "decision_id")
-    ),
-    ("POST", f"{_API}/things"): Audited("mark_thing", "", ("person_id",), ("id",)),
-    ("DELETE", f"{_API}/things/{{thing_id}}"): Audited("unmark_thing", "thing_id"),
-    ("POST", f"{_API}/users"): Audited(
-        "account_added", asked=("name", "role", "days"), by_store=True
-    ),
-    ("PUT", f"{_API}/users/{{user_id}}/role"): Audited(
-        "account_role", "user_id", ("role",), by_store=True
-    ),
-    ("POST", f"{_API}/users/{{user_id}}/reset"): Audited(
-        "account_reset", "user_id", by_store=True
-    ),
-    ("POST", f"{_API}/users/{{user_id}}/disable"): Audited(
-        "account_disabled", "user_id", by_store=True
-    ),
-    ("PUT", f"{_API}/account/password"): Audited("password_changed", by_store=True),
-    ("PUT", f"{_API}/account/language"): Audited("language", asked=("language",)),
-    ("POST", f"{_API}/tokens"): Audited(
-        "token_added", asked=("name", "scope", "days"), by_store=True
-    ),
-    ("DELETE", f"{_API}/tokens/{{token_id}}"): Audited(
-        "token_revoked", "token_id", by_store=True
-    ),
-    **{
-        ("DELETE", f"{_API}{place}/sessions/{{session_id}}"): Audited(
-            "session_ended", "session_id", answered=("name",)
-        )
-        for place in ("", "/account")
-    },
-    **{
-        ("DELETE", f"{_API}{place}/sessions"): Audited(
-            "sessions_ended", answered=("ended",)
-        )
-        for place in ("", "/account")
-    },
-    ("POST", "/signin"): Audited(""),
-    ("POST", "/signout"): Audited("sign_out"),
-    ("POST", "/wall"): Audited("wall"),
-}
+    _row("POST /api/v1/alerts/acknowledge", "acknowledge", "alert_ids note", "left"),
+    _row("PUT /api/v1/rule", "rule", f"version {_RULE}", "version"),
+    _row("POST /api/v1/rule/trial", "trial", _RULE),
+    _row("DELETE /api/v1/rule/trial", "trial_ended"),
+    _row("POST /api/v1/rule/trial/promote", "trial_promoted", "version", "version"),
+    _row("POST /api/v1/notes", "note", "text at x y robot_id decision_id"),
+    _row("POST /api/v1/things", "mark_thing", "person_id", "id"),
+    _row("DELETE /api/v1/things/{thing_id}", "unmark_thing"),
+    _row("POST /api/v1/users", "account_added", "name role days", by_store=True),
+    _row("PUT /api/v1/users/{user_id}/role", "account_role", "role", by_store=True),
+    _row("POST /api/v1/users/{user_id}/reset", "account_reset", by_store=True),
+    _row("POST /api/v1/users/{user_id}/disable", "account_disabled", by_store=True),
+    _row("PUT /api/v1/account/password", "password_changed", by_store=True),
+    _row("PUT /api/v1/account/language", "language", "language"),
+    _row("POST /api/v1/tokens", "token_added", "name scope days", by_store=True),
+    _row("DELETE /api/v1/tokens/{token_id}", "token_revoked", by_store=True),
+    _row("DELETE /api/v1/sessions/{session_id}", "session_ended", "", "name"),
+    _row("DELETE /api/v1/account/sessions/{session_id}", "session_ended", "", "name"),
+    _row("DELETE /api/v1/sessions", "sessions_ended", "", "ended"),
+    _row("DELETE /api/v1/account/sessions", "sessions_ended", "", "ended"),
+    _row("POST /signin", ""),
+    _row("POST /signout", "sign_out"),
+    _row("POST /wall", "wall"),
+)
+AUDITED: Final[Mapping[tuple[str, str], Audited]] = dict(_ROWS)
 """Method and path of a route → what is kept."""
 
-
 _MOST_BYTES: Final = 16 * 1024
-"""Of a body that is read; a longer one leaves its row without it."""
+"""Largest body that is read; a longer one leaves its row without it."""
 _FILES: Final = frozenset(
     {"text/csv", "application/x-ndjson", "application/zip", "application/vnd.mcap"}
 )
@@ -218,7 +185,7 @@ class AuditRequests:
         # What was seen stays beside what came of it.
         seen = {f"{name}_seen": asked[name] for name in asked.keys() & answered.keys()}
         details = {"status": status, **asked, **answered, **seen}
-        subject = clean_text(str(scope["path_params"].get(kept.subject, "")))
+        subject = clean_text("".join(map(str, scope["path_params"].values())))
         self._trail.note(who, kept.action, subject, details, at=self._clock())
 
 

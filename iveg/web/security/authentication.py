@@ -1,7 +1,7 @@
-"""Authentication and authorisation of people, programs and Orion.
+"""Authentication and authorisation of people and programs.
 
-People come with a session cookie, programs with a bearer token, Orion with a shared
-secret.  What a route asks of them is in ``requirements``::
+People come with a session cookie, programs with a bearer token.  What a route asks of
+them is in ``requirements``::
 
     link with token ──> session cookie ──> operator: read, stop, release, by name
     bearer token ─────────────────────────> program:  read, stop
@@ -12,22 +12,30 @@ STOP outlives the session (SECURITY.md): a person who was signed in once can sti
 
 import logging
 from collections.abc import Awaitable, Callable
+from dataclasses import dataclass, field
+from functools import partial
+from urllib.parse import parse_qs, urlsplit
 
-from starlette.exceptions import WebSocketException
+from starlette.exceptions import HTTPException, WebSocketException
 from starlette.requests import HTTPConnection, Request
 from starlette.responses import RedirectResponse, Response
+from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
-from iveg.domain.accounts import DEFAULT_NAME, AccessBook, Account, name_key
+from iveg.domain.accounts import DEFAULT_NAME, Account, name_key
 from iveg.domain.errors import NotAllowedError
 from iveg.vital.audit import AuditTrail
-from iveg.vital.ports import Clock
 from iveg.web.cookies import keep_language, session_cookie
-from iveg.web.problems import NotSignedInError, Problem
+from iveg.web.problems import (
+    ForeignOriginError,
+    NotJsonError,
+    NotSignedInError,
+    Problem,
+    problem_of,
+)
 from iveg.web.security.attempts import Attempts
 from iveg.web.security.audited import READING
-from iveg.web.security.csrf import is_own, refuse_forgery, refuse_other_bodies
-from iveg.web.security.people import People, Programs
+from iveg.web.security.people import People
 from iveg.web.security.roles import PROGRAM, Action, Principal
 from iveg.web.security.secrets import same_secret
 from iveg.web.security.sessions import Sessions
@@ -38,119 +46,103 @@ NO_SESSION, FOREIGN_ORIGIN = 4401, 4403
 _log = logging.getLogger(__name__)
 
 
+@dataclass(frozen=True, slots=True)
+class Credentials:
+    """Secrets of the environment that let in; an empty one lets nobody in.
+
+    Attributes:
+        link: The sign-in link's token (hex); it signs a browser in as operator.
+        api_token: The bearer token of programs.
+        link_name: Name of whoever holds the link.
+    """
+
+    link: str = field(repr=False)
+    api_token: str = field(repr=False)
+    link_name: str = DEFAULT_NAME
+
+
 class Authenticator:
     """Authenticates people and programs.
 
     Args:
-        sign_in_token: The link's token (hex); it signs a browser in as operator.
-        api_token: The bearer token of programs; empty lets no program in.
-        clock: Read at each question.
-        book: Who is known; None: nobody yet.
-        link_name: Name of whoever holds the link.
+        credentials: Of the environment.
+        people: Those with accounts, and programs with tokens of their own.
         trail: Told of sign-ins, and of those that were refused.
-        people: Those with accounts; None: there is the link alone.
-        programs: Those with tokens of their own; None: there is ``api_token`` alone.
     """
 
     def __init__(
-        self,
-        *,
-        sign_in_token: str,
-        api_token: str,
-        clock: Clock,
-        book: AccessBook | None = None,
-        link_name: str = DEFAULT_NAME,
-        trail: AuditTrail | None = None,
-        people: People | None = None,
-        programs: Programs | None = None,
+        self, credentials: Credentials, people: People, trail: AuditTrail
     ) -> None:
-        self._sign_in_token = sign_in_token
-        self._api_token = api_token
-        self._clock = clock
-        self.attempts = Attempts(clock, trail)
-        self._people = people
-        self._programs = programs
-        self.sessions = Sessions(clock, book or AccessBook(), link_name)
+        self._credentials = credentials
+        self.people = people
+        self.attempts = Attempts(people.clock, trail)
+        self.sessions = Sessions(people.clock, people.book, credentials.link_name)
 
     # --- people sign in ---------------------------------------------------------
 
-    def sign_in(self, request: Request, token: str) -> Response | Problem:
+    def sign_in(self, request: Request, token: str) -> Response:
         """Exchange the token that a page has posted for a session cookie.
 
         Raises:
+            HTTPException: it is wrong, or there were too many wrong ones.
             ForeignOriginError: another site's page sent it.
             NotJsonError: a body that is not JSON.
         """
         refuse_forgery(request)
-        refuse_other_bodies(request)
         return self._exchange(request, token, Response(status_code=204))
 
-    def follow_link(self, request: Request, token: str) -> Response | Problem:
-        """Exchange the token in the query of an old link, or say why not."""
+    def follow_link(self, request: Request, token: str) -> Response:
+        """Exchange the token in the query of an old link. Raises HTTPException."""
         response = RedirectResponse("/", 303)
         response.headers["Cache-Control"] = "no-store"
         response.headers["Referrer-Policy"] = "no-referrer"
         return self._exchange(request, token, response)
 
-    def _exchange(
-        self, request: Request, token: str, response: Response
-    ) -> Response | Problem:
-        address = "" if request.client is None else request.client.host
-        if not same_secret(token, self._sign_in_token):
-            return self.attempts.refuse(address, self._clock().mono, "wrong token")
+    def _exchange(self, request: Request, token: str, response: Response) -> Response:
         # Somebody else's wrong links must not shut out whoever has the right one.
+        if not same_secret(token, self._credentials.link):
+            self.attempts.refuse(request, "wrong token")
         self._end_before(request)
         return self.admit(request, self.sessions.open_by_link(), response)
 
     async def sign_in_by_password(
         self, request: Request, name: str, password: str
-    ) -> Response | Problem:
+    ) -> Response:
         """Exchange name and password for a session cookie; raises as ``sign_in``.
 
         A wrong name is told as a wrong password, and takes as long.
         """
+        proof = partial(self.people.sign_in, name, password)
         return await self._prove(
-            request,
-            lambda one: one.sign_in(name, password),
-            "wrong name or password",
-            name_key(name),
+            request, proof, "wrong name or password", name_key(name)
         )
 
     async def accept(
         self, request: Request, invitation: str, password: str
-    ) -> Response | Problem:
+    ) -> Response:
         """Exchange an invitation for an account and its first session."""
-        return await self._prove(
-            request, lambda one: one.accept(invitation, password), "no such invitation"
-        )
+        proof = partial(self.people.accept, invitation, password)
+        return await self._prove(request, proof, "no such invitation")
 
     async def change_password(
         self, request: Request, who: Principal, old: str, new: str
-    ) -> Response | Problem:
+    ) -> Response:
         """Sign somebody in anew by a new password; their other sessions end.
 
         A wrong old one counts as a sign-in that was refused.
         """
-        return await self._prove(
-            request,
-            lambda one: one.change_password(who, old, new),
-            "wrong password",
-            name_key(who.name),
-        )
+        proof = partial(self.people.change_password, who, old, new)
+        return await self._prove(request, proof, "wrong password", name_key(who.name))
 
     async def _prove(
         self,
         request: Request,
-        proof: Callable[[People], Awaitable[Account | None]],
+        proof: Callable[[], Awaitable[Account | None]],
         wrong: str,
-        of: str = "",
-    ) -> Response | Problem:
-        people = self._people
-        account = await self.attempts.weigh(
-            request, wrong, lambda: None if people is None else proof(people), of
-        )
-        if isinstance(account, Problem):
-            return account
+        name: str = "",
+    ) -> Response:
+        refuse_forgery(request)
+        account = await self.attempts.weigh(request, proof, wrong, name)
         self._end_before(request)
         cookie = self.sessions.open(
             account.name, account.role, account.account_id, "password"
@@ -159,15 +151,12 @@ class Authenticator:
         keep_language(response, account.language)
         return self.admit(request, cookie, response)
 
-    def admit(
-        self, request: Request, cookie: str, response: Response, **facts: object
-    ) -> Response:
-        """Give a browser its session; the rest goes into the audit."""
-        address = "" if request.client is None else request.client.host
-        secure = request.url.scheme == "https"
+    def admit(self, request: Request, cookie: str, response: Response) -> Response:
+        """Give a browser its session; the audit has it."""
         who = self.sessions.find(cookie)
         if who is not None:
-            self.attempts.note(who, "sign_in", address, **facts)
+            self.attempts.note(who, "sign_in", request)
+        secure = request.url.scheme == "https"
         response.set_cookie(
             session_cookie(secure=secure),
             cookie,
@@ -203,21 +192,18 @@ class Authenticator:
         """The owner of the cookie or bearer token; None for a stranger."""
         scheme, _, token = connection.headers.get("authorization", "").partition(" ")
         if scheme.lower() == "bearer":
-            return self._program(token.strip())
+            if same_secret(token.strip(), self._credentials.api_token):
+                return PROGRAM
+            return self.people.program(token.strip())
         secure = connection.scope["scheme"] in ("https", "wss")
         cookie = connection.cookies.get(session_cookie(secure=secure))
         return None if cookie is None else self.sessions.find(cookie)
 
-    def _program(self, token: str) -> Principal | None:
-        if same_secret(token, self._api_token):
-            return PROGRAM
-        return None if self._programs is None else self._programs.find(token)
-
     def current(self, principal: Principal) -> Principal | None:
-        """The same person or program as of now: with what is left, or gone."""
+        """Person or program as of now, with the role that is left; None: gone."""
         if principal.session is not None or principal == PROGRAM:
             return self.sessions.current(principal)
-        return None if self._programs is None else self._programs.current(principal)
+        return self.people.current_program(principal)
 
     def authorise(self, request: Request, action: Action) -> Principal:
         """Let a request in, or say why not.
@@ -236,9 +222,10 @@ class Authenticator:
         if principal.role == "expired" and action == "stop":
             _log.info("STOP by %s, whose session is over", principal.name)
         if request.method not in READING:
-            if principal.session is not None:
+            if principal.session is None:
+                refuse_other_bodies(request)
+            else:
                 refuse_forgery(request)
-            refuse_other_bodies(request)
         return principal
 
     async def authorise_websocket(self, websocket: WebSocket) -> Principal:
@@ -256,7 +243,7 @@ class Authenticator:
         principal = self.identify(websocket)
         by_cookie = principal is not None and principal.session is not None
         # Programs send no Origin; browsers always do.
-        if (origin is not None or by_cookie) and not is_own(origin, websocket):
+        if (origin is not None or by_cookie) and not _is_own(origin, websocket):
             raise WebSocketException(FOREIGN_ORIGIN)
         if principal is None or not principal.may("read"):
             # A browser that asked for a subprotocol takes no handshake without one.
@@ -265,3 +252,103 @@ class Authenticator:
             )
             raise WebSocketException(NO_SESSION)
         return principal
+
+
+# --- requests of other sites' pages -----------------------------------------------
+
+
+def refuse_forgery(request: Request) -> None:
+    """Refuse a request without the two signs of our own page, or not as JSON.
+
+    Cookies come with anybody's request.  Browsers send Sec-Fetch-Site to trustworthy
+    addresses only, so over plain HTTP in a greenhouse Origin has to do.
+
+    Raises:
+        ForeignOriginError: one of them is missing or another site's.
+        NotJsonError: a body that is not declared as JSON.
+    """
+    if request.headers.get("x-iveg") != "1":
+        raise ForeignOriginError("header X-IVEG: 1")
+    site = request.headers.get("sec-fetch-site")
+    if site is None:
+        own = _is_own(request.headers.get("origin"), request)
+    else:
+        own = site in ("same-origin", "none")
+    if not own:
+        raise ForeignOriginError("same origin")
+    refuse_other_bodies(request)
+
+
+def refuse_other_bodies(request: Request) -> None:
+    """Refuse bodies that are not JSON: forms of other sites can send anything else.
+
+    Raises:
+        NotJsonError: a body that is not declared as JSON.
+    """
+    content_type = request.headers.get("content-type")
+    if content_type is None:
+        has_body = request.headers.get("content-length", "0") != "0"
+        if has_body or "transfer-encoding" in request.headers:
+            raise NotJsonError
+    elif content_type.partition(";")[0].strip().lower() != "application/json":
+        raise NotJsonError
+
+
+def _is_own(origin: str | None, connection: HTTPConnection) -> bool:
+    """Whether a page of this very server sent it.
+
+    Only host and port are compared: behind a proxy the scheme differs.
+    """
+    host = connection.headers.get("host", "")
+    try:
+        place = urlsplit(origin or "").netloc
+    except ValueError:
+        return False  # such as brackets that do not close
+    return bool(host) and place.lower() == host.lower()
+
+
+# --- the link of earlier versions -------------------------------------------------
+
+
+class SignInLink:
+    """Takes the token off ``GET /?token=…`` before anything can log or keep it.
+
+    For one version more: links now carry it behind ``#``, where no server and no proxy
+    sees it; the page posts it (``POST /signin``).
+
+    Args:
+        authenticator: Where the token is looked at.
+        refusal: Draws the page for a wrong token.
+    """
+
+    def __init__(
+        self,
+        app: ASGIApp,
+        authenticator: Authenticator,
+        refusal: Callable[[Request, Problem], Response],
+    ) -> None:
+        self._app = app
+        self._authenticator = authenticator
+        self._refusal = refusal
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one request."""
+        token = _token_in_link(scope)
+        if token is None:
+            await self._app(scope, receive, send)
+            return
+        # Servers write the query into their access log after the answer.
+        scope["query_string"] = b""
+        request = Request(scope)
+        try:
+            response = self._authenticator.follow_link(request, token)
+        except HTTPException as error:
+            response = self._refusal(request, problem_of(error))
+        await response(scope, receive, send)
+
+
+def _token_in_link(scope: Scope) -> str | None:
+    if scope["type"] != "http" or scope["path"] != "/" or scope["method"] != "GET":
+        return None
+    query: bytes = scope["query_string"]
+    return parse_qs(query.decode("latin-1")).get("token", [None])[0]

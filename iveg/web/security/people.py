@@ -1,7 +1,4 @@
-"""People with accounts: their passwords and invitations.
-
-Programs with tokens of their own: what each may do, and when it was here last.
-"""
+"""People with accounts, and programs with tokens of their own: known from memory."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -18,37 +15,44 @@ from iveg.domain.accounts import (
     digest_of,
     name_key,
 )
-from iveg.domain.audit import Actor, NamedActor
+from iveg.domain.audit import Actor
 from iveg.vital.ports import Clock
 from iveg.web.security.roles import Principal, Role
 
+_ROLES: Final[Mapping[TokenScope, Role]] = {
+    "read": "reader",
+    "stop": "program",
+    "operate": "controller",
+}
+_USED_S = 60.0
+
 
 class People:
-    """Knows who may sign in, from memory alone.
+    """Knows who may sign in or call.
 
     Args:
-        book: Where accounts are known.
+        book: Where they are known.
         passwords: Checks passwords.
         clock: Read at each question.
     """
 
     def __init__(self, book: AccessBook, passwords: Passwords, clock: Clock) -> None:
-        self._book = book
+        self.book, self.clock = book, clock
         self._passwords = passwords
-        self._clock = clock
+        self._used_at = clock().mono
 
     @property
     def known(self) -> Mapping[str, Account]:
         """All accounts, by id."""
-        return self._book.accounts
+        return self.book.accounts
 
     def is_led(self) -> bool:
         """Whether somebody can sign in as admin."""
-        return has_admin(self.known.values(), self._clock().wall)
+        return has_admin(self.known.values(), self.clock().wall)
 
     def admission(self, by: Actor) -> Admission:
         """Changes accounts and tokens as somebody; each counts at once."""
-        return Admission(self._book, by, self._clock().wall)
+        return Admission(self.book, by, self.clock().wall)
 
     def find(self, person: str) -> Account | None:
         """The account of this id."""
@@ -69,16 +73,7 @@ class People:
         # Whoever was changed meanwhile has proved an account that is none any more.
         now = self.find(found.account_id)
         is_same = now is not None and now.password == found.password
-        return now if now and is_same and now.is_open(self._clock().wall) else None
-
-    def vouched(self, user: Account) -> Account:
-        """The account of somebody whom the provider vouches for; made where needed.
-
-        Raises:
-            SignOnError: they are shut out here.
-        """
-        by = NamedActor(user.account_id, user.name, user.role, "sso")
-        return self.admission(by).vouched(user)
+        return now if now and is_same and now.is_open(self.clock().wall) else None
 
     async def accept(self, invitation: str, password: str) -> Account | None:
         """Begin an account by its invitation; None where that is none any more.
@@ -90,21 +85,21 @@ class People:
         if self._invited(digest) is None:
             return None
         kept = await self._passwords.hashed(password)
-        account, now = self._invited(digest), self._clock().wall
+        account = self._invited(digest)
         if account is None:
             return None
+        now = self.clock().wall
         begun = replace(account, password=kept, invitation="", since=now)
-        self._book.put(begun)
+        self.book.put(begun)
         return begun
 
     def _invited(self, digest: str) -> Account | None:
-        now = self._clock().wall
-        waiting = (
-            one
-            for one in self.known.values()
-            if one.invitation == digest and one.invited_until > now and not one.disabled
-        )
-        return next(waiting, None)
+        now = self.clock().wall
+        for one in self.known.values():
+            is_waiting = one.invited_until > now and not one.disabled
+            if one.invitation == digest and is_waiting:
+                return one
+        return None
 
     async def change_password(self, who: Actor, old: str, new: str) -> Account | None:
         """Give somebody a new password; None where the old one is wrong.
@@ -126,55 +121,29 @@ class People:
         """Keep what somebody reads."""
         account = self.find(person)
         if account is not None:
-            self._book.put(replace(account, language=language))
+            self.book.put(replace(account, language=language))
+
+    def program(self, token: str) -> Principal | None:
+        """The program whose token this is; None: nobody's, or nobody's any more."""
+        known, now = self.book.tokens.get(digest_of(token)), self.clock()
+        if known is None or not known.is_open(now.wall):
+            return None
+        self.book.tokens[known.digest] = replace(known, used_at=now.wall)
+        if now.mono - self._used_at >= _USED_S:
+            self._used_at = now.mono
+            self.book.keep()
+        return _principal(known)
+
+    def current_program(self, principal: Principal) -> Principal | None:
+        """Program as of now; None where its token has ended."""
+        for one in self.book.tokens.values():
+            if one.token_id == principal.person and one.is_open(self.clock().wall):
+                return _principal(one)
+        return None
 
     def close(self) -> None:
         """End the thread of passwords."""
         self._passwords.close()
-
-
-_ROLES: Final[Mapping[TokenScope, Role]] = {
-    "read": "reader",
-    "stop": "program",
-    "operate": "controller",
-}
-_USED_S = 60.0
-
-
-class Programs:
-    """Knows the tokens of programs, from memory alone.
-
-    Args:
-        book: Where they are known.
-        clock: Read at each question.
-    """
-
-    def __init__(self, book: AccessBook, clock: Clock) -> None:
-        self._book = book
-        self._clock = clock
-        self._kept_at = clock().mono
-
-    @property
-    def known(self) -> list[ApiToken]:
-        """All tokens, with their newest use."""
-        return [*self._book.tokens.values()]
-
-    def find(self, token: str) -> Principal | None:
-        """Whose token this is; None: nobody's, or nobody's any more."""
-        known, now = self._book.tokens.get(digest_of(token)), self._clock()
-        if known is None or not known.is_open(now.wall):
-            return None
-        self._book.tokens[known.digest] = replace(known, used_at=now.wall)
-        if now.mono - self._kept_at >= _USED_S:
-            self._kept_at = now.mono
-            self._book.keep()
-        return _principal(known)
-
-    def current(self, principal: Principal) -> Principal | None:
-        """The same program as of now; None where its token has ended."""
-        now = self._clock().wall
-        same = (one for one in self.known if one.token_id == principal.person)
-        return next((_principal(one) for one in same if one.is_open(now)), None)
 
 
 def _principal(token: ApiToken) -> Principal:

@@ -1,17 +1,11 @@
-"""Limits of sign-ins and of WebSocket messages (SECURITY.md).
+"""Limits of WebSockets and of their messages (SECURITY.md).
 
-STOP is never limited: not over HTTP, and not on a WebSocket that sends too much.
-Painted frames are counted apart: a page reports every frame that its screen shows.
-
-The gate before all sign-ins together: a flood of them takes little of the loop.
-
-A limit by address alone is none for who has many, and each request that is looked at
-costs the loop on which a STOP runs some milliseconds.
+STOP is never limited, not on a WebSocket that sends too much.  Painted frames are
+counted apart: a page reports every frame that its screen shows.
 """
 
 import asyncio
 import contextlib
-from collections import OrderedDict, deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
@@ -22,12 +16,9 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from iveg.domain.errors import UnreadableError
 from iveg.ngsi.codec import load_json
 from iveg.vital.ports import Clock
-from iveg.web.problems import Problem
+from iveg.web.security.attempts import Allowance
 from iveg.web.security.roles import Principal
 
-SIGN_INS, SIGN_INS_WITHIN_S = 5, 60.0
-REFUSED_ROWS = 5.0
-"""Rows of the audit a second for refused sign-ins, from all addresses together."""
 MESSAGES_PER_S = 20
 PAINTED_PER_S = 300
 """More than frames are ever sent in a second: every honest report counts."""
@@ -37,94 +28,11 @@ PROGRAM_SOCKETS = 20
 TOO_MANY_SOCKETS: Final = 4429
 """Close code of ``/live`` for one more than ``SOCKETS`` of the same session."""
 
-LONGEST_DELAY_S = 10
-_UNDELAYED = 3
-_DELAY_FORGOTTEN_S = 900.0
-_ADDRESSES = 1024
 _LONGEST_STOP = 4096
 """Bytes of a message that is looked at beyond the limit."""
 _FAREWELL_S = 1.0
 _SILENT_S = 3.0
 """Pages ping every second; one silent for longer hangs on a dead line."""
-
-
-class FailedAttempts:
-    """Wrong sign-ins by address: five a minute, then one a minute.
-
-    Never a lock-out: tries during the wait do not make it longer.  A right one takes
-    none away, for whoever guesses may have an account of their own.
-    """
-
-    def __init__(self) -> None:
-        self._wrong: OrderedDict[str, deque[float]] = OrderedDict()
-
-    def wait_s(self, address: str, now: float) -> float:
-        """Time that this address has to wait (s); 0 when it may try.
-
-        Args:
-            address: Where they come from.
-            now: Monotonic time (s).
-        """
-        wrong = self._wrong.get(address)
-        if wrong is None or len(wrong) < SIGN_INS:
-            return 0.0
-        return max(0.0, wrong[-1] + SIGN_INS_WITHIN_S - now)
-
-    def failed(self, address: str, now: float) -> None:
-        """Count a wrong sign-in."""
-        wrong = self._wrong.setdefault(address, deque(maxlen=SIGN_INS))
-        self._wrong.move_to_end(address)
-        while wrong and now - wrong[0] > SIGN_INS * SIGN_INS_WITHIN_S:
-            wrong.popleft()
-        wrong.append(now)
-        if len(self._wrong) > _ADDRESSES:
-            self._wrong.popitem(last=False)
-
-
-class AccountDelays:
-    """Wrong sign-ins by account: after three the next wait, 1 s, 2 s, … 10 s at most.
-
-    Nobody is refused.  Names that nobody has wait alike, so that none is told.
-    """
-
-    def __init__(self) -> None:
-        self._wrong: OrderedDict[str, tuple[int, float]] = OrderedDict()
-
-    def delay_s(self, account: str, now: float) -> float:
-        """Wait of a proof before it is looked at (s)."""
-        wrong, last = self._wrong.get(account, (0, now))
-        if not account or wrong < _UNDELAYED or now - last > _DELAY_FORGOTTEN_S:
-            return 0.0
-        return float(min(LONGEST_DELAY_S, 2 ** (wrong - _UNDELAYED)))
-
-    def failed(self, account: str, now: float) -> None:
-        """Count a wrong proof."""
-        wrong, _ = self._wrong.pop(account, (0, now))
-        self._wrong[account] = min(wrong + 1, 16), now
-        if len(self._wrong) > _ADDRESSES:
-            self._wrong.popitem(last=False)
-
-    def succeeded(self, account: str) -> None:
-        """Forget the wrong ones of this account alone."""
-        self._wrong.pop(account, None)
-
-
-class Allowance:
-    """A second's worth of messages, that fills again with time."""
-
-    def __init__(self, per_s: float, now: float) -> None:
-        self._per_s = per_s
-        self._left = per_s
-        self._at = now
-
-    def admit(self, now: float) -> bool:
-        """Whether one more may pass (``now`` monotonic, s)."""
-        self._left = min(self._per_s, self._left + (now - self._at) * self._per_s)
-        self._at = now
-        if self._left < 1.0:
-            return False
-        self._left -= 1.0
-        return True
 
 
 @dataclass(eq=False, slots=True)
@@ -170,10 +78,8 @@ class SocketLimits:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one connection."""
-        if scope["type"] != "websocket":
-            await self._app(scope, receive, send)
-            return
-        who = self._identify(HTTPConnection(scope))
+        is_socket = scope["type"] == "websocket"
+        who = self._identify(HTTPConnection(scope)) if is_socket else None
         if who is None:
             await self._app(scope, receive, send)
             return
@@ -181,11 +87,9 @@ class SocketLimits:
         owner = who.session or who.name
         sockets = self._sockets.setdefault(owner, [])
         # Programs only listen: their silence says nothing.
-        is_free = (
-            len(sockets) < PROGRAM_SOCKETS
-            if who.session is None
-            else _make_room(sockets, now)
-        )
+        is_free = len(sockets) < PROGRAM_SOCKETS
+        if who.session is not None:
+            is_free = _make_room(sockets, now)
         if not is_free:
             await _refuse(scope, receive, send)
             return
@@ -248,7 +152,7 @@ def _make_room(sockets: list[_Socket], now: float) -> bool:
 
 
 def _kind_of(message: Message) -> object:
-    """What a message says that it is; None where it is no STOP by its length alone."""
+    """Kind that a message names; None where it is no STOP by its length alone."""
     text = message.get("text") or ""
     if len(text) > _LONGEST_STOP:
         return None
@@ -265,31 +169,3 @@ async def _refuse(scope: Scope, receive: Receive, send: Send) -> None:
     subprotocol = next(iter(scope.get("subprotocols", ())), None)
     await send({"type": "websocket.accept", "subprotocol": subprotocol})
     await send({"type": "websocket.close", "code": TOO_MANY_SOCKETS})
-
-
-PASS_PER_S: Final = 20.0
-"""As many as one thread can compute."""
-_SIGN_IN: Final = "/signin"
-
-
-class SignInGate:
-    """Refuses (429) sign-ins beyond twenty a second before anything looks at them."""
-
-    def __init__(self, app: ASGIApp, clock: Clock) -> None:
-        self._app, self._clock = app, clock
-        self._allowance = Allowance(PASS_PER_S, clock().mono)
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Serve one request."""
-        if (
-            scope["type"] == "http"
-            and scope["method"] == "POST"
-            and scope["path"] == _SIGN_IN
-            and not self._allowance.admit(self._clock().mono)
-        ):
-            detail = "Too many sign in at once; try again in a moment."
-            headers = {"Retry-After": "2", "Connection": "close"}
-            refusal = Problem(429, detail, "busy", headers=headers).response()
-            await refusal(scope, receive, send)
-            return
-        await self._app(scope, receive, send)

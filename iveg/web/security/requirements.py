@@ -1,34 +1,40 @@
-"""What a route asks for: the role that its caller needs.
+"""Role that each route asks of its caller, and its refusals in the OpenAPI document.
 
-Every route declares its requirement with ``require``; ``declared_action`` reads it.
+Every route declares its role with ``require``; ``declared_action`` reads it.  The
+OpenAPI document tells the refusals that follow from role, parameters and body (RFC
+9457, ``web/problems.py``); others a route names itself: ``responses=refusals(409)``.
 """
 
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Final
+from dataclasses import dataclass
+from http import HTTPStatus
+from typing import Annotated, Any, Final
 
-from fastapi import Depends
+from fastapi import Depends, FastAPI
 from fastapi.dependencies.models import Dependant
+from fastapi.routing import iter_route_contexts
 from starlette.requests import HTTPConnection, Request
 from starlette.websockets import WebSocket
 
+from iveg.web.security.audited import READING
 from iveg.web.security.authentication import Authenticator
 from iveg.web.security.roles import NOBODY, Action, Principal
 
 
 def authenticator_of(connection: HTTPConnection) -> Authenticator:
-    """What lets people in here; it is put at ``app.state.authenticator``."""
+    """The authenticator, which is put at ``app.state.authenticator``."""
     authenticator: Authenticator = connection.app.state.authenticator
     return authenticator
 
 
+@dataclass(frozen=True, slots=True)
 class Requirement:
     """A FastAPI dependency that lets a role in; made by ``require``.
 
     It serves HTTP and WebSocket routes alike.
     """
 
-    def __init__(self, action: Action) -> None:
-        self.action = action
+    action: Action
 
     async def __call__(self, connection: HTTPConnection) -> Principal:
         """The authorised principal, or the error that refuses the request."""
@@ -40,17 +46,15 @@ class Requirement:
         return authenticator.authorise(Request(connection.scope), self.action)
 
 
-_REQUIREMENTS: Final[Mapping[Action, Requirement]] = {
-    action: Requirement(action)
-    for action in ("open", "read", "stop", "release", "admin")
-}
-
-
 def require(action: Action) -> Requirement:
     """Requirement of a route: ``Depends(require("stop"))``; ``open`` asks nothing."""
-    return _REQUIREMENTS[action]
+    return Requirement(action)
 
 
+STRANGERS: Final = [Depends(require("open"))]
+READERS: Final = [Depends(require("read"))]
+ADMINS: Final = [Depends(require("admin"))]
+"""Dependencies of routes that do not ask who it is."""
 Reader = Annotated[Principal, Depends(require("read"))]
 Presser = Annotated[Principal, Depends(require("stop"))]
 Operator = Annotated[Principal, Depends(require("release"))]
@@ -77,3 +81,82 @@ def _calls(dependant: Dependant) -> Iterator[object]:
     for child in dependant.dependencies:
         yield child.call
         yield from _calls(child)
+
+
+# --- refusals in the OpenAPI document ----------------------------------------------
+
+_PROBLEM: Final = {"$ref": "#/components/schemas/Problem"}
+_SHAPE: Final[Mapping[str, Any]] = {
+    "title": "Problem",
+    "description": "Why a request was refused (RFC 9457); more members may follow.",
+    "type": "object",
+    "required": ["type", "title", "status", "detail"],
+    "properties": {
+        "type": {"type": "string", "description": "Stable, for programs."},
+        "title": {"type": "string"},
+        "status": {"type": "integer"},
+        "detail": {"type": "string", "description": "One sentence, for people."},
+    },
+}
+_FASTAPIS_OWN: Final = ("HTTPValidationError", "ValidationError")
+
+
+def refusals(*statuses: int) -> dict[int | str, dict[str, Any]]:
+    """The ``responses`` of a route that refuses with these statuses."""
+    return {status: _refusal(status) for status in statuses}
+
+
+class DocumentedApp(FastAPI):
+    """An application whose document tells refusals as they are sent."""
+
+    def openapi(self) -> dict[str, Any]:
+        """The document; made once."""
+        if self.openapi_schema is None:
+            document, actions = super().openapi(), declared_actions(self)
+            for path, methods in document["paths"].items():
+                for method, operation in methods.items():
+                    action = actions.get((path, method.upper()), "open")
+                    _tell_refusals(operation, method.upper(), action)
+            schemas = document.setdefault("components", {}).setdefault("schemas", {})
+            for name in _FASTAPIS_OWN:
+                schemas.pop(name, None)
+            schemas["Problem"] = dict(_SHAPE)
+        return self.openapi_schema or {}
+
+
+def declared_actions(app: FastAPI) -> dict[tuple[str, str], Action]:
+    """Action that each route asks for, by path and method."""
+    return {
+        (str(route.path_format), method): action
+        for route in iter_route_contexts(app.routes)
+        if (action := declared_action(route)) is not None
+        for method in route.methods or ()
+    }
+
+
+def _tell_refusals(operation: dict[str, Any], method: str, action: Action) -> None:
+    answers = operation["responses"]
+    answers |= {str(one): _refusal(one) for one in _refused(operation, method, action)}
+    operation["responses"] = dict(sorted(answers.items()))
+
+
+def _refused(
+    operation: Mapping[str, Any], method: str, action: Action
+) -> Iterator[int]:
+    if action != "open":
+        yield from (401, 403)
+    if any(one["in"] == "path" for one in operation.get("parameters", ())):
+        yield 404
+    if method not in READING:
+        yield from (413, 415)
+    if "422" in operation["responses"]:
+        yield 422
+        if "requestBody" in operation:
+            yield 400
+
+
+def _refusal(status: int) -> dict[str, Any]:
+    return {
+        "description": HTTPStatus(status).phrase,
+        "content": {"application/problem+json": {"schema": dict(_PROBLEM)}},
+    }

@@ -1,10 +1,7 @@
-"""Sessions of people: their tokens, and what each still allows.
+"""Sessions of people: how long they last, and which role is left of each.
 
-Only digests of the tokens are kept.
-
-How long a session lasts, and which role is left of it.
-
-Ages follow the wall clock, because no other goes on counting while iVeg is down::
+Only digests of their tokens are kept.  Ages follow the wall clock, because no other
+goes on counting while iVeg is down::
 
     signed in ──12 h idle, or 24 h──> expired: STOP alone ──12 h──> gone
         ├──────── a viewer: 30 days ──────^
@@ -15,7 +12,7 @@ import hashlib
 import secrets
 from collections.abc import Collection
 from dataclasses import replace
-from typing import Any, cast
+from typing import cast
 
 from iveg.domain.accounts import (
     DEFAULT_NAME,
@@ -45,6 +42,7 @@ def role_at(session: Session, now: float) -> Role | None:
     return "expired" if over <= STOP_ONLY_S else None
 
 
+_FORMER = "", DEFAULT_NAME
 _KEEP_SEEN_S = 60.0
 """A crash forgets at most this much of a sign of life."""
 
@@ -58,17 +56,10 @@ class Sessions:
         link_name: Name of whoever holds the link of the environment.
     """
 
-    def __init__(
-        self, clock: Clock, book: AccessBook, link_name: str = DEFAULT_NAME
-    ) -> None:
-        self._clock = clock
-        self._book = book
-        self._link_name = link_name
+    def __init__(self, clock: Clock, book: AccessBook, link_name: str) -> None:
+        self._clock, self._book, self._link_name = clock, book, link_name
         self._kept_at = 0.0
         self._remember()
-
-    def __len__(self) -> int:
-        return len(self._sessions)
 
     @property
     def _sessions(self) -> dict[bytes, Session]:
@@ -108,7 +99,7 @@ class Sessions:
         return self._principal(_digest(token), touch=True)
 
     def current(self, principal: Principal) -> Principal | None:
-        """The same person as of now: with the role that is left, or gone."""
+        """Person as of now, with the role that is left; None: gone."""
         if principal.session is None:
             return principal
         return self._principal(principal.session, touch=False)
@@ -136,13 +127,10 @@ class Sessions:
 
     def lower(self, principal: Principal) -> None:
         """Leave a session what a viewer may do, until somebody signs in anew."""
-        self._change(principal, role="viewer", wall=True)
-
-    def _change(self, principal: Principal, **changes: Any) -> None:
-        session = self._sessions.get(principal.session or b"")
+        digest = principal.session or b""
+        session = self._sessions.get(digest)
         if session is not None:
-            changed = replace(session, **changes)
-            self._sessions[bytes.fromhex(session.digest)] = changed
+            self._sessions[digest] = replace(session, role="viewer", wall=True)
             self._keep()
 
     def _principal(self, digest: bytes, *, touch: bool) -> Principal | None:
@@ -188,22 +176,13 @@ class Sessions:
         for digest, session in [*self._sessions.items()]:
             # A clock that was ahead must not have made a session that never ends.
             began, seen = min(session.began, now), min(session.seen, now)
-            known = self._named(replace(session, began=began, seen=seen))
+            known = replace(session, began=began, seen=seen)
+            # Earlier versions knew the link's person by that name alone.
+            if known.person == LINK_PERSON or (known.person, known.name) == _FORMER:
+                known = replace(known, name=self._link_name, person=LINK_PERSON)
             self._sessions[digest] = known
             if role_at(known, now) is None:
                 del self._sessions[digest]
-
-    def _named(self, session: Session) -> Session:
-        """A session of the link under the link's present name.
-
-        Earlier versions had nobody else, and called that person ``operator``.
-        """
-        is_link = session.person == LINK_PERSON or (
-            not session.person and session.name == DEFAULT_NAME
-        )
-        if not is_link:
-            return session
-        return replace(session, name=self._link_name, person=LINK_PERSON)
 
     def _keep(self) -> None:
         self._kept_at = self._clock().wall

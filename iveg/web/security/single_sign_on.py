@@ -4,8 +4,6 @@ A browser goes to the provider and comes back with a code, which iVeg exchanges:
 
     begin ──> provider's page ──> finish ──> session, at most IVEG_SSO_HOURS
                                      └─────> refused: why, on the page and in the audit
-
-Sign-ins that are at the identity provider: which answers are awaited, and whose.
 """
 
 import asyncio
@@ -14,9 +12,9 @@ import logging
 import re
 import secrets
 from collections import OrderedDict
-from collections.abc import Awaitable, Callable
+from collections.abc import AsyncIterator
 from dataclasses import dataclass
-from typing import Final, TypeVar
+from typing import Final
 
 from starlette.requests import Request
 from starlette.responses import RedirectResponse, Response
@@ -25,16 +23,17 @@ from iveg.adapters.identity_provider import Attempt, IdentityProvider, Vouched
 from iveg.domain.accounts import Account, ClaimReading, ProvenIdentity
 from iveg.domain.audit import STRANGER, Actor, NamedActor
 from iveg.domain.errors import HopError, SignOnError
-from iveg.domain.observations import Instant
-from iveg.vital.audit import AuditTrail
-from iveg.vital.ports import Clock
+from iveg.web.security.attempts import FailedAttempts, client_of
 from iveg.web.security.authentication import Authenticator
-from iveg.web.security.people import People
-from iveg.web.security.rate_limits import REFUSED_ROWS, Allowance, FailedAttempts
 from iveg.web.security.roles import Principal
 
+CALLBACK: Final = "/signin/sso/callback"
 WAITS_S: Final = 600.0
-_MOST, _MOST_OF_ADDRESS = 1000, 16
+_MOST, _MOST_OF_ADDRESS, _MOST_HINTS = 1000, 16, 1000
+_TOGETHER_S, _MOST_TOGETHER = 12.0, 8
+_OWN_PATH: Final = re.compile(r"/(?![/\\])[!-\[\]-~]{0,500}")
+_MOST_CODE: Final = 4096
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +44,7 @@ class WaitingSignOn:
         browser: What the browser's own cookie says, so that nobody ends the sign-in of
             somebody else in their browser.
         to: Path at which the person goes on.
+        until: When nobody waits for it any more (monotonic, s).
         before: Whose session the browser had.
     """
 
@@ -52,49 +52,8 @@ class WaitingSignOn:
     browser: str
     address: str
     to: str
-    began: Instant
+    until: float
     before: Principal | None
-
-
-class WaitingSignOns:
-    """Bounded: the oldest gives way, that of the same address first."""
-
-    def __init__(self) -> None:
-        self._waiting: OrderedDict[str, WaitingSignOn] = OrderedDict()
-
-    def __len__(self) -> int:
-        return len(self._waiting)
-
-    def put(self, one: WaitingSignOn) -> None:
-        """Await the answer to one more."""
-        same = [
-            state
-            for state, other in self._waiting.items()
-            if other.address == one.address
-        ]
-        if len(same) >= _MOST_OF_ADDRESS:
-            del self._waiting[same[0]]
-        elif len(self._waiting) >= _MOST:
-            self._waiting.popitem(last=False)
-        self._waiting[one.attempt.state] = one
-
-    def pop(self, state: str, browser: str, now: Instant) -> WaitingSignOn | None:
-        """The sign-in that an answer belongs to, once; None: to none any more."""
-        one = self._waiting.get(state)
-        if one is None or one.browser != browser or not browser:
-            # Another browser's answer: the sign-in goes on to wait for its own.
-            return None
-        del self._waiting[state]
-        return one if now.mono - one.began.mono < WAITS_S else None
-
-
-CALLBACK: Final = "/signin/sso/callback"
-_TOGETHER_S, _MOST_TOGETHER = 12.0, 8
-_MOST_HINTS: Final = 1000
-_OWN_PATH: Final = re.compile(r"/(?![/\\])[!-\[\]-~]{0,500}")
-_MOST_CODE: Final = 4096
-_T = TypeVar("_T")
-_log = logging.getLogger(__name__)
 
 
 class SingleSignOn:
@@ -103,10 +62,7 @@ class SingleSignOn:
     Args:
         provider: Vouches for them.
         reading: Where name and role stand in what it says.
-        people: Keeps their accounts.
-        authenticator: Keeps their sessions.
-        clock: Read at each question.
-        trail: Told of sign-ins, and of those that were refused.
+        authenticator: Keeps their accounts and sessions.
         lasts_s: How long a session lasts (s).
     """
 
@@ -114,19 +70,15 @@ class SingleSignOn:
         self,
         provider: IdentityProvider,
         reading: ClaimReading,
-        people: People,
         authenticator: Authenticator,
-        clock: Clock,
-        trail: AuditTrail,
         lasts_s: float,
     ) -> None:
         self._provider, self._reading = provider, reading
+        self._authenticator, self._lasts_s = authenticator, lasts_s
         self._issuer = provider.client.issuer
-        self._people, self._authenticator = people, authenticator
-        self._clock, self._trail, self._lasts_s = clock, trail, lasts_s
-        self._waiting = WaitingSignOns()
+        self._clock = authenticator.people.clock
+        self._waiting: OrderedDict[str, WaitingSignOn] = OrderedDict()
         self._wrong = FailedAttempts()
-        self._rows = Allowance(REFUSED_ROWS, clock().mono)
         self._hints: OrderedDict[bytes, str] = OrderedDict()
         self._together = 0
 
@@ -145,29 +97,40 @@ class SingleSignOn:
         before = self._authenticator.identify(request)
         attempt = Attempt(f"{_base(request)}{CALLBACK}")
         try:
-            address = await self._bounded(lambda: self._provider.address(attempt))
+            async with self._asking():
+                address = await self._provider.address(attempt)
         except SignOnError as error:
-            self._refused(request, error, before or STRANGER)
+            self._note_refused(request, error, before or STRANGER)
             raise
         browser = request.cookies.get(_cookie(request), "")
         if not re.fullmatch(r"[\w-]{43}", browser):
             browser = secrets.token_urlsafe(32)
         to = to if _OWN_PATH.fullmatch(to) else "/"
-        now, client = self._clock(), _client(request)
-        self._waiting.put(WaitingSignOn(attempt, browser, client, to, now, before))
+        until, client = self._clock().mono + WAITS_S, client_of(request)
+        self._await(WaitingSignOn(attempt, browser, client, to, until, before))
         response = RedirectResponse(address, 303)
         # Lax: the way back begins at the provider, where Strict cookies stay behind.
-        secure = request.url.scheme == "https"
         response.set_cookie(
             _cookie(request),
             browser,
             max_age=int(WAITS_S),
             path="/",
-            secure=secure,
+            secure=request.url.scheme == "https",
             httponly=True,
             samesite="lax",
         )
         return response
+
+    def _await(self, sign_on: WaitingSignOn) -> None:
+        """Await one more; the oldest gives way, that of the same address first."""
+        waiting = self._waiting
+        address = sign_on.address
+        same = [state for state in waiting if waiting[state].address == address]
+        if len(same) >= _MOST_OF_ADDRESS:
+            del waiting[same[0]]
+        elif len(waiting) >= _MOST:
+            waiting.popitem(last=False)
+        waiting[sign_on.attempt.state] = sign_on
 
     async def finish(self, request: Request) -> tuple[str, str]:
         """Take a browser in that comes from the provider.
@@ -181,50 +144,58 @@ class SingleSignOn:
         who: Actor = STRANGER
         try:
             waiting = self._awaited(request)
-            vouched = await self._bounded(lambda: self._vouched(request, waiting))
-            identity = self._reading.read(self._issuer, vouched.subject, vouched.claims)
-            who = _actor(identity)
-            return self._open(waiting, identity, vouched), waiting.to
+            code = self._code(request)
+            async with self._asking():
+                vouched = await self._provider.vouch(waiting.attempt, code)
+            proven = self._reading.read(self._issuer, vouched.subject, vouched.claims)
+            role = proven.role or "stranger"
+            who = NamedActor(proven.person, proven.name, role, "sso")
+            return self._open(waiting, proven, vouched), waiting.to
         except SignOnError as error:
-            self._refused(request, error, who)
+            self._note_refused(request, error, who)
             raise
 
     def _awaited(self, request: Request) -> WaitingSignOn:
-        """The sign-in that a browser brings the answer to."""
-        now, client = self._clock(), _client(request)
-        if self._wrong.wait_s(client, now.mono) > 0.0:
+        """The sign-in that a browser brings the answer to, once."""
+        now, client = self._clock().mono, client_of(request)
+        if self._wrong.wait_s(client, now) > 0.0:
             raise SignOnError("busy", "too many wrong answers from there")
         state = request.query_params.get("state", "")
-        cookie = request.cookies.get(_cookie(request), "")
-        waiting = self._waiting.pop(state, cookie, now)
-        if waiting is None:
-            self._wrong.failed(client, now.mono)
-            raise SignOnError("outdated", "no sign-in of this browser waits for it")
-        return waiting
+        found = self._waiting.get(state)
+        # Another browser's answer: the sign-in goes on to wait for its own.
+        if found is not None and found.browser == request.cookies.get(_cookie(request)):
+            del self._waiting[state]
+            if now < found.until:
+                return found
+        self._wrong.failed(client, now)
+        raise SignOnError("outdated", "no sign-in of this browser waits for it")
 
-    async def _vouched(self, request: Request, waiting: WaitingSignOn) -> Vouched:
+    def _code(self, request: Request) -> str:
+        """The code in an answer of the provider."""
         query = request.query_params
         if "error" in query:
-            raise SignOnError("refused", _plain(query["error"]))
+            # An OAuth error code as it may be logged.
+            why = re.sub(r"[^\w.-]", "?", query["error"][:40], flags=re.ASCII)
+            raise SignOnError("refused", why)
         # RFC 9207: an answer of somebody else's, where it says whose it is.
         if query.get("iss", self._issuer) != self._issuer:
             raise SignOnError("untrusted", "the answer is another issuer's")
         code = query.get("code", "")
         if not 0 < len(code) <= _MOST_CODE:
             raise SignOnError("untrusted", "the answer holds no code")
-        return await self._provider.vouch(waiting.attempt, code)
+        return code
 
     def _open(
-        self, waiting: WaitingSignOn, identity: ProvenIdentity, vouched: Vouched
+        self, waiting: WaitingSignOn, proven: ProvenIdentity, vouched: Vouched
     ) -> str:
         """Begin the session of somebody who was vouched for."""
-        if identity.role is None:
+        if proven.role is None:
             raise SignOnError("no_role", "none of the claim's values gives one")
-        user = Account(
-            identity.person, identity.name, identity.role, provider=self._issuer
+        by = NamedActor(proven.person, proven.name, proven.role, "sso")
+        account = self._authenticator.people.admission(by).vouched(
+            Account(proven.person, proven.name, proven.role, provider=self._issuer)
         )
-        account = self._people.vouched(user)
-        sessions, now = self._authenticator.sessions, self._clock().wall
+        sessions = self._authenticator.sessions
         if waiting.before is not None:
             sessions.revoke(waiting.before)
         token = sessions.open(
@@ -232,9 +203,13 @@ class SingleSignOn:
             account.role,
             account.account_id,
             "sso",
-            until=now + self._lasts_s,
+            until=self._clock().wall + self._lasts_s,
         )
-        self._keep_hint(sessions.find(token), vouched.id_token)
+        who = sessions.find(token)
+        if who is not None and who.session is not None and vouched.id_token:
+            if len(self._hints) >= _MOST_HINTS:
+                self._hints.popitem(last=False)
+            self._hints[who.session] = vouched.id_token
         return token
 
     # --- away from it -------------------------------------------------------------
@@ -253,20 +228,17 @@ class SingleSignOn:
                 return await self._provider.sign_out_address(back, hint)
         return None
 
-    async def close(self) -> None:
-        """Close the connections to the provider."""
-        await self._provider.close()
-
     # --- small pieces -------------------------------------------------------------
 
-    async def _bounded(self, ask: Callable[[], Awaitable[_T]]) -> _T:
-        """Ask the provider, few at a time and not for long."""
+    @contextlib.asynccontextmanager
+    async def _asking(self) -> AsyncIterator[None]:
+        """A question to the provider: few at a time, and not for long."""
         if self._together >= _MOST_TOGETHER:
             raise SignOnError("busy", "too many sign in at once")
         self._together += 1
         try:
             async with asyncio.timeout(_TOGETHER_S):
-                return await ask()
+                yield
         except TimeoutError as error:
             raise SignOnError("unreachable", "it takes too long") from error
         except HopError as error:
@@ -274,44 +246,14 @@ class SingleSignOn:
         finally:
             self._together -= 1
 
-    def _keep_hint(self, who: Principal | None, id_token: str) -> None:
-        if who is None or who.session is None or not id_token:
-            return
-        if len(self._hints) >= _MOST_HINTS:
-            self._hints.popitem(last=False)
-        self._hints[who.session] = id_token
-
-    def _refused(self, request: Request, error: SignOnError, who: Actor) -> None:
-        now = self._clock()
-        if not self._rows.admit(now.mono):
-            return
-        _log.warning("sign-in by the provider refused: %s", error)
-        details = {
-            "address": _client(request),
-            "by": "sso",
-            "why": error.failure,
-            "detail": error.detail,
-        }
-        self._trail.note(who, "sign_in_refused", details=details, at=now)
-
-
-def _actor(identity: ProvenIdentity) -> Actor:
-    return NamedActor(
-        identity.person, identity.name, identity.role or "stranger", "sso"
-    )
-
-
-def _plain(text: str) -> str:
-    """An OAuth error code as it may be logged."""
-    return re.sub(r"[^\w.-]", "?", text[:40], flags=re.ASCII)
+    def _note_refused(self, request: Request, error: SignOnError, who: Actor) -> None:
+        facts = {"by": "sso", "why": error.failure, "detail": error.detail}
+        if self._authenticator.attempts.note_refused(who, request, **facts):
+            _log.warning("sign-in by the provider refused: %s", error)
 
 
 def _base(request: Request) -> str:
     return str(request.base_url).rstrip("/")
-
-
-def _client(request: Request) -> str:
-    return "" if request.client is None else request.client.host
 
 
 def _cookie(request: Request) -> str:

@@ -24,10 +24,12 @@ from iveg.web.live.pictures import Past
 from iveg.web.live.socket import BoundedSocket
 from iveg.web.pages.contexts import Site
 from iveg.web.pages.drawing import Pages
-from iveg.web.security.authentication import Authenticator
+from iveg.web.security.authentication import Authenticator, Credentials
+from iveg.web.security.people import People
 from iveg.web.security.roles import Role
 from iveg.web.security.secrets import NotifySecret
 from iveg.web.views import Views
+from tests.fakes.accounts import FakeBook, FakePasswords
 from tests.fakes.recordings import FakeRecordings
 from tests.fakes.worker import FakeWorker
 from tests.unit.vital.desk import FIELD, Desk
@@ -35,10 +37,13 @@ from tests.unit.web.when_asked import RoutesWhenAsked
 
 HOST = "iveg.test"
 API_TOKEN = "a-token-for-programs"
-SECRET = "ab" * 32
+SECRET, LINK = "ab" * 32, "cd" * 32
 TENANT = {"Fiware-Service": "agroconnect", "Fiware-ServicePath": "/greenhouse"}
 
-_pages = cache(Pages)
+
+@cache
+def _pages(site: Site) -> Pages:
+    return Pages(site, lambda: True)
 
 
 class WebDesk(Desk):
@@ -56,11 +61,10 @@ class WebDesk(Desk):
         self.former_secrets: set[str] = set()
         self.queues = health.Queues({"ingest": 3}, {"history": 2}, {"stop_send": 1})
         self.trail = AuditTrail(self.sink, self.ids)
+        self.book, self.passwords = FakeBook(), FakePasswords()
+        self.people = People(self.book, self.passwords, self.clock)
         self.authenticator = Authenticator(
-            sign_in_token="cd" * 32,
-            api_token=API_TOKEN,
-            clock=self.clock,
-            trail=self.trail,
+            Credentials(LINK, API_TOKEN), self.people, self.trail
         )
         self.rules = self.parts.rules
         self.rule_store, self.trial_store = self.choices.rules, self.choices.trial

@@ -5,8 +5,7 @@ from typing import Any
 import orjson
 
 from iveg.domain.equipment import Tile
-from iveg.domain.records import MeasurementRecord
-from iveg.web.pages.sentences import Sentences, read_translations
+from iveg.web.pages.sentences import read_sentences
 from tests.unit.web.desk import WebDesk
 
 CONDUCTIVITY = Tile(
@@ -57,7 +56,7 @@ def alerts(desk: WebDesk) -> set[str]:
     desk.evaluator.tick(
         desk.clock(), desk.parts.core.supervision.conditions(desk.clock())
     )
-    say = Sentences(read_translations("en")).say
+    say = read_sentences("en").say
     return {
         say(one.condition.key, one.condition.slots)
         for one in desk.evaluator.alerts.waiting
@@ -91,25 +90,3 @@ async def test_a_tile_that_loses_its_signal_says_so_and_raises_an_alert() -> Non
 
     await notify(desk, flow=17.0)
     assert alerts(desk) == set()
-
-
-async def test_a_limit_and_a_text_are_alerts_of_their_own_tiles() -> None:
-    desk = WebDesk(tiles=[CONDUCTIVITY, FLOW])
-
-    assert await notify(desk, conductivity=3.6, flow="open") == 204
-
-    assert alerts(desk) == {
-        "Conductivity is above 3.5 mS/cm",
-        "Flow: the value is not a number",
-    }
-
-
-async def test_one_number_a_minute_is_kept() -> None:
-    desk = WebDesk(tiles=[CONDUCTIVITY, FLOW])
-    for second in range(0, 121, 10):
-        desk.clock.now = float(second)
-        await notify(desk, conductivity=2.0 + second, flow="open")
-
-    kept = desk.records(MeasurementRecord)
-    assert [one.value for one in kept] == [2.0, 62.0, 122.0]
-    assert {(one.entity_id, one.unit) for one in kept} == {("fertigation-1", "mS/cm")}

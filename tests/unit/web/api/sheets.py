@@ -18,7 +18,7 @@ from iveg.web.pages.contexts import Site
 from iveg.web.pages.drawing import Pages
 from iveg.web.pages.sentences import start_of
 from iveg.web.problems import install
-from iveg.web.security.authentication import Authenticator
+from tests.fakes.doors import authenticator
 
 GREENHOUSE = Greenhouse(
     "house", Rectangle(0, 0, 20, 20), lanes=(DriveLane("1", Rectangle(0, 0, 20, 4)),)
@@ -40,10 +40,9 @@ async def reader(
 
     app = FastAPI()
     install(app)
-    app.state.authenticator = Authenticator(
-        sign_in_token="cd" * 32, api_token="", clock=now
-    )
-    app.include_router(routes(Pages(Site("house", ("AGI",), "1", demo=False)), now))
+    app.state.authenticator = authenticator(now)
+    pages = Pages(Site("house", ("AGI",), "1", demo=False), lambda: True)
+    app.include_router(routes(pages, now))
     cookie = app.state.authenticator.sessions.open("ana", "viewer")
     async with httpx.AsyncClient(
         transport=httpx.ASGITransport(app=app),

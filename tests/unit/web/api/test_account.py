@@ -20,8 +20,6 @@ class OwnDesk(PeoplesDesk):
     def __init__(self) -> None:
         super().__init__()
         self.app.include_router(account.router(self.people))
-        # The audit asks the authenticator of the face.
-        self.face.authenticator.sessions = self.authenticator.sessions
 
     @asynccontextmanager
     async def ana(self) -> AsyncIterator[httpx.AsyncClient]:
@@ -32,10 +30,8 @@ class OwnDesk(PeoplesDesk):
 
 
 @pytest.fixture
-async def desk() -> AsyncIterator[OwnDesk]:
-    desk = OwnDesk()
-    yield desk
-    desk.people.close()
+def desk() -> OwnDesk:
+    return OwnDesk()
 
 
 async def change(page: httpx.AsyncClient, **body: str) -> httpx.Response:

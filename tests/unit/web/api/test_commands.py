@@ -36,17 +36,6 @@ async def test_i8_i11_everybody_who_was_let_in_may_stop(role: Role) -> None:
     assert desk.fleet.stops == [("AGI", machine.hold_id)]
 
 
-async def test_stop_all_is_one_command_a_robot() -> None:
-    desk = WebDesk()
-    async with desk.browser() as browser:
-        answer = await browser.post("/api/v1/fleet/stop")
-
-    commands = answer.json()["commands"]
-    assert answer.status_code == 202
-    assert [one["robot_id"] for one in commands] == ["AGI", "AGII"]
-    assert len(desk.fleet.stops) == 2
-
-
 async def test_i11_stop_has_no_rate_limit() -> None:
     desk = WebDesk()
     async with desk.browser() as browser:

@@ -1,9 +1,7 @@
 """What supervisors and Prometheus are told of the chain."""
 
-import pytest
-
 from iveg.domain.observations import Origin
-from tests.builders import at, detection
+from tests.builders import at
 from tests.unit.web.desk import WebDesk
 
 
@@ -47,21 +45,3 @@ async def test_how_late_measures_are_is_told_to_programs_and_to_prometheus() -> 
     assert agent["detail"] == "measures reach Orion 23 s late, growing"
     assert 'iveg_lag_seconds{hop="iot_agent"} 23.0' in figures
     assert 'iveg_lag_growing{hop="iot_agent"} 1.0' in figures
-
-
-async def test_how_the_fleet_is_told_is_measured_from_the_robots_own_report() -> None:
-    desk = WebDesk()
-    for robot_id, x in (("AGI", 0.0), ("AGII", 50.0)):
-        desk.drive(robot_id, x)
-        desk.look(robot_id)
-        desk.report(robot_id, factor=1.0, reason="clear", linear=0.5)
-    desk.look("AGII", detection("farmer", 1.5))
-    await desk.wait(0.2)
-    desk.report("AGI", factor=0.5, reason="person", linear=0.5)
-    await desk.wait(0.5)
-    async with desk.program() as program:
-        told = (await program.get("/api/v1/health")).json()["safety"]
-
-    assert told["alert_latency"]["p50_ms"] == pytest.approx(200.0, abs=1.0)
-    assert (told["alert_latency"]["count"], told["alert_latency"]["age_s"]) == (1, 0.5)
-    assert (told["not_echoed"]["count"], told["not_echoed"]["of"]) == (0, 1)

@@ -70,19 +70,6 @@ async def test_what_the_paper_printed_stands_beside_it() -> None:
     assert paper["simulation"]["lidar"]["total_p95"] == 168.5
 
 
-async def test_clocks_are_told_with_their_uncertainty() -> None:
-    desk = WebDesk()
-    drive(desk, 2.0)
-
-    clocks = {one["robot_id"]: one for one in (await ask(desk))["clocks"]}
-
-    assert clocks["AGI"]["state"] == "in_step"
-    assert clocks["AGI"]["offset_ms"] == 0.0
-    assert 0.0 < clocks["AGI"]["uncertainty_ms"] < 20.0
-    assert clocks["AGII"]["state"] == "unknown"
-    assert clocks["AGII"]["offset_ms"] is None
-
-
 async def test_the_table_comes_as_csv_for_whoever_likes_that() -> None:
     desk = WebDesk()
     drive(desk, 2.0)

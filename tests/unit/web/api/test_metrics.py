@@ -50,21 +50,6 @@ def samples(text: str) -> dict[str, float]:
     return {one[1] + (one[2] or ""): float(one[3]) for one in found if one is not None}
 
 
-async def test_every_line_is_a_sample_of_a_family_with_type_and_help() -> None:
-    text = await told_by(await busy_desk())
-
-    families = set(re.findall(r"^# TYPE (\w+)", text, re.M))
-    helped = set(re.findall(r"^# HELP (\w+)", text, re.M))
-    named = {re.sub(r"\{.*", "", name) for name in samples(text)}
-    summed = {f"iveg_latency_seconds_{end}" for end in ("sum", "count")}
-
-    assert families == helped
-    assert named - summed <= families
-    assert len(samples(text)) == sum(
-        not line.startswith("#") for line in text.split("\n") if line
-    )
-
-
 async def test_what_was_measured_is_told() -> None:
     told = samples(await told_by(await busy_desk()))
 

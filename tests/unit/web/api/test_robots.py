@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from iveg.domain.observations import Battery, Detection, Hold
+from iveg.domain.observations import Battery, Hold
 from tests.builders import detection
 from tests.unit.vital.desk import settle
 from tests.unit.web.desk import WebDesk
@@ -100,30 +100,6 @@ async def test_an_order_says_what_a_late_agent_means_for_it(
     assert note is None or note.slots == {"lag": 12.3}
 
 
-async def test_a_robot_is_stopped_when_it_says_so_and_not_when_it_was_asked() -> None:
-    desk = WebDesk()
-    await desk.commander.stop(["AGI"], "ana", desk.clock())
-    asked = desk.views.robot("AGI", desk.clock()).mode
-    hold_id = desk.commander.machine("AGI").hold_id or ""
-
-    desk.report("AGI", Hold(hold_id, "iveg", "remote"))
-
-    assert asked == "SLOW"
-    assert desk.views.robot("AGI", desk.clock()).mode == "STOPPED"
-
-
-async def test_somebody_last_seen_long_ago_has_no_ring() -> None:
-    desk = WebDesk()
-    desk.look("AGII", detection("farmer", 1.5))
-    desk.clock.now = 60.0
-
-    told = await get(desk, "/people")
-
-    (person,) = told["items"]
-    assert (person["stage"], person["radius_m"]) == ("last_seen", None)
-    assert person["observers"] == []
-
-
 async def test_13_11_the_server_tells_when_each_device_was_last_heard_of() -> None:
     desk = WebDesk()
     desk.drive("AGI", 1.0)
@@ -146,32 +122,3 @@ async def test_13_11_the_server_tells_when_each_device_was_last_heard_of() -> No
         "AGI_nav": None,
         "AGI_battery": 2.0,
     }
-
-
-async def whom(desk: WebDesk) -> tuple[str, float | None]:
-    """Why AGI is slow, and how far off somebody is."""
-    robot = await get(desk, "/robots/AGI")
-    situation = robot["situation"]
-    assert situation["kind"] == "person"
-    return situation["why"], situation["slots"].get("distance")
-
-
-async def past_somebody(*ahead: Detection) -> WebDesk:
-    """AGI saw somebody a metre away 4 s ago, and sees these now."""
-    desk = WebDesk()
-    for robot_id, x in (("AGI", 0.0), ("AGII", 50.0)):
-        desk.drive(robot_id, x)
-    desk.look("AGI", detection("farmer", -1.0, 0.5))
-    await desk.wait(4.0)
-    for robot_id, x in (("AGI", 0.0), ("AGII", 50.0)):
-        desk.drive(robot_id, x)
-    desk.look("AGI", *ahead)
-    desk.look("AGII")
-    desk.report("AGI", factor=0.5, reason="person", linear=0.4)
-    return desk
-
-
-async def test_who_is_in_view_is_named_before_who_was_here_four_seconds_ago() -> None:
-    desk = await past_somebody(detection("farmer", 2.0))
-
-    assert await whom(desk) == ("person_at", 2.0)

@@ -63,17 +63,6 @@ async def test_a_change_counts_at_once_and_every_later_decision_carries_it() -> 
     assert record.rule_parameters["threshold"] == 0.7
 
 
-async def test_a_class_may_have_a_threshold_of_its_own() -> None:
-    desk = WebDesk()
-    desk.drive("AGI")
-
-    await put(desk, class_thresholds={"person": 0.6})
-    desk.look("AGII", detection("farmer", 9.0, probability=0.6))
-    desk.look("AGII", detection("husky", 19.0, probability=0.6))
-
-    assert [one.class_ for one in desk.evaluator.people.known.values()] == ["person"]
-
-
 async def test_an_alias_is_learnt() -> None:
     desk = WebDesk()
 
@@ -140,18 +129,11 @@ async def test_of_two_changes_at_once_one_counts() -> None:
     "parameters",
     [
         {"confidence_threshold": 1.01},
-        {"confidence_threshold": -0.1},
-        {"confidence_threshold": "0.8"},
-        {"confidence_threshold": True},
         {"class_thresholds": {"crate": 0.5}},
-        {"class_thresholds": {"person": 2}},
-        {"radius_m": 0.4},
         {"radius_m": 6.1},
-        {"aliases": {"crate": "crate"}},
         {"aliases": {"person": "robot"}},
         {"aliases": {" ": "person"}},
         {"aliases": {str(n): "person" for n in range(201)}},
-        {"possible_people": "yes"},
         {"possible_people": False},
         {"factor": 0.9},
     ],

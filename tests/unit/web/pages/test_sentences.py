@@ -2,9 +2,9 @@
 
 import pytest
 
-from iveg.web.pages.sentences import Sentences, in_madrid, read_translations
+from iveg.web.pages.sentences import in_madrid, read_sentences
 
-ES, EN = Sentences(read_translations("es")), Sentences(read_translations("en"))
+ES, EN = read_sentences("es"), read_sentences("en")
 
 
 def test_formats_are_those_of_the_page() -> None:
@@ -13,9 +13,8 @@ def test_formats_are_those_of_the_page() -> None:
     assert EN.say("log.speed_down.default", slots) == (
         "AGII · Speed → 50% (person near)"
     )
-    assert ES.translations.decimal("1.43") == "1,43"
+    assert ES.decimal("1.43") == "1,43"
     assert ES.say("rows.by", {"by": "operator"}) == "operador"
-    assert ES.translations.say("rows.by", by="operator") == "operador"
     assert EN.say("rows.by", {"by": "Ana"}) == "Ana"
     assert ES.lane("Cabecera norte") == "Cabecera norte"
     assert EN.lane("Pasillo 3") == "Aisle 3"

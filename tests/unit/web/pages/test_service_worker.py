@@ -17,11 +17,11 @@ from playwright.sync_api import Browser, expect
 
 from iveg.domain.limits import LIMITS
 from iveg.web.pages import routes
-from iveg.web.security.authentication import Authenticator
 from iveg.web.security.headers import CONTENT_SECURITY_POLICY
 from tests.browsers import running_browser
 from tests.builders import START
 from tests.e2e.reading import serious
+from tests.fakes.doors import authenticator
 
 STATIC = Path(__file__).parents[4] / "iveg" / "static"
 _PAGE = (
@@ -65,9 +65,7 @@ class Served(SimpleHTTPRequestHandler):
 
 async def test_the_worker_is_open_and_never_from_a_cache() -> None:
     app = FastAPI()
-    app.state.authenticator = Authenticator(
-        sign_in_token="cd" * 32, api_token="", clock=lambda: START
-    )
+    app.state.authenticator = authenticator(lambda: START)
     app.include_router(routes.service_worker_router())
     transport = httpx.ASGITransport(app=app)
     async with httpx.AsyncClient(transport=transport, base_url="http://iveg") as client:

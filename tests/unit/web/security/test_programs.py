@@ -5,8 +5,6 @@ import pytest
 
 from iveg.domain.accounts import ApiToken, TokenScope, digest_of
 from iveg.domain.records import AuditRecord
-from iveg.web.security.people import Programs
-from tests.fakes.accounts import FakeBook
 from tests.unit.web.desk import API_TOKEN, WebDesk
 
 SCOPES: tuple[TokenScope, ...] = ("read", "stop", "operate")
@@ -22,10 +20,7 @@ class ProgramsDesk(WebDesk):
 
     def __init__(self) -> None:
         super().__init__()
-        self.book = FakeBook(*TOKENS)
-        self.programs = Programs(self.book, self.clock)
-        # The app's middleware knows this one, too.
-        self.authenticator._programs = self.programs
+        self.book.tokens.update({one.digest: one for one in TOKENS})
 
     def caller(self, token: str) -> httpx.AsyncClient:
         return self._client({"Authorization": f"Bearer {token}"})
@@ -72,7 +67,9 @@ async def test_a_program_acts_by_its_own_name(desk: ProgramsDesk) -> None:
 
 async def test_the_last_use_is_written_once_a_minute(desk: ProgramsDesk) -> None:
     kept: list[float | None] = []
-    desk.book.keep = lambda: kept.append(desk.book.tokens[digest_of("read")].used_at)
+    desk.book.on_keep.append(
+        lambda: kept.append(desk.book.tokens[digest_of("read")].used_at)
+    )
     async with desk.caller("read") as program:
         for _ in range(3):
             await program.get("/api/v1/robots")
@@ -85,14 +82,14 @@ async def test_the_last_use_is_written_once_a_minute(desk: ProgramsDesk) -> None
 async def test_a_revoked_token_is_nobodys_and_its_sockets_are_told(
     desk: ProgramsDesk,
 ) -> None:
-    who = desk.programs.find("operate")
+    who = desk.people.program("operate")
     assert who is not None
     before = desk.authenticator.current(who)
 
     del desk.book.tokens[digest_of("operate")]
 
     assert before == who
-    assert desk.programs.find("operate") is None
+    assert desk.people.program("operate") is None
     # `/live` asks this twice a second and closes.
     assert desk.authenticator.current(who) is None
 

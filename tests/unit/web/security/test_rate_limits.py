@@ -7,12 +7,12 @@ import pytest
 from starlette.requests import HTTPConnection
 from starlette.types import Message, Receive, Scope, Send
 
+from iveg.web.security.attempts import FailedAttempts
 from iveg.web.security.rate_limits import (
     MESSAGES_PER_S,
     PAINTED_PER_S,
     SOCKETS,
     TOO_MANY_SOCKETS,
-    FailedAttempts,
     SocketLimits,
 )
 from iveg.web.security.roles import Principal
@@ -29,14 +29,6 @@ def test_five_wrong_links_are_free_and_the_next_waits_a_minute() -> None:
 
     assert attempts.wait_s("10.0.0.1", 5.0) == 59.0
     assert attempts.wait_s("10.0.0.1", 64.0) == 0.0
-
-
-def test_addresses_are_bounded() -> None:
-    attempts = FailedAttempts()
-    for number in range(5000):
-        attempts.failed(f"10.0.{number}", 0.0)
-
-    assert len(attempts._wrong) <= 1024
 
 
 @dataclass
@@ -159,9 +151,6 @@ async def test_i11_a_stop_is_heard_from_a_page_that_says_too_much() -> None:
     "text",
     [
         '{"type": "ping", "t": "\\"stop\\""}',
-        '{"type": "ping", "stop": "stop"}',
-        '["stop"]',
-        '"stop"',
         '{"type": "stop"',
         '{"type": "stop", "robot_id": "' + "A" * 5000 + '"}',
         '{"type":"painted","type":"ping"}',

@@ -38,22 +38,10 @@ def start(path: Path, clock: FakeClock) -> Restart:
             files.pop().close()
         files.append(file := AccessFile(path))
         book = AccessBook(file.load())
-        book.keep = lambda: file.save(book.picture())
+        book.on_keep.append(lambda: file.save(book.picture()))
         return Sessions(clock, book, link_name)
 
     return start
-
-
-def test_a_session_outlives_a_restart_with_name_and_role(
-    start: Restart, clock: FakeClock
-) -> None:
-    token = start().open("Ana", "viewer")
-    clock.now += 60.0
-
-    found = start().find(token)
-
-    assert found is not None
-    assert (found.name, found.role) == ("Ana", "viewer")
 
 
 def test_the_file_holds_digests_alone_and_only_its_owner_reads_it(

@@ -12,15 +12,11 @@ from iveg.adapters.identity_provider import Client
 from iveg.adapters.oidc import OpenIdProvider
 from iveg.domain.accounts import Account, ClaimReading, person_id
 from iveg.domain.records import AuditRecord
-from iveg.web.pages import signing
 from iveg.web.pages.contexts import Site
 from iveg.web.pages.drawing import Pages
 from iveg.web.pages.routes import router
-from iveg.web.security.authentication import Authenticator
-from iveg.web.security.people import People
 from iveg.web.security.roles import Principal
 from iveg.web.security.single_sign_on import SingleSignOn
-from tests.fakes.accounts import FakeBook, FakePasswords
 from tests.fakes.identity_provider import (
     CLIENT,
     KEYCLOAK,
@@ -46,34 +42,17 @@ class SignOnDesk(WebDesk):
         self.provider = FakeIdentityProvider(
             own_url(), {"ana-1": dict(KEYCLOAK)}, lambda: self.clock().wall
         )
-        self.book = FakeBook(LOCAL)
-        self.people = People(self.book, FakePasswords(), self.clock)
-        self.authenticator = Authenticator(
-            sign_in_token="",
-            api_token="",
-            clock=self.clock,
-            book=self.book,
-            trail=self.trail,
-            people=self.people,
-        )
+        self.book.accounts["P1"] = LOCAL
         client = Client(self.provider.url, CLIENT, SECRET, "openid")
         reading = ClaimReading("realm_access.roles", "name", {"growers": "operator"})
         self.sign_on = SingleSignOn(
-            OpenIdProvider(client, self.clock),
-            reading,
-            self.people,
-            self.authenticator,
-            self.clock,
-            self.trail,
-            LASTS_S,
+            OpenIdProvider(client, self.clock), reading, self.authenticator, LASTS_S
         )
-        self.app.state.authenticator = self.authenticator
         site = Site("field", ("AGI", "AGII"), "1", demo=False, sso="Cooperativa")
-        pages = Pages(site)
+        pages = Pages(site, lambda: True)
         self.app.include_router(
             router(pages, rule=lambda: self.rules.current, sign_on=self.sign_on)
         )
-        self.app.include_router(signing.router(pages, self.sign_on))
         self.person = person_id(self.provider.url, "ana-1")
 
     def page(self) -> httpx.AsyncClient:
@@ -107,8 +86,7 @@ async def desk() -> AsyncIterator[SignOnDesk]:
     desk = SignOnDesk()
     async with serving(desk.provider):
         yield desk
-    await desk.sign_on.close()
-    desk.people.close()
+    await desk.sign_on._provider.close()
 
 
 async def test_whom_the_provider_vouches_for_is_in_by_name_role_and_stable_id(
@@ -143,10 +121,8 @@ async def test_whom_the_provider_vouches_for_is_in_by_name_role_and_stable_id(
         "//evil.test",
         "/\\evil.test",
         "https://evil.test",
-        "alerts",
         "/a\r\nSet-Cookie: x=1",
         "",
-        "/\x00",
         "/" + "a" * 501,
     ],
 )
@@ -215,7 +191,6 @@ async def test_an_answer_counts_once_in_its_own_browser_and_for_ten_minutes(
         ({"error": "access_denied"}, 403, "refused"),
         ({"error": "x\n<b>" * 40}, 403, "refused"),
         ({}, 403, "untrusted"),
-        ({"code": ""}, 403, "untrusted"),
         ({"code": "x" * 5000}, 403, "untrusted"),
         ({"code": "guessed"}, 403, "untrusted"),
         ({"code": "x", "iss": "https://evil.test"}, 403, "untrusted"),
