@@ -1,9 +1,6 @@
-"""Other equipment of the greenhouse: its tiles, live and remembered.
+"""The air in the greenhouse and its other equipment, live and remembered."""
 
-The air in the greenhouse, live and remembered.
-"""
-
-from dataclasses import asdict
+from typing import Self
 
 from pydantic import Field
 
@@ -11,9 +8,8 @@ from iveg.domain.equipment import Limit, State, TileStatus
 from iveg.domain.equipment import Tile as DomainTile
 from iveg.domain.observations import Climate as DomainClimate
 from iveg.domain.observations import Instant
-from iveg.domain.records import MeasurementRecord
 from iveg.domain.stamps import format_stamp
-from iveg.models.base import Model, moment, rounded
+from iveg.models.base import Model, Stamp, Thousandth, rounded
 
 
 class Air(Model):
@@ -32,18 +28,14 @@ class Climate(Air):
         age_s: Since then (s).
     """
 
-    received_at: str
-    age_s: float
+    received_at: Stamp
+    age_s: Thousandth
 
     @classmethod
-    def of(cls, read: DomainClimate, received: Instant, now: Instant) -> "Climate":
+    def of(cls, read: DomainClimate, received: Instant, now: Instant) -> Self:
         """As it came in."""
-        return cls(
-            temperature=read.temperature,
-            relative_humidity=read.relative_humidity,
-            co2=read.co2,
-            received_at=format_stamp(received.wall),
-            age_s=round(now.mono - received.mono, 3),
+        return cls.from_value(
+            read, received_at=received, age_s=now.mono - received.mono
         )
 
 
@@ -54,7 +46,7 @@ class ClimateReading(Air):
         at: When.
     """
 
-    at: str
+    at: Stamp
 
     @classmethod
     def of_series(
@@ -63,7 +55,7 @@ class ClimateReading(Air):
         temperature: float | None,
         relative_humidity: float | None,
         co2: float | None,
-    ) -> "ClimateReading":
+    ) -> Self:
         """With no more decimals than sensors mean; ``at`` in Unix seconds."""
         return cls(
             at=format_stamp(at),
@@ -96,11 +88,6 @@ class TilePlace(Model):
     x: float
     y: float
 
-    @classmethod
-    def of(cls, x: float, y: float) -> "TilePlace":
-        """As the file says (m)."""
-        return cls(x=x, y=y)
-
 
 class Tile(Model):
     """One attribute of one entity, with its newest number.
@@ -129,52 +116,24 @@ class Tile(Model):
     limits: dict[Limit, float]
     state: State
     value: float | None = Field(description="The newest number; null before the first.")
-    received_at: str | None
-    age_s: float | None
+    received_at: Stamp | None
+    age_s: Thousandth | None
     trend: bool
     place: TilePlace | None
 
     @classmethod
     def of(
         cls, tile: DomainTile, status: TileStatus, state: State, now: Instant
-    ) -> "Tile":
+    ) -> Self:
         """As it stands now."""
-        received = status.received
-        return cls(
-            key=tile.key,
-            entity_id=tile.entity_id,
-            attribute=tile.attribute,
+        received, place = status.received, tile.place
+        return cls.from_value(
+            tile,
             name=TileName(**tile.name),
-            unit=tile.unit,
-            decimals=tile.decimals,
-            limits=dict(tile.limits),
             state=state,
             value=status.value,
-            received_at=moment(received),
-            age_s=None if received is None else round(now.mono - received.mono, 3),
+            received_at=received,
+            age_s=None if received is None else now.mono - received.mono,
             trend=tile.has_trend,
-            place=None if tile.place is None else TilePlace.of(*tile.place),
+            place=None if place is None else TilePlace(x=place[0], y=place[1]),
         )
-
-
-class Measurement(Model):
-    """One number of other equipment, as it was kept.
-
-    Attributes:
-        at: IVeg's clock when it arrived (ISO-8601 UTC, ms).
-        entity_id: The entity at Orion.
-        attribute: Its attribute.
-        value: The number (``unit``).
-        unit: Of the tile at that time; ``1``: none.
-    """
-
-    at: str
-    entity_id: str
-    attribute: str
-    value: float
-    unit: str
-
-    @classmethod
-    def of_record(cls, record: MeasurementRecord) -> "Measurement":
-        """As it was kept."""
-        return cls(**asdict(record) | {"at": format_stamp(record.at)})

@@ -2,11 +2,11 @@
 
 from pydantic import Field
 
-from iveg.models.alert import Alert, LogEntry
 from iveg.models.base import GreenhouseMap, Model, Scan
 from iveg.models.command import Command
 from iveg.models.equipment import Climate, Tile
 from iveg.models.health import Health
+from iveg.models.history import Alert, LogEntry
 from iveg.models.people import DetectionFrame, Person
 from iveg.models.robot import Robot
 from iveg.models.rule import Rule

@@ -13,11 +13,11 @@ from typing import Any, Literal, Protocol
 from iveg.domain.observations import Instant
 from iveg.domain.records import LogRecord
 from iveg.domain.stop import FollowedCommand as StopCommand
-from iveg.models.alert import Alert, LogEntry
 from iveg.models.base import GreenhouseMap, Scan
 from iveg.models.command import Command
 from iveg.models.equipment import Climate, Tile
 from iveg.models.health import Health
+from iveg.models.history import Alert, LogEntry
 from iveg.models.people import DetectionFrame, Person
 from iveg.models.robot import Robot
 from iveg.models.rule import Rule

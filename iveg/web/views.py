@@ -16,12 +16,12 @@ from iveg.domain.rule.zones import ZoneEntry
 from iveg.domain.stamps import format_stamp
 from iveg.domain.stop import FollowedCommand, StopMachine
 from iveg.domain.tracking.person import TrackedPerson
-from iveg.models.alert import Alert, LogEntry
-from iveg.models.base import GreenhouseMap, Pose, Position, Scan, Twist, moment, rounded
+from iveg.models.base import GreenhouseMap, Pose, Position, Scan, Twist, stamp
 from iveg.models.command import Command as CommandModel
 from iveg.models.equipment import Climate, Tile
 from iveg.models.health import Health, Safety
 from iveg.models.health import HopHealth as HopModel
+from iveg.models.history import Alert, LogEntry
 from iveg.models.people import Acting, Detection, DetectionFrame, Evidence
 from iveg.models.people import Person as PersonModel
 from iveg.models.robot import (
@@ -98,18 +98,18 @@ class Views:
         return Robot(
             robot_id=robot_id,
             link=robot.link(now),
-            situation=Situation.of(self._situations.of(robot, machine, now)),
+            situation=Situation.from_value(self._situations.of(robot, machine, now)),
             mode=self._mode(robot, machine, now),
-            pose=None if odometry is None else Pose.of(odometry.pose),
+            pose=None if odometry is None else Pose.from_value(odometry.pose),
             lane=None if odometry is None else self._lane(odometry.pose),
             twist=None if odometry is None else Twist.of(odometry.twist),
             stamp=None if odometry is None else odometry.origin.stamp,
-            received_at=moment(robot.odometry_received),
-            age_s=rounded(age),
+            received_at=stamp(robot.odometry_received),
+            age_s=age,
             age_estimated=robot.estimated_since is not None,
             speed_factor=None if safety is None else safety.speed_factor,
             applied=Applied.of(robot, now),
-            speed_limit=SpeedLimit.of(self._evaluator.speed_limits[robot_id]),
+            speed_limit=SpeedLimit.from_value(self._evaluator.speed_limits[robot_id]),
             encounters=[
                 Encounter.of(one, now)
                 for one in self._evaluator.encounters(robot_id, now)
@@ -120,15 +120,17 @@ class Views:
             ],
             detector=Detector.of(robot, now),
             refused=robot.refused,
-            holds=[] if safety is None else [Hold.of(one) for one in safety.holds],
+            holds=[]
+            if safety is None
+            else [Hold.from_value(one) for one in safety.holds],
             stop=None if machine.stop is None else self.command(machine.stop, now),
             stop_state=machine.state,
             navigation=Navigation.of(robot),
             goal=None if goal is None else Goal.of(goal),
             replay=robot.is_replay,
-            clock_offset_s=rounded(robot.clock.offset_s(now)),
+            clock_offset_s=robot.clock.offset_s(now),
             transport=self._world.feeds.of(robot_id).transport(now.mono),
-            profile=Profile.of(robot.profile),
+            profile=Profile.from_value(robot.profile),
             margin=Margin.of(self._margin(robot, margins, now)),
             cmd_status=robot.command_status,
             **Robot.sensed(robot, now),
@@ -209,7 +211,7 @@ class Views:
     ) -> PersonModel:
         newest, rule = person.newest, self._evaluator.rule
         x, y = newest.x, newest.y
-        rings = self._people.zone_radii(person, rule, now)
+        zones = self._people.zone_radii(person, rule, now)
         thing = self._people.things.explain(person, now)
         return PersonModel(
             person_id=person.person_id,
@@ -217,18 +219,18 @@ class Views:
             class_id=newest.class_id,
             stage=person.stage(now),
             position=Position(x=x, y=y, z=newest.z),
-            radius_m=max((radius for _, radius in rings), default=None),
+            radius_m=max((radius for _, radius in zones), default=None),
             confidence=newest.confidence,
             first_seen=format_stamp(person.first_seen.wall),
             last_seen=format_stamp(newest.at.wall),
-            age_s=round(person.age_s(now), 3),
+            age_s=person.age_s(now),
             observers=person.observers(now),
             possible=newest.possible or newest.laser,
             evidence=Evidence.of(newest.looks),
             doubtful=newest.reach_m > 0.0,
             decision_id=max((one.decision_id for one in entries), default=None),
             lane=self._greenhouse.lane_at(x, y),
-            acting=[_acting(one) for one in entries],
+            acting=[Acting.from_value(one) for one in entries],
             margin=Margin.of(margins.of_person(person.person_id)),
             thing_id=None if thing is None else thing.thing_id,
         )
@@ -243,7 +245,7 @@ class Views:
             robot_id=robot_id,
             stamp=stamp,
             transport=transport,
-            age_s=round(now.mono - robot.detections_at, 3),
+            age_s=now.mono - robot.detections_at,
             items=[
                 Detection.of(one, robot_id, stamp, transport)
                 for one in self._evaluator.tracking.placed.get(robot_id, [])
@@ -288,7 +290,7 @@ class Views:
 
     def log(self, lines: Iterable[LogRecord]) -> list[LogEntry]:
         """Lines of the log."""
-        return [LogEntry.of_record(line) for line in lines]
+        return [LogEntry.from_record(line) for line in lines]
 
     def log_since(self, line_id: int) -> list[LogEntry]:
         """The lines after one, oldest first; of many the newest."""
@@ -339,20 +341,5 @@ class Views:
 
 
 def _hop(hop: HopHealth) -> HopModel:
-    return HopModel(
-        hop=hop.name.value,
-        state=hop.state,
-        age_s=rounded(hop.age_s, 1),
-        key=f"health.{hop.name.label}.{hop.state}",
-        detail=hop.detail,
-        lag_s=rounded(hop.lag_s, 1),
-        growing=hop.growing,
-    )
-
-
-def _acting(entry: ZoneEntry) -> Acting:
-    return Acting(
-        robot_id=entry.robot_id,
-        distance_m=round(entry.distance_m, 3),
-        in_sight=entry.in_sight,
-    )
+    key = f"health.{hop.name.label}.{hop.state}"
+    return HopModel.from_value(hop, hop=hop.name.value, key=key)

@@ -17,7 +17,7 @@ import asyncio
 import logging
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Literal, TypeVar
@@ -40,6 +40,7 @@ from iveg.adapters.journal import FileJournal
 from iveg.domain.errors import DataFileError, HopError
 from iveg.domain.observations import Instant
 from iveg.domain.records import (
+    COLUMNS,
     AuditRecord,
     CommandEventRecord,
     CommandRecord,
@@ -51,7 +52,6 @@ from iveg.vital.record import CAPACITY, RecordQueue, Waiting
 _log = logging.getLogger(__name__)
 _Row = dict[str, object]
 _T = TypeVar("_T")
-_FIELDS = {kind: tuple(f.name for f in fields(kind)) for kind in TABLE_MAPPINGS}
 _DURABLE = CommandRecord | CommandEventRecord | AuditRecord
 _VALUE_ERRORS = (ValueError, TypeError, OverflowError)
 
@@ -164,7 +164,7 @@ def _values(rows: Iterable[Waiting], mapping: TableMapping) -> list[_Row]:
 
 
 def _columns(record: Record) -> _Row:
-    return {name: getattr(record, name) for name in _FIELDS[type(record)]}
+    return {one.key: one.read(record) for one in COLUMNS[type(record)]}
 
 
 @cache

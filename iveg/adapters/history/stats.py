@@ -5,8 +5,7 @@ from dataclasses import dataclass
 from sqlalchemy import Connection, Integer, Table, cast, func, select, text
 from sqlalchemy.exc import OperationalError
 
-from iveg.adapters.history.tables import metadata, odometry
-from iveg.adapters.history.upkeep import age_of
+from iveg.adapters.history.tables import AGES, metadata, odometry
 
 _MINUTE_S, _HOUR_S = 60.0, 3600.0
 _PAGES_OF = """
@@ -77,7 +76,7 @@ def _stats(
     since: float | None,
     hours: float,
 ) -> TableStats:
-    at = age_of(table.name)
+    at = AGES[table.name]
     oldest, newest = (
         connection.scalar(select(one(at))) for one in (func.min, func.max)
     )

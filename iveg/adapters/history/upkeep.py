@@ -1,25 +1,17 @@
-"""The history as its retention sees it: pieces of the one writer, and the disk.
+"""Upkeep of the history: rows whose time is over go, in pieces of one transaction each.
 
-Indexes of a few rows of large tables.
-
-A query finds one by its condition, word for word.
-
-Deletion of rows whose time is over, in pieces of one transaction each.
-
-What the history still holds: days, its oldest rows, and what of a day is gone.
+Beside it stands what the history still holds: its days, and what of a day is gone.
 """
 
 import asyncio
 from collections.abc import Callable, Coroutine, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Any, Literal
 
 from sqlalchemy import (
-    Column,
     ColumnElement,
     Connection,
-    Index,
     Table,
     TextClause,
     and_,
@@ -37,71 +29,20 @@ from iveg.adapters.files import disk_space
 from iveg.adapters.history import tables
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.recorder import Recorder
-from iveg.adapters.history.tables import decisions, detections, log, metadata, odometry
+from iveg.adapters.history.tables import decisions, detections, log, odometry
 from iveg.domain.errors import HopError
 from iveg.domain.retention import DAY_S, DiskSpace, PurgeStep
-
-__all__ = ["metadata"]
-
-
-def _partial(
-    name: str,
-    columns: tuple[Column[Any], ...],
-    sqlite: str,
-    postgresql: str | None = None,
-) -> Index:
-    return Index(
-        name,
-        *columns,
-        sqlite_where=text(sqlite),
-        postgresql_where=text(postgresql or sqlite),
-    )
-
-
-# Rows that have a place still, by which they are found to lose it.
-placed_detections = _partial(
-    "ix_detections_placed", (detections.c.at,), "x IS NOT NULL"
-)
-placed_decisions = _partial(
-    "ix_decisions_placed", (decisions.c.started_at,), "x IS NOT NULL"
-)
-placed_lines = _partial(
-    "ix_log_placed", (log.c.at,), "instr(slots, '\"x\":') > 0", "slots ? 'x'"
-)
-
 
 PIECE = 10_000
 """Rows of one transaction; more where many are of one moment."""
 
-_AGES_BY = {
-    "decisions": tables.decisions.c.started_at,
-    "commands": tables.commands.c.requested_at,
-    "alerts": tables.alerts.c.last_raised_at,
-    "api_tokens": tables.api_tokens.c.made_at,
-    "accounts": tables.accounts.c.since,
-}
-"""Tables whose rows age by another column than ``at``."""
 _OVER: Mapping[str, ColumnElement[bool]] = {
     # What goes on is kept whatever its age.
     "decisions": tables.decisions.c.ended_at.is_not(None),
     "commands": ~tables.is_open_command(),
     "alerts": tables.alerts.c.cleared_at.is_not(None),
 }
-_PLACED: Mapping[str, Index] = {
-    "detections": placed_detections,
-    "decisions": placed_decisions,
-    "log": placed_lines,
-}
-"""Table → the index of those of its rows that have a place."""
 _GUARD = "audit_no_delete"
-
-
-def age_of(table: str) -> Column[float]:
-    """The column by which the rows of a table age (Unix s)."""
-    at = _AGES_BY.get(table)
-    return cast(
-        "Column[float]", tables.metadata.tables[table].c.at if at is None else at
-    )
 
 
 def purge_piece(connection: Connection, step: PurgeStep, before: float) -> int:
@@ -115,11 +56,11 @@ def purge_piece(connection: Connection, step: PurgeStep, before: float) -> int:
     Returns:
         Number of rows that it changed; fewer than a piece: nothing is left to do.
     """
-    table, at = tables.metadata.tables[step.table], age_of(step.table)
+    table, at = tables.metadata.tables[step.table], tables.AGES[step.table]
     dialect = connection.dialect.name
     which = _OVER.get(step.table, true())
     if step.kind == "positions":
-        which = _PLACED[step.table].dialect_options[dialect]["where"]
+        which = tables.PLACED[step.table].dialect_options[dialect]["where"]
     due = and_(at < before, which)
     last = select(at).where(due).order_by(at).offset(PIECE - 1).limit(1)
     until = connection.scalar(last)

@@ -46,8 +46,8 @@ from iveg.domain.stamps import format_stamp
 from iveg.domain.transports import TRANSPORTS, TransportId
 from iveg.models.base import GreenhouseMap, Point, rounded, write_json
 from iveg.models.command import Command, Latency, LatencySpread, RobotLatency
-from iveg.models.day import Day, Encounters, Pass, Slowed, Worked
 from iveg.models.equipment import ClimateReading
+from iveg.models.history import Day, Encounters, Pass, Slowed, Worked
 from iveg.vital.ports import Clock
 from iveg.web.api.answers import Apart, Json
 from iveg.web.api.exports import MEDIA_TYPES
@@ -239,7 +239,7 @@ async def _kept(queries: Queries, command_id: str) -> Command | None:
     found = await queries.one(COMMANDS, command_id)
     if found is None:
         return None
-    return Command.of_record(found, await queries.command_events(command_id))
+    return Command.from_record(found, await queries.command_events(command_id))
 
 
 def _joined(followed: Command | None, kept: Command | None) -> Command | None:
@@ -330,7 +330,7 @@ async def _read(queries: Queries, greenhouse: Greenhouse, day: date, now: float)
             foretold_s=rounded(met.foretold_s, 1),
         ),
         passes=[_pass(one) for one in closest_passes(poses, seen, greenhouse)],
-        stops=[Command.of_record(one) for one in await _stops(queries, since, until)],
+        stops=[Command.from_record(one) for one in await _stops(queries, since, until)],
         unseen=len(await queries.unseen_alerts(MOST_KEPT)),
         lost=list(await queries.ask(lost_of, since, until)),
         map=GreenhouseMap.of(greenhouse),

@@ -52,7 +52,7 @@ async def test_times_and_the_row_of_the_history_are_keyed_by_the_third_transport
     assert row.answer_at == {"dds": NOON + 0.5}
     assert set(times.sent) == {"direct", "fiware", "dds"}
     assert times.answer == {"dds": "2023-11-14T22:13:20.500Z"}
-    assert CommandModel.of_record(row).times == times
+    assert CommandModel.from_record(row).times == times
     await desk.commander.close()
 
 
