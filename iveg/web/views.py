@@ -1,4 +1,4 @@
-"""The state of the pipeline as models: built on request; only alerts are kept."""
+"""The state of the pipeline as models, built on request."""
 
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable
@@ -6,7 +6,7 @@ from itertools import islice, takewhile
 
 from iveg.comfort.situations import Situations, fresh_report
 from iveg.domain import margins as margins_
-from iveg.domain.alerts import BookedAlert, acknowledgements_of
+from iveg.domain.alerts import acknowledgements_of
 from iveg.domain.geometry import Pose2D
 from iveg.domain.margins import LeastMargins
 from iveg.domain.observations import Instant
@@ -69,8 +69,6 @@ class Views:
         self._health_monitor = parts.health_monitor
         self._equipment = parts.equipment.equipment
         self._counters = counters or parts.counters
-        self._alerts: dict[str, tuple[BookedAlert, Alert]] = {}
-        """Made for the last list, and of what: in a flood few of many have changed."""
 
     # --- robots -------------------------------------------------------------------
 
@@ -280,13 +278,7 @@ class Views:
         """All alerts that people should see now, gravest first."""
         waiting = self._evaluator.alerts.waiting
         waiting.sort(key=lambda one: (one.priority, -one.last.raised.wall))
-        before, self._alerts = self._alerts, {}
-        for one in waiting:
-            kept = before.get(one.alert_id)
-            if kept is None or kept[0] is not one:
-                kept = one, Alert.of(one)
-            self._alerts[one.alert_id] = kept
-        return [alert for _, alert in self._alerts.values()]
+        return [Alert.of(one) for one in waiting]
 
     def log(self, lines: Iterable[LogRecord]) -> list[LogEntry]:
         """Lines of the log."""

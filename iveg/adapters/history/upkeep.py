@@ -145,10 +145,6 @@ def recorded_days(connection: Connection, most: int) -> tuple[int, ...]:
     return tuple(days)
 
 
-async def _no_recording() -> bool:
-    return False
-
-
 class RecordedHistory:
     """Implements ``pipeline.retention.RetainedHistory``.
 
@@ -156,8 +152,8 @@ class RecordedHistory:
         recorder: The one writer.
         queries: Its reading side.
         directory: Of the data, whose disk is watched.
-        read_space: Room on the disk of a directory.
         drop_recording: Deletes the oldest recording of inputs, if there is one.
+        read_space: Room on the disk of a directory.
     """
 
     def __init__(
@@ -165,8 +161,8 @@ class RecordedHistory:
         recorder: Recorder,
         queries: Queries,
         directory: Path,
+        drop_recording: Callable[[], Coroutine[object, object, bool]],
         read_space: Callable[[Path], DiskSpace] = disk_space,
-        drop_recording: Callable[[], Coroutine[object, object, bool]] = _no_recording,
     ) -> None:
         self._recorder = recorder
         self._directory = directory
