@@ -19,12 +19,11 @@ from iveg.domain.situation import ORDER
 from iveg.models.access import Invitation, NewToken, OpenSession, OwnAccount, SignInCode
 from iveg.models.base import Costmap, Coverage, Model, Scan
 from iveg.models.command import FleetPressed, Latency
-from iveg.models.equipment import ClimateReading
 from iveg.models.health import LatencyTable
 from iveg.models.history import AuditEntry, Decision, Reading
 from iveg.models.people import Thing
 from iveg.models.rule import Trial
-from iveg.models.snapshot import PastWorld, Snapshot
+from iveg.models.snapshot import ClimateReading, PastWorld, Snapshot
 
 TOLD: tuple[type[Model], ...] = (
     Snapshot,

@@ -18,7 +18,6 @@ from iveg.domain.stop import FollowedCommand, StopMachine
 from iveg.domain.tracking.person import TrackedPerson
 from iveg.models.base import GreenhouseMap, Pose, Position, Scan, Twist, stamp
 from iveg.models.command import Command as CommandModel
-from iveg.models.equipment import Climate, Tile
 from iveg.models.health import Health, Safety
 from iveg.models.health import HopHealth as HopModel
 from iveg.models.history import Alert, LogEntry
@@ -41,6 +40,7 @@ from iveg.models.robot import (
     SpeedLimit,
 )
 from iveg.models.rule import Rule
+from iveg.models.snapshot import Climate, Tile
 from iveg.ngsi.names import ROBOT_DEVICES
 from iveg.pipeline import Pipeline
 from iveg.vital.health_monitor import HopHealth

@@ -18,7 +18,7 @@ from mcap.stream_reader import StreamReader
 
 from iveg.adapters.recordings.directory import NAME
 from iveg.adapters.recordings.incoming import CHANGED, WHOLE, WHOLE_S
-from iveg.adapters.recordings.reading import BROKEN, LONGEST_RECORD, unpack
+from iveg.adapters.recordings.mcap_file import BROKEN, LONGEST_RECORD, unpack
 from iveg.adapters.recordings.writer import PICTURES_S
 from iveg.domain.errors import HopError, NotRecordedError
 

@@ -22,7 +22,7 @@ import orjson
 import iveg
 from iveg.adapters.files import disk_space
 from iveg.adapters.recordings.incoming import Sort, pack, worth_keeping
-from iveg.adapters.recordings.reading import finish_broken, write_excerpt
+from iveg.adapters.recordings.mcap_file import finish_broken, write_excerpt
 from iveg.adapters.recordings.writer import PRUNE_S, SETUP, WriterSetup
 from iveg.adapters.worker import Worker
 from iveg.domain.detection_rule import DetectionRule

@@ -41,8 +41,8 @@ from iveg.domain.stamps import format_stamp
 from iveg.domain.transports import TRANSPORTS, TransportId
 from iveg.models.base import GreenhouseMap, Point, write_json
 from iveg.models.command import Command, Latency, LatencySpread, RobotLatency
-from iveg.models.equipment import ClimateReading
 from iveg.models.history import Day, Encounters, Pass, Slowed, Worked
+from iveg.models.snapshot import ClimateReading
 from iveg.vital.ports import Clock
 from iveg.web.api.answers import Apart, Json
 from iveg.web.api.exports import MEDIA_TYPES

@@ -15,8 +15,13 @@ from mcap.reader import make_reader
 
 from iveg.adapters import clock
 from iveg.adapters.recordings.incoming import WHOLE, Sort, pack, unpack
-from iveg.adapters.recordings.mcap_file import CHUNK_BYTES, PADDING
-from iveg.adapters.recordings.reading import finish_broken, is_own, read_messages
+from iveg.adapters.recordings.mcap_file import (
+    CHUNK_BYTES,
+    PADDING,
+    finish_broken,
+    is_own,
+    read_messages,
+)
 from iveg.adapters.recordings.recorder import (
     MOST_BYTES,
     MOST_WAITING,
@@ -308,14 +313,6 @@ def test_inputs_are_the_same_behind_a_pipe_and_one_cut_short_is_none() -> None:
     assert found[2].payload == b"{}" * 50
     for size in (len(whole) - 1, len(whole) - 110):
         assert [*unpack(BytesIO(whole[:size]))] == found[:2]
-
-
-async def test_recordings_that_are_off_take_nothing_in(tmp_path: Path) -> None:
-    site = Site(tmp_path, is_on=False)
-    site.hear(0.0)
-    site.recorder.notification(b"{}", START, ())
-    assert site.recorder.waiting == 0
-    assert not site.path.exists()
 
 
 async def test_the_oldest_goes_where_the_disk_is_low_and_never_the_open_one(
